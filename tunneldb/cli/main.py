@@ -1,0 +1,113 @@
+"""The group of all verbs; a verb's module is imported only when the verb is used, so that help is quick."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from typing import Any
+
+import click
+
+from tunneldb import __version__
+from tunneldb.errors import UserError
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What every verb gets as ``ctx.obj``.
+
+    Attributes
+    ----------
+    dsn
+        Connection string of the database; None means the embedded server.
+    """
+
+    dsn: str | None
+
+
+COMMANDS: dict[str, tuple[str, str]] = {
+    "init": ("tunneldb.cli.init:init", "Create or upgrade the schema, the functions and the roles."),
+    "tunnel": ("tunneldb.cli.tunnel:tunnel", "Add, list or remove tunnels."),
+    "survey": ("tunneldb.cli.survey:survey", "Add, list or remove the scanning campaigns of a tunnel."),
+    "load": ("tunneldb.cli.load:load", "Load LAS and LAZ files into a survey."),
+    "run": ("tunneldb.cli.run:run", "Run the stages: axis, segments, sections, detect."),
+    "leaks": ("tunneldb.cli.leaks:leaks", "List or export the leaks that were found."),
+    "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),
+    "image": ("tunneldb.cli.image:image", "Write the unrolled images as GeoTIFF."),
+    "qgis": ("tunneldb.cli.qgis:qgis", "Write a QGIS project with styled layers."),
+    "status": ("tunneldb.cli.status:status", "Show what is loaded and how far each kilometre has come."),
+    "check": ("tunneldb.cli.check:check", "Check the server and the database, and say how to mend them."),
+    "psql": ("tunneldb.cli.psql:psql", "Open psql on the database."),
+    "server": ("tunneldb.cli.server:server", "Start, stop or look at the embedded server."),
+    "simulate": ("tunneldb.cli.simulate:simulate", "Make a simulated scan of a tunnel, with its truth."),
+}
+
+
+class LazyGroup(click.Group):
+    """A click group that knows its verbs' names and help without importing them."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order in which one uses them."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import the verb's module and return its command."""
+        if cmd_name not in COMMANDS:
+            return None
+        module, _, attribute = COMMANDS[cmd_name][0].partition(":")
+        command = getattr(importlib.import_module(module), attribute)
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the verbs from COMMANDS, without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a verb; turn the user's errors and the server's into one line and exit code 2."""
+        try:
+            return super().invoke(ctx)
+        except UserError as error:
+            message = str(error)
+        except Exception as error:
+            described = _describe_database_error(error)
+            if described is None:
+                raise
+            message = described
+        click.echo(f"tunneldb: {message}", err=True)
+        ctx.exit(2)
+
+
+def _describe_database_error(error: Exception) -> str | None:
+    """Return one line for what may befall a healthy program's connection, None for a bug."""
+    import psycopg
+
+    if isinstance(error, psycopg.errors.DiskFull):
+        return f"the database's disk is full, nothing was changed: {_first_line(error)}"
+    if isinstance(error, psycopg.errors.InsufficientPrivilege):
+        return f"the database refused: {_first_line(error)}; ask its owner for the role tunnel_operator"
+    if isinstance(error, (psycopg.errors.QueryCanceled, psycopg.errors.LockNotAvailable)):
+        return f"the database stopped the work, nothing was changed: {_first_line(error)}"
+    if isinstance(error, psycopg.OperationalError):
+        return f"the connection to the database broke, what was under way is undone: {_first_line(error)}"
+    return None
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().split("\n", 1)[0]
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="tunneldb")
+@click.option(
+    "--dsn",
+    envvar="TUNNELDB_DSN",
+    metavar="DSN",
+    help="Database to use, as libpq wants it (postgresql://… or host=… dbname=…). "
+    "Without it a private server of your own is started. [env: TUNNELDB_DSN]",
+)
+@click.pass_context
+def main(ctx: click.Context, dsn: str | None) -> None:
+    """From laser scans of tunnels to water leaks, in PostGIS and QGIS."""
+    ctx.obj = Settings(dsn=dsn or None)
