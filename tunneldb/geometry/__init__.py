@@ -1,0 +1,1 @@
+"""Axis, segment, section and unrolling: the mathematics of ``sql/``, vectorised for full density."""

@@ -1,0 +1,139 @@
+"""The given axis of a tunnel, as stations at constant spacing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from tunneldb.errors import UserError
+from tunneldb.geometry.frame import Float, frame_at, locate, nearest_segment, segment_rows, tangents
+
+KILOMETRE = 1000.0
+MILLIMETRE = 0.001
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """The given axis: stations at whole multiples of the spacing, with tangents.
+
+    Attributes
+    ----------
+    spacing : float
+        Distance between stations in plan, m.
+    number : (n,) int array
+        Station numbers; station ``k`` stands at chainage ``k * spacing``.
+    vertices : (n, 3) float array
+        Stations in the tunnel's SRID, m.
+    start, end : float
+        Chainage of the first and of the last vertex given, m. The first and the last station lie up to one spacing
+        outside, on the straight continuation.
+    """
+
+    spacing: float
+    number: NDArray[np.int64]
+    vertices: Float
+    start: float
+    end: float
+
+    @classmethod
+    def from_polyline(cls, xyz: Float, start_chainage: float, spacing: float = 10.0) -> Alignment:
+        """Lay a smooth curve through the given vertices and set stations on it.
+
+        The curve is a cubic spline over the chord length in plan; chainage is its length in plan, as stationing is.
+
+        Parameters
+        ----------
+        xyz : (n, 3) float array
+            Vertices in growing chainage, m, n ≥ 2, no two consecutive ones at the same plan position.
+        start_chainage : float
+            Chainage of the first vertex, m.
+        spacing : float
+            Distance between stations, m; it must divide a kilometre, so that each kilometre begins at a station.
+
+        Raises
+        ------
+        UserError
+            If there are fewer than two vertices, two coincide in plan, or the spacing doesn't divide 1000 m.
+        """
+        xyz = np.asarray(xyz, dtype=np.float64)
+        if len(xyz) < 2:
+            raise UserError(f"an axis needs at least 2 points, this one has {len(xyz)}")
+        if spacing <= 0 or abs(KILOMETRE / spacing - round(KILOMETRE / spacing)) > 1e-9:
+            raise UserError(f"the spacing of axis vertices must divide 1000 m: {spacing:g} m does not")
+        chord = np.hypot(*np.diff(xyz[:, :2], axis=0).T)
+        if np.any(chord == 0):
+            row = int(np.argmin(chord)) + 2
+            raise UserError(f"axis point {row} has the same plan position as the one before it: remove one of them")
+        parameter, chainage, position = _curve(xyz, chord)
+        end = start_chainage + float(chainage[-1])
+        first, last = int(np.floor(start_chainage / spacing)), int(np.ceil((end - MILLIMETRE) / spacing))
+        number = np.arange(first, max(last, first + 1) + 1)
+        wanted = number * spacing - start_chainage
+        inside = np.clip(wanted, 0.0, chainage[-1])
+        stations = position(np.interp(inside, chainage, parameter))
+        beyond = (wanted - inside)[:, None]
+        slope = position(np.where(beyond[:, 0] < 0.0, 0.0, parameter[-1]), 1)
+        stations = stations + beyond * slope / np.hypot(slope[:, :1], slope[:, 1:2])
+        return cls(spacing, number, stations, start_chainage, end)
+
+    def chainage(self, points: Float) -> Float:
+        """Chainage of points, m, by the planes of the stations; NaN beyond the first and last vertex given."""
+        return self.locate(points)[0]
+
+    def distance(self, points: Float) -> Float:
+        """Distance of points from the axis in their plane, m; NaN beyond the ends."""
+        return self.locate(points)[1]
+
+    def locate(self, points: Float) -> tuple[Float, Float]:
+        """Chainage and distance from the axis of points (n, 3), both (n,), m; NaN beyond the ends."""
+        segments = segment_rows(self.vertices, tangents(self.vertices))
+        chainage, distance = _locate_all(segments, self.number, self.spacing, np.ascontiguousarray(points, np.float64))
+        beyond = (chainage < self.start) | (chainage > self.end)
+        chainage[beyond] = np.nan
+        distance[beyond] = np.nan
+        return chainage, distance
+
+
+def _curve(xyz: Float, chord: Float) -> tuple[Float, Float, CubicSpline]:
+    """Spline over the chord length, with a table of its parameter against its length in plan."""
+    knots = np.concatenate([[0.0], np.cumsum(chord)])
+    position = CubicSpline(knots, xyz)
+    steps = 64
+    parameter = np.unique(np.concatenate([np.linspace(a, b, steps + 1) for a, b in zip(knots, knots[1:], strict=False)]))
+    slope = position(parameter, 1)
+    middle = position((parameter[1:] + parameter[:-1]) / 2, 1)
+    speed, between = np.hypot(slope[:, 0], slope[:, 1]), np.hypot(middle[:, 0], middle[:, 1])
+    length = np.diff(parameter) * (speed[1:] + 4 * between + speed[:-1]) / 6
+    return parameter, np.concatenate([[0.0], np.cumsum(length)]), position
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _locate_all(
+    segments: Float, number: NDArray[np.int64], spacing: float, points: Float
+) -> tuple[Float, Float]:  # pragma: no cover - compiled
+    count = points.shape[0]
+    chainage = np.empty(count)
+    distance = np.empty(count)
+    block = 4096
+    for b in prange((count + block - 1) // block):
+        frame = np.empty((4, 3))
+        k = -1
+        for i in range(b * block, min(count, (b + 1) * block)):
+            x, y, z = points[i, 0], points[i, 1], points[i, 2]
+            if k < 0:
+                k = nearest_segment(segments, x, y, z)
+            k, f = locate(segments, number, k, x, y, z)
+            if k < 0:
+                chainage[i] = np.nan
+                distance[i] = np.nan
+                continue
+            frame_at(segments[k], f, frame)
+            chainage[i] = (number[k] + f) * spacing
+            distance[i] = np.sqrt(
+                (x - frame[0, 0]) ** 2 + (y - frame[0, 1]) ** 2 + (z - frame[0, 2]) ** 2
+            )
+    return chainage, distance

@@ -1,0 +1,172 @@
+"""The ruled planes of the axis: tangents, segments, and the frame at any chainage.
+
+A segment lies between two planes, each perpendicular to the axis at a vertex (Gonçalves et al., 2012, stage 3).
+Inside the segment the plane turns steadily from the first to the second: the plane at the fraction ``f`` is
+
+.. math:: (1-f)\\,(p-v_a)\\cdot t_a = f\\,(v_b-p)\\cdot t_b
+
+so that a point's fraction is ``d_a / (d_a + d_b)``, its distances from the two planes. It is 0 and 1 on them, hence
+continuous across segments whatever the point's distance from the axis, and differs from the angle on a true circular
+arc of radius 300 m by less than 0.2 mm in a segment of 10 m. The same formulas stand in ``sql/unroll.sql``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+
+def tangents(vertices: Float) -> Float:
+    """Unit tangents at equally spaced vertices of an axis.
+
+    The direction at a vertex is that from its predecessor to its successor (Gonçalves et al., 2012, fig. 5), which on a
+    circular arc is the tangent itself. The two ends take the parabola through the three nearest vertices, exact to the
+    same order; of two vertices, the chord.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float array
+        Axis vertices, m, n ≥ 2.
+
+    Returns
+    -------
+    (n, 3) float array
+    """
+    direction = np.empty_like(vertices)
+    direction[1:-1] = vertices[2:] - vertices[:-2]
+    if len(vertices) == 2:
+        direction[:] = vertices[1] - vertices[0]
+    else:
+        direction[0] = -3.0 * vertices[0] + 4.0 * vertices[1] - vertices[2]
+        direction[-1] = 3.0 * vertices[-1] - 4.0 * vertices[-2] + vertices[-3]
+    return direction / np.linalg.norm(direction, axis=1, keepdims=True)
+
+
+def plan_lengths(vertices: Float, tangent: Float) -> Float:
+    """Plan length of the axis between consecutive vertices, taking each piece as a circular arc.
+
+    Parameters
+    ----------
+    vertices, tangent : (n, 3) float arrays
+        Axis vertices, m, and unit tangents there.
+
+    Returns
+    -------
+    (n - 1,) float array
+        Chord × (φ/2) / sin(φ/2), φ being the angle in plan between the two tangents; m.
+    """
+    chord = np.hypot(*(vertices[1:, :2] - vertices[:-1, :2]).T)
+    azimuth = np.arctan2(tangent[:, 0], tangent[:, 1])
+    half = (np.mod(np.diff(azimuth) + np.pi, 2.0 * np.pi) - np.pi) / 2.0
+    return np.asarray(chord / np.sinc(half / np.pi), dtype=np.float64)
+
+
+@njit(cache=True, nogil=True)
+def fraction(segment: Float, x: float, y: float, z: float) -> float:
+    """Fraction of a segment at which a point lies; below 0 before it, 1 or more after it.
+
+    ``segment`` is one row of 12: vertex_from, vertex_to, tangent_from, tangent_to.
+    """
+    before = (x - segment[0]) * segment[6] + (y - segment[1]) * segment[7] + (z - segment[2]) * segment[8]
+    after = (segment[3] - x) * segment[9] + (segment[4] - y) * segment[10] + (segment[5] - z) * segment[11]
+    if before < 0.0:
+        return -1.0
+    if after <= 0.0:
+        return 2.0
+    return before / (before + after)
+
+
+@njit(cache=True, nogil=True)
+def frame_at(segment: Float, f: float, out: Float) -> None:
+    """Write origin, tangent, right and up (4 × 3 numbers) of the plane at fraction ``f`` of a segment into ``out``.
+
+    The origin is where the cubic Hermite curve through the two vertices meets the plane.
+    """
+    g = 1.0 - f
+    nx = g * segment[6] + f * segment[9]
+    ny = g * segment[7] + f * segment[10]
+    nz = g * segment[8] + f * segment[11]
+    level = g * (segment[0] * segment[6] + segment[1] * segment[7] + segment[2] * segment[8]) + f * (
+        segment[3] * segment[9] + segment[4] * segment[10] + segment[5] * segment[11]
+    )
+    norm = np.sqrt(nx * nx + ny * ny + nz * nz)
+    nx /= norm
+    ny /= norm
+    nz /= norm
+    level /= norm
+
+    length = np.sqrt(
+        (segment[3] - segment[0]) ** 2 + (segment[4] - segment[1]) ** 2 + (segment[5] - segment[2]) ** 2
+    )
+    h00 = (1.0 + 2.0 * f) * g * g
+    h10 = f * g * g * length
+    h01 = f * f * (3.0 - 2.0 * f)
+    h11 = -f * f * g * length
+    px = h00 * segment[0] + h10 * segment[6] + h01 * segment[3] + h11 * segment[9]
+    py = h00 * segment[1] + h10 * segment[7] + h01 * segment[4] + h11 * segment[10]
+    pz = h00 * segment[2] + h10 * segment[8] + h01 * segment[5] + h11 * segment[11]
+    gap = level - (px * nx + py * ny + pz * nz)
+
+    out[0, 0] = px + gap * nx
+    out[0, 1] = py + gap * ny
+    out[0, 2] = pz + gap * nz
+    out[1, 0] = nx
+    out[1, 1] = ny
+    out[1, 2] = nz
+    flat = np.sqrt(nx * nx + ny * ny)
+    ux = ny / flat
+    uy = -nx / flat
+    out[2, 0] = ux
+    out[2, 1] = uy
+    out[2, 2] = 0.0
+    out[3, 0] = uy * nz
+    out[3, 1] = -ux * nz
+    out[3, 2] = ux * ny - uy * nx
+
+
+def segment_rows(vertices: Float, tangent: Float) -> Float:
+    """Rows of 12 (vertex_from, vertex_to, tangent_from, tangent_to) of the segments between consecutive vertices."""
+    return np.ascontiguousarray(np.hstack([vertices[:-1], vertices[1:], tangent[:-1], tangent[1:]]))
+
+
+@njit(cache=True, nogil=True)
+def nearest_segment(segments: Float, x: float, y: float, z: float) -> int:
+    """Index of the segment whose middle is nearest to a point."""
+    best, which = np.inf, 0
+    for k in range(segments.shape[0]):
+        dx = 0.5 * (segments[k, 0] + segments[k, 3]) - x
+        dy = 0.5 * (segments[k, 1] + segments[k, 4]) - y
+        dz = 0.5 * (segments[k, 2] + segments[k, 5]) - z
+        distance = dx * dx + dy * dy + dz * dz
+        if distance < best:
+            best, which = distance, k
+    return which
+
+
+@njit(cache=True, nogil=True)
+def locate(segments: Float, number: NDArray[np.int64], start: int, x: float, y: float, z: float) -> tuple[int, float]:
+    """Segment that holds a point and the fraction in it, walking from the segment ``start``; (-1, 0) if none does.
+
+    ``number`` are the segments' numbers, growing; the walk doesn't cross a gap in them.
+    """
+    k = start
+    for _ in range(segments.shape[0] + 1):
+        f = fraction(segments[k], x, y, z)
+        if f < 0.0:
+            if k == 0 or number[k - 1] != number[k] - 1:
+                return -1, 0.0
+            k -= 1
+        elif f >= 1.0:
+            if k == segments.shape[0] - 1 or number[k + 1] != number[k] + 1:
+                return -1, 0.0
+            # A point between the planes of both (where they cross, far from the axis) belongs to the first.
+            following = fraction(segments[k + 1], x, y, z)
+            k += 1
+            if following < 0.0:
+                return k, 0.0
+        else:
+            return k, f
+    return -1, 0.0

@@ -1,0 +1,106 @@
+"""The surface of a tunnel: segments and sections, and the way between space and the unrolled plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.geometry.frame import Float, frame_at
+from tunneldb.geometry.unrolling import NODES, bracket, roll_all, unroll_all
+
+
+@dataclass(frozen=True)
+class Unrolled:
+    """Points in the unrolled plane; NaN where a point lies off the tunnel.
+
+    Attributes
+    ----------
+    chainage, arc, offset : (n,) float arrays
+        Along the axis in plan; along the section from the crown, positive right; from the surface, positive inwards; m.
+    normal : (n, 3) float array
+        Unit normal of the surface at the point's foot, into the tunnel, in the tunnel's frame.
+    """
+
+    chainage: Float
+    arc: Float
+    offset: Float
+    normal: Float
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Segments and sections of a survey, sorted by chainage.
+
+    Attributes
+    ----------
+    number : (m,) int array
+        Segment numbers; segments with consecutive numbers touch.
+    segments : (m, 12) float array
+        Rows of vertex_from, vertex_to, tangent_from, tangent_to.
+    ends : (m, 2) float array
+        Chainage at the first and second plane, m.
+    chainages : (k,) float array
+        Chainages of the sections, m.
+    radius, arcs : (k, 361) float arrays
+        Distance from the axis and length from the crown at each whole degree from -180° to 180°, m.
+    reach : float
+        Sections farther apart than this leave a hole in the surface, m: one spacing of the axis' vertices.
+    """
+
+    number: NDArray[np.int64]
+    segments: Float
+    ends: Float
+    chainages: Float
+    radius: Float
+    arcs: Float
+    reach: float
+
+    def __post_init__(self) -> None:
+        if self.radius.shape != (len(self.chainages), NODES) or self.arcs.shape != self.radius.shape:
+            raise ValueError(f"sections must have {NODES} nodes, one per degree")
+
+    def unroll(self, points: Float) -> Unrolled:
+        """Chainage, arc, offset and surface normal of points (n, 3) in the tunnel's SRID."""
+        unrolled, normal = unroll_all(
+            self.segments, self.number, self.ends, self.chainages, self.radius, self.arcs, self.reach,
+            np.ascontiguousarray(points, dtype=np.float64),
+        )  # fmt: skip
+        return Unrolled(unrolled[:, 0], unrolled[:, 1], unrolled[:, 2], normal)
+
+    def roll(self, chainage: Float, arc: Float, offset: Float) -> Float:
+        """Points (n, 3) of coordinates in the unrolled plane (n,); NaN where they lie off the tunnel."""
+        unrolled = np.ascontiguousarray(
+            np.column_stack(np.broadcast_arrays(chainage, arc, offset)), dtype=np.float64
+        )
+        which = self.segment_index(unrolled[:, 0])
+        return np.asarray(
+            roll_all(
+                self.segments, which, self.ends, self.chainages, self.radius, self.arcs, self.reach, unrolled
+            )
+        )
+
+    def segment_index(self, chainage: Float) -> NDArray[np.int64]:
+        """Index of the segment at each chainage, -1 where there is none."""
+        index = np.searchsorted(self.ends[:, 0], chainage, side="right") - 1
+        held = (index >= 0) & (chainage <= self.ends[index, 1])
+        return np.where(held, index, -1).astype(np.int64)
+
+    def frames(self, chainage: Float) -> Float:
+        """Origin, tangent, right and up, (n, 4, 3), of the plane at each chainage (n,); NaN where there is no segment."""
+        index = self.segment_index(np.asarray(chainage, dtype=np.float64))
+        frames = np.full((len(index), 4, 3), np.nan)
+        for row, (k, at) in enumerate(zip(index, chainage, strict=True)):
+            if k >= 0:
+                first, second = self.ends[k]
+                frame_at(self.segments[k], (at - first) / (second - first), frames[row])
+        return frames
+
+    def arc_range(self, chainage: float) -> tuple[float, float]:
+        """Arc at the two ends of the section, straight below the axis (-180° and 180°), m; NaN where there is none."""
+        a, b, g = bracket(self.chainages, chainage, self.reach)
+        if a < 0:
+            return float("nan"), float("nan")
+        ends = (1.0 - g) * self.arcs[a, [0, -1]] + g * self.arcs[b, [0, -1]]
+        return float(ends[0]), float(ends[1])
