@@ -1,0 +1,1 @@
+"""The figures that README and docs state, each with the command that makes it."""
