@@ -1,0 +1,183 @@
+"""Image, appendages, threshold, polygons and matching, on made-up pictures."""
+
+import numpy as np
+import pytest
+import shapely
+from affine import Affine
+from shapely.geometry import Polygon, box
+
+from tunneldb.errors import UserError
+from tunneldb.leak.appendage import appendages, distance_from_plane
+from tunneldb.leak.image import Accumulator, Grid
+from tunneldb.leak.match import match
+from tunneldb.leak.polygon import polygons
+from tunneldb.leak.threshold import filter_size, wet_pixels
+
+PIXEL = 0.02
+
+
+def test_image_means_do_not_depend_on_the_order_of_points():
+    rng = np.random.default_rng(1)
+    grid = Grid.covering(12, 0.5, -3.2, 3.2)
+    chainage = rng.uniform(11_990, 13_010, 40_000)
+    arc, offset = rng.uniform(-3.2, 3.2, 40_000), rng.normal(0, 0.01, 40_000)
+    raw = rng.normal(20, 1, 40_000).astype(np.float32)
+    use = rng.random(40_000) < 0.9
+    windows = []
+    for order in (np.arange(40_000), rng.permutation(40_000)):
+        with Accumulator(grid) as image:
+            for part in np.array_split(order, 7):
+                added = image.add(
+                    chainage[part], arc[part], offset[part], raw[part], raw[part] - 5, use[part]
+                )
+                inside = use[part] & (chainage[part] >= 12_000) & (chainage[part] < 13_000)
+                assert added == inside.sum()
+            assert image.blocks() == list(range(20))
+            windows.append(image.window(0, grid.columns))
+    one, other = windows
+    np.testing.assert_array_equal(one.count, other.count)
+    np.testing.assert_allclose(one.raw, other.raw, atol=1e-4)
+    np.testing.assert_allclose(one.corrected, one.raw - 5, atol=1e-4)
+    # A pixel's mean is that of the points within its corners.
+    row, column = np.argwhere(one.count > 3)[500]
+    west, north = grid.transform() @ (column, row)
+    inside = use & (chainage >= west) & (chainage < west + 0.5) & (arc < north) & (arc >= north - 0.5)
+    assert one.count[row, column] == inside.sum()
+    assert one.offset[row, column] == pytest.approx(offset[inside].mean(), abs=1e-6)
+
+
+def test_windows_join_across_blocks_and_stop_at_the_kilometre():
+    grid = Grid.covering(0, 1.0, -1.0, 1.0)
+    with Accumulator(grid) as image:
+        chainage = np.arange(1000) + 0.5
+        level = chainage.astype(np.float32)
+        image.add(chainage, np.full(1000, 0.5), np.zeros(1000), level, level, np.ones(1000, bool))
+        across = image.window(40, 120)
+        np.testing.assert_allclose(across.raw[0], chainage[40:120])
+        assert np.isnan(across.raw[1]).all()
+        assert image.window(-10, 20).columns == slice(0, 20)
+        assert image.window(990, 1020).columns == slice(990, 1000)
+
+
+@pytest.mark.parametrize("pixel", [0.03, 0.0, -1.0, np.nan, 0.001])
+def test_a_pixel_that_does_not_divide_a_block_is_refused(pixel):
+    with pytest.raises(UserError, match=r"image\.pixel"):
+        Grid.covering(0, pixel, -1.0, 1.0)
+
+
+def _wall(rows=300, columns=600, seed=1):
+    """A wall that leans against the section surface, with a box, a cable and a niche; 4 mm of noise."""
+    rng = np.random.default_rng(seed)
+    row, column = np.mgrid[:rows, :columns]
+    wall = 0.02 + 0.01 * np.sin(column / 150) - 0.00008 * row
+    offset = (wall + rng.normal(0, 0.004, (rows, columns))).astype(np.float32)
+    shapes = {"box": np.s_[100:140, 200:260], "cable": np.s_[220:222, :], "niche": np.s_[20:90, 400:450]}
+    for name, stand in (("box", 0.12), ("cable", 0.045), ("niche", -0.3)):
+        offset[shapes[name]] += stand
+    offset[rng.random(offset.shape) < 0.2] = np.nan
+    return offset, wall, shapes
+
+
+def test_appendages_and_niches_stand_off_from_the_wall():
+    offset, wall, shapes = _wall()
+    found = appendages(offset, PIXEL)
+    held = ~np.isnan(offset)
+    true = np.zeros(offset.shape, bool)
+    for where in shapes.values():
+        assert found[where][held[where]].all()
+        true[where] = True
+    near = np.pad(true, 3)
+    near = np.any([np.roll(near, (i, j), (0, 1)) for i in range(-3, 4) for j in range(-3, 4)], axis=0)[
+        3:-3, 3:-3
+    ]
+    assert not found[~near].any()
+    residual = distance_from_plane(offset, PIXEL)
+    lining = held & ~near
+    assert np.abs(residual - (offset - wall))[lining].max() < 0.01
+
+
+def test_a_wide_tray_does_not_pass_for_the_wall():
+    offset = np.random.default_rng(2).normal(0, 0.004, (200, 400)).astype(np.float32)
+    offset[80:105] += 0.1  # half a metre
+    found = appendages(offset, PIXEL)
+    assert found[80:105].all()
+    assert not found[:77].any()
+    assert not found[108:].any()
+
+
+def test_a_single_outlier_is_not_grown():
+    offset = np.zeros((60, 60), np.float32)
+    offset[30, 30] = 0.2
+    assert appendages(offset, PIXEL).sum() == 1
+
+
+def _rings():
+    """Corrected intensity at 0 dB ± 0.3 with a wet disc of −3 dB that has a dry hole."""
+    rng = np.random.default_rng(5)
+    corrected = rng.normal(0, 0.3, (200, 300)).astype(np.float32)
+    row, column = np.mgrid[:200, :300]
+    distance = np.hypot(row - 99.5, column - 149.5)
+    wet = (distance < 60) & (distance > 20)
+    corrected[wet] -= 3.0
+    lining = rng.random(corrected.shape) < 0.6
+    corrected[~lining] = np.nan
+    return corrected, lining, wet
+
+
+def test_wet_polygon_with_a_hole_has_the_true_area():
+    corrected, lining, _ = _rings()
+    closed = np.zeros(corrected.shape, bool)
+    mask = wet_pixels(corrected, lining, closed, -0.9, filter_size(0.6))
+    (found,) = polygons(mask, Affine(PIXEL, 0, 500.0, 0, -PIXEL, 2.0), 0.05)
+    centre = shapely.Point(500.0 + 150 * PIXEL, 2.0 - 100 * PIXEL)
+    true = centre.buffer(60 * PIXEL, 64).difference(centre.buffer(20 * PIXEL, 64))
+    assert found.is_valid
+    assert len(found.interiors) == 1
+    assert found.exterior.is_ccw
+    assert found.area == pytest.approx(true.area, rel=0.02)
+    assert found.intersection(true).area / found.union(true).area > 0.96
+
+
+def test_an_appendage_is_never_wet():
+    corrected, lining, wet = _rings()
+    closed = np.zeros(corrected.shape, bool)
+    closed[:, 140:145] = True
+    mask = wet_pixels(corrected, lining & ~closed, closed, -0.9, 5)
+    assert not mask[closed].any()
+    assert mask[wet & ~closed].mean() > 0.95
+
+
+def test_small_regions_are_left_out_and_outlines_stay_within_a_pixel():
+    rng = np.random.default_rng(6)
+    mask = np.zeros((400, 400), bool)
+    row, column = np.mgrid[:400, :400]
+    truth = []
+    for _ in range(12):
+        r, c, size = rng.uniform(40, 360), rng.uniform(40, 360), rng.uniform(3, 30)
+        mask |= np.hypot(row - r, column - c) < size
+    transform = Affine(PIXEL, 0, 0, 0, -PIXEL, 0)
+    found = polygons(mask, transform, 0.05)
+    truth = polygons(mask, transform, 0.0)
+    assert all(p.is_valid and p.area > 0.045 for p in found)
+    stairs = shapely.union_all(
+        [box(c * PIXEL, -(r + 1) * PIXEL, (c + 1) * PIXEL, -r * PIXEL) for r, c in np.argwhere(mask)]
+    )
+    assert shapely.union_all(truth).symmetric_difference(stairs).buffer(-PIXEL).is_empty
+    assert sum(p.area for p in truth) == pytest.approx(mask.sum() * PIXEL**2, rel=0.02)
+
+
+def test_filter_widens_where_pixels_are_sparse():
+    assert filter_size(1.0) == 5
+    assert filter_size(0.5) == 5
+    assert filter_size(0.1) == 11
+    assert filter_size(0.0) % 2 == 1
+
+
+def test_leaks_found_again_by_mutual_best_overlap():
+    before = [box(0, 0, 1, 1), box(5, 0, 6, 1), box(10, 0, 14, 1)]
+    now = [box(20, 0, 21, 1), box(0.2, 0, 1.2, 1), box(10, 0, 11.5, 1), box(12, 0, 14, 1), box(5.8, 0, 7, 1)]
+    assert match(before, now) == {1: 0, 3: 2}
+    assert match([], now) == {}
+    assert match(before, []) == {}
+    same = [Polygon(p.exterior.coords) for p in now]
+    assert match(same, now) == {k: k for k in range(len(now))}

@@ -1,0 +1,1 @@
+"""Intensity: reference curve, Oren–Nayar reflectance, roughness, correction (Xu et al., 2018)."""

@@ -1,0 +1,91 @@
+"""The effect of distance: a curve measured on a reference target (Xu et al., 2018, eq. 7–12)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.errors import UserError
+
+Float = NDArray[np.float64]
+
+SPAN_TOLERANCE = 0.05
+"""By how much a range may lie outside the curve's span, m; there the curve is held at its end value."""
+
+
+@dataclass(frozen=True)
+class ReferenceCurve:
+    """Intensity of a reference target at several ranges, joined by straight lines (eq. 7–9).
+
+    Attributes
+    ----------
+    range_m : (n,) float array
+        Ranges, m, strictly growing, n ≥ 2.
+    intensity_db : (n,) float array
+        Intensity of the target, dB.
+
+    Raises
+    ------
+    UserError
+        If there are fewer than two rows, a value isn't finite, a range isn't positive or occurs twice.
+    """
+
+    range_m: Float
+    intensity_db: Float
+
+    def __post_init__(self) -> None:
+        ranges, intensity = self.range_m, self.intensity_db
+        if len(ranges) < 2:
+            raise UserError(f"a reference curve needs at least 2 rows, this one has {len(ranges)}")
+        if not (np.all(np.isfinite(ranges)) and np.all(np.isfinite(intensity))):
+            raise UserError("the reference curve holds a value that is not a number: remove or mend that row")
+        if np.any(ranges <= 0):
+            raise UserError(
+                f"the reference curve holds the range {ranges.min():g} m: ranges must be positive"
+            )
+        if np.any(np.diff(ranges) <= 0):
+            row = int(np.argmin(np.diff(ranges))) + 1
+            raise UserError(f"the reference curve's ranges must grow strictly: {ranges[row]:g} m does not")
+
+    @classmethod
+    def from_rows(cls, range_m: Float, intensity_db: Float) -> ReferenceCurve:
+        """Make a curve of rows in any order; a range that occurs twice is a UserError."""
+        order = np.argsort(range_m, kind="stable")
+        return cls(
+            np.ascontiguousarray(range_m, dtype=np.float64)[order],
+            np.ascontiguousarray(intensity_db, dtype=np.float64)[order],
+        )
+
+    def __call__(self, ranges: Float) -> Float:
+        """Intensity of the target at the given ranges (m), dB (eq. 9); beyond the ends, the end values."""
+        return np.interp(ranges, self.range_m, self.intensity_db)
+
+    def outside(self, ranges: Float) -> NDArray[np.bool_]:
+        """Which ranges (m) lie outside the curve's span by more than SPAN_TOLERANCE."""
+        low, high = self.range_m[0] - SPAN_TOLERANCE, self.range_m[-1] + SPAN_TOLERANCE
+        return np.asarray((ranges < low) | (ranges > high), dtype=np.bool_)
+
+    def require_span(self, nearest: float, farthest: float, outside: int, count: int) -> None:
+        """Raise UserError when lining points lie outside the curve's span.
+
+        Parameters
+        ----------
+        nearest, farthest : float
+            Ranges of the lining points, m.
+        outside, count : int
+            How many lining points lie outside the curve's span, and how many there are.
+        """
+        if outside:
+            raise UserError(
+                f"the reference curve spans {self.range_m[0]:g} to {self.range_m[-1]:g} m, the lining lies "
+                f"{nearest:.2f} to {farthest:.2f} m from the scanner: {_share(outside, count)} of its points "
+                f"are outside; give a curve that spans them, or leave out slanting views by a smaller "
+                f"detect.max_incidence"
+            )
+
+
+def _share(part: int, whole: int) -> str:
+    """Share in percent with two digits that count, so that a few of many points don't read as none."""
+    return f"{100.0 * part / whole:.2g} % ({part:,})"

@@ -1,0 +1,1 @@
+"""Leaks: unrolled image, appendages, threshold, polygons, statistics (Xu et al., 2018)."""

@@ -1,0 +1,114 @@
+"""A leak's three geometries, its clock position and its area on the surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from tunneldb.geometry.surface import Surface
+
+Float = NDArray[np.float64]
+
+DENSIFY = 0.1
+"""Longest straight edge of a polygon on the curved surface, m."""
+
+SAMPLES = 5000
+"""Places at which the stretch of the surface is averaged, at most about."""
+
+_STEP = 0.01
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """A leak in space.
+
+    Attributes
+    ----------
+    strip : Polygon
+        In the map strip: each vertex lies beside the axis, at its chainage, by its arc (Gonçalves et al.,
+        2012, eq. 1); the tunnel's SRID.
+    surface : Polygon
+        On the surface, with Z.
+    clock : float
+        Hours, above 0 up to 12: 12 at the crown, 3 to the right looking up-chainage.
+    area : float
+        Area on the surface, m².
+    """
+
+    strip: Polygon
+    surface: Polygon
+    clock: float
+    area: float
+
+
+def shapes(outline: Polygon, surface: Surface) -> Shapes:
+    """Lay an outline in the unrolled plane on the map and on the surface.
+
+    Parameters
+    ----------
+    outline : Polygon
+        (chainage, arc), m.
+    surface : Surface
+        The tunnel.
+    """
+    dense = shapely.segmentize(outline, DENSIFY)
+    return Shapes(
+        strip=shapely.transform(dense, lambda unrolled: strip(surface, unrolled)),
+        surface=_roll(dense, surface),
+        clock=_clock(outline, surface),
+        area=_area(outline, surface),
+    )
+
+
+def strip(surface: Surface, unrolled: Float) -> Float:
+    """Map-strip coordinates (n, 2) of (chainage, arc) rows (n, 2): axis in plan + arc · right."""
+    frames = surface.frames(unrolled[:, 0])
+    return np.asarray(frames[:, 0, :2] + unrolled[:, 1, None] * frames[:, 2, :2], dtype=np.float64)
+
+
+def _roll(outline: Polygon, surface: Surface) -> Polygon:
+    def ring(line: shapely.LinearRing) -> Float:
+        unrolled = shapely.get_coordinates(line)
+        return surface.roll(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled)))
+
+    return Polygon(ring(outline.exterior), [ring(hole) for hole in outline.interiors])
+
+
+def _clock(outline: Polygon, surface: Surface) -> float:
+    inside = outline.representative_point()
+    chainage = np.array([inside.x])
+    origin, _, right, up = surface.frames(chainage)[0]
+    ray = surface.roll(chainage, np.array([inside.y]), np.zeros(1))[0] - origin
+    hours = (np.degrees(np.arctan2(ray @ right, ray @ up)) / 30.0) % 12.0
+    return float(hours) if hours > 0 else 12.0
+
+
+def _area(outline: Polygon, surface: Surface) -> float:
+    """Area in the unrolled plane × the mean stretch of the surface against it (slope, curve)."""
+    chainage, arc = _samples(outline)
+    zero = np.zeros(len(chainage))
+    here = surface.roll(chainage, arc, zero)
+    along = surface.roll(chainage + _STEP, arc, zero) - here
+    across = surface.roll(chainage, arc + _STEP, zero) - here
+    stretch = np.linalg.norm(np.cross(along, across), axis=1) / _STEP**2
+    known = np.isfinite(stretch)
+    return float(outline.area * (stretch[known].mean() if known.any() else 1.0))
+
+
+def _samples(outline: Polygon) -> tuple[Float, Float]:
+    """Places spread evenly over a polygon."""
+    west, south, east, north = outline.bounds
+    step = max(np.sqrt((east - west) * (north - south) / SAMPLES), 1e-3)
+    x, y = (
+        g.ravel()
+        for g in np.meshgrid(np.arange(west, east, step) + step / 2, np.arange(south, north, step) + step / 2)
+    )
+    inside = shapely.contains_xy(outline, x, y)
+    if not inside.any():
+        point = outline.representative_point()
+        return np.array([point.x]), np.array([point.y])
+    return x[inside], y[inside]

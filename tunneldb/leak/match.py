@@ -1,0 +1,51 @@
+"""Which leaks of an earlier run are found again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+MIN_IOU = 0.3
+"""Smallest share of intersection in union at which two outlines are the same leak."""
+
+
+def match(before: Sequence[Polygon], now: Sequence[Polygon], min_iou: float = MIN_IOU) -> dict[int, int]:
+    """Pair earlier leaks with those found now, by mutual best overlap.
+
+    Parameters
+    ----------
+    before, now : sequences of Polygon
+        Outlines in the unrolled plane, m.
+    min_iou : float
+        Smallest intersection over union of a pair.
+
+    Returns
+    -------
+    dict
+        Index in ``now`` → index in ``before``; each index occurs at most once.
+    """
+    if not before or not now:
+        return {}
+    earlier, later = np.asarray(before, dtype=object), np.asarray(now, dtype=object)
+    n, b = shapely.STRtree(earlier).query(later, predicate="intersects")
+    shared = shapely.area(shapely.intersection(later[n], earlier[b]))
+    iou = shared / (shapely.area(later[n]) + shapely.area(earlier[b]) - shared)
+    best_now, best_before = _best(n, iou, len(later)), _best(b, iou, len(earlier))
+    return {
+        int(n[k]): int(b[k])
+        for k in range(len(n))
+        if iou[k] >= min_iou and best_now[n[k]] == k and best_before[b[k]] == k
+    }
+
+
+def _best(owner: NDArray[Any], iou: NDArray[Any], count: int) -> NDArray[Any]:
+    """Pair of the greatest overlap for each owner, the first of several; -1 where there is none."""
+    best = np.full(count, -1)
+    for k in np.argsort(-iou, kind="stable")[::-1]:
+        best[owner[k]] = k
+    return best
