@@ -1,0 +1,58 @@
+-- Chainage as it is written and read, and sums over leaks.
+
+-- Chainage written as km + m: 12345.678 m is 12+345.678, -5 m is -0+005.000. Rounded to mm first, so that 12999.9999 m
+-- is 13+000.000.
+CREATE OR REPLACE FUNCTION tunnel_api.chainage_label(chainage float8)
+RETURNS text
+LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
+AS $$
+    SELECT CASE WHEN round($1::numeric, 3) < 0 THEN '-' ELSE '' END
+        || div(abs(round($1::numeric, 3)), 1000)::text
+        || '+'
+        || to_char(mod(abs(round($1::numeric, 3)), 1000), 'FM000.000')
+$$;
+COMMENT ON FUNCTION tunnel_api.chainage_label(float8) IS
+'Chainage (m) as text, km + m with mm: 12345.678 -> 12+345.678.';
+
+
+-- The way back: '12+345.678', '12+345', '-0+005' or plain metres ('12345.678') -> m. Anything else is an error.
+CREATE OR REPLACE FUNCTION tunnel_api.chainage_parse(label text)
+RETURNS float8
+LANGUAGE plpgsql IMMUTABLE STRICT PARALLEL SAFE
+SET search_path = pg_catalog, pg_temp
+AS $$
+DECLARE
+    part text[];
+BEGIN
+    part := regexp_match(btrim(label), '^(-?)(\d+)\+(\d{3}(?:\.\d*)?)$');
+    IF part IS NOT NULL THEN
+        RETURN ((part[1] || '1')::numeric * (part[2]::numeric * 1000 + part[3]::numeric))::float8;
+    END IF;
+    part := regexp_match(btrim(label), '^(-?\d+(?:\.\d*)?)$');
+    IF part IS NOT NULL THEN
+        RETURN part[1]::float8;
+    END IF;
+    RAISE EXCEPTION '"%" is no chainage: write 12+345.678 or metres', label USING ERRCODE = 'invalid_text_representation';
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.chainage_parse(text) IS
+'Chainage in m of its text: 12+345.678 -> 12345.678; plain metres are taken as they are.';
+
+
+-- Wet area of a stretch of a survey, m² on the lining: the leaks that were found last and are not rejected, cut at both
+-- ends. Runs with the owner's rights, for it reads the tables themselves.
+CREATE OR REPLACE FUNCTION tunnel_api.wet_area(survey text, chainage_from float8, chainage_to float8)
+RETURNS float8
+LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER
+SET search_path = pg_catalog, public, pg_temp
+AS $$
+    SELECT coalesce(sum(l.area * ST_Area(ST_Intersection(l.unrolled, w.stretch)) / ST_Area(l.unrolled)), 0)
+    FROM tunnel.leak l
+    JOIN tunnel.survey s ON s.id = l.survey_id
+    CROSS JOIN LATERAL (
+        SELECT ST_MakeEnvelope($2, ST_YMin(l.unrolled) - 1, $3, ST_YMax(l.unrolled) + 1) AS stretch) w
+    WHERE s.name = $1 AND l.detected AND l.review <> 'rejected'
+        AND l.chainage_to > $2 AND l.chainage_from < $3 AND $2 < $3
+$$;
+COMMENT ON FUNCTION tunnel_api.wet_area(text, float8, float8) IS
+'Wet area (m² on the lining) of a survey between two chainages (m), of leaks found last and not rejected.';
