@@ -1,0 +1,209 @@
+-- Stage 1 of Gonçalves et al. (2012): the axis, averaged from the points near each vertex, again and again until it rests.
+
+-- Vertices with their frames. Tangent: from the vertex before to the one after (Gonçalves et al., 2012, fig. 5); at an end,
+-- the parabola through three vertices; of two vertices, the chord. Right = tangent × vertical, up = right × tangent.
+-- n: vertex numbers; x, y, z: coordinates in the tunnel's SRID, m. Neighbours are those whose numbers differ by one.
+CREATE OR REPLACE FUNCTION tunnel_api.axis_frame(n int[], x float8[], y float8[], z float8[])
+RETURNS TABLE (
+    n int, x float8, y float8, z float8,
+    tx float8, ty float8, tz float8,
+    ux float8, uy float8,
+    wx float8, wy float8, wz float8)
+LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT  -- a STRICT one would not be inlined, hence not run in parallel
+ROWS 100
+AS $$
+    WITH vertex AS (
+        SELECT v.n, v.x, v.y, v.z
+        FROM unnest(axis_frame.n, axis_frame.x, axis_frame.y, axis_frame.z) AS v (n, x, y, z)
+    ), direction AS (
+        SELECT v.n, v.x, v.y, v.z,
+            CASE
+                WHEN a.n IS NOT NULL AND b.n IS NOT NULL THEN ARRAY[b.x - a.x, b.y - a.y, b.z - a.z]
+                WHEN b2.n IS NOT NULL AND b.n IS NOT NULL THEN
+                    ARRAY[4 * b.x - 3 * v.x - b2.x, 4 * b.y - 3 * v.y - b2.y, 4 * b.z - 3 * v.z - b2.z]
+                WHEN b.n IS NOT NULL THEN ARRAY[b.x - v.x, b.y - v.y, b.z - v.z]
+                WHEN a2.n IS NOT NULL AND a.n IS NOT NULL THEN
+                    ARRAY[3 * v.x - 4 * a.x + a2.x, 3 * v.y - 4 * a.y + a2.y, 3 * v.z - 4 * a.z + a2.z]
+                ELSE ARRAY[v.x - a.x, v.y - a.y, v.z - a.z]
+            END AS d
+        FROM vertex v
+        LEFT JOIN vertex a ON a.n = v.n - 1
+        LEFT JOIN vertex a2 ON a2.n = v.n - 2
+        LEFT JOIN vertex b ON b.n = v.n + 1
+        LEFT JOIN vertex b2 ON b2.n = v.n + 2
+    ), tangent AS (
+        SELECT q.n, q.x, q.y, q.z, q.d[1] / q.length AS tx, q.d[2] / q.length AS ty, q.d[3] / q.length AS tz
+        FROM (SELECT d.*, sqrt(d.d[1] ^ 2 + d.d[2] ^ 2 + d.d[3] ^ 2) AS length FROM direction d) q
+    )
+    SELECT t.n, t.x, t.y, t.z, t.tx, t.ty, t.tz,
+        t.ty / p.plan, -t.tx / p.plan,
+        -t.tx / p.plan * t.tz, -t.ty / p.plan * t.tz, p.plan
+    FROM tangent t, LATERAL (SELECT sqrt(t.tx ^ 2 + t.ty ^ 2) AS plan) p
+    ORDER BY t.n
+$$;
+COMMENT ON FUNCTION tunnel_api.axis_frame(int[], float8[], float8[], float8[]) IS
+'Vertices of an axis with unit tangent (t), right (u) and up (w) vectors, in the tunnel''s SRID. Neighbours are vertices whose numbers differ by one. Source: Gonçalves et al. (2012), fig. 5.';
+
+
+-- Where the tunnel's centre lies, seen from given vertices: the shift of each, right and up in its plane, m.
+--
+-- The points in the slab of the vertex (at most half_width from its plane) are averaged by angular class, so that a dense
+-- floor weighs no more than a thin crown. The centre is where opposite classes are equally far: to the side the median over
+-- pairs of classes mirrored in the upward direction, 45° to 135° from it; upwards the median over the classes of the
+-- vault (45° about the upward direction) against the level of the floor. Medians leave niches, cables and
+-- equipment without weight. Where fewer than three pairs of classes are filled it is the plain mean of the points,
+-- as the paper has it. NULL where the slab holds fewer than min_points points.
+CREATE OR REPLACE FUNCTION tunnel_api.axis_shift(
+    survey_id int, n int[], x float8[], y float8[], z float8[],
+    half_width float8 DEFAULT 1.0, angle_step float8 DEFAULT 5.0, min_points int DEFAULT 100)
+RETURNS TABLE (n int, "right" float8, up float8, points bigint)
+LANGUAGE sql STABLE PARALLEL SAFE CALLED ON NULL INPUT  -- a STRICT one would not be inlined, hence not run in parallel
+ROWS 100
+AS $$
+    WITH setting AS MATERIALIZED (
+        SELECT t.spacing,
+            (SELECT min(i) - 0.5 FROM unnest(axis_shift.n) i) * t.spacing AS low,
+            (SELECT max(i) + 0.5 FROM unnest(axis_shift.n) i) * t.spacing AS high
+        FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+        WHERE s.id = axis_shift.survey_id
+    ), profile AS (
+        SELECT f.n, q.u, q.w
+        FROM tunnel.point p
+        JOIN tunnel_api.axis_frame(axis_shift.n, axis_shift.x, axis_shift.y, axis_shift.z) f
+            ON f.n = round(p.chainage / (SELECT spacing FROM setting))::int
+        CROSS JOIN LATERAL (SELECT ST_X(p.geom) - f.x AS dx, ST_Y(p.geom) - f.y AS dy, ST_Z(p.geom) - f.z AS dz) d
+        CROSS JOIN LATERAL (SELECT d.dx * f.ux + d.dy * f.uy AS u, d.dx * f.wx + d.dy * f.wy + d.dz * f.wz AS w) q
+        WHERE p.survey_id = axis_shift.survey_id
+          AND p.km BETWEEN (SELECT floor(low / 1000)::int FROM setting) AND (SELECT floor(high / 1000)::int FROM setting)
+          AND p.chainage BETWEEN (SELECT low FROM setting) AND (SELECT high FROM setting)
+          -- chainage is good to a metre or so until the axis rests; the plane decides
+          AND abs(p.chainage - f.n * (SELECT spacing FROM setting)) <= axis_shift.half_width + 1.5
+          AND abs(d.dx * f.tx + d.dy * f.ty + d.dz * f.tz) <= axis_shift.half_width
+    ), class AS (
+        SELECT p.n, floor(degrees(atan2(p.u, p.w)) / axis_shift.angle_step)::int AS class,
+            avg(sqrt(p.u * p.u + p.w * p.w)) AS radius, sum(p.u) AS u, sum(p.w) AS w, count(*) AS points
+        FROM profile p
+        GROUP BY 1, 2
+    ), angle AS (
+        SELECT c.*, (c.class + 0.5) * axis_shift.angle_step AS angle FROM class c
+    ), floor_level AS (
+        SELECT a.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY -a.radius * cosd(a.angle)) AS depth, count(*) AS classes
+        FROM angle a
+        WHERE abs(a.angle) > 135
+        GROUP BY a.n
+    ), upward AS (
+        SELECT a.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY (a.radius - f.depth / cosd(a.angle)) / 2) AS shift
+        FROM angle a JOIN floor_level f ON f.n = a.n
+        WHERE abs(a.angle) < 45
+        GROUP BY a.n
+        HAVING count(*) >= 3 AND min(f.classes) >= 3
+    ), sideward AS (
+        SELECT a.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY (a.radius - b.radius) / 2) AS shift
+        FROM angle a JOIN angle b ON b.n = a.n AND b.class = -1 - a.class
+        WHERE a.angle BETWEEN 45 AND 135
+        GROUP BY a.n
+        HAVING count(*) >= 3
+    ), total AS (
+        SELECT c.n, sum(c.points)::bigint AS points, sum(c.u) / sum(c.points) AS u, sum(c.w) / sum(c.points) AS w
+        FROM class c
+        GROUP BY c.n
+    )
+    SELECT t.n, coalesce(s.shift, t.u), coalesce(u.shift, t.w), t.points
+    FROM total t
+    LEFT JOIN sideward s ON s.n = t.n
+    LEFT JOIN upward u ON u.n = t.n
+    WHERE t.points >= axis_shift.min_points
+    ORDER BY t.n
+$$;
+COMMENT ON FUNCTION tunnel_api.axis_shift(int, int[], float8[], float8[], float8[], float8, float8, int) IS
+'One pass of stage 1: how far each vertex lies from the tunnel''s centre, to the right and up in its plane, m, from the points within half_width of the plane, averaged by angular class. After Gonçalves et al. (2012), stage 1.';
+
+
+-- Moves the vertices of a kilometre onto the tunnel's centre, pass by pass, and writes them to tunnel.axis_vertex.
+--
+-- Every run starts from the given axis (or the vertex as edited by hand, which stays), and the vertices two spacings beyond
+-- the kilometre are found along with it, so the result doesn't depend on which neighbours were done before.
+-- A vertex without points takes the shift of its neighbours, and is marked interpolated.
+CREATE OR REPLACE FUNCTION tunnel_api.axis_refine(
+    survey_id int, km int,
+    half_width float8 DEFAULT 1.0, angle_step float8 DEFAULT 5.0,
+    tolerance float8 DEFAULT 0.002, max_iterations int DEFAULT 20, min_points int DEFAULT 100)
+RETURNS TABLE (iteration int, moved float8, measured int)
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
+ROWS 10
+AS $$
+#variable_conflict use_column
+DECLARE
+    spacing float8;
+    halo constant int := 2;
+    vn int[]; vx float8[]; vy float8[]; vz float8[];
+    gx float8[]; gy float8[]; gz float8[];
+    fixed boolean[]; counts bigint[];
+BEGIN
+    SELECT t.spacing INTO STRICT spacing
+    FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = axis_refine.survey_id;
+
+    SELECT array_agg(a.n ORDER BY a.n), array_agg(ST_X(a.start) ORDER BY a.n), array_agg(ST_Y(a.start) ORDER BY a.n),
+        array_agg(ST_Z(a.start) ORDER BY a.n), array_agg(a.source = 'edited' ORDER BY a.n)
+    INTO vn, vx, vy, vz, fixed
+    FROM (SELECT v.n, v.source, CASE WHEN v.source = 'edited' THEN v.geom ELSE v.given END AS start
+          FROM tunnel.axis_vertex v
+          WHERE v.survey_id = axis_refine.survey_id
+            AND v.n BETWEEN ceil(axis_refine.km * 1000 / spacing) - halo
+                        AND ceil((axis_refine.km + 1) * 1000 / spacing) - 1 + halo) a;
+    IF vn IS NULL THEN
+        RAISE EXCEPTION 'survey % has no axis in kilometre %', axis_refine.survey_id, axis_refine.km;
+    END IF;
+    gx := vx; gy := vy; gz := vz;
+
+    FOR pass IN 1 .. axis_refine.max_iterations LOOP
+        WITH frame AS (
+            SELECT f.*, g.gx, g.gy, g.gz, g.fixed
+            FROM tunnel_api.axis_frame(vn, vx, vy, vz) f
+            JOIN unnest(vn, gx, gy, gz, fixed) AS g (n, gx, gy, gz, fixed) ON g.n = f.n
+        ), shifted AS (
+            SELECT f.n, f.gx, f.gy, f.gz, f.fixed, f.x, f.y, f.z, s.points,
+                f.x + s."right" * f.ux + s.up * f.wx AS sx,
+                f.y + s."right" * f.uy + s.up * f.wy AS sy,
+                f.z + s.up * f.wz AS sz
+            FROM frame f
+            LEFT JOIN tunnel_api.axis_shift(axis_refine.survey_id, vn, vx, vy, vz,
+                axis_refine.half_width, axis_refine.angle_step, axis_refine.min_points) s ON s.n = f.n AND NOT f.fixed
+        ), bounded AS (
+            SELECT f.*,
+                max(f.n) FILTER (WHERE f.sx IS NOT NULL) OVER (ORDER BY f.n) AS before,
+                min(f.n) FILTER (WHERE f.sx IS NOT NULL) OVER (ORDER BY f.n DESC) AS after
+            FROM shifted f
+        ), placed AS (
+            SELECT b.n, b.points, b.x, b.y, b.z,
+                CASE WHEN b.fixed THEN b.x WHEN b.sx IS NOT NULL THEN b.sx
+                     ELSE b.gx + coalesce((1 - w.g) * (p.sx - p.gx) + w.g * (q.sx - q.gx), p.sx - p.gx, q.sx - q.gx, 0) END AS nx,
+                CASE WHEN b.fixed THEN b.y WHEN b.sx IS NOT NULL THEN b.sy
+                     ELSE b.gy + coalesce((1 - w.g) * (p.sy - p.gy) + w.g * (q.sy - q.gy), p.sy - p.gy, q.sy - q.gy, 0) END AS ny,
+                CASE WHEN b.fixed THEN b.z WHEN b.sx IS NOT NULL THEN b.sz
+                     ELSE b.gz + coalesce((1 - w.g) * (p.sz - p.gz) + w.g * (q.sz - q.gz), p.sz - p.gz, q.sz - q.gz, 0) END AS nz
+            FROM bounded b
+            LEFT JOIN shifted p ON p.n = b.before
+            LEFT JOIN shifted q ON q.n = b.after
+            CROSS JOIN LATERAL (SELECT (b.n - b.before)::float8 / nullif(b.after - b.before, 0) AS g) w
+        )
+        SELECT array_agg(p.nx ORDER BY p.n), array_agg(p.ny ORDER BY p.n), array_agg(p.nz ORDER BY p.n),
+            array_agg(coalesce(p.points, 0) ORDER BY p.n), count(p.points)::int,
+            max(sqrt((p.nx - p.x) ^ 2 + (p.ny - p.y) ^ 2 + (p.nz - p.z) ^ 2))
+        INTO vx, vy, vz, counts, measured, moved
+        FROM placed p;
+        iteration := pass;
+        RETURN NEXT;
+        EXIT WHEN moved < axis_refine.tolerance;
+    END LOOP;
+
+    UPDATE tunnel.axis_vertex v
+    SET geom = ST_SetSRID(ST_MakePoint(p.x, p.y, p.z), ST_SRID(v.given)),
+        points = p.points,
+        source = CASE WHEN p.points > 0 THEN 'measured' ELSE 'interpolated' END
+    FROM unnest(vn, vx, vy, vz, counts) AS p (n, x, y, z, points)
+    WHERE v.survey_id = axis_refine.survey_id AND v.km = axis_refine.km AND v.n = p.n AND v.source <> 'edited';
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.axis_refine(int, int, float8, float8, float8, int, int) IS
+'Stage 1 for one kilometre: moves the axis vertices onto the tunnel''s centre until none moves by tolerance (m) in a pass; returns each pass with its greatest move, m. Vertices edited by hand stay. After Gonçalves et al. (2012), stages 1 and 2.';

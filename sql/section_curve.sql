@@ -1,0 +1,332 @@
+-- The curve of a cross-section through its angular classes.
+
+-- Where the lines of two classes meet: angle (degrees) and radius (m); NULL if they don't between the two classes.
+-- The classes stand at angles a and b (degrees), their lines at radius (m) with slope (m/m) in each class' own frame.
+CREATE OR REPLACE FUNCTION tunnel_api.section_corner(
+    angle_a float8, radius_a float8, slope_a float8, angle_b float8, radius_b float8, slope_b float8)
+RETURNS float8[]
+LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE STRICT
+AS $$
+DECLARE
+    delta constant float8 := radians(angle_b - angle_a);
+    -- in the frame of the first class: x to the right, y outwards
+    x0 constant float8 := radius_b * sin(delta);
+    y0 constant float8 := radius_b * cos(delta);
+    dx constant float8 := cos(delta) + slope_b * sin(delta);
+    dy constant float8 := slope_b * cos(delta) - sin(delta);
+    cross_product constant float8 := dy - slope_a * dx;
+    s float8;
+    x float8;
+    y float8;
+    angle float8;
+BEGIN
+    IF abs(cross_product) < 1e-9 THEN
+        RETURN NULL;
+    END IF;
+    s := (radius_a + slope_a * x0 - y0) / cross_product;
+    x := x0 + s * dx;
+    y := y0 + s * dy;
+    angle := degrees(atan2(x, y));
+    IF angle <= 0 OR angle >= angle_b - angle_a THEN
+        RETURN NULL;
+    END IF;
+    RETURN ARRAY[angle_a + angle, sqrt(x * x + y * y)];
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.section_corner(float8, float8, float8, float8, float8, float8) IS
+'Angle (degrees) and radius (m) where the lines of two angular classes meet; NULL if not between them.';
+
+
+-- The curve of a section: radius and arc at each whole degree from -180° to 180°, and what became of each class.
+--
+-- 1. Where the wall is curved, the points of a class lie inside its tangent by half the curvature times their variance
+--    along it; the radius is put back by that much.
+-- 2. A class that holds a corner (its points fit no line, the lines of its neighbours meet in it) gives way to the corner.
+-- 3. Up to three classes that stand inwards of the smooth wall on both sides, by more than `protrusion` and by more than the
+--    lining is uneven here, are something hung on it: they are rejected.
+-- 4. Between the classes left the curve is a cubic in polar coordinates, or two lines with a corner where the wall turns
+--    by more than 30° at once. Empty and rejected classes are bridged and marked.
+-- Arc is the length of this curve from the upward direction, positive to the right. NULL if under a third of the classes
+-- are filled or more than 120° in a row is empty.
+-- radius (m), slope (m/m), sigma (m), spread (m²): of the classes in order from -180°, NULL for an empty one.
+CREATE OR REPLACE FUNCTION tunnel_api.section_curve(
+    angle_step float8, radius float8[], slope float8[], sigma float8[], spread float8[], protrusion float8 DEFAULT 0.03,
+    OUT node_radius float8[], OUT node_arc float8[], OUT class_radius float8[], OUT class_state text[])
+LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT
+AS $$
+DECLARE
+    classes constant int := round(360 / angle_step);
+    step constant float8 := radians(angle_step);
+    r float8[] := radius;       -- radius of each class
+    b float8[] := slope;        -- slope of each class' line, m/m
+    a int; c int; i int; j int; k int; g int; first int; last int;
+    turn float8; chord float8; usual float8; uneven float8; tolerance float8; corner float8[];
+    differences float8[] := '{}';
+    angles float8[] := '{}'; radii float8[] := '{}'; slopes float8[] := '{}';   -- the classes left, once round and more
+    apart boolean;
+    angle float8; x0 float8; y0 float8; x1 float8; y1 float8; piece float8; length float8;
+    corners float8[] := '{}';   -- angle and radius of each corner
+    at_corner float8[];
+    pieces float8[] := '{}';
+BEGIN
+    class_state := array_fill('measured'::text, ARRAY[classes]);
+    FOR k IN 1 .. classes LOOP
+        IF r[k] IS NULL THEN
+            class_state[k] := 'interpolated';
+        END IF;
+    END LOOP;
+    IF (SELECT count(*) FROM unnest(r) q WHERE q IS NOT NULL) * 3 < classes THEN
+        RETURN;
+    END IF;
+
+    FOR k IN 1 .. classes LOOP
+        CONTINUE WHEN r[k] IS NULL;
+        a := (k + classes - 2) % classes + 1;
+        c := k % classes + 1;
+        -- points bunched in under half of the class give no slope of their own
+        IF b[k] IS NULL OR spread[k] < (r[k] * step) ^ 2 / 48 THEN
+            b[k] := coalesce((r[c] - r[a]) / (2 * step), (r[c] - r[k]) / step, (r[k] - r[a]) / step, 0) / r[k];
+        END IF;
+    END LOOP;
+
+    -- 1. curvature
+    FOR k IN 1 .. classes LOOP
+        a := (k + classes - 2) % classes + 1;
+        c := k % classes + 1;
+        CONTINUE WHEN radius[k] IS NULL OR radius[a] IS NULL OR radius[c] IS NULL;
+        turn := 2 * step - (atan(b[c]) - atan(b[a]));
+        CONTINUE WHEN abs(turn) > radians(30) + 2 * step;
+        chord := sqrt(radius[a] ^ 2 + radius[c] ^ 2 - 2 * radius[a] * radius[c] * cos(2 * step));
+        r[k] := radius[k] + 0.5 * turn / chord * (1 + b[k] ^ 2) ^ 1.5
+            * least(spread[k], (radius[k] * step) ^ 2 * (1 + b[k] ^ 2) / 8);
+    END LOOP;
+
+    -- how uneven the lining is here: each class against the curve through its neighbours
+    FOR k IN 1 .. classes LOOP
+        a := (k + classes - 2) % classes + 1;
+        c := k % classes + 1;
+        IF r[k] IS NOT NULL AND r[a] IS NOT NULL AND r[c] IS NOT NULL THEN
+            differences := differences || abs(r[k] - tunnel_api.section_between(
+                -1, r[a], r[a] * b[a] * angle_step, 1, r[c], r[c] * b[c] * angle_step, 0));
+        END IF;
+    END LOOP;
+    SELECT percentile_cont(0.5) WITHIN GROUP (ORDER BY q) INTO uneven FROM unnest(differences) q;
+    SELECT percentile_cont(0.5) WITHIN GROUP (ORDER BY q) INTO usual FROM unnest(sigma) q;
+    tolerance := greatest(protrusion, 3 * 1.4826 * uneven);
+
+    -- 2. corners inside a class
+    FOR k IN 1 .. classes LOOP
+        a := (k + classes - 2) % classes + 1;
+        c := k % classes + 1;
+        CONTINUE WHEN r[k] IS NULL OR r[a] IS NULL OR r[c] IS NULL OR sigma[k] <= greatest(3 * usual, 0.01);
+        CONTINUE WHEN abs(2 * step - (atan(b[c]) - atan(b[a]))) < radians(45);
+        corner := tunnel_api.section_corner(-angle_step, r[a], b[a], angle_step, r[c], b[c]);
+        IF corner IS NOT NULL AND abs(corner[1]) <= angle_step THEN
+            class_state[k] := 'rejected';
+        END IF;
+    END LOOP;
+
+    -- 3. what hangs on the wall
+    FOR g IN 1 .. 3 LOOP
+        FOR k IN 1 .. classes LOOP
+            -- classes k .. k+g-1 stand between i and j; the wall must go on smoothly before i and after j
+            first := (k + classes - 3) % classes + 1;
+            i := (k + classes - 2) % classes + 1;
+            j := (k + g - 1) % classes + 1;
+            last := (k + g) % classes + 1;
+            CONTINUE WHEN class_state[first] <> 'measured' OR class_state[i] <> 'measured'
+                OR class_state[j] <> 'measured' OR class_state[last] <> 'measured';
+            apart := true;
+            FOR c IN 0 .. g - 1 LOOP
+                a := (k + c - 1) % classes + 1;
+                apart := apart AND class_state[a] = 'measured' AND r[a] < tunnel_api.section_between(
+                    -1, r[i], r[i] * b[i], g, r[j], r[j] * b[j], c) - tolerance;
+                EXIT WHEN NOT apart;
+            END LOOP;
+            CONTINUE WHEN NOT apart;
+            CONTINUE WHEN abs(r[i] - tunnel_api.section_between(
+                    -2 * angle_step, r[first], r[first] * b[first], g * angle_step, r[j], r[j] * b[j], -angle_step)) > tolerance
+                OR abs(r[j] - tunnel_api.section_between(
+                    -angle_step, r[i], r[i] * b[i], (g + 1) * angle_step, r[last], r[last] * b[last], g * angle_step)) > tolerance;
+            FOR c IN 0 .. g - 1 LOOP
+                class_state[(k + c - 1) % classes + 1] := 'rejected';
+            END LOOP;
+        END LOOP;
+    END LOOP;
+
+    -- the classes left, with the last ones repeated before -180° and the first ones after 180°
+    FOR k IN 1 - classes .. 2 * classes LOOP
+        c := (k + classes - 1) % classes + 1;
+        IF class_state[c] = 'measured' THEN
+            angle := -180 + (k - 0.5) * angle_step;
+            IF angle > -360 AND angle < 360 THEN
+                angles := angles || angle;
+                radii := radii || r[c];
+                slopes := slopes || b[c];
+            END IF;
+        END IF;
+    END LOOP;
+
+    -- 4. nodes, and the length between them
+    i := 1;
+    at_corner := NULL;
+    FOR k IN -180 .. 180 LOOP
+        IF k = -180 OR angles[i + 1] <= k THEN
+            WHILE angles[i + 1] <= k LOOP
+                i := i + 1;
+            END LOOP;
+            IF angles[i + 1] - angles[i] > 120 THEN
+                node_radius := NULL;
+                RETURN;
+            END IF;
+            turn := angles[i + 1] - angles[i] - degrees(atan(slopes[i + 1]) - atan(slopes[i]));
+            at_corner := NULL;
+            IF abs(turn) > greatest(30, 2.5 * (angles[i + 1] - angles[i])) THEN
+                at_corner := tunnel_api.section_corner(
+                    angles[i], radii[i], slopes[i], angles[i + 1], radii[i + 1], slopes[i + 1]);
+                IF at_corner IS NOT NULL THEN
+                    corners := corners || at_corner;
+                END IF;
+            END IF;
+        END IF;
+        IF at_corner IS NULL THEN
+            node_radius[k + 181] := tunnel_api.section_between(
+                angles[i], radii[i], radii[i] * slopes[i], angles[i + 1], radii[i + 1], radii[i + 1] * slopes[i + 1], k);
+        ELSE
+            j := CASE WHEN k < at_corner[1] THEN i ELSE i + 1 END;
+            node_radius[k + 181] := radii[j] / (cosd(k - angles[j]) - slopes[j] * sind(k - angles[j]));
+        END IF;
+    END LOOP;
+    node_radius[361] := node_radius[1];
+
+    g := 1;
+    FOR k IN 1 .. 360 LOOP
+        x0 := node_radius[k] * sind(k - 181);
+        y0 := node_radius[k] * cosd(k - 181);
+        x1 := node_radius[k + 1] * sind(k - 180);
+        y1 := node_radius[k + 1] * cosd(k - 180);
+        WHILE g < cardinality(corners) AND corners[g] < k - 181 LOOP
+            g := g + 2;
+        END LOOP;
+        IF g < cardinality(corners) AND corners[g] < k - 180 THEN
+            x1 := corners[g + 1] * sind(corners[g]);
+            y1 := corners[g + 1] * cosd(corners[g]);
+            piece := sqrt((x1 - x0) ^ 2 + (y1 - y0) ^ 2);
+            x0 := node_radius[k + 1] * sind(k - 180);
+            y0 := node_radius[k + 1] * cosd(k - 180);
+            pieces := pieces || piece + sqrt((x1 - x0) ^ 2 + (y1 - y0) ^ 2);
+        ELSE
+            pieces := pieces || sqrt((x1 - x0) ^ 2 + (y1 - y0) ^ 2);
+        END IF;
+    END LOOP;
+    node_arc := array_fill(0::float8, ARRAY[361]);
+    length := 0;
+    FOR k IN 181 .. 360 LOOP
+        length := length + pieces[k];
+        node_arc[k + 1] := length;
+    END LOOP;
+    length := 0;
+    FOR k IN REVERSE 180 .. 1 LOOP
+        length := length - pieces[k];
+        node_arc[k] := length;
+    END LOOP;
+
+    class_radius := r;
+    FOR k IN 1 .. classes LOOP
+        IF class_state[k] <> 'measured' THEN
+            angle := (k - 0.5) * angle_step;    -- from the first node
+            i := floor(angle);
+            class_radius[k] := node_radius[i + 1] + (angle - i) * (node_radius[i + 2] - node_radius[i + 1]);
+        END IF;
+    END LOOP;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.section_curve(float8, float8[], float8[], float8[], float8[], float8) IS
+'The smooth closed curve of a section through its angular classes: radius and arc (m) at each degree from -180° to 180°, and the radius and state of each class (measured, rejected, interpolated). After Gonçalves et al. (2012), stage 4, with a curve for the polygon.';
+
+
+-- Writes the sections of a kilometre to tunnel.section and tunnel.section_class, replacing those there; returns how many.
+--
+-- The slab of a section begins at half_width to both sides of its plane and doubles, up to max_half_width, until nine classes
+-- of ten hold min_points points: where profiles are far apart it widens until the classes fill.
+CREATE OR REPLACE FUNCTION tunnel_api.section_build(
+    survey_id int, km int,
+    angle_step float8 DEFAULT 5.0, half_width float8 DEFAULT 0.1, max_half_width float8 DEFAULT 2.5, min_points int DEFAULT 5,
+    protrusion float8 DEFAULT 0.03)
+RETURNS int
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
+AS $$
+DECLARE
+    classes constant int := round(360 / angle_step);
+    width float8 := least(half_width, max_half_width);
+    pending int[];
+    filled int[];
+    built int;
+BEGIN
+    IF abs(360 / angle_step - classes) > 1e-9 OR angle_step < 1 OR classes % 2 = 1 THEN
+        RAISE EXCEPTION 'angle_step must divide 180 degrees and be at least 1, not %', angle_step;
+    END IF;
+    DELETE FROM tunnel.section s WHERE s.survey_id = section_build.survey_id AND s.km = section_build.km;
+    SELECT coalesce(array_agg(p.segment * 100 + p.half), '{}') INTO pending
+    FROM tunnel_api.section_plane(section_build.survey_id, section_build.km) p;
+
+    LOOP
+        WITH class AS MATERIALIZED (
+            SELECT c.* FROM tunnel_api.section_classes(
+                section_build.survey_id, section_build.km, width, section_build.angle_step, pending) c
+            WHERE c.points >= section_build.min_points
+        ), done AS (
+            SELECT c.segment, c.half
+            FROM class c
+            GROUP BY c.segment, c.half
+            HAVING count(*) >= 0.9 * classes OR width >= section_build.max_half_width
+        ), curve AS (
+            SELECT d.segment, d.half, k.class, k.radius, k.slope, k.sigma, k.points, q.*
+            FROM done d
+            CROSS JOIN LATERAL (
+                SELECT array_agg(i ORDER BY i) AS class, array_agg(c.radius ORDER BY i) AS radius,
+                    array_agg(c.slope ORDER BY i) AS slope, array_agg(c.sigma ORDER BY i) AS sigma,
+                    array_agg(c.spread ORDER BY i) AS spread, array_agg(coalesce(c.points, 0) ORDER BY i) AS points
+                FROM generate_series(0, classes - 1) AS i
+                LEFT JOIN class c ON c.segment = d.segment AND c.half = d.half AND c.class = i) k
+            CROSS JOIN LATERAL tunnel_api.section_curve(
+                section_build.angle_step, k.radius, k.slope, k.sigma, k.spread, section_build.protrusion) q
+        ), written AS (
+            INSERT INTO tunnel.section (survey_id, km, segment, half, chainage, half_width, angle_step, radius, arc, geom,
+                points, interpolated)
+            SELECT section_build.survey_id, section_build.km, c.segment, c.half, p.chainage, width, section_build.angle_step,
+                c.node_radius, c.node_arc,
+                (SELECT ST_MakeLine(array_agg(ST_SetSRID(ST_MakePoint(
+                    p.frame[1] + g.u * p.frame[7] + g.w * p.frame[10],
+                    p.frame[2] + g.u * p.frame[8] + g.w * p.frame[11],
+                    p.frame[3] + g.w * p.frame[12]), t.srid) ORDER BY g.i))
+                 FROM (SELECT i, c.node_radius[i] * sind(i - 181) AS u, c.node_radius[i] * cosd(i - 181) AS w
+                       FROM generate_series(1, 361) AS i) g),
+                (SELECT sum(q) FROM unnest(c.points) q),
+                (SELECT count(*) FROM unnest(c.class_state) q WHERE q <> 'measured')
+            FROM curve c
+            JOIN tunnel_api.section_plane(section_build.survey_id, section_build.km) p
+                ON p.segment = c.segment AND p.half = c.half
+            CROSS JOIN tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+            WHERE s.id = section_build.survey_id AND c.node_radius IS NOT NULL
+            RETURNING section.id, section.segment, section.half
+        ), detail AS (
+            INSERT INTO tunnel.section_class (section_id, class, angle, radius, slope, sigma, points, state)
+            SELECT w.id, k.class, -180 + (k.class + 0.5) * section_build.angle_step, k.radius, k.slope, k.sigma, k.points, k.state
+            FROM written w
+            JOIN curve c ON c.segment = w.segment AND c.half = w.half
+            CROSS JOIN LATERAL unnest(c.class, c.class_radius, c.slope, c.sigma, c.points, c.class_state)
+                AS k (class, radius, slope, sigma, points, state)
+        )
+        SELECT coalesce(array_agg(d.segment * 100 + d.half), '{}') INTO filled FROM done d;
+        SELECT coalesce(array_agg(q), '{}') INTO pending FROM unnest(pending) q WHERE q <> ALL (filled);
+        EXIT WHEN width >= max_half_width OR cardinality(pending) = 0;
+        width := least(2 * width, max_half_width);
+    END LOOP;
+    SELECT count(*) INTO built
+    FROM tunnel.section s WHERE s.survey_id = section_build.survey_id AND s.km = section_build.km;
+    RETURN built;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.section_build(int, int, float8, float8, float8, int, float8) IS
+'Stage 4 for one kilometre: rewrites tunnel.section and tunnel.section_class; returns the number of sections. angle_step in degrees, widths in m. Source: Gonçalves et al. (2012), stage 4.';

@@ -1,0 +1,196 @@
+-- Stage 3 of Gonçalves et al. (2012): segments between planes perpendicular to the axis, and the segment of every point.
+
+-- The plane at the fraction f (0-1) of a segment: origin, tangent, right and up, 12 numbers, in the tunnel's SRID.
+--
+-- The plane turns steadily from the first to the second one; its normal is (1 - f) t_from + f t_to. The origin is where the
+-- cubic Hermite curve through the vertices meets it. The same as tunneldb.geometry.frame.frame_at.
+-- segment: vertex_from, vertex_to, tangent_from, tangent_to, 3 numbers each.
+CREATE OR REPLACE FUNCTION tunnel_api.segment_frame(segment float8[], f float8)
+RETURNS float8[]
+LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE STRICT
+AS $$
+DECLARE
+    g constant float8 := 1 - f;
+    nx float8 := g * segment[7] + f * segment[10];
+    ny float8 := g * segment[8] + f * segment[11];
+    nz float8 := g * segment[9] + f * segment[12];
+    norm constant float8 := sqrt(nx * nx + ny * ny + nz * nz);
+    level constant float8 := (
+        g * (segment[1] * segment[7] + segment[2] * segment[8] + segment[3] * segment[9])
+        + f * (segment[4] * segment[10] + segment[5] * segment[11] + segment[6] * segment[12])) / norm;
+    length constant float8 := sqrt(
+        (segment[4] - segment[1]) ^ 2 + (segment[5] - segment[2]) ^ 2 + (segment[6] - segment[3]) ^ 2);
+    h00 constant float8 := (1 + 2 * f) * g * g;
+    h10 constant float8 := f * g * g * length;
+    h01 constant float8 := f * f * (3 - 2 * f);
+    h11 constant float8 := -f * f * g * length;
+    px constant float8 := h00 * segment[1] + h10 * segment[7] + h01 * segment[4] + h11 * segment[10];
+    py constant float8 := h00 * segment[2] + h10 * segment[8] + h01 * segment[5] + h11 * segment[11];
+    pz constant float8 := h00 * segment[3] + h10 * segment[9] + h01 * segment[6] + h11 * segment[12];
+    gap float8;
+    flat float8;
+BEGIN
+    nx := nx / norm;
+    ny := ny / norm;
+    nz := nz / norm;
+    gap := level - (px * nx + py * ny + pz * nz);
+    flat := sqrt(nx * nx + ny * ny);
+    RETURN ARRAY[
+        px + gap * nx, py + gap * ny, pz + gap * nz,
+        nx, ny, nz,
+        ny / flat, -nx / flat, 0,
+        -nx / flat * nz, -ny / flat * nz, flat];
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.segment_frame(float8[], float8) IS
+'The plane at the fraction f (0-1) of a segment: origin, tangent, right and up (12 numbers), in the tunnel''s SRID, m. segment: vertex_from, vertex_to, tangent_from, tangent_to.';
+
+
+-- The segments of a kilometre as they follow from the axis vertices, without writing them.
+--
+-- Chainage is measured in plan along the axis found, arc by arc, from the start of the kilometre; where the axis goes on
+-- beyond its end, the kilometre is closed on the given axis' whole kilometre, so that no kilometre depends on another one.
+-- line: vertex_from, vertex_to, tangent_from, tangent_to.
+CREATE OR REPLACE FUNCTION tunnel_api.segment_plan(survey_id int, km int)
+RETURNS TABLE (n int, chainage_from float8, chainage_to float8, line float8[])
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+ROWS 100
+AS $$
+    WITH setting AS (
+        SELECT ceil(segment_plan.km * 1000 / t.spacing)::int AS first,
+            ceil((segment_plan.km + 1) * 1000 / t.spacing)::int AS last, t.spacing
+        FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+        WHERE s.id = segment_plan.survey_id
+    ), vertex AS (
+        SELECT array_agg(v.n ORDER BY v.n) AS n, array_agg(ST_X(v.geom) ORDER BY v.n) AS x,
+            array_agg(ST_Y(v.geom) ORDER BY v.n) AS y, array_agg(ST_Z(v.geom) ORDER BY v.n) AS z
+        FROM tunnel.axis_vertex v, setting s
+        WHERE v.survey_id = segment_plan.survey_id AND v.n BETWEEN s.first - 2 AND s.last + 2
+    ), frame AS (
+        SELECT f.* FROM vertex v, tunnel_api.axis_frame(v.n, v.x, v.y, v.z) f
+    ), pair AS (
+        SELECT a.n, ARRAY[a.x, a.y, a.z, b.x, b.y, b.z, a.tx, a.ty, a.tz, b.tx, b.ty, b.tz] AS line,
+            sqrt((b.x - a.x) ^ 2 + (b.y - a.y) ^ 2) AS chord,
+            -- half the angle in plan between the two tangents
+            atan2(a.tx * b.ty - a.ty * b.tx, a.tx * b.tx + a.ty * b.ty) / 2 AS half
+        FROM setting s, frame a JOIN frame b ON b.n = a.n + 1
+        WHERE a.n >= s.first AND a.n < s.last
+    ), measured AS (
+        SELECT p.n, p.line, l.length,
+            sum(l.length) OVER (ORDER BY p.n) AS "to", sum(l.length) OVER () AS total,
+            min(p.n) OVER () AS first, max(p.n) OVER () + 1 AS last
+        FROM pair p
+        CROSS JOIN LATERAL (
+            SELECT CASE WHEN abs(p.half) < 1e-9 THEN p.chord ELSE p.chord * p.half / sin(p.half) END AS length) l
+    )
+    SELECT m.n, m.first * s.spacing + c.scale * (m."to" - m.length), m.first * s.spacing + c.scale * m."to", m.line
+    FROM setting s, measured m
+    CROSS JOIN LATERAL (
+        SELECT CASE WHEN m.last = s.last THEN (m.last - m.first) * s.spacing / m.total ELSE 1 END AS scale) c
+    ORDER BY m.n
+$$;
+COMMENT ON FUNCTION tunnel_api.segment_plan(int, int) IS
+'The segments of one kilometre as they follow from the axis vertices: number, chainage of both planes (m, in plan), and vertex_from, vertex_to, tangent_from, tangent_to (12 numbers, tunnel''s SRID). Source: Gonçalves et al. (2012), stage 3.';
+
+
+-- Writes the segments of a kilometre to tunnel.segment, replacing those there; returns how many.
+CREATE OR REPLACE FUNCTION tunnel_api.segment_build(survey_id int, km int)
+RETURNS int
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
+AS $$
+DECLARE
+    built int;
+BEGIN
+    DELETE FROM tunnel.segment s WHERE s.survey_id = segment_build.survey_id AND s.km = segment_build.km;
+    INSERT INTO tunnel.segment (survey_id, n, km, chainage_from, chainage_to,
+        vertex_from, vertex_to, tangent_from, tangent_to, geom, points)
+    SELECT segment_build.survey_id, p.n, segment_build.km, p.chainage_from, p.chainage_to,
+        p.line[1:3], p.line[4:6], p.line[7:9], p.line[10:12],
+        (SELECT ST_MakeLine(array_agg(ST_SetSRID(ST_MakePoint(f.frame[1], f.frame[2], f.frame[3]), t.srid) ORDER BY i))
+         FROM generate_series(0, 4) AS i, LATERAL (SELECT tunnel_api.segment_frame(p.line, i / 4.0) AS frame) f),
+        0
+    FROM tunnel_api.segment_plan(segment_build.survey_id, segment_build.km) p,
+        tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+    WHERE s.id = segment_build.survey_id;
+    GET DIAGNOSTICS built = ROW_COUNT;
+    RETURN built;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.segment_build(int, int) IS
+'Stage 3 for one kilometre: rewrites tunnel.segment from the axis vertices; returns the number of segments. Source: Gonçalves et al. (2012), stage 3.';
+
+
+-- Segment and chainage of every point of a kilometre: the partition is rewritten with both, in chainage order, and swapped in.
+--
+-- A point's fraction of the way through a segment is its distance from the first plane over the sum of its distances from
+-- both, so it is 0 and 1 on the planes. The segment is first looked up by the chainage known so far, then corrected by the
+-- planes. Points before the first or after the last plane of the tunnel keep their chainage and have no segment.
+CREATE OR REPLACE FUNCTION tunnel_api.segment_tag(survey_id int, km int)
+RETURNS bigint
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
+AS $$
+DECLARE
+    building constant text := tunnel_api.partition_name(survey_id, km) || '_new';
+    spacing float8;
+    tagged bigint;
+    n int[]; a float8[]; b float8[];
+    ax float8[]; ay float8[]; az float8[]; al float8[];
+    bx float8[]; by float8[]; bz float8[]; bl float8[];
+BEGIN
+    SELECT t.spacing INTO STRICT spacing
+    FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = segment_tag.survey_id;
+
+    SELECT array_agg(p.n), array_agg(p.chainage_from), array_agg(p.chainage_to),
+        array_agg(p.line[7]), array_agg(p.line[8]), array_agg(p.line[9]),
+        array_agg(p.line[1] * p.line[7] + p.line[2] * p.line[8] + p.line[3] * p.line[9]),
+        array_agg(p.line[10]), array_agg(p.line[11]), array_agg(p.line[12]),
+        array_agg(p.line[4] * p.line[10] + p.line[5] * p.line[11] + p.line[6] * p.line[12])
+    INTO n, a, b, ax, ay, az, al, bx, by, bz, bl
+    FROM generate_series(segment_tag.km - 1, segment_tag.km + 1) AS k, tunnel_api.segment_plan(segment_tag.survey_id, k) p;
+
+    EXECUTE format('DROP TABLE IF EXISTS tunnel.%I', building);
+    EXECUTE format($query$
+        CREATE TABLE tunnel.%I AS
+        WITH coarse AS (
+            SELECT p.*, s.n + CASE
+                WHEN p.chainage / $3 - s.n BETWEEN 0.15 AND 0.85 THEN 0
+                WHEN ST_X(p.geom) * s.ax + ST_Y(p.geom) * s.ay + ST_Z(p.geom) * s.az < s.al THEN -1
+                WHEN ST_X(p.geom) * s.bx + ST_Y(p.geom) * s.by + ST_Z(p.geom) * s.bz >= s.bl THEN 1
+                ELSE 0 END AS number
+            FROM tunnel.point p
+            LEFT JOIN unnest($4, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, ax, ay, az, al, bx, by, bz, bl)
+                ON s.n = floor(p.chainage / $3)::int
+            WHERE p.survey_id = $1 AND p.km = $2
+        ), measured AS (
+            SELECT c.*, s.n AS found, s.a, s.b,
+                ST_X(c.geom) * s.ax + ST_Y(c.geom) * s.ay + ST_Z(c.geom) * s.az - s.al AS before,
+                s.bl - (ST_X(c.geom) * s.bx + ST_Y(c.geom) * s.by + ST_Z(c.geom) * s.bz) AS after
+            FROM coarse c
+            LEFT JOIN unnest($4, $13, $14, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, a, b, ax, ay, az, al, bx, by, bz, bl)
+                ON s.n = c.number
+        )
+        SELECT m.survey_id, m.km,
+            coalesce(m.a + (m.b - m.a) * m.before / nullif(m.before + m.after, 0), m.chainage) AS chainage,
+            m.gps_time, m.geom, m.found AS segment, m.scan_id, m.file_id, m.intensity, m.classification
+        FROM measured m
+        ORDER BY 3
+    $query$, building)
+    USING survey_id, km, spacing, n, ax, ay, az, al, bx, by, bz, bl, a, b;
+    PERFORM tunnel_api.partition_swap(segment_tag.survey_id, segment_tag.km);
+
+    WITH counted AS (
+        SELECT p.segment, count(*) AS points
+        FROM tunnel.point p
+        WHERE p.survey_id = segment_tag.survey_id AND p.km = segment_tag.km
+        GROUP BY p.segment
+    ), written AS (
+        UPDATE tunnel.segment s SET points = c.points
+        FROM counted c
+        WHERE s.survey_id = segment_tag.survey_id AND s.km = segment_tag.km AND s.n = c.segment
+    )
+    SELECT coalesce(sum(c.points) FILTER (WHERE c.segment IS NOT NULL), 0) INTO tagged FROM counted c;
+    RETURN tagged;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.segment_tag(int, int) IS
+'Stage 3 for the points of one kilometre: rewrites their partition with segment number and chainage (m, in plan) and swaps it in; returns the number of points tagged. Source: Gonçalves et al. (2012), stage 3.';

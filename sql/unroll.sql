@@ -1,0 +1,300 @@
+-- Stage 5 of Gonçalves et al. (2012): between space and the unrolled plane. The same steps as tunneldb/geometry/unrolling.py.
+
+-- Sections before and after a chainage, blended: node radii and arcs (361 each), m. NULL where no section is near.
+-- Two sections bound a stretch when at most one vertex spacing apart; beyond the last one it goes on for half of that.
+CREATE OR REPLACE FUNCTION tunnel_api.section_at(survey_id int, chainage float8, OUT radius float8[], OUT arc float8[])
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+DECLARE
+    reach float8;
+    a tunnel.section;
+    b tunnel.section;
+    g float8;
+BEGIN
+    SELECT t.spacing INTO reach
+    FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = section_at.survey_id;
+    SELECT s.* INTO a FROM tunnel.section s
+    WHERE s.survey_id = section_at.survey_id AND s.chainage <= section_at.chainage ORDER BY s.chainage DESC LIMIT 1;
+    SELECT s.* INTO b FROM tunnel.section s
+    WHERE s.survey_id = section_at.survey_id AND s.chainage > section_at.chainage ORDER BY s.chainage LIMIT 1;
+    IF a.chainage IS NOT NULL AND b.chainage - a.chainage <= reach THEN
+        g := (section_at.chainage - a.chainage) / (b.chainage - a.chainage);
+        SELECT array_agg((1 - g) * q.ra + g * q.rb ORDER BY q.i), array_agg((1 - g) * q.la + g * q.lb ORDER BY q.i)
+        INTO radius, arc
+        FROM unnest(a.radius, b.radius, a.arc, b.arc) WITH ORDINALITY AS q (ra, rb, la, lb, i);
+    ELSIF section_at.chainage - a.chainage <= reach / 2 THEN
+        radius := a.radius;
+        arc := a.arc;
+    ELSIF b.chainage - section_at.chainage <= reach / 2 THEN
+        radius := b.radius;
+        arc := b.arc;
+    END IF;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.section_at(int, float8) IS
+'The section at a chainage, blended from those before and after: radius and arc (m) at each degree from -180° to 180°; NULL where none is near.';
+
+
+-- Node of a section (taken round the circle) and the unit direction of the section there, towards growing angle: u, w, du, dw.
+CREATE OR REPLACE FUNCTION tunnel_api.section_node(radius float8[], k int)
+RETURNS float8[]
+LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE STRICT
+AS $$
+DECLARE
+    i constant int := (k + 360) % 360;
+    before constant float8 := radius[(i + 359) % 360 + 1];
+    after constant float8 := radius[(i + 1) % 360 + 1];
+    du constant float8 := after * sind(i - 179) - before * sind(i - 181);
+    dw constant float8 := after * cosd(i - 179) - before * cosd(i - 181);
+    length constant float8 := sqrt(du * du + dw * dw);
+BEGIN
+    RETURN ARRAY[radius[i + 1] * sind(i - 180), radius[i + 1] * cosd(i - 180), du / length, dw / length];
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.section_node(float8[], int) IS
+'Node k (0-359, -180° + k) of a section, right and up of the axis (m), and the unit direction of the section there.';
+
+
+-- Chainage, arc and offset of a point of a survey's tunnel; NULL where it lies off the tunnel.
+--
+-- chainage: m in plan along the axis; arc: m along the section from the crown, positive right looking up-chainage;
+-- offset: m from the section's surface, positive into the tunnel. The point must have the tunnel's SRID (or none).
+-- A point beyond the ends, or more than 3 m outside the surface, is off the tunnel.
+CREATE OR REPLACE FUNCTION tunnel_api.unroll(
+    survey_id int, point geometry, OUT chainage float8, OUT arc float8, OUT "offset" float8)
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+DECLARE
+    max_outside constant float8 := 3.0;
+    x constant float8 := ST_X(point);
+    y constant float8 := ST_Y(point);
+    z constant float8 := ST_Z(point);
+    srid int;
+    s tunnel.segment;
+    number int;
+    before float8;
+    after float8;
+    f float8;
+    frame float8[];
+    section record;
+    u float8; w float8;
+    k int;
+    n0 float8[]; n1 float8[];
+    here float8; following float8;
+    t float8; c0 float8; c1 float8; c2 float8; slope float8;
+    du float8; dw float8; length float8; inward float8;
+BEGIN
+    SELECT q.srid INTO srid FROM tunnel.survey v JOIN tunnel.tunnel q ON q.id = v.tunnel_id WHERE v.id = unroll.survey_id;
+    IF srid IS NULL THEN
+        RAISE EXCEPTION 'there is no survey %', survey_id;
+    ELSIF ST_SRID(point) NOT IN (0, srid) THEN
+        RAISE EXCEPTION 'the point has SRID %, the tunnel %: use ST_Transform(point, %)', ST_SRID(point), srid, srid;
+    END IF;
+
+    SELECT q.* INTO s FROM tunnel.segment q
+    WHERE q.survey_id = unroll.survey_id ORDER BY q.geom <-> ST_SetSRID(point, srid) LIMIT 1;
+    LOOP
+        IF s.n IS NULL THEN
+            RETURN;
+        END IF;
+        before := (x - s.vertex_from[1]) * s.tangent_from[1] + (y - s.vertex_from[2]) * s.tangent_from[2]
+            + (z - s.vertex_from[3]) * s.tangent_from[3];
+        after := (s.vertex_to[1] - x) * s.tangent_to[1] + (s.vertex_to[2] - y) * s.tangent_to[2]
+            + (s.vertex_to[3] - z) * s.tangent_to[3];
+        IF before < 0 THEN
+            EXIT WHEN s.n - 1 = number;
+            number := s.n;
+            SELECT q.* INTO s FROM tunnel.segment q WHERE q.survey_id = unroll.survey_id AND q.n = number - 1;
+        ELSIF after <= 0 THEN
+            number := s.n;
+            SELECT q.* INTO s FROM tunnel.segment q WHERE q.survey_id = unroll.survey_id AND q.n = number + 1;
+        ELSE
+            EXIT;
+        END IF;
+    END LOOP;
+    -- a point between the planes of two segments (where they cross, far from the axis) lies on the later one's first plane
+    f := CASE WHEN before < 0 THEN 0 ELSE before / (before + after) END;
+    frame := tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to, f);
+    SELECT q.* INTO section
+    FROM tunnel_api.section_at(survey_id, s.chainage_from + f * (s.chainage_to - s.chainage_from)) q;
+    IF section.radius IS NULL THEN
+        RETURN;
+    END IF;
+    u := (x - frame[1]) * frame[7] + (y - frame[2]) * frame[8];
+    w := (x - frame[1]) * frame[10] + (y - frame[2]) * frame[11] + (z - frame[3]) * frame[12];
+
+    -- the interval between whose normals the point lies
+    k := (floor(degrees(atan2(u, w)) + 180))::int % 360;
+    n0 := tunnel_api.section_node(section.radius, k);
+    n1 := tunnel_api.section_node(section.radius, k + 1);
+    here := (u - n0[1]) * n0[3] + (w - n0[2]) * n0[4];
+    following := (u - n1[1]) * n1[3] + (w - n1[2]) * n1[4];
+    FOR step IN 1 .. 180 LOOP
+        IF here < 0 THEN
+            k := (k + 359) % 360;
+            n1 := n0;
+            following := here;
+            n0 := tunnel_api.section_node(section.radius, k);
+            here := (u - n0[1]) * n0[3] + (w - n0[2]) * n0[4];
+            EXIT WHEN here >= 0;
+        ELSIF following >= 0 THEN
+            k := (k + 1) % 360;
+            n0 := n1;
+            here := following;
+            n1 := tunnel_api.section_node(section.radius, k + 1);
+            following := (u - n1[1]) * n1[3] + (w - n1[2]) * n1[4];
+            EXIT WHEN following < 0;
+        ELSE
+            EXIT;
+        END IF;
+    END LOOP;
+
+    -- (q - t b) · (d0 + t e) = 0, q being the point seen from the first node, b the chord, e the change of direction
+    c0 := (u - n0[1]) * n0[3] + (w - n0[2]) * n0[4];
+    c1 := (u - n0[1]) * (n1[3] - n0[3]) + (w - n0[2]) * (n1[4] - n0[4])
+        - (n1[1] - n0[1]) * n0[3] - (n1[2] - n0[2]) * n0[4];
+    c2 := -((n1[1] - n0[1]) * (n1[3] - n0[3]) + (n1[2] - n0[2]) * (n1[4] - n0[4]));
+    t := CASE WHEN here > following THEN here / (here - following) ELSE 0.5 END;
+    FOR step IN 1 .. 4 LOOP
+        slope := c1 + 2 * c2 * t;
+        EXIT WHEN slope = 0;
+        t := t - (c0 + t * (c1 + t * c2)) / slope;
+    END LOOP;
+    t := least(greatest(t, 0), 1);
+
+    du := n0[3] + t * (n1[3] - n0[3]);
+    dw := n0[4] + t * (n1[4] - n0[4]);
+    length := sqrt(du * du + dw * dw);
+    inward := ((u - n0[1] - t * (n1[1] - n0[1])) * dw - (w - n0[2] - t * (n1[2] - n0[2])) * du) / length;
+    IF inward < -max_outside THEN
+        RETURN;
+    END IF;
+    chainage := s.chainage_from + f * (s.chainage_to - s.chainage_from);
+    arc := (1 - t) * section.arc[k + 1] + t * section.arc[k + 2];
+    "offset" := inward;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.unroll(int, geometry) IS
+'Chainage (m in plan along the axis), arc (m along the section from the crown, positive right) and offset (m from the surface, positive into the tunnel) of a point in the tunnel''s SRID; NULL off the tunnel. After Gonçalves et al. (2012), stage 5.';
+
+
+-- The point at chainage, arc and offset, in the tunnel's SRID; NULL where they lie off the tunnel. The inverse of unroll.
+CREATE OR REPLACE FUNCTION tunnel_api.roll(survey_id int, chainage float8, arc float8, "offset" float8 DEFAULT 0)
+RETURNS geometry
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+DECLARE
+    s tunnel.segment;
+    srid int;
+    frame float8[];
+    section record;
+    low int := 1;
+    high int := 361;
+    middle int;
+    t float8;
+    n0 float8[]; n1 float8[];
+    u float8; w float8; du float8; dw float8; length float8;
+BEGIN
+    SELECT q.* INTO s FROM tunnel.segment q
+    WHERE q.survey_id = roll.survey_id AND q.chainage_from <= roll.chainage ORDER BY q.chainage_from DESC LIMIT 1;
+    IF s.n IS NULL OR roll.chainage > s.chainage_to THEN
+        RETURN NULL;
+    END IF;
+    SELECT q.* INTO section FROM tunnel_api.section_at(survey_id, chainage) q;
+    IF section.radius IS NULL OR arc < section.arc[1] - 1e-6 OR arc > section.arc[361] + 1e-6 THEN
+        RETURN NULL;
+    END IF;
+    WHILE high - low > 1 LOOP
+        middle := (low + high) / 2;
+        IF section.arc[middle] <= arc THEN
+            low := middle;
+        ELSE
+            high := middle;
+        END IF;
+    END LOOP;
+    t := (arc - section.arc[low]) / (section.arc[low + 1] - section.arc[low]);
+    n0 := tunnel_api.section_node(section.radius, low - 1);
+    n1 := tunnel_api.section_node(section.radius, low);
+    du := n0[3] + t * (n1[3] - n0[3]);
+    dw := n0[4] + t * (n1[4] - n0[4]);
+    length := sqrt(du * du + dw * dw);
+    u := n0[1] + t * (n1[1] - n0[1]) + "offset" * dw / length;
+    w := n0[2] + t * (n1[2] - n0[2]) - "offset" * du / length;
+    frame := tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to,
+        (chainage - s.chainage_from) / (s.chainage_to - s.chainage_from));
+    SELECT q.srid INTO srid FROM tunnel.survey v JOIN tunnel.tunnel q ON q.id = v.tunnel_id WHERE v.id = roll.survey_id;
+    RETURN ST_SetSRID(ST_MakePoint(
+        frame[1] + u * frame[7] + w * frame[10],
+        frame[2] + u * frame[8] + w * frame[11],
+        frame[3] + w * frame[12]), srid);
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.roll(int, float8, float8, float8) IS
+'The point (tunnel''s SRID) at chainage, arc and offset, m; NULL off the tunnel. The inverse of unroll.';
+
+
+-- A geometry of the unrolled plane (x = chainage, y = arc) laid on the tunnel's surface, in 3D and the tunnel's SRID.
+-- Edges are cut to pieces of at most 0.1 m first, so that they follow the surface. NULL if any of it lies off the tunnel.
+CREATE OR REPLACE FUNCTION tunnel_api.roll(survey_id int, unrolled geometry)
+RETURNS geometry
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+AS $$
+DECLARE
+    rings geometry[];
+    path int[];
+    kind constant text := GeometryType(unrolled);
+    lines geometry[];
+BEGIN
+    IF kind NOT IN ('POINT', 'LINESTRING', 'POLYGON') THEN
+        RAISE EXCEPTION 'roll takes a point, a line or a polygon of the unrolled plane, not a %', kind;
+    ELSIF kind = 'POINT' THEN
+        RETURN tunnel_api.roll(survey_id, ST_X(unrolled), ST_Y(unrolled));
+    END IF;
+    SELECT array_agg(q.line ORDER BY q.ring) INTO lines
+    FROM (SELECT r.ring, CASE WHEN bool_or(p.point IS NULL) THEN NULL ELSE ST_MakeLine(p.point ORDER BY p.i) END AS line
+          FROM (SELECT coalesce(d.path[1], 0) AS ring,
+                    ST_Segmentize(CASE WHEN kind = 'POLYGON' THEN ST_ExteriorRing(d.geom) ELSE d.geom END, 0.1) AS line
+                FROM (SELECT (ST_DumpRings(unrolled)).* WHERE kind = 'POLYGON'
+                      UNION ALL SELECT NULL, unrolled WHERE kind = 'LINESTRING') d) r
+          CROSS JOIN LATERAL (
+              SELECT d.path[1] AS i, tunnel_api.roll(survey_id, ST_X(d.geom), ST_Y(d.geom)) AS point
+              FROM ST_DumpPoints(r.line) d) p
+          GROUP BY r.ring) q;
+    IF array_position(lines, NULL) IS NOT NULL THEN
+        RETURN NULL;
+    ELSIF kind = 'LINESTRING' THEN
+        RETURN lines[1];
+    END IF;
+    RETURN ST_MakePolygon(lines[1], lines[2:]);
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.roll(int, geometry) IS
+'A point, line or polygon of the unrolled plane (chainage, arc; m) laid on the tunnel''s surface: 3D, tunnel''s SRID. NULL if any of it lies off the tunnel.';
+
+
+-- A geometry of the unrolled plane laid on the map beside the axis, in the tunnel's SRID (Gonçalves et al., 2012, eq. 1):
+-- each vertex goes from the axis at its chainage by its arc, horizontally to the right.
+CREATE OR REPLACE FUNCTION tunnel_api.map_point(survey_id int, chainage float8, arc float8)
+RETURNS geometry
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+DECLARE
+    s tunnel.segment;
+    frame float8[];
+BEGIN
+    SELECT q.* INTO s FROM tunnel.segment q
+    WHERE q.survey_id = map_point.survey_id AND q.chainage_from <= map_point.chainage ORDER BY q.chainage_from DESC LIMIT 1;
+    IF s.n IS NULL OR map_point.chainage > s.chainage_to THEN
+        RETURN NULL;
+    END IF;
+    frame := tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to,
+        (chainage - s.chainage_from) / (s.chainage_to - s.chainage_from));
+    RETURN ST_SetSRID(ST_MakePoint(frame[1] + arc * frame[7], frame[2] + arc * frame[8]), ST_SRID(s.geom));
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.map_point(int, float8, float8) IS
+'The point of the map strip (tunnel''s SRID) at chainage and arc, m: arc metres to the right of the axis. Source: Gonçalves et al. (2012), eq. 1.';
