@@ -76,7 +76,7 @@ class LazyGroup(click.Group):
                 raise
             message = described
         click.echo(f"tunneldb: {message}", err=True)
-        ctx.exit(2)
+        return ctx.exit(2)
 
 
 def _describe_database_error(error: Exception) -> str | None:

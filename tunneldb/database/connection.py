@@ -1,0 +1,83 @@
+"""Connections: to the embedded server, or to the database that a DSN names."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import psycopg
+import sqlalchemy
+from sqlalchemy.pool import NullPool, StaticPool
+
+from tunneldb.database.binaries import MINIMUM_POSTGRESQL
+from tunneldb.database.server import Server
+from tunneldb.errors import UserError
+
+MINIMUM_POSTGIS = (3, 3)
+
+
+def resolve_dsn(dsn: str | None) -> str:
+    """Return the DSN, or that of the embedded server, which is started if need be."""
+    return dsn if dsn is not None else Server().start()
+
+
+def open_connection(dsn: str | None) -> psycopg.Connection[Any]:
+    """Connect without looking at the schema.
+
+    Raises
+    ------
+    UserError
+        When the server is down, refuses, or is too old.
+    """
+    try:
+        connection = psycopg.connect(resolve_dsn(dsn), application_name="tunneldb", client_encoding="UTF8", connect_timeout=15)
+    except psycopg.ProgrammingError as error:
+        raise UserError(f"the DSN is not one that libpq understands: {_first_line(error)}") from None
+    except psycopg.OperationalError as error:
+        raise UserError(f"cannot connect to the database: {_first_line(error)}") from None
+    major = connection.info.server_version // 10000
+    if major < MINIMUM_POSTGRESQL:
+        connection.close()
+        raise UserError(f"the server is PostgreSQL {major}; tunneldb needs {MINIMUM_POSTGRESQL} or newer")
+    return connection
+
+
+def connect(dsn: str | None) -> psycopg.Connection[Any]:
+    """Connect to a database that `tunneldb init` has prepared; None means the embedded server.
+
+    Returns
+    -------
+    psycopg.Connection
+        In a transaction of its own (no autocommit), idle.
+
+    Raises
+    ------
+    UserError
+        When the server is down, has no PostGIS, or its schema is absent, older or newer than this program's.
+    """
+    from tunneldb.database.install import require_current_schema
+
+    connection = open_connection(dsn)
+    try:
+        require_current_schema(connection)
+        connection.rollback()
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+def sqlalchemy_engine(dsn: str | None) -> sqlalchemy.Engine:
+    """Return an SQLAlchemy engine on the database; None means the embedded server."""
+    conninfo = resolve_dsn(dsn)
+    return sqlalchemy.create_engine("postgresql+psycopg://", creator=lambda: psycopg.connect(conninfo), poolclass=NullPool)
+
+
+def engine_on(connection: psycopg.Connection[Any]) -> sqlalchemy.Engine:
+    """Return an engine that uses one connection, which stays the caller's to close; it must be idle."""
+    return sqlalchemy.create_engine(
+        "postgresql+psycopg://", creator=lambda: connection, poolclass=StaticPool, pool_reset_on_return=None
+    )
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().split("\n", 1)[0]

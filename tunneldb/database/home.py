@@ -1,0 +1,152 @@
+"""Where the embedded server lives, and as which user it runs."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pwd
+import stat
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import platformdirs
+
+from tunneldb.errors import UserError
+
+SOCKET_PATH_LIMIT = 107  # bytes of sun_path on Linux (103 on macOS), without the final zero
+SOCKET_NAME = ".s.PGSQL.5432"
+ROOT_STATE = Path("/var/lib/tunneldb")
+
+
+@dataclass(frozen=True)
+class Home:
+    """The folders of one embedded server.
+
+    Attributes
+    ----------
+    folder
+        TUNNELDB_HOME, or tunneldb in the user's data folder.
+    state
+        Folder of the data and the log: `folder` itself, or for root one below /var/lib/tunneldb when the
+        server's user cannot enter `folder`.
+    run
+        Folder of the socket; short enough for the operating system.
+    user
+        System user that the server runs as; None for the present one.
+    """
+
+    folder: Path
+    state: Path
+    run: Path
+    user: pwd.struct_passwd | None
+
+    @property
+    def cluster(self) -> Path:
+        """PostgreSQL's data folder."""
+        return self.state / "cluster"
+
+    @property
+    def log(self) -> Path:
+        """The server's log."""
+        return self.state / "server.log"
+
+    @property
+    def lock(self) -> Path:
+        """File that is locked while the server is being made, started or stopped."""
+        return self.folder / "lock"
+
+
+def home_folder() -> Path:
+    """Return the embedded server's folder: TUNNELDB_HOME, or tunneldb in the user's data folder."""
+    given = os.environ.get("TUNNELDB_HOME")
+    return Path(given).expanduser().absolute() if given else Path(platformdirs.user_data_dir("tunneldb"))
+
+
+def prepare_home(folder: Path) -> Home:
+    """Make the folders of an embedded server, with the owner and the mode that PostgreSQL wants.
+
+    Raises
+    ------
+    UserError
+        When a folder cannot be made, or root finds no user to run the server as.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        user = _server_user(folder)
+        state = folder
+        if user is not None:
+            folder.chmod(folder.stat().st_mode | 0o111)
+            if not _can_enter(folder, user):
+                state = ROOT_STATE / f"{folder.name}-{_digest(folder)}"
+                state.mkdir(parents=True, exist_ok=True)
+        run = _socket_dir(state, user)
+        for private in (state / "cluster", run):
+            _make_private(private, user)
+        if state != folder and not (folder / "cluster").is_symlink():
+            (folder / "cluster").symlink_to(state / "cluster")
+    except OSError as error:
+        raise UserError(
+            f"cannot make the embedded server's folder {error.filename or folder}: {error.strerror}; "
+            "set TUNNELDB_HOME to another"
+        ) from None
+    return Home(folder=folder, state=state, run=run, user=user)
+
+
+def _server_user(folder: Path) -> pwd.struct_passwd | None:
+    """Return whom root drops to, since PostgreSQL refuses root; None for anybody else."""
+    if os.geteuid() != 0:
+        return None
+    owner = folder.stat().st_uid
+    if owner != 0:
+        return pwd.getpwuid(owner)
+    try:
+        return pwd.getpwnam("postgres")
+    except KeyError:
+        raise UserError(
+            "PostgreSQL refuses to run as root and there is no user postgres to run it as: "
+            "sudo apt install postgresql-15-postgis-3, or use tunneldb as another user"
+        ) from None
+
+
+def _can_enter(folder: Path, user: pwd.struct_passwd) -> bool:
+    test = ["/usr/bin/test", "-x", str(folder)]
+    return subprocess.run(test, cwd="/", check=False, **run_as(user)).returncode == 0
+
+
+def run_as(user: pwd.struct_passwd | None) -> dict[str, int | list[int]]:
+    """Return the arguments of subprocess that drop root's rights to a user's."""
+    if user is None:
+        return {}
+    return {"user": user.pw_uid, "group": user.pw_gid, "extra_groups": []}
+
+
+def _digest(folder: Path) -> str:
+    return hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:10]
+
+
+def _socket_dir(state: Path, user: pwd.struct_passwd | None) -> Path:
+    """Return the socket's folder: beside the data, or a short one below /tmp when that path is too long."""
+    beside = state / "run"
+    if len(os.fsencode(beside / SOCKET_NAME)) <= SOCKET_PATH_LIMIT - 5:  # room for ".lock"
+        return beside
+    owner = os.geteuid() if user is None else user.pw_uid
+    return Path(f"/tmp/tunneldb-{owner}-{_digest(state)}")
+
+
+def _make_private(folder: Path, user: pwd.struct_passwd | None) -> None:
+    """Make a folder that only the server's user may enter; refuse one that somebody else has made.
+
+    The socket trusts whoever reaches it, so the folder is the lock on the door.
+    """
+    owner = os.geteuid() if user is None else user.pw_uid
+    try:
+        folder.mkdir(mode=0o700)
+        if user is not None:
+            os.chown(folder, user.pw_uid, user.pw_gid)
+    except FileExistsError:
+        found = folder.lstat()
+        if not stat.S_ISDIR(found.st_mode) or found.st_uid != owner:
+            raise UserError(f"{folder} is not a folder of the server's user; remove it or set TUNNELDB_HOME") from None
+        if stat.S_IMODE(found.st_mode) & 0o077:
+            folder.chmod(0o700)

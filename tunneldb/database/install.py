@@ -1,0 +1,206 @@
+"""Install and upgrade: migrations of schema `tunnel`, then schema `tunnel_api` anew."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any, LiteralString, cast
+
+import psycopg
+import sqlalchemy
+from alembic import command
+from alembic.config import Config
+from alembic.script import ScriptDirectory
+from psycopg import sql
+
+from tunneldb import __version__
+from tunneldb.database.connection import MINIMUM_POSTGIS, engine_on
+from tunneldb.database.resources import resource_dir
+from tunneldb.errors import UserError
+
+_LOCK = 7088630451  # any number: two installations of one database wait for each other
+
+
+def install(connection: psycopg.Connection[Any], revision: str = "head") -> None:
+    """Create or upgrade everything, in one transaction; what is up to date stays, tunnel_api is made anew.
+
+    Parameters
+    ----------
+    connection
+        Idle connection as the database's owner.
+    revision
+        Migration to stop at; tests use it.
+
+    Raises
+    ------
+    UserError
+        When PostGIS is missing and cannot be created, or the database is of a newer version.
+    """
+    with engine_on(connection).begin() as session:
+        session.execute(sqlalchemy.text("SELECT pg_advisory_xact_lock(:key)"), {"key": _LOCK})
+        _require_postgis(connection, create=True)
+        known = ScriptDirectory.from_config(alembic_config())
+        present = schema_revision(connection)
+        if present is not None and present not in {script.revision for script in known.walk_revisions()}:
+            raise UserError(_newer(present))
+        command.upgrade(alembic_config(session), revision)
+        install_api(connection)
+
+
+def install_api(connection: psycopg.Connection[Any]) -> None:
+    """Drop schema tunnel_api and install it from the SQL files, in the connection's transaction.
+
+    Raises
+    ------
+    UserError
+        When something outside of the schema was built on it, which the drop would take along.
+    """
+    _refuse_dependents(connection)
+    connection.execute("DROP SCHEMA IF EXISTS tunnel_api CASCADE")
+    connection.execute("CREATE SCHEMA tunnel_api")
+    for path in sql_files():
+        try:
+            connection.execute(cast(LiteralString, path.read_text("utf-8")))
+        except psycopg.Error as error:
+            error.add_note(f"in {path}{_line_of(error, path)}")
+            raise
+    connection.execute(sql.SQL("COMMENT ON SCHEMA tunnel_api IS {}").format(sql.Literal(api_version())))
+
+
+def sql_files() -> list[Path]:
+    """Return the files of tunnel_api in the order of installation.
+
+    Raises
+    ------
+    ValueError
+        When install.txt and the folder do not name the same files.
+    """
+    folder = resource_dir("sql")
+    lines = (folder / "install.txt").read_text("utf-8").splitlines()
+    listed = [line.strip() for line in lines if line.strip() and not line.startswith("#")]
+    there = {path.name for path in folder.glob("*.sql")}
+    if forgotten := there - set(listed):
+        raise ValueError(f"{folder / 'install.txt'} does not list {', '.join(sorted(forgotten))}")
+    return [folder / name for name in listed if name in there]
+
+
+def api_version() -> str:
+    """Return what the comment on schema tunnel_api says: the program's version and a digest of the files."""
+    digest = hashlib.sha256()
+    for path in sql_files():
+        digest.update(path.read_bytes())
+    return f"Functions and views of tunneldb {__version__}, {digest.hexdigest()[:12]}; made anew by tunneldb init"
+
+
+def installed_api_version(connection: psycopg.Connection[Any]) -> str | None:
+    """Return the comment on the database's schema tunnel_api, None when there is none."""
+    row = connection.execute("SELECT obj_description(to_regnamespace('tunnel_api'), 'pg_namespace')").fetchone()
+    return row[0] if row else None
+
+
+def alembic_config(session: sqlalchemy.Connection | None = None) -> Config:
+    """Return Alembic's configuration, on a connection if one is given."""
+    config = Config()
+    config.set_main_option("script_location", str(resource_dir("migrations")).replace("%", "%%"))
+    config.attributes["connection"] = session
+    return config
+
+
+def schema_revision(connection: psycopg.Connection[Any]) -> str | None:
+    """Return the revision of the database's schema `tunnel`, None when it has none."""
+    there = connection.execute("SELECT to_regclass('tunnel.alembic_version')").fetchone()
+    if there is None or there[0] is None:
+        return None
+    row = connection.execute("SELECT version_num FROM tunnel.alembic_version").fetchone()
+    return row[0] if row else None
+
+
+def postgis_version(connection: psycopg.Connection[Any]) -> str | None:
+    """Return the version of PostGIS in this database, None when it has none."""
+    row = connection.execute("SELECT extversion FROM pg_extension WHERE extname = 'postgis'").fetchone()
+    return row[0] if row else None
+
+
+def require_current_schema(connection: psycopg.Connection[Any]) -> None:
+    """Raise a UserError unless PostGIS and this program's schema are there."""
+    _require_postgis(connection, create=False)
+    script = ScriptDirectory.from_config(alembic_config())
+    revision = schema_revision(connection)
+    if revision == script.get_current_head():
+        if installed_api_version(connection) is None:
+            raise UserError("schema tunnel_api is missing: tunneldb init")
+        return
+    if revision is None:
+        raise UserError("the database has no schema tunnel yet: tunneldb init")
+    if revision in {known.revision for known in script.walk_revisions()}:
+        raise UserError(f"the database's schema is older ({revision}) than this program: tunneldb init upgrades it")
+    raise UserError(_newer(revision))
+
+
+def _newer(revision: str) -> str:
+    return (
+        f"the database is of a newer version (schema {revision}) than this tunneldb {__version__}: "
+        "pip install --upgrade tunneldb"
+    )
+
+
+def _require_postgis(connection: psycopg.Connection[Any], *, create: bool) -> None:
+    version = postgis_version(connection)
+    if version is None and not create:
+        raise UserError("the database has no PostGIS: tunneldb init, or CREATE EXTENSION postgis by a superuser")
+    if version is None:
+        try:
+            with connection.transaction():
+                connection.execute("CREATE EXTENSION IF NOT EXISTS postgis")
+        except psycopg.errors.InsufficientPrivilege:
+            raise UserError(
+                "the database has no PostGIS and this user may not create it; a superuser can: CREATE EXTENSION postgis"
+            ) from None
+        except (psycopg.errors.UndefinedFile, psycopg.errors.FeatureNotSupported):
+            major = connection.info.server_version // 10000
+            raise UserError(
+                f"PostGIS is not installed on the database's server: sudo apt install postgresql-{major}-postgis-3"
+            ) from None
+        version = postgis_version(connection)
+    assert version is not None
+    if tuple(int(part) for part in version.split(".")[:2]) < MINIMUM_POSTGIS:
+        least = ".".join(map(str, MINIMUM_POSTGIS))
+        raise UserError(
+            f"the database has PostGIS {version}, tunneldb needs {least} or newer; after installing it on the "
+            "server: SELECT postgis_extensions_upgrade()"
+        )
+
+
+def _refuse_dependents(connection: psycopg.Connection[Any]) -> None:
+    """Refuse to drop tunnel_api while views or columns outside of it rest on it."""
+    rows = connection.execute(
+        """
+        WITH api AS (
+            SELECT 'pg_class'::regclass AS catalog, oid FROM pg_class WHERE relnamespace = to_regnamespace('tunnel_api')
+            UNION ALL
+            SELECT 'pg_proc'::regclass, oid FROM pg_proc WHERE pronamespace = to_regnamespace('tunnel_api')
+            UNION ALL
+            SELECT 'pg_type'::regclass, oid FROM pg_type WHERE typnamespace = to_regnamespace('tunnel_api')
+        )
+        SELECT DISTINCT coalesce(r.ev_class, CASE d.classid WHEN 'pg_class'::regclass THEN d.objid END)::regclass::text
+          FROM pg_depend d
+          JOIN api ON api.catalog = d.refclassid AND api.oid = d.refobjid
+          LEFT JOIN pg_rewrite r ON d.classid = 'pg_rewrite'::regclass AND r.oid = d.objid
+          JOIN pg_class c ON c.oid = coalesce(r.ev_class, CASE d.classid WHEN 'pg_class'::regclass THEN d.objid END)
+         WHERE c.relnamespace <> to_regnamespace('tunnel_api') AND c.relkind <> 'S'
+           AND d.deptype IN ('n', 'a')
+         ORDER BY 1
+        """
+    ).fetchall()
+    if rows:
+        names = ", ".join(row[0] for row in rows)
+        raise UserError(
+            f"{names} rest on schema tunnel_api, which is made anew: drop them, run tunneldb init, create them again"
+        )
+
+
+def _line_of(error: psycopg.Error, path: Path) -> str:
+    position = error.diag.statement_position
+    if position is None:
+        return ""
+    return f", line {path.read_text('utf-8')[: int(position)].count(chr(10)) + 1}"

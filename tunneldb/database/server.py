@@ -1,0 +1,258 @@
+"""The embedded server: a private PostgreSQL cluster of the user's own, that starts by itself.
+
+It listens on a Unix socket only, in a folder that nobody else may enter, and goes on when the command that
+started it has ended; `tunneldb server stop` stops it.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import getpass
+import os
+import subprocess
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal
+
+import psycopg
+from psycopg import sql
+from psycopg.conninfo import make_conninfo
+
+from tunneldb.database import machine
+from tunneldb.database.binaries import Binaries, find_binaries
+from tunneldb.database.home import Home, home_folder, prepare_home, run_as
+from tunneldb.errors import UserError
+
+DATABASE = "tunneldb"
+_SUPERUSER = "postgres"
+_START_SECONDS = 120
+_LOG_LIMIT = 20 * machine.MIB
+_SETTINGS_FILE = "tunneldb.conf"
+
+State = Literal["absent", "stopped", "running"]
+
+
+class Server:
+    """An embedded server in a folder.
+
+    Parameters
+    ----------
+    folder
+        The server's folder; TUNNELDB_HOME or the user's data folder when None.
+    settings
+        PostgreSQL settings on top of those sized to the machine.
+    """
+
+    def __init__(self, folder: Path | None = None, settings: Mapping[str, str] | None = None) -> None:
+        self.folder = folder or home_folder()
+        self._extra = dict(settings or {})
+
+    def start(self) -> str:
+        """Start the server unless it runs, make what it lacks, and return the DSN of its database.
+
+        Raises
+        ------
+        UserError
+            When PostgreSQL or PostGIS is not installed, or the server does not start.
+        """
+        home = prepare_home(self.folder)
+        if not _accepts(home):
+            with _locked(home):
+                if not _accepts(home):
+                    binaries = _initialise(home)
+                    self._write_settings(home)
+                    _launch(home, binaries)
+        return _prepare_database(home)
+
+    def stop(self) -> bool:
+        """Stop the server, and return whether it ran. Connections are closed, their transactions undone."""
+        if self.state() != "running":
+            return False
+        home = prepare_home(self.folder)
+        with _locked(home):
+            _pg_ctl(home, find_binaries(_major(home)), "stop", "-m", "fast", "-t", str(_START_SECONDS))
+        return True
+
+    def state(self) -> State:
+        """Return whether the server was ever made, is stopped, or runs."""
+        if not (self.folder / "cluster" / "PG_VERSION").exists():
+            return "absent"
+        return "running" if _accepts(prepare_home(self.folder)) else "stopped"
+
+    def home(self) -> Home:
+        """Return the server's folders, made if need be."""
+        return prepare_home(self.folder)
+
+    def _write_settings(self, home: Home) -> None:
+        lines = ["# Written anew at each start, from the machine's size. Your own settings: postgresql.conf"]
+        lines += [f"{name} = {value}" for name, value in (machine.settings(home.run) | self._extra).items()]
+        path = home.cluster / _SETTINGS_FILE
+        path.write_text("\n".join(lines) + "\n")
+        _give(path, home)
+
+
+def _give(path: Path, home: Home) -> None:
+    """Let the server's user own a file that root has made."""
+    if home.user is not None:
+        os.chown(path, home.user.pw_uid, home.user.pw_gid)
+
+
+@contextmanager
+def _locked(home: Home) -> Iterator[None]:
+    """Hold the server's lock, so that two commands do not make or start it at once."""
+    with home.lock.open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def _dsn(home: Home, database: str, user: str) -> str:
+    return make_conninfo(host=str(home.run), port=5432, dbname=database, user=user)
+
+
+def _accepts(home: Home) -> bool:
+    """Return whether the server answers."""
+    try:
+        psycopg.connect(_dsn(home, "postgres", _SUPERUSER), connect_timeout=10).close()
+    except psycopg.OperationalError:
+        return False
+    return True
+
+
+def _major(home: Home) -> int:
+    return int((home.cluster / "PG_VERSION").read_text())
+
+
+def _environment() -> dict[str, str]:
+    """Return the environment without what libpq and the server would take from it; messages in English."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PG", "LC_", "LANG"))}
+    return kept | {"LC_ALL": "C"}
+
+
+def _execute(home: Home, command: list[str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command,
+        cwd="/",
+        env=_environment(),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+        **run_as(home.user),  # type: ignore[call-overload]
+    )
+
+
+def _pg_ctl(home: Home, binaries: Binaries, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return _execute(home, [binaries["pg_ctl"], "-D", str(home.cluster), "-w", *arguments])
+
+
+def _initialise(home: Home) -> Binaries:
+    """Make the cluster unless it is there, and return the programs that fit it."""
+    if (home.cluster / "PG_VERSION").exists():
+        return find_binaries(_major(home))
+    binaries = find_binaries()
+    # A cluster that was cut off while being made has no PG_VERSION yet, and initdb wants an empty folder.
+    _empty(home.cluster)
+    command = [binaries["initdb"], "-D", str(home.cluster), "-U", _SUPERUSER, "-A", "trust"]
+    command += ["--data-checksums", "--encoding=UTF8", "--locale=C"]
+    result = _execute(home, command)
+    if result.returncode:
+        _empty(home.cluster)
+        raise UserError(f"initdb failed in {home.cluster}: {_last_line(result.stderr)}")
+    with (home.cluster / "postgresql.conf").open("a") as settings:
+        settings.write(f"\ninclude '{_SETTINGS_FILE}'\n# Your own settings below win over those of tunneldb:\n")
+    return binaries
+
+
+def _empty(folder: Path) -> None:
+    import shutil
+
+    for entry in folder.iterdir():
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry)
+        else:
+            entry.unlink()
+
+
+def _launch(home: Home, binaries: Binaries) -> None:
+    """Start the server, also after a crash."""
+    if home.log.exists() and home.log.stat().st_size > _LOG_LIMIT:
+        home.log.unlink()
+    home.log.touch()
+    _give(home.log, home)
+    deadline = time.monotonic() + _START_SECONDS
+    while True:
+        _clear_stale_pid(home)
+        begin = home.log.stat().st_size
+        result = _pg_ctl(home, binaries, "start", "-t", str(_START_SECONDS), "-l", str(home.log))
+        if result.returncode == 0:
+            return
+        with home.log.open(errors="replace") as log:
+            log.seek(begin)
+            said = log.read()
+        # After a crash of the server's first process, a query may still run: it ends by itself.
+        if "pre-existing shared memory block" not in said or time.monotonic() > deadline:
+            raise UserError(f"the embedded server does not start: {_reason(said)}; see {home.log}")
+        time.sleep(0.5)
+
+
+def _reason(log: str) -> str:
+    for line in log.splitlines():
+        if "FATAL:" in line or "PANIC:" in line:
+            return line.split(":  ", 1)[-1].strip()
+    return _last_line(log)
+
+
+def _last_line(text: str) -> str:
+    lines = text.strip().splitlines()
+    return lines[-1].strip() if lines else "no message"
+
+
+def _clear_stale_pid(home: Home) -> None:
+    """Remove the pid file of a crashed server when its number has gone to another program.
+
+    PostgreSQL itself removes one whose process is gone. It is kept while any process is at home in the data
+    folder: an orphan of the crashed server may still write there.
+    """
+    pid_file = home.cluster / "postmaster.pid"
+    try:
+        pid = int(pid_file.read_text().split("\n", 1)[0])
+    except (OSError, ValueError):
+        return
+    processes = Path("/proc")
+    if not (processes / str(pid)).exists():
+        return
+    cluster = home.cluster.resolve()
+    for process in processes.glob("[0-9]*"):
+        try:
+            if (process / "cwd").readlink() == cluster:
+                return
+        except OSError:
+            continue
+    pid_file.unlink()
+
+
+def _prepare_database(home: Home) -> str:
+    """Make the database and the present user's role unless they are there; return the DSN."""
+    user = getpass.getuser()
+    dsn = _dsn(home, DATABASE, user)
+    try:
+        psycopg.connect(dsn).close()
+        return dsn
+    except psycopg.OperationalError:
+        pass
+    with (
+        _locked(home),
+        psycopg.connect(_dsn(home, "postgres", _SUPERUSER), autocommit=True) as connection,
+    ):
+        if not _exists(connection, "pg_roles", "rolname", user):
+            connection.execute(sql.SQL("CREATE ROLE {} LOGIN SUPERUSER").format(sql.Identifier(user)))
+        if not _exists(connection, "pg_database", "datname", DATABASE):
+            connection.execute(sql.SQL("CREATE DATABASE {}").format(sql.Identifier(DATABASE)))
+    return dsn
+
+
+def _exists(connection: psycopg.Connection[Any], catalog: str, column: str, name: str) -> bool:
+    query = sql.SQL("SELECT FROM {} WHERE {} = %s").format(sql.Identifier(catalog), sql.Identifier(column))
+    return connection.execute(query, [name]).fetchone() is not None

@@ -1,0 +1,76 @@
+"""One survey, with what its tunnel says about it."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from typing import Any
+
+import psycopg
+from psycopg.rows import class_row
+
+from tunneldb.errors import UserError
+
+
+@dataclass(frozen=True)
+class Survey:
+    """A scanning campaign of a tunnel.
+
+    Attributes
+    ----------
+    id, name
+        Key and name of the survey.
+    tunnel_id, tunnel
+        Key and name of its tunnel.
+    srid
+        Spatial reference of the tunnel, projected, metres.
+    start_chainage
+        Chainage of the given axis's first vertex, m.
+    spacing
+        Distance between vertices of the axis, m of chainage.
+    date
+        Day of the scan.
+    intensity_dimension
+        Dimension of the scan files that holds the intensity, None when the kind is ``none``.
+    intensity_kind
+        ``amplitude``, ``reflectance``, ``linear`` or ``none``.
+    platform
+        ``static`` (stations) or ``mobile`` (trajectory).
+    """
+
+    id: int
+    name: str
+    tunnel_id: int
+    tunnel: str
+    srid: int
+    start_chainage: float
+    spacing: float
+    date: dt.date
+    intensity_dimension: str | None
+    intensity_kind: str
+    platform: str
+
+
+def get_survey(conn: psycopg.Connection[Any], name: str) -> Survey:
+    """Return the survey of that name.
+
+    Raises
+    ------
+    UserError
+        When there is none; the message lists those that exist.
+    """
+    with conn.cursor(row_factory=class_row(Survey)) as cursor:
+        survey = cursor.execute(
+            """
+            SELECT s.id, s.name, s.tunnel_id, t.name AS tunnel, t.srid, t.start_chainage, t.spacing,
+                   s.date, s.intensity_dimension, s.intensity_kind, s.platform
+              FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+             WHERE s.name = %s
+            """,
+            [name],
+        ).fetchone()
+    if survey is None:
+        known = [row[0] for row in conn.execute("SELECT name FROM tunnel.survey ORDER BY name")]
+        there = f"the database has {', '.join(known)}" if known else "the database has none: tunneldb survey add"
+        raise UserError(f"there is no survey {name!r}; {there}")
+    return survey
