@@ -1,0 +1,109 @@
+-- Who may do what. Three group roles without login, to be granted to people:
+--   tunnel_viewer     reads the views of tunnel_api and calls its read-only functions
+--   tunnel_inspector  and reviews leaks, moves axis vertices and draws regions, through the views
+--   tunnel_operator   and loads and processes: owns schema tunnel and what lies in it
+-- Runs last, after every function and view, as the database's owner. Where that may not create roles, it says what a
+-- superuser has to run, and goes on: the owner can do everything without them.
+
+DO $$
+DECLARE
+    role text;
+BEGIN
+    FOREACH role IN ARRAY ARRAY['tunnel_viewer', 'tunnel_inspector', 'tunnel_operator'] LOOP
+        IF to_regrole(role) IS NULL THEN
+            BEGIN
+                EXECUTE format('CREATE ROLE %I NOLOGIN', role);
+            EXCEPTION
+                WHEN duplicate_object OR unique_violation THEN NULL;  -- just made from another database
+                WHEN insufficient_privilege THEN
+                    RAISE WARNING 'role % is missing and % may not create it; a superuser can: CREATE ROLE %; then run "tunneldb init" again',
+                        role, current_user, role;
+            END;
+        END IF;
+    END LOOP;
+END
+$$;
+
+-- Each role holds the one before; the owner belongs to the operators, so that both may change schema tunnel.
+DO $$
+DECLARE
+    pair text[];
+BEGIN
+    FOREACH pair SLICE 1 IN ARRAY ARRAY[['tunnel_viewer', 'tunnel_inspector'], ['tunnel_inspector', 'tunnel_operator'],
+                                        ['tunnel_operator', current_user]] LOOP
+        IF to_regrole(pair[1]) IS NOT NULL AND to_regrole(pair[2]) IS NOT NULL
+           AND NOT pg_has_role(pair[2], pair[1], 'USAGE') THEN
+            BEGIN
+                EXECUTE format('GRANT %I TO %I', pair[1], pair[2]);
+            EXCEPTION
+                WHEN unique_violation THEN NULL;  -- just granted from another database
+                WHEN insufficient_privilege THEN
+                    RAISE WARNING '% may not grant role % to %; a superuser can: GRANT % TO %',
+                        current_user, pair[1], pair[2], pair[1], pair[2];
+            END;
+        END IF;
+    END LOOP;
+END
+$$;
+
+REVOKE ALL ON SCHEMA tunnel FROM PUBLIC;
+REVOKE ALL ON SCHEMA tunnel_api FROM PUBLIC;
+REVOKE EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_api FROM PUBLIC;
+REVOKE EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api FROM PUBLIC;
+
+-- Viewers: all views, and the functions that only read and don't need rights on the tables: IMMUTABLE ones, and STABLE
+-- ones that run with the owner's rights (SECURITY DEFINER).
+DO $$
+DECLARE
+    f regprocedure;
+BEGIN
+    IF to_regrole('tunnel_viewer') IS NULL THEN
+        RETURN;
+    END IF;
+    GRANT USAGE ON SCHEMA tunnel_api TO tunnel_viewer;
+    GRANT SELECT ON ALL TABLES IN SCHEMA tunnel_api TO tunnel_viewer;
+    FOR f IN SELECT p.oid FROM pg_proc p
+              WHERE p.pronamespace = 'tunnel_api'::regnamespace AND p.prokind = 'f'
+                AND (p.provolatile = 'i' OR p.provolatile = 's' AND p.prosecdef) LOOP
+        EXECUTE format('GRANT EXECUTE ON FUNCTION %s TO tunnel_viewer', f);
+    END LOOP;
+END
+$$;
+
+-- Inspectors: exactly the columns that are theirs to change.
+DO $$
+BEGIN
+    IF to_regrole('tunnel_inspector') IS NULL THEN
+        RETURN;
+    END IF;
+    GRANT UPDATE (geom) ON tunnel_api.axis_vertex TO tunnel_inspector;
+    GRANT UPDATE (review, remark) ON tunnel_api.leak, tunnel_api.leak_unrolled, tunnel_api.leak_map, tunnel_api.leak_3d
+        TO tunnel_inspector;
+    GRANT INSERT, DELETE, UPDATE (kind, geom) ON tunnel_api.region TO tunnel_inspector;
+END
+$$;
+
+-- Operators: all functions, and schema tunnel as its owners, for to swap a partition one must own the table. Partitions
+-- that an operator makes are his own; another may drop them as owner of the schema.
+DO $$
+DECLARE
+    t record;
+BEGIN
+    IF to_regrole('tunnel_operator') IS NULL THEN
+        RETURN;
+    END IF;
+    GRANT EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_api TO tunnel_operator;
+    GRANT EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api TO tunnel_operator;
+    IF NOT pg_has_role(current_user, 'tunnel_operator', 'USAGE') THEN
+        RETURN;
+    END IF;
+    ALTER SCHEMA tunnel OWNER TO tunnel_operator;
+    FOR t IN SELECT c.oid::regclass AS name
+               FROM pg_class c
+              WHERE c.relnamespace = 'tunnel'::regnamespace AND c.relkind IN ('r', 'p')
+                AND c.relowner <> to_regrole('tunnel_operator')
+                AND pg_has_role(current_user, c.relowner, 'USAGE') LOOP
+        EXECUTE format('ALTER TABLE %s OWNER TO tunnel_operator', t.name);
+    END LOOP;
+END
+$$;

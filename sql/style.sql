@@ -1,0 +1,42 @@
+-- Table in which QGIS looks for the style of a layer that somebody adds by hand; `tunneldb qgis` fills it. Laid out as
+-- QGIS makes it, in its place: schema public. Runs after role.sql, for its grants.
+
+DO $$
+BEGIN
+    IF to_regclass('public.layer_styles') IS NULL THEN
+        BEGIN
+            CREATE TABLE public.layer_styles (
+                id serial PRIMARY KEY,
+                f_table_catalog varchar,
+                f_table_schema varchar,
+                f_table_name varchar,
+                f_geometry_column varchar,
+                stylename text,
+                styleqml xml,
+                stylesld xml,
+                useasdefault boolean,
+                description text,
+                owner varchar(63) DEFAULT current_user,
+                ui xml,
+                update_time timestamp DEFAULT current_timestamp,
+                type varchar,
+                r_raster_column varchar
+            );
+            COMMENT ON TABLE public.layer_styles IS 'Styles of layers, read by QGIS when a layer is added';
+        EXCEPTION WHEN insufficient_privilege THEN
+            RAISE WARNING '% may not create public.layer_styles, in which QGIS looks for styles', current_user;
+        END;
+    END IF;
+    IF to_regclass('public.layer_styles') IS NOT NULL
+       AND pg_has_role(current_user, (SELECT relowner FROM pg_class WHERE oid = 'public.layer_styles'::regclass), 'USAGE')
+    THEN
+        IF to_regrole('tunnel_viewer') IS NOT NULL THEN
+            GRANT SELECT ON public.layer_styles TO tunnel_viewer;
+        END IF;
+        IF to_regrole('tunnel_operator') IS NOT NULL THEN
+            GRANT INSERT, UPDATE, DELETE ON public.layer_styles TO tunnel_operator;
+            GRANT USAGE ON SEQUENCE public.layer_styles_id_seq TO tunnel_operator;
+        END IF;
+    END IF;
+END
+$$;

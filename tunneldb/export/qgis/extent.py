@@ -1,0 +1,112 @@
+"""What each map theme shows at first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import psycopg
+
+from tunneldb.errors import UserError
+
+MARGIN = 0.08
+"""Margin around what is shown, as a share of its size."""
+
+WINDOW = 60.0
+"""Length of tunnel that the unrolled theme shows at first, m."""
+
+
+@dataclass(frozen=True)
+class Extent:
+    """A rectangle, m."""
+
+    xmin: float
+    ymin: float
+    xmax: float
+    ymax: float
+
+    def grown(self) -> Extent:
+        """Return it with a margin all around."""
+        margin = MARGIN * max(self.xmax - self.xmin, self.ymax - self.ymin)
+        return Extent(self.xmin - margin, self.ymin - margin, self.xmax + margin, self.ymax + margin)
+
+    def wkt(self) -> str:
+        """Return it as a WKT polygon."""
+        return (
+            f"POLYGON(({self.xmin} {self.ymin}, {self.xmax} {self.ymin}, {self.xmax} {self.ymax}, "
+            f"{self.xmin} {self.ymax}, {self.xmin} {self.ymin}))"
+        )
+
+
+@dataclass(frozen=True)
+class View:
+    """A place to start from.
+
+    Attributes
+    ----------
+    name : str
+        What the user sees in the list of bookmarks.
+    theme : str
+        Map theme that it belongs to.
+    extent : Extent
+        In the tunnel's SRID or in the unrolled plane, m.
+    """
+
+    name: str
+    theme: str
+    extent: Extent
+
+
+def map_extent(conn: psycopg.Connection, survey: str) -> Extent:
+    """Return the extent of a survey's axis and of the leaks beside it, with a margin.
+
+    Raises
+    ------
+    UserError
+        The survey has no axis yet.
+    """
+    row = conn.execute(
+        "SELECT ST_XMin(e), ST_YMin(e), ST_XMax(e), ST_YMax(e) FROM (SELECT ST_Extent(g) AS e FROM ("
+        "SELECT geom AS g FROM tunnel_api.axis_vertex WHERE survey = %(survey)s "
+        "UNION ALL SELECT geom FROM tunnel_api.leak_map WHERE survey = %(survey)s) a) b WHERE e IS NOT NULL",
+        {"survey": survey},
+    ).fetchone()
+    if row is None:
+        raise UserError(f"survey {survey} has no axis yet: load its files, then run 'tunneldb run {survey}'")
+    return Extent(*row).grown()
+
+
+def unrolled_extents(conn: psycopg.Connection, survey: str) -> list[tuple[int, Extent]]:
+    """Return km and extent of the unrolled lining of each kilometre that has sections, in order."""
+    rows = conn.execute(
+        "SELECT km, min(chainage), min(arc_from), max(chainage), max(arc_to) FROM tunnel_api.section_unrolled "
+        "WHERE survey = %s GROUP BY km ORDER BY km",
+        (survey,),
+    ).fetchall()
+    return [(km, Extent(*bounds)) for km, *bounds in rows]
+
+
+def first_window(conn: psycopg.Connection, survey: str, kilometres: list[tuple[int, Extent]]) -> Extent:
+    """Return a stretch of lining in which one can see something: around the largest leak, or at the start.
+
+    Parameters
+    ----------
+    conn : psycopg.Connection
+        The database.
+    survey : str
+        Name of the survey.
+    kilometres : list of (int, Extent)
+        As :func:`unrolled_extents` returns them, at least one.
+    """
+    row = conn.execute(
+        "SELECT (chainage_from + chainage_to) / 2 FROM tunnel_api.leak WHERE survey = %s ORDER BY area DESC, id LIMIT 1",
+        (survey,),
+    ).fetchone()
+    low, high = kilometres[0][1].xmin, kilometres[-1][1].xmax
+    middle = row[0] if row is not None else low + WINDOW / 2
+    start = max(low, min(middle - WINDOW / 2, high - WINDOW))
+    return Extent(
+        start,
+        min(extent.ymin for _, extent in kilometres),
+        min(start + WINDOW, high),
+        max(extent.ymax for _, extent in kilometres),
+    ).grown()

@@ -1,0 +1,72 @@
+"""The layers of a project: which view, which style, in which group and in which map themes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+MAP, UNROLLED, SPACE = "Map", "Unrolled", "3D"
+"""Groups of the layer tree, and the map themes of the same names."""
+
+
+@dataclass(frozen=True)
+class VectorLayer:
+    """A layer on a view of schema tunnel_api.
+
+    Attributes
+    ----------
+    id : str
+        Unique in the project.
+    title : str
+        What the legend says.
+    view : str
+        View in tunnel_api, whose integer key is the column ``id``.
+    column : str
+        Its geometry column.
+    wkb : str
+        Geometry type as QGIS calls it, with Z where the data have it.
+    style : str
+        Style file, without its ending.
+    group : str
+        Group of the layer tree.
+    themes : tuple of str
+        Map themes that show it.
+    edited : bool
+        Whether it is for editing; the others are read-only in QGIS.
+    """
+
+    id: str
+    title: str
+    view: str
+    wkb: str
+    style: str
+    group: str
+    themes: tuple[str, ...]
+    edited: bool = False
+    column: str = "geom"
+
+    @property
+    def on_map(self) -> bool:
+        """Whether its coordinates are the tunnel's SRID; otherwise they are the unrolled plane's."""
+        return self.group != UNROLLED
+
+    @property
+    def geometry(self) -> str:
+        """Kind of geometry without dimension, as QGIS names it in a project: Point, Line or Polygon."""
+        return {"Point": "Point", "LineString": "Line", "Polygon": "Polygon"}[self.wkb.removesuffix("Z")]
+
+
+# In drawing order within a group, from the top.
+LAYERS = (
+    VectorLayer("axis_vertex", "Axis vertices (editable)", "axis_vertex", "PointZ", "axis_vertex", MAP, (MAP,), True),
+    VectorLayer("leak_map", "Leaks beside the axis (review)", "leak_map", "Polygon", "leak", MAP, (MAP,), True),
+    VectorLayer("axis", "Axis", "axis", "LineStringZ", "axis", MAP, (MAP, SPACE)),
+    VectorLayer("segment", "Segments", "segment", "LineStringZ", "segment", MAP, (MAP,)),
+    VectorLayer("section", "Sections", "section", "LineStringZ", "section", MAP, (MAP, SPACE)),
+    VectorLayer("leak_unrolled", "Leaks (review)", "leak_unrolled", "Polygon", "leak", UNROLLED, (UNROLLED,), True),
+    VectorLayer("region", "Regions drawn by hand", "region", "Polygon", "region", UNROLLED, (UNROLLED,), True),
+    VectorLayer(
+        "section_unrolled", "Sections, unrolled", "section_unrolled", "LineString", "section_unrolled", UNROLLED,
+        (UNROLLED,),
+    ),
+    VectorLayer("leak_3d", "Leaks in space (review)", "leak_3d", "PolygonZ", "leak_3d", SPACE, (SPACE,), True),
+)  # fmt: skip

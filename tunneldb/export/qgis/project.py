@@ -1,0 +1,262 @@
+"""A QGIS project of a survey, written as XML, for a machine that has no QGIS."""
+
+from __future__ import annotations
+
+import os
+import uuid
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Iterable, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import psycopg
+
+from tunneldb import __version__
+from tunneldb.database import Survey
+from tunneldb.export.atomic import replacing
+from tunneldb.export.qgis.crs import crs_element, no_crs
+from tunneldb.export.qgis.extent import Extent, View, first_window, map_extent, unrolled_extents
+from tunneldb.export.qgis.layer import LAYERS, MAP, SPACE, UNROLLED, VectorLayer
+from tunneldb.export.qgis.raster import KINDS, grey_range, image_kind, pipe
+from tunneldb.export.qgis.source import Source
+from tunneldb.export.qgis.style import style_elements
+
+QGIS_VERSION = "3.22.0-Białowieża"
+"""Version whose form of project is written; later ones read it."""
+
+_DOCTYPE = "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A layer of the project: its element, its place in the tree and the themes that show it."""
+
+    id: str
+    title: str
+    group: tuple[str, ...]
+    themes: tuple[str, ...]
+    element: ET.Element
+
+
+@dataclass
+class _Group:
+    entries: list[_Entry] = field(default_factory=list)
+    groups: dict[str, _Group] = field(default_factory=dict)
+
+
+def write_project(
+    conn: psycopg.Connection,
+    survey: Survey,
+    output: Path,
+    images: Sequence[Path] = (),
+    service: str | None = None,
+) -> None:
+    """Write a project with the layers of a survey.
+
+    Parameters
+    ----------
+    conn : psycopg.Connection
+        The database that the layers will read.
+    survey : Survey
+        The survey.
+    output : Path
+        File to write, ``.qgz`` or ``.qgs``; it appears whole or not at all.
+    images : sequence of Path
+        Unrolled images (GeoTIFF), named by kind as :func:`tunneldb.export.image.export_kilometre` does; the project
+        holds their paths relative to itself.
+    service : str, optional
+        Entry of ``pg_service.conf`` by which QGIS connects, instead of this connection's host and database.
+
+    Raises
+    ------
+    UserError
+        The survey has no axis, or its SRID is unknown.
+    """
+    crs = crs_element(conn, survey.srid)
+    source = Source.of_connection(conn) if service is None else Source.of_service(service)
+    entries = [_vector(layer, source, survey, crs) for layer in LAYERS] + _rasters(images, output.parent)
+    views = _views(conn, survey.name)
+    root = ET.Element("qgis", version=QGIS_VERSION, projectname=survey.name, saveUser="", saveUserFull="")
+    ET.SubElement(root, "homePath", path="")
+    ET.SubElement(root, "title").text = survey.name
+    ET.SubElement(root, "autotransaction", active="0")
+    ET.SubElement(root, "evaluateDefaultValues", active="0")
+    ET.SubElement(root, "trust", active="0")
+    ET.SubElement(root, "projectCrs").append(deepcopy(crs))
+    root.append(_tree(entries))
+    _canvases(root, views, crs)
+    layers = ET.SubElement(root, "projectlayers")
+    layers.extend(entry.element for entry in entries)
+    root.append(_themes(entries))
+    root.append(_bookmarks(views, crs))
+    root.append(_properties())
+    view_settings = ET.SubElement(root, "ProjectViewSettings", UseProjectScales="0")
+    _extent(view_settings, views[0].extent, "DefaultViewExtent").append(deepcopy(crs))
+    metadata = ET.SubElement(root, "projectMetadata")
+    ET.SubElement(metadata, "title").text = survey.name
+    ET.SubElement(metadata, "abstract").text = f"Tunnel {survey.tunnel}, written by tunneldb {__version__}"
+    _save(root, output)
+
+
+def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element) -> _Entry:
+    element = ET.Element(
+        "maplayer", type="vector", geometry=layer.geometry, wkbType=layer.wkb, readOnly=str(int(not layer.edited)),
+        autoRefreshEnabled="0", refreshOnNotifyEnabled="0", hasScaleBasedVisibilityFlag="0",
+        minScale="0", maxScale="0", styleCategories="AllStyleCategories",
+    )  # fmt: skip
+    ET.SubElement(element, "id").text = layer.id
+    ET.SubElement(element, "datasource").text = source.layer(layer, survey.name, survey.srid)
+    ET.SubElement(element, "layername").text = layer.title
+    ET.SubElement(element, "srs").append(deepcopy(crs) if layer.on_map else no_crs())
+    ET.SubElement(element, "provider", encoding="UTF-8").text = "postgres"
+    element.extend(style_elements(layer.style))
+    if layer.view == "region":
+        # What is drawn belongs to this survey.
+        name = survey.name.replace("'", "''")
+        ET.SubElement(
+            ET.SubElement(element, "defaults"), "default", field="survey", expression=f"'{name}'", applyOnUpdate="0"
+        )
+    return _Entry(layer.id, layer.title, (layer.group,), layer.themes, element)
+
+
+def _rasters(images: Sequence[Path], folder: Path) -> list[_Entry]:
+    """Layers of the images, a group for each kind; the first kind is shown."""
+    entries = []
+    for kind, title in KINDS.items():
+        paths = sorted(path for path in images if image_kind(path) == kind)
+        limits = grey_range(paths) if kind != "offset" else (0.0, 0.0)
+        for path in paths:
+            element = ET.Element("maplayer", type="raster", styleCategories="AllStyleCategories")
+            ET.SubElement(element, "id").text = f"image_{path.stem}"
+            relative = os.path.relpath(path.resolve(), folder.resolve())
+            ET.SubElement(element, "datasource").text = relative if relative.startswith("..") else f"./{relative}"
+            ET.SubElement(element, "layername").text = path.stem
+            ET.SubElement(element, "srs").append(no_crs())
+            ET.SubElement(element, "provider").text = "gdal"
+            element.append(pipe(kind, limits))
+            ET.SubElement(element, "blendMode").text = "0"
+            themes = (UNROLLED,) if kind == next(iter(KINDS)) else ()
+            entries.append(_Entry(f"image_{path.stem}", path.stem, (UNROLLED, title), themes, element))
+    return entries
+
+
+def _tree(entries: Iterable[_Entry]) -> ET.Element:
+    """The layer tree: what theme Map shows is switched on."""
+    top = _Group()
+    for entry in entries:
+        place = top
+        for name in entry.group:
+            place = place.groups.setdefault(name, _Group())
+        place.entries.append(entry)
+    return _group_element(top, "", True)
+
+
+def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
+    element = ET.Element(
+        "layer-tree-group", name=name, expanded=str(int(name in ("", MAP, UNROLLED))),
+        checked="Qt::Checked" if checked else "Qt::Unchecked",
+    )  # fmt: skip
+    for entry in group.entries:
+        ET.SubElement(
+            element, "layer-tree-layer", id=entry.id, name=entry.title, expanded="0",
+            checked="Qt::Checked" if MAP in entry.themes else "Qt::Unchecked",
+        )  # fmt: skip
+    for title, part in group.groups.items():
+        element.append(_group_element(part, title, title == MAP))
+    return element
+
+
+def _themes(entries: Sequence[_Entry]) -> ET.Element:
+    """Map themes: which layers are visible, and the groups that must be switched on for it."""
+    presets = ET.Element("visibility-presets")
+    for theme in (MAP, UNROLLED, SPACE):
+        preset = ET.SubElement(presets, "visibility-preset", {"name": theme, "has-expanded-info": "1"})
+        shown = [entry for entry in entries if theme in entry.themes]
+        for entry in shown:
+            ET.SubElement(preset, "layer", id=entry.id, visible="1", style="default", expanded="1")
+        for tag in ("checked-group-nodes", "expanded-group-nodes"):
+            nodes = ET.SubElement(preset, tag)
+            for path in sorted({"/".join(e.group[: d + 1]) for e in shown for d in range(len(e.group))}):
+                ET.SubElement(nodes, tag.removesuffix("s"), id=path)
+    return presets
+
+
+def _views(conn: psycopg.Connection, survey: str) -> list[View]:
+    """Where to start: the whole map first, then a window on the unrolled lining, then each of its kilometres."""
+    views = [View("Map", MAP, map_extent(conn, survey))]
+    kilometres = unrolled_extents(conn, survey)
+    if kilometres:
+        views.append(View("Unrolled", UNROLLED, first_window(conn, survey, kilometres)))
+        views += [View(f"Unrolled, km {km}", UNROLLED, extent.grown()) for km, extent in kilometres]
+    return views
+
+
+def _canvases(root: ET.Element, views: Sequence[View], crs: ET.Element) -> None:
+    """The main canvas with the map, and below it a second one that follows theme Unrolled."""
+    _canvas(root, "theMapCanvas", views[0], crs)
+    docks = ET.SubElement(root, "mapViewDocks")
+    if len(views) > 1:
+        _canvas(root, UNROLLED, views[1], no_crs()).set("theme", UNROLLED)
+        # area 8 is the bottom edge of the window
+        ET.SubElement(
+            docks, "view", name=UNROLLED, area="8", floating="0", x="0", y="0", width="1200", height="360",
+            synced="0", showCursor="0", showExtent="0", scaleSynced="0", scaleFactor="1", showLabels="1",
+            zoomSelected="0",
+        )  # fmt: skip
+
+
+def _canvas(root: ET.Element, name: str, view: View, crs: ET.Element) -> ET.Element:
+    canvas = ET.SubElement(root, "mapcanvas", name=name, annotationsVisible="1")
+    ET.SubElement(canvas, "units").text = "meters"
+    _extent(canvas, view.extent, "extent")
+    ET.SubElement(canvas, "rotation").text = "0"
+    ET.SubElement(canvas, "destinationsrs").append(deepcopy(crs))
+    ET.SubElement(canvas, "rendermaptile").text = "0"
+    return canvas
+
+
+def _extent(parent: ET.Element, extent: Extent, tag: str) -> ET.Element:
+    element = ET.SubElement(parent, tag)
+    sides = {side: repr(getattr(extent, side)) for side in ("xmin", "ymin", "xmax", "ymax")}
+    if tag == "extent":
+        for side, value in sides.items():
+            ET.SubElement(element, side).text = value
+    else:
+        element.attrib.update(sides)
+    return element
+
+
+def _bookmarks(views: Sequence[View], crs: ET.Element) -> ET.Element:
+    bookmarks = ET.Element("Bookmarks")
+    for view in views:
+        bookmark = ET.SubElement(
+            bookmarks, "Bookmark", id=f"{{{uuid.uuid5(uuid.NAMESPACE_OID, view.name)}}}", name=view.name,
+            group=view.theme, extent=view.extent.wkt(),
+        )  # fmt: skip
+        bookmark.append(deepcopy(crs) if view.theme == MAP else no_crs())
+    return bookmarks
+
+
+def _properties() -> ET.Element:
+    """Settings of the project: relative paths, lengths in plane metres."""
+    properties = ET.Element("properties")
+    paths = ET.SubElement(properties, "Paths")
+    ET.SubElement(paths, "Absolute", type="bool").text = "false"
+    measure = ET.SubElement(properties, "Measure")
+    ET.SubElement(measure, "Ellipsoid", type="QString").text = "NONE"
+    measurement = ET.SubElement(properties, "Measurement")
+    ET.SubElement(measurement, "DistanceUnits", type="QString").text = "meters"
+    ET.SubElement(measurement, "AreaUnits", type="QString").text = "m2"
+    return properties
+
+
+def _save(root: ET.Element, output: Path) -> None:
+    text = _DOCTYPE + ET.tostring(root, encoding="unicode")
+    with replacing(output) as temporary:
+        if output.suffix.lower() == ".qgs":
+            temporary.write_text(text, encoding="utf-8")
+        else:
+            with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+                archive.writestr(f"{output.stem}.qgs", text)

@@ -1,0 +1,84 @@
+"""Unrolled images as layers of a project."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import rasterio
+
+KINDS = {"corrected": "Intensity, corrected", "raw": "Intensity, raw", "offset": "Offset"}
+"""Kinds of image, the one shown at first in front, with the names of their groups."""
+
+OFFSET_RANGE = 0.1
+"""Offset at which the colours are full, m."""
+
+# Inwards red, outwards blue (ColorBrewer RdBu).
+_OFFSET_COLOURS = ((-1.0, "#2166ac"), (-0.4, "#92c5de"), (0.0, "#f7f7f7"), (0.4, "#f4a582"), (1.0, "#b2182b"))
+_SAMPLE = 1000
+
+
+def image_kind(path: Path) -> str | None:
+    """Return the kind of an image by its file name, None if it is no image of the lining."""
+    return next((kind for kind in KINDS if path.stem.endswith(kind)), None)
+
+
+def grey_range(paths: Sequence[Path]) -> tuple[float, float]:
+    """Return the intensities, dB, that are drawn black and white: the 2 and 98 % quantiles over all images."""
+    samples = []
+    for path in paths:
+        with rasterio.open(path) as image:
+            rows, columns = min(image.height, _SAMPLE), min(image.width, _SAMPLE)
+            band = image.read(1, out_shape=(rows, columns), masked=True)
+        values = np.asarray(band.compressed(), dtype=np.float64)
+        samples.append(values[np.isfinite(values)])
+    values = np.concatenate(samples) if samples else np.empty(0)
+    if not len(values):
+        return 0.0, 1.0
+    low, high = np.quantile(values, [0.02, 0.98])
+    return float(low), float(max(high, low + 0.1))
+
+
+def pipe(kind: str, limits: tuple[float, float]) -> ET.Element:
+    """Return the element that says how an image is drawn: intensity in grey, offset in diverging colours."""
+    element = ET.Element("pipe")
+    common = {"opacity": "1", "alphaBand": "-1", "nodataColor": ""}
+    if kind == "offset":
+        renderer = ET.SubElement(
+            element, "rasterrenderer", type="singlebandpseudocolor", band="1",
+            classificationMin=str(-OFFSET_RANGE), classificationMax=str(OFFSET_RANGE), **common,
+        )  # fmt: skip
+        _origin(renderer)
+        shader = ET.SubElement(
+            ET.SubElement(renderer, "rastershader"), "colorrampshader", colorRampType="INTERPOLATED",
+            classificationMode="1", clip="0",
+            minimumValue=str(-OFFSET_RANGE), maximumValue=str(OFFSET_RANGE),
+        )  # fmt: skip
+        for share, colour in _OFFSET_COLOURS:
+            value = share * OFFSET_RANGE
+            ET.SubElement(
+                shader, "item", value=f"{value:g}", label=f"{value * 1000:+.0f} mm", color=colour, alpha="255"
+            )
+    else:
+        renderer = ET.SubElement(
+            element, "rasterrenderer", type="singlebandgray", grayBand="1", gradient="BlackToWhite", **common
+        )
+        _origin(renderer)
+        enhancement = ET.SubElement(renderer, "contrastEnhancement")
+        ET.SubElement(enhancement, "minValue").text = f"{limits[0]:.3f}"
+        ET.SubElement(enhancement, "maxValue").text = f"{limits[1]:.3f}"
+        ET.SubElement(enhancement, "algorithm").text = "StretchToMinimumMaximum"
+    ET.SubElement(element, "brightnesscontrast", brightness="0", contrast="0", gamma="1")
+    ET.SubElement(element, "huesaturation", saturation="0", colorizeOn="0", grayscaleMode="0")
+    ET.SubElement(element, "rasterresampler", maxOversampling="2", zoomedOutResampler="bilinear")
+    return element
+
+
+def _origin(renderer: ET.Element) -> None:
+    """State that the limits are given, not to be found out from the image."""
+    origin = ET.SubElement(renderer, "minMaxOrigin")
+    ET.SubElement(origin, "limits").text = "None"
+    ET.SubElement(origin, "extent").text = "WholeRaster"
+    ET.SubElement(origin, "statAccuracy").text = "Estimated"

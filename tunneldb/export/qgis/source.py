@@ -1,0 +1,57 @@
+"""Where a layer's rows come from: QGIS data source strings, which never hold a password."""
+
+from __future__ import annotations
+
+import getpass
+from dataclasses import dataclass
+
+import psycopg
+
+from tunneldb.export.qgis.layer import VectorLayer
+
+
+def quote(value: str) -> str:
+    """Quote a value of a data source string."""
+    return "'" + value.replace("\\", "\\\\").replace("'", "\\'") + "'"
+
+
+@dataclass(frozen=True)
+class Source:
+    """How QGIS reaches the database.
+
+    Attributes
+    ----------
+    connection : str
+        The part of a data source string that names server and database.
+    """
+
+    connection: str
+
+    @classmethod
+    def of_service(cls, name: str) -> Source:
+        """Connect by an entry of the user's ``pg_service.conf``."""
+        return cls(f"service={quote(name)}")
+
+    @classmethod
+    def of_connection(cls, conn: psycopg.Connection) -> Source:
+        """Connect to where ``conn`` is connected; as whoever opens the project, unless ``conn`` names another user."""
+        info = conn.info
+        parts = [f"dbname={quote(info.dbname)}", f"host={quote(info.host)}", f"port={info.port}"]
+        if info.user != getpass.getuser():
+            parts.append(f"user={quote(info.user)}")
+        mode = info.get_parameters().get("sslmode")
+        if mode is not None:
+            parts.append(f"sslmode={mode}")
+        return cls(" ".join(parts))
+
+    def layer(self, layer: VectorLayer, survey: str, srid: int) -> str:
+        """Return the data source of a layer, restricted to a survey.
+
+        Key, SRID and type are stated and statistics trusted, so that QGIS doesn't scan the view to find them out.
+        """
+        name = "'" + survey.replace("'", "''") + "'"
+        return (
+            f"{self.connection} key='id' estimatedmetadata=true srid={srid if layer.on_map else 0} type={layer.wkb} "
+            f"checkPrimaryKeyUnicity='0' table=\"tunnel_api\".\"{layer.view}\" ({layer.column}) "
+            f'sql="survey" = {name}'
+        )

@@ -1,0 +1,76 @@
+"""Styles of the layers: files in QGIS' own form, and their copies in ``public.layer_styles``."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from importlib import resources
+
+import psycopg
+
+from tunneldb.errors import UserError
+from tunneldb.export.qgis.layer import LAYERS
+
+STYLE_NAME = "tunneldb"
+
+
+def style_text(name: str) -> str:
+    """Return the text of a style file."""
+    return (resources.files(__package__) / "style" / f"{name}.qml").read_text(encoding="utf-8")
+
+
+def style_elements(name: str) -> list[ET.Element]:
+    """Return the elements of a style file, as they stand within a layer of a project."""
+    return list(ET.fromstring(style_text(name)))
+
+
+def store_styles(conn: psycopg.Connection) -> int:
+    """Put each layer's style into ``public.layer_styles`` as its default; a rerun replaces ours and no other's.
+
+    Parameters
+    ----------
+    conn : psycopg.Connection
+        Connection whose transaction this joins.
+
+    Returns
+    -------
+    int
+        Number of styles stored.
+
+    Raises
+    ------
+    UserError
+        The table is missing.
+    """
+    exists = conn.execute("SELECT to_regclass('public.layer_styles') IS NOT NULL").fetchone()
+    if exists is None or not exists[0]:
+        raise UserError('the table public.layer_styles is missing: run "tunneldb init" as the database\'s owner')
+    for view, column, style, title in styled_columns():
+        place = {"view": view, "column": column, "name": STYLE_NAME}
+        conn.execute(
+            "DELETE FROM public.layer_styles WHERE f_table_catalog = current_database() "
+            "AND f_table_schema = 'tunnel_api' AND f_table_name = %(view)s AND f_geometry_column = %(column)s "
+            "AND stylename = %(name)s",
+            place,
+        )
+        conn.execute(
+            "UPDATE public.layer_styles SET useasdefault = false WHERE f_table_catalog = current_database() "
+            "AND f_table_schema = 'tunnel_api' AND f_table_name = %(view)s AND f_geometry_column = %(column)s",
+            place,
+        )
+        conn.execute(
+            "INSERT INTO public.layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column, "
+            "stylename, styleqml, useasdefault, description, owner) "
+            "VALUES (current_database(), 'tunnel_api', %(view)s, %(column)s, %(name)s, "
+            "xmlparse(DOCUMENT %(qml)s), true, %(title)s, current_user)",
+            {**place, "qml": style_text(style), "title": title},
+        )
+    return len(styled_columns())
+
+
+def styled_columns() -> list[tuple[str, str, str, str]]:
+    """Return view, geometry column, style and title of whatever has a style; view ``leak`` has three geometries."""
+    return [(layer.view, layer.column, layer.style, layer.title) for layer in LAYERS] + [
+        ("leak", "unrolled", "leak", "Leaks, unrolled"),
+        ("leak", "map", "leak", "Leaks beside the axis"),
+        ("leak", "surface", "leak_3d", "Leaks in space"),
+    ]

@@ -1,0 +1,353 @@
+<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
+<qgis version="3.22.0" styleCategories="AllStyleCategories" hasScaleBasedVisibilityFlag="0" minScale="0" maxScale="0" readOnly="0">
+  <renderer-v2 type="categorizedSymbol" attr="review" forceraster="0" enableorderby="0" symbollevels="0">
+    <categories>
+      <category symbol="0" value="open" label="Open" render="true"/>
+      <category symbol="1" value="confirmed" label="Confirmed" render="true"/>
+      <category symbol="2" value="rejected" label="Rejected" render="true"/>
+    </categories>
+    <symbols>
+      <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleLine" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="line_color" value="255,255,255,190"/>
+            <Option type="QString" name="line_style" value="solid"/>
+            <Option type="QString" name="line_width" value="0.9"/>
+            <Option type="QString" name="line_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+            <Option type="QString" name="capstyle" value="round"/>
+          </Option>
+        </layer>
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="230,126,0,90"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="230,126,0,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.45"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+      </symbol>
+      <symbol name="1" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleLine" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="line_color" value="255,255,255,190"/>
+            <Option type="QString" name="line_style" value="solid"/>
+            <Option type="QString" name="line_width" value="0.9"/>
+            <Option type="QString" name="line_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+            <Option type="QString" name="capstyle" value="round"/>
+          </Option>
+        </layer>
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="0,92,175,110"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="0,92,175,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.45"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+      </symbol>
+      <symbol name="2" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleLine" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="line_color" value="255,255,255,190"/>
+            <Option type="QString" name="line_style" value="solid"/>
+            <Option type="QString" name="line_width" value="0.9"/>
+            <Option type="QString" name="line_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+            <Option type="QString" name="capstyle" value="round"/>
+          </Option>
+        </layer>
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="110,110,110,140"/>
+            <Option type="QString" name="style" value="b_diagonal"/>
+            <Option type="QString" name="outline_color" value="110,110,110,255"/>
+            <Option type="QString" name="outline_style" value="dash"/>
+            <Option type="QString" name="outline_width" value="0.35"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+      </symbol>
+    </symbols>
+  </renderer-v2>
+  <fieldConfiguration>
+    <field name="id" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="survey_id" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="survey" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="km" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="segment" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="chainage_from" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="chainage_to" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="label" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="arc_from" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="arc_to" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="clock" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="area" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="drop_mean" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="drop_max" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="image_share" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="review" configurationFlags="None">
+      <editWidget type="ValueMap">
+        <config>
+          <Option type="Map">
+            <Option type="List" name="map">
+              <Option type="Map">
+                <Option type="QString" name="Open" value="open"/>
+              </Option>
+              <Option type="Map">
+                <Option type="QString" name="Confirmed" value="confirmed"/>
+              </Option>
+              <Option type="Map">
+                <Option type="QString" name="Rejected" value="rejected"/>
+              </Option>
+            </Option>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="reviewed_by" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="reviewed_at" configurationFlags="None">
+      <editWidget type="DateTime">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="allow_null" value="true"/>
+            <Option type="bool" name="calendar_popup" value="true"/>
+            <Option type="QString" name="display_format" value="yyyy-MM-dd HH:mm"/>
+            <Option type="bool" name="field_iso_format" value="false"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="remark" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="IsMultiline" value="true"/>
+            <Option type="bool" name="UseHtml" value="false"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="detected" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="created_at" configurationFlags="None">
+      <editWidget type="DateTime">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="allow_null" value="true"/>
+            <Option type="bool" name="calendar_popup" value="true"/>
+            <Option type="QString" name="display_format" value="yyyy-MM-dd HH:mm"/>
+            <Option type="bool" name="field_iso_format" value="false"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="detected_at" configurationFlags="None">
+      <editWidget type="DateTime">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="allow_null" value="true"/>
+            <Option type="bool" name="calendar_popup" value="true"/>
+            <Option type="QString" name="display_format" value="yyyy-MM-dd HH:mm"/>
+            <Option type="bool" name="field_iso_format" value="false"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+  </fieldConfiguration>
+  <aliases>
+    <alias index="0" field="id" name="Leak"/>
+    <alias index="1" field="survey_id" name="Survey key"/>
+    <alias index="2" field="survey" name="Survey"/>
+    <alias index="3" field="km" name="Kilometre"/>
+    <alias index="4" field="segment" name="Segment"/>
+    <alias index="5" field="chainage_from" name="Chainage from (m)"/>
+    <alias index="6" field="chainage_to" name="Chainage to (m)"/>
+    <alias index="7" field="label" name="Chainage"/>
+    <alias index="8" field="arc_from" name="Arc from (m)"/>
+    <alias index="9" field="arc_to" name="Arc to (m)"/>
+    <alias index="10" field="clock" name="Clock position (h)"/>
+    <alias index="11" field="area" name="Area (m²)"/>
+    <alias index="12" field="drop_mean" name="Mean drop (dB)"/>
+    <alias index="13" field="drop_max" name="Greatest drop (dB)"/>
+    <alias index="14" field="image_share" name="Share measured"/>
+    <alias index="15" field="review" name="Review"/>
+    <alias index="16" field="reviewed_by" name="Reviewed by"/>
+    <alias index="17" field="reviewed_at" name="Reviewed at"/>
+    <alias index="18" field="remark" name="Remark"/>
+    <alias index="19" field="detected" name="Found by the last detection"/>
+    <alias index="20" field="created_at" name="First detected"/>
+    <alias index="21" field="detected_at" name="Last detected"/>
+  </aliases>
+  <editable>
+    <field name="id" editable="0"/>
+    <field name="survey_id" editable="0"/>
+    <field name="survey" editable="0"/>
+    <field name="km" editable="0"/>
+    <field name="segment" editable="0"/>
+    <field name="chainage_from" editable="0"/>
+    <field name="chainage_to" editable="0"/>
+    <field name="label" editable="0"/>
+    <field name="arc_from" editable="0"/>
+    <field name="arc_to" editable="0"/>
+    <field name="clock" editable="0"/>
+    <field name="area" editable="0"/>
+    <field name="drop_mean" editable="0"/>
+    <field name="drop_max" editable="0"/>
+    <field name="image_share" editable="0"/>
+    <field name="review" editable="1"/>
+    <field name="reviewed_by" editable="0"/>
+    <field name="reviewed_at" editable="0"/>
+    <field name="remark" editable="1"/>
+    <field name="detected" editable="0"/>
+    <field name="created_at" editable="0"/>
+    <field name="detected_at" editable="0"/>
+  </editable>
+  <editorlayout>tablayout</editorlayout>
+  <attributeEditorForm>
+    <attributeEditorContainer name="Review" columnCount="1" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
+      <attributeEditorField name="review" index="15" showLabel="1"/>
+      <attributeEditorField name="remark" index="18" showLabel="1"/>
+      <attributeEditorField name="reviewed_by" index="16" showLabel="1"/>
+      <attributeEditorField name="reviewed_at" index="17" showLabel="1"/>
+    </attributeEditorContainer>
+    <attributeEditorContainer name="Leak" columnCount="2" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
+      <attributeEditorField name="id" index="0" showLabel="1"/>
+      <attributeEditorField name="label" index="7" showLabel="1"/>
+      <attributeEditorField name="segment" index="4" showLabel="1"/>
+      <attributeEditorField name="clock" index="10" showLabel="1"/>
+      <attributeEditorField name="area" index="11" showLabel="1"/>
+      <attributeEditorField name="image_share" index="14" showLabel="1"/>
+      <attributeEditorField name="drop_mean" index="12" showLabel="1"/>
+      <attributeEditorField name="drop_max" index="13" showLabel="1"/>
+      <attributeEditorField name="chainage_from" index="5" showLabel="1"/>
+      <attributeEditorField name="chainage_to" index="6" showLabel="1"/>
+      <attributeEditorField name="arc_from" index="8" showLabel="1"/>
+      <attributeEditorField name="arc_to" index="9" showLabel="1"/>
+      <attributeEditorField name="detected" index="19" showLabel="1"/>
+      <attributeEditorField name="created_at" index="20" showLabel="1"/>
+      <attributeEditorField name="detected_at" index="21" showLabel="1"/>
+      <attributeEditorField name="survey" index="2" showLabel="1"/>
+    </attributeEditorContainer>
+  </attributeEditorForm>
+  <previewExpression>"label"</previewExpression>
+  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% format_number("clock", 1) %] h&lt;br&gt;drop [% format_number("drop_mean", 1) %] dB, [% "review" %]</mapTip>
+  <renderer-3d type="vector">
+    <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
+    <symbol type="polygon">
+      <data alt-clamping="absolute" alt-binding="vertex" offset="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
+      <material ambient="0,60,115" diffuse="0,92,175" specular="200,220,255" shininess="10"/>
+      <edges enabled="1" width="2" color="255,255,255"/>
+    </symbol>
+  </renderer-3d>
+  <layerGeometryType>2</layerGeometryType>
+</qgis>

@@ -1,0 +1,122 @@
+<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
+<qgis version="3.22.0" styleCategories="AllStyleCategories" hasScaleBasedVisibilityFlag="0" minScale="0" maxScale="0" readOnly="0">
+  <renderer-v2 type="categorizedSymbol" attr="kind" forceraster="0" enableorderby="0" symbollevels="0">
+    <categories>
+      <category symbol="0" value="homogeneous" label="One material" render="true"/>
+      <category symbol="1" value="dry" label="Dry lining" render="true"/>
+    </categories>
+    <symbols>
+      <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="120,60,160,35"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="120,60,160,255"/>
+            <Option type="QString" name="outline_style" value="dot"/>
+            <Option type="QString" name="outline_width" value="0.5"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+      </symbol>
+      <symbol name="1" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="60,140,60,35"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="60,140,60,255"/>
+            <Option type="QString" name="outline_style" value="dot"/>
+            <Option type="QString" name="outline_width" value="0.5"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+      </symbol>
+    </symbols>
+  </renderer-v2>
+  <fieldConfiguration>
+    <field name="id" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="survey_id" configurationFlags="None">
+      <editWidget type="Hidden">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="survey" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="kind" configurationFlags="None">
+      <editWidget type="ValueMap">
+        <config>
+          <Option type="Map">
+            <Option type="List" name="map">
+              <Option type="Map">
+                <Option type="QString" name="One material (gives the roughness)" value="homogeneous"/>
+              </Option>
+              <Option type="Map">
+                <Option type="QString" name="Dry lining (gives the threshold)" value="dry"/>
+              </Option>
+            </Option>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="drawn_by" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="drawn_at" configurationFlags="None">
+      <editWidget type="DateTime">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="allow_null" value="true"/>
+            <Option type="bool" name="calendar_popup" value="true"/>
+            <Option type="QString" name="display_format" value="yyyy-MM-dd HH:mm"/>
+            <Option type="bool" name="field_iso_format" value="false"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+  </fieldConfiguration>
+  <aliases>
+    <alias index="0" field="id" name="Region"/>
+    <alias index="1" field="survey_id" name="Survey key"/>
+    <alias index="2" field="survey" name="Survey"/>
+    <alias index="3" field="kind" name="Kind"/>
+    <alias index="4" field="drawn_by" name="Drawn by"/>
+    <alias index="5" field="drawn_at" name="Drawn at"/>
+  </aliases>
+  <editable>
+    <field name="id" editable="0"/>
+    <field name="survey_id" editable="1"/>
+    <field name="survey" editable="0"/>
+    <field name="kind" editable="1"/>
+    <field name="drawn_by" editable="0"/>
+    <field name="drawn_at" editable="0"/>
+  </editable>
+  <editorlayout>tablayout</editorlayout>
+  <attributeEditorForm>
+    <attributeEditorContainer name="Region" columnCount="1" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
+      <attributeEditorField name="kind" index="3" showLabel="1"/>
+      <attributeEditorField name="drawn_by" index="4" showLabel="1"/>
+      <attributeEditorField name="drawn_at" index="5" showLabel="1"/>
+    </attributeEditorContainer>
+  </attributeEditorForm>
+  <previewExpression>"kind"</previewExpression>
+  <mapTip>&lt;b&gt;[% "kind" %]&lt;/b&gt;&lt;br&gt;drawn by [% "drawn_by" %]</mapTip>
+  <layerGeometryType>2</layerGeometryType>
+</qgis>
