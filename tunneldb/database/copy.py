@@ -19,7 +19,7 @@ from psycopg import sql
 _HEADER = b"PGCOPY\n\xff\r\n\0" + struct.pack(">ii", 0, 0)
 _TRAILER = struct.pack(">h", -1)
 _EWKB_POINT_Z = 0xA0000001  # point, with Z (0x80000000) and SRID (0x20000000)
-_EWKB_BYTES = 29
+_EWKB_BYTES = 33  # byte order, type, SRID, three coordinates
 
 
 @dataclass(frozen=True)

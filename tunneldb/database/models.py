@@ -208,7 +208,8 @@ Point = Table(
     Column("classification", SmallInteger, nullable=False, comment="Class as in the file (ASPRS)"),
     Index("point_chainage_idx", "chainage", postgresql_using="brin", postgresql_with={"pages_per_range": "16"}),
     postgresql_partition_by="LIST (survey_id)",
-    comment="Points at survey density: partition point_s<survey> and in it point_s<survey>_km<km>, each in the order of chainage",
+    comment="Points at survey density: partition point_s<survey> and in it point_s<survey>_km<km>, "
+    "each in the order of chainage",
 )
 
 

@@ -1,0 +1,98 @@
+"""A PostgreSQL of the tests' own: the embedded server itself, in a folder that goes away with the session.
+
+Each test that asks for `dsn` or `conn` gets a fresh database, copied from a template that is migrated and
+installed once a session. With pytest-xdist each worker has its own server.
+"""
+
+from __future__ import annotations
+
+import itertools
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import psycopg
+import pytest
+from psycopg import sql
+from psycopg.conninfo import make_conninfo
+
+from tunneldb.database import connect, install, open_connection
+from tunneldb.database.server import Server
+
+TEMPLATE = "tunneldb_template"
+# Nothing of value is in it: no need to wait for the disk, and small enough for two workers on a small machine.
+TEST_SETTINGS = {"fsync": "off", "synchronous_commit": "off", "full_page_writes": "off", "shared_buffers": "128MB"}
+
+_numbers = itertools.count(1)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Keep every test away from the user's own embedded server and database."""
+    home = Path(tempfile.mkdtemp(prefix="tunneldb-tests-"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TUNNELDB_HOME", str(home))
+        patch.delenv("TUNNELDB_DSN", raising=False)
+        yield home
+    Server(home).stop()
+    shutil.rmtree(home, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def server_dsn(_own_home: Path) -> str:
+    """DSN of the embedded server's own database; started on first use."""
+    return Server(_own_home, settings=TEST_SETTINGS).start()
+
+
+@pytest.fixture(scope="session")
+def template(server_dsn: str) -> str:
+    """Name of the database that is migrated and installed, to be copied."""
+    create_database(server_dsn, TEMPLATE)
+    with open_connection(make_conninfo(server_dsn, dbname=TEMPLATE)) as connection:
+        install(connection)
+    return TEMPLATE
+
+
+@pytest.fixture
+def empty_dsn(server_dsn: str) -> Iterator[str]:
+    """DSN of a fresh database without anything in it, not even PostGIS."""
+    with _temporary(server_dsn, None) as dsn:
+        yield dsn
+
+
+@pytest.fixture
+def dsn(server_dsn: str, template: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """DSN of a fresh, installed database; also in TUNNELDB_DSN, for commands."""
+    with _temporary(server_dsn, template) as fresh:
+        monkeypatch.setenv("TUNNELDB_DSN", fresh)
+        yield fresh
+
+
+@pytest.fixture
+def conn(dsn: str) -> Iterator[psycopg.Connection]:
+    """Connection to a fresh, installed database; not in autocommit."""
+    with connect(dsn) as connection:
+        yield connection
+
+
+class _temporary:  # noqa: N801
+    """A database for the length of a with block."""
+
+    def __init__(self, server_dsn: str, template: str | None) -> None:
+        self.server_dsn, self.template = server_dsn, template
+        self.name = f"test_{next(_numbers)}"
+
+    def __enter__(self) -> str:
+        create_database(self.server_dsn, self.name, self.template)
+        return make_conninfo(self.server_dsn, dbname=self.name)
+
+    def __exit__(self, *_: object) -> None:
+        with psycopg.connect(self.server_dsn, autocommit=True) as connection:
+            connection.execute(sql.SQL("DROP DATABASE IF EXISTS {} WITH (FORCE)").format(sql.Identifier(self.name)))
+
+
+def create_database(server_dsn: str, name: str, template: str | None = None) -> None:
+    command = sql.SQL("CREATE DATABASE {} TEMPLATE {}").format(sql.Identifier(name), sql.Identifier(template or "template0"))
+    with psycopg.connect(server_dsn, autocommit=True) as connection:
+        connection.execute(command)
