@@ -1,0 +1,30 @@
+"""Synthetic laser-scanned tunnels with truth, for the demo, tests and benchmarks.
+
+>>> from tunneldb.simulate import Parameters, Simulation, simulate
+>>> cloud = simulate(Parameters(length=30, radius=300, scanner="profiler", profile_spacing=0.2, leaks=2))
+"""
+
+from tunneldb.simulate.centreline import CentreLine, Element
+from tunneldb.simulate.generate import Cloud, Simulation, simulate
+from tunneldb.simulate.output import Files, write
+from tunneldb.simulate.parameters import PRESETS, Parameters
+from tunneldb.simulate.section import Section, box, circular, horseshoe
+from tunneldb.simulate.tunnel import Tunnel, Unrolled
+
+__all__ = [
+    "PRESETS",
+    "CentreLine",
+    "Cloud",
+    "Element",
+    "Files",
+    "Parameters",
+    "Section",
+    "Simulation",
+    "Tunnel",
+    "Unrolled",
+    "box",
+    "circular",
+    "horseshoe",
+    "simulate",
+    "write",
+]

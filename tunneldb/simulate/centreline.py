@@ -1,0 +1,252 @@
+"""Centre line of a synthetic tunnel: exact position and frame at every chainage.
+
+Plan: straight, circular and clothoid elements joined with a common tangent. Profile: constant grades joined by
+parabolas. Chainage is the length in plan. The frame at a chainage is ``t`` (unit tangent up-chainage, in 3D),
+``u = t x z`` normalised (horizontal, to the right) and ``w = u x t`` (upward, perpendicular to the 3D axis).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tunneldb.errors import UserError
+
+Array = NDArray[np.float64]
+
+# 8-point Gauss-Legendre rule on [0, 1]; on the clothoids used here (turning by far less than 1 rad) it is exact
+# to rounding.
+_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(8)
+_GAUSS_X = 0.5 * (_GAUSS_X + 1.0)
+_GAUSS_W = 0.5 * _GAUSS_W
+
+PLAN_COLUMNS = 6  # chainage, x, y, direction (rad from east, anticlockwise), curvature, change of curvature per m
+PROFILE_COLUMNS = 4  # chainage, z, grade, change of grade per m
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _plan_at(row: Array, sigma: float) -> tuple[float, float, float, float, float]:
+    """Advance x, y from the start of a plan element, cos and sin of the direction there, and curvature."""
+    direction, curvature, change = row[3], row[4], row[5]
+    if change == 0.0:
+        half = 0.5 * curvature * sigma
+        chord = sigma if abs(half) < 1e-12 else sigma * math.sin(half) / half
+        dx = chord * math.cos(direction + half)
+        dy = chord * math.sin(direction + half)
+    else:
+        dx = 0.0
+        dy = 0.0
+        for i in range(8):
+            r = sigma * _GAUSS_X[i]
+            angle = direction + r * (curvature + 0.5 * change * r)
+            dx += _GAUSS_W[i] * math.cos(angle)
+            dy += _GAUSS_W[i] * math.sin(angle)
+        dx *= sigma
+        dy *= sigma
+    end = direction + sigma * (curvature + 0.5 * change * sigma)
+    return dx, dy, math.cos(end), math.sin(end), curvature + change * sigma
+
+
+@njit(cache=True, nogil=True, inline="always")
+def axis_at(
+    plan: Array, profile: Array, s: float
+) -> tuple[float, float, float, float, float, float, float, float]:
+    """Axis at chainage ``s``: x, y, z, cos and sin of direction, curvature, grade, change of grade.
+
+    The first and last elements continue beyond the ends.
+    """
+    i = 0
+    while i + 1 < plan.shape[0] and s >= plan[i + 1, 0]:
+        i += 1
+    dx, dy, c, n, k = _plan_at(plan[i], s - plan[i, 0])
+    j = 0
+    while j + 1 < profile.shape[0] and s >= profile[j + 1, 0]:
+        j += 1
+    h = s - profile[j, 0]
+    z = profile[j, 1] + h * (profile[j, 2] + 0.5 * profile[j, 3] * h)
+    return plan[i, 1] + dx, plan[i, 2] + dy, z, c, n, k, profile[j, 2] + profile[j, 3] * h, profile[j, 3]
+
+
+@njit(cache=True, nogil=True)
+def _axis_many(plan: Array, profile: Array, s: Array, out: Array) -> None:
+    for i in range(s.shape[0]):
+        x, y, z, c, n, k, g, dg = axis_at(plan, profile, s[i])
+        out[i, 0] = x
+        out[i, 1] = y
+        out[i, 2] = z
+        out[i, 3] = c
+        out[i, 4] = n
+        out[i, 5] = k
+        out[i, 6] = g
+        out[i, 7] = dg
+
+
+class Frame(NamedTuple):
+    """Axis position and unit vectors, each (n, 3): position, t (up-chainage), u (right), w (up)."""
+
+    position: Array
+    t: Array
+    u: Array
+    w: Array
+
+
+@dataclass(frozen=True)
+class Element:
+    """A plan element: length in m, curvature at its start and end in 1/m (positive to the left)."""
+
+    length: float
+    curvature_from: float
+    curvature_to: float
+
+
+@dataclass(frozen=True)
+class CentreLine:
+    """Centre line of a tunnel; build it with :meth:`from_elements` or :meth:`curve`.
+
+    Attributes
+    ----------
+    plan : (m, 6) array
+        Rows: chainage, x, y, direction, curvature, change of curvature, with x and y from ``origin``.
+    profile : (k, 4) array
+        Rows: chainage, z, grade, change of grade, with z from ``origin``.
+    origin : (3,) array
+        Coordinates of the start, m. Kept apart so that the arithmetic runs on small numbers.
+    start, end : float
+        Chainage of both ends, m.
+    """
+
+    plan: Array
+    profile: Array
+    origin: Array
+    start: float
+    end: float
+
+    @classmethod
+    def from_elements(
+        cls,
+        elements: list[Element],
+        *,
+        slope: float = 0.0,
+        slope_end: float | None = None,
+        start_chainage: float = 0.0,
+        azimuth: float = 60.0,
+        origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> CentreLine:
+        """Join plan elements; grades in m/m, azimuth in degrees from north, clockwise.
+
+        With ``slope_end`` a parabola over the middle half of the length leads from ``slope`` to it.
+        """
+        rows, s, x, y, direction = [], start_chainage, 0.0, 0.0, math.radians(90.0 - azimuth)
+        for e in elements:
+            change = (e.curvature_to - e.curvature_from) / e.length
+            row = np.array([s, x, y, direction, e.curvature_from, change])
+            rows.append(row)
+            dx, dy, _, _, _ = _plan_at(row, e.length)
+            s, x, y = s + e.length, x + dx, y + dy
+            direction += 0.5 * e.length * (e.curvature_from + e.curvature_to)
+        length = s - start_chainage
+        if slope_end is None or slope_end == slope:
+            profile = [[start_chainage, 0.0, slope, 0.0]]
+        else:
+            quarter, half = 0.25 * length, 0.5 * length
+            profile = [
+                [start_chainage, 0.0, slope, 0.0],
+                [start_chainage + quarter, slope * quarter, slope, (slope_end - slope) / half],
+                [
+                    start_chainage + quarter + half,
+                    slope * quarter + 0.5 * (slope + slope_end) * half,
+                    slope_end,
+                    0.0,
+                ],
+            ]
+        return cls(np.array(rows), np.array(profile), np.array(origin, dtype=float), start_chainage, s)
+
+    @classmethod
+    def curve(
+        cls,
+        length: float,
+        radius: float,
+        *,
+        straight: float | None = None,
+        transition: float = 0.0,
+        s_curve: bool = False,
+        slope: float = 0.0,
+        slope_end: float | None = None,
+        start_chainage: float = 0.0,
+        azimuth: float = 60.0,
+        origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> CentreLine:
+        """A straight of ``straight`` m (default a fifth of the length), then an arc to the end.
+
+        Parameters
+        ----------
+        radius : float
+            m; positive bends to the right, negative to the left, 0 is straight throughout.
+        transition : float
+            Length of the clothoid between straight and arc (and, in an S-curve, between the two arcs), m.
+        s_curve : bool
+            Bend one way for half of the curved length, then the other way.
+        """
+        lead = 0.2 * length if straight is None else straight
+        curved = length - lead - transition * (2 if s_curve else 1)
+        if radius and curved <= 0:
+            raise UserError(
+                f"straight ({lead:g} m) and transitions ({transition:g} m) leave no arc in {length:g} m of tunnel:"
+                " shorten them or lengthen the tunnel"
+            )
+        if radius == 0:
+            elements = [Element(length, 0.0, 0.0)]
+        else:
+            k = -1.0 / radius
+            parts = [Element(lead, 0.0, 0.0), Element(transition, 0.0, k)]
+            if s_curve:
+                parts += [
+                    Element(0.5 * curved, k, k),
+                    Element(transition, k, -k),
+                    Element(0.5 * curved, -k, -k),
+                ]
+            else:
+                parts.append(Element(curved, k, k))
+            elements = [e for e in parts if e.length > 0]
+        return cls.from_elements(
+            elements,
+            slope=slope,
+            slope_end=slope_end,
+            start_chainage=start_chainage,
+            azimuth=azimuth,
+            origin=origin,
+        )
+
+    def _rows(self, chainage: Array) -> Array:
+        s = np.ascontiguousarray(np.atleast_1d(chainage), dtype=np.float64)
+        out = np.empty((s.size, 8))
+        _axis_many(self.plan, self.profile, s, out)
+        return out
+
+    def position(self, chainage: Array) -> Array:
+        """Coordinates of the axis at chainages (n,) -> (n, 3), m."""
+        return self._rows(chainage)[:, :3] + self.origin
+
+    def frame(self, chainage: Array) -> Frame:
+        """Position and unit vectors t, u, w of the axis at chainages (n,)."""
+        row = self._rows(chainage)
+        c, n, g = row[:, 3], row[:, 4], row[:, 6]
+        q = np.sqrt(1.0 + g * g)
+        zero = np.zeros_like(c)
+        return Frame(
+            row[:, :3] + self.origin,
+            np.column_stack([c / q, n / q, g / q]),
+            np.column_stack([n, -c, zero]),
+            np.column_stack([-g * c / q, -g * n / q, 1.0 / q]),
+        )
+
+    def vertices(self, spacing: float) -> Array:
+        """Axis vertices every ``spacing`` m of chainage, the last at the end of the tunnel; (n, 3)."""
+        count = int(math.ceil((self.end - self.start) / spacing - 1e-9))
+        s = np.append(self.start + spacing * np.arange(count), self.end)
+        return self.position(s)

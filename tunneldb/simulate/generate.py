@@ -1,0 +1,166 @@
+"""A synthetic survey: the tunnel with its contents, and its points block by block."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.simulate.furniture import FLOOR, Appendage, Niche, furnish, refuges
+from tunneldb.simulate.intensity import counts, reference_curve
+from tunneldb.simulate.leaks import Leak, place
+from tunneldb.simulate.parameters import Parameters
+from tunneldb.simulate.ray import scene, trace
+from tunneldb.simulate.scanner import BlockPlan, Scanner
+from tunneldb.simulate.tunnel import Tunnel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Points with truth, all arrays of n in file order.
+
+    Attributes
+    ----------
+    xyz : (n, 3)
+        Coordinates, m.
+    time : (n,)
+        GPS time, s.
+    scan_id : (n,)
+        Station number from 1; 1 for a profiler.
+    amplitude, reflectance : (n,)
+        dB.
+    intensity : (n,)
+        Linear counts.
+    chainage, arc, offset : (n,)
+        Of the point as stored, m.
+    klass : (n,)
+        0 lining, 1 floor, 2 appendage, 3 niche, 4 outlier.
+    leak : (n,)
+        Id of the leak that the laser met, -1 for none.
+    range, incidence : (n,)
+        Distance from the scanner to the spot met, m, and angle to its normal, rad; without noise.
+    """
+
+    xyz: Array
+    time: Array
+    scan_id: NDArray[np.uint16]
+    amplitude: NDArray[np.float32]
+    reflectance: NDArray[np.float32]
+    intensity: NDArray[np.uint16]
+    chainage: Array
+    arc: NDArray[np.float32]
+    offset: NDArray[np.float32]
+    klass: NDArray[np.uint8]
+    leak: NDArray[np.int32]
+    range: NDArray[np.float32]
+    incidence: NDArray[np.float32]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+class Simulation:
+    """A synthetic survey, ready to be scanned.
+
+    Attributes
+    ----------
+    parameters : Parameters
+    tunnel : Tunnel
+        Exact geometry.
+    appendages, niches, leaks : list
+        What is in it.
+    scanner : Scanner
+        Poses.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.parameters = parameters
+        self.tunnel: Tunnel = parameters.tunnel()
+        furniture, wet, reference, self._seed = np.random.SeedSequence(parameters.seed).spawn(4)
+        self.appendages: list[Appendage] = (
+            furnish(self.tunnel, np.random.default_rng(furniture)) if parameters.appendages else []
+        )
+        self.niches: list[Niche] = refuges(self.tunnel) if parameters.niches else []
+        obstacles = [a.footprint() for a in self.appendages] + [n.footprint(self.tunnel) for n in self.niches]
+        self.leaks: list[Leak] = place(
+            self.tunnel,
+            obstacles,
+            parameters.leak_count(),
+            parameters.leak_area,
+            parameters.leak_drop,
+            np.random.default_rng(wet),
+        )
+        self.reference = reference_curve(parameters.max_range, np.random.default_rng(reference))
+        self.scanner = Scanner(parameters, self.tunnel)
+        self._scene = scene(self.tunnel, self.appendages, self.niches, self.leaks)
+
+    def make(self, plan: BlockPlan) -> Cloud:
+        """Points of one block; the same for the same seed and index, whenever it is made."""
+        p = self.parameters
+        sequence = np.random.SeedSequence(self._seed.entropy, spawn_key=(*self._seed.spawn_key, plan.index))
+        rng = np.random.default_rng(sequence)
+        rays = self.scanner.rays(plan, rng)
+        n = len(rays.time)
+        out = np.empty((n, 12))
+        trace(
+            self._scene,
+            rays.origin,
+            rays.direction,
+            rays.hint,
+            rng.standard_normal(n) * p.range_noise,
+            rng.random((n, 2)),
+            p.outliers,
+            p.relief,
+            p.max_range,
+            out,
+        )
+        keep = np.flatnonzero(~np.isnan(out[:, 0]))
+        out = out[keep]
+        radiometry = p.radiometry()
+        klass = out[:, 7].astype(np.uint8)
+        noise = rng.standard_normal(len(out)) * p.intensity_noise
+        reflectance = radiometry.reflectance(out[:, 10], klass == FLOOR, out[:, 9]) + noise
+        amplitude = radiometry.amplitude(out[:, 11], reflectance)
+        index = out[:, 8].astype(np.int32)
+        return Cloud(
+            xyz=out[:, 1:4] + self.tunnel.line.origin,
+            time=rays.time[keep],
+            scan_id=rays.scan_id[keep],
+            amplitude=amplitude.astype(np.float32),
+            reflectance=reflectance.astype(np.float32),
+            intensity=counts(amplitude),
+            chainage=out[:, 4].copy(),
+            arc=out[:, 5].astype(np.float32),
+            offset=out[:, 6].astype(np.float32),
+            klass=klass,
+            leak=np.where(index >= 0, index + 1, -1).astype(np.int32),
+            range=out[:, 11].astype(np.float32),
+            incidence=np.arccos(out[:, 10]).astype(np.float32),
+        )
+
+    def blocks(self, workers: int | None = None) -> Iterator[tuple[BlockPlan, Cloud]]:
+        """Blocks in file order, made a few ahead by threads (the kernels release the interpreter's lock)."""
+        count = workers or os.cpu_count() or 1
+        waiting: deque[tuple[BlockPlan, Future[Cloud]]] = deque()
+        with ThreadPoolExecutor(count) as pool:
+            for plan in self.scanner.plans():
+                waiting.append((plan, pool.submit(self.make, plan)))
+                if len(waiting) > count + 1:
+                    done, future = waiting.popleft()
+                    yield done, future.result()
+            while waiting:
+                done, future = waiting.popleft()
+                yield done, future.result()
+
+
+def simulate(parameters: Parameters) -> Cloud:
+    """All points of a synthetic survey at once; for small ones."""
+    clouds = [cloud for _, cloud in Simulation(parameters).blocks()]
+    return Cloud(**{f.name: np.concatenate([getattr(c, f.name) for c in clouds]) for f in fields(Cloud)})

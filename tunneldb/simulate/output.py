@@ -1,0 +1,227 @@
+"""Files of a synthetic survey: LAZ, poses, reference curve, axis and truth."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import date
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, BinaryIO
+
+import laspy
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry import mapping
+
+import tunneldb
+from tunneldb.errors import UserError
+from tunneldb.simulate.generate import Cloud, Simulation
+
+# Resolution of the stored coordinates, m; as scanner makers export.
+SCALE = 0.00025
+AXIS_SPACING = 20.0
+# A fixed day, so that the same seed gives the same bytes.
+CREATED = date(2024, 5, 4)
+
+TRUTH = {
+    "chainage": np.dtype(np.float64),
+    "arc": np.dtype(np.float32),
+    "offset": np.dtype(np.float32),
+    "klass": np.dtype(np.uint8),
+    "leak": np.dtype(np.int32),
+}
+TRUTH_NAMES = {"klass": "class"}
+
+
+@dataclass
+class Files:
+    """What :func:`write` made."""
+
+    clouds: list[Path] = field(default_factory=list)
+    truth: list[Path] = field(default_factory=list)
+    axis: Path = Path()
+    poses: Path = Path()
+    reference: Path = Path()
+    leaks: Path = Path()
+    parameters: Path = Path()
+    points: int = 0
+
+
+class _TruthWriter:
+    """Columns of truth, streamed to an .npz without holding them."""
+
+    def __init__(self, path: Path, scratch: Path) -> None:
+        self.path = path
+        self.count = 0
+        self.files: dict[str, BinaryIO] = {n: (scratch / f"{path.name}.{n}").open("w+b") for n in TRUTH}
+
+    def add(self, cloud: Cloud) -> None:
+        self.count += len(cloud)
+        for name, dtype in TRUTH.items():
+            getattr(cloud, name).astype(dtype, copy=False).tofile(self.files[name])
+
+    def close(self) -> None:
+        with zipfile.ZipFile(self.path, "w", zipfile.ZIP_STORED) as archive:
+            for name, dtype in TRUTH.items():
+                source = self.files[name]
+                source.flush()
+                source.seek(0)
+                info = zipfile.ZipInfo(f"{TRUTH_NAMES.get(name, name)}.npy")
+                with archive.open(info, "w", force_zip64=True) as target:
+                    header: dict[str, Any] = {
+                        "descr": np.lib.format.dtype_to_descr(dtype),
+                        "fortran_order": False,
+                        "shape": (self.count,),
+                    }
+                    np.lib.format.write_array_header_1_0(target, header)
+                    shutil.copyfileobj(source, target, 1 << 22)
+                source.close()
+
+
+def _header(simulation: Simulation) -> laspy.LasHeader:
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.add_extra_dims(
+        [
+            laspy.ExtraBytesParams("Amplitude", np.float32, "echo amplitude, dB"),
+            laspy.ExtraBytesParams("Reflectance", np.float32, "without range, dB"),
+        ]
+    )
+    header.add_crs(simulation.parameters.crs())
+    header.scales = np.full(3, SCALE)
+    header.offsets = np.floor(simulation.tunnel.line.origin)
+    header.generating_software = f"tunneldb {tunneldb.__version__} simulate"
+    header.system_identifier = "SIMULATION"
+    header.creation_date = CREATED
+    return header
+
+
+def _record(header: laspy.LasHeader, cloud: Cloud) -> laspy.ScaleAwarePointRecord:
+    record = laspy.ScaleAwarePointRecord.zeros(len(cloud), header=header)
+    cells = np.rint((cloud.xyz - header.offsets) / header.scales)
+    if np.abs(cells).max(initial=0.0) >= 2**31:
+        raise UserError("the tunnel is too long for one coordinate offset in LAS: make it shorter than 500 km")
+    for i, name in enumerate("XYZ"):
+        record[name] = cells[:, i].astype(np.int32)
+    record["intensity"] = cloud.intensity
+    record["return_number"] = np.ones(len(cloud), dtype=np.uint8)
+    record["number_of_returns"] = np.ones(len(cloud), dtype=np.uint8)
+    record["point_source_id"] = cloud.scan_id
+    record["gps_time"] = cloud.time
+    record["Amplitude"] = cloud.amplitude
+    record["Reflectance"] = cloud.reflectance
+    return record
+
+
+def _csv(path: Path, columns: str, rows: NDArray[np.float64], formats: list[str]) -> Path:
+    np.savetxt(path, rows, fmt=formats, delimiter=",", header=columns, comments="")
+    return path
+
+
+def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
+    p, line, scanner = simulation.parameters, simulation.tunnel.line, simulation.scanner
+    base = folder / p.name
+    files.axis = _csv(Path(f"{base}.axis.csv"), "x,y,z", line.vertices(AXIS_SPACING), ["%.4f"] * 3)
+    if p.scanner == "static":
+        stations = scanner.stations()
+        rows = np.column_stack([np.arange(1, len(stations) + 1), stations])
+        files.poses = _csv(Path(f"{base}.stations.csv"), "scan_id,x,y,z", rows, ["%d"] + ["%.4f"] * 3)
+    else:
+        files.poses = _csv(
+            Path(f"{base}.trajectory.csv"), "time,x,y,z", scanner.trajectory(), ["%.3f"] + ["%.4f"] * 3
+        )
+    files.reference = _csv(
+        Path(f"{base}.reference.csv"), "range_m,intensity_db", simulation.reference, ["%.2f", "%.3f"]
+    )
+    files.leaks = Path(f"{base}.truth.geojson")
+    features = [
+        {
+            "type": "Feature",
+            "id": leak.id,
+            "properties": {
+                "id": leak.id,
+                "area": round(leak.area, 5),
+                "area_surface": round(leak.area_surface, 5),
+                "drop_db": round(leak.drop, 3),
+            },
+            "geometry": mapping(leak.polygon),
+        }
+        for leak in simulation.leaks
+    ]
+    files.leaks.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    section = simulation.tunnel.section
+    record = {
+        "software": f"tunneldb {tunneldb.__version__}",
+        "parameters": p.as_dict(),
+        "chainage": [line.start, line.end],
+        "section": {
+            "floor_arc": section.floor_arc,
+            "half_perimeter": section.half_perimeter,
+            "floor_below_axis": -section.floor,
+        },
+        "classes": {"lining": 0, "floor": 1, "appendage": 2, "niche": 3, "outlier": 4},
+        "points": files.points,
+        "files": [path.name for path in files.clouds],
+        "appendages": [vars(a) for a in simulation.appendages],
+        "niches": [vars(n) for n in simulation.niches],
+    }
+    files.parameters = Path(f"{base}.json")
+    files.parameters.write_text(json.dumps(record, indent=1))
+
+
+def write(
+    simulation: Simulation,
+    folder: Path,
+    *,
+    truth: bool = True,
+    progress: Callable[[float, int], None] | None = None,
+) -> Files:
+    """Scan a simulation into ``folder``, one LAZ up to 1 km of tunnel, else one each kilometre of chainage.
+
+    Parameters
+    ----------
+    truth : bool
+        Also write the truth of each point (21 bytes a point).
+    progress : callable, optional
+        Called with the share done (0 to 1) and the points written after each block.
+    """
+    p, line = simulation.parameters, simulation.tunnel.line
+    files = Files()
+    folder.mkdir(parents=True, exist_ok=True)
+    by_km = p.length > 1000.0
+    header = _header(simulation)
+    with TemporaryDirectory(dir=folder, prefix=".truth-") as scratch:
+        current, cloud_writer, truth_writer = None, None, None
+        try:
+            for plan, cloud in simulation.blocks():
+                km = math.floor(plan.chainage / 1000.0 + 1e-9) if by_km else 0
+                if km != current:
+                    for writer in (cloud_writer, truth_writer):
+                        if writer is not None:
+                            writer.close()
+                    current = km
+                    base = folder / (f"{p.name}-km{km:03d}" if by_km else p.name)
+                    path = Path(f"{base}.laz")
+                    files.clouds.append(path)
+                    cloud_writer = laspy.open(
+                        path, mode="w", header=header, laz_backend=laspy.LazBackend.LazrsParallel
+                    )
+                    if truth:
+                        files.truth.append(Path(f"{base}.truth.npz"))
+                        truth_writer = _TruthWriter(files.truth[-1], Path(scratch))
+                cloud_writer.write_points(_record(header, cloud))
+                if truth_writer is not None:
+                    truth_writer.add(cloud)
+                files.points += len(cloud)
+                if progress is not None:
+                    progress((plan.chainage_to - line.start) / (line.end - line.start), files.points)
+        finally:
+            for writer in (cloud_writer, truth_writer):
+                if writer is not None:
+                    writer.close()
+    _sidecars(simulation, folder, files)
+    return files

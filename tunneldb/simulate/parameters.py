@@ -1,0 +1,202 @@
+"""What a synthetic survey is made of."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Literal
+
+import pyproj
+from pyproj.exceptions import CRSError
+
+from tunneldb.errors import UserError
+from tunneldb.simulate import section
+from tunneldb.simulate.centreline import CentreLine
+from tunneldb.simulate.intensity import Radiometry
+from tunneldb.simulate.tunnel import Tunnel
+
+# Allowed values: low, high, unit.
+LIMITS: dict[str, tuple[float, float, str]] = {
+    "length": (10.0, 100_000.0, "m"),
+    "transition": (0.0, 1000.0, "m"),
+    "slope": (-20.0, 20.0, "%"),
+    "slope_end": (-20.0, 20.0, "%"),
+    "start_chainage": (0.0, 10_000_000.0, "m"),
+    "azimuth": (0.0, 400.0, "degrees"),
+    "station_spacing": (2.0, 100.0, "m"),
+    "angular_step": (0.01, 5.0, "degrees"),
+    "profile_spacing": (0.002, 5.0, "m"),
+    "profile_points": (36, 100_000, "points"),
+    "speed": (0.05, 30.0, "m/s"),
+    "scanner_height": (0.5, 10.0, "m"),
+    "scanner_offset": (-10.0, 10.0, "m"),
+    "max_range": (2.0, 40.0, "m"),
+    "range_noise": (0.0, 0.05, "m"),
+    "outliers": (0.0, 0.2, "(share)"),
+    "relief": (0.0, 0.02, "m"),
+    "roughness": (0.0, 60.0, "degrees"),
+    "intensity_noise": (0.0, 5.0, "dB"),
+    "leaks": (0, 100_000, "leaks"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters:
+    """A synthetic tunnel, its contents and its survey; lengths in m, angles in degrees, levels in dB.
+
+    Raises
+    ------
+    UserError
+        A value is out of its range, or the values do not go together.
+    """
+
+    name: str = "tunnel"
+    seed: int = 1
+    srid: int = 25830
+
+    section: Literal["circular", "horseshoe", "box"] = "circular"
+    radius_section: float = 4.0
+    invert: float = 2.8
+    wall_height: float = 3.0
+    wall_lean: float = 0.0
+    width: float = 8.0
+    height: float = 6.0
+
+    length: float = 200.0
+    radius: float = 300.0
+    straight: float | None = None
+    transition: float = 0.0
+    s_curve: bool = False
+    slope: float = 0.0
+    slope_end: float | None = None
+    start_chainage: float = 0.0
+    azimuth: float = 60.0
+    origin: tuple[float, float, float] = (272_000.0, 4_765_000.0, 640.0)
+
+    scanner: Literal["static", "profiler"] = "static"
+    station_spacing: float = 15.0
+    angular_step: float = 0.15
+    profile_spacing: float = 0.015
+    profile_points: int = 1500
+    speed: float = 1.0
+    density: float | None = None
+    scanner_height: float = 1.7
+    scanner_offset: float = 0.3
+    max_range: float = 25.0
+    range_noise: float = 0.003
+    outliers: float = 0.0005
+    relief: float = 0.0
+
+    roughness: float = 12.0
+    intensity_noise: float = 0.35
+    leaks: int | None = None
+    leak_area: tuple[float, float] = (0.05, 3.0)
+    leak_drop: tuple[float, float] = (4.0, 8.0)
+    appendages: bool = True
+    niches: bool = True
+
+    def __post_init__(self) -> None:
+        for name, (low, high, unit) in LIMITS.items():
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise UserError(f"{name.replace('_', ' ')} is {value:g}: give {low:g} to {high:g} {unit}")
+        if not self.name or any(c in self.name for c in "/\\\0") or self.name.startswith("."):
+            raise UserError(f"name {self.name!r} does not make a file name: use letters, digits, - and _")
+        if self.section not in ("circular", "horseshoe", "box"):
+            raise UserError(f"section {self.section!r} is unknown: use circular, horseshoe or box")
+        if self.scanner not in ("static", "profiler"):
+            raise UserError(f"scanner {self.scanner!r} is unknown: use static or profiler")
+        if self.radius and not abs(self.radius) >= 50.0:
+            raise UserError(f"radius of the curve is {self.radius:g} m: give 50 m or more, or 0 for a straight tunnel")
+        if self.straight is not None and not 0.0 <= self.straight <= self.length:
+            raise UserError(f"straight is {self.straight:g} m: give 0 to the length, {self.length:g} m")
+        if self.density is not None and not 0.1 <= self.density <= 1e6:
+            raise UserError(f"density is {self.density:g} points/m²: give 0.1 to 1000000")
+        if self.seed < 0:
+            raise UserError(f"seed is {self.seed}: give 0 or more")
+        for name, floor in (("leak_area", 1e-3), ("leak_drop", 0.1)):
+            low, high = getattr(self, name)
+            if not floor <= low <= high:
+                raise UserError(f"{name.replace('_', ' ')} is {low:g} to {high:g}: give two growing numbers from {floor:g}")
+        self.crs()
+        tunnel = self.tunnel()
+        height = tunnel.section.floor + self.scanner_height
+        _, offset, _ = tunnel.section.project([self.scanner_offset], [height])
+        if offset[0] < 0.5:
+            raise UserError(
+                f"the scanner, {self.scanner_height:g} m above the floor and {self.scanner_offset:g} m off the"
+                " middle, stands less than 0.5 m from the lining: change its height or offset"
+            )
+
+    def crs(self) -> pyproj.CRS:
+        """Coordinate system; projected, in metres."""
+        try:
+            crs = pyproj.CRS.from_epsg(self.srid)
+        except CRSError:
+            raise UserError(f"SRID {self.srid} is unknown: give the EPSG code of a projected system") from None
+        if not crs.is_projected or not math.isclose(crs.axis_info[0].unit_conversion_factor, 1.0):
+            raise UserError(f"SRID {self.srid} ({crs.name}) is not projected in metres: give one that is")
+        return crs
+
+    def tunnel(self) -> Tunnel:
+        """Geometry of the tunnel."""
+        if self.section == "circular":
+            shape = section.circular(self.radius_section, self.invert)
+        elif self.section == "horseshoe":
+            shape = section.horseshoe(self.radius_section, self.wall_height, self.wall_lean)
+        else:
+            shape = section.box(self.width, self.height)
+        line = CentreLine.curve(
+            self.length,
+            self.radius,
+            straight=self.straight,
+            transition=self.transition,
+            s_curve=self.s_curve,
+            slope=self.slope / 100.0,
+            slope_end=None if self.slope_end is None else self.slope_end / 100.0,
+            start_chainage=self.start_chainage,
+            azimuth=self.azimuth,
+            origin=self.origin,
+        )
+        return Tunnel(line, shape)
+
+    def radiometry(self) -> Radiometry:
+        """Material of the surfaces."""
+        return Radiometry(roughness=self.roughness)
+
+    def leak_count(self) -> int:
+        """Number of leaks: as asked, else one every 12 m."""
+        return max(1, round(self.length / 12.0)) if self.leaks is None else self.leaks
+
+    def as_dict(self) -> dict[str, Any]:
+        """All parameters, for the record."""
+        return asdict(self)
+
+
+# Named starting points; every value can be overridden.
+PRESETS: dict[str, dict[str, Any]] = {
+    # about 12 million points
+    "demo": {
+        "name": "demo",
+        "length": 150.0,
+        "straight": 40.0,
+        "slope": 2.0,
+        "start_chainage": 12_300.0,
+        "scanner": "profiler",
+        "profile_spacing": 0.016,
+        "profile_points": 1250,
+        "leaks": 14,
+    },
+    # about 200 000 points, for tests
+    "small": {
+        "name": "small",
+        "length": 40.0,
+        "straight": 5.0,
+        "scanner": "profiler",
+        "profile_spacing": 0.1,
+        "profile_points": 500,
+        "leaks": 3,
+    },
+}
+
+FIELDS = tuple(f.name for f in fields(Parameters))

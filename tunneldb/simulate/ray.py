@@ -1,0 +1,332 @@
+"""Rays from a scanner to the first thing they meet in a synthetic tunnel.
+
+The offset of the swept section is a nearly concave function along a ray, so that Newton's method, started where the
+offset falls, finds the lining in a few steps from beyond. Appendages stand within a known distance of the lining;
+only the last part of the ray is marched through their signed distances. Niches are straight boxes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tunneldb.simulate.furniture import (
+    APPENDAGE,
+    FLOOR,
+    LINING,
+    NICHE,
+    OUTLIER,
+    Appendage,
+    Niche,
+    appendage_table,
+    bin_of,
+    bins,
+    distance,
+    niche_table,
+)
+from tunneldb.simulate.leaks import EDGE, Leak, depth_inside, edge_table
+from tunneldb.simulate.section import nearest
+from tunneldb.simulate.tunnel import Tunnel, gradient, newton_step
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+# Beyond this incidence the echo is lost, as scanners lose it.
+MINIMUM_COSINE = 0.087
+
+
+class Scene(NamedTuple):
+    """A tunnel and what is in it, as flat arrays for the kernels."""
+
+    plan: Array
+    profile: Array
+    parts: Array
+    ends: Array  # chainage of both ends, arc of the floor's corner, reach of the appendages off the lining
+    items: Array
+    item_bins: Index
+    item_list: Index
+    niches: Array
+    niche_bins: Index
+    niche_list: Index
+    edges: Array
+    edge_first: Index
+    leaks: Array
+    leak_bins: Index
+    leak_list: Index
+
+
+def scene(tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: list[Leak]) -> Scene:
+    """Lay a tunnel and its contents out for the kernels."""
+    line = tunnel.line
+    item_rows, niche_rows = appendage_table(tunnel, items), niche_table(tunnel, niches)
+    edges, first, leak_rows = edge_table(leaks)
+    reach = max((i.standoff + 0.5 * math.hypot(i.width, i.depth) for i in items), default=0.0)
+    return Scene(
+        line.plan,
+        line.profile,
+        tunnel.section.parts,
+        np.array([line.start, line.end, tunnel.section.floor_arc, 1.1 * reach]),
+        item_rows,
+        *bins(item_rows[:, 1], item_rows[:, 2], line.start, line.end),
+        niche_rows,
+        *bins(niche_rows[:, 0], niche_rows[:, 1], line.start, line.end),
+        edges,
+        first,
+        leak_rows,
+        *bins(leak_rows[:, 0], leak_rows[:, 2], line.start, line.end),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _lining(
+    sc: Scene, o: Array, d: Array, s: float, furthest: float
+) -> tuple[float, float, float, float, float, float]:
+    """Range along a ray to the swept section, chainage, arc and cosine there, then at the start: offset, chainage.
+
+    Range is NaN when nothing is met within ``furthest``.
+    """
+    x, y, z = o[0], o[1], o[2]
+    for _ in range(20):
+        step, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
+        s += step
+        if abs(step) < 1e-9:
+            break
+    s0 = s
+    offset0 = 0.0
+    arc = 0.0
+    r = 0.0
+    for i in range(80):
+        step, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
+        s += step
+        if abs(step) > 1e-4:
+            step, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
+            s += step
+        arc, offset, gu, gw = nearest(sc.parts, u, w)
+        nx, ny, nz = gradient(gu, gw, u, w, c, n, k, g, q, det)
+        slope = nx * d[0] + ny * d[1] + nz * d[2]
+        if i == 0:
+            offset0 = offset
+        if abs(offset) < 1e-7 and abs(step) < 1e-6 and r > 0.0:
+            norm = math.sqrt(nx * nx + ny * ny + nz * nz)
+            return r, s, arc, -slope / norm, offset0, s0
+        advance = offset if slope > -0.02 and offset > 0.0 else -offset / slope
+        if offset > 0.0 and r >= furthest:
+            return np.nan, s, arc, 0.0, offset0, s0
+        advance = min(advance, furthest - r)
+        r += advance
+        x += advance * d[0]
+        y += advance * d[1]
+        z += advance * d[2]
+        s += advance * (d[0] * c + d[1] * n + d[2] * g) / det
+    return np.nan, s, arc, 0.0, offset0, s0
+
+
+@njit(cache=True, nogil=True)
+def _item(sc: Scene, o: Array, d: Array, s: float, r: float, wall: float) -> tuple[float, int, float]:
+    """March from range r to the lining at ``wall``: range to an appendage (NaN: none), which, cosine there."""
+    r_begin = r
+    for i in range(200):
+        x, y, z = o[0] + r * d[0], o[1] + r * d[1], o[2] + r * d[2]
+        step, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
+        s += step
+        if i == 0 or abs(step) > 1e-5:
+            step, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
+            s += step
+        b = bin_of(s, sc.ends[0], sc.item_bins)
+        near = 0.8  # below the REACH of a bin's list
+        which = -1
+        for j in range(sc.item_bins[b], sc.item_bins[b + 1]):
+            gap = distance(sc.items[sc.item_list[j]], s, u, w)
+            if gap < near:
+                near = gap
+                which = sc.item_list[j]
+        if near < 1e-4:
+            if r == r_begin and r == 0.0:
+                return np.nan, -1, 0.0
+            row = sc.items[which]
+            h = 1e-5
+            gs = (distance(row, s + h, u, w) - distance(row, s - h, u, w)) / (2 * h)
+            gu = (distance(row, s, u + h, w) - distance(row, s, u - h, w)) / (2 * h)
+            gw = (distance(row, s, u, w + h) - distance(row, s, u, w - h)) / (2 * h)
+            nx, ny, nz = gradient(gu, gw, u, w, c, n, k, g, q, det)
+            nx, ny, nz = nx + gs * c / det, ny + gs * n / det, nz + gs * g / det
+            norm = math.sqrt(nx * nx + ny * ny + nz * nz)
+            return r, which, -(nx * d[0] + ny * d[1] + nz * d[2]) / norm
+        advance = 0.96 * near
+        r += advance
+        if r >= wall:
+            return np.nan, -1, 0.0
+        s += advance * (d[0] * c + d[1] * n + d[2] * g) / det
+    return np.nan, -1, 0.0
+
+
+@njit(cache=True, nogil=True)
+def _niche(sc: Scene, o: Array, d: Array, s: float, r: float) -> tuple[float, float]:
+    """Range to the inside of a niche whose opening the ray passes at range r, and cosine there (NaN: none)."""
+    b = bin_of(s, sc.ends[0], sc.niche_bins)
+    for j in range(sc.niche_bins[b], sc.niche_bins[b + 1]):
+        row = sc.niches[sc.niche_list[j]]
+        leave = 1e300
+        cosine = 0.0
+        inside = True
+        for axis in range(3):
+            a = row[5 + 3 * axis : 8 + 3 * axis]
+            at = (
+                (o[0] + r * d[0] - row[2]) * a[0]
+                + (o[1] + r * d[1] - row[3]) * a[1]
+                + (o[2] + r * d[2] - row[4]) * a[2]
+            )
+            rate = d[0] * a[0] + d[1] * a[1] + d[2] * a[2]
+            low, high = 0.0, row[16]
+            if axis == 0:
+                low, high = -row[14], row[14]
+            elif axis == 2:
+                high = row[15]
+            if at < low or at > high:
+                inside = False
+                break
+            if abs(rate) > 1e-12:
+                to = ((high if rate > 0.0 else low) - at) / rate
+                if to < leave:
+                    leave = to
+                    cosine = abs(rate)
+        if inside:
+            return r + leave, cosine
+    return np.nan, 0.0
+
+
+@njit(cache=True, nogil=True)
+def _wetness(sc: Scene, s: float, arc: float) -> tuple[int, float]:
+    """Number of the leak that holds a point of the lining (-1: none) and drop there, dB."""
+    b = bin_of(s, sc.ends[0], sc.leak_bins)
+    for j in range(sc.leak_bins[b], sc.leak_bins[b + 1]):
+        i = sc.leak_list[j]
+        row = sc.leaks[i]
+        if s < row[0] - EDGE or s > row[2] + EDGE or arc < row[1] - EDGE or arc > row[3] + EDGE:
+            continue
+        depth = depth_inside(sc.edges, sc.edge_first[i], sc.edge_first[i + 1], s, arc)
+        if depth > -EDGE:
+            share = min(0.5 * (depth + EDGE) / EDGE, 1.0)
+            return (i if depth > 0.0 else -1), row[4] * share * share * (3.0 - 2.0 * share)
+    return -1, 0.0
+
+
+@njit(cache=True, nogil=True)
+def _bump(s: float, arc: float, size: float) -> float:
+    """Smooth pseudo-random relief, -1 to 1, with a wavelength of about two ``size`` (value noise)."""
+    x, y = s / size, arc / size
+    fx, fy = math.floor(x), math.floor(y)
+    tx, ty = x - fx, y - fy
+    tx, ty = tx * tx * (3.0 - 2.0 * tx), ty * ty * (3.0 - 2.0 * ty)
+    total = 0.0
+    for i in range(2):
+        for j in range(2):
+            h = math.sin((fx + i) * 12.9898 + (fy + j) * 78.233) * 43758.5453
+            value = 2.0 * (h - math.floor(h)) - 1.0
+            total += value * (tx if i else 1.0 - tx) * (ty if j else 1.0 - ty)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def trace(
+    sc: Scene,
+    origin: Array,
+    direction: Array,
+    hint: Array,
+    noise: Array,
+    chance: Array,
+    outliers: float,
+    relief: float,
+    furthest: float,
+    out: Array,
+) -> None:
+    """Shoot rays.
+
+    Parameters
+    ----------
+    origin, direction : (n, 3)
+        From the line's origin, m; unit vectors.
+    hint : (n,)
+        Chainage near each origin, m.
+    noise : (n,)
+        Range error, m.
+    chance : (n, 2)
+        Uniform numbers that decide on outliers and where they fall.
+    outliers : float
+        Share of rays that become isolated points.
+    relief : float
+        Height of small-scale relief of the lining, m.
+    furthest : float
+        Greatest range, m.
+    out : (n, 12)
+        range (NaN: no echo), x, y, z, chainage, arc, offset, class, leak (-1: none), drop (dB), cosine of
+        incidence, true range. Chainage, arc and offset are those of the stored point; leak, drop and cosine
+        those of the spot that the laser met.
+    """
+    for i in range(origin.shape[0]):
+        o, d = origin[i], direction[i]
+        wall, s, arc, cosine, offset0, s0 = _lining(sc, o, d, hint[i], 2.0 * furthest)
+        out[i, 0] = np.nan
+        if math.isnan(wall) or offset0 <= 0.0:
+            continue
+        r = wall
+        klass = FLOOR if abs(arc) > sc.ends[2] else LINING
+        leak = -1
+        drop = 0.0
+        height = 0.0
+        if sc.items.shape[0] > 0:
+            # The offset is concave along the ray, so it cannot fall below the appendages' reach before here.
+            begin = wall * max(0.0, 1.0 - sc.ends[3] / offset0)
+            hit, which, c = _item(sc, o, d, s0 + (s - s0) * begin / wall, begin, wall)
+            if which >= 0:
+                r, cosine = hit, c
+                klass = int(sc.items[which, 9])
+                drop = sc.items[which, 10]
+        if r == wall and klass == LINING:
+            hit, c = _niche(sc, o, d, s, wall)
+            if not math.isnan(hit):
+                r, cosine, klass = hit, c, NICHE
+            else:
+                leak, drop = _wetness(sc, s, arc)
+                if relief > 0.0:
+                    height = relief * _bump(s, arc, 0.12)
+        if r > furthest or cosine < MINIMUM_COSINE:
+            continue
+        true_range = r
+        r += noise[i] - height / max(cosine, 0.3)
+        v = chance[i, 1]
+        if chance[i, 0] < outliers:
+            # Most isolated points hang in the air, some lie behind the wall (multipath).
+            r = r * (0.15 + 1.1 * v) if v < 0.7 else r * (1.0 + 0.5 * (v - 0.7))
+            klass = OUTLIER
+        elif klass == APPENDAGE and chance[i, 0] < outliers + 0.01:
+            r += v * (wall - r)  # a mixed pixel: the beam meets the appendage's edge and the wall behind it
+            klass = OUTLIER
+        if klass == OUTLIER:
+            leak = -1
+            drop += 3.0
+        x, y, z = o[0] + r * d[0], o[1] + r * d[1], o[2] + r * d[2]
+        for _ in range(10):
+            step, u, w, ca, sa, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
+            s += step
+            if abs(step) < 1e-7:
+                break
+        arc, offset, gu, gw = nearest(sc.parts, u, w)
+        if s < sc.ends[0] or s > sc.ends[1]:
+            continue
+        out[i, 0] = r
+        out[i, 1] = x
+        out[i, 2] = y
+        out[i, 3] = z
+        out[i, 4] = s
+        out[i, 5] = arc
+        out[i, 6] = offset
+        out[i, 7] = klass
+        out[i, 8] = leak
+        out[i, 9] = drop
+        out[i, 10] = cosine
+        out[i, 11] = true_range

@@ -1,0 +1,201 @@
+"""Where a scanner stands and which rays it shoots, block by block.
+
+A block is a few hundred thousand rays that are made and written together, so that memory stays bounded. Every
+block has random numbers of its own, by its index: the result does not depend on which thread makes it or when.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.simulate.parameters import Parameters
+from tunneldb.simulate.tunnel import Tunnel
+
+Array = NDArray[np.float64]
+
+RAYS = 400_000  # a block
+START_TIME = 300_000.0  # GPS seconds of the week
+STATION_TIME = 300.0  # between the starts of two stations, s
+TRAJECTORY_STEP = 0.1  # s
+# Scanners cannot look through their own tripod.
+LOWEST_ZENITH = 150.0
+
+
+class Rays(NamedTuple):
+    """Rays from the line's origin: origins and unit directions (n, 3), chainage of the scanner, time (s), scan id."""
+
+    origin: Array
+    direction: Array
+    hint: Array
+    time: Array
+    scan_id: NDArray[np.uint16]
+
+
+@dataclass(frozen=True)
+class BlockPlan:
+    """A block before it is made: its index, chainage (which file), and what is meant by ``first`` to ``last``.
+
+    For static stations these are azimuth indices of station ``station``; for a profiler, indices of shots; for
+    uniform sampling, ``first`` and ``last`` are unused and chainages given.
+    """
+
+    index: int
+    chainage: float
+    station: int
+    first: int
+    last: int
+    chainage_to: float
+
+
+class Scanner:
+    """A static scanner on stations or a profiler on a trolley in a tunnel."""
+
+    def __init__(self, parameters: Parameters, tunnel: Tunnel) -> None:
+        self.parameters = parameters
+        self.tunnel = tunnel
+        line, p = tunnel.line, parameters
+        self.height = tunnel.section.floor + p.scanner_height
+        count = max(1, math.ceil((line.end - line.start) / p.station_spacing - 1e-9))
+        gap = (line.end - line.start) / count
+        self.station_chainage = line.start + gap * (np.arange(count) + 0.5)
+        # Tripods stand where there is room, not in the middle: alternately to both sides.
+        self.station_offset = p.scanner_offset * np.where(np.arange(count) % 2 == 0, 1.0, -1.0)
+
+    def _at(self, chainage: Array, offset: Array | float) -> Array:
+        """Scanner positions from the line's origin, (n, 3)."""
+        f = self.tunnel.line.frame(chainage)
+        across = np.broadcast_to(offset, chainage.shape)[:, None]
+        return f.position - self.tunnel.line.origin + across * f.u + self.height * f.w
+
+    def stations(self) -> Array:
+        """Positions of static stations, (n, 3); station i has scan id i + 1."""
+        return self._at(self.station_chainage, self.station_offset) + self.tunnel.line.origin
+
+    def time_at(self, chainage: Array) -> Array:
+        """GPS time at which the trolley passes a chainage."""
+        return START_TIME + (chainage - self.tunnel.line.start) / self.parameters.speed
+
+    def trajectory(self) -> Array:
+        """Trolley poses from a second before the start to a second after the end; (n, 4): time, x, y, z."""
+        line, speed = self.tunnel.line, self.parameters.speed
+        duration = (line.end - line.start) / speed
+        time = np.arange(-1.0, duration + 1.0 + TRAJECTORY_STEP, TRAJECTORY_STEP)
+        position = self._at(line.start + speed * time, self.parameters.scanner_offset) + line.origin
+        return np.column_stack([START_TIME + time, position])
+
+    def plans(self) -> Iterator[BlockPlan]:
+        """Blocks in the order in which they are written, chainage growing."""
+        p, line = self.parameters, self.tunnel.line
+        if p.density is not None:
+            yield from self._uniform_plans(p.density)
+        elif p.scanner == "static":
+            rows, columns = self._grid()
+            wide = max(1, RAYS // rows)
+            index = 0
+            for station, s in enumerate(self.station_chainage):
+                for first in range(0, columns, wide):
+                    yield BlockPlan(index, float(s), station, first, min(first + wide, columns), float(s))
+                    index += 1
+        else:
+            profiles = math.ceil((line.end - line.start) / p.profile_spacing)
+            deep = max(1, RAYS // p.profile_points)
+            edges = self._file_edges()
+            index = 0
+            for low, high in zip(edges[:-1], edges[1:], strict=True):
+                begin = min(profiles, math.ceil((low - line.start) / p.profile_spacing - 1e-9))
+                end = min(profiles, math.ceil((high - line.start) / p.profile_spacing - 1e-9))
+                for first in range(begin, end, deep):
+                    last = min(first + deep, end)
+                    s, t = line.start + np.array([first, last]) * p.profile_spacing
+                    yield BlockPlan(index, float(s), 0, first * p.profile_points, last * p.profile_points, float(t))
+                    index += 1
+
+    def _file_edges(self) -> Array:
+        """Start, kilometre marks, end."""
+        line = self.tunnel.line
+        marks = 1000.0 * np.arange(math.floor(line.start / 1000.0) + 1, math.ceil(line.end / 1000.0))
+        return np.concatenate([[line.start], marks, [line.end]])
+
+    def _uniform_plans(self, density: float) -> Iterator[BlockPlan]:
+        step = RAYS / (density * 2.0 * self.tunnel.section.half_perimeter)
+        edges = self._file_edges()
+        index = 0
+        for low, high in zip(edges[:-1], edges[1:], strict=True):
+            count = max(1, math.ceil((high - low) / step))
+            cuts = np.linspace(low, high, count + 1)
+            for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+                yield BlockPlan(index, float(a), 0, 0, 0, float(b))
+                index += 1
+
+    def _grid(self) -> tuple[int, int]:
+        """Rows (zenith) and columns (azimuth) of a static scan."""
+        step = self.parameters.angular_step
+        return int(LOWEST_ZENITH / step), round(360.0 / step)
+
+    def rays(self, plan: BlockPlan, rng: np.random.Generator) -> Rays:
+        """Rays of a block."""
+        if self.parameters.density is not None:
+            return self._uniform_rays(plan, rng, self.parameters.density)
+        if self.parameters.scanner == "static":
+            return self._static_rays(plan)
+        return self._profiler_rays(plan)
+
+    def _static_rays(self, plan: BlockPlan) -> Rays:
+        rows, columns = self._grid()
+        azimuth = 2.0 * np.pi / columns * np.arange(plan.first, plan.last)
+        zenith = np.radians(self.parameters.angular_step) * (np.arange(rows) + 0.5)
+        sz, cz = np.sin(zenith), np.cos(zenith)
+        n = azimuth.size * rows
+        direction = np.empty((azimuth.size, rows, 3))
+        direction[:, :, 0] = np.sin(azimuth)[:, None] * sz
+        direction[:, :, 1] = np.cos(azimuth)[:, None] * sz
+        direction[:, :, 2] = cz
+        k = plan.station
+        origin = self._at(self.station_chainage[k : k + 1], self.station_offset[k])
+        shot = plan.first * rows + np.arange(n)
+        return Rays(
+            np.repeat(origin, n, axis=0),
+            direction.reshape(n, 3),
+            np.full(n, plan.chainage),
+            START_TIME + STATION_TIME * k + shot * (0.8 * STATION_TIME / (rows * columns)),
+            np.full(n, k + 1, dtype=np.uint16),
+        )
+
+    def _profiler_rays(self, plan: BlockPlan) -> Rays:
+        """Mirror turning evenly while the trolley moves: each profile is one turn of a helix."""
+        p, line = self.parameters, self.tunnel.line
+        shot = np.arange(plan.first, plan.last)
+        s = line.start + shot * (p.profile_spacing / p.profile_points)
+        f = line.frame(s)
+        origin = f.position - line.origin + p.scanner_offset * f.u + self.height * f.w
+        angle = 2.0 * np.pi / p.profile_points * ((shot % p.profile_points) + 0.5)
+        # From the floor round by the left wall, so that the seam of a profile lies on the floor.
+        direction = -np.sin(angle)[:, None] * f.u - np.cos(angle)[:, None] * f.w
+        return Rays(origin, direction, s, self.time_at(s), np.ones(s.size, dtype=np.uint16))
+
+    def _uniform_rays(self, plan: BlockPlan, rng: np.random.Generator, density: float) -> Rays:
+        """Rays to points spread evenly over the surface, from the trolley beside them or the nearest station."""
+        p, line, half = self.parameters, self.tunnel.line, self.tunnel.section.half_perimeter
+        n = round(density * 2.0 * half * (plan.chainage_to - plan.chainage))
+        s = np.sort(rng.uniform(plan.chainage, plan.chainage_to, n))
+        target = self.tunnel.roll(s, rng.uniform(-half, half, n)) - line.origin
+        if p.scanner == "static":
+            gap = (line.end - line.start) / self.station_chainage.size
+            k = np.clip(((s - line.start) / gap).astype(int), 0, self.station_chainage.size - 1)
+            hint = self.station_chainage[k]
+            origin = self._at(self.station_chainage, self.station_offset)[k]
+            within = (s - (hint - 0.5 * gap)) / gap
+            time = START_TIME + STATION_TIME * (k + 0.8 * np.clip(within, 0.0, 1.0))
+            scan_id = (k + 1).astype(np.uint16)
+        else:
+            hint, time, scan_id = s, self.time_at(s), np.ones(n, dtype=np.uint16)
+            origin = self._at(s, p.scanner_offset)
+        direction = target - origin
+        direction /= np.linalg.norm(direction, axis=1)[:, None]
+        return Rays(origin, direction, hint, time, scan_id)
