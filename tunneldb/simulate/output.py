@@ -51,6 +51,19 @@ class Files:
     parameters: Path = Path()
     points: int = 0
 
+    def moved(self, folder: Path) -> Files:
+        """Move the files to another folder of the same disk."""
+
+        def to(path: Path) -> Path:
+            return path.replace(folder / path.name)
+
+        return Files(
+            [to(p) for p in self.clouds],
+            [to(p) for p in self.truth],
+            *(to(p) for p in (self.axis, self.poses, self.reference, self.leaks, self.parameters)),
+            points=self.points,
+        )
+
 
 class _TruthWriter:
     """Columns of truth, streamed to an .npz without holding them."""
@@ -173,6 +186,29 @@ def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
     files.parameters.write_text(json.dumps(record, indent=1))
 
 
+class _Sink:
+    """Writers of the file that is being filled: points, and truth where wanted."""
+
+    def __init__(self, header: laspy.LasHeader, folder: Path, base: str, truth: bool) -> None:
+        self.header = header
+        self.cloud = folder / f"{base}.laz"
+        self.truth = folder / f"{base}.truth.npz"
+        self.points = laspy.open(
+            self.cloud, mode="w", header=header, laz_backend=laspy.LazBackend.LazrsParallel
+        )
+        self.columns = _TruthWriter(self.truth, folder) if truth else None
+
+    def add(self, cloud: Cloud) -> None:
+        self.points.write_points(_record(self.header, cloud))
+        if self.columns is not None:
+            self.columns.add(cloud)
+
+    def close(self) -> None:
+        self.points.close()
+        if self.columns is not None:
+            self.columns.close()
+
+
 def write(
     simulation: Simulation,
     folder: Path,
@@ -182,46 +218,52 @@ def write(
 ) -> Files:
     """Scan a simulation into ``folder``, one LAZ up to 1 km of tunnel, else one each kilometre of chainage.
 
+    Files appear in the folder when all are complete.
+
     Parameters
     ----------
     truth : bool
         Also write the truth of each point (21 bytes a point).
     progress : callable, optional
         Called with the share done (0 to 1) and the points written after each block.
+
+    Raises
+    ------
+    UserError
+        The folder cannot be written, or the disk is full.
     """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch:
+            files = _scan(simulation, Path(scratch), truth, progress)
+            _sidecars(simulation, Path(scratch), files)
+            return files.moved(folder)
+    except OSError as error:
+        raise UserError(f"cannot write to {folder}: {error.strerror or error}") from error
+
+
+def _scan(
+    simulation: Simulation, folder: Path, truth: bool, progress: Callable[[float, int], None] | None
+) -> Files:
+    """Write points and their truth."""
     p, line = simulation.parameters, simulation.tunnel.line
     files = Files()
-    folder.mkdir(parents=True, exist_ok=True)
-    by_km = p.length > 1000.0
     header = _header(simulation)
-    with TemporaryDirectory(dir=folder, prefix=".truth-") as scratch:
-        current, cloud_writer, truth_writer = None, None, None
-        try:
-            for plan, cloud in simulation.blocks():
-                km = math.floor(plan.chainage / 1000.0 + 1e-9) if by_km else 0
-                if km != current:
-                    for writer in (cloud_writer, truth_writer):
-                        if writer is not None:
-                            writer.close()
-                    current = km
-                    base = folder / (f"{p.name}-km{km:03d}" if by_km else p.name)
-                    path = Path(f"{base}.laz")
-                    files.clouds.append(path)
-                    cloud_writer = laspy.open(
-                        path, mode="w", header=header, laz_backend=laspy.LazBackend.LazrsParallel
-                    )
-                    if truth:
-                        files.truth.append(Path(f"{base}.truth.npz"))
-                        truth_writer = _TruthWriter(files.truth[-1], Path(scratch))
-                cloud_writer.write_points(_record(header, cloud))
-                if truth_writer is not None:
-                    truth_writer.add(cloud)
-                files.points += len(cloud)
-                if progress is not None:
-                    progress((plan.chainage_to - line.start) / (line.end - line.start), files.points)
-        finally:
-            for writer in (cloud_writer, truth_writer):
-                if writer is not None:
-                    writer.close()
-    _sidecars(simulation, folder, files)
+    current, sink = None, None
+    for plan, cloud in simulation.blocks():
+        km = math.floor(plan.chainage / 1000.0 + 1e-9) if p.length > 1000.0 else None
+        if sink is None or km != current:
+            if sink is not None:
+                sink.close()
+            current = km
+            sink = _Sink(header, folder, p.name if km is None else f"{p.name}-km{km:03d}", truth)
+            files.clouds.append(sink.cloud)
+            if truth:
+                files.truth.append(sink.truth)
+        sink.add(cloud)
+        files.points += len(cloud)
+        if progress is not None:
+            progress((plan.chainage_to - line.start) / (line.end - line.start), files.points)
+    if sink is not None:
+        sink.close()
     return files

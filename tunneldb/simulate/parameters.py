@@ -55,7 +55,7 @@ class Parameters:
     srid: int = 25830
 
     section: Literal["circular", "horseshoe", "box"] = "circular"
-    radius_section: float = 4.0
+    section_radius: float = 4.0
     invert: float = 2.8
     wall_height: float = 3.0
     wall_lean: float = 0.0
@@ -141,9 +141,9 @@ class Parameters:
     def tunnel(self) -> Tunnel:
         """Geometry of the tunnel."""
         if self.section == "circular":
-            shape = section.circular(self.radius_section, self.invert)
+            shape = section.circular(self.section_radius, self.invert)
         elif self.section == "horseshoe":
-            shape = section.horseshoe(self.radius_section, self.wall_height, self.wall_lean)
+            shape = section.horseshoe(self.section_radius, self.wall_height, self.wall_lean)
         else:
             shape = section.box(self.width, self.height)
         line = CentreLine.curve(

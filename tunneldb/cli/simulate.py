@@ -1,0 +1,196 @@
+"""``tunneldb simulate``: make a simulated scan of a tunnel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from tunneldb.simulate import PRESETS, Parameters, Simulation, write
+
+
+class _Option(NamedTuple):
+    """An option that sets a field of Parameters; its default is taken from there."""
+
+    field: str
+    metavar: str
+    help: str
+    type: Any = float
+    nargs: int = 1
+
+
+_GROUPS: dict[str, list[_Option]] = {
+    "Tunnel": [
+        _Option("length", "M", "Length in plan."),
+        _Option("radius", "M", "Radius of the curve: positive bends right, negative left, 0 is straight."),
+        _Option("straight", "M", "Straight before the curve [a fifth of the length]."),
+        _Option("transition", "M", "Length of the clothoid into the curve, 0 for none."),
+        _Option("slope", "%", "Slope, positive is up."),
+        _Option("slope_end", "%", "Slope at the end; a parabola over the middle half leads to it [as --slope]."),
+        _Option("start_chainage", "M", "Chainage of the start."),
+        _Option("azimuth", "DEG", "Direction of the start, from north, clockwise."),
+        _Option("origin", "E N Z", "Coordinates of the axis at the start.", float, 3),
+        _Option("srid", "EPSG", "Coordinate system, projected in metres.", int),
+    ],
+    "Section": [
+        _Option(
+            "section",
+            "NAME",
+            "circular (flat invert), horseshoe (arch, walls, flat floor) or box (sharp corners).",
+            click.Choice(["circular", "horseshoe", "box"]),
+        ),
+        _Option("section_radius", "M", "Radius of circular and of the horseshoe's arch."),
+        _Option("invert", "M", "Floor of circular, below the centre of the circle."),
+        _Option("wall_height", "M", "Height of the horseshoe's walls."),
+        _Option("wall_lean", "DEG", "Lean of the horseshoe's walls, inward towards the floor."),
+        _Option("width", "M", "Width of box."),
+        _Option("height", "M", "Height of box."),
+    ],
+    "Scanner": [
+        _Option(
+            "scanner",
+            "NAME",
+            "static (tripod on stations) or profiler (on a trolley, one turn of the mirror a profile).",
+            click.Choice(["static", "profiler"]),
+        ),
+        _Option("station_spacing", "M", "static: greatest distance between stations."),
+        _Option("angular_step", "DEG", "static: step of azimuth and zenith."),
+        _Option("profile_spacing", "M", "profiler: way of the trolley in one turn of the mirror."),
+        _Option("profile_points", "N", "profiler: points in one turn.", int),
+        _Option("speed", "M/S", "profiler: speed of the trolley."),
+        _Option(
+            "density",
+            "N",
+            "Points per m², spread evenly over the surface in place of the scanner's own pattern "
+            "(100 is survey density) [the scanner's pattern].",
+        ),
+        _Option("scanner_height", "M", "Height above the floor."),
+        _Option("scanner_offset", "M", "Off the middle: trolley to the right, stations alternately right and left."),
+        _Option("max_range", "M", "Greatest range."),
+        _Option("range_noise", "M", "Standard deviation along the ray."),
+        _Option("outliers", "SHARE", "Share of isolated points, in the air or behind the wall."),
+        _Option("relief", "M", "Height of small-scale relief of the lining."),
+    ],
+    "Intensity and contents": [
+        _Option("roughness", "DEG", "Oren–Nayar roughness of all surfaces (9 to 20 for concrete)."),
+        _Option("intensity_noise", "DB", "Standard deviation of a point's intensity."),
+        _Option("leaks", "N", "Number of leaks [one every 12 m].", int),
+        _Option("leak_area", "MIN MAX", "Area of leaks, m².", float, 2),
+        _Option("leak_drop", "MIN MAX", "How much darker than dry lining leaks are, dB.", float, 2),
+    ],
+    "Other": [
+        _Option("name", "NAME", "First part of the file names.", str),
+        _Option("seed", "N", "Seed; the same seed gives the same points.", int),
+    ],
+}
+_FLAGS = {
+    "s_curve": ("--s-curve", True, "Bend back in the second half.", "Tunnel"),
+    "appendages": ("--no-appendages", False, "No cables, trays, boxes, lamps and rails.", "Intensity and contents"),
+    "niches": ("--no-niches", False, "No refuge niches.", "Intensity and contents"),
+}
+
+
+class _GroupedCommand(click.Command):
+    """A command that lists its options under headings."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, group by group; options without a group come last."""
+        headings = {o.field: group for group, options in _GROUPS.items() for o in options}
+        headings |= {field: flag[3] for field, flag in _FLAGS.items()}
+        for group in _GROUPS:
+            rows = []
+            for parameter in self.get_params(ctx):
+                record = parameter.get_help_record(ctx)
+                if record is not None and headings.get(parameter.name or "", "Other") == group:
+                    rows.append(record)
+            with formatter.section(group):
+                formatter.write_dl(rows)
+
+
+def _options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add all options of the groups to a command."""
+    defaults = {f.name: f.default for f in fields(Parameters)}
+    for options in reversed(_GROUPS.values()):
+        for o in reversed(options):
+            default = defaults[o.field]
+            shown = " ".join(f"{v:g}" if o.nargs > 1 else str(v) for v in (default if o.nargs > 1 else [default]))
+            command = click.option(
+                "--" + o.field.replace("_", "-"),
+                o.field,
+                type=o.type,
+                nargs=o.nargs,
+                metavar=o.metavar,
+                help=o.help if default is None else f"{o.help} [{shown}]",
+            )(command)
+    for field, (flag, value, text, _) in _FLAGS.items():
+        command = click.option(flag, field, flag_value=value, type=bool, default=None, help=text)(command)
+    return command
+
+
+@click.command(cls=_GroupedCommand)
+@click.argument("out", type=click.Path(file_okay=False, path_type=Path))
+@click.option(
+    "--preset",
+    type=click.Choice(list(PRESETS)),
+    help="Start from named values, which other options override: demo (150 m, 11 million points), "
+    "small (40 m, 200 000 points).",
+)
+@click.option("--no-truth", is_flag=True, help="Leave out the truth of each point (21 bytes a point).")
+@_options
+def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> None:
+    """Make a simulated scan of a tunnel, with its truth, in the folder OUT.
+
+    A section is swept along a curved and sloping axis, perpendicular to it. A static scanner or a profiler on a
+    trolley shoots rays at the lining, which carries leaks, cables, a tray, boxes, lamps, rails and refuge niches;
+    what hides behind them is not seen. Intensity follows the range (with the loss of near ranges), the incidence
+    (Oren–Nayar), the material and the water, plus noise.
+
+    \b
+    OUT/NAME.laz             points: LAS 1.4, Amplitude and Reflectance in dB, intensity in linear counts
+                             (NAME-km000.laz and so on when longer than 1 km)
+    OUT/NAME.axis.csv        x,y,z every 20 m of the axis
+    OUT/NAME.stations.csv    scan_id,x,y,z (static), or
+    OUT/NAME.trajectory.csv  time,x,y,z (profiler)
+    OUT/NAME.reference.csv   range_m,intensity_db of a 30 % target
+    OUT/NAME.truth.npz       chainage, arc, offset, class and leak of each point, in file order;
+                             class 0 lining, 1 floor, 2 appendage, 3 niche, 4 outlier; leak -1 for none
+    OUT/NAME.truth.geojson   leaks as polygons in the plane (chainage, arc)
+    OUT/NAME.json            all parameters, appendages and niches
+
+    \b
+    Examples:
+      tunneldb simulate demo --preset demo
+      tunneldb simulate out --name bend --section horseshoe --length 100 --radius 300 --slope 4
+      tunneldb simulate out --section box --scanner profiler --leaks 20 --leak-area 0.1 2 --seed 7
+      tunneldb simulate out --name km --length 25000 --radius 4000 --scanner profiler --density 100 --no-truth
+
+    Lengths are in metres, angles in degrees, levels in dB.
+    """
+    values = PRESETS[preset] if preset else {}
+    parameters = Parameters(**{**values, **{k: v for k, v in given.items() if v is not None}})
+    simulation = Simulation(parameters)
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[points]:,} points"),
+        TimeElapsedColumn(),
+        console=console,
+        disable=not console.is_terminal,
+    ) as bar:
+        task = bar.add_task(f"Scanning {parameters.name}", total=1.0, points=0)
+        files = write(
+            simulation,
+            out,
+            truth=not no_truth,
+            progress=lambda share, points: bar.update(task, completed=share, points=points),
+        )
+    click.echo(
+        f"{files.points:,} points, {len(simulation.leaks)} leaks of {sum(k.area for k in simulation.leaks):.2f} m²: "
+        + ", ".join(str(p) for p in files.clouds)
+    )
