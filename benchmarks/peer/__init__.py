@@ -19,6 +19,8 @@ import numpy as np
 import psycopg
 
 SRID = 25830  # as in the SQL
+TOLERANCE = 0.01  # m, of the axis
+MOST_PASSES = 10
 FOLDER = Path(__file__).parent
 
 
@@ -36,10 +38,10 @@ class PeerResult:
         return sum(self.seconds.values())
 
 
-def run(dsn: str, files: list[Path], axis: Path, tolerance: float, most_passes: int = 10) -> PeerResult:
+def run(dsn: str, files: list[Path], axis: Path) -> PeerResult:
     """Load files and run stages 1, 3, 4 and 5; the schema ``peer`` of the database is replaced.
 
-    The pass of stage 1 is repeated until no vertex between the first and the last moves more than `tolerance`
+    The pass of stage 1 is repeated until no vertex between the first and the last moves more than `TOLERANCE`
     metres (these two see half a buffer and are never still).
     """
     result = PeerResult()
@@ -52,10 +54,10 @@ def run(dsn: str, files: list[Path], axis: Path, tolerance: float, most_passes: 
             _script(connection, "0_index")
         with _timed(result, "axis"):
             _script(connection, "1_axis_start")
-            while result.axis_passes < most_passes:
+            while result.axis_passes < MOST_PASSES:
                 _script(connection, "1_axis_pass")
                 result.axis_passes += 1
-                if _moved(connection) <= tolerance:
+                if _moved(connection) <= TOLERANCE:
                     break
         for number, stage in ((3, "segments"), (4, "sections"), (5, "projection")):
             with _timed(result, stage):
@@ -84,9 +86,7 @@ def _one(connection: psycopg.Connection, query: bytes) -> int:
 
 
 def _moved(connection: psycopg.Connection) -> float:
-    row = connection.execute(
-        "SELECT max(moved) FROM peer.axis WHERE n > 0 AND n < (SELECT max(n) FROM peer.axis)"
-    ).fetchone()
+    row = connection.execute("SELECT max(moved) FROM peer.axis WHERE n > 0 AND n < (SELECT max(n) FROM peer.axis)").fetchone()
     assert row is not None
     return float(row[0])
 
