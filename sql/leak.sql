@@ -9,7 +9,7 @@ AS $$
     SELECT CASE WHEN round($1::numeric, 3) < 0 THEN '-' ELSE '' END
         || div(abs(round($1::numeric, 3)), 1000)::text
         || '+'
-        || to_char(mod(abs(round($1::numeric, 3)), 1000), 'FM000.000')
+        || lpad(mod(abs(round($1::numeric, 3)), 1000)::text, 7, '0')
 $$;
 COMMENT ON FUNCTION tunnel_api.chainage_label(float8) IS
 'Chainage (m) as text, km + m with mm: 12345.678 -> 12+345.678.';

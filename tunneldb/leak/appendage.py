@@ -89,9 +89,7 @@ def _growth(pixel: float) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _level(
-    offset: Single, top: int, bottom: int, left: int, right: int
-) -> float:  # pragma: no cover - compiled
+def _level(offset: Single, top: int, bottom: int, left: int, right: int) -> float:  # pragma: no cover - compiled
     """Offset near which most pixels of a part lie, those near the section surface counting more."""
     counts = np.zeros(2 * _BINS + 1)
     for i in range(top, bottom):
@@ -157,9 +155,7 @@ def _distance(
             xx, xy, yy = sxx - sx * sx / s0, sxy - sx * sy / s0, syy - sy * sy / s0
             xz, yz = sxz - sx * sz / s0, syz - sy * sz / s0
             determinant = xx * yy - xy * xy
-            if (
-                determinant > 1e-6 * s0 * s0 * 0.0069
-            ):  # spread in both directions: 1/144 is that of a full square
+            if determinant > 1e-6 * s0 * s0 * 0.0069:  # spread in both directions: 1/144 is that of a full square
                 b = (xz * yy - yz * xy) / determinant
                 c = (yz * xx - xz * xy) / determinant
             else:

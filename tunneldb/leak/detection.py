@@ -106,9 +106,7 @@ def detect(
     )
 
 
-def _dry_statistics(
-    image: Accumulator, state: NDArray[np.uint8], blocks: list[int], dry_regions: list[Polygon]
-) -> Dry:
+def _dry_statistics(image: Accumulator, state: NDArray[np.uint8], blocks: list[int], dry_regions: list[Polygon]) -> Dry:
     """Statistics of dry lining pixels (eq. 19): of those in the drawn regions, or of all, robustly."""
     lining = int(np.count_nonzero(state == State.LINING))
     every = 1 if dry_regions else max(1, lining // SAMPLE)
@@ -134,9 +132,7 @@ def _inside(image: Accumulator, columns: slice, regions: list[Polygon]) -> NDArr
     return np.asarray(inside, dtype=np.bool_)
 
 
-def _statistics(
-    image: Accumulator, blocks: list[int], outlines: list[Polygon], dry_mean: float
-) -> list[Found]:
+def _statistics(image: Accumulator, blocks: list[int], outlines: list[Polygon], dry_mean: float) -> list[Found]:
     """Drop and image share of each leak, gathered block by block."""
     count = len(outlines)
     pixels, filled, total = np.zeros(count), np.zeros(count), np.zeros(count)

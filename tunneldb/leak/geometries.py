@@ -103,10 +103,7 @@ def _samples(outline: Polygon) -> tuple[Float, Float]:
     """Places spread evenly over a polygon."""
     west, south, east, north = outline.bounds
     step = max(np.sqrt((east - west) * (north - south) / SAMPLES), 1e-3)
-    x, y = (
-        g.ravel()
-        for g in np.meshgrid(np.arange(west, east, step) + step / 2, np.arange(south, north, step) + step / 2)
-    )
+    x, y = (g.ravel() for g in np.meshgrid(np.arange(west, east, step) + step / 2, np.arange(south, north, step) + step / 2))
     inside = shapely.contains_xy(outline, x, y)
     if not inside.any():
         point = outline.representative_point()

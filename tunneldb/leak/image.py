@@ -159,9 +159,7 @@ class Accumulator:
         """Return the accumulator."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         """Give the file back."""
         del self._sums
         self._map.close()

@@ -36,11 +36,7 @@ def match(before: Sequence[Polygon], now: Sequence[Polygon], min_iou: float = MI
     shared = shapely.area(shapely.intersection(later[n], earlier[b]))
     iou = shared / (shapely.area(later[n]) + shapely.area(earlier[b]) - shared)
     best_now, best_before = _best(n, iou, len(later)), _best(b, iou, len(earlier))
-    return {
-        int(n[k]): int(b[k])
-        for k in range(len(n))
-        if iou[k] >= min_iou and best_now[n[k]] == k and best_before[b[k]] == k
-    }
+    return {int(n[k]): int(b[k]) for k in range(len(n)) if iou[k] >= min_iou and best_now[n[k]] == k and best_before[b[k]] == k}
 
 
 def _best(owner: NDArray[Any], iou: NDArray[Any], count: int) -> NDArray[Any]:

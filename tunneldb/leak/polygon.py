@@ -13,9 +13,7 @@ SIMPLIFY = 0.75
 """Tolerance of the simplification, pixels: enough to straighten the stairs of a slanting edge."""
 
 
-def polygons(
-    mask: NDArray[np.bool_] | NDArray[np.uint8], transform: Affine, min_area: float
-) -> list[Polygon]:
+def polygons(mask: NDArray[np.bool_] | NDArray[np.uint8], transform: Affine, min_area: float) -> list[Polygon]:
     """Outline the connected regions of a mask, with their holes.
 
     Parameters
@@ -35,9 +33,7 @@ def polygons(
     pixel = abs(transform.a)
     image = np.ascontiguousarray(mask, dtype=np.uint8)
     found = []
-    for shape, _ in rasterio.features.shapes(
-        image, mask=image.astype(bool), connectivity=4, transform=transform
-    ):
+    for shape, _ in rasterio.features.shapes(image, mask=image.astype(bool), connectivity=4, transform=transform):
         outline = shapely.geometry.shape(shape)
         if outline.area >= min_area:
             found.append(_straighten(outline, SIMPLIFY * pixel))

@@ -1,0 +1,31 @@
+"""Files that are there whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tunneldb.errors import UserError
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a temporary path beside ``path`` to write to; it takes the place of ``path`` when the block succeeds.
+
+    The temporary path has the suffix of ``path`` and doesn't exist yet.
+
+    Raises
+    ------
+    UserError
+        If the folder doesn't exist or can't be written to, or the disk is full.
+    """
+    try:
+        with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as folder:
+            temporary = Path(folder) / path.name
+            yield temporary
+            os.replace(temporary, path)  # noqa: PTH105 - the point is that it is atomic
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written: {error.strerror or error}") from error

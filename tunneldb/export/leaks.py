@@ -1,0 +1,245 @@
+"""Leaks as a table, CSV, GeoJSON or GeoPackage."""
+
+from __future__ import annotations
+
+import csv
+import datetime as dt
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import psycopg
+import pyogrio.raw
+import shapely
+from psycopg import sql
+from rich.table import Table
+from shapely.geometry import Polygon, mapping
+
+from tunneldb.database import Survey
+
+Geometry = Literal["unrolled", "map", "3d"]
+"""Unrolled plane (chainage, arc); map strip beside the axis; on the surface in space."""
+
+DECIMALS = 4
+"""Decimals of coordinates in text, m."""
+
+_COLUMN = {"unrolled": "unrolled", "map": "map", "3d": "surface"}
+
+
+@dataclass(frozen=True)
+class Leak:
+    """A leak as it is listed.
+
+    Attributes
+    ----------
+    id, km : int
+        Key and kilometre.
+    chainage_from, chainage_to : float
+        m.
+    label : str
+        Chainage of the middle, km + m.
+    arc_from, arc_to : float
+        m from the crown, positive to the right looking up-chainage.
+    clock : float
+        Hours.
+    area : float
+        On the surface, m².
+    drop_mean, drop_max : float
+        dB below dry lining.
+    image_share : float
+        0 to 1.
+    review : str
+        open, confirmed or rejected.
+    reviewed_by : str or None
+    reviewed_at : datetime or None
+    detected : bool
+        False when the last detection found it no more.
+    geometry : Polygon
+        In the coordinates asked for.
+    """
+
+    id: int
+    km: int
+    chainage_from: float
+    chainage_to: float
+    label: str
+    arc_from: float
+    arc_to: float
+    clock: float
+    area: float
+    drop_mean: float
+    drop_max: float
+    image_share: float
+    review: str
+    reviewed_by: str | None
+    reviewed_at: dt.datetime | None
+    detected: bool
+    geometry: Polygon
+
+
+COLUMNS = tuple(f.name for f in fields(Leak) if f.name != "geometry")
+
+
+def read_leaks(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    geometry: Geometry = "unrolled",
+    kilometres: Sequence[int] | None = None,
+    min_area: float = 0.0,
+) -> list[Leak]:
+    """Read the leaks of a survey in order of chainage.
+
+    Those that the last detection found, and those that an inspector confirmed although it did not.
+
+    Parameters
+    ----------
+    conn, survey
+        Where from.
+    geometry : {'unrolled', 'map', '3d'}
+        Which coordinates.
+    kilometres : sequence of int, optional
+        Only these.
+    min_area : float
+        Smaller ones are left out, m².
+    """
+    query = sql.SQL(
+        "SELECT {columns}, public.ST_AsBinary({geometry}) FROM tunnel_api.leak"
+        " WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed')"
+        " AND (%(km)s::int[] IS NULL OR km = ANY (%(km)s)) AND area >= %(min_area)s"
+        " ORDER BY chainage_from, arc_from, id"
+    ).format(columns=sql.SQL(", ").join(map(sql.Identifier, COLUMNS)), geometry=sql.Identifier(_COLUMN[geometry]))
+    wanted = None if kilometres is None else list(kilometres)
+    rows = conn.execute(query, {"survey": survey.id, "km": wanted, "min_area": min_area}).fetchall()
+    names = [*COLUMNS, "geometry"]
+    return [
+        Leak(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True))) for row in rows
+    ]
+
+
+def as_table(leaks: Sequence[Leak], title: str) -> Table:
+    """Lay leaks out for a terminal."""
+    table = Table(title=title, caption=_total(leaks))
+    for heading in ("id", "chainage", "length m", "arc m", "clock", "area m²", "drop dB", "max dB", "image", "review", "by"):
+        table.add_column(heading, justify="left" if heading in ("review", "by") else "right", no_wrap=True)
+    for leak in leaks:
+        table.add_row(
+            str(leak.id),
+            leak.label,
+            f"{leak.chainage_to - leak.chainage_from:.2f}",
+            f"{leak.arc_from:+.2f} to {leak.arc_to:+.2f}",
+            clock_label(leak.clock),
+            f"{leak.area:.2f}",
+            f"{leak.drop_mean:.1f}",
+            f"{leak.drop_max:.1f}",
+            f"{100 * leak.image_share:.0f} %",
+            leak.review if leak.detected else f"{leak.review}, not found again",
+            leak.reviewed_by or "",
+        )
+    return table
+
+
+def clock_label(hours: float) -> str:
+    """Clock position as hours and minutes: 12 is the crown, 0.5 is 12:30."""
+    minutes = round(hours * 60) % 720
+    return f"{minutes // 60 or 12}:{minutes % 60:02d}"
+
+
+def _total(leaks: Sequence[Leak]) -> str:
+    return f"{len(leaks)} leaks, {sum(leak.area for leak in leaks):.2f} m²"
+
+
+def as_csv(leaks: Sequence[Leak]) -> str:
+    """Write leaks as CSV with a header; the last column, ``geometry``, is WKT."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([*COLUMNS, "geometry"])
+    for leak in leaks:
+        wkt = shapely.to_wkt(leak.geometry, rounding_precision=DECIMALS)
+        writer.writerow([*(_plain(getattr(leak, name)) for name in COLUMNS), wkt])
+    return out.getvalue()
+
+
+def as_geojson(leaks: Sequence[Leak], geometry: Geometry, srid: int) -> str:
+    """Write leaks as a GeoJSON FeatureCollection in the coordinates of the chosen geometry.
+
+    Map and space carry the tunnel's coordinate system in a ``crs`` member, as GDAL and QGIS read it; the
+    unrolled plane has none.
+    """
+    collection: dict[str, Any] = {"type": "FeatureCollection", "name": layer_name(geometry)}
+    if geometry != "unrolled":
+        collection["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{srid}"}}
+    collection["features"] = [
+        {
+            "type": "Feature",
+            "id": leak.id,
+            "geometry": _rounded(mapping(leak.geometry)),
+            "properties": {name: _plain(getattr(leak, name)) for name in COLUMNS},
+        }
+        for leak in leaks
+    ]
+    return json.dumps(collection, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_gpkg(path: Path, leaks: Sequence[Leak], geometry: Geometry, srid: int) -> None:
+    """Write leaks as a GeoPackage with one layer; the unrolled plane is an undefined Cartesian system there."""
+    data = [np.array([getattr(leak, name) for leak in leaks], dtype=_GPKG_TYPE.get(name, object)) for name in COLUMNS]
+    moments = [leak.reviewed_at for leak in leaks]
+    data[COLUMNS.index("reviewed_at")] = np.array(
+        [np.datetime64("NaT") if m is None else _utc(m) for m in moments], dtype="datetime64[ms]"
+    )
+    pyogrio.raw.write(
+        str(path),
+        shapely.to_wkb(np.array([leak.geometry for leak in leaks], dtype=object)),
+        data,
+        np.array(COLUMNS),
+        geometry_type="Polygon Z" if geometry == "3d" else "Polygon",
+        crs=None if geometry == "unrolled" else f"EPSG:{srid}",
+        driver="GPKG",
+        layer=layer_name(geometry),
+    )
+
+
+_GPKG_TYPE: dict[str, Any] = {
+    "id": np.int64,
+    "km": np.int32,
+    "detected": np.bool_,
+    **dict.fromkeys(
+        (
+            "chainage_from",
+            "chainage_to",
+            "arc_from",
+            "arc_to",
+            "clock",
+            "area",
+            "drop_mean",
+            "drop_max",
+            "image_share",
+        ),
+        np.float64,
+    ),
+}
+
+
+def layer_name(geometry: Geometry) -> str:
+    """Name of the layer in files."""
+    return f"leak_{geometry}"
+
+
+def _utc(moment: dt.datetime) -> dt.datetime:
+    """Drop the zone, which NumPy doesn't know, after turning to UTC."""
+    return moment.astimezone(dt.UTC).replace(tzinfo=None)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return round(value, DECIMALS)
+    return value.isoformat() if isinstance(value, dt.datetime) else value
+
+
+def _rounded(shape: dict[str, Any]) -> dict[str, Any]:
+    rings = [[[round(number, DECIMALS) for number in vertex] for vertex in ring] for ring in shape["coordinates"]]
+    return {"type": shape["type"], "coordinates": rings}

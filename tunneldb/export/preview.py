@@ -1,0 +1,172 @@
+"""PNG previews of a kilometre's image: one strip a hectometre, with a grid, ticks and a scale.
+
+Where profiles lie far apart the image has gaps between them. In a preview, and only there, a pixel without a
+point takes the value of the nearest one within 0.3 m, so that profiles up to 0.6 m apart join.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+from scipy import ndimage
+from shapely.geometry import Polygon
+
+Single = NDArray[np.float32]
+
+STRIP = 100.0
+"""Length of a strip, m."""
+
+PIXEL = 0.05
+"""Side of a preview's pixel, m; that of the image where it is larger."""
+
+FILL = 0.3
+"""Gaps are filled from values at most so far away, m."""
+
+OFFSET_SPAN = 0.1
+"""Offsets beyond this are shown in the full colour, m."""
+
+_MARGIN, _HEAD, _GAP = 64, 40, 26
+_BACK, _INK, _GRID, _EMPTY, _LEAK = (255, 255, 255), (40, 40, 40), (150, 170, 200), (226, 229, 233), (0, 200, 255)
+_BLUE, _WHITE, _RED = np.array([33, 102, 172.0]), np.array([247, 247, 247.0]), np.array([178, 24, 43.0])
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A hectometre of an image at the preview's pixel.
+
+    Attributes
+    ----------
+    start : float
+        Chainage of its beginning, m.
+    values : (rows, columns) float32 array
+        From the greatest arc downwards, NaN where there is none.
+    """
+
+    start: float
+    values: Single
+
+
+def shrink(values: Single, factor: int) -> Single:
+    """Average blocks of ``factor`` × ``factor`` pixels, passing over NaNs; the image is filled up to whole blocks."""
+    rows, columns = (-(-n // factor) * factor for n in values.shape)
+    padded = np.full((rows, columns), np.nan, np.float32)
+    padded[: values.shape[0], : values.shape[1]] = values
+    blocks = padded.reshape(rows // factor, factor, columns // factor, factor)
+    held = np.isfinite(blocks)
+    count = held.sum(axis=(1, 3))
+    total = np.where(held, blocks, 0.0).sum(axis=(1, 3))
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan).astype(np.float32)
+
+
+def fill_gaps(values: Single, reach: float) -> Single:
+    """Give pixels without a value that of the nearest one within ``reach`` pixels."""
+    empty = np.isnan(values)
+    if empty.all() or not empty.any():
+        return values
+    distance, (row, column) = ndimage.distance_transform_edt(empty, return_indices=True)
+    filled = values[row, column]
+    filled[distance > reach] = np.nan
+    return np.asarray(filled, dtype=np.float32)
+
+
+def draw(
+    path: Path, title: str, kind: str, strips: Sequence[Strip], top: float, pixel: float, leaks: Sequence[Polygon] = ()
+) -> None:
+    """Draw strips below one another and write them as PNG.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    title : str
+        Heading.
+    kind : {'raw', 'corrected', 'offset'}
+        Intensities are drawn in grey between their 2nd and 98th percentile, offsets in blue (outside the
+        surface) to red (inside) within ±0.1 m.
+    strips : sequence of Strip
+        In order of chainage.
+    top : float
+        Arc of the upper edge, m.
+    pixel : float
+        Side of a pixel, m.
+    leaks : sequence of Polygon
+        Outlines to draw, (chainage, arc), m.
+    """
+    width, height = round(STRIP / pixel), max(s.values.shape[0] for s in strips)
+    sheet = Image.new("RGB", (width + _MARGIN + 20, _HEAD + len(strips) * (height + _GAP) + 10), _BACK)
+    pen = ImageDraw.Draw(sheet)
+    low, high = _span(kind, strips)
+    unit = "m" if kind == "offset" else "dB"
+    pen.text((_MARGIN, 8), f"{title}   {low:.2f} to {high:.2f} {unit}", _INK, ImageFont.load_default(18))
+    small = ImageFont.load_default(13)
+    for number, strip in enumerate(strips):
+        y = _HEAD + number * (height + _GAP)
+        colours = _colours(kind, fill_gaps(strip.values, FILL / pixel), low, high)
+        sheet.paste(Image.fromarray(colours), (_MARGIN, y))
+        _ticks(pen, strip, (_MARGIN, y), (width, height), top, pixel, small)
+        for leak in leaks:
+            if leak.bounds[0] < strip.start + STRIP and leak.bounds[2] > strip.start:
+                for ring in (leak.exterior, *leak.interiors):
+                    line = [(_MARGIN + (c - strip.start) / pixel, y + (top - a) / pixel) for c, a in ring.coords]
+                    pen.line(_clip(line, _MARGIN, _MARGIN + width), _LEAK, 2)
+    sheet.save(path, "PNG", optimize=True)
+
+
+def label(chainage: float) -> str:
+    """Chainage in whole metres as km + m."""
+    metres = round(chainage)
+    return f"{'-' if metres < 0 else ''}{abs(metres) // 1000}+{abs(metres) % 1000:03d}"
+
+
+def _clip(line: list[tuple[float, float]], left: float, right: float) -> list[tuple[float, float]]:
+    return [(min(max(x, left), right), y) for x, y in line]
+
+
+def _span(kind: str, strips: Sequence[Strip]) -> tuple[float, float]:
+    if kind == "offset":
+        return -OFFSET_SPAN, OFFSET_SPAN
+    held = np.concatenate([s.values[np.isfinite(s.values)] for s in strips])
+    if len(held) == 0:
+        return 0.0, 1.0
+    low, high = (float(v) for v in np.percentile(held, [2, 98]))
+    return low, max(high, low + 0.1)
+
+
+def _colours(kind: str, values: Single, low: float, high: float) -> NDArray[np.uint8]:
+    """Colours (rows, columns, 3) of values; places without one in a pale grey."""
+    with np.errstate(invalid="ignore"):
+        share = np.clip((values - low) / (high - low), 0.0, 1.0)[..., None]
+    if kind == "offset":
+        colour = np.where(share < 0.5, _BLUE + (_WHITE - _BLUE) * 2 * share, _WHITE + (_RED - _WHITE) * (2 * share - 1))
+    else:
+        colour = np.repeat(255.0 * share, 3, axis=2)
+    colour[np.isnan(values)] = _EMPTY
+    return np.asarray(colour, dtype=np.uint8)
+
+
+def _ticks(
+    pen: ImageDraw.ImageDraw,
+    strip: Strip,
+    corner: tuple[int, int],
+    size: tuple[int, int],
+    top: float,
+    pixel: float,
+    font: ImageFont.ImageFont | ImageFont.FreeTypeFont,
+) -> None:
+    """Grid every 10 m along the tunnel and every 5 m across, with labels."""
+    (x0, y0), (width, height) = corner, size
+    for metre in range(0, round(STRIP) + 1, 10):
+        x = x0 + round(metre / pixel)
+        pen.line([(x, y0), (x, y0 + height)], _GRID, 1)
+        if metre < STRIP:
+            pen.text((x + 2, y0 + height + 4), label(strip.start + metre), _INK, font)
+    bottom = top - height * pixel
+    for arc in range(int(np.ceil(bottom / 5)) * 5, int(np.floor(top)) + 1, 5):
+        y = y0 + round((top - arc) / pixel)
+        pen.line([(x0, y), (x0 + width, y)], _GRID, 1)
+        pen.text((6, y - 8), f"{arc:+d} m" if arc else "crown", _INK, font)

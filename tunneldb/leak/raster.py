@@ -1,0 +1,101 @@
+"""Image blocks as GeoTIFF bytes in the unrolled plane: x is the chainage, y the arc, m; no coordinate system."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import rasterio
+from affine import Affine
+from numpy.typing import NDArray
+from rasterio.errors import NotGeoreferencedWarning
+from rasterio.io import MemoryFile
+
+Single = NDArray[np.float32]
+
+KINDS = ("raw", "corrected", "offset")
+"""What the images of a kilometre show: raw and corrected intensity (dB), offset from the surface (m)."""
+
+STEP = {"raw": 0.01, "corrected": 0.01, "offset": 0.001}
+"""Value of one step of the stored whole numbers: dB, dB, m."""
+
+UNIT = {"raw": "dB", "corrected": "dB", "offset": "m"}
+
+NODATA = -32768
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Values of an image, NaN where there is no point, and where they lie.
+
+    Attributes
+    ----------
+    values : (rows, columns) float32 array
+        dB or m.
+    transform : Affine
+        From (column, row) to (chainage, arc), m.
+    """
+
+    values: Single
+    transform: Affine
+
+
+def encode(raster: Raster, kind: str) -> bytes:
+    """Write an image as a GeoTIFF of 16-bit whole numbers, deflated, with its scale, unit and nodata value."""
+    step = STEP[kind]
+    held = np.isfinite(raster.values)
+    whole = np.full(raster.values.shape, NODATA, np.int16)
+    whole[held] = np.clip(np.rint(raster.values[held] / step), NODATA + 1, 32767).astype(np.int16)
+    rows, columns = raster.values.shape
+    profile: dict[str, Any] = {
+        "driver": "GTiff",
+        "height": rows,
+        "width": columns,
+        "count": 1,
+        "dtype": "int16",
+        "nodata": NODATA,
+        "transform": raster.transform,
+        "compress": "deflate",
+        "predictor": 2,
+        "zlevel": 6,
+        "tiled": True,
+        "blockxsize": 256,
+        "blockysize": 256,
+    }
+    with MemoryFile() as memory:
+        with memory.open(**profile) as image:
+            image.write(whole, 1)
+            image.scales, image.units = (step,), (UNIT[kind],)
+            image.set_band_description(1, kind)
+        return bytes(memory.read())
+
+
+def decode(tiff: bytes) -> Raster:
+    """Read an image that :func:`encode` wrote."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        with MemoryFile(tiff) as memory, memory.open() as image:
+            whole = image.read(1)
+            values = np.where(whole == image.nodata, np.nan, whole * image.scales[0]).astype(np.float32)
+            return Raster(values, image.transform)
+
+
+def write_tiff(path: str, shape: tuple[int, int], transform: Affine) -> Any:
+    """Open a tiled GeoTIFF of single-precision numbers for writing, NaN for nodata."""
+    return rasterio.open(
+        path,
+        "w",
+        driver="GTiff",
+        height=shape[0],
+        width=shape[1],
+        count=1,
+        dtype="float32",
+        nodata=float("nan"),
+        transform=transform,
+        tiled=True,
+        blockxsize=256,
+        blockysize=256,
+        bigtiff="if_safer",
+    )
