@@ -9,7 +9,7 @@ RETURNS TABLE (
     tx float8, ty float8, tz float8,
     ux float8, uy float8,
     wx float8, wy float8, wz float8)
-LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT  -- a STRICT one would not be inlined, hence not run in parallel
+LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
 ROWS 100
 AS $$
     WITH vertex AS (
@@ -52,54 +52,58 @@ COMMENT ON FUNCTION tunnel_api.axis_frame(int[], float8[], float8[], float8[]) I
 -- pairs of classes mirrored in the upward direction, 45° to 135° from it; upwards the median over the classes of the
 -- vault (45° about the upward direction) against the level of the floor. Medians leave niches, cables and
 -- equipment without weight. Where fewer than three pairs of classes are filled it is the plain mean of the points,
--- as the paper has it. NULL where the slab holds fewer than min_points points.
+-- as the paper has it. A vertex whose slab holds fewer than min_points points is left out.
 CREATE OR REPLACE FUNCTION tunnel_api.axis_shift(
     survey_id int, n int[], x float8[], y float8[], z float8[],
     half_width float8 DEFAULT 1.0, angle_step float8 DEFAULT 5.0, min_points int DEFAULT 100)
-RETURNS TABLE (n int, "right" float8, up float8, points bigint)
-LANGUAGE sql STABLE PARALLEL SAFE CALLED ON NULL INPUT  -- a STRICT one would not be inlined, hence not run in parallel
+RETURNS TABLE (vertex int, "right" float8, up float8, points bigint)
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 100
+SET enable_nestloop = off  -- the planner expects few classes and would compare each with every other
+SET plan_cache_mode = force_custom_plan
 AS $$
-    WITH setting AS MATERIALIZED (
-        SELECT t.spacing,
-            (SELECT min(i) - 0.5 FROM unnest(axis_shift.n) i) * t.spacing AS low,
-            (SELECT max(i) + 0.5 FROM unnest(axis_shift.n) i) * t.spacing AS high
-        FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
-        WHERE s.id = axis_shift.survey_id
-    ), profile AS (
+DECLARE
+    spacing float8;
+    low float8;
+    high float8;
+BEGIN
+    SELECT t.spacing INTO STRICT spacing
+    FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = axis_shift.survey_id;
+    SELECT (min(i) - 0.5) * spacing, (max(i) + 0.5) * spacing INTO low, high FROM unnest(axis_shift.n) i;
+
+    RETURN QUERY
+    WITH profile AS (
         SELECT f.n, q.u, q.w
         FROM tunnel.point p
         JOIN tunnel_api.axis_frame(axis_shift.n, axis_shift.x, axis_shift.y, axis_shift.z) f
-            ON f.n = round(p.chainage / (SELECT spacing FROM setting))::int
+            ON f.n = round(p.chainage / spacing)::int
         CROSS JOIN LATERAL (SELECT ST_X(p.geom) - f.x AS dx, ST_Y(p.geom) - f.y AS dy, ST_Z(p.geom) - f.z AS dz) d
         CROSS JOIN LATERAL (SELECT d.dx * f.ux + d.dy * f.uy AS u, d.dx * f.wx + d.dy * f.wy + d.dz * f.wz AS w) q
         WHERE p.survey_id = axis_shift.survey_id
-          AND p.km BETWEEN (SELECT floor(low / 1000)::int FROM setting) AND (SELECT floor(high / 1000)::int FROM setting)
-          AND p.chainage BETWEEN (SELECT low FROM setting) AND (SELECT high FROM setting)
+          AND p.km BETWEEN floor(low / 1000)::int AND floor(high / 1000)::int
+          AND p.chainage BETWEEN low AND high
           -- chainage is good to a metre or so until the axis rests; the plane decides
-          AND abs(p.chainage - f.n * (SELECT spacing FROM setting)) <= axis_shift.half_width + 1.5
+          AND abs(p.chainage - round(p.chainage / spacing) * spacing) <= axis_shift.half_width + 1.5
           AND abs(d.dx * f.tx + d.dy * f.ty + d.dz * f.tz) <= axis_shift.half_width
-    ), class AS (
-        SELECT p.n, floor(degrees(atan2(p.u, p.w)) / axis_shift.angle_step)::int AS class,
+    ), class AS MATERIALIZED (
+        SELECT p.n, (floor(degrees(atan2(p.u, p.w)) / axis_shift.angle_step) + 0.5) * axis_shift.angle_step AS angle,
             avg(sqrt(p.u * p.u + p.w * p.w)) AS radius, sum(p.u) AS u, sum(p.w) AS w, count(*) AS points
         FROM profile p
         GROUP BY 1, 2
-    ), angle AS (
-        SELECT c.*, (c.class + 0.5) * axis_shift.angle_step AS angle FROM class c
     ), floor_level AS (
-        SELECT a.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY -a.radius * cosd(a.angle)) AS depth, count(*) AS classes
-        FROM angle a
-        WHERE abs(a.angle) > 135
-        GROUP BY a.n
+        SELECT c.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY -c.radius * cosd(c.angle)) AS depth, count(*) AS classes
+        FROM class c
+        WHERE abs(c.angle) > 135
+        GROUP BY c.n
     ), upward AS (
-        SELECT a.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY (a.radius - f.depth / cosd(a.angle)) / 2) AS shift
-        FROM angle a JOIN floor_level f ON f.n = a.n
-        WHERE abs(a.angle) < 45
-        GROUP BY a.n
+        SELECT c.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY (c.radius - f.depth / cosd(c.angle)) / 2) AS shift
+        FROM class c JOIN floor_level f ON f.n = c.n
+        WHERE abs(c.angle) < 45
+        GROUP BY c.n
         HAVING count(*) >= 3 AND min(f.classes) >= 3
     ), sideward AS (
         SELECT a.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY (a.radius - b.radius) / 2) AS shift
-        FROM angle a JOIN angle b ON b.n = a.n AND b.class = -1 - a.class
+        FROM class a JOIN class b ON b.n = a.n AND b.angle = -a.angle
         WHERE a.angle BETWEEN 45 AND 135
         GROUP BY a.n
         HAVING count(*) >= 3
@@ -113,7 +117,8 @@ AS $$
     LEFT JOIN sideward s ON s.n = t.n
     LEFT JOIN upward u ON u.n = t.n
     WHERE t.points >= axis_shift.min_points
-    ORDER BY t.n
+    ORDER BY t.n;
+END
 $$;
 COMMENT ON FUNCTION tunnel_api.axis_shift(int, int[], float8[], float8[], float8[], float8, float8, int) IS
 'One pass of stage 1: how far each vertex lies from the tunnel''s centre, to the right and up in its plane, m, from the points within half_width of the plane, averaged by angular class. After Gonçalves et al. (2012), stage 1.';
@@ -163,12 +168,13 @@ BEGIN
             JOIN unnest(vn, gx, gy, gz, fixed) AS g (n, gx, gy, gz, fixed) ON g.n = f.n
         ), shifted AS (
             SELECT f.n, f.gx, f.gy, f.gz, f.fixed, f.x, f.y, f.z, s.points,
+                -- in its plane, so that the given axis keeps its chainage
                 f.x + s."right" * f.ux + s.up * f.wx AS sx,
                 f.y + s."right" * f.uy + s.up * f.wy AS sy,
                 f.z + s.up * f.wz AS sz
             FROM frame f
             LEFT JOIN tunnel_api.axis_shift(axis_refine.survey_id, vn, vx, vy, vz,
-                axis_refine.half_width, axis_refine.angle_step, axis_refine.min_points) s ON s.n = f.n AND NOT f.fixed
+                axis_refine.half_width, axis_refine.angle_step, axis_refine.min_points) s ON s.vertex = f.n AND NOT f.fixed
         ), bounded AS (
             SELECT f.*,
                 max(f.n) FILTER (WHERE f.sx IS NOT NULL) OVER (ORDER BY f.n) AS before,

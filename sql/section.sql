@@ -30,10 +30,15 @@ CREATE OR REPLACE FUNCTION tunnel_api.section_classes(
     survey_id int, km int, half_width float8, angle_step float8, "only" int[])
 RETURNS TABLE (
     segment int, half int2, class int, radius float8, slope float8, sigma float8, spread float8, points bigint)
-LANGUAGE sql STABLE PARALLEL SAFE STRICT
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 10000
+SET enable_nestloop = off  -- the planner expects few classes and would compare each with every other
+SET plan_cache_mode = force_custom_plan
 AS $$
-    WITH plane AS MATERIALIZED (
+#variable_conflict use_column
+BEGIN
+    RETURN QUERY
+    WITH plane AS (
         SELECT p.segment, p.half, p.chainage,
             p.frame[1] AS x, p.frame[2] AS y, p.frame[3] AS z, p.frame[7] AS ux, p.frame[8] AS uy,
             p.frame[10] AS wx, p.frame[11] AS wy, p.frame[12] AS wz
@@ -42,12 +47,13 @@ AS $$
     ), polar AS (
         SELECT s.segment, s.half, sqrt(q.u * q.u + q.w * q.w) AS r, degrees(atan2(q.u, q.w)) AS angle
         FROM plane s
-        JOIN tunnel.point p
-            ON p.survey_id = section_classes.survey_id
-           AND p.km BETWEEN section_classes.km - 1 AND section_classes.km + 1
-           AND p.chainage BETWEEN s.chainage - section_classes.half_width AND s.chainage + section_classes.half_width
+        JOIN tunnel.point p ON p.segment = s.segment AND abs(p.chainage - s.chainage) <= section_classes.half_width
         CROSS JOIN LATERAL (SELECT ST_X(p.geom) - s.x AS dx, ST_Y(p.geom) - s.y AS dy, ST_Z(p.geom) - s.z AS dz) d
         CROSS JOIN LATERAL (SELECT d.dx * s.ux + d.dy * s.uy AS u, d.dx * s.wx + d.dy * s.wy + d.dz * s.wz AS w) q
+        WHERE p.survey_id = section_classes.survey_id
+          -- near the ends of a kilometre a point may lie in the partition next door
+          AND p.km BETWEEN section_classes.km - 1 AND section_classes.km + 1
+          AND p.chainage BETWEEN section_classes.km * 1000 - 2 AND section_classes.km * 1000 + 1002
     ), classed AS (
         SELECT p.segment, p.half, p.r,
             least(floor((p.angle + 180) / section_classes.angle_step), 360 / section_classes.angle_step - 1)::int AS class, p.angle
@@ -87,21 +93,8 @@ AS $$
     JOIN bound b ON b.segment = r.segment AND b.half = r.half AND b.class = r.class
     WHERE r.distance <= b.tolerance
     GROUP BY r.segment, r.half, r.class
-    ORDER BY 1, 2, 3
+    ORDER BY 1, 2, 3;
+END
 $$;
 COMMENT ON FUNCTION tunnel_api.section_classes(int, int, float8, float8, int[]) IS
 'Angular classes of the sections of one kilometre: a line through the points within two standard deviations, by class of angle_step degrees counted from -180°. radius, sigma in m, slope in m/m, spread in m². Source: Gonçalves et al. (2012), stage 4.';
-
-
--- Radius at an angle between two classes, by the cubic through both with their slopes (in m/rad).
-CREATE OR REPLACE FUNCTION tunnel_api.section_between(
-    angle_a float8, radius_a float8, slope_a float8, angle_b float8, radius_b float8, slope_b float8, angle float8)
-RETURNS float8
-LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT  -- inlined
-AS $$
-    SELECT (1 + 2 * t.s) * (1 - t.s) ^ 2 * radius_a + t.s * (1 - t.s) ^ 2 * t.h * slope_a
-        + t.s ^ 2 * (3 - 2 * t.s) * radius_b - t.s ^ 2 * (1 - t.s) * t.h * slope_b
-    FROM (SELECT (angle - angle_a) / (angle_b - angle_a) AS s, radians(angle_b - angle_a) AS h) t
-$$;
-COMMENT ON FUNCTION tunnel_api.section_between(float8, float8, float8, float8, float8, float8, float8) IS
-'Radius (m) at an angle (degrees) between two classes: the cubic Hermite curve with their radii (m) and slopes (m/rad).';

@@ -1,5 +1,19 @@
 -- The curve of a cross-section through its angular classes.
 
+-- Radius between two classes, by the cubic through both with their slopes: s from 0 to 1 is the share of the way, slopes are
+-- in m over the whole way.
+CREATE OR REPLACE FUNCTION tunnel_api.section_between(
+    s float8, radius_a float8, slope_a float8, radius_b float8, slope_b float8)
+RETURNS float8
+LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT  -- so that it is inlined
+AS $$
+    SELECT radius_a + s * (slope_a + s * (
+        3 * (radius_b - radius_a) - 2 * slope_a - slope_b + s * (2 * (radius_a - radius_b) + slope_a + slope_b)))
+$$;
+COMMENT ON FUNCTION tunnel_api.section_between(float8, float8, float8, float8, float8) IS
+'Radius (m) at the share s (0-1) of the way from one angular class to another: the cubic Hermite curve with their radii (m) and slopes (m over the whole way).';
+
+
 -- Where the lines of two classes meet: angle (degrees) and radius (m); NULL if they don't between the two classes.
 -- The classes stand at angles a and b (degrees), their lines at radius (m) with slope (m/m) in each class' own frame.
 CREATE OR REPLACE FUNCTION tunnel_api.section_corner(
@@ -64,10 +78,11 @@ DECLARE
     differences float8[] := '{}';
     angles float8[] := '{}'; radii float8[] := '{}'; slopes float8[] := '{}';   -- the classes left, once round and more
     apart boolean;
-    angle float8; x0 float8; y0 float8; x1 float8; y1 float8; piece float8; length float8;
+    wide float8; way float8;
+    angle float8; x0 float8; y0 float8; x1 float8; y1 float8; cx float8; cy float8; length float8;
     corners float8[] := '{}';   -- angle and radius of each corner
     at_corner float8[];
-    pieces float8[] := '{}';
+    pieces float8[] := array_fill(0::float8, ARRAY[360]);
 BEGIN
     class_state := array_fill('measured'::text, ARRAY[classes]);
     FOR k IN 1 .. classes LOOP
@@ -107,7 +122,7 @@ BEGIN
         c := k % classes + 1;
         IF r[k] IS NOT NULL AND r[a] IS NOT NULL AND r[c] IS NOT NULL THEN
             differences := differences || abs(r[k] - tunnel_api.section_between(
-                -1, r[a], r[a] * b[a] * angle_step, 1, r[c], r[c] * b[c] * angle_step, 0));
+                0.5, r[a], 2 * step * r[a] * b[a], r[c], 2 * step * r[c] * b[c]));
         END IF;
     END LOOP;
     SELECT percentile_cont(0.5) WITHIN GROUP (ORDER BY q) INTO uneven FROM unnest(differences) q;
@@ -140,14 +155,15 @@ BEGIN
             FOR c IN 0 .. g - 1 LOOP
                 a := (k + c - 1) % classes + 1;
                 apart := apart AND class_state[a] = 'measured' AND r[a] < tunnel_api.section_between(
-                    -1, r[i], r[i] * b[i], g, r[j], r[j] * b[j], c) - tolerance;
+                    (c + 1.0) / (g + 1), r[i], (g + 1) * step * r[i] * b[i], r[j], (g + 1) * step * r[j] * b[j]) - tolerance;
                 EXIT WHEN NOT apart;
             END LOOP;
             CONTINUE WHEN NOT apart;
+            wide := (g + 2) * step;
             CONTINUE WHEN abs(r[i] - tunnel_api.section_between(
-                    -2 * angle_step, r[first], r[first] * b[first], g * angle_step, r[j], r[j] * b[j], -angle_step)) > tolerance
+                    1.0 / (g + 2), r[first], wide * r[first] * b[first], r[j], wide * r[j] * b[j])) > tolerance
                 OR abs(r[j] - tunnel_api.section_between(
-                    -angle_step, r[i], r[i] * b[i], (g + 1) * angle_step, r[last], r[last] * b[last], g * angle_step)) > tolerance;
+                    (g + 1.0) / (g + 2), r[i], wide * r[i] * b[i], r[last], wide * r[last] * b[last])) > tolerance;
             FOR c IN 0 .. g - 1 LOOP
                 class_state[(k + c - 1) % classes + 1] := 'rejected';
             END LOOP;
@@ -168,6 +184,7 @@ BEGIN
     END LOOP;
 
     -- 4. nodes, and the length between them
+    node_radius := array_fill(0::float8, ARRAY[361]);
     i := 1;
     at_corner := NULL;
     FOR k IN -180 .. 180 LOOP
@@ -180,6 +197,7 @@ BEGIN
                 RETURN;
             END IF;
             turn := angles[i + 1] - angles[i] - degrees(atan(slopes[i + 1]) - atan(slopes[i]));
+            way := radians(angles[i + 1] - angles[i]);
             at_corner := NULL;
             IF abs(turn) > greatest(30, 2.5 * (angles[i + 1] - angles[i])) THEN
                 at_corner := tunnel_api.section_corner(
@@ -190,8 +208,8 @@ BEGIN
             END IF;
         END IF;
         IF at_corner IS NULL THEN
-            node_radius[k + 181] := tunnel_api.section_between(
-                angles[i], radii[i], radii[i] * slopes[i], angles[i + 1], radii[i + 1], radii[i + 1] * slopes[i + 1], k);
+            node_radius[k + 181] := tunnel_api.section_between((k - angles[i]) / (angles[i + 1] - angles[i]),
+                radii[i], way * radii[i] * slopes[i], radii[i + 1], way * radii[i + 1] * slopes[i + 1]);
         ELSE
             j := CASE WHEN k < at_corner[1] THEN i ELSE i + 1 END;
             node_radius[k + 181] := radii[j] / (cosd(k - angles[j]) - slopes[j] * sind(k - angles[j]));
@@ -200,23 +218,22 @@ BEGIN
     node_radius[361] := node_radius[1];
 
     g := 1;
+    x1 := node_radius[1] * sind(-180);
+    y1 := node_radius[1] * cosd(-180);
     FOR k IN 1 .. 360 LOOP
-        x0 := node_radius[k] * sind(k - 181);
-        y0 := node_radius[k] * cosd(k - 181);
+        x0 := x1;
+        y0 := y1;
         x1 := node_radius[k + 1] * sind(k - 180);
         y1 := node_radius[k + 1] * cosd(k - 180);
         WHILE g < cardinality(corners) AND corners[g] < k - 181 LOOP
             g := g + 2;
         END LOOP;
         IF g < cardinality(corners) AND corners[g] < k - 180 THEN
-            x1 := corners[g + 1] * sind(corners[g]);
-            y1 := corners[g + 1] * cosd(corners[g]);
-            piece := sqrt((x1 - x0) ^ 2 + (y1 - y0) ^ 2);
-            x0 := node_radius[k + 1] * sind(k - 180);
-            y0 := node_radius[k + 1] * cosd(k - 180);
-            pieces := pieces || piece + sqrt((x1 - x0) ^ 2 + (y1 - y0) ^ 2);
+            cx := corners[g + 1] * sind(corners[g]);
+            cy := corners[g + 1] * cosd(corners[g]);
+            pieces[k] := sqrt((cx - x0) ^ 2 + (cy - y0) ^ 2) + sqrt((x1 - cx) ^ 2 + (y1 - cy) ^ 2);
         ELSE
-            pieces := pieces || sqrt((x1 - x0) ^ 2 + (y1 - y0) ^ 2);
+            pieces[k] := sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0));
         END IF;
     END LOOP;
     node_arc := array_fill(0::float8, ARRAY[361]);

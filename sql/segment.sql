@@ -134,8 +134,8 @@ DECLARE
     spacing float8;
     tagged bigint;
     n int[]; a float8[]; b float8[];
-    ax float8[]; ay float8[]; az float8[]; al float8[];
-    bx float8[]; by float8[]; bz float8[]; bl float8[];
+    px float8[]; py float8[]; pz float8[]; pl float8[];
+    qx float8[]; qy float8[]; qz float8[]; ql float8[];
 BEGIN
     SELECT t.spacing INTO STRICT spacing
     FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = segment_tag.survey_id;
@@ -145,7 +145,7 @@ BEGIN
         array_agg(p.line[1] * p.line[7] + p.line[2] * p.line[8] + p.line[3] * p.line[9]),
         array_agg(p.line[10]), array_agg(p.line[11]), array_agg(p.line[12]),
         array_agg(p.line[4] * p.line[10] + p.line[5] * p.line[11] + p.line[6] * p.line[12])
-    INTO n, a, b, ax, ay, az, al, bx, by, bz, bl
+    INTO n, a, b, px, py, pz, pl, qx, qy, qz, ql
     FROM generate_series(segment_tag.km - 1, segment_tag.km + 1) AS k, tunnel_api.segment_plan(segment_tag.survey_id, k) p;
 
     EXECUTE format('DROP TABLE IF EXISTS tunnel.%I', building);
@@ -154,19 +154,19 @@ BEGIN
         WITH coarse AS (
             SELECT p.*, s.n + CASE
                 WHEN p.chainage / $3 - s.n BETWEEN 0.15 AND 0.85 THEN 0
-                WHEN ST_X(p.geom) * s.ax + ST_Y(p.geom) * s.ay + ST_Z(p.geom) * s.az < s.al THEN -1
-                WHEN ST_X(p.geom) * s.bx + ST_Y(p.geom) * s.by + ST_Z(p.geom) * s.bz >= s.bl THEN 1
+                WHEN ST_X(p.geom) * s.px + ST_Y(p.geom) * s.py + ST_Z(p.geom) * s.pz < s.pl THEN -1
+                WHEN ST_X(p.geom) * s.qx + ST_Y(p.geom) * s.qy + ST_Z(p.geom) * s.qz >= s.ql THEN 1
                 ELSE 0 END AS number
             FROM tunnel.point p
-            LEFT JOIN unnest($4, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, ax, ay, az, al, bx, by, bz, bl)
+            LEFT JOIN unnest($4, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, px, py, pz, pl, qx, qy, qz, ql)
                 ON s.n = floor(p.chainage / $3)::int
             WHERE p.survey_id = $1 AND p.km = $2
         ), measured AS (
             SELECT c.*, s.n AS found, s.a, s.b,
-                ST_X(c.geom) * s.ax + ST_Y(c.geom) * s.ay + ST_Z(c.geom) * s.az - s.al AS before,
-                s.bl - (ST_X(c.geom) * s.bx + ST_Y(c.geom) * s.by + ST_Z(c.geom) * s.bz) AS after
+                ST_X(c.geom) * s.px + ST_Y(c.geom) * s.py + ST_Z(c.geom) * s.pz - s.pl AS before,
+                s.ql - (ST_X(c.geom) * s.qx + ST_Y(c.geom) * s.qy + ST_Z(c.geom) * s.qz) AS after
             FROM coarse c
-            LEFT JOIN unnest($4, $13, $14, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, a, b, ax, ay, az, al, bx, by, bz, bl)
+            LEFT JOIN unnest($4, $13, $14, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, a, b, px, py, pz, pl, qx, qy, qz, ql)
                 ON s.n = c.number
         )
         SELECT m.survey_id, m.km,
@@ -175,7 +175,7 @@ BEGIN
         FROM measured m
         ORDER BY 3
     $query$, building)
-    USING survey_id, km, spacing, n, ax, ay, az, al, bx, by, bz, bl, a, b;
+    USING survey_id, km, spacing, n, px, py, pz, pl, qx, qy, qz, ql, a, b;
     PERFORM tunnel_api.partition_swap(segment_tag.survey_id, segment_tag.km);
 
     WITH counted AS (
@@ -193,4 +193,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.segment_tag(int, int) IS
-'Stage 3 for the points of one kilometre: rewrites their partition with segment number and chainage (m, in plan) and swaps it in; returns the number of points tagged. Source: Gonçalves et al. (2012), stage 3.';
+'Stage 3 for the points of one kilometre: rewrites their partition with segment number and chainage (m, in plan) and swaps it in; returns the number of points tagged. Source: Gonçalves et pl. (2012), stage 3.';
