@@ -154,6 +154,7 @@ class Accumulator:
             ) from None
         self._map = mmap.mmap(self._file.fileno(), size)
         self._sums = np.frombuffer(self._map, dtype=np.float32).reshape(shape)
+        self._held = np.zeros(grid.blocks, np.bool_)
 
     def __enter__(self) -> Accumulator:
         """Return the accumulator."""
@@ -188,6 +189,7 @@ class Accumulator:
         grid = self.grid
         added = _add(
             self._sums,
+            self._held,
             grid.km * KILOMETRE,
             1.0 / grid.pixel,
             grid.bottom,
@@ -203,12 +205,7 @@ class Accumulator:
 
     def blocks(self) -> list[int]:
         """Blocks, counted from 0, that hold points."""
-        held = []
-        for block in range(self.grid.blocks):
-            if bool(np.any(self._sums[block, :, :, 0])):
-                held.append(block)
-            self._give_back()
-        return held
+        return [int(block) for block in np.flatnonzero(self._held)]
 
     def window(self, start: int, stop: int) -> Window:
         """Means over the columns from ``start`` up to ``stop``; columns outside the kilometre are cut off."""
@@ -233,6 +230,7 @@ class Accumulator:
 @njit(cache=True, nogil=True)
 def _add(
     sums: NDArray[np.float32],
+    held: NDArray[np.bool_],
     start: float,
     per_metre: float,
     bottom: int,
@@ -253,6 +251,7 @@ def _add(
         if column < 0 or column >= blocks * width or row < 0 or row >= rows:
             continue
         block = column // width
+        held[block] = True
         pixel = sums[block, row, column - block * width]
         pixel[0] += 1.0
         pixel[1] += offset[i]
