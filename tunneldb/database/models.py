@@ -229,6 +229,9 @@ class AxisVertex(Base):
     n: Mapped[int] = mapped_column(comment="Number along the axis; its chainage is n * tunnel.spacing")
     km: Mapped[int] = mapped_column(comment=_KM)
     geom: Mapped[WKBElement] = mapped_column(_geometry("POINTZ"), comment="Position, tunnel's SRID, m")
+    given: Mapped[WKBElement] = mapped_column(
+        _geometry("POINTZ"), comment="Where the given axis has this chainage, tunnel's SRID, m"
+    )
     points: Mapped[int] = mapped_column(comment="Points that were averaged; 0 unless measured")
     source: Mapped[str] = mapped_column(
         comment="measured (averaged), interpolated (too few points) or edited (by hand, kept by a rerun)"
@@ -281,9 +284,11 @@ class Section(Base):
     chainage: Mapped[float] = mapped_column(comment="Chainage of its plane, m")
     half_width: Mapped[float] = mapped_column(comment="Half the thickness of the slab that its points are from, m")
     angle_step: Mapped[float] = mapped_column(comment="Width of an angular class, degrees")
-    radius: Mapped[Floats] = mapped_column(comment="Distance of the surface from the axis at the classes' angles, m")
+    radius: Mapped[Floats] = mapped_column(
+        comment="Distance of the surface from the axis at each whole degree from -180 to 180, m"
+    )
     arc: Mapped[Floats] = mapped_column(
-        comment="Arc from the crown to the classes' angles, m, positive right looking up-chainage"
+        comment="Arc from the crown at each whole degree, m, positive right looking up-chainage"
     )
     geom: Mapped[WKBElement] = mapped_column(
         _geometry("LINESTRINGZ"), comment="The section as a line in space, tunnel's SRID, m"
@@ -309,8 +314,10 @@ class SectionClass(Base):
     )
     angle: Mapped[float] = mapped_column(comment="Its angle from the crown, degrees, positive right")
     radius: Mapped[float] = mapped_column(comment="Distance of the surface from the axis at the angle, m")
-    slope: Mapped[float] = mapped_column(comment="Change of the radius with the angle, m per radian")
-    sigma: Mapped[float] = mapped_column(comment="Standard deviation of its points from the fit, m")
+    slope: Mapped[float | None] = mapped_column(
+        comment="Inclination of the line through its points: outwards per metre to the right; none if empty"
+    )
+    sigma: Mapped[float | None] = mapped_column(comment="Standard deviation of its points from the line, m; none if empty")
     points: Mapped[int] = mapped_column(comment="Points that it keeps")
     state: Mapped[str] = mapped_column(
         comment="measured, rejected (an outlier among its neighbours) or interpolated (too few points)"

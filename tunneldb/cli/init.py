@@ -1,0 +1,34 @@
+"""`tunneldb init`."""
+
+from __future__ import annotations
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.database import open_connection
+from tunneldb.database.install import install, schema_revision
+
+
+@click.command()
+@click.pass_obj
+def init(settings: Settings) -> None:
+    """Create or upgrade the schema, the functions and the roles.
+
+    Data stay; schema tunnel_api is made anew. Run it once for a new database, and again after each upgrade of
+    tunneldb.
+    """
+    with open_connection(settings.dsn) as connection:
+        before = schema_revision(connection)
+        connection.rollback()
+        connection.add_notice_handler(
+            lambda notice: (
+                click.echo(f"tunneldb: {notice.message_primary}", err=True)
+                if notice.severity_nonlocalized == "WARNING"
+                else None
+            )
+        )
+        install(connection)
+        after = schema_revision(connection)
+    change = "created" if before is None else "is up to date" if before == after else f"upgraded from {before}"
+    where = "the embedded server" if settings.dsn is None else "the database"
+    click.echo(f"{where}: schema tunnel {change} ({after}), tunnel_api installed", err=True)

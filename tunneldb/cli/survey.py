@@ -1,0 +1,115 @@
+"""`tunneldb survey`."""
+
+from __future__ import annotations
+
+import datetime as dt
+from pathlib import Path
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect, get_survey
+from tunneldb.errors import UserError
+
+FILE = click.Path(path_type=Path)
+
+
+@click.group()
+def survey() -> None:
+    """Add, list or remove the scanning campaigns of a tunnel."""
+
+
+@survey.command()
+@click.argument("name")
+@click.option("--tunnel", required=True, help="Tunnel that was scanned.")
+@click.option("--date", type=click.DateTime(["%Y-%m-%d"]), required=True, metavar="YYYY-MM-DD", help="Day of the scan.")
+@click.option("--trajectory", type=FILE, help="CSV with time,x,y,z of a mobile scanner; time as gps_time in the files.")
+@click.option("--stations", type=FILE, help="CSV with scan_id,x,y,z of a static scanner; scan_id as point_source_id.")
+@click.option("--backwards", is_flag=True, help="The trajectory was driven towards falling chainage.")
+@click.option("--reference", type=FILE, help="CSV with range_m,intensity_db: the scanner's intensity over range.")
+@click.option("--intensity", metavar="DIMENSION", help="Dimension of the files that holds the intensity, such as Amplitude.")
+@click.option(
+    "--intensity-kind",
+    type=click.Choice(["amplitude", "reflectance", "linear", "none"]),
+    required=True,
+    help="amplitude: dB, falls with range. reflectance: dB, range removed by the maker. linear: counts. none: there is none.",
+)
+@click.pass_obj
+def add(
+    settings: Settings,
+    name: str,
+    tunnel: str,
+    date: dt.datetime,
+    trajectory: Path | None,
+    stations: Path | None,
+    backwards: bool,
+    reference: Path | None,
+    intensity: str | None,
+    intensity_kind: str,
+) -> None:
+    """Add the survey NAME."""
+    from tunneldb.database.catalog import Intensity, add_survey
+
+    poses = trajectory or stations
+    if poses is None or (trajectory is not None and stations is not None):
+        raise UserError("say where the scanner was: exactly one of --trajectory and --stations")
+    if backwards and trajectory is None:
+        raise UserError("--backwards is about a trajectory; stations have no direction")
+    if (intensity is None) != (intensity_kind == "none"):
+        raise UserError("--intensity names the dimension for every --intensity-kind but none, and only for those")
+    with connect(settings.dsn) as connection:
+        count = add_survey(
+            connection,
+            name,
+            tunnel,
+            date.date(),
+            poses,
+            mobile=trajectory is not None,
+            backwards=backwards,
+            reference=reference,
+            intensity=Intensity(intensity_kind, intensity),
+        )
+    click.echo(f"{name}: {count} {'poses' if trajectory else 'stations'} of {tunnel}, {date:%Y-%m-%d}", err=True)
+
+
+@survey.command("list")
+@click.pass_obj
+def list_(settings: Settings) -> None:
+    """List the surveys."""
+    with connect(settings.dsn) as connection:
+        rows = connection.execute(
+            """
+            SELECT name, tunnel, date, platform, intensity_kind, files, points,
+                   tunnel_api.chainage_label(chainage_from), tunnel_api.chainage_label(chainage_to)
+              FROM tunnel_api.survey ORDER BY tunnel, date, name
+            """
+        ).fetchall()
+    header = ["survey", "tunnel", "date", "platform", "intensity", "files", "points", "from", "to"]
+    print_table(header, rows, right=(5, 6, 7, 8))
+
+
+@survey.command()
+@click.argument("name")
+@click.option("--yes", is_flag=True, help="Do not ask.")
+@click.pass_obj
+def remove(settings: Settings, name: str, yes: bool) -> None:
+    """Remove the survey NAME with its points, sections, images, leaks and their reviews."""
+    from tunneldb.database.catalog import remove_survey
+
+    with connect(settings.dsn) as connection:
+        found = get_survey(connection, name)
+        row = connection.execute(
+            """
+            SELECT (SELECT coalesce(sum(kept), 0) FROM tunnel.scan_file WHERE survey_id = %(id)s),
+                   (SELECT count(*) FROM tunnel.leak WHERE survey_id = %(id)s),
+                   (SELECT count(*) FROM tunnel.leak WHERE survey_id = %(id)s AND review <> 'open')
+            """,
+            {"id": found.id},
+        ).fetchone()
+        assert row is not None
+        connection.rollback()
+        question = f"Remove {name} with {row[0]} points and {row[1]} leaks, {row[2]} of them reviewed?"
+        if not yes and not click.confirm(question):
+            raise click.Abort
+        remove_survey(connection, name)

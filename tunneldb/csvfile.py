@@ -1,0 +1,125 @@
+"""Reading the small CSV files of the interface: axis, stations, trajectory, reference, points."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.errors import UserError
+
+if TYPE_CHECKING:
+    import _csv
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """Numbers of a CSV file.
+
+    Attributes
+    ----------
+    path
+        The file.
+    names
+        Columns, in the order asked for.
+    values
+        (rows, columns), float64, all finite.
+    lines
+        (rows,), line in the file of each row, from 1.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    values: NDArray[np.float64]
+    lines: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.values)
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """Return a column."""
+        return self.values[:, self.names.index(name)]
+
+    def columns(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Return several columns, (rows, len(names))."""
+        return np.ascontiguousarray(self.values[:, [self.names.index(name) for name in names]])
+
+    def error(self, row: int, text: str) -> UserError:
+        """Return an error about a row, naming file and line."""
+        return UserError(f"{self.path}, line {self.lines[row]}: {text}")
+
+    def require_growing(self, name: str) -> None:
+        """Raise a UserError unless a column grows strictly from row to row."""
+        column = self[name]
+        wrong = np.flatnonzero(np.diff(column) <= 0)
+        if len(wrong):
+            row = int(wrong[0]) + 1
+            how = "repeats" if column[row] == column[row - 1] else "is less than"
+            raise self.error(row, f"{name} {column[row]:.15g} {how} that of the row before; sort by {name}, each once")
+
+
+def read_csv(path: Path, names: Sequence[str]) -> CsvTable:
+    """Read numeric columns of a CSV file with a header; other columns are left out.
+
+    Raises
+    ------
+    UserError
+        When the file cannot be read, a column is missing, or a value is not a finite number; names file, line and
+        value.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows, lines = _read_rows(path, csv.reader(file), names)
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path} is not a text file in UTF-8 (byte {error.start}); save it as CSV") from None
+    except csv.Error as error:
+        raise UserError(f"{path} is not a CSV file: {error}") from None
+    values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
+    return CsvTable(path, tuple(names), values, np.array(lines, dtype=np.int64))
+
+
+def _read_rows(path: Path, reader: _csv._reader, names: Sequence[str]) -> tuple[list[list[float]], list[int]]:
+    header = next(reader, None)
+    if header is None:
+        raise UserError(f"{path} is empty; it needs the header {','.join(names)}")
+    indices = _indices(path, [cell.strip() for cell in header], names)
+    rows: list[list[float]] = []
+    lines: list[int] = []
+    for row in reader:
+        if not any(cell.strip() for cell in row):
+            continue
+        if len(row) != len(header):
+            raise UserError(f"{path}, line {reader.line_num}: {len(row)} values under a header of {len(header)} columns")
+        rows.append([_number(path, reader.line_num, name, row[i]) for name, i in zip(names, indices, strict=True)])
+        lines.append(reader.line_num)
+    return rows, lines
+
+
+def _indices(path: Path, header: list[str], names: Sequence[str]) -> list[int]:
+    missing = [name for name in names if name not in header]
+    if missing:
+        hint = "; separate columns by commas" if len(header) == 1 else ""
+        raise UserError(f"{path} has no column {', '.join(missing)}: its header is {','.join(header)!r}{hint}")
+    repeated = [name for name in names if header.count(name) > 1]
+    if repeated:
+        raise UserError(f"{path} has the column {repeated[0]} twice")
+    return [header.index(name) for name in names]
+
+
+def _number(path: Path, line: int, name: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise UserError(f"{path}, line {line}: {name} is {text.strip()!r}, not a number") from None
+    if not math.isfinite(value):
+        raise UserError(f"{path}, line {line}: {name} is {text.strip()}, which is no measurement; remove the line")
+    return value

@@ -1,0 +1,260 @@
+"""Adding and removing tunnels and surveys."""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+import pyproj
+import shapely
+from numpy.typing import NDArray
+from psycopg import sql
+
+from tunneldb.csvfile import CsvTable, read_csv
+from tunneldb.database.copy import PointZ, copy_binary, pack
+from tunneldb.errors import UserError
+from tunneldb.geometry.alignment import Alignment
+
+XYZ = ("x", "y", "z")
+FARTHEST_SCANNER = 50.0  # m from the axis; a scanner that was never nearer stood in another tunnel
+SCAN_ID_LIMIT = 65536  # point_source_id of LAS has 16 bits
+
+
+@dataclass(frozen=True)
+class Intensity:
+    """Which dimension of the scan files holds the intensity, and what it is."""
+
+    kind: str
+    dimension: str | None
+
+
+def add_tunnel(
+    connection: psycopg.Connection[Any],
+    name: str,
+    srid: int,
+    axis: Path,
+    start_chainage: float,
+    spacing: float,
+) -> Alignment:
+    """Add a tunnel with its given axis, and return the axis.
+
+    Parameters
+    ----------
+    axis
+        CSV with x,y,z in growing chainage, metres in the SRID.
+    start_chainage
+        Chainage of the axis's first point, m.
+    spacing
+        Distance between the vertices of the averaged axis, m.
+
+    Raises
+    ------
+    UserError
+        For a name that is taken, an SRID that is unknown or not in metres, or an axis that is none.
+    """
+    _require_name(name)
+    _require_metres(connection, srid)
+    xyz = _read_axis(axis)
+    alignment = Alignment.from_polyline(xyz, start_chainage, spacing)
+    line = shapely.set_srid(shapely.LineString(xyz), srid)
+    try:
+        connection.execute(
+            "INSERT INTO tunnel.tunnel (name, srid, start_chainage, spacing, alignment) VALUES (%s, %s, %s, %s, %s::geometry)",
+            [name, srid, start_chainage, spacing, shapely.to_wkb(line, hex=True, include_srid=True)],
+        )
+    except psycopg.errors.UniqueViolation:
+        raise UserError(f"there is a tunnel {name!r} already: tunneldb tunnel list") from None
+    return alignment
+
+
+def _read_axis(path: Path) -> NDArray[np.float64]:
+    """Return the vertices of an axis file; it must not turn back on itself."""
+    table = read_csv(path, XYZ)
+    if len(table) < 2:
+        raise UserError(f"{path}: an axis needs at least 2 points, this one has {len(table)}")
+    xyz = table.columns(XYZ)
+    steps = np.diff(xyz[:, :2], axis=0)
+    standing = np.flatnonzero(~steps.any(axis=1))
+    if len(standing):
+        raise table.error(int(standing[0]) + 1, "the same x,y as the point before; remove one of them")
+    turns = np.flatnonzero(np.einsum("ij,ij->i", steps[1:], steps[:-1]) <= 0)
+    if len(turns):
+        raise table.error(int(turns[0]) + 2, "the axis turns back here; its points must be in growing chainage")
+    return xyz
+
+
+def _require_name(name: str) -> None:
+    """Names stand in file names and on the command line."""
+    if not re.fullmatch(r"[A-Za-z0-9][\w.-]*", name):
+        raise UserError(f"the name {name!r} will not do: letters, digits, and inside also - _ .")
+
+
+def _require_metres(connection: psycopg.Connection[Any], srid: int) -> None:
+    row = connection.execute("SELECT srtext FROM spatial_ref_sys WHERE srid = %s", [srid]).fetchone()
+    if row is None:
+        raise UserError(f"PostGIS does not know SRID {srid}; use an EPSG number, such as 25830")
+    crs = pyproj.CRS.from_wkt(row[0])
+    if not crs.is_projected:
+        raise UserError(f"SRID {srid} ({crs.name}) is not projected; lengths and chainage need one in metres")
+    units = {axis.unit_name for axis in crs.axis_info}
+    if units != {"metre"}:
+        raise UserError(f"SRID {srid} ({crs.name}) is in {', '.join(sorted(units))}, not metres")
+
+
+def add_survey(
+    connection: psycopg.Connection[Any],
+    name: str,
+    tunnel: str,
+    date: dt.date,
+    poses: Path,
+    *,
+    mobile: bool,
+    backwards: bool,
+    reference: Path | None,
+    intensity: Intensity,
+) -> int:
+    """Add a survey with its scanner positions and reference curve; return how many positions it has.
+
+    Parameters
+    ----------
+    poses
+        CSV of the trajectory (time,x,y,z) when `mobile`, else of the stations (scan_id,x,y,z).
+    backwards
+        Whether the trajectory was driven towards falling chainage.
+    reference
+        CSV with range_m,intensity_db.
+
+    Raises
+    ------
+    UserError
+        For a name that is taken, an unknown tunnel, or files that do not fit it.
+    """
+    _require_name(name)
+    tunnel_id, srid, alignment = _alignment(connection, tunnel)
+    table = _read_trajectory(poses) if mobile else _read_stations(poses)
+    _require_near(table, alignment, tunnel)
+    if mobile:
+        _require_direction(table, alignment, backwards=backwards)
+    curve = None if reference is None else _read_reference(reference)
+    try:
+        row = connection.execute(
+            """
+            INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_dimension, intensity_kind, platform)
+            VALUES (%s, %s, %s, %s, %s, %s) RETURNING id
+            """,
+            [tunnel_id, name, date, intensity.dimension, intensity.kind, "mobile" if mobile else "static"],
+        ).fetchone()
+    except psycopg.errors.UniqueViolation:
+        raise UserError(f"there is a survey {name!r} already: tunneldb survey list") from None
+    assert row is not None
+    survey = np.full(len(table), row[0], dtype=np.int32)
+    points = PointZ(table.columns(XYZ), srid)
+    if mobile:
+        _insert(connection, "pose", ["survey_id", "time", "geom"], [survey, table["time"], points])
+    else:
+        ids = table["scan_id"].astype(np.int32)
+        _insert(connection, "station", ["survey_id", "scan_id", "geom"], [survey, ids, points])
+    if curve is not None:
+        survey = np.full(len(curve), row[0], dtype=np.int32)
+        columns = [survey, curve["range_m"], curve["intensity_db"]]
+        _insert(connection, "reference", ["survey_id", "range_m", "intensity_db"], columns)
+    return len(table)
+
+
+def _insert(connection: psycopg.Connection[Any], table: str, names: list[str], columns: list[Any]) -> None:
+    copy_binary(connection, sql.Identifier("tunnel", table), names, [pack(columns)])
+
+
+def _alignment(connection: psycopg.Connection[Any], tunnel: str) -> tuple[int, int, Alignment]:
+    """Return a tunnel's key, SRID and given axis."""
+    row = connection.execute(
+        "SELECT id, srid, start_chainage, spacing, ST_AsBinary(alignment) FROM tunnel.tunnel WHERE name = %s", [tunnel]
+    ).fetchone()
+    if row is None:
+        known = ", ".join(found[0] for found in connection.execute("SELECT name FROM tunnel.tunnel ORDER BY name"))
+        raise UserError(f"there is no tunnel {tunnel!r}; the database has {known or 'none: tunneldb tunnel add'}")
+    key, srid, start, spacing, wkb = row
+    xyz = shapely.get_coordinates(shapely.from_wkb(wkb), include_z=True)
+    return key, srid, Alignment.from_polyline(xyz, start, spacing)
+
+
+def _read_trajectory(path: Path) -> CsvTable:
+    table = read_csv(path, ("time", *XYZ))
+    if len(table) < 2:
+        raise UserError(f"{path}: a trajectory needs at least 2 rows, this one has {len(table)}")
+    table.require_growing("time")
+    return table
+
+
+def _read_stations(path: Path) -> CsvTable:
+    table = read_csv(path, ("scan_id", *XYZ))
+    if not len(table):
+        raise UserError(f"{path} holds no station")
+    ids = table["scan_id"]
+    wrong = np.flatnonzero((ids != np.floor(ids)) | (ids < 0) | (ids >= SCAN_ID_LIMIT))
+    if len(wrong):
+        raise table.error(int(wrong[0]), f"scan_id {ids[wrong[0]]:g} is not a whole number from 0 to {SCAN_ID_LIMIT - 1}")
+    _, first = np.unique(ids, return_index=True)
+    repeated = np.setdiff1d(np.arange(len(ids)), first)
+    if len(repeated):
+        raise table.error(int(repeated[0]), f"scan_id {ids[repeated[0]]:g} stands above already; each station once")
+    return table
+
+
+def _read_reference(path: Path) -> CsvTable:
+    table = read_csv(path, ("range_m", "intensity_db"))
+    if len(table) < 2:
+        raise UserError(f"{path}: a reference curve needs at least 2 rows, this one has {len(table)}")
+    if table["range_m"][0] <= 0:
+        raise table.error(0, f"range_m {table['range_m'][0]:g} is not positive")
+    table.require_growing("range_m")
+    return table
+
+
+def _require_near(table: CsvTable, alignment: Alignment, tunnel: str) -> None:
+    """The scanner must have been near the axis at least once."""
+    distance = alignment.distance(table.columns(XYZ))
+    if np.isnan(distance).all() or np.nanmin(distance) > FARTHEST_SCANNER:
+        nearest = "beyond its ends" if np.isnan(distance).all() else f"{np.nanmin(distance):.0f} m at the nearest"
+        raise UserError(
+            f"{table.path}: the scanner was never within {FARTHEST_SCANNER:g} m of the axis of {tunnel!r} ({nearest}); "
+            "is it of another tunnel or in another SRID?"
+        )
+
+
+def _require_direction(table: CsvTable, alignment: Alignment, *, backwards: bool) -> None:
+    """The trajectory must run up the axis, or down it when that was said."""
+    chainage = alignment.chainage(table.columns(XYZ))
+    within = chainage[np.isfinite(chainage)]
+    run = within[-1] - within[0]
+    if run < 0 and not backwards:
+        raise UserError(
+            f"{table.path}: the trajectory runs {-run:.0f} m down the axis; reverse the axis's points, or say --backwards "
+            "if the scanner did go towards falling chainage"
+        )
+    if run > 0 and backwards:
+        raise UserError(f"{table.path}: the trajectory runs {run:.0f} m up the axis, so --backwards is wrong")
+
+
+def remove_survey(connection: psycopg.Connection[Any], name: str) -> None:
+    """Remove a survey with all that was made of it."""
+    if connection.execute("DELETE FROM tunnel.survey WHERE name = %s", [name]).rowcount == 0:
+        raise UserError(f"there is no survey {name!r}: tunneldb survey list")
+
+
+def remove_tunnel(connection: psycopg.Connection[Any], name: str) -> None:
+    """Remove a tunnel; its surveys must have been removed before."""
+    surveys = connection.execute(
+        "SELECT s.name FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE t.name = %s ORDER BY s.name",
+        [name],
+    ).fetchall()
+    if surveys:
+        names = ", ".join(row[0] for row in surveys)
+        raise UserError(f"the tunnel {name!r} has surveys: {names}; remove them first (tunneldb survey remove)")
+    if connection.execute("DELETE FROM tunnel.tunnel WHERE name = %s", [name]).rowcount == 0:
+        raise UserError(f"there is no tunnel {name!r}: tunneldb tunnel list")

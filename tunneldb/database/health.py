@@ -1,0 +1,166 @@
+"""What is right and wrong with the server and the database, and the command that mends it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import psycopg
+from alembic.script import ScriptDirectory
+
+from tunneldb.database.connection import MINIMUM_POSTGIS, open_connection
+from tunneldb.database.install import (
+    alembic_config,
+    api_version,
+    installed_api_version,
+    postgis_version,
+    schema_revision,
+)
+from tunneldb.database.server import Server
+from tunneldb.errors import UserError
+
+ROLES = ("tunnel_viewer", "tunnel_inspector", "tunnel_operator")
+LITTLE_SPACE = 5 * 1024**3  # bytes; a kilometre at survey density takes some 0.5 GB with its rewrite
+GIB = 1024**3
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    Attributes
+    ----------
+    level
+        ``ok``, ``note`` (works, but could be better) or ``wrong``.
+    subject, text
+        What was looked at, and how it is.
+    mend
+        Command or statement that puts it right; empty when nothing needs to.
+    """
+
+    level: Literal["ok", "note", "wrong"]
+    subject: str
+    text: str
+    mend: str = ""
+
+
+def examine(dsn: str | None) -> Iterator[Finding]:
+    """Look at everything, in the order in which things depend on each other; stop where nothing more can be seen."""
+    try:
+        connection = open_connection(dsn)
+    except UserError as error:
+        yield Finding("wrong", "server", str(error))
+        return
+    with connection:
+        info = connection.info
+        where = "embedded" if dsn is None else f"{info.host or 'local'}, database {info.dbname}"
+        yield Finding("ok", "server", f"PostgreSQL {info.parameter_status('server_version')} ({where})")
+        postgis = _postgis(connection)
+        yield postgis
+        if postgis.level == "wrong":
+            return
+        schema = _schema(connection)
+        yield schema
+        if schema.level == "wrong":
+            return
+        yield _api(connection)
+        yield from _roles(connection)
+        yield from _settings(connection, embedded=dsn is None)
+        yield from _work(connection)
+        if dsn is None:
+            yield _space()
+
+
+def _postgis(connection: psycopg.Connection[Any]) -> Finding:
+    version = postgis_version(connection)
+    if version is None:
+        return Finding(
+            "wrong", "PostGIS", "not in this database", "tunneldb init   -- or a superuser: CREATE EXTENSION postgis;"
+        )
+    if tuple(map(int, version.split(".")[:2])) < MINIMUM_POSTGIS:
+        least = ".".join(map(str, MINIMUM_POSTGIS))
+        return Finding("wrong", "PostGIS", f"{version}, older than {least}", "SELECT postgis_extensions_upgrade();")
+    return Finding("ok", "PostGIS", version)
+
+
+def _schema(connection: psycopg.Connection[Any]) -> Finding:
+    revision = schema_revision(connection)
+    script = ScriptDirectory.from_config(alembic_config())
+    if revision is None:
+        return Finding("wrong", "schema tunnel", "missing", "tunneldb init")
+    if revision == script.get_current_head():
+        return Finding("ok", "schema tunnel", f"revision {revision}, the newest")
+    if revision in {known.revision for known in script.walk_revisions()}:
+        return Finding("wrong", "schema tunnel", f"revision {revision}, older than this program", "tunneldb init")
+    return Finding("wrong", "schema tunnel", f"revision {revision}, newer than this program", "pip install --upgrade tunneldb")
+
+
+def _api(connection: psycopg.Connection[Any]) -> Finding:
+    installed = installed_api_version(connection)
+    if installed == api_version():
+        return Finding("ok", "schema tunnel_api", installed.split(";")[0])
+    text = "missing" if installed is None else f"not this program's ({installed.split(';')[0]})"
+    return Finding("wrong", "schema tunnel_api", text, "tunneldb init")
+
+
+def _roles(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+    there = {row[0] for row in connection.execute("SELECT rolname FROM pg_roles WHERE rolname = ANY(%s)", [list(ROLES)])}
+    missing = [role for role in ROLES if role not in there]
+    if missing:
+        mend = "; ".join(f"CREATE ROLE {role}" for role in missing)
+        yield Finding("wrong", "roles", f"missing: {', '.join(missing)}", f"as a superuser: {mend}; then tunneldb init")
+        return
+    granted = connection.execute(
+        "SELECT bool_and(has_schema_privilege(role, 'tunnel_api', 'USAGE')) FROM unnest(%s::text[]) role", [list(ROLES)]
+    ).fetchone()
+    if granted is None or not granted[0]:
+        yield Finding("wrong", "roles", "without their rights, as after a restore", "tunneldb init")
+    else:
+        yield Finding("ok", "roles", ", ".join(ROLES))
+
+
+def _settings(connection: psycopg.Connection[Any], *, embedded: bool) -> Iterator[Finding]:
+    """Settings that make a survey slow; the embedded server has its own."""
+    if embedded:
+        yield Finding("ok", "settings", "sized to this machine")
+        return
+    rows = connection.execute(
+        """
+        SELECT name, pg_size_bytes(current_setting(name)), pg_size_bytes(least), least
+          FROM (VALUES ('shared_buffers', '512MB'), ('work_mem', '16MB'), ('maintenance_work_mem', '128MB'),
+                       ('max_wal_size', '2GB')) wanted (name, least)
+        """
+    ).fetchall()
+    small = [(name, least) for name, size, wanted, least in rows if size < wanted]
+    for name, least in small:
+        mend = f"as a superuser: ALTER SYSTEM SET {name} = '{least}'; then restart the server"
+        yield Finding("note", "settings", f"{name} is small for scans", mend)
+    if not small:
+        yield Finding("ok", "settings", "memory and WAL are big enough")
+
+
+def _work(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+    """Stages that were cut off or failed."""
+    rows = connection.execute(
+        """
+        SELECT survey, km, stage, outcome, message FROM tunnel_api.stage_status
+         WHERE outcome IN ('interrupted', 'failed') ORDER BY survey, km, step
+        """
+    ).fetchall()
+    for survey, km, stage, outcome, message in rows:
+        why = f": {message.splitlines()[0]}" if message else ""
+        mend = f"tunneldb run {survey} --km {km} --from {stage}" if stage != "load" else f"tunneldb load {survey} FILES"
+        yield Finding("note", "work", f"{survey} km {km}, {stage} {outcome}{why}", mend)
+    if not rows:
+        yield Finding("ok", "work", "no stage failed or was interrupted")
+
+
+def _space() -> Finding:
+    home = Server().home()
+    free = shutil.disk_usage(home.state).free
+    text = f"{free / GIB:.1f} GB free in {home.state}"
+    if free < LITTLE_SPACE:
+        return Finding("note", "disk", text, "free some, or set TUNNELDB_HOME to a folder on a bigger disk")
+    return Finding("ok", "disk", text)
