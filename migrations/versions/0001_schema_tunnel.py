@@ -179,6 +179,12 @@ def upgrade() -> None:
         ),
         sa.Column("km", sa.Integer(), nullable=False, comment="Kilometre: floor(chainage / 1000)"),
         sa.Column("geom", _geometry("POINTZ"), nullable=False, comment="Position, tunnel's SRID, m"),
+        sa.Column(
+            "given",
+            _geometry("POINTZ"),
+            nullable=False,
+            comment="Where the given axis has this chainage, tunnel's SRID, m",
+        ),
         sa.Column("points", sa.Integer(), nullable=False, comment="Points that were averaged; 0 unless measured"),
         sa.Column(
             "source",
@@ -566,13 +572,13 @@ def upgrade() -> None:
             "radius",
             postgresql.ARRAY(sa.Double()),
             nullable=False,
-            comment="Distance of the surface from the axis at the classes' angles, m",
+            comment="Distance of the surface from the axis at each whole degree from -180 to 180, m",
         ),
         sa.Column(
             "arc",
             postgresql.ARRAY(sa.Double()),
             nullable=False,
-            comment="Arc from the crown to the classes' angles, m, positive right looking up-chainage",
+            comment="Arc from the crown at each whole degree, m, positive right looking up-chainage",
         ),
         sa.Column(
             "geom",
@@ -624,6 +630,10 @@ def upgrade() -> None:
         schema="tunnel",
         comment="The tunnel between the planes at two consecutive vertices of the axis",
     )
+    op.create_index(
+        op.f("segment_survey_id_chainage_from_idx"), "segment", ["survey_id", "chainage_from"], unique=False, schema="tunnel"
+    )
+    op.create_index(op.f("section_survey_id_chainage_idx"), "section", ["survey_id", "chainage"], unique=False, schema="tunnel")
     op.create_index(op.f("segment_geom_idx"), "segment", ["geom"], unique=False, schema="tunnel", postgresql_using="gist")
     op.create_table(
         "station",
@@ -658,8 +668,18 @@ def upgrade() -> None:
             nullable=False,
             comment="Distance of the surface from the axis at the angle, m",
         ),
-        sa.Column("slope", sa.Double(), nullable=False, comment="Change of the radius with the angle, m per radian"),
-        sa.Column("sigma", sa.Double(), nullable=False, comment="Standard deviation of its points from the fit, m"),
+        sa.Column(
+            "slope",
+            sa.Double(),
+            nullable=True,
+            comment="Inclination of the line through its points: outwards per metre to the right; none if empty",
+        ),
+        sa.Column(
+            "sigma",
+            sa.Double(),
+            nullable=True,
+            comment="Standard deviation of its points from the line, m; none if empty",
+        ),
         sa.Column("points", sa.Integer(), nullable=False, comment="Points that it keeps"),
         sa.Column(
             "state",

@@ -247,6 +247,7 @@ class Segment(Base):
     __table_args__ = (
         UniqueConstraint("survey_id", "n"),
         Index(None, "geom", postgresql_using="gist"),
+        Index(None, "survey_id", "chainage_from"),
         {"comment": "The tunnel between the planes at two consecutive vertices of the axis"},
     )
 
@@ -272,6 +273,7 @@ class Section(Base):
     __tablename__ = "section"
     __table_args__ = (
         UniqueConstraint("survey_id", "segment", "half"),
+        Index(None, "survey_id", "chainage"),
         CheckConstraint("half IN (25, 75)", name="half"),
         {"comment": "Cross-sections at 25 % and 75 % of each segment, from angular classes"},
     )

@@ -1,0 +1,93 @@
+"""``tunneldb run``: the stages of the pipeline."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+from tunneldb.cli.main import Settings
+from tunneldb.database import connect, get_survey
+from tunneldb.errors import UserError
+from tunneldb.job.ledger import Run
+from tunneldb.job.parameters import PARAMETERS, settings
+
+if TYPE_CHECKING:
+    from tunneldb.job.stages import Stage
+
+
+def _parameter_table() -> str:
+    width = max(map(len, PARAMETERS))
+    return "\n".join(
+        f"  {name:<{width}}  {p.text} [{f'{p.default:g} {p.unit}'.rstrip()}]" for name, p in PARAMETERS.items()
+    )
+
+
+@click.command(
+    epilog="\b\nParameters for --set, with their defaults:\n" + _parameter_table(),
+)
+@click.argument("survey")
+@click.option("--km", metavar="A[-B]", help="Only these kilometres, 511 or 511-512; all that are loaded by default.")
+@click.option("--from", "first", metavar="STAGE", help="Begin with this stage: axis, segments, sections or detect.")
+@click.option("--to", "last", metavar="STAGE", help="End with this stage.")
+@click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see below. May be repeated.")
+@click.pass_obj
+def run(
+    settings_: Settings, survey: str, km: str | None, first: str | None, last: str | None, assignments: tuple[str, ...]
+) -> None:
+    """Run the stages of SURVEY: axis, segments, sections, detect.
+
+    Each stage of each kilometre is one transaction that replaces what the stage made there before, so a run may be
+    stopped at any moment and repeated. Axis vertices moved by hand and reviews of leaks stay.
+    """
+    from tunneldb.job.run import choose_stages, loaded_kilometres, parse_km, run_stages
+
+    values = settings(assignments)
+    stages = choose_stages(first, last)
+    with connect(settings_.dsn) as conn:
+        found = get_survey(conn, survey)
+        there = loaded_kilometres(conn, found)
+        conn.rollback()
+        if not there:
+            raise UserError(f"survey {survey} holds no points yet: tunneldb load {survey} FILE...")
+        kilometres = parse_km(km, there)
+        shown = _Shown(len(stages) * len(kilometres))
+        with shown.progress:
+            run_stages(conn, found, kilometres, stages, values, shown.begin, shown.end)
+
+
+class _Shown:
+    """A bar per stage and kilometre on a terminal, and a line for each when it is done."""
+
+    def __init__(self, total: int) -> None:
+        self.console = Console(file=sys.stderr)
+        self.progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TimeElapsedColumn(),
+            console=self.console,
+            transient=True,
+            disable=not self.console.is_terminal,
+        )
+        self.total = total
+        self.done = 0
+        self.task = TaskID(0)
+
+    def begin(self, stage: Stage, km: int) -> Callable[[float], None]:
+        task = self.progress.add_task(f"[{self.done + 1}/{self.total}] {stage.name} km {km}", total=1.0)
+        self.task = task
+        return lambda share: self.progress.update(task, completed=share)
+
+    def end(self, stage: Stage, km: int, run: Run) -> None:
+        self.done += 1
+        self.progress.remove_task(self.task)
+        counts = ", ".join(f"{name} {_short(value)}" for name, value in run.counts.items())
+        click.echo(f"[{self.done}/{self.total}] {stage.name} km {km}: {counts}")
+
+
+def _short(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else f"{value}"

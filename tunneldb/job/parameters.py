@@ -1,0 +1,87 @@
+"""Parameters of the stages: names, defaults, bounds and what each means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from tunneldb.errors import UserError
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that steers a stage.
+
+    Attributes
+    ----------
+    default, low, high : float
+        Default value and the bounds of what is allowed.
+    unit, text : str
+        Its unit ("" for a pure number) and what it means.
+    whole : bool
+        Whether it must be a whole number.
+    """
+
+    default: float
+    low: float
+    high: float
+    unit: str
+    text: str
+    whole: bool = False
+
+
+PARAMETERS: dict[str, Parameter] = {
+    "axis.half_width": Parameter(1.0, 0.05, 3.0, "m", "half the thickness of the slab whose points place a vertex"),
+    "axis.angle_step": Parameter(5.0, 1.0, 20.0, "°", "width of the angular classes that place a vertex"),
+    "axis.tolerance": Parameter(0.002, 1e-5, 1.0, "m", "the axis rests when no vertex moves by as much in a pass"),
+    "axis.max_iterations": Parameter(20, 1, 100, "", "passes at the most", whole=True),
+    "section.angle_step": Parameter(5.0, 1.0, 20.0, "°", "width of an angular class; must divide 180"),
+    "section.half_width": Parameter(0.1, 0.01, 2.5, "m", "half the thickness of a section's slab, to begin with"),
+    "section.max_half_width": Parameter(2.5, 0.01, 2.5, "m", "widest half of a slab where the classes don't fill"),
+    "section.min_points": Parameter(5, 2, 1000, "", "points that fill a class", whole=True),
+    "section.protrusion": Parameter(0.03, 0.001, 1.0, "m", "classes that stand in by more are hung on the wall, not the wall"),
+    "lining.tolerance": Parameter(0.5, 0.01, 5.0, "m", "points farther from the surface are not lining"),
+    "image.pixel": Parameter(0.02, 0.005, 0.5, "m", "edge of a pixel of the unrolled images"),
+    "appendage.distance": Parameter(0.03, 0.005, 0.5, "m", "what stands off the local plane by more hangs on the lining"),
+    "leak.min_area": Parameter(0.05, 0.0, 100.0, "m²", "smaller leaks are left out"),
+}
+
+
+def settings(assignments: Iterable[str] = ()) -> dict[str, float]:
+    """Values of all parameters, some of them set as ``name=value``.
+
+    Raises
+    ------
+    UserError
+        For an unknown name, a value that is no number, or one out of bounds.
+    """
+    values = {name: parameter.default for name, parameter in PARAMETERS.items()}
+    for assignment in assignments:
+        name, equals, text = assignment.partition("=")
+        if name not in PARAMETERS:
+            raise UserError(f"there is no parameter {name!r}; there are {', '.join(PARAMETERS)}")
+        values[name] = _value(name, text if equals else "")
+    if 180.0 / values["section.angle_step"] % 1 > 1e-9:
+        raise UserError(f"section.angle_step must divide 180 degrees: {values['section.angle_step']:g} does not")
+    if values["section.half_width"] > values["section.max_half_width"]:
+        raise UserError("section.half_width must not exceed section.max_half_width")
+    return values
+
+
+def of_stage(values: Mapping[str, float], prefixes: Iterable[str]) -> dict[str, float]:
+    """Those of the values whose names begin with one of the prefixes: what a stage depends on."""
+    chosen = tuple(f"{prefix}." for prefix in prefixes)
+    return {name: value for name, value in values.items() if name.startswith(chosen)}
+
+
+def _value(name: str, text: str) -> float:
+    parameter = PARAMETERS[name]
+    try:
+        value = float(text)
+    except ValueError:
+        raise UserError(f"{name} needs a number, not {text!r}: --set {name}={parameter.default:g}") from None
+    if not parameter.low <= value <= parameter.high:
+        raise UserError(f"{name}={value:g} is out of bounds: {parameter.low:g} to {parameter.high:g} {parameter.unit}".rstrip())
+    if parameter.whole and value != int(value):
+        raise UserError(f"{name}={value:g} must be a whole number")
+    return value
