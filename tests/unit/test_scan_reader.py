@@ -1,0 +1,165 @@
+import contextlib
+from pathlib import Path
+
+import laspy
+import numpy as np
+import pytest
+from pyproj import CRS
+from pyproj.crs import CompoundCRS
+
+from tunneldb.errors import UserError
+from tunneldb.scan.reader import check_header, read_chunks, read_header
+
+DATA = Path(__file__).parents[3] / "shared" / "data"
+
+
+def write(
+    path: Path,
+    count: int = 120_000,
+    crs: CRS | None = None,
+    point_format: int = 6,
+    amplitude: np.ndarray | None = None,
+) -> laspy.LasData:
+    rng = np.random.default_rng(3)
+    header = laspy.LasHeader(point_format=point_format, version="1.4")
+    header.scales, header.offsets = [0.001] * 3, [500_000, 4_500_000, 100]
+    header.add_extra_dim(laspy.ExtraBytesParams("Amplitude", "float32"))
+    if crs is not None:
+        header.add_crs(crs)
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = rng.uniform(-50, 50, (3, count)) + np.array([[500_000], [4_500_000], [100]])
+    if "gps_time" in las.point_format.dimension_names:
+        las.gps_time = np.arange(count) * 0.001
+    las.point_source_id = np.arange(count) % 5
+    las.classification = np.arange(count) % 3
+    las.Amplitude = rng.normal(20, 1, count) if amplitude is None else amplitude
+    las.write(path)
+    return las
+
+
+@pytest.mark.parametrize("suffix", ["las", "laz"])
+def test_chunks_are_the_file(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a.{suffix}"
+    las = write(path)
+    chunks = list(read_chunks(path, "Amplitude", 50_000))
+    assert [len(chunk) for chunk in chunks] == [50_000, 50_000, 20_000]
+    np.testing.assert_allclose(np.concatenate([chunk.xyz for chunk in chunks]), las.xyz, atol=1e-9)
+    for name, dimension in (
+        ("time", "gps_time"),
+        ("scan_id", "point_source_id"),
+        ("intensity", "Amplitude"),
+        ("classification", "classification"),
+    ):
+        found = np.concatenate([getattr(chunk, name) for chunk in chunks])
+        np.testing.assert_array_equal(found, np.asarray(las[dimension]))
+
+
+def test_without_a_dimension_intensity_is_nought(tmp_path: Path) -> None:
+    write(tmp_path / "a.laz", 100)
+    (chunk,) = read_chunks(tmp_path / "a.laz", None)
+    assert not chunk.intensity.any()
+
+
+@pytest.mark.parametrize("suffix", ["las", "laz"])
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.004, 0.3, 0.8, 0.999])
+def test_truncated(tmp_path: Path, suffix: str, share: float) -> None:
+    path = tmp_path / f"a.{suffix}"
+    write(path)
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    with pytest.raises(UserError, match=rf"a\.{suffix}: .*(truncated|corrupt)"):
+        list(read_chunks(path, "Amplitude", 50_000))
+
+
+def test_corrupt_header_never_gives_a_traceback(tmp_path: Path) -> None:
+    path = tmp_path / "a.laz"
+    write(path, 2000)
+    data = path.read_bytes()
+    rng = np.random.default_rng(0)
+    for _ in range(150):
+        bad = bytearray(data)
+        for place in rng.integers(0, 700, 3):
+            bad[place] = int(rng.integers(0, 256))
+        path.write_bytes(bad)
+        with contextlib.suppress(UserError):
+            header = read_header(path)
+            if header.points <= 10_000:
+                list(read_chunks(path, None, 1000))
+
+
+def test_missing_and_not_a_scan(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"none\.laz: no such file"):
+        read_header(tmp_path / "none.laz")
+    with pytest.raises(UserError, match="cannot be read: Is a directory"):
+        read_header(tmp_path)
+    (tmp_path / "a.laz").write_text("x,y,z\n1,2,3\n" * 100)
+    with pytest.raises(UserError, match="not a LAS or LAZ file"):
+        read_header(tmp_path / "a.laz")
+
+
+def test_missing_dimension_lists_those_present(tmp_path: Path) -> None:
+    write(tmp_path / "a.laz", 10)
+    header = read_header(tmp_path / "a.laz")
+    with pytest.raises(UserError, match=r"no dimension 'Reflectance'.*gps_time.*Amplitude"):
+        check_header(header, "Reflectance", 25830, needs_time=False)
+    with pytest.raises(UserError, match="no dimension 'Reflectance'"):
+        list(read_chunks(tmp_path / "a.laz", "Reflectance"))
+
+
+def test_a_trajectory_needs_times(tmp_path: Path) -> None:
+    write(tmp_path / "a.las", 10, point_format=0)
+    header = read_header(tmp_path / "a.las")
+    check_header(header, "Amplitude", 25830, needs_time=False)
+    with pytest.raises(UserError, match="no dimension 'gps_time', which the trajectory needs"):
+        check_header(header, "Amplitude", 25830, needs_time=True)
+
+
+@pytest.mark.parametrize(
+    "crs",
+    [None, CRS(25830), CompoundCRS("both", [CRS(25830), CRS(5782)]), CRS.from_wkt(CRS(25830).to_wkt("WKT1_GDAL"))],
+    ids=["none", "same", "compound", "wkt1"],
+)
+def test_agreeing_coordinate_systems(tmp_path: Path, crs: CRS | None) -> None:
+    write(tmp_path / "a.laz", 10, crs)
+    check_header(read_header(tmp_path / "a.laz"), "Amplitude", 25830, needs_time=True)
+
+
+@pytest.mark.parametrize("code", [25829, 32630, 4326, 3794])
+def test_another_coordinate_system_is_refused_by_name(tmp_path: Path, code: int) -> None:
+    write(tmp_path / "a.laz", 10, CRS(code))
+    with pytest.raises(UserError, match=rf"EPSG:{code} .*EPSG:25830"):
+        check_header(read_header(tmp_path / "a.laz"), "Amplitude", 25830, needs_time=True)
+
+
+def test_nan_intensity(tmp_path: Path) -> None:
+    values = np.ones(100)
+    values[[41, 60]] = np.nan
+    write(tmp_path / "a.laz", 100, amplitude=values)
+    with pytest.raises(UserError, match="Amplitude is NaN or infinite at point 42 and at 1 more"):
+        list(read_chunks(tmp_path / "a.laz", "Amplitude"))
+
+
+def test_nan_coordinates(tmp_path: Path) -> None:
+    path = tmp_path / "a.las"
+    write(path, 10)
+    data = bytearray(path.read_bytes())
+    data[131:139] = np.array([np.nan]).tobytes()  # the header's x scale
+    path.write_bytes(data)
+    with pytest.raises(UserError, match=r"scale \(nan, 0\.001, 0\.001\)"):
+        read_header(path)
+
+
+def test_no_points(tmp_path: Path) -> None:
+    write(tmp_path / "a.laz", 0)
+    with pytest.raises(UserError, match="holds no points"):
+        read_header(tmp_path / "a.laz")
+
+
+@pytest.mark.skipif(not DATA.exists(), reason="the real scans are not beside the checkout")
+def test_real_scans() -> None:
+    assert sum(map(len, read_chunks(DATA / "ringo.laz", None, 300_000))) == 1_139_889
+    header = read_header(DATA / "extra-bytes.laz")
+    check_header(header, "Deviation", 2154, needs_time=True)
+    assert sum(map(len, read_chunks(DATA / "extra-bytes.laz", "Deviation"))) == header.points
+    with pytest.raises(UserError, match="EPSG:4326"):
+        check_header(read_header(DATA / "lone-star.laz"), "intensity", 25830, needs_time=True)

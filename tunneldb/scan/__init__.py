@@ -1,0 +1,1 @@
+"""Laser scans on disk: reading, scanner positions, noise filter and thinning."""

@@ -1,0 +1,71 @@
+"""The few numbers of a LAS or LAZ file that a decoder believes before it looks at the bytes they speak of.
+
+Where one of them is damaged, the LAZ decoder may ask for more memory than there is, and that ends the process
+without an error that could be caught. So they are compared with the size of the file first.
+
+Source: ASPRS LAS 1.4 R15, tables 3 and 24; LASzip's layout of the chunk table.
+"""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+_VLR_BYTES = 54
+_LASZIP_ID = 22204
+_VARIABLE_CHUNKS = 0xFFFFFFFF
+_STREAMED = -1  # the place of the chunk table stands in the file's last 8 bytes
+_LARGEST_CHUNK = 1 << 32  # bytes
+
+
+def check_envelope(path: Path) -> None:
+    """Compare counts and offsets with the size of the file.
+
+    Raises
+    ------
+    ValueError, struct.error
+        If the file is shorter than they say, or they contradict each other.
+    OSError
+        If the file cannot be read.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(375)
+        if head[:4] != b"LASF":
+            raise ValueError("it does not begin with LASF")
+        (header_size,) = struct.unpack_from("<H", head, 94)
+        points_at, vlrs, point_format, record, count = struct.unpack_from("<IIBHI", head, 96)
+        if head[25] >= 4:  # minor version
+            (count,) = struct.unpack_from("<Q", head, 247)
+        if not header_size + vlrs * _VLR_BYTES <= points_at <= size:
+            raise ValueError(f"its header speaks of {vlrs} records before byte {points_at}, the file has {size} bytes")
+        if point_format < 128:  # not compressed
+            if points_at + count * record > size:
+                raise ValueError(f"its header announces {count} points, the file has room for {(size - points_at) // record}")
+            return
+        place = header_size
+        for _ in range(vlrs):
+            file.seek(place)
+            number, length = struct.unpack_from("<HH", file.read(_VLR_BYTES), 18)
+            place += _VLR_BYTES
+            if number == _LASZIP_ID:
+                file.seek(place)
+                body = file.read(length)
+                (chunk,) = struct.unpack_from("<I", body, 12)
+                (items,) = struct.unpack_from("<H", body, 32)
+                if sum(struct.unpack_from("<HHH", body, 34 + 6 * item)[1] for item in range(items)) != record:
+                    raise ValueError(f"the items of its points do not make up {record} bytes")
+                if chunk != _VARIABLE_CHUNKS and chunk * record > _LARGEST_CHUNK:
+                    raise ValueError(f"its chunks would have {chunk} points")
+            place += length
+        file.seek(points_at)
+        (table_at,) = struct.unpack("<q", file.read(8))
+        if table_at == _STREAMED:
+            file.seek(size - 8)
+            (table_at,) = struct.unpack("<q", file.read(8))
+        if not points_at + 8 <= table_at <= size - 8:
+            raise ValueError(f"its chunk table would be at byte {table_at}, the file has {size} bytes")
+        file.seek(table_at)
+        version, chunks = struct.unpack("<II", file.read(8))
+        if version != 0 or chunks > max(count, 1):
+            raise ValueError(f"its chunk table is damaged: version {version}, {chunks} chunks for {count} points")

@@ -1,0 +1,220 @@
+"""Points of a file or of a kilometre set aside by chainage, in memory and beyond that on disk."""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import TracebackType
+from typing import IO, Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tunneldb.errors import UserError
+
+# One row a point. `tag` is the noise filter's cell while a file is filtered, its file's number afterwards.
+ROW = np.dtype(
+    [
+        ("x", "f8"),
+        ("y", "f8"),
+        ("z", "f8"),
+        ("chainage", "f8"),
+        ("time", "f8"),
+        ("intensity", "f4"),
+        ("scan_id", "i4"),
+        ("tag", "i4"),
+        ("classification", "u1"),
+    ]
+)
+Rows = NDArray[Any]
+
+# Points are found again by bins of 1/8 m of chainage: fine enough for a bin of the densest scan to fit in memory, and
+# a power of two, so that a bin never straddles a kilometre.
+BINS_PER_METRE = 8
+BINS_PER_KM = 1000 * BINS_PER_METRE
+
+
+def bin_of(chainage: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Bin of each chainage (m)."""
+    return np.floor(chainage * BINS_PER_METRE).astype(np.int64)
+
+
+def rows_xyz(rows: Rows) -> NDArray[np.float64]:
+    """Coordinates (n, 3) of rows."""
+    xyz = np.empty((len(rows), 3))
+    for column, name in enumerate("xyz"):
+        xyz[:, column] = rows[name]
+    return xyz
+
+
+@dataclass
+class _Run:
+    """Rows in order of their bins: bin first + k begins at start[k]."""
+
+    first: int
+    start: NDArray[np.int64]
+    rows: Rows | None
+    offset: int
+
+
+class Spool:
+    """Rows that can be had back by bins of chainage, whatever order they came in.
+
+    Each call of `add` makes a run sorted by bin; runs beyond the memory allowed go to a temporary file (in TMPDIR),
+    from which a range of bins is one read a run.
+
+    Parameters
+    ----------
+    memory : int
+        Bytes of rows held in memory.
+    """
+
+    def __init__(self, memory: int) -> None:
+        self.memory = memory
+        self._runs: list[_Run] = []
+        self._held = 0
+        self._file: IO[bytes] | None = None
+        self._spilt = 0
+
+    def __enter__(self) -> Spool:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._file is not None:
+            self._file.close()
+        self._runs.clear()
+
+    def add(self, rows: Rows) -> None:
+        """Set rows aside.
+
+        Raises
+        ------
+        UserError
+            If the disk of the temporary folder is full.
+        """
+        if len(rows) == 0:
+            return
+        bins = bin_of(rows["chainage"])
+        first = int(bins.min())
+        order, start = _sort_by_bin(bins - first, int(bins.max()) - first + 1)
+        run = _Run(first, start, rows[order], 0)
+        if self._held + rows.nbytes > self.memory:
+            self._spill(run)
+        else:
+            self._held += rows.nbytes
+        self._runs.append(run)
+
+    def counts(self) -> tuple[int, NDArray[np.int64]]:
+        """First bin, and the number of rows in each bin from it on."""
+        if not self._runs:
+            return 0, np.zeros(0, np.int64)
+        first = min(run.first for run in self._runs)
+        last = max(run.first + len(run.start) - 1 for run in self._runs)
+        total = np.zeros(last - first, np.int64)
+        for run in self._runs:
+            total[run.first - first : run.first - first + len(run.start) - 1] += np.diff(run.start)
+        return first, total
+
+    def read(self, low: int, high: int) -> Rows:
+        """Rows of the bins low ≤ bin < high; runs in order of `add`, each in order of bins."""
+        parts = [part for run in self._runs if len(part := self._slice(run, low, high))]
+        return np.concatenate(parts) if parts else np.empty(0, ROW)
+
+    def _slice(self, run: _Run, low: int, high: int) -> Rows:
+        last = len(run.start) - 1
+        begin = int(run.start[min(max(low - run.first, 0), last)])
+        end = int(run.start[min(max(high - run.first, 0), last)])
+        if run.rows is not None:
+            return run.rows[begin:end]
+        assert self._file is not None
+        rows: Rows = np.empty(end - begin, ROW)
+        if end > begin:
+            # preadv and not seek and read: two threads read at once.
+            _read_at(self._file.fileno(), rows, run.offset + begin * ROW.itemsize)
+        return rows
+
+    def _spill(self, run: _Run) -> None:
+        assert run.rows is not None
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile(prefix="tunneldb-", buffering=0)  # noqa: SIM115
+            _write_all(self._file, _bytes(run.rows))
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                raise
+            raise UserError(
+                f"no space left for temporary files in {tempfile.gettempdir()}, nothing was changed; "
+                "free some or set TMPDIR to a folder on a larger disk"
+            ) from error
+        run.offset, run.rows = self._spilt, None
+        self._spilt += int(run.start[-1]) * ROW.itemsize
+
+
+def windows(first: int, counts: NDArray[np.int64], limit: int) -> Iterator[tuple[int, int]]:
+    """Cut a range of bins into windows.
+
+    Parameters
+    ----------
+    first : int
+        First bin.
+    counts : (n,) int64 array
+        Rows in each bin from `first` on.
+    limit : int
+        Number of rows at which a window ends.
+
+    Yields
+    ------
+    low, high : int
+        Windows low ≤ bin < high that hold rows, in order; none straddles a kilometre.
+    """
+    before = np.concatenate([[0], np.cumsum(counts)])
+    low, end = first, first + len(counts)
+    while low < end:
+        wall = (math.floor(low / BINS_PER_KM) + 1) * BINS_PER_KM
+        full = int(np.searchsorted(before, before[low - first] + limit)) + first
+        high = min(max(full, low + 1), wall, end)
+        if before[high - first] > before[low - first]:
+            yield low, high
+        low = high
+
+
+def _bytes(rows: Rows) -> memoryview:
+    return memoryview(rows.view(np.uint8))
+
+
+def _read_at(handle: int, rows: Rows, offset: int) -> None:
+    view = _bytes(rows)
+    done = 0
+    while done < len(view):
+        got = os.preadv(handle, [view[done:]], offset + done)
+        if got == 0:
+            raise EOFError("the temporary file is shorter than what was written to it")
+        done += got
+
+
+def _write_all(file: IO[bytes], view: memoryview) -> None:
+    done = 0
+    while done < len(view):
+        done += file.write(view[done:])
+
+
+@njit(cache=True, nogil=True)
+def _sort_by_bin(
+    bins: NDArray[np.int64], count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:  # pragma: no cover - compiled
+    start = np.zeros(count + 1, np.int64)
+    for i in range(len(bins)):
+        start[bins[i] + 1] += 1
+    for b in range(count):
+        start[b + 1] += start[b]
+    place = start[:-1].copy()
+    order = np.empty(len(bins), np.int64)
+    for i in range(len(bins)):
+        order[place[bins[i]]] = i
+        place[bins[i]] += 1
+    return order, start
