@@ -87,7 +87,7 @@ def read_csv(path: Path, names: Sequence[str]) -> CsvTable:
     return CsvTable(path, tuple(names), values, np.array(lines, dtype=np.int64))
 
 
-def _read_rows(path: Path, reader: _csv._reader, names: Sequence[str]) -> tuple[list[list[float]], list[int]]:
+def _read_rows(path: Path, reader: _csv.Reader, names: Sequence[str]) -> tuple[list[list[float]], list[int]]:
     header = next(reader, None)
     if header is None:
         raise UserError(f"{path} is empty; it needs the header {','.join(names)}")

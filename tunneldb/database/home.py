@@ -110,15 +110,27 @@ def _server_user(folder: Path) -> pwd.struct_passwd | None:
 
 
 def _can_enter(folder: Path, user: pwd.struct_passwd) -> bool:
-    test = ["/usr/bin/test", "-x", str(folder)]
-    return subprocess.run(test, cwd="/", check=False, **run_as(user)).returncode == 0
+    return execute(["/usr/bin/test", "-x", str(folder)], user).returncode == 0
 
 
-def run_as(user: pwd.struct_passwd | None) -> dict[str, int | list[int]]:
-    """Return the arguments of subprocess that drop root's rights to a user's."""
-    if user is None:
-        return {}
-    return {"user": user.pw_uid, "group": user.pw_gid, "extra_groups": []}
+def execute(command: list[str], user: pwd.struct_passwd | None) -> subprocess.CompletedProcess[str]:
+    """Run a program to its end, with a user's rights; None means the present one.
+
+    It sees nothing that libpq and the server would take from the environment, and speaks English.
+    """
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PG", "LC_", "LANG"))}
+    return subprocess.run(
+        command,
+        cwd="/",
+        env=kept | {"LC_ALL": "C"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+        user=None if user is None else user.pw_uid,
+        group=None if user is None else user.pw_gid,
+        extra_groups=None if user is None else [],
+    )
 
 
 def _digest(folder: Path) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import Any, LiteralString, cast
+from typing import Any
 
 import psycopg
 import sqlalchemy
@@ -60,7 +60,7 @@ def install_api(connection: psycopg.Connection[Any]) -> None:
     connection.execute("CREATE SCHEMA tunnel_api")
     for path in sql_files():
         try:
-            connection.execute(cast(LiteralString, path.read_text("utf-8")))
+            connection.execute(path.read_bytes())
         except psycopg.Error as error:
             error.add_note(f"in {path}{_line_of(error, path)}")
             raise

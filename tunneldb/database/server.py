@@ -9,6 +9,7 @@ from __future__ import annotations
 import fcntl
 import getpass
 import os
+import shutil
 import subprocess
 import time
 from collections.abc import Iterator, Mapping
@@ -22,7 +23,7 @@ from psycopg.conninfo import make_conninfo
 
 from tunneldb.database import machine
 from tunneldb.database.binaries import Binaries, find_binaries
-from tunneldb.database.home import Home, home_folder, prepare_home, run_as
+from tunneldb.database.home import Home, execute, home_folder, prepare_home
 from tunneldb.errors import UserError
 
 DATABASE = "tunneldb"
@@ -124,27 +125,8 @@ def _major(home: Home) -> int:
     return int((home.cluster / "PG_VERSION").read_text())
 
 
-def _environment() -> dict[str, str]:
-    """Return the environment without what libpq and the server would take from it; messages in English."""
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PG", "LC_", "LANG"))}
-    return kept | {"LC_ALL": "C"}
-
-
-def _execute(home: Home, command: list[str]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        command,
-        cwd="/",
-        env=_environment(),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        check=False,
-        **run_as(home.user),  # type: ignore[call-overload]
-    )
-
-
 def _pg_ctl(home: Home, binaries: Binaries, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return _execute(home, [binaries["pg_ctl"], "-D", str(home.cluster), "-w", *arguments])
+    return execute([binaries["pg_ctl"], "-D", str(home.cluster), "-w", *arguments], home.user)
 
 
 def _initialise(home: Home) -> Binaries:
@@ -156,7 +138,7 @@ def _initialise(home: Home) -> Binaries:
     _empty(home.cluster)
     command = [binaries["initdb"], "-D", str(home.cluster), "-U", _SUPERUSER, "-A", "trust"]
     command += ["--data-checksums", "--encoding=UTF8", "--locale=C"]
-    result = _execute(home, command)
+    result = execute(command, home.user)
     if result.returncode:
         _empty(home.cluster)
         raise UserError(f"initdb failed in {home.cluster}: {_last_line(result.stderr)}")
@@ -166,8 +148,6 @@ def _initialise(home: Home) -> Binaries:
 
 
 def _empty(folder: Path) -> None:
-    import shutil
-
     for entry in folder.iterdir():
         if entry.is_dir() and not entry.is_symlink():
             shutil.rmtree(entry)
