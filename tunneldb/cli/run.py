@@ -22,9 +22,7 @@ if TYPE_CHECKING:
 
 def _parameter_table() -> str:
     width = max(map(len, PARAMETERS))
-    return "\n".join(
-        f"  {name:<{width}}  {p.text} [{f'{p.default:g} {p.unit}'.rstrip()}]" for name, p in PARAMETERS.items()
-    )
+    return "\n".join(f"  {name:<{width}}  {p.text} [{f'{p.default:g} {p.unit}'.rstrip()}]" for name, p in PARAMETERS.items())
 
 
 @click.command(

@@ -20,7 +20,7 @@ _PLANE = ("chainage", "arc", "offset")
 @click.command()
 @click.argument("survey")
 @click.argument("points", type=click.Path(dir_okay=False, path_type=Path))
-@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write; standard output by default.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write, else standard output.")
 @click.option("--inverse", is_flag=True, help="From chainage,arc,offset to x,y,z.")
 @click.pass_obj
 def unroll(settings: Settings, survey: str, points: Path, output: Path | None, inverse: bool) -> None:

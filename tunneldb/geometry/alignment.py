@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,7 +104,7 @@ def _curve(xyz: Float, chord: Float) -> tuple[Float, Float, CubicSpline]:
     knots = np.concatenate([[0.0], np.cumsum(chord)])
     position = CubicSpline(knots, xyz)
     steps = 64
-    parameter = np.unique(np.concatenate([np.linspace(a, b, steps + 1) for a, b in zip(knots, knots[1:], strict=False)]))
+    parameter = np.unique(np.concatenate([np.linspace(a, b, steps + 1) for a, b in itertools.pairwise(knots)]))
     slope = position(parameter, 1)
     middle = position((parameter[1:] + parameter[:-1]) / 2, 1)
     speed, between = np.hypot(slope[:, 0], slope[:, 1]), np.hypot(middle[:, 0], middle[:, 1])
@@ -133,7 +134,5 @@ def _locate_all(
                 continue
             frame_at(segments[k], f, frame)
             chainage[i] = (number[k] + f) * spacing
-            distance[i] = np.sqrt(
-                (x - frame[0, 0]) ** 2 + (y - frame[0, 1]) ** 2 + (z - frame[0, 2]) ** 2
-            )
+            distance[i] = np.sqrt((x - frame[0, 0]) ** 2 + (y - frame[0, 1]) ** 2 + (z - frame[0, 2]) ** 2)
     return chainage, distance

@@ -1,9 +1,9 @@
-"""The ruled planes of the axis: tangents, segments, and the frame at any chainage.
+r"""The ruled planes of the axis: tangents, segments, and the frame at any chainage.
 
 A segment lies between two planes, each perpendicular to the axis at a vertex (Gonçalves et al., 2012, stage 3).
 Inside the segment the plane turns steadily from the first to the second: the plane at the fraction ``f`` is
 
-.. math:: (1-f)\\,(p-v_a)\\cdot t_a = f\\,(v_b-p)\\cdot t_b
+.. math:: (1-f)\,(p-v_a)\cdot t_a = f\,(v_b-p)\cdot t_b
 
 so that a point's fraction is ``d_a / (d_a + d_b)``, its distances from the two planes. It is 0 and 1 on them, hence
 continuous across segments whatever the point's distance from the axis, and differs from the angle on a true circular
@@ -98,9 +98,7 @@ def frame_at(segment: Float, f: float, out: Float) -> None:
     nz /= norm
     level /= norm
 
-    length = np.sqrt(
-        (segment[3] - segment[0]) ** 2 + (segment[4] - segment[1]) ** 2 + (segment[5] - segment[2]) ** 2
-    )
+    length = np.sqrt((segment[3] - segment[0]) ** 2 + (segment[4] - segment[1]) ** 2 + (segment[5] - segment[2]) ** 2)
     h00 = (1.0 + 2.0 * f) * g * g
     h10 = f * g * g * length
     h01 = f * f * (3.0 - 2.0 * f)

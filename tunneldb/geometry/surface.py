@@ -71,14 +71,10 @@ class Surface:
 
     def roll(self, chainage: Float, arc: Float, offset: Float) -> Float:
         """Points (n, 3) of coordinates in the unrolled plane (n,); NaN where they lie off the tunnel."""
-        unrolled = np.ascontiguousarray(
-            np.column_stack(np.broadcast_arrays(chainage, arc, offset)), dtype=np.float64
-        )
+        unrolled = np.ascontiguousarray(np.column_stack(np.broadcast_arrays(chainage, arc, offset)), dtype=np.float64)
         which = self.segment_index(unrolled[:, 0])
         return np.asarray(
-            roll_all(
-                self.segments, which, self.ends, self.chainages, self.radius, self.arcs, self.reach, unrolled
-            )
+            roll_all(self.segments, which, self.ends, self.chainages, self.radius, self.arcs, self.reach, unrolled)
         )
 
     def segment_index(self, chainage: Float) -> NDArray[np.int64]:

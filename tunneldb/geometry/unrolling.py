@@ -119,9 +119,7 @@ def foot(radius: Float, a: int, b: int, g: float, u: float, w: float) -> tuple[i
 
 
 @njit(cache=True, nogil=True)
-def surface_at(
-    radius: Float, a: int, b: int, g: float, k: int, s: float
-) -> tuple[float, float, float, float]:
+def surface_at(radius: Float, a: int, b: int, g: float, k: int, s: float) -> tuple[float, float, float, float]:
     """Point of the blended section at share ``s`` of interval ``k`` and the inward unit normal there: u, w, nu, nw."""
     u0, w0 = _node(radius, a, b, g, k)
     u1, w1 = _node(radius, a, b, g, k + 1)
@@ -134,9 +132,7 @@ def surface_at(
 
 
 @njit(cache=True, nogil=True)
-def _longitudinal(
-    radius: Float, chainages: Float, a: int, b: int, k: int, s: float, nu: float, nw: float
-) -> float:
+def _longitudinal(radius: Float, chainages: Float, a: int, b: int, k: int, s: float, nu: float, nw: float) -> float:
     """Component along the axis of the surface normal, for sections that change with chainage (unnormalised)."""
     if a == b:
         return 0.0
@@ -286,7 +282,5 @@ def roll_all(
         if k < 0:
             points[i, :] = np.nan
         else:
-            _roll_one(
-                segments[k], ends[k], chainages, radius, arcs, reach, unrolled[i], frame, points[i]
-            )
+            _roll_one(segments[k], ends[k], chainages, radius, arcs, reach, unrolled[i], frame, points[i])
     return points

@@ -67,9 +67,7 @@ def stage_run(
     conn.commit()
 
 
-def _begin(
-    conn: psycopg.Connection[Any], survey_id: int, km: int | None, stage: str, parameters: Mapping[str, Any]
-) -> int:
+def _begin(conn: psycopg.Connection[Any], survey_id: int, km: int | None, stage: str, parameters: Mapping[str, Any]) -> int:
     row = conn.execute(
         """
         INSERT INTO tunnel.run (survey_id, km, stage, parameters, versions, counts, backend_pid, backend_start,
@@ -100,7 +98,8 @@ def _fail(conn: psycopg.Connection[Any], run: Run, error: BaseException) -> None
     try:
         conn.rollback()
         conn.execute(
-            "UPDATE tunnel.run SET outcome = 'failed', finished_at = clock_timestamp(), counts = %s, message = %s WHERE id = %s",
+            "UPDATE tunnel.run SET outcome = 'failed', finished_at = clock_timestamp(), counts = %s, message = %s"
+            " WHERE id = %s",
             [Jsonb(run.counts), message, run.id],
         )
         conn.commit()

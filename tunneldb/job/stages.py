@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, LiteralString
 
 import psycopg
 
@@ -39,9 +39,7 @@ class Stage:
     parameters: tuple[str, ...]
 
 
-def axis(
-    conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress
-) -> Counts:
+def axis(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
     """Stage 1 of Gonçalves et al. (2012): the axis; vertices edited by hand (stage 2) stay."""
     _plant(conn, survey)
     passes = conn.execute(
@@ -97,9 +95,7 @@ def _plant(conn: psycopg.Connection[Any], survey: Survey) -> None:
     )
 
 
-def segments(
-    conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress
-) -> Counts:
+def segments(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
     """Stage 3: segments, and the segment and chainage of every point."""
     built = _one(conn, "SELECT tunnel_api.segment_build(%s, %s)", survey.id, km)
     if not built:
@@ -108,9 +104,7 @@ def segments(
     return {"segments": built, "points": _one(conn, "SELECT tunnel_api.segment_tag(%s, %s)", survey.id, km)}
 
 
-def sections(
-    conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress
-) -> Counts:
+def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
     """Stage 4: two cross-sections a segment."""
     built = _one(
         conn,
@@ -123,9 +117,7 @@ def sections(
         int(values["section.min_points"]),
         values["section.protrusion"],
     )
-    points = _one(
-        conn, "SELECT coalesce(sum(points), 0) FROM tunnel.segment WHERE survey_id = %s AND km = %s", survey.id, km
-    )
+    points = _one(conn, "SELECT coalesce(sum(points), 0) FROM tunnel.segment WHERE survey_id = %s AND km = %s", survey.id, km)
     if not built and points >= FEW_POINTS:
         raise UserError(
             f"kilometre {km} has no section: the {points} points in its segments fill no section"
@@ -139,8 +131,9 @@ def sections(
     return {"sections": built, **{f"classes_{state}": count for state, count in classes}}
 
 
-def _one(conn: psycopg.Connection[Any], query: str, *arguments: Any) -> int:
-    row = conn.execute(query, arguments).fetchone()  # type: ignore[call-overload]
+def _one(conn: psycopg.Connection[Any], query: LiteralString, *arguments: Any) -> int:
+    row = conn.execute(query, arguments).fetchone()
+    assert row is not None
     return int(row[0])
 
 
