@@ -91,6 +91,16 @@ class Grid:
         west = self.km * KILOMETRE + column * self.pixel
         return Affine(self.pixel, 0.0, west, 0.0, -self.pixel, (self.bottom + self.rows) * self.pixel)
 
+    def pick(self, mask: NDArray[np.bool_], chainage: Float, arc: Float) -> NDArray[np.bool_]:
+        """Value of a mask (rows, columns) at places (n,) in the unrolled plane; False outside the kilometre."""
+        held = np.isfinite(chainage) & np.isfinite(arc)
+        column = np.floor((np.where(held, chainage, 0.0) - self.km * KILOMETRE) / self.pixel).astype(np.int64)
+        row = self.rows - 1 - (np.floor(np.where(held, arc, 0.0) / self.pixel).astype(np.int64) - self.bottom)
+        held &= (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
+        values = np.zeros(len(held), np.bool_)
+        values[held] = mask[row[held], column[held]]
+        return values
+
     def chainages(self, columns: slice) -> Float:
         """Chainage of the centres of columns, m."""
         return np.asarray(self.km * KILOMETRE + (np.arange(columns.start, columns.stop) + 0.5) * self.pixel)

@@ -49,15 +49,35 @@ def floor(surface: Surface, chainage: NDArray[np.float64], arc: NDArray[np.float
     along = np.arange(chainage[0], chainage[-1] + _ALONG, _ALONG).clip(max=chainage[-1])
     across = np.arange(arc[-1], arc[0] + _ACROSS, _ACROSS)
     c, a = (grid.ravel() for grid in np.meshgrid(along, across))
-    points = surface.roll(c, a, np.zeros(len(c)))
-    normal = surface.unroll(points).normal
-    origin = np.repeat(surface.frames(along)[None, :, 0, :], len(across), axis=0).reshape(-1, 3)
-    up_looking = normal[:, 2] > FLOOR_SLOPE
-    below = points[:, 2] < origin[:, 2]
-    marked = ((up_looking & below) | np.isnan(normal[:, 2])).reshape(len(across), len(along))
+    marked = _is_floor(surface, c, a).reshape(len(across), len(along))
     row = np.clip(np.rint((arc - across[0]) / _ACROSS).astype(np.intp), 0, len(across) - 1)
     column = np.clip(np.rint((chainage - along[0]) / _ALONG).astype(np.intp), 0, len(along) - 1)
     return np.asarray(marked[np.ix_(row, column)])
+
+
+def floor_points(surface: Surface, chainage: NDArray[np.float64], arc: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Mark points of the unrolled plane, (n,) chainage and arc in m, below which the surface is floor."""
+    known = np.isfinite(chainage) & np.isfinite(arc)
+    marked = np.ones(len(chainage), np.bool_)
+    marked[known] = _is_floor(surface, chainage[known], arc[known])
+    return marked
+
+
+def _is_floor(surface: Surface, chainage: NDArray[np.float64], arc: NDArray[np.float64]) -> NDArray[np.bool_]:
+    points = surface.roll(chainage, arc, np.zeros(len(chainage)))
+    normal = surface.unroll(points).normal[:, 2]
+    level = np.unique(np.rint(chainage / _ALONG)) * _ALONG
+    axis = np.interp(chainage, level, _finite(surface.frames(level)[:, 0, 2]))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(((normal > FLOOR_SLOPE) & (points[:, 2] < axis)) | np.isnan(normal), dtype=np.bool_)
+
+
+def _finite(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Replace NaN by the nearest number."""
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) == 0:
+        return values
+    return np.asarray(np.interp(np.arange(len(values)), known, values[known]))
 
 
 def states(image: Accumulator, surface: Surface, delta: float) -> NDArray[np.uint8]:

@@ -1,0 +1,266 @@
+"""The stage ``detect``: from the scan files, at full density, to images and leaks of one kilometre."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import psycopg
+import shapely
+from numpy.typing import NDArray
+from scipy import ndimage
+from shapely.geometry import Polygon
+
+from tunneldb.database.survey import Survey
+from tunneldb.errors import UserError
+from tunneldb.geometry.store import load_surface
+from tunneldb.geometry.surface import Surface
+from tunneldb.intensity.correct import Kind, Views, needs_reference
+from tunneldb.intensity.dry import Dry, plain_statistics
+from tunneldb.intensity.roughness import Regions, Roughness, automatic_regions, drawn_regions, find_roughness
+from tunneldb.job.sources import Source, sample, sources
+from tunneldb.leak.detection import Detection
+from tunneldb.leak.detection import detect as find_leaks
+from tunneldb.leak.image import Accumulator, Grid
+from tunneldb.leak.lining import State, floor_points, states
+from tunneldb.leak.raster import KINDS
+from tunneldb.leak.seen import Eye, Radiometer, Seen, Span
+from tunneldb.leak.store import (
+    drop_radiometry,
+    load_reference,
+    load_regions,
+    save_images,
+    save_leaks,
+    save_radiometry,
+)
+from tunneldb.scan.pose import load_poses
+from tunneldb.scan.reader import Points, read_chunks
+
+Counts = dict[str, Any]
+
+NEAR_SURFACE = 0.05
+"""Points that serve for the roughness lie no farther from the surface, m."""
+
+WET_EDGE = 3
+"""Pixels about a wet one that don't count as dry lining."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Points of survey density, as seen.
+
+    Attributes
+    ----------
+    seen : Seen
+        Where they lie and what they show.
+    scan_id : (n,) int array
+        Scan that each is of.
+    lining : (n,) bool array
+        Points used that don't lie on the floor.
+    """
+
+    seen: Seen
+    scan_id: NDArray[np.int32]
+    lining: NDArray[np.bool_]
+
+    @property
+    def views(self) -> Views:
+        """How the scanner saw the points."""
+        assert self.seen.views is not None
+        return self.seen.views
+
+
+def detect(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    km: int,
+    values: Mapping[str, float],
+    progress: Callable[[float], None],
+) -> Counts:
+    """Make the unrolled images of a kilometre and find its leaks (Xu et al., 2018).
+
+    The files are read chunk by chunk; only images and leaks are kept.
+
+    Raises
+    ------
+    UserError
+        If there are no sections, a file is gone or was changed, or intensity can't be corrected.
+    """
+    surface = load_surface(conn, survey, km * 1000.0, (km + 1) * 1000.0)
+    files = sources(conn, survey, km)
+    radiometer = _radiometer(conn, survey, values["intensity.max_incidence"])
+    eye = Eye.of(surface, km, values["lining.tolerance"], radiometer)
+    with Accumulator(_grid(surface, km, values["image.pixel"])) as image:
+        if radiometer is None:
+            counts = _gather(eye, files, image, 0.0, progress)
+            drop_radiometry(conn, survey, km)
+            save_leaks(conn, survey, km, surface, [])
+            pixels = save_images(conn, survey, image, ["offset"])
+            return {**counts, "pixels": pixels, "leaks": 0, "note": "no intensity: offset image only, no leaks sought"}
+        view = _sample(conn, survey, eye)
+        roughness = _roughness(view, load_regions(conn, survey, km, "homogeneous"))
+        counts = _gather(eye, files, image, roughness.sigma, progress)
+        state = states(image, surface, values["appendage.distance"])
+        dry_regions = load_regions(conn, survey, km, "dry")
+        found = find_leaks(image, state, values["leak.min_area"], dry_regions)
+        save_radiometry(conn, survey, km, roughness, found, _sigma(view, image.grid, state, found, roughness, dry_regions))
+        matched = save_leaks(conn, survey, km, surface, found.leaks)
+        pixels = save_images(conn, survey, image, KINDS)
+    return {
+        **counts,
+        "pixels": pixels,
+        "lining_pixels": found.pixels,
+        "wet_pixels": found.wet_pixels,
+        "leaks": len(found.leaks),
+        "leaks_new": matched.new,
+        "leaks_again": matched.again,
+        "leaks_kept_for_review": matched.kept,
+        "leaks_gone": matched.gone,
+        **_report(roughness),
+    }
+
+
+def _radiometer(conn: psycopg.Connection[Any], survey: Survey, max_incidence: float) -> Radiometer | None:
+    if survey.intensity_kind == "none":
+        return None
+    kind = cast(Kind, survey.intensity_kind)
+    reference = load_reference(conn, survey) if needs_reference(kind) else None
+    if needs_reference(kind) and reference is None:
+        raise UserError(
+            f"survey {survey.name} has no reference curve, without which intensity of kind {kind} can't be corrected for"
+            " distance: add the survey with --reference CSV (range_m,intensity_db), or take a reflectance dimension"
+        )
+    return Radiometer(kind, load_poses(conn, survey), reference, max_incidence)
+
+
+def _grid(surface: Surface, km: int, pixel: float) -> Grid:
+    """Grid of a kilometre, from the lowest to the highest arc of its sections."""
+    inside = (surface.chainages >= km * 1000.0 - surface.reach) & (surface.chainages <= (km + 1) * 1000.0 + surface.reach)
+    if not inside.any():
+        raise UserError(f"kilometre {km} has no sections yet: run its stages segments and sections first")
+    return Grid.covering(km, pixel, float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max()))
+
+
+def _sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye) -> Sample:
+    """Look at points of survey density, and check their ranges against the reference curve before files are read."""
+    points = sample(conn, survey, eye.km)
+    seen = eye.see(points, f"survey {survey.name}")
+    unrolled = Sample(seen, points.scan_id, seen.use & ~floor_points(eye.surface, seen.chainage, seen.arc))
+    if not unrolled.lining.any():
+        raise UserError(
+            f"no point of kilometre {eye.km} lies on the lining: within {eye.tolerance:g} m of the sections and seen at"
+            f" less than the incidence intensity.max_incidence"
+        )
+    assert eye.radiometer is not None
+    if eye.radiometer.reference:
+        span = Span()
+        span.add(seen, eye.radiometer.reference)
+        span.require(eye.radiometer.reference)
+    return unrolled
+
+
+def _roughness(view: Sample, drawn: list[Polygon]) -> Roughness:
+    """Roughness from the regions that the user drew, or from automatic ones."""
+    seen, views = view.seen, view.views
+    if drawn:
+        regions = drawn_regions(_polygon_of(seen, drawn), view.scan_id, views.cosine, views.distance_db)
+        if len(regions) < 2:
+            raise UserError(f"the {len(drawn)} homogeneous regions drawn hold too few points: draw larger ones, or none")
+        return find_roughness(regions)
+    near = view.lining & (np.abs(seen.offset) <= NEAR_SURFACE)
+    regions = automatic_regions(
+        seen.chainage[near], seen.arc[near], view.scan_id[near], views.cosine[near], views.distance_db[near]
+    )
+    return find_roughness(regions) if len(regions) >= 2 else _unknown(regions)
+
+
+def _unknown(regions: Regions) -> Roughness:
+    """Lambert's law, for want of regions that tell."""
+    return Roughness(0.0, False, float("nan"), 0.0, len(regions), float("nan"), float("nan"))
+
+
+def _polygon_of(seen: Seen, polygons: list[Polygon]) -> NDArray[np.int64]:
+    """Number of the polygon that holds each point, -1 for none."""
+    number = np.full(len(seen.chainage), -1, np.int64)
+    usable = np.flatnonzero(seen.use)
+    for k, polygon in enumerate(polygons):
+        number[usable[shapely.contains_xy(polygon, seen.chainage[usable], seen.arc[usable])]] = k
+    return number
+
+
+def _gather(eye: Eye, files: list[Source], image: Accumulator, roughness: float, progress: Callable[[float], None]) -> Counts:
+    """Read the files and put their points into the image."""
+    total, read, used = sum(file.points for file in files), 0, 0
+    span = Span()
+    reference = eye.radiometer.reference if eye.radiometer else None
+    for path, points in _chunks(files):
+        read += len(points)
+        near = eye.near(points)
+        if len(near):
+            seen = eye.see(near, path.name)
+            if reference:
+                span.add(seen, reference)
+            if seen.views is None:
+                raw = corrected = np.zeros(len(near), np.float32)
+            else:
+                raw, corrected = seen.views.raw_db, seen.views.corrected(roughness)
+            used += image.add(seen.chainage, seen.arc, seen.offset, raw, corrected, seen.use)
+        progress(0.9 * read / max(total, 1))
+    if reference:
+        span.require(reference)
+    if not used:
+        raise UserError(f"no point of {', '.join(file.path.name for file in files)} lies on the lining of kilometre {eye.km}")
+    return {"files": len(files), "points_read": read, "points_used": used}
+
+
+def _chunks(files: list[Source]) -> Iterator[tuple[Path, Points]]:
+    for file in files:
+        for points in read_chunks(file.path, file.dimension):
+            yield file.path, points
+
+
+def _sigma(
+    view: Sample,
+    grid: Grid,
+    state: NDArray[np.uint8],
+    found: Detection,
+    roughness: Roughness,
+    dry_regions: list[Polygon],
+) -> tuple[Dry, Dry, Dry]:
+    """Standard deviation of dry lining points, raw and corrected by Lambert's law and Oren–Nayar (Table 1)."""
+    seen, views = view.seen, view.views
+    if dry_regions:
+        dry = view.lining & (_polygon_of(seen, dry_regions) >= 0)
+    else:
+        edge = ndimage.binary_dilation(found.wet, ndimage.generate_binary_structure(2, 2), iterations=WET_EDGE)
+        dry = view.lining & grid.pick((state == State.LINING) & ~edge, seen.chainage, seen.arc)
+    return (
+        plain_statistics(views.raw_db[dry]),
+        plain_statistics(views.corrected(0.0)[dry]),
+        plain_statistics(views.corrected(roughness.sigma)[dry]),
+    )
+
+
+def _report(roughness: Roughness) -> Counts:
+    """What the ledger says about the roughness."""
+
+    def known(value: float, digits: int) -> float | None:
+        return round(value, digits) if np.isfinite(value) else None
+
+    report: Counts = {
+        "roughness": known(roughness.sigma, 2),
+        "roughness_determined": roughness.determined,
+        "roughness_contrast_db": known(roughness.contrast, 3),
+        "regions": roughness.regions,
+        "incidence_from": known(roughness.incidence_from, 1),
+        "incidence_to": known(roughness.incidence_to, 1),
+    }
+    if not roughness.determined:
+        report["note"] = (
+            "the lining is seen at too similar incidence angles to tell its roughness;"
+            " whichever is taken hardly changes the corrected intensity"
+        )
+    return report

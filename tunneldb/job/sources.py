@@ -1,0 +1,105 @@
+"""What a stage reads: the scan files of a kilometre, and its points of survey density."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+from psycopg import sql
+
+from tunneldb.database.survey import Survey
+from tunneldb.errors import UserError
+from tunneldb.scan.reader import Points
+
+SAMPLE = 500_000
+"""Points of survey density that are looked at, about."""
+
+_HEADER = 19
+_FIELDS = (("x", ">f8"), ("y", ">f8"), ("z", ">f8"), ("time", ">f8"), ("scan", ">i4"), ("intensity", ">f4"))
+
+
+@dataclass(frozen=True)
+class Source:
+    """A scan file that was loaded.
+
+    Attributes
+    ----------
+    path : Path
+        Where it lay then.
+    points : int
+        Points in it.
+    dimension : str or None
+        The survey's intensity dimension.
+    """
+
+    path: Path
+    points: int
+    dimension: str | None
+
+
+def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Source]:
+    """Scan files of a survey that touch a kilometre, in order of chainage; each must be what was loaded.
+
+    Raises
+    ------
+    UserError
+        If there is none, or one is gone or has other contents than when it was loaded.
+    """
+    rows = conn.execute(
+        "SELECT path, points, bytes, checksum FROM tunnel.scan_file"
+        " WHERE survey_id = %s AND chainage_to >= %s AND chainage_from < %s ORDER BY chainage_from, name",
+        (survey.id, km * 1000.0, (km + 1) * 1000.0),
+    ).fetchall()
+    if not rows:
+        raise UserError(f"survey {survey.name} has no scan file in kilometre {km}: tunneldb load {survey.name} FILE")
+    found = []
+    for name, points, size, checksum in rows:
+        path = Path(name)
+        if not path.is_file():
+            raise UserError(f"{path}: the scan file is gone since it was loaded; put it back or load it from elsewhere")
+        if path.stat().st_size != size or _checksum(path) != checksum:
+            raise UserError(f"{path}: the scan file was changed since it was loaded; load it again")
+        found.append(Source(path, points, survey.intensity_dimension))
+    return found
+
+
+def _checksum(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def sample(conn: psycopg.Connection[Any], survey: Survey, km: int, count: int = SAMPLE) -> Points:
+    """Read about ``count`` points of a kilometre at survey density, spread evenly; the same ones each time.
+
+    Raises
+    ------
+    UserError
+        If the kilometre holds no points.
+    """
+    row = conn.execute("SELECT count(*) FROM tunnel.point WHERE survey_id = %s AND km = %s", (survey.id, km)).fetchone()
+    assert row is not None
+    if not row[0]:
+        raise UserError(f"survey {survey.name} has no points in kilometre {km}")
+    query = sql.SQL(
+        "COPY (SELECT public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom), coalesce(gps_time, 0)::float8,"
+        " coalesce(scan_id, 0)::int4, intensity::float4 FROM tunnel.point TABLESAMPLE BERNOULLI ({share}) REPEATABLE (1)"
+        " WHERE survey_id = {survey} AND km = {km}) TO STDOUT (FORMAT binary)"
+    ).format(share=sql.Literal(min(100.0, 100.0 * count / row[0])), survey=sql.Literal(survey.id), km=sql.Literal(km))
+    with conn.cursor() as cursor, cursor.copy(query) as copy:
+        data = b"".join(bytes(part) for part in copy)
+    record: list[tuple[str, str]] = [("fields", ">i2")]
+    for name, kind in _FIELDS:
+        record += [(f"{name}_bytes", ">i4"), (name, kind)]
+    dtype = np.dtype(record)
+    rows = np.frombuffer(data, dtype, (len(data) - _HEADER - 2) // dtype.itemsize, _HEADER)
+    return Points(
+        np.column_stack([rows[axis] for axis in "xyz"]).astype(np.float64),
+        rows["time"].astype(np.float64),
+        rows["scan"].astype(np.int32),
+        rows["intensity"].astype(np.float32),
+        np.zeros(len(rows), np.uint8),
+    )

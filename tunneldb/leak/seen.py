@@ -1,0 +1,157 @@
+"""Scanned points as the image takes them: unrolled, with corrected intensity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.geometry.surface import Surface
+from tunneldb.intensity.correct import Kind, Views, observe, range_span
+from tunneldb.intensity.reference import ReferenceCurve
+from tunneldb.scan.pose import PoseModel
+from tunneldb.scan.reader import Points
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Radiometer:
+    """What intensity is corrected with.
+
+    Attributes
+    ----------
+    kind : {'amplitude', 'reflectance', 'linear'}
+        What the raw intensity is.
+    poses : PoseModel
+        Scanner positions.
+    reference : ReferenceCurve or None
+        Effect of distance; None for reflectance.
+    max_incidence : float
+        Points seen more slantingly are left out, degrees.
+    """
+
+    kind: Kind
+    poses: PoseModel
+    reference: ReferenceCurve | None
+    max_incidence: float
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Points near the surface; all arrays (n,).
+
+    Attributes
+    ----------
+    chainage, arc, offset : float arrays
+        Unrolled, m.
+    use : bool array
+        Points within the tolerance of the surface, in the kilometre, and whose intensity can be corrected.
+    views : Views or None
+        Range, incidence and intensity; None when the survey has no intensity.
+    """
+
+    chainage: Float
+    arc: Float
+    offset: Float
+    use: NDArray[np.bool_]
+    views: Views | None
+
+
+@dataclass(frozen=True)
+class Eye:
+    """Turns points of a survey into what the image of one kilometre takes.
+
+    Attributes
+    ----------
+    surface : Surface
+        The tunnel.
+    km : int
+        Kilometre.
+    tolerance : float
+        Points farther from the surface are not lining, m.
+    radiometer : Radiometer or None
+        None when the survey has no intensity.
+    box : (2, 3) float array
+        Least and greatest coordinates of the kilometre's lining, m.
+    """
+
+    surface: Surface
+    km: int
+    tolerance: float
+    radiometer: Radiometer | None
+    box: Float
+
+    @classmethod
+    def of(cls, surface: Surface, km: int, tolerance: float, radiometer: Radiometer | None) -> Eye:
+        """Make the eye for a kilometre that the surface covers at least in part."""
+        touching = (surface.ends[:, 1] > km * 1000.0) & (surface.ends[:, 0] < (km + 1) * 1000.0)
+        vertices = surface.segments[touching, :6].reshape(-1, 3)
+        margin = float(surface.radius.max()) + tolerance
+        return cls(surface, km, tolerance, radiometer, np.array([vertices.min(0) - margin, vertices.max(0) + margin]))
+
+    def near(self, points: Points) -> Points:
+        """Points in the kilometre's bounding box."""
+        inside = np.all((points.xyz >= self.box[0]) & (points.xyz <= self.box[1]), axis=1)
+        if inside.all():
+            return points
+        return Points(
+            points.xyz[inside],
+            points.time[inside],
+            points.scan_id[inside],
+            points.intensity[inside],
+            points.classification[inside],
+        )
+
+    def see(self, points: Points, name: str) -> Seen:
+        """Unroll points and look up their intensity.
+
+        Parameters
+        ----------
+        points : Points
+            A chunk.
+        name : str
+            The file, for messages.
+
+        Raises
+        ------
+        UserError
+            If a point's scanner position is unknown.
+        """
+        unrolled = self.surface.unroll(points.xyz)
+        start = self.km * 1000.0
+        with np.errstate(invalid="ignore"):
+            use = np.abs(unrolled.offset) <= self.tolerance
+            use &= (unrolled.chainage >= start) & (unrolled.chainage < start + 1000.0)
+        views = None
+        if self.radiometer:
+            radiometer = self.radiometer
+            scanner = radiometer.poses.positions(points, name)
+            views = observe(points.xyz, scanner, unrolled.normal, points.intensity, radiometer.kind, radiometer.reference)
+            with np.errstate(invalid="ignore"):
+                use &= views.cosine >= np.cos(np.radians(radiometer.max_incidence))
+            use &= np.isfinite(views.raw_db)
+        return Seen(unrolled.chainage, unrolled.arc, unrolled.offset, use, views)
+
+
+@dataclass
+class Span:
+    """Ranges of the points used so far, against those of the reference curve."""
+
+    nearest: float = np.inf
+    farthest: float = -np.inf
+    outside: int = 0
+    count: int = 0
+
+    def add(self, seen: Seen, reference: ReferenceCurve) -> None:
+        """Count the points of a chunk."""
+        assert seen.views is not None
+        nearest, farthest, outside, count = range_span(seen.views, seen.use, reference)
+        self.nearest, self.farthest = min(self.nearest, nearest), max(self.farthest, farthest)
+        self.outside += outside
+        self.count += count
+
+    def require(self, reference: ReferenceCurve) -> None:
+        """Raise UserError if points lie outside the curve's span."""
+        reference.require_span(self.nearest, self.farthest, self.outside, self.count)
