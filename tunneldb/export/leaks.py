@@ -115,9 +115,7 @@ def read_leaks(
     wanted = None if kilometres is None else list(kilometres)
     rows = conn.execute(query, {"survey": survey.id, "km": wanted, "min_area": min_area}).fetchall()
     names = [*COLUMNS, "geometry"]
-    return [
-        Leak(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True))) for row in rows
-    ]
+    return [Leak(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True))) for row in rows]
 
 
 def as_table(leaks: Sequence[Leak], title: str) -> Table:

@@ -105,20 +105,22 @@ def save_leaks(conn: psycopg.Connection[Any], survey: Survey, km: int, surface: 
     return Matched(len(found) - len(again), len(again), len(kept), len(gone))
 
 
-_SHAPES = (
-    "public.ST_GeomFromWKB(%(unrolled)s, 0), public.ST_GeomFromWKB(%(map)s, %(srid)s::int),"
-    " public.ST_GeomFromWKB(%(surface)s, %(srid)s::int)"
-)
-_COLUMNS = "chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max, image_share"
-_VALUES = ", ".join(f"%({name.strip()})s" for name in _COLUMNS.split(","))
-_INSERT: Any = (
-    f"INSERT INTO tunnel.leak (survey_id, km, {_COLUMNS}, unrolled, map, surface)"  # noqa: S608 - constants only
-    f" VALUES (%(survey)s, %(km)s, {_VALUES}, {_SHAPES})"
-)
-_UPDATE: Any = (
-    f"UPDATE tunnel.leak SET ({_COLUMNS}, unrolled, map, surface, detected, detected_at)"  # noqa: S608 - constants only
-    f" = ({_VALUES}, {_SHAPES}, true, now()) WHERE id = %(id)s"
-)
+_INSERT = """
+    INSERT INTO tunnel.leak (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max,
+                             image_share, unrolled, map, surface)
+    VALUES (%(survey)s, %(km)s, %(chainage_from)s, %(chainage_to)s, %(arc_from)s, %(arc_to)s, %(clock)s, %(area)s,
+            %(drop_mean)s, %(drop_max)s, %(image_share)s, public.ST_GeomFromWKB(%(unrolled)s, 0),
+            public.ST_GeomFromWKB(%(map)s, %(srid)s::int), public.ST_GeomFromWKB(%(surface)s, %(srid)s::int))
+"""
+_UPDATE = """
+    UPDATE tunnel.leak
+       SET chainage_from = %(chainage_from)s, chainage_to = %(chainage_to)s, arc_from = %(arc_from)s,
+           arc_to = %(arc_to)s, clock = %(clock)s, area = %(area)s, drop_mean = %(drop_mean)s, drop_max = %(drop_max)s,
+           image_share = %(image_share)s, unrolled = public.ST_GeomFromWKB(%(unrolled)s, 0),
+           map = public.ST_GeomFromWKB(%(map)s, %(srid)s::int),
+           surface = public.ST_GeomFromWKB(%(surface)s, %(srid)s::int), detected = true, detected_at = now()
+     WHERE id = %(id)s
+"""
 
 
 def _row(leak: Found, surface: Surface, srid: int) -> dict[str, Any]:

@@ -1,0 +1,45 @@
+"""The verb ``image``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.database import connect, get_survey
+from tunneldb.errors import UserError
+from tunneldb.export.image import export_kilometre, image_kilometres
+from tunneldb.job.run import parse_km
+
+
+@click.command()
+@click.argument("survey")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path(),
+    help="Folder to write to; made if it isn't there. [default: the current one]",
+)
+@click.option("--km", metavar="A-B", help="Only these kilometres: 12 or 12-14.")
+@click.pass_obj
+def image(settings: Settings, survey: str, output: Path, km: str | None) -> None:
+    """Write the unrolled images of SURVEY: raw and corrected intensity, and offset from the surface.
+
+    Each kilometre gets three Cloud Optimized GeoTIFFs (dB and m; x is the chainage, y the arc, m) and a PNG preview of
+    each, with leaks outlined on the corrected one. In previews, gaps between profiles up to 0.6 m apart are filled.
+    """
+    with connect(settings.dsn) as conn:
+        found = get_survey(conn, survey)
+        there = image_kilometres(conn, found)
+        if not there:
+            raise UserError(f"survey {survey} has no images yet: tunneldb run {survey}")
+        wanted = parse_km(km, there)
+        try:
+            output.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UserError(f"{output}: the folder cannot be made: {error.strerror}") from error
+        for number, kilometre in enumerate(wanted, start=1):
+            for path in export_kilometre(conn, found, kilometre, output):
+                click.echo(f"[{number}|{len(wanted)}] {path}", err=True)
