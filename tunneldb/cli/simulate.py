@@ -106,7 +106,7 @@ class _GroupedCommand(click.Command):
             rows = []
             for parameter in self.get_params(ctx):
                 record = parameter.get_help_record(ctx)
-                if record is not None and headings.get(parameter.name or "", "Other") == group:
+                if isinstance(parameter, click.Option) and record and headings.get(parameter.name or "", "Other") == group:
                     rows.append(record)
             with formatter.section(group):
                 formatter.write_dl(rows)
@@ -118,7 +118,7 @@ def _options(command: Callable[..., None]) -> Callable[..., None]:
     for options in reversed(_GROUPS.values()):
         for o in reversed(options):
             default = defaults[o.field]
-            shown = " ".join(f"{v:g}" if o.nargs > 1 else str(v) for v in (default if o.nargs > 1 else [default]))
+            shown = " ".join(f"{v:.10g}" if o.type is float else str(v) for v in (default if o.nargs > 1 else [default]))
             command = click.option(
                 "--" + o.field.replace("_", "-"),
                 o.field,

@@ -29,7 +29,7 @@ from tunneldb.simulate.furniture import (
     niche_table,
 )
 from tunneldb.simulate.leaks import EDGE, Leak, depth_inside, edge_table
-from tunneldb.simulate.section import nearest
+from tunneldb.simulate.section import LINE, nearest
 from tunneldb.simulate.tunnel import Tunnel, gradient, newton_step
 
 Array = NDArray[np.float64]
@@ -37,6 +37,10 @@ Index = NDArray[np.int64]
 
 # Beyond this incidence the echo is lost, as scanners lose it.
 MINIMUM_COSINE = 0.087
+
+# A Newton step for chainage leaves an error of its square times the curvature, in chainage, u and w: after a step
+# of this many metres the next iteration of the ray corrects what is left.
+LOOSE = 0.05
 
 
 class Scene(NamedTuple):
@@ -64,12 +68,12 @@ def scene(tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: li
     line = tunnel.line
     item_rows, niche_rows = appendage_table(tunnel, items), niche_table(tunnel, niches)
     edges, first, leak_rows = edge_table(leaks)
-    reach = max((i.standoff + 0.5 * math.hypot(i.width, i.depth) for i in items), default=0.0)
+    reach = max((i.standoff + 0.5 * i.depth for i in items), default=0.0)
     return Scene(
         line.plan,
         line.profile,
         tunnel.section.parts,
-        np.array([line.start, line.end, tunnel.section.floor_arc, 1.1 * reach]),
+        np.array([line.start, line.end, tunnel.section.floor_arc, 1.1 * reach + 0.02]),
         item_rows,
         *bins(item_rows[:, 1], item_rows[:, 2], line.start, line.end),
         niche_rows,
@@ -79,6 +83,33 @@ def scene(tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: li
         leak_rows,
         *bins(leak_rows[:, 0], leak_rows[:, 2], line.start, line.end),
     )
+
+
+@njit(cache=True, nogil=True)
+def _straight(parts: Array, u: float, w: float, du: float, dw: float) -> float:
+    """Range at which a ray of a section's plane leaves the section, as in a straight tunnel.
+
+    A convex section lies inside all its lines; where their first crossing is outside, an arc is met before.
+    """
+    flat = 1e300
+    round_ = 1e300
+    for i in range(parts.shape[0]):
+        if parts[i, 0] == LINE:
+            for side in (1.0, -1.0):
+                nu, nw = side * parts[i, 6], -parts[i, 5]
+                rate = nu * du + nw * dw
+                if rate < -1e-12:
+                    flat = min(flat, ((u - side * parts[i, 3]) * nu + (w - parts[i, 4]) * nw) / -rate)
+        else:
+            h = w - parts[i, 4]
+            a = du * du + dw * dw
+            b = u * du + h * dw
+            root = b * b - a * (u * u + h * h - parts[i, 5] ** 2)
+            if a > 1e-18 and root > 0.0:
+                round_ = min(round_, (math.sqrt(root) - b) / a)
+    if round_ < flat and (flat > 1e6 or nearest(parts, u + flat * du, w + flat * dw)[1] < -1e-6):
+        return round_
+    return flat
 
 
 @njit(cache=True, nogil=True)
@@ -102,7 +133,7 @@ def _lining(
     for i in range(80):
         step, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
         s += step
-        if abs(step) > 1e-4:
+        if abs(step) > LOOSE:
             step, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
             s += step
         arc, offset, gu, gw = nearest(sc.parts, u, w)
@@ -110,7 +141,16 @@ def _lining(
         slope = nx * d[0] + ny * d[1] + nz * d[2]
         if i == 0:
             offset0 = offset
-        if abs(offset) < 1e-7 and abs(step) < 1e-6 and r > 0.0:
+            du = d[0] * n - d[1] * c
+            dw = (d[2] - g * (d[0] * c + d[1] * n)) / q
+            advance = min(_straight(sc.parts, u, w, du, dw), furthest)
+            r = advance
+            x += advance * d[0]
+            y += advance * d[1]
+            z += advance * d[2]
+            s += advance * (d[0] * c + d[1] * n + d[2] * g) / det
+            continue
+        if abs(offset) < 1e-7 and abs(step) < 1e-4 and r > 0.0:
             norm = math.sqrt(nx * nx + ny * ny + nz * nz)
             return r, s, arc, -slope / norm, offset0, s0
         advance = offset if slope > -0.02 and offset > 0.0 else -offset / slope
@@ -133,7 +173,7 @@ def _item(sc: Scene, o: Array, d: Array, s: float, r: float, wall: float) -> tup
         x, y, z = o[0] + r * d[0], o[1] + r * d[1], o[2] + r * d[2]
         step, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
         s += step
-        if i == 0 or abs(step) > 1e-5:
+        if abs(step) > LOOSE:
             step, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
             s += step
         b = bin_of(s, sc.ends[0], sc.item_bins)
@@ -313,7 +353,7 @@ def trace(
         for _ in range(10):
             step, u, w, ca, sa, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
             s += step
-            if abs(step) < 1e-7:
+            if abs(step) < 1e-3:
                 break
         arc, offset, gu, gw = nearest(sc.parts, u, w)
         if s < sc.ends[0] or s > sc.ends[1]:
