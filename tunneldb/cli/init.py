@@ -6,7 +6,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.database import open_connection
-from tunneldb.database.install import install, schema_revision
+from tunneldb.database.schema import install, schema_revision
 
 
 @click.command()

@@ -2,8 +2,8 @@
 
 from tunneldb.database.connection import connect, open_connection, resolve_dsn, sqlalchemy_engine
 from tunneldb.database.copy import PointZ, copy_binary, pack
-from tunneldb.database.install import install
 from tunneldb.database.resources import resource_dir
+from tunneldb.database.schema import install
 from tunneldb.database.survey import Survey, get_survey
 
 __all__ = [

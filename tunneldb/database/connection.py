@@ -54,7 +54,7 @@ def connect(dsn: str | None) -> psycopg.Connection[Any]:
     UserError
         When the server is down, has no PostGIS, or its schema is absent, older or newer than this program's.
     """
-    from tunneldb.database.install import require_current_schema
+    from tunneldb.database.schema import require_current_schema
 
     connection = open_connection(dsn)
     try:

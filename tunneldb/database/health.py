@@ -11,7 +11,7 @@ import psycopg
 from alembic.script import ScriptDirectory
 
 from tunneldb.database.connection import MINIMUM_POSTGIS, open_connection
-from tunneldb.database.install import (
+from tunneldb.database.schema import (
     alembic_config,
     api_version,
     installed_api_version,

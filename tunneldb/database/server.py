@@ -178,10 +178,11 @@ def _launch(home: Home, binaries: Binaries) -> None:
 
 
 def _reason(log: str) -> str:
-    for line in log.splitlines():
-        if "FATAL:" in line or "PANIC:" in line:
-            return line.split(":  ", 1)[-1].strip()
-    return _last_line(log)
+    """Return why the server says that it does not start; of a wrong setting, which."""
+    marks = ("invalid value for parameter", "unrecognized configuration parameter", "FATAL:", "PANIC:")
+    lines = log.splitlines()
+    found = (line for mark in marks for line in lines if mark in line)
+    return next(found, _last_line(log)).split(":  ", 1)[-1].strip()
 
 
 def _last_line(text: str) -> str:

@@ -78,10 +78,10 @@ def sql_files() -> list[Path]:
     folder = resource_dir("sql")
     lines = (folder / "install.txt").read_text("utf-8").splitlines()
     listed = [line.strip() for line in lines if line.strip() and not line.startswith("#")]
-    there = {path.name for path in folder.glob("*.sql")}
-    if forgotten := there - set(listed):
-        raise ValueError(f"{folder / 'install.txt'} does not list {', '.join(sorted(forgotten))}")
-    return [folder / name for name in listed if name in there]
+    different = {path.name for path in folder.glob("*.sql")} ^ set(listed)
+    if different:
+        raise ValueError(f"{folder / 'install.txt'} and its folder differ in {', '.join(sorted(different))}")
+    return [folder / name for name in listed]
 
 
 def api_version() -> str:
