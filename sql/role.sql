@@ -51,8 +51,8 @@ REVOKE ALL ON SCHEMA tunnel_api FROM PUBLIC;
 REVOKE EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_api FROM PUBLIC;
 REVOKE EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api FROM PUBLIC;
 
--- Viewers: all views, and the functions that only read and don't need rights on the tables: IMMUTABLE ones, and STABLE
--- ones that run with the owner's rights (SECURITY DEFINER).
+-- Viewers: all views, and the functions that only read. One that reads tables must itself run with the owner's rights
+-- (SECURITY DEFINER) to be of use to them.
 DO $$
 DECLARE
     f regprocedure;
@@ -64,7 +64,7 @@ BEGIN
     GRANT SELECT ON ALL TABLES IN SCHEMA tunnel_api TO tunnel_viewer;
     FOR f IN SELECT p.oid FROM pg_proc p
               WHERE p.pronamespace = 'tunnel_api'::regnamespace AND p.prokind = 'f'
-                AND (p.provolatile = 'i' OR p.provolatile = 's' AND p.prosecdef) LOOP
+                AND p.provolatile <> 'v' LOOP
         EXECUTE format('GRANT EXECUTE ON FUNCTION %s TO tunnel_viewer', f);
     END LOOP;
 END

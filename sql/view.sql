@@ -1,11 +1,14 @@
 -- Views of a tunnel and its geometry: tunnel, survey, file, point, axis, axis_vertex, segment, section, section_unrolled,
--- region. Each has a stable integer key first and its geometry last; all lengths are metres. Tunnels differ in SRID, so
--- geometries carry a type but no SRID in their column; the SRID is each geometry's own (view "tunnel" states it).
--- Needs chainage_label (leak.sql).
+-- region. Each has a stable integer key first and its geometry last; all lengths are metres. Needs chainage_label
+-- (leak.sql).
+--
+-- Tunnels differ in SRID, so what lies on the map is cast to plain geometry: a column that states a type but no SRID
+-- makes QGIS look for rows of SRID 0, of which there are none. Of a plain column QGIS reads 100 rows (with "estimated
+-- table metadata" in its connection) to find type, SRID and Z.
 
 CREATE OR REPLACE VIEW tunnel_api.tunnel AS
 SELECT t.id, t.name, t.srid, t.start_chainage, t.spacing, t.created_at,
-       t.alignment::public.geometry(LineStringZ) AS geom
+       t.alignment::public.geometry AS geom
   FROM tunnel.tunnel t;
 COMMENT ON VIEW tunnel_api.tunnel IS 'Tunnels, with the axis as it was given';
 COMMENT ON COLUMN tunnel_api.tunnel.srid IS 'Coordinate reference system of all the tunnel''s geometry on the map';
@@ -44,7 +47,7 @@ CREATE OR REPLACE VIEW tunnel_api.point AS
 SELECT ((p.km::bigint & 65535) << 44) | ((p.ctid::text::pg_catalog.point)[0]::bigint << 12)
          | (p.ctid::text::pg_catalog.point)[1]::bigint AS id,
        p.survey_id, p.km, p.chainage, p.segment, p.gps_time, p.scan_id, p.file_id, p.intensity, p.classification,
-       p.geom::public.geometry(PointZ) AS geom
+       p.geom::public.geometry AS geom
   FROM tunnel.point p;
 COMMENT ON VIEW tunnel_api.point IS
     'Points at survey density, in chainage order; state survey_id and km (and chainage) to read only their part';
@@ -59,7 +62,7 @@ SELECT s.id, s.id AS survey_id, s.name AS survey, t.name AS tunnel, a.vertices, 
        a.first * t.spacing AS chainage_from, a.last * t.spacing AS chainage_to,
        tunnel_api.chainage_label(a.first * t.spacing) AS label_from,
        tunnel_api.chainage_label(a.last * t.spacing) AS label_to,
-       a.geom::public.geometry(LineStringZ) AS geom
+       a.geom::public.geometry AS geom
   FROM tunnel.survey s
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
   JOIN LATERAL (SELECT count(*) AS vertices,
@@ -75,7 +78,7 @@ COMMENT ON COLUMN tunnel_api.axis.edited IS 'Vertices placed by hand';
 CREATE OR REPLACE VIEW tunnel_api.axis_vertex AS
 SELECT v.id, v.survey_id, s.name AS survey, v.n, v.km, v.n * t.spacing AS chainage,
        tunnel_api.chainage_label(v.n * t.spacing) AS label, v.points, v.source, v.edited_by, v.edited_at,
-       v.geom::public.geometry(PointZ) AS geom
+       v.geom::public.geometry AS geom
   FROM tunnel.axis_vertex v
   JOIN tunnel.survey s ON s.id = v.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id;
@@ -102,7 +105,7 @@ SELECT g.id, g.survey_id, s.name AS survey, g.n, g.km, g.chainage_from, g.chaina
                         (CASE v.n WHEN o.n THEN o.vertex_from ELSE o.vertex_to END)[2],
                         (CASE v.n WHEN o.n THEN o.vertex_from ELSE o.vertex_to END)[3]),
                       public.st_srid(v.geom))) > 1e-4) AS stale,
-       g.geom::public.geometry(LineStringZ) AS geom
+       g.geom::public.geometry AS geom
   FROM tunnel.segment g
   JOIN tunnel.survey s ON s.id = g.survey_id;
 COMMENT ON VIEW tunnel_api.segment IS 'Segments: the tunnel between planes perpendicular to the axis at consecutive vertices';
@@ -113,7 +116,7 @@ COMMENT ON COLUMN tunnel_api.segment.stale IS 'True when the axis has moved sinc
 CREATE OR REPLACE VIEW tunnel_api.section AS
 SELECT c.id, c.survey_id, s.name AS survey, c.km, c.segment, c.half, c.chainage,
        tunnel_api.chainage_label(c.chainage) AS label, c.half_width, c.angle_step, c.points, c.interpolated,
-       c.geom::public.geometry(LineStringZ) AS geom
+       c.geom::public.geometry AS geom
   FROM tunnel.section c
   JOIN tunnel.survey s ON s.id = c.survey_id;
 COMMENT ON VIEW tunnel_api.section IS 'Cross-sections at 25 % and 75 % of each segment, drawn in space';

@@ -12,8 +12,8 @@ SELECT l.id, l.survey_id, s.name AS survey, l.km,
        l.arc_from, l.arc_to, l.clock, l.area, l.drop_mean, l.drop_max, l.image_share,
        l.review, l.reviewed_by, l.reviewed_at, l.remark, l.detected, l.created_at, l.detected_at,
        l.unrolled::public.geometry(Polygon, 0) AS unrolled,
-       l.map::public.geometry(Polygon) AS map,
-       l.surface::public.geometry(PolygonZ) AS surface
+       l.map::public.geometry AS map,
+       l.surface::public.geometry AS surface
   FROM tunnel.leak l
   JOIN tunnel.survey s ON s.id = l.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
@@ -83,3 +83,32 @@ COMMENT ON COLUMN tunnel_api.radiometry.threshold IS 'Corrected intensity below 
 COMMENT ON COLUMN tunnel_api.radiometry.sigma_raw IS 'Standard deviation of dry lining before correction, dB';
 COMMENT ON COLUMN tunnel_api.radiometry.sigma_lambert IS 'The same after correction by Lambert''s law, dB';
 COMMENT ON COLUMN tunnel_api.radiometry.sigma_oren_nayar IS 'The same after correction by Oren-Nayar, dB';
+
+-- The lining seen is what the last detection counted: pixels of lining that hold measurements × the area of a pixel.
+CREATE OR REPLACE VIEW tunnel_api.km_statistics AS
+SELECT s.id::bigint * 1000000 + 500000 + g.km AS id, s.id AS survey_id, s.name AS survey, g.km, g.chainage_from,
+       g.chainage_to, d.lining_area, l.wet_area, l.wet_area / nullif(d.lining_area, 0) AS wet_share, l.leaks, l.leaks_open,
+       l.leaks_confirmed, l.leaks_rejected, l.largest_area, l.greatest_drop
+  FROM tunnel.survey s
+  JOIN (SELECT survey_id, km, min(chainage_from) AS chainage_from, max(chainage_to) AS chainage_to
+          FROM tunnel.segment GROUP BY survey_id, km) g ON g.survey_id = s.id
+  LEFT JOIN LATERAL (
+        SELECT (r.counts ->> 'lining_pixels')::float8 * (r.parameters ->> 'image.pixel')::float8 ^ 2 AS lining_area
+          FROM tunnel.run r
+         WHERE r.survey_id = g.survey_id AND r.km = g.km AND r.stage = 'detect' AND r.outcome = 'done'
+         ORDER BY r.finished_at DESC, r.id DESC LIMIT 1) d ON true
+ CROSS JOIN LATERAL (
+        SELECT count(*) FILTER (WHERE k.detected AND k.review <> 'rejected') AS leaks,
+               count(*) FILTER (WHERE k.detected AND k.review = 'open') AS leaks_open,
+               count(*) FILTER (WHERE k.detected AND k.review = 'confirmed') AS leaks_confirmed,
+               count(*) FILTER (WHERE k.detected AND k.review = 'rejected') AS leaks_rejected,
+               coalesce(sum(k.area) FILTER (WHERE k.detected AND k.review <> 'rejected'), 0) AS wet_area,
+               max(k.area) FILTER (WHERE k.detected AND k.review <> 'rejected') AS largest_area,
+               max(k.drop_max) FILTER (WHERE k.detected AND k.review <> 'rejected') AS greatest_drop
+          FROM tunnel.leak k
+         WHERE k.survey_id = g.survey_id AND k.km = g.km) l;
+COMMENT ON VIEW tunnel_api.km_statistics IS 'Leaks of each kilometre, summed; without those rejected or no longer found';
+COMMENT ON COLUMN tunnel_api.km_statistics.lining_area IS 'Lining that the last detection saw, m²; NULL before it';
+COMMENT ON COLUMN tunnel_api.km_statistics.wet_area IS 'Area of the leaks on the lining, m²';
+COMMENT ON COLUMN tunnel_api.km_statistics.wet_share IS 'wet_area / lining_area';
+COMMENT ON COLUMN tunnel_api.km_statistics.leaks IS 'Leaks open or confirmed';

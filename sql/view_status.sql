@@ -1,4 +1,4 @@
--- Views of the work: the ledger of runs, how far each kilometre has come, and what was found in it.
+-- Views of the work: the ledger of runs and how far each kilometre has come.
 
 -- True when the database session that started a run still lives. Runs with the owner's rights, for pg_stat_activity
 -- hides the sessions of others.

@@ -100,13 +100,18 @@ def write_project(
     _save(root, output)
 
 
+def layer_id(name: str) -> str:
+    """Return a layer's id in a project; QGIS replaces ids of ten letters or fewer by its own."""
+    return f"tunneldb_layer_{name}"
+
+
 def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element) -> _Entry:
     element = ET.Element(
         "maplayer", type="vector", geometry=layer.geometry, wkbType=layer.wkb, readOnly=str(int(not layer.edited)),
         autoRefreshEnabled="0", refreshOnNotifyEnabled="0", hasScaleBasedVisibilityFlag="0",
         minScale="0", maxScale="0", styleCategories="AllStyleCategories",
     )  # fmt: skip
-    ET.SubElement(element, "id").text = layer.id
+    ET.SubElement(element, "id").text = layer_id(layer.id)
     ET.SubElement(element, "datasource").text = source.layer(layer, survey.name, survey.srid)
     ET.SubElement(element, "layername").text = layer.title
     ET.SubElement(element, "srs").append(deepcopy(crs) if layer.on_map else no_crs())
@@ -118,7 +123,7 @@ def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element)
         ET.SubElement(
             ET.SubElement(element, "defaults"), "default", field="survey", expression=f"'{name}'", applyOnUpdate="0"
         )
-    return _Entry(layer.id, layer.title, (layer.group,), layer.themes, element)
+    return _Entry(layer_id(layer.id), layer.title, (layer.group,), layer.themes, element)
 
 
 def _rasters(images: Sequence[Path], folder: Path) -> list[_Entry]:
@@ -129,7 +134,7 @@ def _rasters(images: Sequence[Path], folder: Path) -> list[_Entry]:
         limits = grey_range(paths) if kind != "offset" else (0.0, 0.0)
         for path in paths:
             element = ET.Element("maplayer", type="raster", styleCategories="AllStyleCategories")
-            ET.SubElement(element, "id").text = f"image_{path.stem}"
+            ET.SubElement(element, "id").text = layer_id(path.stem)
             relative = os.path.relpath(path.resolve(), folder.resolve())
             ET.SubElement(element, "datasource").text = relative if relative.startswith("..") else f"./{relative}"
             ET.SubElement(element, "layername").text = path.stem
@@ -138,7 +143,7 @@ def _rasters(images: Sequence[Path], folder: Path) -> list[_Entry]:
             element.append(pipe(kind, limits))
             ET.SubElement(element, "blendMode").text = "0"
             themes = (UNROLLED,) if kind == next(iter(KINDS)) else ()
-            entries.append(_Entry(f"image_{path.stem}", path.stem, (UNROLLED, title), themes, element))
+            entries.append(_Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))
     return entries
 
 
@@ -198,7 +203,8 @@ def _canvases(root: ET.Element, views: Sequence[View], crs: ET.Element) -> None:
     _canvas(root, "theMapCanvas", views[0], crs)
     docks = ET.SubElement(root, "mapViewDocks")
     if len(views) > 1:
-        _canvas(root, UNROLLED, views[1], no_crs()).set("theme", UNROLLED)
+        # Its layers have no reference system and are drawn as they are; the tunnel's gives the canvas its unit, the metre.
+        _canvas(root, UNROLLED, views[1], crs).set("theme", UNROLLED)
         # area 8 is the bottom edge of the window
         ET.SubElement(
             docks, "view", name=UNROLLED, area="8", floating="0", x="0", y="0", width="1200", height="360",
@@ -235,7 +241,7 @@ def _bookmarks(views: Sequence[View], crs: ET.Element) -> ET.Element:
             bookmarks, "Bookmark", id=f"{{{uuid.uuid5(uuid.NAMESPACE_OID, view.name)}}}", name=view.name,
             group=view.theme, extent=view.extent.wkt(),
         )  # fmt: skip
-        bookmark.append(deepcopy(crs) if view.theme == MAP else no_crs())
+        bookmark.append(deepcopy(crs))
     return bookmarks
 
 
@@ -244,6 +250,8 @@ def _properties() -> ET.Element:
     properties = ET.Element("properties")
     paths = ET.SubElement(properties, "Paths")
     ET.SubElement(paths, "Absolute", type="bool").text = "false"
+    reference = ET.SubElement(properties, "SpatialRefSys")
+    ET.SubElement(reference, "ProjectionsEnabled", type="int").text = "1"
     measure = ET.SubElement(properties, "Measure")
     ET.SubElement(measure, "Ellipsoid", type="QString").text = "NONE"
     measurement = ET.SubElement(properties, "Measurement")

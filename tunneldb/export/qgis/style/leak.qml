@@ -20,11 +20,11 @@
         </layer>
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="230,126,0,90"/>
+            <Option type="QString" name="color" value="230,126,0,45"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="230,126,0,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
-            <Option type="QString" name="outline_width" value="0.45"/>
+            <Option type="QString" name="outline_width" value="0.5"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
@@ -43,11 +43,11 @@
         </layer>
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="0,92,175,110"/>
+            <Option type="QString" name="color" value="0,92,175,55"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="0,92,175,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
-            <Option type="QString" name="outline_width" value="0.45"/>
+            <Option type="QString" name="outline_width" value="0.5"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
@@ -66,11 +66,11 @@
         </layer>
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="110,110,110,140"/>
-            <Option type="QString" name="style" value="b_diagonal"/>
+            <Option type="QString" name="color" value="110,110,110,0"/>
+            <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="110,110,110,255"/>
             <Option type="QString" name="outline_style" value="dash"/>
-            <Option type="QString" name="outline_width" value="0.35"/>
+            <Option type="QString" name="outline_width" value="0.5"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
@@ -81,12 +81,12 @@
   <labeling type="simple">
     <settings calloutType="simple">
       <text-style fieldName="&quot;label&quot; || '\n' || format_number(&quot;area&quot;, 2) || ' m²'" isExpression="1" fontFamily="Sans Serif" namedStyle="Regular" fontWeight="50" fontSize="8" fontSizeUnit="Point" textColor="30,30,30,255" textOpacity="1" multilineHeight="1" allowHtml="0">
-        <text-buffer bufferDraw="1" bufferSize="0.7" bufferSizeUnits="MM" bufferColor="255,255,255,215" bufferOpacity="1" bufferJoinStyle="128" bufferNoFill="1"/>
-        <background shapeDraw="0"/>
+        <text-buffer bufferDraw="0" bufferSize="0.7" bufferSizeUnits="MM" bufferColor="255,255,255,215" bufferOpacity="1" bufferJoinStyle="128" bufferNoFill="1"/>
+        <background shapeDraw="1" shapeType="0" shapeSizeType="0" shapeSizeX="0.8" shapeSizeY="0.5" shapeSizeUnit="MM" shapeRadiiX="0.8" shapeRadiiY="0.8" shapeRadiiUnit="MM" shapeFillColor="255,255,255,225" shapeBorderColor="150,150,150,255" shapeBorderWidth="0.1" shapeBorderWidthUnit="MM" shapeOpacity="1" shapeJoinStyle="128"/>
         <shadow shadowDraw="0"/>
       </text-style>
       <text-format multilineAlign="1"/>
-      <placement placement="8" dist="1" distUnits="MM" polygonPlacementFlags="3" priority="8" geometryGeneratorEnabled="0"/>
+      <placement placement="8" dist="1.5" distUnits="MM" polygonPlacementFlags="3" priority="8"/>
       <rendering scaleVisibility="1" scaleMin="0" scaleMax="4000" obstacle="1" obstacleFactor="1" displayAll="0" drawLabels="1" upsidedownLabels="0" fontLimitPixelSize="0" mergeLines="0" limitNumLabels="0" minFeatureSize="0"/>
       <dd_properties>
         <Option type="Map">

@@ -20,11 +20,11 @@
         </layer>
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="230,126,0,90"/>
+            <Option type="QString" name="color" value="230,126,0,45"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="230,126,0,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
-            <Option type="QString" name="outline_width" value="0.45"/>
+            <Option type="QString" name="outline_width" value="0.5"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
@@ -43,11 +43,11 @@
         </layer>
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="0,92,175,110"/>
+            <Option type="QString" name="color" value="0,92,175,55"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="0,92,175,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
-            <Option type="QString" name="outline_width" value="0.45"/>
+            <Option type="QString" name="outline_width" value="0.5"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
@@ -66,11 +66,11 @@
         </layer>
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="110,110,110,140"/>
-            <Option type="QString" name="style" value="b_diagonal"/>
+            <Option type="QString" name="color" value="110,110,110,0"/>
+            <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="110,110,110,255"/>
             <Option type="QString" name="outline_style" value="dash"/>
-            <Option type="QString" name="outline_width" value="0.35"/>
+            <Option type="QString" name="outline_width" value="0.5"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>

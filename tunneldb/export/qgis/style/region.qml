@@ -102,8 +102,8 @@
   </aliases>
   <editable>
     <field name="id" editable="0"/>
-    <field name="survey_id" editable="1"/>
-    <field name="survey" editable="0"/>
+    <field name="survey_id" editable="0"/>
+    <field name="survey" editable="1"/>
     <field name="kind" editable="1"/>
     <field name="drawn_by" editable="0"/>
     <field name="drawn_at" editable="0"/>

@@ -1,0 +1,190 @@
+"""A survey made by hand, without scans: a curved, sloped tunnel with a flat floor, its leaks and images."""
+
+from __future__ import annotations
+
+import numpy as np
+import psycopg
+import pytest
+import shapely
+from shapely.geometry import Polygon
+
+from tunneldb.geometry.frame import frame_at, segment_rows, tangents
+from tunneldb.geometry.surface import Surface
+from tunneldb.leak.geometries import shapes
+from tunneldb.leak.image import BLOCK, Grid
+from tunneldb.leak.raster import KINDS, Raster, encode
+
+NAME, SRID, SPACING = "demo-2024", 25830, 10.0
+FIRST, LAST = 1230, 1250  # axis vertices: chainage 12+300 to 12+500
+KM = 12
+PIXEL = 0.05
+
+
+@pytest.fixture
+def example(conn: psycopg.Connection) -> str:
+    """Name of a survey with every kind of row that the views and QGIS show; committed."""
+    surface, vertices = example_surface()
+    tunnel_id = conn.execute(
+        "INSERT INTO tunnel.tunnel (name, srid, start_chainage, spacing, alignment) "
+        "VALUES ('demo', %s, %s, %s, ST_GeomFromWKB(%s, %s)) RETURNING id",
+        (SRID, FIRST * SPACING, SPACING, shapely.to_wkb(shapely.LineString(vertices)), SRID),
+    ).fetchone()[0]
+    survey_id = conn.execute(
+        "INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_dimension, intensity_kind, platform) "
+        "VALUES (%s, %s, '2024-05-04', 'Amplitude', 'amplitude', 'static') RETURNING id",
+        (tunnel_id, NAME),
+    ).fetchone()[0]
+    _files_and_runs(conn, survey_id)
+    _axis(conn, survey_id, vertices)
+    _segments(conn, survey_id, surface)
+    _sections(conn, survey_id, surface)
+    outlines = _leaks(conn, survey_id, surface)
+    _images(conn, survey_id, surface, outlines)
+    conn.execute(
+        "INSERT INTO tunnel.region (survey_id, kind, geom) "
+        "VALUES (%s, 'dry', ST_MakeEnvelope(12410, -3, 12414, 0, 0))",
+        (survey_id,),
+    )
+    conn.commit()
+    return NAME
+
+
+def example_surface() -> tuple[Surface, np.ndarray]:
+    """A circular tunnel of 4 m radius with a floor 2.5 m below its axis, R = 300 m, 2 % up."""
+    chainage = np.arange(FIRST, LAST + 1) * SPACING
+    azimuth = (chainage - chainage[0]) / 300.0
+    vertices = np.column_stack([
+        500_000 + 300 * (1 - np.cos(azimuth)),
+        4_640_000 + 300 * np.sin(azimuth),
+        600 + 0.02 * (chainage - chainage[0]),
+    ])  # fmt: skip
+    rows = segment_rows(vertices, tangents(vertices))
+    ends = np.column_stack([chainage[:-1], chainage[1:]])
+    sections = np.sort(np.concatenate([chainage[:-1] + 2.5, chainage[:-1] + 7.5]))
+    angle = np.radians(np.arange(361) - 180.0)
+    below = np.where(np.cos(angle) < -1e-9, -2.5 / np.minimum(np.cos(angle), -1e-9), np.inf)
+    radius = np.minimum(4.0, below)
+    u, w = radius * np.sin(angle), radius * np.cos(angle)
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(u), np.diff(w)))])
+    arc = length - length[180]
+    count = len(sections)
+    surface = Surface(
+        np.arange(FIRST, LAST), rows, ends, sections, np.tile(radius, (count, 1)), np.tile(arc, (count, 1)), SPACING
+    )
+    return surface, vertices
+
+
+def _files_and_runs(conn: psycopg.Connection, survey_id: int) -> None:
+    conn.execute(
+        "INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, thinned, kept, "
+        "chainage_from, chainage_to, loaded_at) VALUES "
+        "(%s, 'demo.laz', '/scans/demo.laz', repeat('0', 64), 1000, 100, 1, 2, 37, 60, 12300.1, 12499.9, '2024-05-05 08:00Z')",
+        (survey_id,),
+    )
+    for hour, stage in enumerate(["load", "axis", "segments", "sections", "detect"], start=8):
+        conn.execute(
+            "INSERT INTO tunnel.run (survey_id, km, stage, started_at, finished_at, outcome) "
+            "VALUES (%s, %s, %s, make_timestamptz(2024, 5, 5, %s, 0, 0, 'UTC'), "
+            "make_timestamptz(2024, 5, 5, %s, 30, 0, 'UTC'), 'done')",
+            (survey_id, KM, stage, hour, hour),
+        )
+
+
+def _axis(conn: psycopg.Connection, survey_id: int, vertices: np.ndarray) -> None:
+    for n, vertex in enumerate(vertices, start=FIRST):
+        interpolated = n in (1241, 1242)
+        conn.execute(
+            "INSERT INTO tunnel.axis_vertex (survey_id, n, km, geom, given, points, source) "
+            "VALUES (%(survey)s, %(n)s, %(km)s, ST_GeomFromWKB(%(wkb)s, %(srid)s), ST_GeomFromWKB(%(wkb)s, %(srid)s), "
+            "%(points)s, %(source)s)",
+            {
+                "survey": survey_id, "n": n, "km": KM, "wkb": shapely.to_wkb(shapely.Point(vertex)), "srid": SRID,
+                "points": 0 if interpolated else 5000, "source": "interpolated" if interpolated else "measured",
+            },
+        )  # fmt: skip
+
+
+def _segments(conn: psycopg.Connection, survey_id: int, surface: Surface) -> None:
+    frame = np.empty((4, 3))
+    for n, row, (start, end) in zip(surface.number, surface.segments, surface.ends, strict=True):
+        line = []
+        for part in range(5):
+            frame_at(row, part / 4, frame)
+            line.append(frame[0].copy())
+        conn.execute(
+            "INSERT INTO tunnel.segment (survey_id, n, km, chainage_from, chainage_to, vertex_from, vertex_to, "
+            "tangent_from, tangent_to, geom, points) "
+            "VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, ST_GeomFromWKB(%s, %s), 2500)",
+            (
+                survey_id, int(n), KM, float(start), float(end), *(row[i : i + 3].tolist() for i in (0, 3, 6, 9)),
+                shapely.to_wkb(shapely.LineString(line)), SRID,
+            ),
+        )  # fmt: skip
+
+
+def _sections(conn: psycopg.Connection, survey_id: int, surface: Surface) -> None:
+    for k, chainage in enumerate(surface.chainages):
+        arc = surface.arcs[k]
+        ring = surface.roll(np.full(361, chainage), arc, np.zeros(361))
+        conn.execute(
+            "INSERT INTO tunnel.section (survey_id, km, segment, half, chainage, half_width, angle_step, radius, arc, "
+            "geom, points, interpolated) VALUES (%s, %s, %s, %s, %s, 0.5, 5, %s, %s, ST_GeomFromWKB(%s, %s), 900, %s)",
+            (
+                survey_id, KM, int(surface.number[k // 2]), 25 if k % 2 == 0 else 75, float(chainage),
+                surface.radius[k].tolist(), arc.tolist(), shapely.to_wkb(shapely.LineString(ring)), SRID,
+                4 if k in (22, 23) else 0,
+            ),
+        )  # fmt: skip
+
+
+def _leaks(conn: psycopg.Connection, survey_id: int, surface: Surface) -> list[Polygon]:
+    rng = np.random.default_rng(1)
+    outlines = []
+    for number, (chainage, arc, size, review) in enumerate(
+        [
+            (12318.0, 1.0, 0.5, "open"),
+            (12344.0, -5.2, 0.9, "open"),
+            (12402.5, 4.4, 1.1, "confirmed"),
+            (12421.0, -1.5, 0.4, "rejected"),
+            (12428.0, 6.0, 0.7, "open"),
+            (12436.0, -6.1, 0.8, "confirmed"),
+            (12471.0, 0.3, 0.5, "open"),
+        ]
+    ):
+        angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+        reach = size * (1 + 0.35 * rng.standard_normal(24).cumsum() / 5)
+        outline = Polygon(np.column_stack([chainage + 1.4 * reach * np.cos(angle), arc + reach * np.sin(angle)])).buffer(0)
+        outlines.append(outline)
+        shaped = shapes(outline, surface)
+        west, south, east, north = outline.bounds
+        conn.execute(
+            "INSERT INTO tunnel.leak (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, "
+            "drop_mean, drop_max, image_share, unrolled, map, surface, review) VALUES (%s, %s, %s, %s, %s, %s, %s, %s, "
+            "%s, %s, 0.97, ST_GeomFromWKB(%s, 0), ST_GeomFromWKB(%s, %s), ST_GeomFromWKB(%s, %s), %s)",
+            (
+                survey_id, KM, west, east, south, north, shaped.clock, shaped.area, 3.1 + number / 10, 5.0,
+                shapely.to_wkb(outline), shapely.to_wkb(shaped.strip), SRID, shapely.to_wkb(shaped.surface), SRID, review,
+            ),
+        )  # fmt: skip
+    return outlines
+
+
+def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines: list[Polygon]) -> None:
+    """Lining in bands of shade, darker where it leaks; the floor has no pixels."""
+    rng = np.random.default_rng(2)
+    grid = Grid.covering(KM, PIXEL, *surface.arc_range(12402.5))
+    for block in range(int(12300 / BLOCK), int(12500 / BLOCK)):
+        columns = slice((block - grid.first_block) * grid.block_columns, (block - grid.first_block + 1) * grid.block_columns)
+        x, y = np.meshgrid(grid.chainages(columns), grid.arcs())
+        wet = np.zeros(x.shape, bool)
+        for outline in outlines:
+            wet |= shapely.contains_xy(outline, x, y)
+        shade = -12 + 0.5 * rng.standard_normal(x.shape) + 0.3 * np.sin(x / 1.2) - 3.5 * wet
+        offset = 0.004 * rng.standard_normal(x.shape) + 0.03 * np.sin(y) * np.cos(x / 15)
+        values = {"corrected": shade, "raw": shade - 0.08 * (x % 20 - 10) ** 2 / 2, "offset": offset}
+        for kind in KINDS:
+            held = np.where(np.abs(y) < 9.0, values[kind], np.nan).astype(np.float32)
+            conn.execute(
+                "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %s)",
+                (survey_id, KM, kind, block, encode(Raster(held, grid.transform(columns.start)), kind)),
+            )

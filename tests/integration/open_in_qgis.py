@@ -1,0 +1,175 @@
+"""Open a project with real QGIS and say what it sees, as JSON; runs under the Python that has PyQGIS.
+
+Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK | draw KIND
+       | add VIEW
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+from qgis._3d import Qgs3D
+from qgis.core import (
+    QgsApplication,
+    QgsDataSourceUri,
+    QgsFeature,
+    QgsGeometry,
+    QgsMapLayer,
+    QgsMapRendererParallelJob,
+    QgsMapSettings,
+    QgsPointXY,
+    QgsProject,
+    QgsReadWriteContext,
+    QgsRectangle,
+    QgsVectorLayer,
+    QgsVectorLayerUtils,
+    QgsWkbTypes,
+)
+from qgis.gui import QgsMapCanvas
+from qgis.PyQt.QtCore import QSize
+from qgis.PyQt.QtGui import QColor
+from qgis.PyQt.QtXml import QDomDocument
+
+PREFIX = "tunneldb_layer_"
+WIDTH, HEIGHT = 1600, 640
+
+
+def describe(project: QgsProject, canvas: QgsMapCanvas) -> dict[str, Any]:
+    """Everything that the tests compare with the database."""
+    layers = {}
+    for layer in project.mapLayers().values():
+        seen: dict[str, Any] = {"valid": layer.isValid(), "crs": layer.crs().authid(), "source": layer.source()}
+        if isinstance(layer, QgsVectorLayer):
+            editable = [
+                layer.fields().at(i).name()
+                for i in range(layer.fields().count())
+                if not layer.editFormConfig().readOnly(i)
+            ]
+            features = list(layer.getFeatures())
+            seen |= {
+                "wkb": QgsWkbTypes.displayString(layer.wkbType()),
+                "features": len(features),
+                "z": [max((v.z() for v in f.geometry().vertices()), default=None) for f in features],
+                "widget": {f.name(): layer.editorWidgetSetup(layer.fields().indexOf(f.name())).type() for f in layer.fields()},
+                "read_only": layer.readOnly(),
+                "editable": editable,
+                "renderer": layer.renderer().type(),
+                "labels": layer.labelsEnabled(),
+                "error": layer.error().summary() if not layer.error().isEmpty() else "",
+                "extent": layer.extent().toString(),
+            }
+            if layer.renderer3D() is not None:
+                document = QDomDocument()
+                layer.exportNamedStyle(document, QgsReadWriteContext(), QgsMapLayer.Symbology3D)
+                data = document.documentElement().firstChildElement("renderer-3d").elementsByTagName("data").at(0).toElement()
+                seen |= {"clamping": data.attribute("alt-clamping"), "binding": data.attribute("alt-binding")}
+        layers[layer.id().removeprefix(PREFIX)] = seen
+    collection = project.mapThemeCollection()
+    return {
+        "crs": project.crs().authid(),
+        "layers": layers,
+        "themes": {
+            name: [layer.removeprefix(PREFIX) for layer in collection.mapThemeVisibleLayerIds(name)]
+            for name in collection.mapThemes()
+        },
+        "bookmarks": [bookmark.name() for bookmark in project.bookmarkManager().bookmarks()],
+        "canvas_theme": canvas.theme(),
+        "canvas_extent": canvas.extent().toString(3),
+        "extent": project.viewSettings().defaultViewExtent().toString(3),
+    }
+
+
+def render(project: QgsProject, theme: str, path: str) -> dict[str, Any]:
+    """Draw a theme at its bookmark and report the errors."""
+    bookmark = next(b for b in project.bookmarkManager().bookmarks() if b.name() == theme)
+    settings = QgsMapSettings()
+    settings.setLayers(project.mapThemeCollection().mapThemeVisibleLayers(theme))
+    settings.setDestinationCrs(bookmark.extent().crs())
+    settings.setExtent(QgsRectangle(bookmark.extent()))
+    settings.setOutputSize(QSize(WIDTH, HEIGHT))
+    settings.setBackgroundColor(QColor("white"))
+    settings.setFlag(QgsMapSettings.Antialiasing)
+    job = QgsMapRendererParallelJob(settings)
+    job.start()
+    job.waitForFinished()
+    saved = job.renderedImage().save(path)
+    return {"saved": saved, "errors": [f"{e.layerID}: {e.message}" for e in job.errors()]}
+
+
+def move_vertex(project: QgsProject, n: str, dx: str, dz: str) -> dict[str, Any]:
+    """Move one axis vertex as the vertex tool does."""
+    layer = project.mapLayer(PREFIX + "axis_vertex")
+    feature = next(f for f in layer.getFeatures() if f["n"] == int(n))
+    point = feature.geometry().constGet().clone()
+    point.setX(point.x() + float(dx))
+    point.setZ(point.z() + float(dz))
+    assert layer.startEditing(), "cannot be edited"
+    assert layer.changeGeometry(feature.id(), QgsGeometry(point))
+    return _commit(layer)
+
+
+def review(project: QgsProject, number: str, status: str, remark: str, layer_id: str = "leak_unrolled") -> dict[str, Any]:
+    """Set a leak's review and remark as the form does."""
+    layer = project.mapLayer(PREFIX + layer_id)
+    feature = next(f for f in layer.getFeatures() if f["id"] == int(number))
+    assert layer.startEditing(), "cannot be edited"
+    for name, value in (("review", status), ("remark", remark)):
+        assert layer.changeAttributeValue(feature.id(), layer.fields().indexOf(name), value)
+    return _commit(layer)
+
+
+def draw(project: QgsProject, kind: str) -> dict[str, Any]:
+    """Draw a region in the unrolled plane, with the values that the form would fill in."""
+    layer = project.mapLayer(PREFIX + "region")
+    square = [QgsPointXY(12440, 1), QgsPointXY(12444, 1), QgsPointXY(12444, 3), QgsPointXY(12440, 3)]
+    assert layer.startEditing(), "cannot be edited"
+    attributes = {layer.fields().indexOf("kind"): kind}
+    feature = QgsVectorLayerUtils.createFeature(layer, QgsGeometry.fromPolygonXY([square]), attributes)
+    assert layer.addFeature(QgsFeature(feature))
+    return _commit(layer)
+
+
+def add(project: QgsProject, view: str) -> dict[str, Any]:
+    """Add a view by hand, as from the browser, and report whether its style was found in the database."""
+    uri = QgsDataSourceUri(project.mapLayer(PREFIX + "leak_map").source())
+    uri.setDataSource("tunnel_api", view, "geom", "", "id")
+    uri.setSrid("")
+    uri.setWkbType(QgsWkbTypes.Unknown)
+    layer = QgsVectorLayer(uri.uri(False), view, "postgres")
+    message, loaded = layer.loadDefaultStyle()
+    return {"valid": layer.isValid(), "loaded": loaded, "message": message, "renderer": layer.renderer().type(), "wkb": QgsWkbTypes.displayString(layer.wkbType()), "crs": layer.crs().authid()}
+
+
+def _commit(layer: QgsVectorLayer) -> dict[str, Any]:
+    saved = layer.commitChanges()
+    return {"saved": saved, "errors": layer.commitErrors()}
+
+
+def main() -> None:
+    """Run one action and print its result."""
+    application = QgsApplication([], True)
+    application.initQgis()
+    Qgs3D.initialize()
+    project = QgsProject.instance()
+    canvas = QgsMapCanvas()
+    canvas.setObjectName("Unrolled")
+    project.readProject.connect(canvas.readProject)
+    assert project.read(sys.argv[1]), project.error()
+    action, arguments = sys.argv[2], sys.argv[3:]
+    if action == "describe":
+        result = describe(project, canvas)
+    else:
+        result = globals()[action](project, *arguments)
+    print(json.dumps(result))
+    project.clear()
+    sys.stdout.flush()
+    # Leaving the interpreter normally makes QGIS crash now and then in its own destructors.
+    import os
+
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
