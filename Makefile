@@ -1,0 +1,54 @@
+# make demo   a simulated tunnel from its scan to leaks in QGIS, in ./demo
+# make test   lint, types and all tests, against the wheel as a user would install it
+# make bench  the figures of the README and the docs
+# Each installs what it lacks: PostgreSQL with PostGIS by apt, and a virtual environment in .venv.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := $(shell find tunneldb sql migrations -type f -not -name '*.py[co]' -not -name '*.nb[ic]') pyproject.toml README.md LICENSE
+
+.PHONY: install demo test bench lint clean
+.DELETE_ON_ERROR:
+
+install: $(VENV)/wheel
+
+$(VENV)/server:
+	scripts/system-packages.sh server
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "tunneldb needs Python 3.11 or newer")'
+	$(PYTHON) -m venv $(VENV)
+	touch $@
+
+# What tests and tools need, with the project's own dependencies.
+$(VENV)/dependencies: pyproject.toml | $(VENV)/server
+	$(BIN)/python -m pip install -q --upgrade pip build
+	$(BIN)/python -m build -q --wheel --outdir $(VENV)/dist
+	$(BIN)/python -m pip install -q "$$(ls -t $(VENV)/dist/*.whl | head -n 1)[dev]"
+	touch $@
+
+$(VENV)/wheel: $(SOURCES) | $(VENV)/dependencies
+	rm -rf $(VENV)/dist
+	$(BIN)/python -m build -q --wheel --outdir $(VENV)/dist
+	$(BIN)/python -m pip install -q --no-deps --force-reinstall $(VENV)/dist/*.whl
+	touch $@
+
+$(VENV)/tests: | $(VENV)/server
+	scripts/system-packages.sh server tests
+	touch $@
+
+demo: install
+	scripts/demo.sh $(abspath $(BIN))/tunneldb
+
+lint: install
+	$(BIN)/ruff check
+	$(BIN)/mypy
+
+# Not `python -m pytest`: that would put the source tree before the wheel.
+test: lint $(VENV)/tests
+	$(BIN)/pytest -n 2 -rs
+
+bench: install
+	$(BIN)/python -m benchmarks.run
+
+clean:
+	rm -rf $(VENV) build dist demo .pytest_cache .mypy_cache .ruff_cache .hypothesis

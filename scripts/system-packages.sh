@@ -1,0 +1,58 @@
+#!/usr/bin/env bash
+# Installs by apt what the embedded server, the tests and QGIS need, unless it is there.
+# Usage: scripts/system-packages.sh [server] [tests]
+set -euo pipefail
+
+wanted=("$@")
+packages=()
+
+# The newest PostgreSQL that both is packaged and has PostGIS; 15 on Debian 12.
+postgresql_version() {
+    apt-cache search --names-only '^postgresql-[0-9]+-postgis-3$' | sed -E 's/^postgresql-([0-9]+)-.*/\1/' | sort -n | tail -n 1
+}
+
+need() { # a package, unless a file that it brings is there
+    local package=$1
+    shift
+    compgen -G "$1" > /dev/null || packages+=("$package")
+}
+
+collect() {
+    local version
+    version=$(postgresql_version)
+    for what in "${wanted[@]}"; do
+        case $what in
+            server)
+                need "postgresql-${version}-postgis-3" '/usr/share/postgresql/*/extension/postgis.control'
+                need "postgresql-${version}" '/usr/lib/postgresql/*/bin/postgres'
+                python3 -c 'import ensurepip' 2> /dev/null || packages+=(python3-venv)
+                ;;
+            tests)
+                need "postgresql-${version}-plpgsql-check" '/usr/share/postgresql/*/extension/plpgsql_check.control'
+                need python3-qgis '/usr/lib/python3/dist-packages/qgis/core/__init__.py'
+                need qgis-providers '/usr/lib/*/qgis/plugins/*postgresprovider*'
+                ;;
+        esac
+    done
+}
+
+have_everything() {
+    packages=()
+    collect
+    [ ${#packages[@]} -eq 0 ]
+}
+
+if ! command -v apt-get > /dev/null; then
+    echo "no apt here: PostgreSQL 14 or newer with PostGIS 3.3 or newer must be installed some other way" >&2
+    exit 0
+fi
+have_everything && exit 0
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+    command -v sudo > /dev/null || { echo "missing: ${packages[*]}; install them as root" >&2; exit 1; }
+    as_root=(sudo)
+fi
+"${as_root[@]}" apt-get update -q
+have_everything || true # the versions are known now
+DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install -q -y --no-install-recommends "${packages[@]}"
