@@ -6,6 +6,7 @@ import csv
 import datetime as dt
 import io
 import json
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 import psycopg
 import pyogrio.raw
 import shapely
+from numpy.typing import NDArray
 from psycopg import sql
 from rich.table import Table
 from shapely.geometry import Polygon, mapping
@@ -189,6 +191,12 @@ def write_gpkg(path: Path, leaks: Sequence[Leak], geometry: Geometry, srid: int)
     data[COLUMNS.index("reviewed_at")] = np.array(
         [np.datetime64("NaT") if m is None else _utc(m) for m in moments], dtype="datetime64[ms]"
     )
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "'crs' was not provided")  # the unrolled plane has none
+        _write_layer(path, leaks, data, geometry, srid)
+
+
+def _write_layer(path: Path, leaks: Sequence[Leak], data: list[NDArray[Any]], geometry: Geometry, srid: int) -> None:
     pyogrio.raw.write(
         str(path),
         shapely.to_wkb(np.array([leak.geometry for leak in leaks], dtype=object)),
