@@ -55,7 +55,7 @@ def stage_run(
     run = Run(_begin(conn, survey_id, km, stage, parameters))
     try:
         with conn.transaction():
-            _lock(conn, survey_id, km)
+            lock(conn, survey_id, km)
             yield run
             conn.execute(
                 "UPDATE tunnel.run SET outcome = 'done', finished_at = clock_timestamp(), counts = %s WHERE id = %s",
@@ -83,7 +83,14 @@ def _begin(conn: psycopg.Connection[Any], survey_id: int, km: int | None, stage:
     return int(row[0])
 
 
-def _lock(conn: psycopg.Connection[Any], survey_id: int, km: int | None) -> None:
+def lock(conn: psycopg.Connection[Any], survey_id: int, km: int | None) -> None:
+    """Keep other runs off a survey's kilometre, or with None off its stages of the whole, until the transaction ends.
+
+    Raises
+    ------
+    UserError
+        When another process is at work on it.
+    """
     taken = conn.execute("SELECT pg_try_advisory_xact_lock(%s, %s)", [survey_id, -1 if km is None else km]).fetchone()
     if taken is None or not taken[0]:
         where = "the survey" if km is None else f"kilometre {km}"
