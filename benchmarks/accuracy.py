@@ -3,7 +3,8 @@
     python -m benchmarks.accuracy [--section circular] [--seed 1] [--scanner profiler] [--set PARAMETER=VALUE]
 
 A tunnel of 120 m with a radius of 300 m and a slope of 4 % is simulated, loaded and run to its sections;
-a kilometre begins in its middle. All points of the scan are unrolled and compared with the truth.
+a kilometre begins in its middle. The curve follows a straight of 24 m without a transition, unless --straight
+says otherwise. All points of the scan are unrolled and compared with the truth.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ Figures = dict[str, Any]
 
 LENGTH = 120.0
 START = 940.0
+RADIUS = 300.0
+SLOPE = 4.0  # %
 SPACING = 10.0
 SQL_POINTS = 5000
 HEADER = (
@@ -41,24 +44,26 @@ def main() -> None:
     parser.add_argument("--seed", action="append", type=int)
     parser.add_argument("--scanner", default="profiler", choices=("profiler", "static"))
     parser.add_argument("--length", type=float, default=LENGTH)
+    parser.add_argument("--straight", type=float, default=24.0, help="before the curve, m")
     parser.add_argument("--set", action="append", default=[], metavar="PARAMETER=VALUE", help="as in tunneldb run")
     arguments = parser.parse_args()
     rows = []
     for section in arguments.section or ("circular", "horseshoe", "box"):
         for seed in arguments.seed or (1, 2, 3):
             progress(f"{section}, seed {seed}")
-            rows.append(measure(arguments.dsn, section, seed, arguments.scanner, arguments.length, arguments.set))
+            rows.append(measure(arguments, section, seed))
     print_table("Unrolling against the truth (mm; lining only)", HEADER, [list(row.values()) for row in rows])
-    save("accuracy", {"scanner": arguments.scanner, "set": arguments.set, "rows": rows})
+    save("accuracy", {"arguments": vars(arguments), "rows": rows})
 
 
-def measure(dsn: str | None, section: str, seed: int, scanner: str, length: float, settings: list[str]) -> Figures:
+def measure(arguments: argparse.Namespace, section: str, seed: int) -> Figures:
     """Figures of one simulated tunnel, lengths in mm."""
-    options = [item for setting in settings for item in ("--set", setting)]
-    with tempfile.TemporaryDirectory() as folder, scratch_database(dsn) as database:
+    options = [item for setting in arguments.set for item in ("--set", setting)]
+    with tempfile.TemporaryDirectory() as folder, scratch_database(arguments.dsn) as database:
         scene = Scene.simulate(
-            Path(folder), "tunnel", "--section", section, "--length", length, "--radius", 300, "--slope", 4,
-            "--scanner", scanner, "--seed", seed, start_chainage=START,
+            Path(folder), "tunnel", "--section", section, "--length", arguments.length,
+            "--radius", RADIUS, "--slope", SLOPE, "--straight", arguments.straight,
+            "--scanner", arguments.scanner, "--seed", seed, start_chainage=START,
         )  # fmt: skip
         scene.register(database)
         scene.load(database)
