@@ -74,17 +74,18 @@ BEGIN
     RETURN QUERY
     WITH profile AS (
         SELECT f.n, q.u, q.w
-        FROM tunnel.point p
-        JOIN tunnel_api.axis_frame(axis_shift.n, axis_shift.x, axis_shift.y, axis_shift.z) f
-            ON f.n = round(p.chainage / spacing)::int
-        CROSS JOIN LATERAL (SELECT ST_X(p.geom) - f.x AS dx, ST_Y(p.geom) - f.y AS dy, ST_Z(p.geom) - f.z AS dz) d
+        FROM (SELECT round(p.chainage / spacing)::int AS n, ST_X(p.geom) AS x, ST_Y(p.geom) AS y, ST_Z(p.geom) AS z,
+                  clock_timestamp()  -- a fence that lets the scan be parallel: the coordinates are taken out once
+              FROM tunnel.point p
+              WHERE p.survey_id = axis_shift.survey_id
+                AND p.km BETWEEN floor(low / 1000)::int AND floor(high / 1000)::int
+                AND p.chainage BETWEEN low AND high
+                -- chainage is good to a metre or so until the axis rests; the plane decides
+                AND abs(p.chainage - round(p.chainage / spacing) * spacing) <= axis_shift.half_width + 1.5) p
+        JOIN tunnel_api.axis_frame(axis_shift.n, axis_shift.x, axis_shift.y, axis_shift.z) f ON f.n = p.n
+        CROSS JOIN LATERAL (SELECT p.x - f.x AS dx, p.y - f.y AS dy, p.z - f.z AS dz) d
         CROSS JOIN LATERAL (SELECT d.dx * f.ux + d.dy * f.uy AS u, d.dx * f.wx + d.dy * f.wy + d.dz * f.wz AS w) q
-        WHERE p.survey_id = axis_shift.survey_id
-          AND p.km BETWEEN floor(low / 1000)::int AND floor(high / 1000)::int
-          AND p.chainage BETWEEN low AND high
-          -- chainage is good to a metre or so until the axis rests; the plane decides
-          AND abs(p.chainage - round(p.chainage / spacing) * spacing) <= axis_shift.half_width + 1.5
-          AND abs(d.dx * f.tx + d.dy * f.ty + d.dz * f.tz) <= axis_shift.half_width
+        WHERE abs(d.dx * f.tx + d.dy * f.ty + d.dz * f.tz) <= axis_shift.half_width
     ), class AS MATERIALIZED (
         SELECT p.n, (floor(degrees(atan2(p.u, p.w)) / axis_shift.angle_step) + 0.5) * axis_shift.angle_step AS angle,
             avg(sqrt(p.u * p.u + p.w * p.w)) AS radius, sum(p.u) AS u, sum(p.w) AS w, count(*) AS points
@@ -208,7 +209,9 @@ BEGIN
         points = p.points,
         source = CASE WHEN p.points > 0 THEN 'measured' ELSE 'interpolated' END
     FROM unnest(vn, vx, vy, vz, counts) AS p (n, x, y, z, points)
-    WHERE v.survey_id = axis_refine.survey_id AND v.km = axis_refine.km AND v.n = p.n AND v.source <> 'edited';
+    -- a vertex next door that no points have placed (its kilometre may hold none) goes along
+    WHERE v.survey_id = axis_refine.survey_id AND v.n = p.n AND v.source <> 'edited'
+      AND (v.km = axis_refine.km OR v.points = 0);
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.axis_refine(int, int, float8, float8, float8, int, int) IS

@@ -16,66 +16,76 @@ COMMENT ON FUNCTION tunnel_api.section_plane(int, int) IS
 'Planes of the cross-sections of one kilometre, at 25 % and 75 % of each segment: chainage (m) and frame (origin, tangent, right, up; 12 numbers). Source: Gonçalves et al. (2012), stage 4.';
 
 
+-- The points of a slab: those at most half_width (in chainage, m) from a plane, in the plane's own frame, right and up, m.
+CREATE OR REPLACE FUNCTION tunnel_api.section_slab(survey_id int, chainage float8, frame float8[], half_width float8)
+RETURNS TABLE (u float8, w float8)
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+ROWS 1000
+AS $$
+#variable_conflict use_variable
+BEGIN
+    RETURN QUERY
+    SELECT d.x * frame[7] + d.y * frame[8], d.x * frame[10] + d.y * frame[11] + d.z * frame[12]
+    FROM tunnel.point p
+    CROSS JOIN LATERAL (
+        SELECT ST_X(p.geom) - frame[1] AS x, ST_Y(p.geom) - frame[2] AS y, ST_Z(p.geom) - frame[3] AS z) d
+    WHERE p.survey_id = section_slab.survey_id
+      -- near the ends of a kilometre a point may lie in the partition next door
+      AND p.km BETWEEN floor((section_slab.chainage - half_width - 1) / 1000)::int
+                   AND floor((section_slab.chainage + half_width + 1) / 1000)::int
+      AND p.chainage BETWEEN section_slab.chainage - half_width AND section_slab.chainage + half_width;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.section_slab(int, float8, float8[], float8) IS
+'Points at most half_width (m of chainage) from the plane of a section, in its frame: right and up of the axis, m. Source: Gonçalves et al. (2012), stage 4.';
+
+
 -- Angular classes of the sections of a kilometre.
 --
 -- The points at most half_width from a section's plane are taken in polar coordinates about the axis, angle 0 at the upward
 -- direction and positive to the right, and grouped by classes of angle_step degrees, class 0 beginning at -180°. Each class
 -- is described by a straight line through its points: radius is where the line meets the middle of the class, slope its
 -- inclination there (outwards per metre to the right, in the class' own frame), so the class' width cuts no corner. Points
--- are kept within two standard deviations, taken robustly from the median distance to the line through the medians of the
--- neighbouring classes; what the median leaves out can't shift it.
+-- are kept within two standard deviations, taken robustly from the median distance to the line through the median
+-- radius, parallel to that through the medians of the classes beside it; what the median leaves out can't shift it.
 -- sigma: standard deviation of the points kept from the line, m; spread: variance of their position along it, m².
 -- only: the sections wanted, as segment * 100 + half.
 CREATE OR REPLACE FUNCTION tunnel_api.section_classes(
     survey_id int, km int, half_width float8, angle_step float8, "only" int[])
 RETURNS TABLE (
     segment int, half int2, class int, radius float8, slope float8, sigma float8, spread float8, points bigint)
-LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
 ROWS 10000
 SET enable_nestloop = off  -- the planner expects few classes and would compare each with every other
-SET plan_cache_mode = force_custom_plan
 AS $$
-#variable_conflict use_column
-BEGIN
-    RETURN QUERY
-    WITH plane AS (
-        SELECT p.segment, p.half, p.chainage,
-            p.frame[1] AS x, p.frame[2] AS y, p.frame[3] AS z, p.frame[7] AS ux, p.frame[8] AS uy,
-            p.frame[10] AS wx, p.frame[11] AS wy, p.frame[12] AS wz
+    WITH polar AS (
+        SELECT p.segment, p.half, sqrt(q.u * q.u + q.w * q.w) AS r, degrees(atan2(q.u, q.w)) + 180 AS angle
         FROM tunnel_api.section_plane(section_classes.survey_id, section_classes.km) p
+        CROSS JOIN LATERAL tunnel_api.section_slab(
+            section_classes.survey_id, p.chainage, p.frame, section_classes.half_width) q
         WHERE p.segment * 100 + p.half = ANY (section_classes."only")
-    ), polar AS (
-        SELECT s.segment, s.half, sqrt(q.u * q.u + q.w * q.w) AS r, degrees(atan2(q.u, q.w)) AS angle
-        FROM plane s
-        JOIN tunnel.point p ON p.segment = s.segment AND abs(p.chainage - s.chainage) <= section_classes.half_width
-        CROSS JOIN LATERAL (SELECT ST_X(p.geom) - s.x AS dx, ST_Y(p.geom) - s.y AS dy, ST_Z(p.geom) - s.z AS dz) d
-        CROSS JOIN LATERAL (SELECT d.dx * s.ux + d.dy * s.uy AS u, d.dx * s.wx + d.dy * s.wy + d.dz * s.wz AS w) q
-        WHERE p.survey_id = section_classes.survey_id
-          -- near the ends of a kilometre a point may lie in the partition next door
-          AND p.km BETWEEN section_classes.km - 1 AND section_classes.km + 1
-          AND p.chainage BETWEEN section_classes.km * 1000 - 2 AND section_classes.km * 1000 + 1002
     ), classed AS (
-        SELECT p.segment, p.half, p.r,
-            least(floor((p.angle + 180) / section_classes.angle_step), 360 / section_classes.angle_step - 1)::int AS class, p.angle
+        SELECT p.segment, p.half, p.r, p.angle,
+            least(floor(p.angle / section_classes.angle_step), 360 / section_classes.angle_step - 1)::int AS class
         FROM polar p
     ), local AS MATERIALIZED (
-        SELECT c.segment, c.half, c.class, c.r, c.r * sind(a.delta) AS x, c.r * cosd(a.delta) AS y
+        SELECT c.segment, c.half, c.class, c.r,
+            c.r * sind(c.angle - (c.class + 0.5) * section_classes.angle_step) AS x,
+            c.r * cosd(c.angle - (c.class + 0.5) * section_classes.angle_step) AS y
         FROM classed c
-        CROSS JOIN LATERAL (SELECT c.angle + 180 - (c.class + 0.5) * section_classes.angle_step AS delta) a
     ), middle AS (
         SELECT l.segment, l.half, l.class, percentile_cont(0.5) WITHIN GROUP (ORDER BY l.r) AS radius
         FROM local l
         GROUP BY l.segment, l.half, l.class
     ), rough AS (
-        -- the rough line: through the median, parallel to that from neighbour to neighbour
         SELECT m.segment, m.half, m.class, m.radius,
-            coalesce((b.radius - a.radius) / (2 * radians(section_classes.angle_step) * m.radius), 0) AS slope
+            coalesce((lead(m.radius) OVER beside - lag(m.radius) OVER beside)
+                / (radians(section_classes.angle_step) * (lead(m.class) OVER beside - lag(m.class) OVER beside) * m.radius),
+                0) AS slope
         FROM middle m
-        CROSS JOIN LATERAL (SELECT round(360 / section_classes.angle_step)::int AS classes) t
-        LEFT JOIN middle a ON a.segment = m.segment AND a.half = m.half AND a.class = (m.class + t.classes - 1) % t.classes
-        LEFT JOIN middle b ON b.segment = m.segment AND b.half = m.half AND b.class = (m.class + 1) % t.classes
-    ), residual AS (
-        SELECT l.*, abs(l.y - r.radius - r.slope * l.x) AS distance
+        WINDOW beside AS (PARTITION BY m.segment, m.half ORDER BY m.class)
+    ), residual AS MATERIALIZED (
+        SELECT l.segment, l.half, l.class, l.x, l.y, abs(l.y - r.radius - r.slope * l.x) AS distance
         FROM local l
         JOIN rough r ON r.segment = l.segment AND r.half = l.half AND r.class = l.class
     ), bound AS (
@@ -93,8 +103,7 @@ BEGIN
     JOIN bound b ON b.segment = r.segment AND b.half = r.half AND b.class = r.class
     WHERE r.distance <= b.tolerance
     GROUP BY r.segment, r.half, r.class
-    ORDER BY 1, 2, 3;
-END
+    ORDER BY 1, 2, 3
 $$;
 COMMENT ON FUNCTION tunnel_api.section_classes(int, int, float8, float8, int[]) IS
 'Angular classes of the sections of one kilometre: a line through the points within two standard deviations, by class of angle_step degrees counted from -180°. radius, sigma in m, slope in m/m, spread in m². Source: Gonçalves et al. (2012), stage 4.';

@@ -268,7 +268,7 @@ COMMENT ON FUNCTION tunnel_api.section_curve(float8, float8[], float8[], float8[
 -- of ten hold min_points points: where profiles are far apart it widens until the classes fill.
 CREATE OR REPLACE FUNCTION tunnel_api.section_build(
     survey_id int, km int,
-    angle_step float8 DEFAULT 5.0, half_width float8 DEFAULT 0.1, max_half_width float8 DEFAULT 2.5, min_points int DEFAULT 5,
+    angle_step float8 DEFAULT 5.0, half_width float8 DEFAULT 0.15, max_half_width float8 DEFAULT 2.5, min_points int DEFAULT 5,
     protrusion float8 DEFAULT 0.03)
 RETURNS int
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
@@ -277,7 +277,7 @@ DECLARE
     classes constant int := round(360 / angle_step);
     width float8 := least(half_width, max_half_width);
     pending int[];
-    filled int[];
+    complete int[];
     built int;
 BEGIN
     IF abs(360 / angle_step - classes) > 1e-9 OR angle_step < 1 OR classes % 2 = 1 THEN
@@ -297,17 +297,19 @@ BEGIN
             FROM class c
             GROUP BY c.segment, c.half
             HAVING count(*) >= 0.9 * classes OR width >= section_build.max_half_width
-        ), curve AS (
-            SELECT d.segment, d.half, k.class, k.radius, k.slope, k.sigma, k.points, q.*
+        ), filled AS (
+            SELECT d.segment, d.half, array_agg(i ORDER BY i) AS class, array_agg(c.radius ORDER BY i) AS radius,
+                array_agg(c.slope ORDER BY i) AS slope, array_agg(c.sigma ORDER BY i) AS sigma,
+                array_agg(c.spread ORDER BY i) AS spread, array_agg(coalesce(c.points, 0) ORDER BY i) AS points
             FROM done d
-            CROSS JOIN LATERAL (
-                SELECT array_agg(i ORDER BY i) AS class, array_agg(c.radius ORDER BY i) AS radius,
-                    array_agg(c.slope ORDER BY i) AS slope, array_agg(c.sigma ORDER BY i) AS sigma,
-                    array_agg(c.spread ORDER BY i) AS spread, array_agg(coalesce(c.points, 0) ORDER BY i) AS points
-                FROM generate_series(0, classes - 1) AS i
-                LEFT JOIN class c ON c.segment = d.segment AND c.half = d.half AND c.class = i) k
+            CROSS JOIN generate_series(0, classes - 1) AS i
+            LEFT JOIN class c ON c.segment = d.segment AND c.half = d.half AND c.class = i
+            GROUP BY d.segment, d.half
+        ), curve AS (
+            SELECT f.segment, f.half, f.class, f.slope, f.sigma, f.points, q.*
+            FROM filled f
             CROSS JOIN LATERAL tunnel_api.section_curve(
-                section_build.angle_step, k.radius, k.slope, k.sigma, k.spread, section_build.protrusion) q
+                section_build.angle_step, f.radius, f.slope, f.sigma, f.spread, section_build.protrusion) q
         ), written AS (
             INSERT INTO tunnel.section (survey_id, km, segment, half, chainage, half_width, angle_step, radius, arc, geom,
                 points, interpolated)
@@ -335,8 +337,8 @@ BEGIN
             CROSS JOIN LATERAL unnest(c.class, c.class_radius, c.slope, c.sigma, c.points, c.class_state)
                 AS k (class, radius, slope, sigma, points, state)
         )
-        SELECT coalesce(array_agg(d.segment * 100 + d.half), '{}') INTO filled FROM done d;
-        SELECT coalesce(array_agg(q), '{}') INTO pending FROM unnest(pending) q WHERE q <> ALL (filled);
+        SELECT coalesce(array_agg(d.segment * 100 + d.half), '{}') INTO complete FROM done d;
+        SELECT coalesce(array_agg(q), '{}') INTO pending FROM unnest(pending) q WHERE q <> ALL (complete);
         EXIT WHEN width >= max_half_width OR cardinality(pending) = 0;
         width := least(2 * width, max_half_width);
     END LOOP;

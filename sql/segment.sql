@@ -128,11 +128,13 @@ COMMENT ON FUNCTION tunnel_api.segment_build(int, int) IS
 CREATE OR REPLACE FUNCTION tunnel_api.segment_tag(survey_id int, km int)
 RETURNS bigint
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
+SET work_mem = '256MB'  -- a kilometre at survey density is sorted in memory
 AS $$
 DECLARE
     building constant text := tunnel_api.partition_name(survey_id, km) || '_new';
     spacing float8;
     tagged bigint;
+    counts bigint[];
     n int[]; a float8[]; b float8[];
     px float8[]; py float8[]; pz float8[]; pl float8[];
     qx float8[]; qy float8[]; qz float8[]; ql float8[];
@@ -151,44 +153,37 @@ BEGIN
     EXECUTE format('DROP TABLE IF EXISTS tunnel.%I', building);
     EXECUTE format($query$
         CREATE TABLE tunnel.%I AS
-        WITH coarse AS (
-            SELECT p.*, s.n + CASE
-                WHEN p.chainage / $3 - s.n BETWEEN 0.15 AND 0.85 THEN 0
-                WHEN ST_X(p.geom) * s.px + ST_Y(p.geom) * s.py + ST_Z(p.geom) * s.pz < s.pl THEN -1
-                WHEN ST_X(p.geom) * s.qx + ST_Y(p.geom) * s.qy + ST_Z(p.geom) * s.qz >= s.ql THEN 1
-                ELSE 0 END AS number
-            FROM tunnel.point p
-            LEFT JOIN unnest($4, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, px, py, pz, pl, qx, qy, qz, ql)
-                ON s.n = floor(p.chainage / $3)::int
-            WHERE p.survey_id = $1 AND p.km = $2
-        ), measured AS (
-            SELECT c.*, s.n AS found, s.a, s.b,
-                ST_X(c.geom) * s.px + ST_Y(c.geom) * s.py + ST_Z(c.geom) * s.pz - s.pl AS before,
-                s.ql - (ST_X(c.geom) * s.qx + ST_Y(c.geom) * s.qy + ST_Z(c.geom) * s.qz) AS after
-            FROM coarse c
-            LEFT JOIN unnest($4, $13, $14, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, a, b, px, py, pz, pl, qx, qy, qz, ql)
-                ON s.n = c.number
-        )
-        SELECT m.survey_id, m.km,
-            coalesce(m.a + (m.b - m.a) * m.before / nullif(m.before + m.after, 0), m.chainage) AS chainage,
-            m.gps_time, m.geom, m.found AS segment, m.scan_id, m.file_id, m.intensity, m.classification
-        FROM measured m
+        SELECT c.survey_id, c.km,
+            coalesce(s.a + (s.b - s.a) * m.before / nullif(m.before + m.after, 0), c.chainage) AS chainage,
+            c.gps_time, c.geom, s.n AS segment, c.scan_id, c.file_id, c.intensity, c.classification
+        FROM (SELECT p.*, s.n + CASE
+                  WHEN p.x * s.px + p.y * s.py + p.z * s.pz < s.pl THEN -1
+                  WHEN p.x * s.qx + p.y * s.qy + p.z * s.qz >= s.ql THEN 1
+                  ELSE 0 END AS number
+              FROM (SELECT p.*, ST_X(p.geom) AS x, ST_Y(p.geom) AS y, ST_Z(p.geom) AS z,
+                        clock_timestamp()  -- a fence that lets the scan be parallel: the coordinates are taken out once
+                    FROM tunnel.point p
+                    WHERE p.survey_id = $1 AND p.km = $2) p
+              LEFT JOIN unnest($4, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, px, py, pz, pl, qx, qy, qz, ql)
+                  ON s.n = floor(p.chainage / $3)::int) c
+        LEFT JOIN unnest($4, $13, $14, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, a, b, px, py, pz, pl, qx, qy, qz, ql)
+            ON s.n = c.number
+        CROSS JOIN LATERAL (
+            SELECT c.x * s.px + c.y * s.py + c.z * s.pz - s.pl AS before,
+                s.ql - (c.x * s.qx + c.y * s.qy + c.z * s.qz) AS after) m
         ORDER BY 3
     $query$, building)
     USING survey_id, km, spacing, n, px, py, pz, pl, qx, qy, qz, ql, a, b;
     PERFORM tunnel_api.partition_swap(segment_tag.survey_id, segment_tag.km);
 
-    WITH counted AS (
-        SELECT p.segment, count(*) AS points
-        FROM tunnel.point p
-        WHERE p.survey_id = segment_tag.survey_id AND p.km = segment_tag.km
-        GROUP BY p.segment
-    ), written AS (
-        UPDATE tunnel.segment s SET points = c.points
-        FROM counted c
-        WHERE s.survey_id = segment_tag.survey_id AND s.km = segment_tag.km AND s.n = c.segment
-    )
-    SELECT coalesce(sum(c.points) FILTER (WHERE c.segment IS NOT NULL), 0) INTO tagged FROM counted c;
+    SELECT array_agg(c.segment), array_agg(c.points), coalesce(sum(c.points), 0) INTO n, counts, tagged
+    FROM (SELECT p.segment, count(*) AS points
+          FROM tunnel.point p
+          WHERE p.survey_id = segment_tag.survey_id AND p.km = segment_tag.km AND p.segment IS NOT NULL
+          GROUP BY p.segment) c;
+    UPDATE tunnel.segment s SET points = c.points
+    FROM unnest(n, counts) AS c (n, points)
+    WHERE s.survey_id = segment_tag.survey_id AND s.km = segment_tag.km AND s.n = c.n;
     RETURN tagged;
 END
 $$;
