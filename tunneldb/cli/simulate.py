@@ -114,11 +114,11 @@ class _GroupedCommand(click.Command):
 
 def _options(command: Callable[..., None]) -> Callable[..., None]:
     """Add all options of the groups to a command."""
-    defaults = {f.name: f.default for f in fields(Parameters)}
+    defaults: dict[str, Any] = {f.name: f.default for f in fields(Parameters)}
     for options in reversed(_GROUPS.values()):
         for o in reversed(options):
             default = defaults[o.field]
-            shown = " ".join(f"{v:.10g}" if o.type is float else str(v) for v in (default if o.nargs > 1 else [default]))
+            shown = " ".join(f"{v:.10g}" if isinstance(v, float) else str(v) for v in (default if o.nargs > 1 else [default]))
             command = click.option(
                 "--" + o.field.replace("_", "-"),
                 o.field,
@@ -143,7 +143,7 @@ def _options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--no-truth", is_flag=True, help="Leave out the truth of each point (21 bytes a point).")
 @_options
 def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> None:
-    """Make a simulated scan of a tunnel, with its truth, in the folder OUT.
+    r"""Make a simulated scan of a tunnel, with its truth, in the folder OUT.
 
     A section is swept along a curved and sloping axis, perpendicular to it. A static scanner or a profiler on a
     trolley shoots rays at the lining, which carries leaks, cables, a tray, boxes, lamps, rails and refuge niches;

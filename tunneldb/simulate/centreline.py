@@ -53,9 +53,7 @@ def _plan_at(row: Array, sigma: float) -> tuple[float, float, float, float, floa
 
 
 @njit(cache=True, nogil=True, inline="always")
-def axis_at(
-    plan: Array, profile: Array, s: float
-) -> tuple[float, float, float, float, float, float, float, float]:
+def axis_at(plan: Array, profile: Array, s: float) -> tuple[float, float, float, float, float, float, float, float]:
     """Axis at chainage ``s``: x, y, z, cos and sin of direction, curvature, grade, change of grade.
 
     The first and last elements continue beyond the ends.
@@ -247,6 +245,6 @@ class CentreLine:
 
     def vertices(self, spacing: float) -> Array:
         """Axis vertices every ``spacing`` m of chainage, the last at the end of the tunnel; (n, 3)."""
-        count = int(math.ceil((self.end - self.start) / spacing - 1e-9))
+        count = math.ceil((self.end - self.start) / spacing - 1e-9)
         s = np.append(self.start + spacing * np.arange(count), self.end)
         return self.position(s)

@@ -181,30 +181,17 @@ def furnish(tunnel: Tunnel, rng: np.random.Generator) -> list[Appendage]:
     line, section = tunnel.line, tunnel.section
     start, end = line.start, line.end
     lining = section.floor_arc
-    items = []
-    for side, share, count in ((1, 0.72, 2), (-1, 0.62, 1)):
-        for i in range(count):
-            items.append(
-                Appendage(
-                    "cable",
-                    start,
-                    end,
-                    side * (share * lining + 0.25 * i),
-                    float(rng.uniform(0.07, 0.15)),
-                    *(2 * [float(rng.uniform(0.04, 0.07))]),
-                    float(rng.uniform(5.0, 7.0)),
-                )
-            )
-    items.append(Appendage("tray", start, end, -0.80 * lining, 0.13, 0.30, 0.10, 5.0))
-    gap = 30.0
-    for s in np.arange(start + 0.4 * gap, end - 2.0, gap):
-        at = float(s + rng.uniform(-3.0, 3.0))
-        items.append(Appendage("box", at, at + 0.6, 0.55 * lining, 0.10, 0.45, 0.20, float(rng.uniform(4.0, 6.0))))
-    for s in np.arange(start + 5.0, end - 2.0, 12.0):
-        items.append(Appendage("lamp", float(s), float(s) + 1.2, 0.22 * lining, 0.15, 0.16, 0.12, 5.0))
-    for side in (-1, 1):
-        arc = side * (section.half_perimeter - 0.75)
-        items.append(Appendage("rail", start, end, arc, 0.085, 0.07, 0.17, 3.0))
+    items = [Appendage("tray", start, end, -0.80 * lining, 0.13, 0.30, 0.10, 5.0)]
+    for arc in (0.72 * lining, 0.72 * lining + 0.25, -0.62 * lining):
+        off, thick, drop = rng.uniform((0.07, 0.04, 5.0), (0.15, 0.07, 7.0)).tolist()
+        items.append(Appendage("cable", start, end, arc, off, thick, thick, drop))
+    for s in np.arange(start + 12.0, end - 5.0, 30.0).tolist():
+        at, drop = s + float(rng.uniform(-3.0, 3.0)), float(rng.uniform(4.0, 6.0))
+        items.append(Appendage("box", at, at + 0.6, 0.55 * lining, 0.10, 0.45, 0.20, drop))
+    lamps = np.arange(start + 5.0, end - 2.0, 12.0).tolist()
+    items += [Appendage("lamp", s, s + 1.2, 0.22 * lining, 0.15, 0.16, 0.12, 5.0) for s in lamps]
+    rails = section.half_perimeter - 0.75, 0.75 - section.half_perimeter
+    items += [Appendage("rail", start, end, arc, 0.085, 0.07, 0.17, 3.0) for arc in rails]
     return items
 
 

@@ -90,7 +90,7 @@ def place(
     ready = [prep(t) for t in taken]
     leaks = []
     for number, size in enumerate(sizes):
-        for _ in range(2000):
+        for _ in range(600):
             s = float(rng.uniform(line.start + end_margin, line.end - end_margin))
             arc = float(rng.uniform(-lowest, lowest))
             polygon = _shape(rng, float(size), 1 if arc >= 0 else -1, number % 3 == 0 and size >= 0.5)
@@ -103,9 +103,7 @@ def place(
             if inside and polygon.is_valid and not any(r.intersects(polygon) for r in ready):
                 break
         else:
-            raise UserError(
-                f"no room on the lining for leak {number + 1} of {count} ({size:.2f} m²): ask for fewer or smaller"
-            )
+            raise UserError(f"no room on the lining for leak {number + 1} of {count} ({size:.2f} m²): ask for fewer or smaller")
         ready.append(prep(polygon.buffer(0.3)))
         centre = polygon.representative_point()
         factor = float(tunnel.area_factor(np.array([centre.x]), np.array([centre.y]))[0])

@@ -28,7 +28,7 @@ AXIS_SPACING = 20.0
 # A fixed day, so that the same seed gives the same bytes.
 CREATED = date(2024, 5, 4)
 
-TRUTH = {
+TRUTH: dict[str, np.dtype[Any]] = {
     "chainage": np.dtype(np.float64),
     "arc": np.dtype(np.float32),
     "offset": np.dtype(np.float32),
@@ -58,9 +58,13 @@ class Files:
             return path.replace(folder / path.name)
 
         return Files(
-            [to(p) for p in self.clouds],
-            [to(p) for p in self.truth],
-            *(to(p) for p in (self.axis, self.poses, self.reference, self.leaks, self.parameters)),
+            clouds=[to(p) for p in self.clouds],
+            truth=[to(p) for p in self.truth],
+            axis=to(self.axis),
+            poses=to(self.poses),
+            reference=to(self.reference),
+            leaks=to(self.leaks),
+            parameters=to(self.parameters),
             points=self.points,
         )
 
@@ -144,12 +148,8 @@ def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
         rows = np.column_stack([np.arange(1, len(stations) + 1), stations])
         files.poses = _csv(Path(f"{base}.stations.csv"), "scan_id,x,y,z", rows, ["%d"] + ["%.4f"] * 3)
     else:
-        files.poses = _csv(
-            Path(f"{base}.trajectory.csv"), "time,x,y,z", scanner.trajectory(), ["%.3f"] + ["%.4f"] * 3
-        )
-    files.reference = _csv(
-        Path(f"{base}.reference.csv"), "range_m,intensity_db", simulation.reference, ["%.2f", "%.3f"]
-    )
+        files.poses = _csv(Path(f"{base}.trajectory.csv"), "time,x,y,z", scanner.trajectory(), ["%.3f"] + ["%.4f"] * 3)
+    files.reference = _csv(Path(f"{base}.reference.csv"), "range_m,intensity_db", simulation.reference, ["%.2f", "%.3f"])
     files.leaks = Path(f"{base}.truth.geojson")
     features = [
         {
@@ -193,9 +193,7 @@ class _Sink:
         self.header = header
         self.cloud = folder / f"{base}.laz"
         self.truth = folder / f"{base}.truth.npz"
-        self.points = laspy.open(
-            self.cloud, mode="w", header=header, laz_backend=laspy.LazBackend.LazrsParallel
-        )
+        self.points = laspy.open(self.cloud, mode="w", header=header, laz_backend=laspy.LazBackend.LazrsParallel)
         self.columns = _TruthWriter(self.truth, folder) if truth else None
 
     def add(self, cloud: Cloud) -> None:
@@ -242,9 +240,7 @@ def write(
         raise UserError(f"cannot write to {folder}: {error.strerror or error}") from error
 
 
-def _scan(
-    simulation: Simulation, folder: Path, truth: bool, progress: Callable[[float, int], None] | None
-) -> Files:
+def _scan(simulation: Simulation, folder: Path, truth: bool, progress: Callable[[float, int], None] | None) -> Files:
     """Write points and their truth."""
     p, line = simulation.parameters, simulation.tunnel.line
     files = Files()

@@ -6,6 +6,7 @@ import math
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
+import numpy as np
 import pyproj
 from pyproj.exceptions import CRSError
 
@@ -121,7 +122,7 @@ class Parameters:
         self.crs()
         tunnel = self.tunnel()
         height = tunnel.section.floor + self.scanner_height
-        _, offset, _ = tunnel.section.project([self.scanner_offset], [height])
+        _, offset, _ = tunnel.section.project(np.array([self.scanner_offset]), np.array([height]))
         if offset[0] < 0.5:
             raise UserError(
                 f"the scanner, {self.scanner_height:g} m above the floor and {self.scanner_offset:g} m off the"

@@ -37,6 +37,8 @@ Index = NDArray[np.int64]
 
 # Beyond this incidence the echo is lost, as scanners lose it.
 MINIMUM_COSINE = 0.087
+# Least range of the scanner, m.
+NEAREST = 1.0
 
 # A Newton step for chainage leaves an error of its square times the curvature, in chainage, u and w: after a step
 # of this many metres the next iteration of the ray corrects what is left.
@@ -113,9 +115,7 @@ def _straight(parts: Array, u: float, w: float, du: float, dw: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _lining(
-    sc: Scene, o: Array, d: Array, s: float, furthest: float
-) -> tuple[float, float, float, float, float, float]:
+def _lining(sc: Scene, o: Array, d: Array, s: float, furthest: float) -> tuple[float, float, float, float, float, float]:
     """Range along a ray to the swept section, chainage, arc and cosine there, then at the start: offset, chainage.
 
     Range is NaN when nothing is met within ``furthest``.
@@ -169,7 +169,7 @@ def _lining(
 def _item(sc: Scene, o: Array, d: Array, s: float, r: float, wall: float) -> tuple[float, int, float]:
     """March from range r to the lining at ``wall``: range to an appendage (NaN: none), which, cosine there."""
     r_begin = r
-    for i in range(200):
+    for _ in range(200):
         x, y, z = o[0] + r * d[0], o[1] + r * d[1], o[2] + r * d[2]
         step, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
         s += step
@@ -215,11 +215,7 @@ def _niche(sc: Scene, o: Array, d: Array, s: float, r: float) -> tuple[float, fl
         inside = True
         for axis in range(3):
             a = row[5 + 3 * axis : 8 + 3 * axis]
-            at = (
-                (o[0] + r * d[0] - row[2]) * a[0]
-                + (o[1] + r * d[1] - row[3]) * a[1]
-                + (o[2] + r * d[2] - row[4]) * a[2]
-            )
+            at = (o[0] + r * d[0] - row[2]) * a[0] + (o[1] + r * d[1] - row[3]) * a[1] + (o[2] + r * d[2] - row[4]) * a[2]
             rate = d[0] * a[0] + d[1] * a[1] + d[2] * a[2]
             low, high = 0.0, row[16]
             if axis == 0:
@@ -346,16 +342,18 @@ def trace(
         elif klass == APPENDAGE and chance[i, 0] < outliers + 0.01:
             r += v * (wall - r)  # a mixed pixel: the beam meets the appendage's edge and the wall behind it
             klass = OUTLIER
+        if r < NEAREST or r > furthest:
+            continue
         if klass == OUTLIER:
             leak = -1
             drop += 3.0
         x, y, z = o[0] + r * d[0], o[1] + r * d[1], o[2] + r * d[2]
         for _ in range(10):
-            step, u, w, ca, sa, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
-            s += step
-            if abs(step) < 1e-3:
+            found = newton_step(sc.plan, sc.profile, x, y, z, s)
+            s += found[0]
+            if abs(found[0]) < 1e-3:
                 break
-        arc, offset, gu, gw = nearest(sc.parts, u, w)
+        arc, offset, _, _ = nearest(sc.parts, found[1], found[2])
         if s < sc.ends[0] or s > sc.ends[1]:
             continue
         out[i, 0] = r

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -63,7 +64,7 @@ class Scanner:
         self.height = tunnel.section.floor + p.scanner_height
         count = max(1, math.ceil((line.end - line.start) / p.station_spacing - 1e-9))
         gap = (line.end - line.start) / count
-        self.station_chainage = line.start + gap * (np.arange(count) + 0.5)
+        self.station_chainage: Array = line.start + gap * (np.arange(count, dtype=np.float64) + 0.5)
         # Tripods stand where there is room, not in the middle: alternately to both sides.
         self.station_offset = p.scanner_offset * np.where(np.arange(count) % 2 == 0, 1.0, -1.0)
 
@@ -107,7 +108,7 @@ class Scanner:
             deep = max(1, RAYS // p.profile_points)
             edges = self._file_edges()
             index = 0
-            for low, high in zip(edges[:-1], edges[1:], strict=True):
+            for low, high in pairwise(edges.tolist()):
                 begin = min(profiles, math.ceil((low - line.start) / p.profile_spacing - 1e-9))
                 end = min(profiles, math.ceil((high - line.start) / p.profile_spacing - 1e-9))
                 for first in range(begin, end, deep):
@@ -126,11 +127,11 @@ class Scanner:
         step = RAYS / (density * 2.0 * self.tunnel.section.half_perimeter)
         edges = self._file_edges()
         index = 0
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
+        for low, high in pairwise(edges.tolist()):
             count = max(1, math.ceil((high - low) / step))
             cuts = np.linspace(low, high, count + 1)
-            for a, b in zip(cuts[:-1], cuts[1:], strict=True):
-                yield BlockPlan(index, float(a), 0, 0, 0, float(b))
+            for a, b in pairwise(cuts.tolist()):
+                yield BlockPlan(index, a, 0, 0, 0, b)
                 index += 1
 
     def _grid(self) -> tuple[int, int]:
@@ -157,13 +158,14 @@ class Scanner:
         direction[:, :, 1] = np.cos(azimuth)[:, None] * sz
         direction[:, :, 2] = cz
         k = plan.station
+        pace = 0.8 * STATION_TIME / (rows * columns)
         origin = self._at(self.station_chainage[k : k + 1], self.station_offset[k])
         shot = plan.first * rows + np.arange(n)
         return Rays(
             np.repeat(origin, n, axis=0),
             direction.reshape(n, 3),
             np.full(n, plan.chainage),
-            START_TIME + STATION_TIME * k + shot * (0.8 * STATION_TIME / (rows * columns)),
+            START_TIME + STATION_TIME * k + pace * shot.astype(np.float64),
             np.full(n, k + 1, dtype=np.uint16),
         )
 
@@ -171,7 +173,7 @@ class Scanner:
         """Mirror turning evenly while the trolley moves: each profile is one turn of a helix."""
         p, line = self.parameters, self.tunnel.line
         shot = np.arange(plan.first, plan.last)
-        s = line.start + shot * (p.profile_spacing / p.profile_points)
+        s: Array = line.start + shot * np.float64(p.profile_spacing / p.profile_points)
         f = line.frame(s)
         origin = f.position - line.origin + p.scanner_offset * f.u + self.height * f.w
         angle = 2.0 * np.pi / p.profile_points * ((shot % p.profile_points) + 0.5)

@@ -75,9 +75,7 @@ def _unroll_many(plan: Array, profile: Array, parts: Array, xyz: Array, s: Array
 
 
 @njit(cache=True, nogil=True)
-def _roll_many(
-    plan: Array, profile: Array, parts: Array, s: Array, arc: Array, offset: Array, out: Array
-) -> None:
+def _roll_many(plan: Array, profile: Array, parts: Array, s: Array, arc: Array, offset: Array, out: Array) -> None:
     for i in range(s.shape[0]):
         ax, ay, az, c, n, _, g, _ = axis_at(plan, profile, s[i])
         pu, pw, nu, nw = on_section(parts, arc[i])
