@@ -134,7 +134,7 @@ DECLARE
     building constant text := tunnel_api.partition_name(survey_id, km) || '_new';
     spacing float8;
     tagged bigint;
-    counts bigint[];
+    numbers int[]; counts bigint[];
     n int[]; a float8[]; b float8[];
     px float8[]; py float8[]; pz float8[]; pl float8[];
     qx float8[]; qy float8[]; qz float8[]; ql float8[];
@@ -176,13 +176,13 @@ BEGIN
     USING survey_id, km, spacing, n, px, py, pz, pl, qx, qy, qz, ql, a, b;
     PERFORM tunnel_api.partition_swap(segment_tag.survey_id, segment_tag.km);
 
-    SELECT array_agg(c.segment), array_agg(c.points), coalesce(sum(c.points), 0) INTO n, counts, tagged
+    SELECT array_agg(c.segment), array_agg(c.points), coalesce(sum(c.points), 0) INTO numbers, counts, tagged
     FROM (SELECT p.segment, count(*) AS points
           FROM tunnel.point p
           WHERE p.survey_id = segment_tag.survey_id AND p.km = segment_tag.km AND p.segment IS NOT NULL
           GROUP BY p.segment) c;
     UPDATE tunnel.segment s SET points = c.points
-    FROM unnest(n, counts) AS c (n, points)
+    FROM unnest(numbers, counts) AS c (n, points)
     WHERE s.survey_id = segment_tag.survey_id AND s.km = segment_tag.km AND s.n = c.n;
     RETURN tagged;
 END
