@@ -144,13 +144,16 @@ def test_niche_is_as_deep_as_it_says() -> None:
     assert np.median(back) == pytest.approx(niche.depth, abs=0.01)
 
 
-def test_outliers_are_as_many_as_asked_and_off_the_surface() -> None:
-    cloud = simulate(Parameters(**FEW, scanner="profiler", outliers=0.05, appendages=False))
+def test_outliers_are_as_many_as_asked_off_the_surface_and_within_range() -> None:
+    p = Parameters(**FEW, scanner="profiler", outliers=0.05, appendages=False)
+    cloud = simulate(p)
     stray = cloud.klass == 4
-    assert cloud.range.min() >= 1.0
     assert stray.mean() == pytest.approx(0.05, abs=0.005)
     assert (np.abs(cloud.offset[stray]) > 0.02).mean() > 0.9
     assert np.all(cloud.leak[stray] == -1)
+    distance = np.linalg.norm(cloud.xyz - sight(Simulation(p), cloud), axis=1)
+    assert distance.min() > 1.0 - 1e-3
+    assert distance.max() < p.max_range
 
 
 @pytest.mark.parametrize("scanner", ["static", "profiler"])

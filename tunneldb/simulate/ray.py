@@ -337,7 +337,7 @@ def trace(
         v = chance[i, 1]
         if chance[i, 0] < outliers:
             # Most isolated points hang in the air, some lie behind the wall (multipath).
-            r = r * (0.15 + 1.1 * v) if v < 0.7 else r * (1.0 + 0.5 * (v - 0.7))
+            r = NEAREST + v / 0.7 * (0.95 * r - NEAREST) if v < 0.7 else r * (1.0 + 0.5 * (v - 0.7))
             klass = OUTLIER
         elif klass == APPENDAGE and chance[i, 0] < outliers + 0.01:
             r += v * (wall - r)  # a mixed pixel: the beam meets the appendage's edge and the wall behind it
