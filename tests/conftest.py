@@ -62,9 +62,13 @@ def empty_dsn(server_dsn: str) -> Iterator[str]:
 
 
 @pytest.fixture
-def dsn(server_dsn: str, template: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """DSN of a fresh, installed database; also in TUNNELDB_DSN, for commands."""
-    with _temporary(server_dsn, template) as fresh:
+def dsn(request: pytest.FixtureRequest, server_dsn: str, template: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """DSN of a fresh, installed database; also in TUNNELDB_DSN, for commands.
+
+    It holds the example survey when the test asks for `example` (see integration/conftest.py).
+    """
+    source = request.getfixturevalue("example_template") if "example" in request.fixturenames else template
+    with _temporary(server_dsn, source) as fresh:
         monkeypatch.setenv("TUNNELDB_DSN", fresh)
         yield fresh
 

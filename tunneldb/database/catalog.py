@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,6 +59,8 @@ def add_tunnel(
         For a name that is taken, an SRID that is unknown or not in metres, or an axis that is none.
     """
     _require_name(name)
+    if not math.isfinite(start_chainage) or not math.isfinite(spacing):
+        raise UserError(f"start chainage {start_chainage:g} m and spacing {spacing:g} m must be finite numbers")
     _require_metres(connection, srid)
     xyz = _read_axis(axis)
     alignment = Alignment.from_polyline(xyz, start_chainage, spacing)

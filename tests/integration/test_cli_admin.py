@@ -1,0 +1,178 @@
+"""init, status, check, psql, server: what an administrator types."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import psycopg
+import pytest
+from click.testing import CliRunner, Result
+from psycopg.conninfo import make_conninfo
+
+from tunneldb.cli.main import COMMANDS, main
+from tunneldb.database.server import Server
+
+TUNNELDB = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, [*arguments])
+
+
+@pytest.fixture
+def home(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A home without a server, and no DSN."""
+    folder = Path(tempfile.mkdtemp(prefix="tunneldb-cli-"))
+    monkeypatch.setenv("TUNNELDB_HOME", str(folder))
+    monkeypatch.delenv("TUNNELDB_DSN", raising=False)
+    yield folder
+    Server(folder).stop()
+    shutil.rmtree(folder)
+
+
+def test_every_verb_can_be_imported_and_has_help() -> None:
+    for name in COMMANDS:
+        if name != "psql":  # --help is psql's own
+            result = run(name, "--help")
+            assert result.exit_code == 0, name
+            assert result.output.startswith("Usage: ")
+
+
+def test_help_imports_no_verb() -> None:
+    program = (
+        "import sys, tunneldb.cli.main as m\n"
+        "try: m.main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "print([name for name in ('numpy', 'psycopg', 'numba') if name in sys.modules])"
+    )
+    output = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    assert output.endswith("[]\n")
+
+
+def test_without_a_dsn_everything_starts_by_itself(home: Path) -> None:
+    environment = os.environ | {"TUNNELDB_HOME": str(home)}
+
+    def tunneldb(*arguments: str) -> str:
+        result = subprocess.run([*TUNNELDB, *arguments], env=environment, capture_output=True, text=True, check=False)
+        return f"{result.returncode} {result.stdout}{result.stderr}"
+
+    assert tunneldb("server", "status").startswith("0 absent")
+    assert "tunneldb init" in tunneldb("status")
+    assert "schema tunnel created" in tunneldb("init")
+    assert "is up to date" in tunneldb("init")
+    assert tunneldb("psql", "-At", "-c", "SELECT tunnel_api.chainage_label(12345.678)") == "0 12+345.678\n"
+    assert "✓ disk" in tunneldb("check")
+    assert tunneldb("server", "status").startswith("0 running")
+    assert "stopped" in tunneldb("server", "stop")
+    assert "was not running" in tunneldb("server", "stop")
+    assert str(home) in tunneldb("server", "start")
+
+
+def test_the_embedded_server_is_not_meant_when_a_dsn_is_given(dsn: str) -> None:
+    result = run("server", "stop")
+    assert result.exit_code == 2
+    assert "DSN" in result.stderr
+
+
+def test_check_says_what_is_missing_and_what_mends_it(empty_dsn: str) -> None:
+    def check(code: int) -> str:
+        result = run("--dsn", empty_dsn, "check")
+        assert result.exit_code == code, result.output
+        return result.output
+
+    output = check(1)
+    assert "✗ PostGIS" in output
+    assert "tunneldb init" in output
+    with psycopg.connect(empty_dsn) as connection:
+        connection.execute("CREATE EXTENSION postgis")
+    assert "✗ schema tunnel: missing" in check(1)
+    assert run("--dsn", empty_dsn, "init").exit_code == 0
+    assert "✗" not in check(0)
+    with psycopg.connect(empty_dsn) as connection:
+        connection.execute("COMMENT ON SCHEMA tunnel_api IS 'Functions and views of tunneldb 0.0.9, abc'")
+    assert "✗ schema tunnel_api: not this program's" in check(1)
+    with psycopg.connect(empty_dsn) as connection:
+        connection.execute("UPDATE tunnel.alembic_version SET version_num = '9999'")
+    assert "newer than this program" in check(1)
+
+
+def test_check_of_a_server_that_is_down(tmp_path: Path) -> None:
+    result = run("--dsn", make_conninfo(host=str(tmp_path)), "check")
+    assert result.exit_code == 1
+    assert "✗ server: cannot connect" in result.output
+
+
+def test_a_server_that_is_down_is_one_line(tmp_path: Path) -> None:
+    result = run("--dsn", make_conninfo(host=str(tmp_path)), "status")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("tunneldb: cannot connect")
+    assert result.stderr.count("\n") == 1
+
+
+def test_status_of_a_survey(example: str) -> None:
+    result = run("status")
+    assert result.exit_code == 0
+    lines = [line.split() for line in result.output.splitlines()]
+    assert [example, "demo", "2024-05-04", "1", "60", "12+300.100", "12+499.900"] in lines
+    assert [example, "12", "done", "done", "done", "done", "done"] in lines
+    assert run("status", example).output == result.output
+    unknown = run("status", "other")
+    assert unknown.exit_code == 2
+    assert example in unknown.stderr
+
+
+def test_status_shows_a_run_whose_program_is_gone(example: str, conn: psycopg.Connection, dsn: str) -> None:
+    with psycopg.connect(dsn) as worker:
+        worker.execute(
+            """
+            INSERT INTO tunnel.run (survey_id, km, stage, backend_pid, backend_start)
+            SELECT s.id, 12, 'axis', pid, backend_start FROM tunnel.survey s, pg_stat_activity WHERE pid = pg_backend_pid()
+            """
+        )
+        worker.commit()
+        assert "running" in run("status").output
+        pid = worker.info.backend_pid
+    while conn.execute("SELECT FROM pg_stat_activity WHERE pid = %s", [pid]).fetchone():
+        conn.rollback()
+        time.sleep(0.02)
+    assert "interrupted" in run("status").output
+    assert f"tunneldb run {example} --km 12 --from axis" in run("check").output
+
+
+def test_a_bug_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch, dsn: str) -> None:
+    monkeypatch.setattr("tunneldb.cli.status.get_survey", lambda *_: 1 / 0)
+    result = run("status", "x")
+    assert isinstance(result.exception, ZeroDivisionError)
+
+
+def test_the_database_of_somebody_without_rights_is_one_line(dsn: str) -> None:
+    with psycopg.connect(dsn, autocommit=True) as connection:
+        connection.execute("DO $$ BEGIN CREATE ROLE stranger LOGIN; EXCEPTION WHEN duplicate_object THEN END $$")
+    result = run("--dsn", make_conninfo(dsn, user="stranger"), "status")
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    assert "Traceback" not in result.stderr
+
+
+def test_the_wheel_brings_both_folders() -> None:
+    installed = importlib.metadata.distribution("tunneldb")
+    files = {str(file) for file in installed.files or ()}
+    if "tunneldb/__init__.py" not in files:
+        pytest.skip("tunneldb is installed from a checkout, not from a wheel")
+    root = Path(__file__).parents[2]
+    assert not Path(sys.modules["tunneldb"].__file__ or "").is_relative_to(root / "tunneldb")
+    for folder, inside in (("sql", "_sql"), ("migrations", "_migrations")):
+        for path in (root / folder).rglob("*"):
+            if path.suffix in {".sql", ".txt", ".py", ".mako"}:
+                packed = Path("tunneldb", inside, path.relative_to(root / folder))
+                assert str(packed) in files
+                assert Path(str(installed.locate_file(packed))).read_bytes() == path.read_bytes()
+    assert not [file for file in files if file.startswith(("tests/", "benchmarks/"))]
