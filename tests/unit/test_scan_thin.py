@@ -5,7 +5,6 @@ from hypothesis import strategies as st
 
 from tunneldb.scan.thin import thin, voxel_edge
 
-
 ORIGIN = np.array([500_000.0, 4_500_000.0, 100.0])
 
 

@@ -39,9 +39,7 @@ def fetch_array(
     (n,) structured array
         In native byte order; the order of the rows is the server's own.
     """
-    packed = sql.SQL(" || ").join(
-        sql.SQL("{}({})").format(sql.SQL(_SEND[kind]), expression) for _, kind, expression in fields
-    )
+    packed = sql.SQL(" || ").join(sql.SQL("{}({})").format(sql.SQL(_SEND[kind]), expression) for _, kind, expression in fields)
     query = sql.SQL("SELECT string_agg({}, ''::bytea) {}").format(packed, source)
     with conn.cursor(binary=True) as cursor:
         row = cursor.execute(query, parameters).fetchone()

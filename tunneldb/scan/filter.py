@@ -71,9 +71,9 @@ class FilterCounts:
     points, outside, noise, kept : int
         Points read; beyond the ends of the axis or too far from it; noise; kept after thinning.
     chainage : (float, float)
-        Least and greatest chainage of the points near the axis, m.
+        Least and greatest chainage of the points kept, m.
     extent : (6,) float64 array
-        Least and greatest x, y, z of all points: x0, y0, z0, x1, y1, z1, m.
+        Least and greatest x, y, z of the points kept: x0, y0, z0, x1, y1, z1, m.
     """
 
     points: int = 0
@@ -87,6 +87,16 @@ class FilterCounts:
     def thinned(self) -> int:
         """Points that thinning left out."""
         return self.points - self.outside - self.noise - self.kept
+
+    def keep(self, rows: Rows) -> None:
+        """Count rows that are kept."""
+        self.kept += len(rows)
+        if len(rows):
+            low, high = float(rows["chainage"].min()), float(rows["chainage"].max())
+            self.chainage = (min(self.chainage[0], low), max(self.chainage[1], high))
+            for column, name in enumerate("xyz"):
+                self.extent[column] = min(self.extent[column], rows[name].min())
+                self.extent[column + 3] = max(self.extent[column + 3], rows[name].max())
 
 
 def filter_file(
@@ -128,8 +138,8 @@ def filter_file(
     Raises
     ------
     UserError
-        If the file cannot be read, no point lies near the axis (says how far they are), or the scanner position of
-        any point near the axis is unknown.
+        If the file cannot be read, no point lies near the axis (says how far they are), all near it are noise, or the
+        scanner position of any point near the axis is unknown.
     """
     counts, cells = FilterCounts(), CellCounts()
     with Spool(memory) as spool:
@@ -149,9 +159,13 @@ def filter_file(
                 rows["tag"] = tag
                 survivors.add(rows)
                 counts.noise += noise
-                counts.kept += len(rows)
+                counts.keep(rows)
                 progress(int(bins[low - first : high - first].sum()))
     progress(counts.outside)
+    if counts.kept == 0:
+        raise UserError(
+            f"{path}: all {counts.noise} points near the axis are noise: none has {settings.noise_points} points around it"
+        )
     return counts
 
 
@@ -209,14 +223,10 @@ def _spool_file(
             near = np.flatnonzero(distance <= settings.max_distance)
         counts.points += len(points)
         counts.outside += len(points) - len(near)
-        np.minimum(counts.extent[:3], points.xyz.min(axis=0), out=counts.extent[:3])
-        np.maximum(counts.extent[3:], points.xyz.max(axis=0), out=counts.extent[3:])
         if len(near):
             rows = _rows(points, chainage, near)
             rows["tag"] = cells.add(rows_xyz(rows))
             spool.add(rows)
-            low, high = rows["chainage"].min(), rows["chainage"].max()
-            counts.chainage = (min(counts.chainage[0], float(low)), max(counts.chainage[1], float(high)))
             faults += poses.faults(_some(points, near))
         elif counts.outside == counts.points:
             nearest = min(nearest, float(cKDTree(alignment.vertices).query(points.xyz[::100])[0].min()))

@@ -74,7 +74,7 @@ class CellCounts:
     @property
     def centres(self) -> Float:
         """Centre of each cell, (k, 3), m."""
-        centres: Float = (self._cells[: self._used] + 0.5) * self.edge
+        centres: Float = np.multiply(self._cells[: self._used] + 0.5, self.edge, dtype=np.float64)
         return centres
 
     def _grow(self) -> None:

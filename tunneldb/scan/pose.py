@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import psycopg
 from numba import njit
 from numpy.typing import NDArray
+from psycopg import sql
 
+from tunneldb.database.fetch import fetch_array
 from tunneldb.errors import UserError
 from tunneldb.scan.reader import Points
 
@@ -153,7 +155,7 @@ class PoseModel:
         return self.station[np.searchsorted(self.scan_id, points.scan_id)]
 
 
-def load_poses(conn: psycopg.Connection, survey: Survey) -> PoseModel:
+def load_poses(conn: psycopg.Connection[Any], survey: Survey) -> PoseModel:
     """Read the trajectory of a mobile survey, or the stations of a static one.
 
     Raises
@@ -161,25 +163,18 @@ def load_poses(conn: psycopg.Connection, survey: Survey) -> PoseModel:
     UserError
         If the survey has none.
     """
-    if survey.platform == "mobile":
-        rows = conn.execute(
-            "SELECT time, public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom) FROM tunnel.pose"
-            " WHERE survey_id = %s ORDER BY time",
-            (survey.id,),
-        ).fetchall()
-    else:
-        rows = conn.execute(
-            "SELECT scan_id, public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom) FROM tunnel.station"
-            " WHERE survey_id = %s ORDER BY scan_id",
-            (survey.id,),
-        ).fetchall()
-    if not rows:
+    table, key = ("pose", "time") if survey.platform == "mobile" else ("station", "scan_id")
+    fields: list[tuple[str, str, sql.Composable]] = [(key, "f8", sql.SQL("{}::float8").format(sql.Identifier(key)))]
+    fields += [("x", "f8", sql.SQL("ST_X(geom)")), ("y", "f8", sql.SQL("ST_Y(geom)")), ("z", "f8", sql.SQL("ST_Z(geom)"))]
+    source = sql.SQL("FROM {} WHERE survey_id = %(survey)s").format(sql.Identifier("tunnel", table))
+    rows = fetch_array(conn, fields, source, {"survey": survey.id})
+    if len(rows) == 0:
         kind = "trajectory" if survey.platform == "mobile" else "stations"
         raise UserError(f"survey {survey.name} has no {kind}: add the survey again with --{kind}")
-    table = np.array(rows, dtype=np.float64)
+    xyz = np.column_stack([rows["x"], rows["y"], rows["z"]])
     if survey.platform == "mobile":
-        return PoseModel.from_trajectory(table[:, 0], table[:, 1:])
-    return PoseModel.from_stations(table[:, 0].astype(np.int64), table[:, 1:])
+        return PoseModel.from_trajectory(rows["time"], xyz)
+    return PoseModel.from_stations(rows["scan_id"].astype(np.int64), xyz)
 
 
 def _count_scans(scan_id: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -63,12 +63,16 @@ class ScanHeader:
         Names of the dimensions of a point.
     crs : CRS or None
         Coordinate reference system, None when the file states none.
+    low, high : (3,) float64 array
+        Box of the coordinates by the header, m; not checked.
     """
 
     path: Path
     points: int
     dimensions: tuple[str, ...]
     crs: CRS | None
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
 
 
 def read_header(path: Path) -> ScanHeader:
@@ -97,7 +101,7 @@ def read_header(path: Path) -> ScanHeader:
             f"{path}: the header's scale {_row(scales)} or offset {_row(offsets)} is not a usable number, "
             "so its coordinates would not be either"
         )
-    return ScanHeader(path, count, dimensions, crs)
+    return ScanHeader(path, count, dimensions, crs, np.array(header.mins), np.array(header.maxs))
 
 
 def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_time: bool) -> None:

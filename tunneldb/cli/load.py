@@ -1,0 +1,133 @@
+"""`tunneldb load`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect, get_survey
+from tunneldb.errors import UserError
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from tunneldb.job.load import Loaded
+
+
+@click.command()
+@click.argument("survey")
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILES...")
+@click.option(
+    "--density",
+    default="100",
+    show_default=True,
+    help="Points per m² of surface to keep, 1 or more, or 'all'. A survey has one density.",
+)
+@click.option(
+    "--noise-points",
+    type=click.IntRange(1, 1000),
+    default=5,
+    show_default=True,
+    help="A point with fewer points than this around it, itself included, is noise; 1 keeps all.",
+)
+@click.option(
+    "--noise-diameter",
+    type=click.FloatRange(0.001, 1.0),
+    default=0.05,
+    show_default=True,
+    metavar="M",
+    help="Diameter of what is around a point, at full density; wider where the scan is sparser.",
+)
+@click.option(
+    "--max-distance",
+    type=click.FloatRange(0.5, 1000.0),
+    default=25.0,
+    show_default=True,
+    metavar="M",
+    help="Points farther from the given axis are left out.",
+)
+@click.pass_obj
+def load(
+    settings: Settings,
+    survey: str,
+    files: tuple[Path, ...],
+    density: str,
+    noise_points: int,
+    noise_diameter: float,
+    max_distance: float,
+) -> None:
+    """Load LAS and LAZ FILES into SURVEY.
+
+    Noise is dropped, the rest thinned to the survey's density and stored in the order of chainage. A file that is
+    loaded already is left alone; a file of the same name with other content takes its place.
+    """
+    from tunneldb.job.load import load_files
+    from tunneldb.scan.filter import FilterSettings
+
+    chosen = FilterSettings(_density(density), noise_points, noise_diameter, max_distance)
+    done: list[Loaded] = []
+    with connect(settings.dsn) as connection:
+        found = get_survey(connection, survey)
+        try:
+            with _progress() as progress:
+                for file in load_files(connection, found, files, chosen, _begin(progress)):
+                    done.append(file)  # noqa: PERF402 - those before a failure are in the summary too
+        finally:
+            if done:
+                _summary(done)
+
+
+def _density(text: str) -> float | None:
+    if text == "all":
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 1.0 <= value <= 1e6:
+        raise UserError(f"--density takes points per m², 1 or more, or 'all', not {text!r}")
+    return value
+
+
+def _progress() -> Progress:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+
+
+def _begin(progress: Progress) -> Callable[[str, int], Callable[[int], None]]:
+    """Show one step at a time."""
+
+    def begin(text: str, total: int) -> Callable[[int], None]:
+        for task in progress.task_ids:
+            progress.remove_task(task)
+        task = progress.add_task(text, total=total)
+        return lambda count: progress.advance(task, count)
+
+    return begin
+
+
+def _summary(done: list[Loaded]) -> None:
+    header = ["file", "", "points", "points/s", "noise", "outside", "thinned", "kept"]
+    rows = [
+        [
+            file.name,
+            file.state,
+            *map(_number, (file.points, file.points / file.seconds if file.seconds else None)),
+            *map(_number, (file.noise, file.outside, file.thinned, file.kept)),
+        ]
+        for file in done
+    ]
+    print_table(header, rows, right=range(2, 8))
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:,.0f}".replace(",", " ")

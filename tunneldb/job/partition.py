@@ -1,0 +1,165 @@
+"""Writing a kilometre's partition of tunnel.point: rows that are there and rows that come, as one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import psycopg
+from numpy.typing import NDArray
+from psycopg import sql
+
+from tunneldb.database.copy import PointZ, copy_binary, pack
+from tunneldb.database.fetch import fetch_array
+from tunneldb.database.survey import Survey
+from tunneldb.geometry.alignment import Alignment
+from tunneldb.scan.filter import STRETCHING, prefetch, thin_rows
+from tunneldb.scan.spool import BINS_PER_KM, BINS_PER_METRE, ROW, Rows, Spool, bin_of, windows
+
+COLUMNS = (
+    "survey_id",
+    "km",
+    "chainage",
+    "gps_time",
+    "geom",
+    "scan_id",
+    "file_id",
+    "intensity",
+    "classification",
+)
+WINDOW = 500_000  # rows read, thinned and packed at a time
+KILOMETRE = 1000.0
+
+
+def partition(survey: Survey, km: int, suffix: str = "") -> sql.Identifier:
+    """Name of the partition of a survey's kilometre."""
+    return sql.Identifier("tunnel", f"point_s{survey.id}_km{km}{suffix}")
+
+
+def partition_exists(conn: psycopg.Connection[Any], survey: Survey, km: int) -> bool:
+    """Tell whether a survey's kilometre holds points."""
+    row = conn.execute("SELECT to_regclass(%s)", [partition(survey, km).as_string(conn)]).fetchone()
+    return row is not None and row[0] is not None
+
+
+def read_partition(conn: psycopg.Connection[Any], survey: Survey, km: int, alignment: Alignment) -> Iterator[Rows]:
+    """Rows of a kilometre, some at a time, with the file's id as tag.
+
+    Their chainage is that of the given axis again, as at loading, for the stage ``segments`` sets it by the axis found.
+    """
+    table = partition(survey, km)
+    counts = conn.execute(
+        sql.SQL("SELECT floor(chainage)::int AS metre, count(*) FROM {} GROUP BY metre ORDER BY metre").format(table)
+    ).fetchall()
+    fields: list[tuple[str, str, sql.Composable]] = [
+        ("x", "f8", sql.SQL("ST_X(geom)")),
+        ("y", "f8", sql.SQL("ST_Y(geom)")),
+        ("z", "f8", sql.SQL("ST_Z(geom)")),
+        *((name, kind, sql.Identifier(name)) for name, kind in (("gps_time", "f8"), ("intensity", "f4"), ("scan_id", "i4"))),
+        *((name, kind, sql.Identifier(name)) for name, kind in (("file_id", "i4"), ("classification", "i2"))),
+    ]
+    source = sql.SQL("FROM {} WHERE chainage >= %(low)s AND chainage < %(high)s").format(table)
+    for low, high in _ranges(counts):
+        found = fetch_array(conn, fields, source, {"low": low, "high": high})
+        rows: Rows = np.empty(len(found), ROW)
+        for name in ("x", "y", "z", "intensity", "scan_id", "classification"):
+            rows[name] = found[name]
+        rows["time"], rows["tag"] = found["gps_time"], found["file_id"]
+        chainage = alignment.chainage(np.column_stack([found["x"], found["y"], found["z"]]))
+        rows["chainage"] = np.clip(chainage, km * KILOMETRE, np.nextafter((km + 1) * KILOMETRE, -np.inf))
+        yield rows
+
+
+def _ranges(counts: list[tuple[int, int]]) -> Iterator[tuple[float, float]]:
+    """Ranges of whole metres with about WINDOW rows each."""
+    low, held = None, 0
+    for metre, count in counts:
+        low, held = metre if low is None else low, held + count
+        if held >= WINDOW:
+            yield float(low), metre + 1.0
+            low, held = None, 0
+    if low is not None:
+        yield float(low), counts[-1][0] + 1.0
+
+
+def write_partition(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    km: int,
+    spool: Spool,
+    edge: float | None,
+    file_ids: NDArray[np.int32],
+    rank: NDArray[np.int64],
+    progress: Callable[[int], None],
+) -> NDArray[np.int64]:
+    """Build a kilometre's partition aside from all its rows, thinned as a whole, and swap it in.
+
+    The table is made, filled and swapped in in the caller's transaction: the embedded server writes no WAL for its
+    rows, and others see the old kilometre until the end.
+
+    Parameters
+    ----------
+    spool : Spool
+        Rows of at least this kilometre.
+    edge : float or None
+        Voxel edge of thinning, m; None keeps every row.
+    file_ids : (k,) int32 array
+        scan_file.id for each tag.
+    rank : (k,) int64 array
+        Order of the files, for points that are equal in all else.
+    progress : callable
+        Called with the number of rows looked at.
+
+    Returns
+    -------
+    (k,) int64 array
+        Rows written of each tag.
+    """
+    first, counts = spool.counts()
+    begin, end = km * BINS_PER_KM, (km + 1) * BINS_PER_KM
+    counts = counts[max(begin - first, 0) : max(end - first, 0)]
+    written = np.zeros(len(file_ids), np.int64)
+    # The farthest that two points of one voxel can lie apart in chainage.
+    reach = 0 if edge is None else math.ceil(edge * math.sqrt(3.0) * STRETCHING * BINS_PER_METRE)
+
+    def chunks() -> Iterator[bytes]:
+        for low, high in windows(max(first, begin), counts, WINDOW):
+            rows = spool.read(max(low - reach, begin), min(high + reach, end))
+            rows = thin_rows(rows, edge, rank)
+            bins = bin_of(rows["chainage"])
+            rows = rows[(bins >= low) & (bins < high)]
+            rows = rows[np.argsort(rows["chainage"], kind="stable")]
+            np.add(written, np.bincount(rows["tag"], minlength=len(written)), out=written)
+            yield _pack(survey, km, rows, file_ids)
+            progress(int(counts[low - max(first, begin) : high - max(first, begin)].sum()))
+
+    new = partition(survey, km, "_new")
+    conn.execute(sql.SQL("DROP TABLE IF EXISTS {}").format(new))
+    conn.execute(sql.SQL("CREATE TABLE {} (LIKE tunnel.point)").format(new))
+    copy_binary(conn, new, COLUMNS, prefetch(chunks()))
+    if written.any():
+        conn.execute("SELECT tunnel_api.partition_swap(%s, %s)", [survey.id, km])
+    else:
+        conn.execute(sql.SQL("DROP TABLE {}").format(new))
+        conn.execute(sql.SQL("DROP TABLE IF EXISTS {}").format(partition(survey, km)))
+    return written
+
+
+def _pack(survey: Survey, km: int, rows: Rows, file_ids: NDArray[np.int32]) -> bytes:
+    count = len(rows)
+    xyz = np.column_stack([rows["x"], rows["y"], rows["z"]])
+    return pack(
+        [
+            np.full(count, survey.id, np.int32),
+            np.full(count, km, np.int32),
+            rows["chainage"],
+            rows["time"],
+            PointZ(xyz, survey.srid),
+            rows["scan_id"],
+            file_ids[rows["tag"]],
+            rows["intensity"],
+            rows["classification"].astype(np.int16),
+        ]
+    )
