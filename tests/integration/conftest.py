@@ -6,23 +6,45 @@ import numpy as np
 import psycopg
 import pytest
 import shapely
+from psycopg import sql
+from psycopg.conninfo import make_conninfo
 from shapely.geometry import Polygon
 
+from tunneldb.database import install, open_connection
 from tunneldb.geometry.frame import frame_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
 from tunneldb.leak.geometries import shapes
 from tunneldb.leak.image import BLOCK, Grid
 from tunneldb.leak.raster import KINDS, Raster, encode
 
+DATABASE = "tunneldb_example"
 NAME, SRID, SPACING = "demo-2024", 25830, 10.0
 FIRST, LAST = 1230, 1250  # axis vertices: chainage 12+300 to 12+500
 KM = 12
-PIXEL = 0.05
+PIXEL = 0.1
+
+
+@pytest.fixture(scope="session")
+def example_template(server_dsn: str) -> str:
+    """Name of a database with a survey that has every kind of row which the views and QGIS show, to be copied.
+
+    A test module that gives this as its `template` finds the survey in its `conn`.
+    """
+    with psycopg.connect(server_dsn, autocommit=True) as connection:
+        connection.execute(sql.SQL("CREATE DATABASE {} TEMPLATE template0").format(sql.Identifier(DATABASE)))
+    with open_connection(make_conninfo(server_dsn, dbname=DATABASE)) as connection:
+        install(connection)
+        _fill(connection)
+    return DATABASE
 
 
 @pytest.fixture
 def example(conn: psycopg.Connection) -> str:
-    """Name of a survey with every kind of row that the views and QGIS show; committed."""
+    """Name of the survey in a copy of the example."""
+    return NAME
+
+
+def _fill(conn: psycopg.Connection) -> None:
     surface, vertices = example_surface()
     tunnel_id = conn.execute(
         "INSERT INTO tunnel.tunnel (name, srid, start_chainage, spacing, alignment) "
@@ -41,12 +63,14 @@ def example(conn: psycopg.Connection) -> str:
     outlines = _leaks(conn, survey_id, surface)
     _images(conn, survey_id, surface, outlines)
     conn.execute(
-        "INSERT INTO tunnel.region (survey_id, kind, geom) "
-        "VALUES (%s, 'dry', ST_MakeEnvelope(12410, -3, 12414, 0, 0))",
+        "INSERT INTO tunnel.region (survey_id, kind, geom) VALUES (%s, 'dry', ST_MakeEnvelope(12410, -3, 12414, 0, 0))",
         (survey_id,),
     )
-    conn.commit()
-    return NAME
+    conn.execute(
+        "INSERT INTO tunnel.radiometry (survey_id, km, roughness, dry_mean, dry_sigma, threshold, regions, pixels, wet_pixels) "
+        "VALUES (%s, %s, 24, -12, 0.6, -13.8, 9, 1000000, 7000)",
+        (survey_id, KM),
+    )
 
 
 def example_surface() -> tuple[Surface, np.ndarray]:

@@ -1,12 +1,13 @@
 """Open a project with real QGIS and say what it sees, as JSON; runs under the Python that has PyQGIS.
 
-Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK | draw KIND
-       | add VIEW
+Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK [LAYER]
+       | draw KIND | add VIEW
 """
 
 from __future__ import annotations
 
 import json
+import os
 import sys
 from typing import Any
 
@@ -43,9 +44,7 @@ def describe(project: QgsProject, canvas: QgsMapCanvas) -> dict[str, Any]:
         seen: dict[str, Any] = {"valid": layer.isValid(), "crs": layer.crs().authid(), "source": layer.source()}
         if isinstance(layer, QgsVectorLayer):
             editable = [
-                layer.fields().at(i).name()
-                for i in range(layer.fields().count())
-                if not layer.editFormConfig().readOnly(i)
+                layer.fields().at(i).name() for i in range(layer.fields().count()) if not layer.editFormConfig().readOnly(i)
             ]
             features = list(layer.getFeatures())
             seen |= {
@@ -139,7 +138,14 @@ def add(project: QgsProject, view: str) -> dict[str, Any]:
     uri.setWkbType(QgsWkbTypes.Unknown)
     layer = QgsVectorLayer(uri.uri(False), view, "postgres")
     message, loaded = layer.loadDefaultStyle()
-    return {"valid": layer.isValid(), "loaded": loaded, "message": message, "renderer": layer.renderer().type(), "wkb": QgsWkbTypes.displayString(layer.wkbType()), "crs": layer.crs().authid()}
+    return {
+        "valid": layer.isValid(),
+        "loaded": loaded,
+        "message": message,
+        "renderer": layer.renderer().type(),
+        "wkb": QgsWkbTypes.displayString(layer.wkbType()),
+        "crs": layer.crs().authid(),
+    }
 
 
 def _commit(layer: QgsVectorLayer) -> dict[str, Any]:
@@ -158,16 +164,11 @@ def main() -> None:
     project.readProject.connect(canvas.readProject)
     assert project.read(sys.argv[1]), project.error()
     action, arguments = sys.argv[2], sys.argv[3:]
-    if action == "describe":
-        result = describe(project, canvas)
-    else:
-        result = globals()[action](project, *arguments)
+    result = describe(project, canvas) if action == "describe" else globals()[action](project, *arguments)
     print(json.dumps(result))
     project.clear()
     sys.stdout.flush()
     # Leaving the interpreter normally makes QGIS crash now and then in its own destructors.
-    import os
-
     os._exit(0)
 
 

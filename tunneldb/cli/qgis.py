@@ -20,9 +20,7 @@ from tunneldb.export.qgis import store_styles, write_project
     "-o", "--output", required=True, type=click.Path(dir_okay=False, path_type=Path),
     help="Project to write, .qgz or .qgs; its images go into a folder beside it.",
 )  # fmt: skip
-@click.option(
-    "--service", metavar="NAME", help="Let the project connect by this entry of pg_service.conf (never a password)."
-)
+@click.option("--service", metavar="NAME", help="Let the project connect by this entry of pg_service.conf (never a password).")
 @click.pass_obj
 def qgis(settings: Settings, survey: str, output: Path, service: str | None) -> None:
     """Write a QGIS project of SURVEY: map, unrolled lining and 3D, with styled layers.

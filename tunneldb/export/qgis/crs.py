@@ -19,9 +19,7 @@ def crs_element(conn: psycopg.Connection, srid: int) -> ET.Element:
     UserError
         The SRID isn't in ``spatial_ref_sys``, or its definition can't be understood.
     """
-    row = conn.execute(
-        "SELECT auth_name, auth_srid, srtext FROM spatial_ref_sys WHERE srid = %s", (srid,)
-    ).fetchone()
+    row = conn.execute("SELECT auth_name, auth_srid, srtext FROM spatial_ref_sys WHERE srid = %s", (srid,)).fetchone()
     if row is None:
         raise UserError(f"SRID {srid} is not in the database's spatial_ref_sys; add its definition there")
     authority, code, text = row

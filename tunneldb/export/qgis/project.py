@@ -120,9 +120,7 @@ def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element)
     if layer.view == "region":
         # What is drawn belongs to this survey.
         name = survey.name.replace("'", "''")
-        ET.SubElement(
-            ET.SubElement(element, "defaults"), "default", field="survey", expression=f"'{name}'", applyOnUpdate="0"
-        )
+        ET.SubElement(ET.SubElement(element, "defaults"), "default", field="survey", expression=f"'{name}'", applyOnUpdate="0")
     return _Entry(layer_id(layer.id), layer.title, (layer.group,), layer.themes, element)
 
 

@@ -44,11 +44,10 @@ def grey_range(paths: Sequence[Path]) -> tuple[float, float]:
 def pipe(kind: str, limits: tuple[float, float]) -> ET.Element:
     """Return the element that says how an image is drawn: intensity in grey, offset in diverging colours."""
     element = ET.Element("pipe")
-    common = {"opacity": "1", "alphaBand": "-1", "nodataColor": ""}
     if kind == "offset":
         renderer = ET.SubElement(
             element, "rasterrenderer", type="singlebandpseudocolor", band="1",
-            classificationMin=str(-OFFSET_RANGE), classificationMax=str(OFFSET_RANGE), **common,
+            classificationMin=str(-OFFSET_RANGE), classificationMax=str(OFFSET_RANGE),
         )  # fmt: skip
         _origin(renderer)
         shader = ET.SubElement(
@@ -58,18 +57,15 @@ def pipe(kind: str, limits: tuple[float, float]) -> ET.Element:
         )  # fmt: skip
         for share, colour in _OFFSET_COLOURS:
             value = share * OFFSET_RANGE
-            ET.SubElement(
-                shader, "item", value=f"{value:g}", label=f"{value * 1000:+.0f} mm", color=colour, alpha="255"
-            )
+            ET.SubElement(shader, "item", value=f"{value:g}", label=f"{value * 1000:+.0f} mm", color=colour, alpha="255")
     else:
-        renderer = ET.SubElement(
-            element, "rasterrenderer", type="singlebandgray", grayBand="1", gradient="BlackToWhite", **common
-        )
+        renderer = ET.SubElement(element, "rasterrenderer", type="singlebandgray", grayBand="1", gradient="BlackToWhite")
         _origin(renderer)
         enhancement = ET.SubElement(renderer, "contrastEnhancement")
         ET.SubElement(enhancement, "minValue").text = f"{limits[0]:.3f}"
         ET.SubElement(enhancement, "maxValue").text = f"{limits[1]:.3f}"
         ET.SubElement(enhancement, "algorithm").text = "StretchToMinimumMaximum"
+    renderer.attrib.update({"opacity": "1", "alphaBand": "-1", "nodataColor": ""})
     ET.SubElement(element, "brightnesscontrast", brightness="0", contrast="0", gamma="1")
     ET.SubElement(element, "huesaturation", saturation="0", colorizeOn="0", grayscaleMode="0")
     ET.SubElement(element, "rasterresampler", maxOversampling="2", zoomedOutResampler="bilinear")

@@ -52,6 +52,6 @@ class Source:
         name = "'" + survey.replace("'", "''") + "'"
         return (
             f"{self.connection} key='id' estimatedmetadata=true srid={srid if layer.on_map else 0} type={layer.wkb} "
-            f"checkPrimaryKeyUnicity='0' table=\"tunnel_api\".\"{layer.view}\" ({layer.column}) "
+            f'checkPrimaryKeyUnicity=\'0\' table="tunnel_api"."{layer.view}" ({layer.column}) '
             f'sql="survey" = {name}'
         )

@@ -1,0 +1,315 @@
+"""The QGIS project, opened, drawn and edited by real QGIS where it is installed."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import warnings
+import zipfile
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+import pytest
+import rasterio
+from click.testing import CliRunner, Result
+from psycopg import sql
+from psycopg.conninfo import make_conninfo
+from rasterio.errors import NotGeoreferencedWarning
+
+from tunneldb.cli.main import main
+
+SCRIPT = Path(__file__).with_name("open_in_qgis.py")
+PYTHON = "/usr/bin/python3"
+ENVIRONMENT = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "LC_ALL": "C.UTF-8", "PYTHONPATH": ""}
+
+ON_MAP = {
+    "axis": "LineStringZ",
+    "axis_vertex": "PointZ",
+    "segment": "LineStringZ",
+    "section": "LineStringZ",
+    "leak_map": "Polygon",
+    "leak_3d": "PolygonZ",
+}
+UNROLLED = {"leak_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon"}
+
+
+@cache
+def has_qgis() -> bool:
+    try:
+        found = subprocess.run([PYTHON, "-c", "import qgis.core, qgis._3d"], env=ENVIRONMENT, capture_output=True, check=False)
+    except FileNotFoundError:
+        return False
+    return found.returncode == 0
+
+
+@pytest.fixture(scope="session")
+def template(example_template: str) -> str:
+    return example_template
+
+
+def write(output: Path, *options: str, dsn: str | None = None) -> Result:
+    where = [] if dsn is None else ["--dsn", dsn]
+    return CliRunner().invoke(main, [*where, "qgis", "demo-2024", "-o", str(output), *options])
+
+
+def act(project: Path, *arguments: str) -> dict[str, Any]:
+    """Run an action on a project in QGIS."""
+    if not has_qgis():
+        pytest.skip("QGIS is not installed")
+    done = subprocess.run(
+        [PYTHON, str(SCRIPT), str(project), *arguments], env=ENVIRONMENT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout.splitlines()[-1])
+    assert isinstance(result, dict)
+    return result
+
+
+@pytest.fixture(scope="module")
+def shared_dsn(server_dsn: str, example_template: str) -> str:
+    """Database of the tests that only read."""
+    with psycopg.connect(server_dsn, autocommit=True) as connection:
+        connection.execute(sql.SQL("CREATE DATABASE qgis_shared TEMPLATE {}").format(sql.Identifier(example_template)))
+    return make_conninfo(server_dsn, dbname="qgis_shared")
+
+
+@pytest.fixture(scope="module")
+def shared(shared_dsn: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Project of the tests that only read."""
+    path = tmp_path_factory.mktemp("project") / "demo.qgz"
+    result = write(path, dsn=shared_dsn)
+    assert result.exit_code == 0, result.output
+    return path
+
+
+@pytest.fixture(scope="module")
+def seen(shared: Path) -> dict[str, Any]:
+    """What QGIS sees of it."""
+    return act(shared, "describe")
+
+
+@pytest.fixture
+def rows(shared_dsn: str) -> Iterator[psycopg.Connection]:
+    """Connection to the database of the tests that only read."""
+    with psycopg.connect(shared_dsn) as connection:
+        yield connection
+
+
+@pytest.fixture
+def project(shared: Path, conn: psycopg.Connection, tmp_path: Path) -> Path:
+    """The same project on a database of the test's own."""
+    path = tmp_path / "own.qgs"
+    path.write_text(qgs(shared).replace("dbname='qgis_shared'", f"dbname='{conn.info.dbname}'"), encoding="utf-8")
+    (tmp_path / "demo-images").symlink_to(shared.parent / "demo-images")
+    return path
+
+
+def qgs(path: Path) -> str:
+    with zipfile.ZipFile(path) as archive:
+        (name,) = archive.namelist()
+        return archive.read(name).decode()
+
+
+def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str, Any]) -> None:
+    layers = seen["layers"]
+    assert {name for name, layer in layers.items() if not layer["valid"]} == set()
+    assert set(layers) == {*ON_MAP, *UNROLLED, *(f"demo-2024-km012-{kind}" for kind in ("raw", "corrected", "offset"))}
+    assert seen["crs"] == "EPSG:25830"
+    for name, kind in (ON_MAP | UNROLLED).items():
+        layer = layers[name]
+        (count,) = rows.execute(f"SELECT count(*) FROM tunnel_api.{name} WHERE survey = 'demo-2024'").fetchone()  # type: ignore[arg-type,misc]
+        assert (layer["wkb"], layer["features"]) == (kind, count), name
+        assert layer["crs"] == ("EPSG:25830" if name in ON_MAP else ""), name
+        assert layer["error"] == "", name
+    for kind in ("raw", "corrected", "offset"):
+        assert layers[f"demo-2024-km012-{kind}"]["crs"] == ""
+
+
+def test_height_reaches_qgis(rows: psycopg.Connection, seen: dict[str, Any]) -> None:
+    layers = seen["layers"]
+    for name in ("axis_vertex", "axis", "segment", "section", "leak_3d"):
+        heights = rows.execute(f"SELECT ST_ZMax(geom) FROM tunnel_api.{name}").fetchall()  # type: ignore[arg-type]
+        assert sorted(layers[name]["z"]) == pytest.approx(sorted(z for (z,) in heights)), name
+    for name in ("axis", "section", "leak_3d"):
+        assert (layers[name]["clamping"], layers[name]["binding"]) == ("absolute", "vertex")
+
+
+def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
+    layers = seen["layers"]
+    for name in ("leak_map", "leak_unrolled", "leak_3d"):
+        assert (layers[name]["read_only"], layers[name]["editable"]) == (False, ["review", "remark"])
+        assert layers[name]["widget"]["review"] == "ValueMap"
+    assert (layers["axis_vertex"]["read_only"], layers["axis_vertex"]["editable"]) == (False, [])
+    assert all(layers[name]["read_only"] for name in ("axis", "segment", "section", "section_unrolled"))
+
+
+def test_themes_and_views(seen: dict[str, Any]) -> None:
+    assert set(seen["themes"]) == {"Map", "Unrolled", "3D"}
+    assert set(seen["themes"]["Map"]) == {"axis", "axis_vertex", "segment", "section", "leak_map"}
+    assert set(seen["themes"]["Unrolled"]) == {*UNROLLED, "demo-2024-km012-corrected"}
+    assert seen["bookmarks"] == ["Map", "Unrolled", "Unrolled, km 12"]
+    # the second canvas follows the theme, and starts where there is lining
+    assert seen["canvas_theme"] == "Unrolled"
+    low, high = (corner.split(",") for corner in seen["canvas_extent"].split(" : "))
+    assert 12300 <= float(low[0]) < float(high[0]) <= 12500
+    assert float(low[1]) < -9 < 9 < float(high[1])
+
+
+@pytest.mark.parametrize("theme", ["Map", "Unrolled"])
+def test_themes_are_drawn(shared: Path, tmp_path: Path, theme: str) -> None:
+    picture = tmp_path / f"{theme}.png"
+    assert act(shared, "render", theme, str(picture)) == {"saved": True, "errors": []}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        image = rasterio.open(picture)
+    with image:
+        pixels = image.read([1, 2, 3]).astype(int)
+    inked = (pixels < 250).any(axis=0)
+    colourful = np.ptp(pixels, axis=0) > 80
+    orange = (pixels[0] > 180) & (pixels[1] > 80) & (pixels[1] < 180) & (pixels[2] < 80)
+    assert orange.sum() > 30, "an open leak"
+    assert colourful.sum() > 200
+    # the image of the lining fills half of its picture; a map of a tunnel is mostly paper
+    assert 0.4 < inked.mean() < 0.9 if theme == "Unrolled" else 0.01 < inked.mean() < 0.3
+    if theme == "Unrolled":
+        rows = np.flatnonzero(inked.mean(axis=1) > 0.9)
+        assert rows[-1] - rows[0] > 0.4 * inked.shape[0], "the lining"
+
+
+def test_vertex_moved_in_qgis_is_saved_with_its_stamp(conn: psycopg.Connection, project: Path) -> None:
+    before = conn.execute("SELECT ST_X(geom), ST_Y(geom), ST_Z(geom) FROM tunnel.axis_vertex WHERE n = 1235").fetchone()
+    conn.commit()
+    assert act(project, "move_vertex", "1235", "0.25", "0.125")["saved"]
+    x, y, z, source, by, at = conn.execute(
+        "SELECT ST_X(geom), ST_Y(geom), ST_Z(geom), source, edited_by, edited_at FROM tunnel.axis_vertex WHERE n = 1235"
+    ).fetchone()  # type: ignore[misc]
+    assert before is not None
+    assert (x, y, z) == pytest.approx((before[0] + 0.25, before[1], before[2] + 0.125), abs=1e-6)
+    assert (source, by) == conn.execute("SELECT 'edited', session_user::text").fetchone()
+    assert at is not None
+
+
+@pytest.mark.parametrize("layer", ["leak_unrolled", "leak_map", "leak_3d"])
+def test_review_in_qgis_is_saved_with_its_stamp(conn: psycopg.Connection, project: Path, layer: str) -> None:
+    assert act(project, "review", "3", "rejected", "a stain, dry to the touch", layer)["saved"]
+    review, remark, by, at = conn.execute(
+        "SELECT review, remark, reviewed_by, reviewed_at FROM tunnel.leak WHERE id = 3"
+    ).fetchone()  # type: ignore[misc]
+    assert (review, remark) == ("rejected", "a stain, dry to the touch")
+    assert (by,) == conn.execute("SELECT session_user::text").fetchone()
+    assert at is not None
+
+
+def test_region_drawn_in_qgis_belongs_to_the_survey(conn: psycopg.Connection, project: Path) -> None:
+    assert act(project, "draw", "homogeneous")["saved"]
+    rows = conn.execute("SELECT survey, ST_Area(geom) FROM tunnel_api.region WHERE kind = 'homogeneous'").fetchall()
+    assert rows == [("demo-2024", 8)]
+
+
+def test_viewer_opens_the_project_but_cannot_edit(server_dsn: str, project: Path) -> None:
+    with psycopg.connect(server_dsn, autocommit=True) as connection:
+        connection.execute("CREATE ROLE reader LOGIN IN ROLE tunnel_viewer")
+    text = project.read_text()
+    assert "user=" not in text
+    project.write_text(text.replace("host=", "user='reader' host="), encoding="utf-8")
+    layers = act(project, "describe")["layers"]
+    assert all(layer["valid"] for layer in layers.values())
+    done = subprocess.run(
+        [PYTHON, str(SCRIPT), str(project), "review", "1", "confirmed", ""],
+        env=ENVIRONMENT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert "cannot be edited" in done.stderr
+
+
+@pytest.mark.parametrize("view", ["leak_map", "leak_3d", "leak_unrolled", "axis_vertex", "segment", "section"])
+def test_layer_added_by_hand_finds_its_style_srid_and_height(shared: Path, view: str) -> None:
+    added = act(shared, "add", view)
+    assert added["valid"]
+    assert added["loaded"], "no default style"
+    assert added["renderer"] in ("categorizedSymbol", "RuleRenderer")
+    assert (added["wkb"], added["crs"]) == ((ON_MAP | UNROLLED)[view], "" if view in UNROLLED else "EPSG:25830")
+
+
+def test_styles_have_one_default_a_layer_and_are_replaced(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    def styles() -> list[tuple[Any, ...]]:
+        return conn.execute(
+            "SELECT f_table_name, f_geometry_column, count(*) FILTER (WHERE useasdefault), count(*), "
+            "bool_and(f_table_catalog = current_database() AND f_table_schema = 'tunnel_api') "
+            "FROM public.layer_styles GROUP BY 1, 2 ORDER BY 1, 2"
+        ).fetchall()
+
+    conn.execute("DELETE FROM tunnel.image")
+    conn.commit()
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    first = styles()
+    assert {(row[0], row[1]) for row in first} == {
+        *((name, "geom") for name in ON_MAP | UNROLLED), ("leak", "unrolled"), ("leak", "map"), ("leak", "surface"),
+    }  # fmt: skip
+    assert all(row[2:] == (1, 1, True) for row in first)
+    conn.execute(
+        "INSERT INTO public.layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column, stylename, "
+        "useasdefault) VALUES (current_database(), 'tunnel_api', 'axis', 'geom', 'my own', true)"
+    )
+    conn.commit()
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    again = {row[:2]: row[2:] for row in styles()}
+    # the user's own style stays, but no longer as the default
+    assert again.pop(("axis", "geom")) == (1, 2, True)
+    assert all(counts == (1, 1, True) for counts in again.values())
+
+
+def test_project_holds_relative_paths_and_spares_qgis_the_search(shared: Path) -> None:
+    text = qgs(shared)
+    assert str(shared.parent) not in text
+    assert "<datasource>./demo-images/demo-2024-km012-corrected.tif</datasource>" in text
+    assert text.count("estimatedmetadata=true") == text.count("checkPrimaryKeyUnicity='0'") == len(ON_MAP | UNROLLED)
+
+
+def test_project_holds_no_password(conn: psycopg.Connection, dsn: str, example: str, tmp_path: Path) -> None:
+    conn.execute("DELETE FROM tunnel.image")
+    conn.commit()
+    assert write(tmp_path / "demo.qgs", dsn=make_conninfo(dsn, password="s3cret")).exit_code == 0
+    text = (tmp_path / "demo.qgs").read_text()
+    assert "s3cret" not in text
+    assert "password" not in text
+
+
+def test_service_stands_for_the_connection(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    conn.execute("DELETE FROM tunnel.image")
+    conn.commit()
+    assert write(tmp_path / "demo.qgs", "--service", "o'tunnels").exit_code == 0
+    text = (tmp_path / "demo.qgs").read_text()
+    assert "<datasource>service='o\\'tunnels' key=" in text
+    assert "host=" not in text
+
+
+def test_project_without_leaks_sections_and_images(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    for table in ("leak", "image", "section"):
+        conn.execute(f"DELETE FROM tunnel.{table}")  # type: ignore[arg-type]
+    conn.commit()
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    seen = act(tmp_path / "demo.qgz", "describe")
+    assert all(layer["valid"] for layer in seen["layers"].values())
+    assert (seen["layers"]["leak_3d"]["wkb"], seen["layers"]["leak_3d"]["features"]) == ("PolygonZ", 0)
+    assert seen["bookmarks"] == ["Map"]
+
+
+def test_errors_are_one_line(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    result = write(tmp_path / "demo.txt")
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert "ends in .qgz or .qgs" in result.stderr
+    result = write(tmp_path / "nowhere" / "demo.qgz")
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    conn.execute("DELETE FROM tunnel.axis_vertex")
+    conn.execute("DELETE FROM tunnel.leak")
+    conn.execute("DELETE FROM tunnel.image")
+    conn.commit()
+    result = write(tmp_path / "demo.qgz")
+    assert result.exit_code == 2
+    assert "has no axis yet" in result.stderr
+    assert list(tmp_path.iterdir()) == []
