@@ -3,115 +3,21 @@
 from __future__ import annotations
 
 import subprocess
-import sys
-import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import laspy
 import numpy as np
 import psycopg
 import pytest
 from click.testing import CliRunner
+from loading import LENGTH, ORIGIN, RADIUS, START, SURVEY, add_survey, files, load, rows, runs, tube, write
 
 from tunneldb.cli.main import main
-from tunneldb.database import get_survey
 from tunneldb.errors import UserError
-from tunneldb.job.load import Loaded, load_files
 from tunneldb.scan.filter import FilterSettings
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
-START = 970.0  # chainage of the axis' beginning: the kilometre changes in the middle
-LENGTH = 60.0
-RADIUS = 2.0
-ORIGIN = np.array([500_000.0, 4_500_000.0, 100.0])
-SURVEY = "s"
-SETTINGS = FilterSettings()
-
-
-def tube(first: float, last: float, density: float, seed: int) -> np.ndarray:
-    """Points on a straight tunnel along x between two chainages, with strays in its air; to the millimetre."""
-    rng = np.random.default_rng(seed)
-    count = int(density * 2 * np.pi * RADIUS * (last - first))
-    along, angle = rng.uniform(first, last, count) - START, rng.uniform(-np.pi, np.pi, count)
-    wall = np.column_stack([along, RADIUS * np.sin(angle), RADIUS * np.cos(angle)])
-    strays = rng.uniform([first - START, -1, -1], [last - START, 1, 1], (20, 3))
-    return np.round(ORIGIN + np.concatenate([wall, strays]), 3)
-
-
-def write(path: Path, xyz: np.ndarray, scan_id: int = 1, seed: int = 0) -> Path:
-    header = laspy.LasHeader(point_format=6, version="1.4")
-    header.scales, header.offsets = [0.001] * 3, ORIGIN
-    header.add_extra_dim(laspy.ExtraBytesParams("Amplitude", "float32"))
-    las = laspy.LasData(header)
-    las.x, las.y, las.z = xyz.T
-    las.gps_time = xyz[:, 0] - ORIGIN[0]
-    las.point_source_id = np.full(len(xyz), scan_id)
-    # A value of its own for each place, so that a row can be told to have come whole.
-    las.Amplitude = np.round(xyz[:, 1] - ORIGIN[1], 3)
-    las.classification = np.full(len(xyz), seed % 5)
-    las.write(path)
-    return path
-
-
-def add_survey(conn: psycopg.Connection, platform: str = "static", kind: str = "amplitude") -> None:
-    end = ORIGIN + np.array([LENGTH, 0, 0])
-    tunnel = conn.execute(
-        "INSERT INTO tunnel.tunnel (name, srid, start_chainage, alignment) VALUES ('t', 25830, %s, "
-        "ST_SetSRID(ST_MakeLine(ST_MakePoint(%s, %s, %s), ST_MakePoint(%s, %s, %s)), 25830)) RETURNING id",
-        (START, *ORIGIN.tolist(), *end.tolist()),
-    ).fetchone()[0]
-    survey = conn.execute(
-        "INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_dimension, intensity_kind, platform) "
-        "VALUES (%s, %s, '2024-05-04', %s, %s, %s) RETURNING id",
-        (tunnel, SURVEY, None if kind == "none" else "Amplitude", kind, platform),
-    ).fetchone()[0]
-    table = "pose (survey_id, time, geom)" if platform == "mobile" else "station (survey_id, scan_id, geom)"
-    for key, x in ((0, 0.0), (1, LENGTH), (2, LENGTH)) if platform == "static" else ((0, 0.0), (60, LENGTH)):
-        conn.execute(
-            f"INSERT INTO tunnel.{table} VALUES (%s, %s, ST_SetSRID(ST_MakePoint(%s, %s, %s), 25830))",
-            (survey, key, ORIGIN[0] + x, *ORIGIN[1:].tolist()),
-        )
-    conn.commit()
-
-
-def load(
-    conn: psycopg.Connection, paths: Sequence[Path], settings: FilterSettings = SETTINGS, **options: object
-) -> list[Loaded]:
-    survey = get_survey(conn, SURVEY)
-    conn.rollback()
-    return list(load_files(conn, survey, paths, settings, **options))
-
-
-def rows(conn: psycopg.Connection) -> set[tuple[object, ...]]:
-    found = conn.execute(
-        "SELECT p.km, p.chainage, p.gps_time, ST_X(geom), ST_Y(geom), ST_Z(geom), segment, scan_id, f.name, intensity, "
-        "classification FROM tunnel.point p JOIN tunnel.scan_file f ON f.id = p.file_id"
-    ).fetchall()
-    conn.rollback()
-    assert len(set(found)) == len(found)
-    return set(found)
-
-
-def files(conn: psycopg.Connection) -> dict[str, tuple[int, ...]]:
-    found = conn.execute("SELECT name, points, noise, outside, thinned, kept FROM tunnel.scan_file").fetchall()
-    conn.rollback()
-    return {row[0]: row[1:] for row in found}
-
-
-def runs(conn: psycopg.Connection) -> list[tuple[object, ...]]:
-    found = conn.execute("SELECT km, outcome, message FROM tunnel.run WHERE stage = 'load' ORDER BY id").fetchall()
-    conn.rollback()
-    return found
-
-
-def assert_nothing_loaded(conn: psycopg.Connection) -> None:
-    assert rows(conn) == set()
-    assert files(conn) == {}
-    left = conn.execute("SELECT relname FROM pg_class WHERE relname ~ '_km|_new$' AND relkind = 'r'").fetchall()
-    conn.rollback()
-    assert left == []
 
 
 @pytest.fixture
@@ -259,7 +165,7 @@ def test_replacing_needs_the_overlapping_file(survey: psycopg.Connection, tmp_pa
         load(survey, [path])
     assert (rows(survey), files(survey)) == before
     assert [(loaded.name, loaded.state) for loaded in load(survey, [path, moved])] == [
-        ("b.laz", "unchanged"),
+        ("b.laz", "moved"),
         ("a.laz", "replaced"),
         ("b.laz", "reread"),
     ]
@@ -299,156 +205,6 @@ def test_without_intensity_it_is_nought(conn: psycopg.Connection, tmp_path: Path
     add_survey(conn, kind="none")
     load(conn, [write(tmp_path / "a.laz", tube(1002, 1010, 200, seed=1))])
     assert {row[-2] for row in rows(conn)} == {0.0}
-
-
-class TestBadInput:
-    """One clear line, and nothing written."""
-
-    def refused(self, conn: psycopg.Connection, paths: Sequence[Path], match: str) -> None:
-        with pytest.raises(UserError, match=match):
-            load(conn, paths)
-        assert_nothing_loaded(conn)
-
-    def test_far_from_the_axis(self, survey: psycopg.Connection, tmp_path: Path) -> None:
-        path = write(tmp_path / "a.laz", tube(980, 1020, 50, seed=1) + np.array([0, 700.0, 0]))
-        self.refused(survey, [path], r"a\.laz: no points near the axis: the nearest is about (69|70).* m")
-        assert runs(survey)[0][:2] == (None, "failed")
-        assert "no points near the axis" in str(runs(survey)[0][2])
-
-    def test_nothing_but_noise(self, survey: psycopg.Connection, tmp_path: Path) -> None:
-        path = write(tmp_path / "a.laz", ORIGIN + np.array([[10.0, 0, 0], [20, 0, 0]]))
-        self.refused(survey, [path], "all 2 points near the axis are noise")
-
-    def test_gps_time_outside_the_trajectory(self, conn: psycopg.Connection, tmp_path: Path) -> None:
-        add_survey(conn, platform="mobile")
-        xyz = tube(980, 1020, 100, seed=1)
-        path = write(tmp_path / "a.laz", xyz)
-        las = laspy.read(path)
-        las.gps_time[:7] += 100.0
-        las.gps_time[7:10] = -12.5
-        las.write(path)
-        self.refused(conn, [path], r"gps_time of 10 points .* 12\.500 s before its start and up to .* s after its end")
-        load(conn, [write(path, xyz)])
-
-    def test_scan_without_a_station(self, survey: psycopg.Connection, tmp_path: Path) -> None:
-        path = write(tmp_path / "a.laz", tube(980, 1020, 50, seed=1), scan_id=9)
-        self.refused(survey, [path], r"no station for scan_id 9 \(")
-
-    def test_all_files_are_looked_at_first(self, survey: psycopg.Connection, tmp_path: Path) -> None:
-        good = write(tmp_path / "a.laz", tube(980, 990, 50, seed=1))
-        las = laspy.read(good)
-        las.remove_extra_dim("Amplitude")
-        las.write(tmp_path / "b.laz")
-        self.refused(survey, [good, tmp_path / "b.laz"], r"b\.laz: no dimension 'Amplitude'.*gps_time")
-        self.refused(survey, [good, tmp_path / "c.laz"], r"c\.laz: no such file")
-        assert runs(survey) == []
-
-    def test_two_files_of_a_name(self, survey: psycopg.Connection, tmp_path: Path) -> None:
-        (tmp_path / "b").mkdir()
-        paths = [write(folder / "a.laz", tube(980, 990, 50, seed=1)) for folder in (tmp_path, tmp_path / "b")]
-        self.refused(survey, paths, "have the same name")
-
-    def test_truncated_after_good_ones(self, survey: psycopg.Connection, tmp_path: Path) -> None:
-        good = write(tmp_path / "a.laz", tube(1005, 1020, 100, seed=1))
-        bad = write(tmp_path / "b.las", tube(975, 990, 100, seed=2))
-        data = bytearray(bad.read_bytes())
-        data[-30 * 1000 : -30 * 1000 + 8] = b"\xff" * 8
-        bad.write_bytes(data[:-5000])
-        self.refused(survey, [good, bad], r"b\.las: truncated")
-
-    def test_temporary_folder_full(self, survey: psycopg.Connection, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        path = write(tmp_path / "a.laz", tube(980, 1020, 100, seed=1))
-        monkeypatch.setattr(tempfile, "TemporaryFile", lambda **_: Path("/dev/full").open("wb", buffering=0))
-        with pytest.raises(UserError, match="no space left for temporary files"):
-            load(survey, [path], memory=0)
-        assert_nothing_loaded(survey)
-        assert runs(survey)[0][:2] == (None, "failed")
-
-    def test_another_process_at_work(self, survey: psycopg.Connection, dsn: str, tmp_path: Path) -> None:
-        path = write(tmp_path / "a.laz", tube(1002, 1020, 100, seed=1))
-        with psycopg.connect(dsn) as other:
-            other.execute("SELECT pg_advisory_xact_lock(1, 1)")
-            self.refused(survey, [path], "another process is at work on kilometre 1")
-        load(survey, [path])
-
-
-@pytest.mark.parametrize("loaded_before", [False, True])
-def test_disk_full_during_copy(survey: psycopg.Connection, dsn: str, tmp_path: Path, loaded_before: bool) -> None:
-    path = tmp_path / "a.laz"
-    if loaded_before:
-        load(survey, [write(path, tube(980, 1020, 150, seed=1))])
-    before = rows(survey), files(survey)
-    # A disk that fills up after 1000 rows of kilometre 1: the server reports it in the same words.
-    survey.execute(
-        """
-        CREATE SEQUENCE room;
-        CREATE FUNCTION fill() RETURNS trigger LANGUAGE plpgsql AS $$
-        BEGIN
-            IF nextval('room') > 1000 THEN
-                RAISE 'could not extend file "base/1/2": No space left on device' USING ERRCODE = 'disk_full';
-            END IF;
-            RETURN NEW;
-        END $$;
-        CREATE FUNCTION watch() RETURNS event_trigger LANGUAGE plpgsql AS $$
-        BEGIN
-            IF to_regclass('tunnel.point_s1_km1_new') IS NOT NULL THEN
-                CREATE TRIGGER fill BEFORE INSERT ON tunnel.point_s1_km1_new FOR EACH ROW EXECUTE FUNCTION fill();
-            END IF;
-        END $$;
-        CREATE EVENT TRIGGER watch ON ddl_command_end WHEN TAG IN ('CREATE TABLE') EXECUTE FUNCTION watch();
-        """
-    )
-    survey.commit()
-    write(path, tube(980, 1020, 200, seed=2))
-    result = CliRunner().invoke(main, ["--dsn", dsn, "load", SURVEY, str(path)])
-    assert result.exit_code == 2
-    assert result.stderr.splitlines() == [
-        'tunneldb: the database\'s disk is full, nothing was changed: could not extend file "base/1/2": No space left on device'
-    ]
-    assert (rows(survey), files(survey)) == before
-    survey.execute("DROP EVENT TRIGGER watch")
-    survey.commit()
-    assert CliRunner().invoke(main, ["--dsn", dsn, "load", SURVEY, str(path)]).exit_code == 0
-
-
-KILLED = """
-import os, sys
-from pathlib import Path
-from tunneldb.database import connect, get_survey
-from tunneldb.job.load import load_files
-from tunneldb.scan.filter import FilterSettings
-
-def begin(text, total):
-    return lambda done: os.kill(os.getpid(), 9) if text == sys.argv[2] else None
-
-with connect(sys.argv[1]) as conn:
-    survey = get_survey(conn, "s")
-    conn.rollback()
-    list(load_files(conn, survey, [Path(sys.argv[3])], FilterSettings(), begin))
-"""
-
-
-@pytest.mark.parametrize("moment", ["a.laz", "kilometre 0", "kilometre 1"])
-def test_killed_at_any_moment_leaves_the_old_state(survey: psycopg.Connection, dsn: str, tmp_path: Path, moment: str) -> None:
-    path = write(tmp_path / "a.laz", tube(980, 1020, 150, seed=1))
-
-    def kill() -> None:
-        done = subprocess.run([sys.executable, "-c", KILLED, dsn, moment, str(path)], check=False)
-        assert done.returncode == -9
-        # The server notices when it next speaks to the client that is gone.
-        survey.execute(
-            "SELECT pg_terminate_backend(pid, 10000) FROM pg_stat_activity WHERE pid <> pg_backend_pid() "
-            "AND datname = current_database()"
-        )
-        survey.commit()
-
-    kill()
-    assert_nothing_loaded(survey)
-    load(survey, [path])
-    before = rows(survey), files(survey)
-    write(path, tube(980, 1020, 100, seed=2))
-    kill()
-    assert (rows(survey), files(survey)) == before
 
 
 @pytest.fixture
@@ -492,10 +248,22 @@ def test_what_was_loaded_before_a_failure_is_told(cli: Callable[..., tuple[int, 
 @pytest.mark.skipif(not DATA.exists(), reason="the real scans are not beside the checkout")
 def test_a_real_tunnel(conn: psycopg.Connection, dsn: str) -> None:
     run = CliRunner().invoke
+    axis, trajectory = str(DATA / "ringo.axis.csv"), str(DATA / "ringo.trajectory.csv")
     arguments = (
-        ["tunnel", "add", "ringo", "--srid", "3794", "--axis", str(DATA / "ringo.axis.csv"), "--start-chainage", "511746.75"],
-        ["survey", "add", "s", "--tunnel", "ringo", "--date", "2024-05-04", "--intensity-kind", "none"]
-        + ["--trajectory", str(DATA / "ringo.trajectory.csv")],
+        ["tunnel", "add", "ringo", "--srid", "3794", "--axis", axis, "--start-chainage", "511746.75"],
+        [
+            "survey",
+            "add",
+            "s",
+            "--tunnel",
+            "ringo",
+            "--date",
+            "2024-05-04",
+            "--intensity-kind",
+            "none",
+            "--trajectory",
+            trajectory,
+        ],
         ["load", "s", str(DATA / "ringo.laz")],
     )
     for words in arguments:

@@ -16,7 +16,7 @@ from tunneldb.errors import UserError
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-    from tunneldb.job.load import Loaded
+    from tunneldb.job.files import Loaded
 
 
 @click.command()

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +17,20 @@ from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.store import load_alignment
+from tunneldb.job.files import (
+    Loaded,
+    Recorded,
+    Source,
+    already_loaded,
+    change_kept,
+    checksum,
+    finish_file,
+    record_file,
+    recorded_files,
+)
 from tunneldb.job.ledger import Run, lock, stage_run
-from tunneldb.job.partition import KILOMETRE, partition_exists, read_partition, write_partition
-from tunneldb.scan.filter import MEMORY, FilterCounts, FilterSettings, filter_file
+from tunneldb.job.partition import KILOMETRE, partition_exists, read_partition, voxel_reach, write_partition
+from tunneldb.scan.filter import MEMORY, FilterSettings, filter_file
 from tunneldb.scan.pose import PoseModel, load_poses
 from tunneldb.scan.reader import ScanHeader, check_header, read_header
 from tunneldb.scan.spool import BINS_PER_KM, Spool
@@ -29,61 +39,6 @@ BATCH = 20_000_000  # points of files of the same kilometre that are loaded in o
 
 Begin = Callable[[str, int], Callable[[int], None]]
 """Takes what begins and how much it is; returns what takes how much of it is done."""
-
-
-@dataclass(frozen=True)
-class Loaded:
-    """What became of a file that was to be loaded.
-
-    Attributes
-    ----------
-    name : str
-    state : str
-        ``loaded``, ``replaced`` (there was a file of this name with other content), ``reread`` (because of a file that
-        was replaced) or ``unchanged``.
-    points, noise, outside, thinned, kept : int
-        Its points, and what they came to; points = noise + outside + thinned + kept.
-    seconds : float
-        Time that it took, its share of what was done for several files at once included; 0 when unchanged.
-    """
-
-    name: str
-    state: str
-    points: int
-    noise: int
-    outside: int
-    thinned: int
-    kept: int
-    seconds: float = 0.0
-
-
-@dataclass(frozen=True)
-class _Recorded:
-    """A row of tunnel.scan_file."""
-
-    id: int
-    name: str
-    path: str
-    checksum: str
-    low: float
-    high: float
-
-
-@dataclass
-class _Source:
-    """A file to be loaded."""
-
-    path: Path
-    checksum: str
-    size: int
-    srid: int | None
-    state: str
-    counts: FilterCounts
-    seconds: float = 0.0
-
-    @property
-    def name(self) -> str:
-        return self.path.name
 
 
 def load_files(
@@ -189,14 +144,6 @@ def _density(settings: FilterSettings) -> str:
     return "all" if settings.density is None else f"{settings.density:g}"
 
 
-def _checksum(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
-
-
 @dataclass
 class _Batch:
     """Files that are loaded in one transaction."""
@@ -211,12 +158,13 @@ class _Batch:
     given: Sequence[Path]
 
     def load(self, headers: Sequence[ScanHeader]) -> Iterator[Loaded]:
-        sources = [self._source(header) for header in headers]
-        recorded = self._recorded()
-        unchanged = [source for source in sources if self._is_recorded(source, recorded)]
-        sources = [source for source in sources if source not in unchanged]
-        yield from (self._unchanged(source) for source in unchanged)
-        self.conn.rollback()
+        sources = [Source.of(header, self.survey.srid) for header in headers]
+        recorded = recorded_files(self.conn, self.survey)
+        same = [source for source in sources if source.name in recorded and recorded[source.name].checksum == source.checksum]
+        there = [already_loaded(self.conn, source, recorded[source.name]) for source in same]
+        self.conn.commit()
+        yield from there
+        sources = [source for source in sources if source not in same]
         if not sources:
             return
         parameters = {
@@ -227,41 +175,16 @@ class _Batch:
             "files": [source.name for source in sources],
         }
         with stage_run(self.conn, self.survey.id, None, "load", parameters) as run, Spool(self.memory) as spool:
-            recorded = self._recorded()
+            recorded = recorded_files(self.conn, self.survey)
             sources += self._to_reread(sources, recorded)
             for tag, source in enumerate(sources):
                 self._filter(source, spool, tag)
             loaded = self._write(run, sources, spool, recorded)
         yield from loaded
 
-    def _source(self, header: ScanHeader) -> _Source:
-        srid = None if header.crs is None else self.survey.srid
-        path = header.path.resolve()
-        return _Source(path, _checksum(path), path.stat().st_size, srid, "loaded", FilterCounts())
-
-    def _recorded(self) -> dict[str, _Recorded]:
-        rows = self.conn.execute(
-            "SELECT id, name, path, checksum, chainage_from, chainage_to FROM tunnel.scan_file WHERE survey_id = %s",
-            [self.survey.id],
-        ).fetchall()
-        return {row[1]: _Recorded(*row) for row in rows}
-
-    @staticmethod
-    def _is_recorded(source: _Source, recorded: dict[str, _Recorded]) -> bool:
-        return source.name in recorded and recorded[source.name].checksum == source.checksum
-
-    def _unchanged(self, source: _Source) -> Loaded:
-        row = self.conn.execute(
-            "SELECT name, 'unchanged', points, noise, outside, thinned, kept FROM tunnel.scan_file"
-            " WHERE survey_id = %s AND name = %s",
-            [self.survey.id, source.name],
-        ).fetchone()
-        assert row is not None
-        return Loaded(*row)
-
-    def _to_reread(self, sources: Sequence[_Source], recorded: dict[str, _Recorded]) -> list[_Source]:
+    def _to_reread(self, sources: Sequence[Source], recorded: dict[str, Recorded]) -> list[Source]:
         """Files that overlap one that is replaced: points of theirs may come back where it was nearer to the centre."""
-        again: dict[str, _Source] = {}
+        again: dict[str, Source] = {}
         names = {source.name for source in sources}
         for source in sources:
             old = recorded.get(source.name)
@@ -270,24 +193,25 @@ class _Batch:
             source.state = "replaced"
             if self.settings.edge is None:
                 continue
+            reach = voxel_reach(self.settings.edge)
             for other in recorded.values():
-                if other.name in names or other.low > old.high + 1.0 or other.high < old.low - 1.0:
+                if other.name in names or other.low > old.high + reach or other.high < old.low - reach:
                     continue
                 again[other.name] = self._reread(source, other)
         return list(again.values())
 
-    def _reread(self, source: _Source, other: _Recorded) -> _Source:
+    def _reread(self, source: Source, other: Recorded) -> Source:
         path = next((path for path in self.given if path.name == other.name), Path(other.path))
-        if not path.is_file() or _checksum(path) != other.checksum:
+        if not path.is_file() or checksum(path) != other.checksum:
             raise UserError(
                 f"{source.path} replaces a file that overlaps {other.name}, which has to be read again and is not at {path}"
                 " as it was loaded: give its place in the same command"
             )
         header = read_header(path)
         check_header(header, self.survey.intensity_dimension, self.survey.srid, needs_time=self.poses.mobile)
-        return replace(self._source(header), state="reread")
+        return Source.of(header, self.survey.srid, "reread")
 
-    def _filter(self, source: _Source, spool: Spool, tag: int) -> None:
+    def _filter(self, source: Source, spool: Spool, tag: int) -> None:
         started = time.monotonic()
         header = read_header(source.path)
         source.counts = filter_file(
@@ -303,10 +227,10 @@ class _Batch:
         )
         source.seconds = time.monotonic() - started
 
-    def _write(self, run: Run, sources: Sequence[_Source], spool: Spool, recorded: dict[str, _Recorded]) -> list[Loaded]:
+    def _write(self, run: Run, sources: Sequence[Source], spool: Spool, recorded: dict[str, Recorded]) -> list[Loaded]:
         """Write the kilometres that the files touch, or touched before, and the files' own rows."""
         started = time.monotonic()
-        files = [(source.name, self._record(source)) for source in sources]
+        files = [(source.name, record_file(self.conn, self.survey, source)) for source in sources]
         gone = {recorded[source.name].id for source in sources if source.name in recorded}
         files += [(other.name, other.id) for other in recorded.values() if other.id not in gone]
         file_ids = np.array([number for _, number in files], np.int32)
@@ -319,19 +243,18 @@ class _Batch:
             written = write_partition(self.conn, self.survey, km, spool, self.settings.edge, file_ids, rank, advance)
             kept += written - before
             self._enter(run, km, int(written.sum()))
-        for (_, number), change in list(zip(files, kept.tolist(), strict=True))[len(sources) :]:
-            self.conn.execute(
-                "UPDATE tunnel.scan_file SET kept = kept + %s, thinned = thinned - %s WHERE id = %s", [change, change, number]
-            )
+        for file_id, change in zip(file_ids[len(sources) :].tolist(), kept[len(sources) :].tolist(), strict=True):
+            change_kept(self.conn, file_id, change)
         share = (time.monotonic() - started) / len(sources)
         loaded = []
-        for source, number, count in zip(sources, file_ids.tolist(), kept.tolist(), strict=False):
-            loaded.append(self._finish(source, number, count, share))
+        for source, file_id, count in zip(sources, file_ids.tolist(), kept.tolist(), strict=False):
+            source.seconds += share
+            loaded.append(finish_file(self.conn, source, file_id, count))
         for name in ("points", "noise", "outside", "thinned", "kept"):
             run.counts[name] = sum(getattr(file, name) for file in loaded)
         return loaded
 
-    def _touched(self, sources: Sequence[_Source], spool: Spool, recorded: dict[str, _Recorded]) -> list[int]:
+    def _touched(self, sources: Sequence[Source], spool: Spool, recorded: dict[str, Recorded]) -> list[int]:
         first, counts = spool.counts()
         touched = set(np.unique(np.floor_divide(first + np.flatnonzero(counts), BINS_PER_KM)).tolist())
         for source in sources:
@@ -358,37 +281,6 @@ class _Batch:
         first, counts = spool.counts()
         return int(counts[max(km * BINS_PER_KM - first, 0) : max((km + 1) * BINS_PER_KM - first, 0)].sum())
 
-    def _record(self, source: _Source) -> int:
-        """Enter the file, or what it is now; its final counts come later."""
-        counts = source.counts
-        row = self.conn.execute(
-            """
-            INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, thinned, kept,
-                                          chainage_from, chainage_to, extent, srid)
-            VALUES (%s, %s, %s, %s, %s, %s, %s, %s, 0, 0, %s, %s, %s, %s)
-            ON CONFLICT (survey_id, name) DO UPDATE
-               SET path = excluded.path, checksum = excluded.checksum, bytes = excluded.bytes, points = excluded.points,
-                   noise = excluded.noise, outside = excluded.outside, chainage_from = excluded.chainage_from,
-                   chainage_to = excluded.chainage_to, extent = excluded.extent, srid = excluded.srid
-            RETURNING id
-            """,
-            [
-                self.survey.id,
-                source.name,
-                str(source.path),
-                source.checksum,
-                source.size,
-                counts.points,
-                counts.noise,
-                counts.outside,
-                *counts.chainage,
-                counts.extent.tolist(),
-                source.srid,
-            ],
-        ).fetchone()
-        assert row is not None
-        return int(row[0])
-
     def _enter(self, run: Run, km: int, kept: int) -> None:
         """Enter the kilometre into the ledger, for what rests on its points."""
         self.conn.execute(
@@ -401,13 +293,3 @@ class _Batch:
             """,
             [km, kept, run.id],
         )
-
-    def _finish(self, source: _Source, number: int, kept: int, share: float) -> Loaded:
-        counts = source.counts
-        thinned = counts.points - counts.noise - counts.outside - kept
-        self.conn.execute(
-            "UPDATE tunnel.scan_file SET kept = %s, thinned = %s, loaded_at = clock_timestamp() WHERE id = %s",
-            [kept, thinned, number],
-        )
-        seconds = source.seconds + share
-        return Loaded(source.name, source.state, counts.points, counts.noise, counts.outside, thinned, kept, seconds)

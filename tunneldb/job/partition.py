@@ -84,6 +84,11 @@ def _ranges(counts: list[tuple[int, int]]) -> Iterator[tuple[float, float]]:
         yield float(low), counts[-1][0] + 1.0
 
 
+def voxel_reach(edge: float) -> float:
+    """Greatest difference of chainage between two points of one voxel, m."""
+    return edge * math.sqrt(3.0) * STRETCHING
+
+
 def write_partition(
     conn: psycopg.Connection[Any],
     survey: Survey,
@@ -121,8 +126,7 @@ def write_partition(
     begin, end = km * BINS_PER_KM, (km + 1) * BINS_PER_KM
     counts = counts[max(begin - first, 0) : max(end - first, 0)]
     written = np.zeros(len(file_ids), np.int64)
-    # The farthest that two points of one voxel can lie apart in chainage.
-    reach = 0 if edge is None else math.ceil(edge * math.sqrt(3.0) * STRETCHING * BINS_PER_METRE)
+    reach = 0 if edge is None else math.ceil(voxel_reach(edge) * BINS_PER_METRE)
 
     def chunks() -> Iterator[bytes]:
         for low, high in windows(max(first, begin), counts, WINDOW):
