@@ -21,23 +21,19 @@ COMMENT ON VIEW tunnel_api.run IS 'Ledger: each run of a stage, with parameters,
 COMMENT ON COLUMN tunnel_api.run.km IS 'Kilometre; NULL for the whole survey';
 COMMENT ON COLUMN tunnel_api.run.outcome IS 'running, done, failed, or interrupted when its session is gone';
 
--- Last run of each stage on each kilometre, and whether its result is out of date. A kilometre exists once it is
--- loaded; a run without a kilometre counts for all of its survey, but a load of files only where their points lie.
+-- Last run of each stage on each kilometre that was ever loaded or worked on, and whether its result is out of date.
+-- A run without a kilometre counts for all of its survey; only a load has a row for each kilometre that it touched
+-- beside the one for all of its files.
 --
 -- A result is stale when, since its last successful run began,
---   * an earlier stage has succeeded on that kilometre (or a file was loaded into it), or
+--   * an earlier stage has succeeded on that kilometre, or
 --   * a vertex of the axis in the kilometre or at most two beyond its ends was moved by hand (stages after axis), or
 -- when the result of an earlier stage is stale itself.
 CREATE OR REPLACE VIEW tunnel_api.stage_status AS
 WITH stage (step, stage) AS (
     VALUES (1, 'load'), (2, 'axis'), (3, 'segments'), (4, 'sections'), (5, 'detect')
 ), kilometre AS (
-    SELECT f.survey_id, k.km
-      FROM tunnel.scan_file f
-     CROSS JOIN LATERAL generate_series(floor(f.chainage_from / 1000)::integer,
-                                        floor(f.chainage_to / 1000)::integer) AS k (km)
-    UNION
-    SELECT r.survey_id, r.km FROM tunnel.run r WHERE r.km IS NOT NULL
+    SELECT DISTINCT r.survey_id, r.km FROM tunnel.run r WHERE r.km IS NOT NULL
 ), attempt AS (
     SELECT k.survey_id, k.km, g.step, r.id, r.started_at, r.finished_at, r.outcome, r.counts, r.message
       FROM kilometre k
@@ -45,17 +41,10 @@ WITH stage (step, stage) AS (
       JOIN stage g ON g.stage = r.stage
 ), last_attempt AS (
     SELECT DISTINCT ON (survey_id, km, step) * FROM attempt ORDER BY survey_id, km, step, started_at DESC, id DESC
-), file_load AS (
-    SELECT k.survey_id, k.km, 1 AS step, max(f.loaded_at) AS loaded_at, count(*) AS files, sum(f.kept) AS kept
-      FROM kilometre k
-      JOIN tunnel.scan_file f ON f.survey_id = k.survey_id
-       AND k.km BETWEEN floor(f.chainage_from / 1000) AND floor(f.chainage_to / 1000)
-     GROUP BY k.survey_id, k.km
 ), success AS (
     SELECT survey_id, km, step, max(started_at) AS started_at, max(finished_at) AS finished_at
-      FROM (SELECT survey_id, km, step, started_at, finished_at FROM attempt WHERE outcome = 'done'
-            UNION ALL
-            SELECT survey_id, km, step, loaded_at, loaded_at FROM file_load) s
+      FROM attempt
+     WHERE outcome = 'done'
      GROUP BY survey_id, km, step
 ), edit AS (
     SELECT k.survey_id, k.km, max(v.edited_at) AS edited_at
@@ -66,7 +55,7 @@ WITH stage (step, stage) AS (
        AND v.n BETWEEN ceil(k.km * 1000 / t.spacing) - 2 AND floor((k.km + 1) * 1000 / t.spacing) + 2
      GROUP BY k.survey_id, k.km
 ), direct AS (
-    SELECT d.survey_id, d.km, d.step, d.started_at AS done_from, d.finished_at AS done_at,
+    SELECT d.survey_id, d.km, d.step, d.finished_at AS done_at,
            CASE WHEN u.stage IS NOT NULL THEN format('%s ran since', u.stage)
                 WHEN d.step > 2 AND e.edited_at > d.started_at THEN 'axis edited since' END AS reason
       FROM success d
@@ -86,19 +75,13 @@ WITH stage (step, stage) AS (
 )
 SELECT (k.survey_id::bigint * 1000000 + 500000 + k.km) * 10 + g.step AS id, k.survey_id, s.name AS survey, k.km, g.step,
        g.stage,
-       coalesce(a.outcome, CASE WHEN j.done_at IS NOT NULL THEN 'done' ELSE 'never' END) AS outcome,
-       coalesce(a.started_at, j.done_from) AS started_at,
-       CASE WHEN a.id IS NULL THEN j.done_at ELSE a.finished_at END AS finished_at,
-       j.done_at,
-       CASE WHEN a.id IS NULL AND f.files IS NOT NULL THEN jsonb_build_object('files', f.files, 'kept', f.kept)
-            ELSE a.counts END AS counts,
-       a.message, j.stale_reason IS NOT NULL AS stale, j.stale_reason AS reason
+       coalesce(a.outcome, 'never') AS outcome, a.started_at, a.finished_at, j.done_at, a.counts, a.message,
+       j.stale_reason IS NOT NULL AS stale, j.stale_reason AS reason
   FROM kilometre k
   JOIN tunnel.survey s ON s.id = k.survey_id
  CROSS JOIN stage g
   LEFT JOIN last_attempt a ON a.survey_id = k.survey_id AND a.km = k.km AND a.step = g.step
-  LEFT JOIN judged j ON j.survey_id = k.survey_id AND j.km = k.km AND j.step = g.step
-  LEFT JOIN file_load f ON f.survey_id = k.survey_id AND f.km = k.km AND f.step = g.step;
+  LEFT JOIN judged j ON j.survey_id = k.survey_id AND j.km = k.km AND j.step = g.step;
 COMMENT ON VIEW tunnel_api.stage_status IS 'How far each kilometre of each survey has come: one row per stage';
 COMMENT ON COLUMN tunnel_api.stage_status.step IS 'Order of the stages: load, axis, segments, sections, detect';
 COMMENT ON COLUMN tunnel_api.stage_status.outcome IS 'Of the last run: running, done, failed, interrupted (its session is gone) or never';
