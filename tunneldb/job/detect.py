@@ -11,7 +11,6 @@ import numpy as np
 import psycopg
 import shapely
 from numpy.typing import NDArray
-from scipy import ndimage
 from shapely.geometry import Polygon
 
 from tunneldb.database.survey import Survey
@@ -22,10 +21,10 @@ from tunneldb.intensity.correct import Kind, Views, needs_reference
 from tunneldb.intensity.dry import Dry, plain_statistics
 from tunneldb.intensity.roughness import Regions, Roughness, automatic_regions, drawn_regions, find_roughness
 from tunneldb.job.sources import Source, sample, sources
-from tunneldb.leak.detection import Detection
+from tunneldb.leak.detection import Detection, dry_pixels
 from tunneldb.leak.detection import detect as find_leaks
 from tunneldb.leak.image import Accumulator, Grid
-from tunneldb.leak.lining import State, floor_points, states
+from tunneldb.leak.lining import floor_points, states
 from tunneldb.leak.raster import KINDS
 from tunneldb.leak.seen import Eye, Radiometer, Seen, Span
 from tunneldb.leak.store import (
@@ -43,9 +42,6 @@ Counts = dict[str, Any]
 
 NEAR_SURFACE = 0.05
 """Points that serve for the roughness lie no farther from the surface, m."""
-
-WET_EDGE = 3
-"""Pixels about a wet one that don't count as dry lining."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +102,7 @@ def detect(
         state = states(image, surface, values["appendage.distance"])
         dry_regions = load_regions(conn, survey, km, "dry")
         found = find_leaks(image, state, values["leak.min_area"], dry_regions)
-        save_radiometry(conn, survey, km, roughness, found, _sigma(view, image.grid, state, found, roughness, dry_regions))
+        save_radiometry(conn, survey, km, roughness, found, _sigma(view, image, state, found, roughness, dry_regions))
         matched = save_leaks(conn, survey, km, surface, found.leaks)
         pixels = save_images(conn, survey, image, KINDS)
     return {
@@ -224,7 +220,7 @@ def _chunks(files: list[Source]) -> Iterator[tuple[Path, Points]]:
 
 def _sigma(
     view: Sample,
-    grid: Grid,
+    image: Accumulator,
     state: NDArray[np.uint8],
     found: Detection,
     roughness: Roughness,
@@ -235,8 +231,7 @@ def _sigma(
     if dry_regions:
         dry = view.lining & (_polygon_of(seen, dry_regions) >= 0)
     else:
-        edge = ndimage.binary_dilation(found.wet, ndimage.generate_binary_structure(2, 2), iterations=WET_EDGE)
-        dry = view.lining & grid.pick((state == State.LINING) & ~edge, seen.chainage, seen.arc)
+        dry = view.lining & image.grid.pick(dry_pixels(image, state, found), seen.chainage, seen.arc)
     return (
         plain_statistics(views.raw_db[dry]),
         plain_statistics(views.corrected(0.0)[dry]),

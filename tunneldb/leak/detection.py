@@ -8,6 +8,7 @@ import numpy as np
 import rasterio.features
 import shapely
 from numpy.typing import NDArray
+from scipy import ndimage
 from shapely.geometry import Polygon
 
 from tunneldb.intensity.dry import Dry, plain_statistics, robust_statistics
@@ -18,6 +19,9 @@ from tunneldb.leak.threshold import filter_size, wet_pixels
 
 SAMPLE = 2_000_000
 """Pixels, about, that the statistics of dry lining are drawn from."""
+
+WET_EDGE = 3
+"""Pixels about a wet one that don't count as dry lining."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +108,19 @@ def detect(
         pixels=lining,
         wet_pixels=int(np.count_nonzero(wet & (state == State.LINING))),
     )
+
+
+def dry_pixels(image: Accumulator, state: NDArray[np.uint8], found: Detection) -> NDArray[np.bool_]:
+    """Lining pixels that are neither wet nor next to a wet one."""
+    dry = state == State.LINING
+    for block in image.blocks():
+        columns = block_columns(image.grid, block)
+        near = slice(max(columns.start - WET_EDGE, 0), columns.stop + WET_EDGE)
+        wet = found.wet[:, near]
+        if wet.any():
+            edge = ndimage.maximum_filter(wet.view(np.uint8), 2 * WET_EDGE + 1)
+            dry[:, columns] &= edge[:, columns.start - near.start :][:, : columns.stop - columns.start] == 0
+    return dry
 
 
 def _dry_statistics(image: Accumulator, state: NDArray[np.uint8], blocks: list[int], dry_regions: list[Polygon]) -> Dry:

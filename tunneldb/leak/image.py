@@ -1,17 +1,18 @@
 """The unrolled image of a kilometre, gathered from points in any order in bounded memory.
 
-A pixel holds sums over the points that fall into it. The sums lie in a file of the temporary folder that is
-mapped into memory and given back to the system after each chunk of points, so that the memory in use doesn't
-grow with the image.
+A pixel holds sums over the points that fall into it. Only the blocks used last lie in memory; the others in a file
+of the temporary folder.
 """
 
 from __future__ import annotations
 
-import mmap
+import errno
 import os
 import tempfile
+from collections import OrderedDict
 from dataclasses import dataclass
 from types import TracebackType
+from typing import BinaryIO
 
 import numpy as np
 from affine import Affine
@@ -26,6 +27,9 @@ Single = NDArray[np.float32]
 KILOMETRE = 1000.0
 BLOCK = 50.0
 """Length of a block of the image along the tunnel, m."""
+
+MEMORY = 400_000_000
+"""Bytes of memory for sums."""
 
 CHANNELS = 4
 """Sums a pixel holds: points, offset, raw, corrected."""
@@ -136,45 +140,36 @@ class Window:
 class Accumulator:
     """Sums of all points of a kilometre by pixel.
 
-    Use it as a context manager: the file that holds the sums goes at the end.
+    Use it as a context manager: the file that holds what memory doesn't goes at the end.
 
     Parameters
     ----------
     grid : Grid
         The pixels.
-
-    Raises
-    ------
-    UserError
-        If the temporary folder has no room for the image.
+    memory : int
+        Bytes of memory for sums, at least one block's.
     """
 
-    def __init__(self, grid: Grid) -> None:
+    def __init__(self, grid: Grid, memory: int = MEMORY) -> None:
         self.grid = grid
-        shape = (grid.blocks, grid.rows, grid.block_columns, CHANNELS)
-        size = int(np.prod(shape)) * 4
-        self._file = tempfile.TemporaryFile(prefix="tunneldb-image-")  # noqa: SIM115 - closed by __exit__
-        try:
-            os.posix_fallocate(self._file.fileno(), 0, size)
-        except OSError as error:
-            self._file.close()
-            raise UserError(
-                f"no room for the image of km {grid.km} in {tempfile.gettempdir()} ({size / 1e9:.1f} GB): "
-                f"{error.strerror}; set TMPDIR to a folder with more"
-            ) from None
-        self._map = mmap.mmap(self._file.fileno(), size)
-        self._sums = np.frombuffer(self._map, dtype=np.float32).reshape(shape)
-        self._held = np.zeros(grid.blocks, np.bool_)
+        self._shape = (grid.rows, grid.block_columns, CHANNELS)
+        self._bytes = 4 * int(np.prod(self._shape))
+        self._room = max(1, memory // self._bytes)
+        self._blocks: OrderedDict[int, Single] = OrderedDict()
+        """Blocks in memory, the one used last at the end."""
+        self._changed: set[int] = set()
+        self._spilled: set[int] = set()
+        self._file: BinaryIO | None = None
 
     def __enter__(self) -> Accumulator:
         """Return the accumulator."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        """Give the file back."""
-        del self._sums
-        self._map.close()
-        self._file.close()
+        """Give memory and file back."""
+        self._blocks.clear()
+        if self._file:
+            self._file.close()
 
     def add(
         self,
@@ -195,77 +190,117 @@ class Accumulator:
             Intensity, dB.
         use : (n,) bool array
             Which points to add; their offset and intensities must not be NaN.
+
+        Raises
+        ------
+        UserError
+            If the temporary folder has no room for what memory doesn't hold.
         """
         grid = self.grid
-        added = _add(
-            self._sums,
-            self._held,
-            grid.km * KILOMETRE,
-            1.0 / grid.pixel,
-            grid.bottom,
-            chainage,
-            arc,
-            offset,
-            raw,
-            corrected,
-            use,
-        )
-        self._give_back()
-        return int(added)
+        row, column = _pixels(grid.km * KILOMETRE, 1.0 / grid.pixel, grid.bottom, grid.rows, grid.columns, chainage, arc, use)
+        width = grid.block_columns
+        touched = np.unique(column[column >= 0] // width).tolist()
+        # Blocks in memory first, lest fetching another one puts them out.
+        for block in sorted(touched, key=lambda b: b not in self._blocks):
+            _add(self._fetch(block), row, column - block * width, offset, raw, corrected)
+            self._changed.add(block)
+        return int(np.count_nonzero(column >= 0))
 
     def blocks(self) -> list[int]:
         """Blocks, counted from 0, that hold points."""
-        return [int(block) for block in np.flatnonzero(self._held)]
+        return sorted(self._spilled | self._blocks.keys())
 
     def window(self, start: int, stop: int) -> Window:
         """Means over the columns from ``start`` up to ``stop``; columns outside the kilometre are cut off."""
         start, stop = max(start, 0), min(stop, self.grid.columns)
         width = self.grid.block_columns
-        pieces = []
+        held = set(self.blocks())
+        sums = np.zeros((self.grid.rows, stop - start, CHANNELS), np.float32)
         for block in range(start // width, (stop - 1) // width + 1):
-            first = block * width
-            pieces.append(self._sums[block, :, max(start - first, 0) : stop - first, :].copy())
-        self._give_back()
-        sums = np.concatenate(pieces, axis=1)
+            if block in held:
+                first, last = max(block * width, start), min((block + 1) * width, stop)
+                part = self._fetch(block)[:, first - block * width : last - block * width]
+                sums[:, first - start : last - start] = part
         count = sums[:, :, 0]
         with np.errstate(invalid="ignore", divide="ignore"):
             offset, raw, corrected = (sums[:, :, k] / count for k in (1, 2, 3))
         return Window(slice(start, stop), count.astype(np.int32), offset, raw, corrected)
 
-    def _give_back(self) -> None:
-        """Let the system drop the mapped pages from this process; the sums stay in its cache or on disk."""
-        self._map.madvise(mmap.MADV_DONTNEED)
+    def _fetch(self, block: int) -> Single:
+        """Sums of a block, brought into memory, from the file or new."""
+        if block in self._blocks:
+            self._blocks.move_to_end(block)
+            return self._blocks[block]
+        while len(self._blocks) >= self._room:
+            self._put_out(*self._blocks.popitem(last=False))
+        sums = np.zeros(self._shape, np.float32)
+        if block in self._spilled:
+            assert self._file
+            self._file.seek(block * self._bytes)
+            self._file.readinto(sums.data.cast("B"))  # type: ignore[attr-defined]
+        self._blocks[block] = sums
+        return sums
+
+    def _put_out(self, block: int, sums: Single) -> None:
+        """Write a block that leaves memory to the file, unless it is there already."""
+        if block not in self._changed:
+            return
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile(  # noqa: SIM115 - closed by __exit__
+                    prefix="tunneldb-image-", buffering=0
+                )
+            self._file.seek(block * self._bytes)
+            written = self._file.write(sums.data.cast("B"))
+            if written < self._bytes:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            raise UserError(
+                f"no room for the image of km {self.grid.km} in {tempfile.gettempdir()}: {error.strerror}; it may need"
+                f" {self._bytes * self.grid.blocks / 1e9:.1f} GB; set TMPDIR to a folder with more"
+            ) from error
+        self._changed.discard(block)
+        self._spilled.add(block)
+
+
+@njit(cache=True, nogil=True)
+def _pixels(
+    start: float,
+    per_metre: float,
+    bottom: int,
+    rows: int,
+    columns: int,
+    chainage: Float,
+    arc: Float,
+    use: NDArray[np.bool_],
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:  # pragma: no cover - compiled
+    """Row and column of each point; column -1 for those not to be added."""
+    row = np.zeros(chainage.shape[0], np.int32)
+    column = np.full(chainage.shape[0], -1, np.int32)
+    for i in range(chainage.shape[0]):
+        if use[i]:
+            c = np.floor((chainage[i] - start) * per_metre)
+            r = rows - 1 - (np.floor(arc[i] * per_metre) - bottom)
+            if 0 <= c < columns and 0 <= r < rows:
+                row[i] = int(r)
+                column[i] = int(c)
+    return row, column
 
 
 @njit(cache=True, nogil=True)
 def _add(
-    sums: NDArray[np.float32],
-    held: NDArray[np.bool_],
-    start: float,
-    per_metre: float,
-    bottom: int,
-    chainage: Float,
-    arc: Float,
+    sums: Single,
+    row: NDArray[np.int32],
+    column: NDArray[np.int32],
     offset: Float,
     raw: Single,
     corrected: Single,
-    use: NDArray[np.bool_],
-) -> int:  # pragma: no cover - compiled
-    blocks, rows, width, _ = sums.shape
-    added = 0
-    for i in range(chainage.shape[0]):
-        if not use[i]:
-            continue
-        column = int(np.floor((chainage[i] - start) * per_metre))
-        row = rows - 1 - (int(np.floor(arc[i] * per_metre)) - bottom)
-        if column < 0 or column >= blocks * width or row < 0 or row >= rows:
-            continue
-        block = column // width
-        held[block] = True
-        pixel = sums[block, row, column - block * width]
-        pixel[0] += 1.0
-        pixel[1] += offset[i]
-        pixel[2] += raw[i]
-        pixel[3] += corrected[i]
-        added += 1
-    return added
+) -> None:  # pragma: no cover - compiled
+    width = sums.shape[1]
+    for i in range(row.shape[0]):
+        if 0 <= column[i] < width:
+            pixel = sums[row[i], column[i]]
+            pixel[0] += 1.0
+            pixel[1] += offset[i]
+            pixel[2] += raw[i]
+            pixel[3] += corrected[i]

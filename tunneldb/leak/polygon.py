@@ -30,8 +30,12 @@ def polygons(mask: NDArray[np.bool_] | NDArray[np.uint8], transform: Affine, min
     list of Polygon
         Valid, exterior counter-clockwise, ordered by where they begin along the tunnel.
     """
-    pixel = abs(transform.a)
-    image = np.ascontiguousarray(mask, dtype=np.uint8)
+    columns = np.flatnonzero(mask.any(axis=0))
+    if len(columns) == 0:
+        return []
+    pixel, first = abs(transform.a), int(columns[0])
+    image = np.ascontiguousarray(mask[:, first : columns[-1] + 1], dtype=np.uint8)
+    transform = transform @ Affine.translation(first, 0)
     found = []
     for shape, _ in rasterio.features.shapes(image, mask=image.astype(bool), connectivity=4, transform=transform):
         outline = shapely.geometry.shape(shape)

@@ -93,9 +93,9 @@ class Eye:
 
     def near(self, points: Points) -> Points:
         """Points in the kilometre's bounding box."""
-        inside = np.all((points.xyz >= self.box[0]) & (points.xyz <= self.box[1]), axis=1)
-        if inside.all():
+        if not len(points) or np.all((points.xyz.min(0) >= self.box[0]) & (points.xyz.max(0) <= self.box[1])):
             return points
+        inside = np.all((points.xyz >= self.box[0]) & (points.xyz <= self.box[1]), axis=1)
         return Points(
             points.xyz[inside],
             points.time[inside],
