@@ -24,9 +24,7 @@ class Helix:
 
     def position(self, s: np.ndarray) -> np.ndarray:
         angle = s / self.radius
-        return ORIGIN + np.column_stack(
-            [self.radius * (1 - np.cos(angle)), self.radius * np.sin(angle), self.slope * s]
-        )
+        return ORIGIN + np.column_stack([self.radius * (1 - np.cos(angle)), self.radius * np.sin(angle), self.slope * s])
 
     def frame(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         angle = s / self.radius
