@@ -43,7 +43,7 @@ def scan(folder: Path, section: str, seed: int) -> Simulation:
             scanner="profiler",
             density=100.0,
             leaks=0,
-        )  # fmt: skip
+        )
     )
     write(simulation, folder)
     return simulation
@@ -220,14 +220,12 @@ def test_wider_slabs_where_profiles_are_far_apart(conn: psycopg.Connection, tmp_
             appendages=False,
             niches=False,
             outliers=0.0,
-        )  # fmt: skip
+        )
     )
     write(simulation, tmp_path)
     prepare(tmp_path)
     command("run", NAME, "--to", "sections")
-    narrow, widest, empty = conn.execute(
-        "SELECT min(half_width), max(half_width), sum(interpolated) FROM tunnel.section"
-    ).fetchone()
+    widest, empty = conn.execute("SELECT max(half_width), sum(interpolated) FROM tunnel.section").fetchone()
     assert widest > 0.15
     assert empty < 0.1 * 72 * 12
     survey = get_survey(conn, NAME)
@@ -251,7 +249,7 @@ def test_unroll_command(curve: tuple[psycopg.Connection, Survey, Path]) -> None:
             scanner="profiler",
             density=100.0,
             leaks=0,
-        )  # fmt: skip
+        )
     )
     points = simulation.tunnel.roll(np.array([980.0, 1010.0]), np.array([-3.0, 5.0]), np.zeros(2))
     table = folder / "points.csv"

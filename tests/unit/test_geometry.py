@@ -127,7 +127,7 @@ def test_off_the_tunnel() -> None:
         [
             helix.position(np.array([-20.0])),  # before the first plane
             helix.position(np.array([130.0])),  # after the last one
-            helix.position(np.array([50.0])) + [0.0, 0.0, 30.0],  # above it
+            helix.position(np.array([50.0])) + np.array([0.0, 0.0, 30.0]),  # above it
             ORIGIN + 1e6,
         ]
     )
