@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
+import tempfile
 from pathlib import Path
 
 import psycopg
@@ -15,7 +17,9 @@ from psycopg.conninfo import make_conninfo
 
 from tunneldb.database import connect, install, open_connection, sqlalchemy_engine
 from tunneldb.database.binaries import find_binaries
+from tunneldb.database.health import examine
 from tunneldb.database.schema import alembic_config, install_api, sql_files
+from tunneldb.database.server import Server
 from tunneldb.errors import UserError
 
 
@@ -182,6 +186,43 @@ def test_a_dump_restored_is_a_working_database(example: str, dsn: str, empty_dsn
     assert dump(empty_dsn, "--schema-only", "--exclude-table=tunnel.point_*") == dump(
         dsn, "--schema-only", "--exclude-table=tunnel.point_*"
     )
+
+
+def test_a_dump_restored_on_another_server_needs_one_init(example: str, dsn: str, tmp_path: Path) -> None:
+    """Roles are the server's, not the database's: another server has none of them yet."""
+    archive = tmp_path / "dump"
+    subprocess.run([find_binaries()["pg_dump"], "-Fc", "-f", str(archive), "--dbname", dsn], check=True)
+    home = Path(tempfile.mkdtemp(prefix="tunneldb-restore-"))
+    server = Server(home, {"fsync": "off", "shared_buffers": "32MB"})
+    try:
+        other = server.start()
+        restore = [find_binaries()["pg_restore"], "--exit-on-error", "--no-owner", "--no-privileges", "--dbname", other]
+        subprocess.run([*restore, str(archive)], check=True)
+        assert [finding.subject for finding in examine(other) if finding.level == "wrong"] == ["roles"]
+        with open_connection(other) as connection:
+            install(connection)
+        assert not [finding for finding in examine(other) if finding.level == "wrong"]
+        with connect(other) as connection:
+            connection.execute("SET ROLE tunnel_viewer")
+            assert connection.execute("SELECT count(*) > 0 FROM tunnel_api.leak").fetchone() == (True,)
+    finally:
+        server.stop()
+        shutil.rmtree(home)
+
+
+def test_init_does_not_wait_for_ever_for_others(conn: psycopg.Connection, dsn: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tunneldb.database.schema._PATIENCE", "100ms")
+    conn.execute("SELECT * FROM tunnel_api.leak")  # and stays in its transaction
+    with open_connection(dsn) as connection, pytest.raises(UserError, match="close QGIS"):
+        install(connection)
+
+
+def test_postgis_in_another_schema_is_refused(empty_dsn: str) -> None:
+    with open_connection(empty_dsn) as connection:
+        connection.execute("CREATE SCHEMA gis")
+        connection.execute("CREATE EXTENSION postgis SCHEMA gis")
+    with open_connection(empty_dsn) as connection, pytest.raises(UserError, match="in schema gis"):
+        install(connection)
 
 
 def test_a_deleted_survey_takes_its_rows_along(example: str, conn: psycopg.Connection) -> None:

@@ -15,6 +15,7 @@ from tunneldb.database.schema import (
     alembic_config,
     api_version,
     installed_api_version,
+    postgis_schema,
     postgis_version,
     schema_revision,
 )
@@ -82,6 +83,9 @@ def _postgis(connection: psycopg.Connection[Any]) -> Finding:
     if tuple(map(int, version.split(".")[:2])) < MINIMUM_POSTGIS:
         least = ".".join(map(str, MINIMUM_POSTGIS))
         return Finding("wrong", "PostGIS", f"{version}, older than {least}", "SELECT postgis_extensions_upgrade();")
+    schema = postgis_schema(connection)
+    if schema != "public":
+        return Finding("wrong", "PostGIS", f"{version}, in schema {schema} instead of public", "use a database of its own")
     return Finding("ok", "PostGIS", version)
 
 
@@ -110,7 +114,8 @@ def _roles(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
     missing = [role for role in ROLES if role not in there]
     if missing:
         mend = "; ".join(f"CREATE ROLE {role}" for role in missing)
-        yield Finding("wrong", "roles", f"missing: {', '.join(missing)}", f"as a superuser: {mend}; then tunneldb init")
+        mend = f"tunneldb init   -- if you may not create roles, first a superuser: {mend};"
+        yield Finding("wrong", "roles", f"missing: {', '.join(missing)}", mend)
         return
     granted = connection.execute(
         "SELECT bool_and(has_schema_privilege(role, 'tunnel_api', 'USAGE')) FROM unnest(%s::text[]) role", [list(ROLES)]

@@ -19,6 +19,7 @@ from tunneldb.database.resources import resource_dir
 from tunneldb.errors import UserError
 
 _LOCK = 7088630451  # any number: two installations of one database wait for each other
+_PATIENCE = "30s"  # how long to wait for others that use what is to be changed
 
 
 def install(connection: psycopg.Connection[Any], revision: str = "head") -> None:
@@ -36,8 +37,21 @@ def install(connection: psycopg.Connection[Any], revision: str = "head") -> None
     UserError
         When PostGIS is missing and cannot be created, or the database is of a newer version.
     """
+    try:
+        _install(connection, revision)
+    except (psycopg.errors.LockNotAvailable, sqlalchemy.exc.OperationalError) as error:
+        cause = error.orig if isinstance(error, sqlalchemy.exc.OperationalError) else error
+        if not isinstance(cause, psycopg.errors.LockNotAvailable):
+            raise
+        raise UserError(
+            f"other programs have used the database for {_PATIENCE}; close QGIS and let runs end, then tunneldb init again"
+        ) from None
+
+
+def _install(connection: psycopg.Connection[Any], revision: str) -> None:
     with engine_on(connection).begin() as session:
-        session.execute(sqlalchemy.text("SELECT pg_advisory_xact_lock(:key)"), {"key": _LOCK})
+        connection.execute(sql.SQL("SET LOCAL lock_timeout = {}").format(_PATIENCE))
+        connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
         _require_postgis(connection, create=True)
         known = ScriptDirectory.from_config(alembic_config())
         present = schema_revision(connection)
@@ -121,6 +135,12 @@ def postgis_version(connection: psycopg.Connection[Any]) -> str | None:
     return row[0] if row else None
 
 
+def postgis_schema(connection: psycopg.Connection[Any]) -> str | None:
+    """Return the schema in which PostGIS is, None when it is not."""
+    row = connection.execute("SELECT extnamespace::regnamespace::text FROM pg_extension WHERE extname = 'postgis'").fetchone()
+    return row[0] if row else None
+
+
 def require_current_schema(connection: psycopg.Connection[Any]) -> None:
     """Raise a UserError unless PostGIS and this program's schema are there."""
     _require_postgis(connection, create=False)
@@ -168,6 +188,11 @@ def _require_postgis(connection: psycopg.Connection[Any], *, create: bool) -> No
         raise UserError(
             f"the database has PostGIS {version}, tunneldb needs {least} or newer; after installing it on the "
             "server: SELECT postgis_extensions_upgrade()"
+        )
+    if postgis_schema(connection) != "public":
+        raise UserError(
+            f"PostGIS is in schema {postgis_schema(connection)}; tunneldb, like QGIS, looks for it in public: "
+            "use a database of its own"
         )
 
 

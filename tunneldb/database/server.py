@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import psycopg
-from psycopg import sql
+from psycopg import pq, sql
 from psycopg.conninfo import make_conninfo
 
 from tunneldb.database import machine
@@ -113,12 +113,13 @@ def _dsn(home: Home, database: str, user: str) -> str:
 
 
 def _accepts(home: Home) -> bool:
-    """Return whether the server answers."""
-    try:
-        psycopg.connect(_dsn(home, "postgres", _SUPERUSER), connect_timeout=10).close()
-    except psycopg.OperationalError:
-        return False
-    return True
+    """Return whether the server answers; while it starts or stops, wait until it has made up its mind."""
+    deadline = time.monotonic() + _START_SECONDS
+    while True:
+        answer = pq.PGconn.ping(_dsn(home, "postgres", _SUPERUSER).encode())
+        if answer != pq.Ping.REJECT or time.monotonic() > deadline:
+            return answer == pq.Ping.OK
+        time.sleep(0.1)
 
 
 def _major(home: Home) -> int:
