@@ -73,14 +73,14 @@ DECLARE
     step constant float8 := radians(angle_step);
     r float8[] := radius;       -- radius of each class
     b float8[] := slope;        -- slope of each class' line, m/m
-    a int; c int; i int; j int; k int; g int; first int; last int;
+    a int; c int; i int; j int; g int; first int; last int;
     turn float8; chord float8; usual float8; uneven float8; tolerance float8; corner float8[];
-    differences float8[] := '{}';
-    angles float8[] := '{}'; radii float8[] := '{}'; slopes float8[] := '{}';   -- the classes left, once round and more
+    differences float8[] := '{}'::float8[];
+    angles float8[] := '{}'::float8[]; radii float8[] := '{}'::float8[]; slopes float8[] := '{}'::float8[];   -- the classes left, once round and more
     apart boolean;
     wide float8; way float8;
     angle float8; x0 float8; y0 float8; x1 float8; y1 float8; cx float8; cy float8; length float8;
-    corners float8[] := '{}';   -- angle and radius of each corner
+    corners float8[] := '{}'::float8[];   -- angle and radius of each corner
     at_corner float8[];
     pieces float8[] := array_fill(0::float8, ARRAY[360]);
 BEGIN

@@ -243,8 +243,6 @@ RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 AS $$
 DECLARE
-    rings geometry[];
-    path int[];
     kind constant text := GeometryType(unrolled);
     lines geometry[];
 BEGIN
