@@ -28,7 +28,11 @@ def survey() -> None:
 @click.option("--stations", type=FILE, help="CSV with scan_id,x,y,z of a static scanner; scan_id as point_source_id.")
 @click.option("--backwards", is_flag=True, help="The trajectory was driven towards falling chainage.")
 @click.option("--reference", type=FILE, help="CSV with range_m,intensity_db: the scanner's intensity over range.")
-@click.option("--intensity", metavar="DIMENSION", help="Dimension of the files that holds the intensity, such as Amplitude.")
+@click.option(
+    "--intensity",
+    metavar="DIMENSION",
+    help="Dimension of the files that holds the intensity, such as Amplitude; not read when the kind is none.",
+)
 @click.option(
     "--intensity-kind",
     type=click.Choice(["amplitude", "reflectance", "linear", "none"]),
@@ -56,8 +60,10 @@ def add(
         raise UserError("say where the scanner was: exactly one of --trajectory and --stations")
     if backwards and trajectory is None:
         raise UserError("--backwards is about a trajectory; stations have no direction")
-    if (intensity is None) != (intensity_kind == "none"):
-        raise UserError("--intensity names the dimension for every --intensity-kind but none, and only for those")
+    if intensity_kind == "none":
+        intensity = None
+    elif intensity is None:
+        raise UserError(f"--intensity must name the dimension that holds the {intensity_kind}")
     with connect(settings.dsn) as connection:
         count = add_survey(
             connection,
