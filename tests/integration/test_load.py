@@ -84,6 +84,17 @@ def test_loading_twice_changes_nothing(survey: psycopg.Connection, tmp_path: Pat
     assert (survey.execute("SELECT * FROM tunnel.scan_file").fetchall(), rows(survey), runs(survey)) == before
 
 
+def test_a_file_that_was_moved_is_known_and_found(survey: psycopg.Connection, tmp_path: Path) -> None:
+    path = write(tmp_path / "a.laz", tube(980, 1020, 200, seed=1))
+    load(survey, [path])
+    before = rows(survey)
+    (tmp_path / "archive").mkdir()
+    path = path.rename(tmp_path / "archive" / "a.laz")
+    assert [loaded.state for loaded in load(survey, [path]) + load(survey, [path])] == ["moved", "unchanged"]
+    assert survey.execute("SELECT path FROM tunnel.scan_file").fetchall() == [(str(path),)]
+    assert rows(survey) == before
+
+
 def test_the_order_of_files_does_not_matter(
     survey: psycopg.Connection, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

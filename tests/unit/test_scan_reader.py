@@ -2,8 +2,10 @@ import contextlib
 from pathlib import Path
 
 import laspy
+import lazrs
 import numpy as np
 import pytest
+from laspy.vlrs.known import LasZipVlr
 from pyproj import CRS
 from pyproj.crs import CompoundCRS
 
@@ -52,6 +54,23 @@ def test_chunks_are_the_file(tmp_path: Path, suffix: str) -> None:
     ):
         found = np.concatenate([getattr(chunk, name) for chunk in chunks])
         np.testing.assert_array_equal(found, np.asarray(las[dimension]))
+
+
+def test_chunks_of_varying_size_as_in_copc(tmp_path: Path) -> None:
+    las = write(tmp_path / "a.las", 10_000)
+    las.update_header()
+    vlr = lazrs.LazVlr.new_for_compression(6, las.point_format.num_extra_bytes, True)
+    las.header.vlrs.append(LasZipVlr(vlr.record_data()))
+    las.header.are_points_compressed = True
+    with (tmp_path / "a.copc.laz").open("wb") as file:
+        las.header.write_to(file)
+        compressor = lazrs.LasZipCompressor(file, vlr)
+        for part in np.split(las.points.array, [3000, 3001, 8000]):
+            compressor.compress_many(np.frombuffer(part.tobytes(), np.uint8))
+            compressor.finish_current_chunk()
+        compressor.done()
+    chunks = list(read_chunks(tmp_path / "a.copc.laz", None, 2500))
+    np.testing.assert_allclose(np.concatenate([chunk.xyz for chunk in chunks]), las.xyz, atol=1e-9)
 
 
 def test_without_a_dimension_intensity_is_nought(tmp_path: Path) -> None:

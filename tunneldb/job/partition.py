@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -142,7 +143,8 @@ def write_partition(
     new = partition(survey, km, "_new")
     conn.execute(sql.SQL("DROP TABLE IF EXISTS {}").format(new))
     conn.execute(sql.SQL("CREATE TABLE {} (LIKE tunnel.point)").format(new))
-    copy_binary(conn, new, COLUMNS, prefetch(chunks()))
+    with closing(prefetch(chunks())) as packed:
+        copy_binary(conn, new, COLUMNS, packed)
     if written.any():
         conn.execute("SELECT tunnel_api.partition_swap(%s, %s)", [survey.id, km])
     else:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from queue import Queue
@@ -169,8 +170,11 @@ def filter_file(
     return counts
 
 
-def prefetch(items: Iterable[T], ahead: int = 1) -> Iterator[T]:
-    """Make the next items in a thread of their own while the present one is worked on."""
+def prefetch(items: Iterable[T], ahead: int = 1) -> Generator[T, None, None]:
+    """Make the next items in a thread of their own while the present one is worked on.
+
+    To be closed by whoever may leave before the end (`contextlib.closing`), which also ends the thread.
+    """
     queue: Queue[tuple[bool, T | BaseException | None]] = Queue(ahead)
     stopped = Event()
 
@@ -217,20 +221,21 @@ def _spool_file(
 ) -> None:
     faults = PoseFaults()
     nearest = math.inf
-    for points in prefetch(read_chunks(path, dimension, chunk)):
-        chainage, distance = alignment.locate(points.xyz)
-        with np.errstate(invalid="ignore"):
-            near = np.flatnonzero(distance <= settings.max_distance)
-        counts.points += len(points)
-        counts.outside += len(points) - len(near)
-        if len(near):
-            rows = _rows(points, chainage, near)
-            rows["tag"] = cells.add(rows_xyz(rows))
-            spool.add(rows)
-            faults += poses.faults(_some(points, near))
-        elif counts.outside == counts.points:
-            nearest = min(nearest, float(cKDTree(alignment.vertices).query(points.xyz[::100])[0].min()))
-        progress(len(points))
+    with closing(prefetch(read_chunks(path, dimension, chunk))) as chunks:
+        for points in chunks:
+            chainage, distance = alignment.locate(points.xyz)
+            with np.errstate(invalid="ignore"):
+                near = np.flatnonzero(distance <= settings.max_distance)
+            counts.points += len(points)
+            counts.outside += len(points) - len(near)
+            if len(near):
+                rows = _rows(points, chainage, near)
+                rows["tag"] = cells.add(rows_xyz(rows))
+                spool.add(rows)
+                faults += poses.faults(_some(points, near))
+            elif counts.outside == counts.points:
+                nearest = min(nearest, float(cKDTree(alignment.vertices).query(points.xyz[::100])[0].min()))
+            progress(len(points))
     if counts.outside == counts.points:
         raise UserError(
             f"{path}: no points near the axis: the nearest is about {nearest:.0f} m from it and the limit is "
