@@ -127,7 +127,7 @@ COMMENT ON COLUMN tunnel_api.section.interpolated IS 'Angular classes without po
 
 CREATE OR REPLACE VIEW tunnel_api.section_unrolled AS
 SELECT c.id, c.survey_id, s.name AS survey, c.km, c.segment, c.half, c.chainage,
-       tunnel_api.chainage_label(c.chainage) AS label, e.arc_from, e.arc_to, c.interpolated,
+       tunnel_api.chainage_label(c.chainage) AS label, e.arc_from, e.arc_to, c.angle_step, c.interpolated,
        public.st_makeline(public.st_makepoint(c.chainage, e.arc_from), public.st_makepoint(c.chainage, e.arc_to)
            )::public.geometry(LineString, 0) AS geom
   FROM tunnel.section c

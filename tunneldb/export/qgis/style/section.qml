@@ -2,8 +2,8 @@
 <qgis version="3.22.0" styleCategories="AllStyleCategories" hasScaleBasedVisibilityFlag="0" minScale="0" maxScale="0" readOnly="0">
   <renderer-v2 type="RuleRenderer" forceraster="0" enableorderby="0" symbollevels="0">
     <rules key="{root}">
-      <rule symbol="0" key="{r0}" filter='"interpolated" = 0' label="Complete"/>
-      <rule symbol="1" key="{r1}" filter='"interpolated" &gt; 0' label="With interpolated classes"/>
+      <rule symbol="0" key="{r0}" filter='"interpolated" * "angle_step" &lt;= 36' label="Measured"/>
+      <rule symbol="1" key="{r1}" filter='"interpolated" * "angle_step" &gt; 36' label="More than a tenth interpolated"/>
     </rules>
     <symbols>
       <symbol name="0" type="line" alpha="1" clip_to_extent="1" force_rhr="0">
@@ -21,9 +21,9 @@
       <symbol name="1" type="line" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleLine" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="line_color" value="190,130,0,230"/>
-            <Option type="QString" name="line_style" value="dash"/>
-            <Option type="QString" name="line_width" value="0.35"/>
+            <Option type="QString" name="line_color" value="200,120,0,230"/>
+            <Option type="QString" name="line_style" value="solid"/>
+            <Option type="QString" name="line_width" value="0.4"/>
             <Option type="QString" name="line_width_unit" value="MM"/>
             <Option type="QString" name="capstyle" value="flat"/>
             <Option type="QString" name="joinstyle" value="round"/>

@@ -2,8 +2,8 @@
 <qgis version="3.22.0" styleCategories="AllStyleCategories" hasScaleBasedVisibilityFlag="0" minScale="0" maxScale="0" readOnly="0">
   <renderer-v2 type="RuleRenderer" forceraster="0" enableorderby="0" symbollevels="0">
     <rules key="{root}">
-      <rule symbol="0" key="{r0}" filter='"interpolated" = 0' label="Section (cross: crown)"/>
-      <rule symbol="1" key="{r1}" filter='"interpolated" &gt; 0' label="With interpolated classes"/>
+      <rule symbol="0" key="{r0}" filter='"interpolated" * "angle_step" &lt;= 36' label="Measured (cross: crown)"/>
+      <rule symbol="1" key="{r1}" filter='"interpolated" * "angle_step" &gt; 36' label="More than a tenth interpolated"/>
     </rules>
     <symbols>
       <symbol name="0" type="line" alpha="1" clip_to_extent="1" force_rhr="0">
@@ -42,9 +42,9 @@
       <symbol name="1" type="line" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleLine" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="line_color" value="190,130,0,220"/>
+            <Option type="QString" name="line_color" value="200,120,0,220"/>
             <Option type="QString" name="line_style" value="dash"/>
-            <Option type="QString" name="line_width" value="0.3"/>
+            <Option type="QString" name="line_width" value="0.4"/>
             <Option type="QString" name="line_width_unit" value="MM"/>
             <Option type="QString" name="capstyle" value="flat"/>
             <Option type="QString" name="joinstyle" value="round"/>
@@ -76,7 +76,7 @@
   </renderer-v2>
   <labeling type="simple">
     <settings calloutType="simple">
-      <text-style fieldName='"label"' isExpression="1" fontFamily="Sans Serif" namedStyle="Regular" fontWeight="50" fontSize="7" fontSizeUnit="Point" textColor="0,95,102,255" textOpacity="1" multilineHeight="1" allowHtml="0">
+      <text-style fieldName="regexp_replace(&quot;label&quot;, '\\d\\d$', '')" isExpression="1" fontFamily="Sans Serif" namedStyle="Regular" fontWeight="50" fontSize="7" fontSizeUnit="Point" textColor="0,95,102,255" textOpacity="1" multilineHeight="1" allowHtml="0">
         <text-buffer bufferDraw="1" bufferSize="0.7" bufferSizeUnits="MM" bufferColor="255,255,255,215" bufferOpacity="1" bufferJoinStyle="128" bufferNoFill="1"/>
         <background shapeDraw="0"/>
         <shadow shadowDraw="0"/>
@@ -157,6 +157,13 @@
         </config>
       </editWidget>
     </field>
+    <field name="angle_step" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
     <field name="interpolated" configurationFlags="None">
       <editWidget type="TextEdit">
         <config>
@@ -176,7 +183,8 @@
     <alias index="7" field="label" name="Chainage"/>
     <alias index="8" field="arc_from" name="Arc from (m)"/>
     <alias index="9" field="arc_to" name="Arc to (m)"/>
-    <alias index="10" field="interpolated" name="Interpolated classes"/>
+    <alias index="10" field="angle_step" name="Class width (°)"/>
+    <alias index="11" field="interpolated" name="Interpolated classes"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -189,6 +197,7 @@
     <field name="label" editable="0"/>
     <field name="arc_from" editable="0"/>
     <field name="arc_to" editable="0"/>
+    <field name="angle_step" editable="0"/>
     <field name="interpolated" editable="0"/>
   </editable>
   <previewExpression>"label"</previewExpression>
