@@ -236,45 +236,8 @@ COMMENT ON FUNCTION tunnel_api.roll(int, float8, float8, float8) IS
 'The point (tunnel''s SRID) at chainage, arc and offset, m; NULL off the tunnel. The inverse of unroll.';
 
 
--- A geometry of the unrolled plane (x = chainage, y = arc) laid on the tunnel's surface, in 3D and the tunnel's SRID.
--- Edges are cut to pieces of at most 0.1 m first, so that they follow the surface. NULL if any of it lies off the tunnel.
-CREATE OR REPLACE FUNCTION tunnel_api.roll(survey_id int, unrolled geometry)
-RETURNS geometry
-LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
-AS $$
-DECLARE
-    kind constant text := GeometryType(unrolled);
-    lines geometry[];
-BEGIN
-    IF kind NOT IN ('POINT', 'LINESTRING', 'POLYGON') THEN
-        RAISE EXCEPTION 'roll takes a point, a line or a polygon of the unrolled plane, not a %', kind;
-    ELSIF kind = 'POINT' THEN
-        RETURN tunnel_api.roll(survey_id, ST_X(unrolled), ST_Y(unrolled));
-    END IF;
-    SELECT array_agg(q.line ORDER BY q.ring) INTO lines
-    FROM (SELECT r.ring, CASE WHEN bool_or(p.point IS NULL) THEN NULL ELSE ST_MakeLine(p.point ORDER BY p.i) END AS line
-          FROM (SELECT coalesce(d.path[1], 0) AS ring,
-                    ST_Segmentize(CASE WHEN kind = 'POLYGON' THEN ST_ExteriorRing(d.geom) ELSE d.geom END, 0.1) AS line
-                FROM (SELECT (ST_DumpRings(unrolled)).* WHERE kind = 'POLYGON'
-                      UNION ALL SELECT NULL, unrolled WHERE kind = 'LINESTRING') d) r
-          CROSS JOIN LATERAL (
-              SELECT d.path[1] AS i, tunnel_api.roll(survey_id, ST_X(d.geom), ST_Y(d.geom)) AS point
-              FROM ST_DumpPoints(r.line) d) p
-          GROUP BY r.ring) q;
-    IF array_position(lines, NULL) IS NOT NULL THEN
-        RETURN NULL;
-    ELSIF kind = 'LINESTRING' THEN
-        RETURN lines[1];
-    END IF;
-    RETURN ST_MakePolygon(lines[1], lines[2:]);
-END
-$$;
-COMMENT ON FUNCTION tunnel_api.roll(int, geometry) IS
-'A point, line or polygon of the unrolled plane (chainage, arc; m) laid on the tunnel''s surface: 3D, tunnel''s SRID. NULL if any of it lies off the tunnel.';
-
-
--- A geometry of the unrolled plane laid on the map beside the axis, in the tunnel's SRID (Gonçalves et al., 2012, eq. 1):
--- each vertex goes from the axis at its chainage by its arc, horizontally to the right.
+-- A point of the unrolled plane laid on the map beside the axis, in the tunnel's SRID (Gonçalves et al., 2012, eq. 1):
+-- from the axis at its chainage by its arc, horizontally to the right. NULL where there is no axis.
 CREATE OR REPLACE FUNCTION tunnel_api.map_point(survey_id int, chainage float8, arc float8)
 RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT

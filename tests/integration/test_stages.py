@@ -381,3 +381,27 @@ def _kill_others(dsn: str) -> None:
             " WHERE datname = current_database() AND pid <> pg_backend_pid() AND application_name = 'tunneldb'"
             "   AND query ~ 'tunnel_api'"
         )
+
+
+def test_shapes_there_and_back(curve: tuple[psycopg.Connection, Survey, Path]) -> None:
+    """A polygon with a hole laid on the surface and back; its area on the map strip is that of the unrolled plane."""
+    conn, survey, _ = curve
+    ring = "(980 2, 983 2, 983 4, 980 4, 980 2)", "(981 2.5, 982 2.5, 982 3, 981 2.5)"
+    plane = f"POLYGON ({ring[0]}, {ring[1]})"
+    rolled, back, mapped, holes = conn.execute(
+        """
+        SELECT ST_ZMax(r.rolled) - ST_ZMin(r.rolled), ST_HausdorffDistance(tunnel_api.unroll_shape(%(id)s, r.rolled), p.plane),
+               ST_Area(m.mapped) / ST_Area(p.plane), ST_NumInteriorRings(r.rolled)
+        FROM (SELECT ST_GeomFromText(%(plane)s) AS plane) p, LATERAL (SELECT tunnel_api.roll(%(id)s, p.plane) AS rolled) r,
+             LATERAL (SELECT tunnel_api.map_strip(%(id)s, p.plane) AS mapped) m
+        """,
+        {"id": survey.id, "plane": plane},
+    ).fetchone()
+    assert rolled > 0.5
+    assert back < 0.001
+    assert mapped == pytest.approx(1 - 3 / 300, abs=0.003)  # inside of a right-hand curve of R 300 m, 3 m off the axis
+    assert holes == 1
+    outside = "LINESTRING (980 2, 2000 2)"
+    assert conn.execute("SELECT tunnel_api.roll(%s, ST_GeomFromText(%s))", [survey.id, outside]).fetchone() == (None,)
+    with pytest.raises(psycopg.errors.RaiseException, match="not a MULTIPOINT"):
+        conn.execute("SELECT tunnel_api.roll(%s, ST_GeomFromText('MULTIPOINT (1 1)'))", [survey.id])

@@ -1,0 +1,86 @@
+-- Lines and polygons between space, the unrolled plane and the map: vertex by vertex, edges cut to short pieces first.
+
+-- The id of a survey, by its name.
+CREATE OR REPLACE FUNCTION tunnel_api.survey_id(survey text)
+RETURNS int
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+DECLARE
+    found int;
+BEGIN
+    SELECT s.id INTO found FROM tunnel.survey s WHERE s.name = survey;
+    IF found IS NULL THEN
+        RAISE EXCEPTION 'there is no survey %', survey USING HINT = 'SELECT name FROM tunnel_api.survey';
+    END IF;
+    RETURN found;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.survey_id(text) IS 'The id of a survey, by its name; an error if there is none.';
+
+
+-- A point, line or polygon with each vertex carried over: 'roll' (unrolled plane to surface), 'map' (unrolled plane to map
+-- strip) or 'unroll' (space to unrolled plane). Edges are cut to pieces of at most step metres first, so that they follow
+-- the surface. NULL if any vertex lies off the tunnel.
+CREATE OR REPLACE FUNCTION tunnel_api.carry_over(survey_id int, shape geometry, way text, step float8)
+RETURNS geometry
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+AS $$
+DECLARE
+    kind constant text := GeometryType(shape);
+    rings geometry[];
+BEGIN
+    IF kind NOT IN ('POINT', 'LINESTRING', 'POLYGON') THEN
+        RAISE EXCEPTION 'a point, a line or a polygon is needed, not a %', kind USING HINT = 'Use ST_Dump for the parts.';
+    END IF;
+    SELECT array_agg(q.ring ORDER BY q.i) INTO rings
+    FROM (SELECT r.i, CASE WHEN bool_or(p.carried IS NULL) THEN NULL
+                           WHEN kind = 'POINT' THEN (array_agg(p.carried))[1]
+                           ELSE ST_MakeLine(p.carried ORDER BY p.j) END AS ring
+          FROM (SELECT d.path[1] AS i, ST_Segmentize(ST_ExteriorRing(d.geom), step) AS line
+                FROM ST_DumpRings(CASE WHEN kind = 'POLYGON' THEN shape END) d
+                UNION ALL
+                SELECT 0, ST_Segmentize(shape, step) WHERE kind <> 'POLYGON') r
+          CROSS JOIN LATERAL (
+              SELECT coalesce(v.path[1], 1) AS j,
+                  CASE way
+                      WHEN 'roll' THEN tunnel_api.roll(survey_id, ST_X(v.geom), ST_Y(v.geom))
+                      WHEN 'map' THEN tunnel_api.map_point(survey_id, ST_X(v.geom), ST_Y(v.geom))
+                      WHEN 'unroll' THEN (SELECT ST_MakePoint(u.chainage, u.arc) FROM tunnel_api.unroll(survey_id, v.geom) u)
+                  END AS carried
+              FROM ST_DumpPoints(r.line) v) p
+          GROUP BY r.i) q;
+    IF array_position(rings, NULL) IS NOT NULL THEN
+        RETURN NULL;
+    ELSIF kind = 'POLYGON' THEN
+        RETURN ST_MakePolygon(rings[1], rings[2:]);
+    END IF;
+    RETURN rings[1];
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.carry_over(int, geometry, text, float8) IS
+'A point, line or polygon carried over vertex by vertex, edges cut to pieces of step metres: way is roll (unrolled plane to surface), map (unrolled plane to map strip) or unroll (space to unrolled plane). NULL if any vertex lies off the tunnel.';
+
+
+CREATE OR REPLACE FUNCTION tunnel_api.roll(survey_id int, unrolled geometry)
+RETURNS geometry
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+AS $$ SELECT tunnel_api.carry_over(survey_id, unrolled, 'roll', 0.1) $$;
+COMMENT ON FUNCTION tunnel_api.roll(int, geometry) IS
+'A point, line or polygon of the unrolled plane (chainage, arc; m) laid on the tunnel''s surface: 3D, tunnel''s SRID. NULL if any of it lies off the tunnel.';
+
+
+CREATE OR REPLACE FUNCTION tunnel_api.map_strip(survey_id int, unrolled geometry)
+RETURNS geometry
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+AS $$ SELECT tunnel_api.carry_over(survey_id, unrolled, 'map', 1.0) $$;
+COMMENT ON FUNCTION tunnel_api.map_strip(int, geometry) IS
+'A point, line or polygon of the unrolled plane (chainage, arc; m) laid on the map beside the axis, tunnel''s SRID. Source: Gonçalves et al. (2012), eq. 1.';
+
+
+CREATE OR REPLACE FUNCTION tunnel_api.unroll_shape(survey_id int, shape geometry)
+RETURNS geometry
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+AS $$ SELECT tunnel_api.carry_over(survey_id, shape, 'unroll', 0.1) $$;
+COMMENT ON FUNCTION tunnel_api.unroll_shape(int, geometry) IS
+'A point, line or polygon in space (3D, tunnel''s SRID) in the unrolled plane (chainage, arc; m; SRID 0). NULL if any of it lies off the tunnel.';
