@@ -5,7 +5,7 @@
 CREATE OR REPLACE VIEW tunnel_api.leak AS
 SELECT l.id, l.survey_id, s.name AS survey, l.km,
        (SELECT min(g.n) FROM tunnel.segment g
-         WHERE g.survey_id = l.survey_id AND g.n BETWEEN m.chainage / t.spacing - 2 AND m.chainage / t.spacing + 1
+         WHERE g.survey_id = l.survey_id AND g.n BETWEEN m.near - 2 AND m.near + 2
            AND m.chainage BETWEEN g.chainage_from AND g.chainage_to) AS segment,
        l.chainage_from, l.chainage_to,
        tunnel_api.chainage_label(m.chainage) AS label,
@@ -17,7 +17,8 @@ SELECT l.id, l.survey_id, s.name AS survey, l.km,
   FROM tunnel.leak l
   JOIN tunnel.survey s ON s.id = l.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
- CROSS JOIN LATERAL (SELECT (l.chainage_from + l.chainage_to) / 2 AS chainage) m;
+ CROSS JOIN LATERAL (SELECT (l.chainage_from + l.chainage_to) / 2 AS chainage,
+                            floor((l.chainage_from + l.chainage_to) / 2 / t.spacing)::integer AS near) m;
 
 CREATE OR REPLACE VIEW tunnel_api.leak_unrolled AS
 SELECT id, survey_id, survey, km, segment, chainage_from, chainage_to, label, arc_from, arc_to, clock, area, drop_mean,

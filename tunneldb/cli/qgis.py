@@ -36,6 +36,8 @@ def qgis(settings: Settings, survey: str, output: Path, service: str | None) -> 
         write_project(conn, found, output, images, service)
         styles = _store_styles(conn)
     click.echo(f"{output}: {len(images)} images, {styles}", err=True)
+    if settings.dsn is None and service is None:
+        click.echo("QGIS reads your own server; should it be stopped: tunneldb server start", err=True)
 
 
 def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> list[Path]:
