@@ -81,7 +81,7 @@ def report(figures: dict[str, Any]) -> None:
     """Print the stages side by side, and the ratios."""
     ours = figures.get("pipeline", {}).get("seconds", {})
     theirs = figures.get("peer", {}).get("seconds", {})
-    names = ("load", "index", "axis", "segments", "sections", "projection", "total")
+    names = ("load", "index", "axis", "segments", "sections", "projection", "start-up of run", "total")
     rows = [(name, *(f"{side[name]:.2f}" if name in side else "" for side in (ours, theirs))) for name in names]
     print_table("Survey density, seconds", ("stage", "tunneldb", "peer"), rows)
     if ours:
