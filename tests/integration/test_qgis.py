@@ -299,6 +299,16 @@ def test_project_without_leaks_sections_and_images(conn: psycopg.Connection, exa
     assert seen["bookmarks"] == ["Map"]
 
 
+def test_socket_that_qgis_cannot_reach_is_refused(conn: psycopg.Connection, dsn: str, example: str, tmp_path: Path) -> None:
+    conn.execute("DELETE FROM tunnel.image")
+    conn.commit()
+    (tmp_path / "a b").symlink_to(conn.info.host)
+    result = write(tmp_path / "demo.qgz", dsn=make_conninfo(dsn, host=str(tmp_path / "a b")))
+    assert result.exit_code == 2
+    assert "--service" in result.stderr
+    assert write(tmp_path / "demo.qgz", "--service", "tunnels").exit_code == 0
+
+
 def test_errors_are_one_line(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
     result = write(tmp_path / "demo.txt")
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1)

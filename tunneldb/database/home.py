@@ -138,9 +138,10 @@ def _digest(folder: Path) -> str:
 
 
 def _socket_dir(state: Path, user: pwd.struct_passwd | None) -> Path:
-    """Return the socket's folder: beside the data, or a short one below /tmp when that path is too long."""
+    """Return the socket's folder: beside the data, or one below /tmp when that path is too long or QGIS cannot use it."""
     beside = state / "run"
-    if len(os.fsencode(beside / SOCKET_NAME)) <= SOCKET_PATH_LIMIT - 5:  # room for ".lock"
+    fits = len(os.fsencode(beside / SOCKET_NAME)) <= SOCKET_PATH_LIMIT - 5  # room for ".lock"
+    if fits and not set(" '\\") & set(str(beside)):  # QGIS hands the path to libpq unquoted
         return beside
     owner = os.geteuid() if user is None else user.pw_uid
     return Path(f"/tmp/tunneldb-{owner}-{_digest(state)}")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import psycopg
 
+from tunneldb.errors import UserError
 from tunneldb.export.qgis.layer import VectorLayer
 
 
@@ -34,8 +35,19 @@ class Source:
 
     @classmethod
     def of_connection(cls, conn: psycopg.Connection) -> Source:
-        """Connect to where ``conn`` is connected; as whoever opens the project, unless ``conn`` names another user."""
+        """Connect to where ``conn`` is connected; as whoever opens the project, unless ``conn`` names another user.
+
+        Raises
+        ------
+        UserError
+            QGIS can't use the server's address.
+        """
         info = conn.info
+        if set(" '\\") & set(info.host):
+            raise UserError(
+                f"QGIS cannot connect to a socket in {info.host!r}, for it does not quote the path: name an entry of"
+                " pg_service.conf by --service"
+            )
         parts = [f"dbname={quote(info.dbname)}", f"host={quote(info.host)}", f"port={info.port}"]
         if info.user != getpass.getuser():
             parts.append(f"user={quote(info.user)}")
