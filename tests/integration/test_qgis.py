@@ -299,6 +299,13 @@ def test_project_without_leaks_sections_and_images(conn: psycopg.Connection, exa
     assert seen["bookmarks"] == ["Map"]
 
 
+def test_offset_is_shown_where_there_is_no_intensity(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    conn.execute("DELETE FROM tunnel.image WHERE kind <> 'offset'")
+    conn.commit()
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    assert set(act(tmp_path / "demo.qgz", "describe")["themes"]["Unrolled"]) == {*UNROLLED, "demo-2024-km012-offset"}
+
+
 def test_socket_that_qgis_cannot_reach_is_refused(conn: psycopg.Connection, dsn: str, example: str, tmp_path: Path) -> None:
     conn.execute("DELETE FROM tunnel.image")
     conn.commit()

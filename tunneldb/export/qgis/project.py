@@ -125,10 +125,12 @@ def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element)
 
 
 def _rasters(images: Sequence[Path], folder: Path) -> list[_Entry]:
-    """Layers of the images, a group for each kind; the first kind is shown."""
+    """Layers of the images, a group for each kind; the first kind that there is is shown (offset, without intensity)."""
     entries = []
+    of_kind = {kind: sorted(path for path in images if image_kind(path) == kind) for kind in KINDS}
+    shown = next((kind for kind, paths in of_kind.items() if paths), None)
     for kind, title in KINDS.items():
-        paths = sorted(path for path in images if image_kind(path) == kind)
+        paths = of_kind[kind]
         limits = grey_range(paths) if kind != "offset" else (0.0, 0.0)
         for path in paths:
             element = ET.Element("maplayer", type="raster", styleCategories="AllStyleCategories")
@@ -140,7 +142,7 @@ def _rasters(images: Sequence[Path], folder: Path) -> list[_Entry]:
             ET.SubElement(element, "provider").text = "gdal"
             element.append(pipe(kind, limits))
             ET.SubElement(element, "blendMode").text = "0"
-            themes = (UNROLLED,) if kind == next(iter(KINDS)) else ()
+            themes = (UNROLLED,) if kind == shown else ()
             entries.append(_Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))
     return entries
 
