@@ -15,8 +15,8 @@ KINDS = {"corrected": "Intensity, corrected", "raw": "Intensity, raw", "offset":
 OFFSET_RANGE = 0.1
 """Offset at which the colours are full, m."""
 
-# Inwards red, outwards blue (ColorBrewer RdBu).
-_OFFSET_COLOURS = ((-1.0, "#2166ac"), (-0.4, "#92c5de"), (0.0, "#f7f7f7"), (0.4, "#f4a582"), (1.0, "#b2182b"))
+# Inwards red, outwards blue (ColorBrewer RdBu), the surface itself grey, to be told from paper.
+_OFFSET_COLOURS = ((-1.0, "#2166ac"), (-0.4, "#92c5de"), (0.0, "#e6e6e6"), (0.4, "#f4a582"), (1.0, "#b2182b"))
 _SAMPLE = 1000
 
 
