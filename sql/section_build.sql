@@ -1,0 +1,176 @@
+-- Stage 4 of Gonçalves et al. (2012) for a whole kilometre: classes gathered, curves drawn, neighbours compared, rows written.
+
+-- The angular classes of each section of a kilometre, as arrays over the classes (NULL for an empty one).
+--
+-- The slab of a section begins at half_width to both sides of its plane and doubles, up to max_half_width, until nine classes
+-- of ten hold min_points points: where profiles are far apart it widens until the classes fill.
+CREATE OR REPLACE FUNCTION tunnel_api.section_gather(
+    survey_id int, km int, angle_step float8, half_width float8, max_half_width float8, min_points int)
+RETURNS TABLE (
+    segment int, half int2, width float8,
+    radius float8[], slope float8[], sigma float8[], spread float8[], points bigint[])
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+ROWS 200
+SET enable_mergejoin = off  -- it would match classes by their section alone
+AS $$
+#variable_conflict use_column
+DECLARE
+    classes constant int := round(360 / angle_step);
+    slab float8 := least(half_width, max_half_width);
+    pending int[];
+BEGIN
+    SELECT coalesce(array_agg(p.segment * 100 + p.half), '{}') INTO pending
+    FROM tunnel_api.section_plane(section_gather.survey_id, section_gather.km) p;
+    WHILE cardinality(pending) > 0 LOOP
+        FOR segment, half, width, radius, slope, sigma, spread, points IN
+            WITH class AS MATERIALIZED (
+                SELECT c.* FROM tunnel_api.section_classes(
+                    section_gather.survey_id, section_gather.km, slab, section_gather.angle_step, pending) c
+                WHERE c.points >= section_gather.min_points
+            ), done AS (
+                SELECT c.segment, c.half
+                FROM class c
+                GROUP BY c.segment, c.half
+                HAVING count(*) >= 0.9 * classes OR slab >= section_gather.max_half_width
+            )
+            SELECT d.segment, d.half, slab, array_agg(c.radius ORDER BY i), array_agg(c.slope ORDER BY i),
+                array_agg(c.sigma ORDER BY i), array_agg(c.spread ORDER BY i), array_agg(coalesce(c.points, 0) ORDER BY i)
+            FROM done d
+            CROSS JOIN generate_series(0, classes - 1) AS i
+            LEFT JOIN class c ON c.segment = d.segment AND c.half = d.half AND c.class = i
+            GROUP BY d.segment, d.half
+        LOOP
+            RETURN NEXT;
+            pending := array_remove(pending, segment * 100 + half);
+        END LOOP;
+        EXIT WHEN slab >= max_half_width;
+        slab := least(2 * slab, max_half_width);
+    END LOOP;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.section_gather(int, int, float8, float8, float8, int) IS
+'Angular classes of each section of one kilometre as arrays; the slab (width: half of it, m) is widened until nine classes of ten hold min_points points.';
+
+
+-- The curves of the sections of a kilometre.
+--
+-- Each section is compared with the two before and the two after it, class by class. A class that stands in from their median
+-- by more than protrusion, and by more than the lining differs there from section to section, holds something hung on the
+-- wall that the section by itself did not tell from it: it is rejected, and the curve drawn again. Where more than a quarter
+-- of the classes stand in, it is the tunnel that is narrower, and nothing is rejected.
+CREATE OR REPLACE FUNCTION tunnel_api.section_curves(
+    survey_id int, km int, angle_step float8, half_width float8, max_half_width float8, min_points int, protrusion float8)
+RETURNS TABLE (
+    segment int, half int2, width float8, slope float8[], sigma float8[], points bigint[],
+    node_radius float8[], node_arc float8[], class_radius float8[], class_state text[])
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+ROWS 200
+SET enable_nestloop = off  -- the planner expects few classes and would compare each with every other
+AS $$
+    WITH gathered AS MATERIALIZED (
+        SELECT row_number() OVER (ORDER BY g.segment, g.half) AS i, g.*
+        FROM tunnel_api.section_gather(section_curves.survey_id, section_curves.km, section_curves.angle_step,
+            section_curves.half_width, section_curves.max_half_width, section_curves.min_points) g
+    ), alone AS MATERIALIZED (
+        SELECT g.i, q.*
+        FROM gathered g
+        CROSS JOIN LATERAL tunnel_api.section_curve(
+            section_curves.angle_step, g.radius, g.slope, g.sigma, g.spread, section_curves.protrusion) q
+        WHERE q.node_radius IS NOT NULL
+    ), class AS (
+        SELECT a.i, k.class, k.radius
+        FROM alone a CROSS JOIN LATERAL unnest(a.class_radius) WITH ORDINALITY AS k (radius, class)
+    ), beside AS (
+        SELECT c.i, c.class, c.radius - percentile_cont(0.5) WITHIN GROUP (ORDER BY o.radius) AS apart
+        FROM (SELECT c.*, c.i + d AS other FROM class c CROSS JOIN unnest(ARRAY[-2, -1, 1, 2]) AS d) c
+        JOIN class o ON o.i = c.other AND o.class = c.class
+        GROUP BY c.i, c.class, c.radius
+        HAVING count(*) >= 3
+    ), usual AS (
+        SELECT b.i, greatest(section_curves.protrusion,
+            3 * 1.4826 * percentile_cont(0.5) WITHIN GROUP (ORDER BY abs(b.apart))) AS tolerance
+        FROM beside b
+        GROUP BY b.i
+    ), hung AS (
+        SELECT b.i, array_agg(b.class::int) AS classes
+        FROM beside b JOIN usual u ON u.i = b.i
+        WHERE b.apart < -u.tolerance
+        GROUP BY b.i
+        HAVING count(*) * 4 <= round(360 / section_curves.angle_step)
+    ), again AS (
+        SELECT h.i, h.classes, q.*
+        FROM hung h
+        JOIN gathered g ON g.i = h.i
+        CROSS JOIN LATERAL (
+            SELECT array_agg(CASE WHEN k.class = ANY (h.classes) THEN NULL ELSE k.radius END ORDER BY k.class) AS radius
+            FROM unnest(g.radius) WITH ORDINALITY AS k (radius, class)) r
+        CROSS JOIN LATERAL tunnel_api.section_curve(
+            section_curves.angle_step, r.radius, g.slope, g.sigma, g.spread, section_curves.protrusion) q
+        WHERE q.node_radius IS NOT NULL
+    )
+    SELECT g.segment, g.half, g.width, g.slope, g.sigma, g.points,
+        coalesce(b.node_radius, a.node_radius), coalesce(b.node_arc, a.node_arc), coalesce(b.class_radius, a.class_radius),
+        CASE WHEN b.i IS NULL THEN a.class_state
+             ELSE (SELECT array_agg(CASE WHEN k.class = ANY (b.classes) THEN 'rejected' ELSE k.state END ORDER BY k.class)
+                   FROM unnest(b.class_state) WITH ORDINALITY AS k (state, class)) END
+    FROM gathered g
+    JOIN alone a ON a.i = g.i
+    LEFT JOIN again b ON b.i = g.i
+    ORDER BY g.i
+$$;
+COMMENT ON FUNCTION tunnel_api.section_curves(int, int, float8, float8, float8, int, float8) IS
+'The curves of the sections of one kilometre, each compared with its neighbours: radius and arc (m) at each degree from -180° to 180°, and radius and state of each angular class.';
+
+
+-- Writes the sections of a kilometre to tunnel.section and tunnel.section_class, replacing those there; returns how many.
+CREATE OR REPLACE FUNCTION tunnel_api.section_build(
+    survey_id int, km int,
+    angle_step float8 DEFAULT 5.0, half_width float8 DEFAULT 0.15, max_half_width float8 DEFAULT 2.5, min_points int DEFAULT 5,
+    protrusion float8 DEFAULT 0.03)
+RETURNS int
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
+AS $$
+DECLARE
+    built int;
+BEGIN
+    IF abs(180 / angle_step - round(180 / angle_step)) > 1e-9 OR angle_step < 1 THEN
+        RAISE EXCEPTION 'angle_step must divide 180 degrees and be at least 1, not %', angle_step;
+    END IF;
+    DELETE FROM tunnel.section s WHERE s.survey_id = section_build.survey_id AND s.km = section_build.km;
+    WITH curve AS MATERIALIZED (
+        SELECT c.*, p.chainage, p.frame
+        FROM tunnel_api.section_curves(section_build.survey_id, section_build.km, section_build.angle_step,
+            section_build.half_width, section_build.max_half_width, section_build.min_points, section_build.protrusion) c
+        JOIN tunnel_api.section_plane(section_build.survey_id, section_build.km) p ON p.segment = c.segment AND p.half = c.half
+    ), written AS (
+        INSERT INTO tunnel.section (survey_id, km, segment, half, chainage, half_width, angle_step, radius, arc, geom,
+            points, interpolated)
+        SELECT section_build.survey_id, section_build.km, c.segment, c.half, c.chainage, c.width, section_build.angle_step,
+            c.node_radius, c.node_arc,
+            (SELECT ST_MakeLine(array_agg(ST_SetSRID(ST_MakePoint(
+                c.frame[1] + g.u * c.frame[7] + g.w * c.frame[10],
+                c.frame[2] + g.u * c.frame[8] + g.w * c.frame[11],
+                c.frame[3] + g.w * c.frame[12]), t.srid) ORDER BY g.i))
+             FROM (SELECT i, c.node_radius[i] * sind(i - 181) AS u, c.node_radius[i] * cosd(i - 181) AS w
+                   FROM generate_series(1, 361) AS i) g),
+            (SELECT sum(q) FROM unnest(c.points) q),
+            (SELECT count(*) FROM unnest(c.class_state) q WHERE q <> 'measured')
+        FROM curve c
+        CROSS JOIN tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+        WHERE s.id = section_build.survey_id
+        RETURNING section.id, section.segment, section.half
+    ), detail AS (
+        INSERT INTO tunnel.section_class (section_id, class, angle, radius, slope, sigma, points, state)
+        SELECT w.id, k.class - 1, -180 + (k.class - 0.5) * section_build.angle_step, k.radius, k.slope, k.sigma, k.points, k.state
+        FROM written w
+        JOIN curve c ON c.segment = w.segment AND c.half = w.half
+        CROSS JOIN LATERAL ROWS FROM (
+            unnest(c.class_radius), unnest(c.slope), unnest(c.sigma), unnest(c.points), unnest(c.class_state))
+            WITH ORDINALITY AS k (radius, slope, sigma, points, state, class)
+    )
+    SELECT count(*) INTO built FROM written;
+    RETURN built;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.section_build(int, int, float8, float8, float8, int, float8) IS
+'Stage 4 for one kilometre: rewrites tunnel.section and tunnel.section_class; returns the number of sections. angle_step in degrees, widths in m. Source: Gonçalves et al. (2012), stage 4.';
