@@ -54,7 +54,8 @@ COMMENT ON FUNCTION tunnel_api.section_gather(int, int, float8, float8, float8, 
 
 -- The curves of the sections of a kilometre.
 --
--- Each section is compared with the two before and the two after it, class by class. A class that stands in from their median
+-- Each section is compared with the two before and the two after it (at the ends of the kilometre, with the nearest four),
+-- class by class. A class that stands in from their median
 -- by more than protrusion, and by more than the lining differs there from section to section, holds something hung on the
 -- wall that the section by itself did not tell from it: it is rejected, and the curve drawn again. Where more than a quarter
 -- of the classes stand in, it is the tunnel that is narrower, and nothing is rejected.
@@ -82,8 +83,9 @@ AS $$
         FROM alone a CROSS JOIN LATERAL unnest(a.class_radius) WITH ORDINALITY AS k (radius, class)
     ), beside AS (
         SELECT c.i, c.class, c.radius - percentile_cont(0.5) WITHIN GROUP (ORDER BY o.radius) AS apart
-        FROM (SELECT c.*, c.i + d AS other FROM class c CROSS JOIN unnest(ARRAY[-2, -1, 1, 2]) AS d) c
-        JOIN class o ON o.i = c.other AND o.class = c.class
+        FROM (SELECT c.*, greatest(least(c.i - 2, n.sections - 4), 1) + d AS other
+              FROM class c CROSS JOIN (SELECT count(*) AS sections FROM gathered) n CROSS JOIN generate_series(0, 4) AS d) c
+        JOIN class o ON o.i = c.other AND o.i <> c.i AND o.class = c.class
         GROUP BY c.i, c.class, c.radius
         HAVING count(*) >= 3
     ), usual AS (
