@@ -41,9 +41,7 @@ def to_decibel(raw: Single | Float, kind: Kind) -> Float:
     if kind != "linear":
         return raw
     positive = raw > 0
-    return np.asarray(
-        np.where(positive, 10.0 * np.log10(np.where(positive, raw, 1.0)), np.nan), dtype=np.float64
-    )
+    return np.asarray(np.where(positive, 10.0 * np.log10(np.where(positive, raw, 1.0)), np.nan), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -79,9 +77,7 @@ def needs_reference(kind: Kind) -> bool:
     return kind != "reflectance"
 
 
-def observe(
-    points: Float, scanner: Float, normal: Float, raw: Single, kind: Kind, reference: ReferenceCurve | None
-) -> Views:
+def observe(points: Float, scanner: Float, normal: Float, raw: Single, kind: Kind, reference: ReferenceCurve | None) -> Views:
     """Range, incidence and distance-corrected intensity of points.
 
     Parameters
@@ -113,16 +109,10 @@ def observe(
         )
     knots = reference.range_m if reference else np.zeros(0)
     values = reference.intensity_db if reference else np.zeros(0)
-    return Views(
-        *_observe(
-            points, scanner, normal, raw.astype(np.float32, copy=False), kind == "linear", knots, values
-        )
-    )
+    return Views(*_observe(points, scanner, normal, raw.astype(np.float32, copy=False), kind == "linear", knots, values))
 
 
-def range_span(
-    views: Views, use: NDArray[np.bool_], reference: ReferenceCurve
-) -> tuple[float, float, int, int]:
+def range_span(views: Views, use: NDArray[np.bool_], reference: ReferenceCurve) -> tuple[float, float, int, int]:
     """Nearest and farthest range (m) of the points to use, how many are outside the curve's span, and all."""
     nearest, farthest, outside, count = _range_span(
         views.range_m, use, reference.range_m[0] - SPAN_TOLERANCE, reference.range_m[-1] + SPAN_TOLERANCE
@@ -171,9 +161,7 @@ def _observe(
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _corrected(
-    distance_db: Single, cosine: Single, a: float, b: float
-) -> Single:  # pragma: no cover - compiled
+def _corrected(distance_db: Single, cosine: Single, a: float, b: float) -> Single:  # pragma: no cover - compiled
     corrected = np.empty(distance_db.shape[0], np.float32)
     for i in prange(distance_db.shape[0]):
         c = float(cosine[i])

@@ -42,9 +42,7 @@ class ReferenceCurve:
         if not (np.all(np.isfinite(ranges)) and np.all(np.isfinite(intensity))):
             raise UserError("the reference curve holds a value that is not a number: remove or mend that row")
         if np.any(ranges <= 0):
-            raise UserError(
-                f"the reference curve holds the range {ranges.min():g} m: ranges must be positive"
-            )
+            raise UserError(f"the reference curve holds the range {ranges.min():g} m: ranges must be positive")
         if np.any(np.diff(ranges) <= 0):
             row = int(np.argmin(np.diff(ranges))) + 1
             raise UserError(f"the reference curve's ranges must grow strictly: {ranges[row]:g} m does not")

@@ -115,10 +115,7 @@ def find_roughness(regions: Regions) -> Roughness:
     sigma = float(fine[np.argmin(values)])
     flattest, steepest = float(regions.cosine.max()), float(regions.cosine.min())
     ends = np.array([flattest, steepest])
-    course = [
-        float(np.diff(incidence_db(ends, float(np.clip(s, 0, 90))))[0])
-        for s in (sigma - TELLING, sigma + TELLING)
-    ]
+    course = [float(np.diff(incidence_db(ends, float(np.clip(s, 0, 90))))[0]) for s in (sigma - TELLING, sigma + TELLING)]
     contrast = abs(course[1] - course[0])
     return Roughness(
         sigma=sigma,
@@ -172,8 +169,7 @@ def automatic_regions(
     kept = enough & (spread <= 2.0 * np.median(spread[enough]))
     class_of = incidence_class[first]
     chosen = [
-        _nearest_to_dry_level(np.flatnonzero(kept & (class_of == c)), regions.distance_db)
-        for c in np.unique(class_of[kept])
+        _nearest_to_dry_level(np.flatnonzero(kept & (class_of == c)), regions.distance_db) for c in np.unique(class_of[kept])
     ]
     return _take(regions, np.concatenate(chosen))
 
@@ -207,18 +203,14 @@ def _group(
     """Average points of the same key; return one point of each group, the groups, and each one's spread."""
     count = len(keys)
     order = np.lexsort(keys.T[::-1])
-    start = np.flatnonzero(
-        np.concatenate([np.ones(min(count, 1), bool), np.any(np.diff(keys[order], axis=0) != 0, axis=1)])
-    )
+    start = np.flatnonzero(np.concatenate([np.ones(min(count, 1), bool), np.any(np.diff(keys[order], axis=0) != 0, axis=1)]))
     points = np.diff(np.append(start, count))
     if count == 0:
         return start, Regions(np.zeros(0), np.zeros(0), points), np.zeros(0)
     ordered = level[order].astype(np.float64)
     mean = np.add.reduceat(ordered, start) / points
     mean_cosine = np.add.reduceat(cosine[order].astype(np.float64), start) / points
-    spread = np.sqrt(
-        np.add.reduceat((ordered - np.repeat(mean, points)) ** 2, start) / np.maximum(points - 1, 1)
-    )
+    spread = np.sqrt(np.add.reduceat((ordered - np.repeat(mean, points)) ** 2, start) / np.maximum(points - 1, 1))
     return order[start], Regions(mean_cosine, mean, points), spread
 
 

@@ -24,7 +24,7 @@ from tunneldb.job.sources import Source, sample, sources
 from tunneldb.leak.detection import Detection, dry_pixels
 from tunneldb.leak.detection import detect as find_leaks
 from tunneldb.leak.image import Accumulator, Grid
-from tunneldb.leak.lining import floor_points, states
+from tunneldb.leak.lining import Floor, states
 from tunneldb.leak.raster import KINDS
 from tunneldb.leak.seen import Eye, Radiometer, Seen, Span
 from tunneldb.leak.store import (
@@ -96,10 +96,11 @@ def detect(
             save_leaks(conn, survey, km, surface, [])
             pixels = save_images(conn, survey, image, ["offset"])
             return {**counts, "pixels": pixels, "leaks": 0, "note": "no intensity: offset image only, no leaks sought"}
-        view = _sample(conn, survey, eye)
+        floor = Floor.of(surface, km * 1000.0, (km + 1) * 1000.0)
+        view = _sample(conn, survey, eye, floor)
         roughness = _roughness(view, load_regions(conn, survey, km, "homogeneous"))
         counts = _gather(eye, files, image, roughness.sigma, progress)
-        state = states(image, surface, values["appendage.distance"])
+        state = states(image, floor, values["appendage.distance"])
         dry_regions = load_regions(conn, survey, km, "dry")
         found = find_leaks(image, state, values["leak.min_area"], dry_regions)
         save_radiometry(conn, survey, km, roughness, found, _sigma(view, image, state, found, roughness, dry_regions))
@@ -140,11 +141,11 @@ def _grid(surface: Surface, km: int, pixel: float) -> Grid:
     return Grid.covering(km, pixel, float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max()))
 
 
-def _sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye) -> Sample:
+def _sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye, floor: Floor) -> Sample:
     """Look at points of survey density, and check their ranges against the reference curve before files are read."""
     points = sample(conn, survey, eye.km)
     seen = eye.see(points, f"survey {survey.name}")
-    unrolled = Sample(seen, points.scan_id, seen.use & ~floor_points(eye.surface, seen.chainage, seen.arc))
+    unrolled = Sample(seen, points.scan_id, seen.use & ~floor.covers(seen.chainage, seen.arc))
     if not unrolled.lining.any():
         raise UserError(
             f"no point of kilometre {eye.km} lies on the lining: within {eye.tolerance:g} m of the sections and seen at"

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from tunneldb.geometry.surface import Surface
 from tunneldb.leak.appendage import appendages
 from tunneldb.leak.image import Accumulator, Grid
 
+Float = NDArray[np.float64]
+
 FLOOR_SLOPE = np.cos(np.radians(45.0))
 """Surface whose normal points up more steeply than this, below the axis, is floor."""
+
+FLOOR_EDGE = 0.1
+"""So much of the wall above the floor goes with it, m: there the section is rounded, and dirt lies."""
 
 HALO = 1.0
 """Width of the neighbouring strips that a block's planes look at, m."""
@@ -29,66 +36,67 @@ class State(IntEnum):
     FLOOR = 3
 
 
-def floor(surface: Surface, chainage: NDArray[np.float64], arc: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Mark the floor at pixel centres: surface that looks up by more than 45° and lies below the axis.
+@dataclass(frozen=True)
+class Floor:
+    """Where the floor begins, on both sides, each metre along the tunnel.
 
-    Parameters
+    The floor is the surface below the axis that looks up by more than 45°. Going down a wall it begins where
+    that holds for 0.3 m, and all that lies beyond, rails or whatever stands there, belongs to it.
+
+    Attributes
     ----------
-    surface : Surface
-        The tunnel.
-    chainage : (columns,) float array
-        Chainage of the columns, m, growing.
-    arc : (rows,) float array
-        Arc of the rows, m, falling.
-
-    Returns
-    -------
-    (rows, columns) bool array
-        True as well beyond the ends of the section and where there is no surface.
+    chainage : (k,) float array
+        m, growing.
+    left, right : (k,) float arrays
+        Arc at which the floor begins, m; the middle where there is no surface.
     """
-    along = np.arange(chainage[0], chainage[-1] + _ALONG, _ALONG).clip(max=chainage[-1])
-    across = np.arange(arc[-1], arc[0] + _ACROSS, _ACROSS)
-    c, a = (grid.ravel() for grid in np.meshgrid(along, across))
-    marked = _is_floor(surface, c, a).reshape(len(across), len(along))
-    row = np.clip(np.rint((arc - across[0]) / _ACROSS).astype(np.intp), 0, len(across) - 1)
-    column = np.clip(np.rint((chainage - along[0]) / _ALONG).astype(np.intp), 0, len(along) - 1)
-    return np.asarray(marked[np.ix_(row, column)])
+
+    chainage: Float
+    left: Float
+    right: Float
+
+    @classmethod
+    def of(cls, surface: Surface, start: float, stop: float) -> Floor:
+        """Find the floor of a surface between two chainages, m."""
+        chainage = np.arange(start, stop + _ALONG, _ALONG)
+        arc = np.arange(float(surface.arcs[:, 0].min()), float(surface.arcs[:, -1].max()) + _ACROSS, _ACROSS)
+        c, a = (grid.ravel() for grid in np.meshgrid(chainage, arc, indexing="ij"))
+        points = surface.roll(c, a, np.zeros(len(c)))
+        normal = surface.unroll(points).normal[:, 2].reshape(len(chainage), len(arc))
+        axis = surface.frames(chainage)[:, 0, 2]
+        height = points[:, 2].reshape(normal.shape) - axis[:, None]
+        with np.errstate(invalid="ignore"):
+            looks_up = ((normal > FLOOR_SLOPE) & (height < 0)) | np.isnan(normal)
+        crown = int(np.argmin(np.abs(arc)))
+        right = arc[crown + _begin(looks_up[:, crown:])] - FLOOR_EDGE
+        left = arc[crown - _begin(looks_up[:, crown::-1])] + FLOOR_EDGE
+        # What a single metre shows that its neighbours don't is not the tunnel's shape.
+        return cls(chainage, ndimage.median_filter(left, 5), ndimage.median_filter(right, 5))
+
+    def covers(self, chainage: Float, arc: Float) -> NDArray[np.bool_]:
+        """Tell which places in the unrolled plane are floor; arrays that broadcast, m."""
+        place = np.where(np.isfinite(chainage), chainage, self.chainage[0])
+        row = np.clip(np.rint((place - self.chainage[0]) / _ALONG).astype(np.intp), 0, len(self.chainage) - 1)
+        with np.errstate(invalid="ignore"):
+            return np.asarray((arc <= self.left[row]) | (arc >= self.right[row]), dtype=np.bool_)
 
 
-def floor_points(surface: Surface, chainage: NDArray[np.float64], arc: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Mark points of the unrolled plane, (n,) chainage and arc in m, below which the surface is floor."""
-    known = np.isfinite(chainage) & np.isfinite(arc)
-    marked = np.ones(len(chainage), np.bool_)
-    marked[known] = _is_floor(surface, chainage[known], arc[known])
-    return marked
+def _begin(looks_up: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Index in each row from which on it holds for 0.3 m, or the last one."""
+    run = round(0.3 / _ACROSS)
+    kept = np.asarray(np.lib.stride_tricks.sliding_window_view(looks_up, run, axis=1)).all(axis=-1)
+    return np.where(kept.any(axis=1), kept.argmax(axis=1), looks_up.shape[1] - 1)
 
 
-def _is_floor(surface: Surface, chainage: NDArray[np.float64], arc: NDArray[np.float64]) -> NDArray[np.bool_]:
-    points = surface.roll(chainage, arc, np.zeros(len(chainage)))
-    normal = surface.unroll(points).normal[:, 2]
-    level = np.unique(np.rint(chainage / _ALONG)) * _ALONG
-    axis = np.interp(chainage, level, _finite(surface.frames(level)[:, 0, 2]))
-    with np.errstate(invalid="ignore"):
-        return np.asarray(((normal > FLOOR_SLOPE) & (points[:, 2] < axis)) | np.isnan(normal), dtype=np.bool_)
-
-
-def _finite(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Replace NaN by the nearest number."""
-    known = np.flatnonzero(np.isfinite(values))
-    if len(known) == 0:
-        return values
-    return np.asarray(np.interp(np.arange(len(values)), known, values[known]))
-
-
-def states(image: Accumulator, surface: Surface, delta: float) -> NDArray[np.uint8]:
+def states(image: Accumulator, floor: Floor, delta: float) -> NDArray[np.uint8]:
     """State of every pixel of a kilometre, found block by block.
 
     Parameters
     ----------
     image : Accumulator
         The sums of all points.
-    surface : Surface
-        The tunnel.
+    floor : Floor
+        Where the floor begins.
     delta : float
         Distance from the lining's plane from which a pixel is an appendage, m.
 
@@ -100,7 +108,7 @@ def states(image: Accumulator, surface: Surface, delta: float) -> NDArray[np.uin
     grid = image.grid
     out = np.zeros((grid.rows, grid.columns), np.uint8)
     for block in image.blocks():
-        out[:, block_columns(grid, block)] = _block_states(image, surface, delta, block)
+        out[:, block_columns(grid, block)] = _block_states(image, floor, delta, block)
     return out
 
 
@@ -109,7 +117,7 @@ def block_columns(grid: Grid, block: int) -> slice:
     return slice(block * grid.block_columns, (block + 1) * grid.block_columns)
 
 
-def _block_states(image: Accumulator, surface: Surface, delta: float, block: int) -> NDArray[np.uint8]:
+def _block_states(image: Accumulator, floor: Floor, delta: float, block: int) -> NDArray[np.uint8]:
     grid = image.grid
     columns = block_columns(grid, block)
     halo = round(HALO / grid.pixel)
@@ -118,5 +126,5 @@ def _block_states(image: Accumulator, surface: Surface, delta: float, block: int
     off = appendages(window.offset, grid.pixel, delta)[:, inner]
     state = np.where(window.count[:, inner] > 0, State.LINING, State.EMPTY).astype(np.uint8)
     state[off] = State.APPENDAGE
-    state[floor(surface, grid.chainages(columns), grid.arcs())] = State.FLOOR
+    state[floor.covers(grid.chainages(columns)[None, :], grid.arcs()[:, None])] = State.FLOOR
     return state

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tunneldb.geometry.surface import Surface
 from tunneldb.intensity.correct import Kind, Views, observe, range_span
+from tunneldb.intensity.edge import Edges
 from tunneldb.intensity.reference import ReferenceCurve
 from tunneldb.scan.pose import PoseModel
 from tunneldb.scan.reader import Points
@@ -73,6 +74,8 @@ class Eye:
         Points farther from the surface are not lining, m.
     radiometer : Radiometer or None
         None when the survey has no intensity.
+    edges : Edges
+        Where the surface bends sharply.
     box : (2, 3) float array
         Least and greatest coordinates of the kilometre's lining, m.
     """
@@ -81,6 +84,7 @@ class Eye:
     km: int
     tolerance: float
     radiometer: Radiometer | None
+    edges: Edges
     box: Float
 
     @classmethod
@@ -89,7 +93,8 @@ class Eye:
         touching = (surface.ends[:, 1] > km * 1000.0) & (surface.ends[:, 0] < (km + 1) * 1000.0)
         vertices = surface.segments[touching, :6].reshape(-1, 3)
         margin = float(surface.radius.max()) + tolerance
-        return cls(surface, km, tolerance, radiometer, np.array([vertices.min(0) - margin, vertices.max(0) + margin]))
+        edges = Edges.of(surface, km * 1000.0, (km + 1) * 1000.0)
+        return cls(surface, km, tolerance, radiometer, edges, np.array([vertices.min(0) - margin, vertices.max(0) + margin]))
 
     def near(self, points: Points) -> Points:
         """Points in the kilometre's bounding box."""
@@ -128,7 +133,8 @@ class Eye:
         if self.radiometer:
             radiometer = self.radiometer
             scanner = radiometer.poses.positions(points, name)
-            views = observe(points.xyz, scanner, unrolled.normal, points.intensity, radiometer.kind, radiometer.reference)
+            normals = self.edges.normals_of(points.xyz, unrolled)
+            views = observe(points.xyz, scanner, normals, points.intensity, radiometer.kind, radiometer.reference)
             with np.errstate(invalid="ignore"):
                 use &= views.cosine >= np.cos(np.radians(radiometer.max_incidence))
             use &= np.isfinite(views.raw_db)
