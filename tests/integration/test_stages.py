@@ -14,6 +14,7 @@ from click.testing import CliRunner, Result
 from tunneldb.cli.main import main
 from tunneldb.database import Survey, get_survey
 from tunneldb.geometry.store import load_surface
+from tunneldb.job.run import parse_km
 from tunneldb.simulate import Parameters, Simulation, write
 
 NAME = "curve"
@@ -297,6 +298,7 @@ def test_unroll_of_bad_tables(conn: psycopg.Connection, tmp_path: Path, text: st
     ("options", "says"),
     [
         (["--km", "7"], "no points are loaded in kilometre 7; loaded: 0, 1"),
+        (["--km", "7-9"], "no points are loaded in kilometre 7-9"),
         (["--km", "1-0"], "runs backwards"),
         (["--km", "one"], "--km takes a kilometre"),
         (["--from", "leaks"], "there is no stage 'leaks'"),
@@ -334,6 +336,12 @@ def loaded_curve(conn: psycopg.Connection) -> psycopg.Connection:
         conn.execute("SELECT tunnel_api.partition_swap(%s, %s)", [survey, km])
     conn.commit()
     return conn
+
+
+def test_a_range_takes_the_kilometres_that_are_there() -> None:
+    assert parse_km("511-512", [510, 511]) == [511]
+    assert parse_km("0-9", [1, 3, 12]) == [1, 3]
+    assert parse_km(None, [1, 3]) == [1, 3]
 
 
 def test_too_few_points_is_one_line(loaded_curve: psycopg.Connection) -> None:

@@ -16,12 +16,12 @@ from tunneldb.job.stages import STAGES, Progress, Stage
 
 
 def parse_km(text: str | None, there: list[int]) -> list[int]:
-    """Kilometres of ``text`` (``511`` or ``511-513``) among those that are there; all of them without a text.
+    """Kilometres of ``text`` (``511`` or ``511-513``) that are there; all of them without a text.
 
     Raises
     ------
     UserError
-        If the text is no range, or no points are loaded in one of its kilometres.
+        If the text is no range, or no points are loaded in any of its kilometres.
     """
     if text is None:
         return there
@@ -31,10 +31,11 @@ def parse_km(text: str | None, there: list[int]) -> list[int]:
     first, last = int(match[1]), int(match[2] or match[1])
     if last < first:
         raise UserError(f"--km {text}: the range runs backwards")
-    if missing := sorted(set(range(first, last + 1)) - set(there)):
+    chosen = [km for km in there if first <= km <= last]
+    if not chosen:
         loaded = ", ".join(map(str, there)) or "none"
-        raise UserError(f"no points are loaded in kilometre {', '.join(map(str, missing))}; loaded: {loaded}")
-    return list(range(first, last + 1))
+        raise UserError(f"no points are loaded in kilometre {text.strip()}; loaded: {loaded}")
+    return chosen
 
 
 def loaded_kilometres(conn: psycopg.Connection[Any], survey: Survey) -> list[int]:
