@@ -31,9 +31,7 @@ def test_oren_nayar_is_equation_15(angle, roughness):
 
 
 def test_reference_curve_is_piecewise_linear():
-    np.testing.assert_allclose(
-        CURVE(np.array([1.0, 2.5, 4.0, 7.0, 20.0, 30.0])), [20, 23, 26, 25.5, 20.25, 15.5]
-    )
+    np.testing.assert_allclose(CURVE(np.array([1.0, 2.5, 4.0, 7.0, 20.0, 30.0])), [20, 23, 26, 25.5, 20.25, 15.5])
 
 
 @pytest.mark.parametrize(
@@ -85,9 +83,7 @@ def test_counts_that_are_not_positive_have_no_level():
 
 
 def test_a_surface_seen_from_behind_has_no_corrected_intensity():
-    views = _views(
-        np.array([[0.0, 0.0, 5.0]]), np.array([0.0, 0.0, 9.0]), np.array([3.0], np.float32), "reflectance"
-    )
+    views = _views(np.array([[0.0, 0.0, 5.0]]), np.array([0.0, 0.0, 9.0]), np.array([3.0], np.float32), "reflectance")
     assert np.isnan(views.corrected(10.0)).all()
 
 

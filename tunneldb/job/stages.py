@@ -141,5 +141,5 @@ STAGES: tuple[Stage, ...] = (
     Stage("axis", axis, ("axis",)),
     Stage("segments", segments, ()),
     Stage("sections", sections, ("section",)),
-    Stage("detect", detect, ("lining", "image", "appendage", "leak")),
+    Stage("detect", detect, ("lining", "image", "intensity", "appendage", "leak")),
 )
