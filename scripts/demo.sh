@@ -23,7 +23,7 @@ start=$SECONDS
 step simulate demo/scan --preset demo --name demo
 step init
 remove_former
-step tunnel add demo --srid 25830 --axis demo/scan/demo.axis.csv
+step tunnel add demo --srid 25830 --axis demo/scan/demo.axis.csv --start-chainage 12300
 step survey add demo-2024 --tunnel demo --date 2024-05-04 --trajectory demo/scan/demo.trajectory.csv \
     --reference demo/scan/demo.reference.csv --intensity Amplitude --intensity-kind amplitude
 step load demo-2024 demo/scan/demo*.laz

@@ -188,4 +188,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.segment_tag(int, int) IS
-'Stage 3 for the points of one kilometre: rewrites their partition with segment number and chainage (m, in plan) and swaps it in; returns the number of points tagged. Source: Gonçalves et pl. (2012), stage 3.';
+'Stage 3 for the points of one kilometre: rewrites their partition with segment number and chainage (m, in plan) and swaps it in; returns the number of points tagged. Source: Gonçalves et al. (2012), stage 3.';

@@ -143,7 +143,7 @@ def _options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--no-truth", is_flag=True, help="Leave out the truth of each point (21 bytes a point).")
 @_options
 def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> None:
-    r"""Make a simulated scan of a tunnel, with its truth, in the folder OUT.
+    """Make a simulated scan of a tunnel, with its truth, in the folder OUT.
 
     A section is swept along a curved and sloping axis, perpendicular to it. A static scanner or a profiler on a
     trolley shoots rays at the lining, which carries leaks, cables, a tray, boxes, lamps, rails and refuge niches;
@@ -170,7 +170,7 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
       tunneldb simulate out --name km --length 25000 --radius 4000 --scanner profiler --density 100 --no-truth
 
     Lengths are in metres, angles in degrees, levels in dB.
-    """
+    """  # noqa: D301 - \b is click's mark for lines to be kept
     values = PRESETS[preset] if preset else {}
     parameters = Parameters(**{**values, **{k: v for k, v in given.items() if v is not None}})
     simulation = Simulation(parameters)
