@@ -21,7 +21,7 @@ from tunneldb.export.qgis.extent import Extent, View, first_window, map_extent, 
 from tunneldb.export.qgis.layer import LAYERS, MAP, SPACE, UNROLLED, VectorLayer
 from tunneldb.export.qgis.raster import KINDS, grey_range, image_kind, pipe
 from tunneldb.export.qgis.source import Source
-from tunneldb.export.qgis.style import style_elements
+from tunneldb.export.qgis.styles import style_elements
 
 QGIS_VERSION = "3.22.0-Białowieża"
 """Version whose form of project is written; later ones read it."""
