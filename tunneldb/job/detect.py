@@ -86,10 +86,11 @@ def detect(
         If there are no sections, a file is gone or was changed, or intensity can't be corrected.
     """
     surface = load_surface(conn, survey, km * 1000.0, (km + 1) * 1000.0)
+    grid = _grid(surface, km, values["image.pixel"])
     files = sources(conn, survey, km)
     radiometer = _radiometer(conn, survey, values["intensity.max_incidence"])
     eye = Eye.of(surface, km, values["lining.tolerance"], radiometer)
-    with Accumulator(_grid(surface, km, values["image.pixel"])) as image:
+    with Accumulator(grid) as image:
         if radiometer is None:
             counts = _gather(eye, files, image, 0.0, progress)
             drop_radiometry(conn, survey, km)

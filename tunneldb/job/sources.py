@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from psycopg import sql
 
 from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
+from tunneldb.job.files import checksum
 from tunneldb.scan.reader import Points
 
 SAMPLE = 500_000
@@ -57,19 +57,14 @@ def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Sour
     if not rows:
         raise UserError(f"survey {survey.name} has no scan file in kilometre {km}: tunneldb load {survey.name} FILE")
     found = []
-    for name, points, size, checksum in rows:
+    for name, points, size, known in rows:
         path = Path(name)
         if not path.is_file():
             raise UserError(f"{path}: the scan file is gone since it was loaded; put it back or load it from elsewhere")
-        if path.stat().st_size != size or _checksum(path) != checksum:
+        if path.stat().st_size != size or checksum(path) != known:
             raise UserError(f"{path}: the scan file was changed since it was loaded; load it again")
         found.append(Source(path, points, survey.intensity_dimension))
     return found
-
-
-def _checksum(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def sample(conn: psycopg.Connection[Any], survey: Survey, km: int, count: int = SAMPLE) -> Points:

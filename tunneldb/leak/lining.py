@@ -85,7 +85,7 @@ def _begin(looks_up: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Index in each row from which on it holds for 0.3 m, or the last one."""
     run = round(0.3 / _ACROSS)
     kept = np.asarray(np.lib.stride_tricks.sliding_window_view(looks_up, run, axis=1)).all(axis=-1)
-    return np.where(kept.any(axis=1), kept.argmax(axis=1), looks_up.shape[1] - 1)
+    return np.where(np.any(kept, axis=1), np.argmax(kept, axis=1), looks_up.shape[1] - 1)
 
 
 def states(image: Accumulator, floor: Floor, delta: float) -> NDArray[np.uint8]:
