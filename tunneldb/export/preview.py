@@ -101,8 +101,12 @@ def draw(
     sheet = Image.new("RGB", (width + _MARGIN + 20, _HEAD + len(strips) * (height + _GAP) + 10), _BACK)
     pen = ImageDraw.Draw(sheet)
     low, high = _span(kind, strips)
-    unit = "m" if kind == "offset" else "dB"
-    pen.text((_MARGIN, 8), f"{title}   {low:.2f} to {high:.2f} {unit}", _INK, ImageFont.load_default(18))
+    scale = (
+        f"blue {low:+.2f} m (outside) to red {high:+.2f} m (inside)"
+        if kind == "offset"
+        else f"black {low:.2f} dB to white {high:.2f} dB"
+    )
+    pen.text((_MARGIN, 8), f"{title}:  {scale}", _INK, ImageFont.load_default(18))
     small = ImageFont.load_default(13)
     for number, strip in enumerate(strips):
         y = _HEAD + number * (height + _GAP)
@@ -114,7 +118,7 @@ def draw(
                 for ring in (leak.exterior, *leak.interiors):
                     line = [(_MARGIN + (c - strip.start) / pixel, y + (top - a) / pixel) for c, a in ring.coords]
                     pen.line(_clip(line, _MARGIN, _MARGIN + width), _LEAK, 2)
-    sheet.save(path, "PNG", optimize=True)
+    sheet.save(path, "PNG")
 
 
 def label(chainage: float) -> str:
