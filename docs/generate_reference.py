@@ -1,0 +1,304 @@
+"""Write the reference pages from the program itself: its commands, its parameters, and the comments in its database.
+
+    python docs/generate_reference.py
+
+makes a scratch database on the server of TUNNELDB_DSN, or on the embedded one, and drops it again.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import psycopg
+from psycopg import sql
+from psycopg.conninfo import make_conninfo
+
+from tunneldb.cli.main import COMMANDS, main
+from tunneldb.database import install, open_connection, resolve_dsn
+from tunneldb.database.schema import sql_files
+from tunneldb.job.parameters import PARAMETERS
+from tunneldb.job.stages import STAGES
+
+FOLDER = Path(__file__).parent
+NOTE = "<!-- Written by generate_reference.py; edit what it reads, not this page. -->"
+
+# Columns that mean the same in every view.
+COMMON = {
+    "id": "Key",
+    "survey_id": "Key of the survey",
+    "survey": "Name of the survey",
+    "tunnel_id": "Key of the tunnel",
+    "tunnel": "Name of the tunnel",
+    "km": "Kilometre",
+    "n": "Number",
+    "segment": "Number of the segment",
+    "chainage": "Chainage, m",
+    "label": "Chainage, as 12+345.678",
+    "chainage_from": "Least chainage, m",
+    "chainage_to": "Greatest chainage, m",
+    "label_from": "Least chainage, as 12+345.678",
+    "label_to": "Greatest chainage, as 12+345.678",
+    "points": "Number of points",
+    "files": "Number of files",
+    "vertices": "Number of vertices",
+    "srid": "Coordinate reference system of the tunnel",
+    "half": "Place in the segment, %: 25 or 75",
+    "angle_step": "Width of an angular class, degrees",
+    "interpolated": "Angular classes without enough points of their own, or rejected",
+    "duration": "finished_at - started_at",
+    "leaks_open": "Of these, those not reviewed yet",
+    "leaks_confirmed": "Of these, those confirmed",
+    "leaks_rejected": "Leaks rejected",
+    "largest_area": "Area of the largest leak, m²",
+    "greatest_drop": "Greatest drop of intensity, dB",
+    "remark": "The reviewer's remark",
+    "created_at": "When the row was made",
+    "detected_at": "When it was last detected",
+    "drawn_by": "Who drew it last, set by the database",
+    "drawn_at": "When it was drawn last, set by the database",
+}
+# Tables whose columns have the same names and meaning as those of a view.
+TABLES = {"file": "scan_file", "leak_unrolled": "leak", "leak_map": "leak", "leak_3d": "leak", "stage_status": "run"}
+# Columns geom that no table has.
+GEOMETRY = {
+    "axis": "The axis, tunnel's SRID",
+    "section_unrolled": "From its left to its right end, in the unrolled plane",
+    "leak_unrolled": "In the unrolled plane",
+    "leak_map": "On the map strip beside the axis, tunnel's SRID",
+    "leak_3d": "On the lining in space, tunnel's SRID",
+}
+
+
+def commands() -> str:
+    """Return the page of the command line."""
+    parts = [
+        "# The command line",
+        NOTE,
+        "`tunneldb [--dsn DSN] VERB …`. Without `--dsn` or `TUNNELDB_DSN` the embedded server is used. Results go to standard "
+        "output, messages and progress to standard error. Exit codes: 0 done; 1 `check` found something wrong; 2 the input, "
+        "the server or the command line is at fault, said in one line `tunneldb: …`.",
+        _options(main),
+    ]
+    for verb in COMMANDS:
+        command = main.get_command(click.Context(main), verb)
+        assert command is not None
+        parts += _command(command, verb)
+    return _page(parts)
+
+
+def _command(command: click.Command, name: str) -> Iterator[str]:
+    arguments = " ".join(_argument(p) for p in command.params if isinstance(p, click.Argument))
+    yield f"{'###' if ' ' in name else '##'} {name}"
+    if isinstance(command, click.Group):
+        yield _help(command)
+        for part, child in command.commands.items():
+            yield from _command(child, f"{name} {part}")
+        return
+    usage = [f"tunneldb {name}", "[OPTIONS]" if any(isinstance(p, click.Option) for p in command.params) else "", arguments]
+    yield f"`{' '.join(filter(None, usage))}`"
+    yield _help(command)
+    if options := _options(command):
+        yield options
+
+
+def _argument(argument: click.Argument) -> str:
+    name = argument.metavar or (argument.name or "").upper()
+    if argument.nargs == -1 and "..." not in name:
+        name += "..."
+    return name if argument.required else f"[{name}]"
+
+
+def _help(command: click.Command) -> str:
+    """Return the help's paragraphs; those that keep their lines, which begin with a backspace, as code."""
+    paragraphs = []
+    for paragraph in re.split(r"\n\s*\n", inspect.cleandoc(command.help or "")):
+        if paragraph.startswith("\b"):
+            paragraphs.append(f"```text\n{paragraph[1:].strip(chr(10))}\n```")
+        else:
+            paragraphs.append(" ".join(paragraph.split()))
+    return "\n\n".join(paragraphs)
+
+
+def _options(command: click.Command) -> str:
+    rows = []
+    for option in command.params:
+        if isinstance(option, click.Option):
+            names = ", ".join(f"`{name}{'' if option.is_flag else ' ' + _metavar(option)}`" for name in option.opts)
+            text = option.help or ""
+            if option.required:
+                text += " Required."
+            if option.show_default and option.default is not None:
+                default = f"{option.default:g}" if isinstance(option.default, float) else option.default
+                text += f" Default: {default}."
+            rows.append((names, text))
+    return _table(("option", "meaning"), rows) if rows else ""
+
+
+def _metavar(option: click.Option) -> str:
+    if option.metavar:
+        return option.metavar
+    if isinstance(option.type, click.Choice):
+        return "|".join(map(str, option.type.choices))
+    names = {"text": "TEXT", "integer": "N", "path": "PATH", "file": "FILE", "directory": "FOLDER"}
+    return names.get(option.type.name, option.type.name.upper().replace(" RANGE", "").replace("INTEGER", "N"))
+
+
+def parameters() -> str:
+    """Return the page of the parameters."""
+    stage_of = {prefix: stage.name for stage in STAGES for prefix in stage.parameters}
+    rows = [
+        (
+            f"`{name}`",
+            stage_of[name.partition(".")[0]],
+            f"{p.default:g} {p.unit}",
+            f"{p.low:g} to {p.high:g}",
+            p.text[0].upper() + p.text[1:] + ("; a whole number" if p.whole else ""),
+        )
+        for name, p in PARAMETERS.items()
+    ]
+    load = main.get_command(click.Context(main), "load")
+    assert load is not None
+    return _page(
+        [
+            "# Parameters",
+            NOTE,
+            "Set by `tunneldb run SURVEY --set NAME=VALUE`, as often as needed, for that run. Every run records the values "
+            "that its stage depends on (`tunnel_api.run`, column `parameters`). A value out of its bounds is refused.",
+            _table(("parameter", "stage", "default", "bounds", "meaning"), rows),
+            "Loading has options of its own:",
+            _options(load),
+            "A survey has one density: files loaded later must be loaded with the same one.",
+        ]
+    )
+
+
+def database(conn: psycopg.Connection[Any]) -> str:
+    """Return the page of schema tunnel_api, from the comments in an installed database."""
+    parts = [
+        "# Views and functions",
+        NOTE,
+        "Schema `tunnel_api`. Lengths are metres, chainage is in plan along the axis, arc is from the crown and positive to "
+        "the right looking up-chainage, offset is positive into the tunnel. Angles of sections are degrees from the upward "
+        "direction, positive to the right. Geometry is in the tunnel's SRID, or in the unrolled plane (chainage, arc), SRID 0.",
+        "## Views",
+        "Members of `tunnel_viewer` may read all of them. `axis_vertex` (its geometry), the leak views (`review` and `remark`) "
+        "and `region` may be changed by members of `tunnel_inspector`.",
+    ]
+    parts += _views(conn)
+    parts += [
+        "## Functions",
+        "Those that only read may be called by members of `tunnel_viewer`; those that change data (marked) by members of "
+        "`tunnel_operator`. A function that reads tables of schema `tunnel` and doesn't run with its owner's rights needs "
+        "`tunnel_operator` too.",
+    ]
+    parts += _functions(conn)
+    return _page(parts)
+
+
+def _views(conn: psycopg.Connection[Any]) -> Iterator[str]:
+    rows = conn.execute(
+        """
+        SELECT c.relname, obj_description(c.oid, 'pg_class'), a.attname, format_type(a.atttypid, a.atttypmod),
+               coalesce(col_description(c.oid, a.attnum), '')
+          FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid AND a.attnum > 0
+         WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' ORDER BY c.oid, a.attnum
+        """
+    ).fetchall()
+    of_table = {
+        (table, column): text
+        for table, column, text in conn.execute(
+            """
+            SELECT c.relname, a.attname, col_description(c.oid, a.attnum)
+              FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid AND a.attnum > 0
+             WHERE c.relnamespace = 'tunnel'::regnamespace AND c.relkind IN ('r', 'p')
+            """
+        ).fetchall()
+    }
+    for view in dict.fromkeys(row[0] for row in rows):
+        columns = [row for row in rows if row[0] == view]
+        yield f"### {view}"
+        yield _sentence(columns[0][1])
+        lines = []
+        for _, _, column, kind, comment in columns:
+            text = comment or COMMON.get(column) or of_table.get((TABLES.get(view, view), column)) or GEOMETRY.get(view, "")
+            lines.append((f"`{column}`", kind, text))
+        yield _table(("column", "type", "meaning"), lines)
+
+
+def _functions(conn: psycopg.Connection[Any]) -> Iterator[str]:
+    """Functions by the file that they come from: both were made in the same order."""
+    made = [
+        (path, name)
+        for path in sql_files()
+        for name in re.findall(r"^CREATE OR REPLACE FUNCTION tunnel_api\.(\w+)", path.read_text("utf-8"), re.MULTILINE)
+    ]
+    found = conn.execute(
+        """
+        SELECT p.proname, pg_get_function_arguments(p.oid), pg_get_function_result(p.oid), p.provolatile, p.prosecdef,
+               obj_description(p.oid, 'pg_proc')
+          FROM pg_proc p WHERE p.pronamespace = 'tunnel_api'::regnamespace ORDER BY p.oid
+        """
+    ).fetchall()
+    if [name for _, name in made] != [row[0] for row in found]:
+        raise ValueError("the functions in the database are not those of the files")
+    before = None
+    for (path, name), (_, arguments, result, volatility, definer, comment) in zip(made, found, strict=True):
+        if result == "trigger":
+            continue
+        if path != before:
+            yield f"### {_first_sentence(path)}"
+            before = path
+        text = f"{name}({arguments})\n    → {result}".replace(" DEFAULT ", " = ").replace("double precision", "float8")
+        yield f"```text\n{text}\n```"
+        notes = ["Changes data."] * (volatility == "v") + ["Runs with its owner's rights."] * definer
+        yield " ".join([_sentence(comment), *notes])
+
+
+def _first_sentence(path: Path) -> str:
+    line = path.read_text("utf-8").splitlines()[0].removeprefix("-- ")
+    return re.split(r"\.\s+(?=[A-Z])", line)[0].rstrip(".:")
+
+
+def _sentence(text: str) -> str:
+    return text if text.endswith(".") else f"{text}."
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [header, tuple("---" for _ in header), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|").strip() for cell in line) + " |" for line in lines)
+
+
+def _page(parts: list[str]) -> str:
+    return "\n\n".join(parts) + "\n"
+
+
+PAGES: dict[str, Callable[..., str]] = {
+    "reference-cli.md": lambda conn: commands(),
+    "reference-parameters.md": lambda conn: parameters(),
+    "reference-sql.md": database,
+}
+
+
+def generate() -> None:
+    """Write all pages."""
+    server = resolve_dsn(os.environ.get("TUNNELDB_DSN"))
+    name = sql.Identifier(f"tunneldb_reference_{os.getpid()}")
+    with psycopg.connect(server, autocommit=True) as admin:
+        admin.execute(sql.SQL("CREATE DATABASE {}").format(name))
+        try:
+            with open_connection(make_conninfo(server, dbname=f"tunneldb_reference_{os.getpid()}")) as conn:
+                install(conn)
+                for page, write in PAGES.items():
+                    (FOLDER / page).write_text(write(conn), encoding="utf-8")
+        finally:
+            admin.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(name))
+
+
+if __name__ == "__main__":
+    generate()

@@ -1,0 +1,102 @@
+"""The documentation against the program: links, commands, parameters and targets that it names must exist."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import click
+import pytest
+
+from tunneldb.cli.main import main
+from tunneldb.job.parameters import PARAMETERS
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").glob("*.md")])
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+PLACEHOLDERS = ("VERB", "…", "[OPTIONS]", "[--dsn", "DSN]", "--help", "-h")
+pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.+)$", FENCE.sub("", page.read_text("utf-8")), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pages
+def test_links_lead_somewhere(page: Path) -> None:
+    dead = []
+    for target in LINK.findall(FENCE.sub("", page.read_text("utf-8"))):
+        if target.startswith(("http://", "https://")):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        if not file.exists() or (anchor and anchor not in anchors(file)):
+            dead.append(target)
+    assert not dead
+
+
+def commands(page: Path) -> list[list[str]]:
+    """Command lines of tunneldb: those of shell blocks, and those in the text."""
+    text = page.read_text("utf-8")
+    lines = [line for kind, code in FENCE.findall(text) if kind == "sh" for line in code.replace("\\\n", " ").splitlines()]
+    lines += re.findall(r"`(tunneldb [^`]+)`", FENCE.sub("", text).replace("\n", " "))
+    words = [shlex.split(line, comments=True) for line in lines if "tunneldb" in line]
+    return [line[line.index("tunneldb") + 1 :] for line in words if "tunneldb" in line]
+
+
+@pages
+def test_commands_exist(page: Path) -> None:
+    wrong = [f"tunneldb {' '.join(words)}: {found}" for words in commands(page) if (found := mistake(words))]
+    assert not wrong
+
+
+def mistake(words: list[str]) -> str | None:
+    """What the program would not understand of a command line."""
+    command: click.Command = main
+    words = list(words)
+    while words:
+        word = words.pop(0)
+        if word in ("|", ">", "&&", ";"):
+            return None
+        if word in PLACEHOLDERS:
+            continue
+        if word.startswith("-"):
+            option = next((p for p in command.params if isinstance(p, click.Option) and word in p.opts), None)
+            if option is None:
+                return f"{command.name} has no option {word}"
+            if word == "--set" and words[0] != "NAME=VALUE" and words[0].partition("=")[0] not in PARAMETERS:
+                return f"there is no parameter {words[0]}"
+            words = words if option.is_flag else words[option.nargs :]
+        elif isinstance(command, click.Group):
+            found = command.get_command(click.Context(command), word)
+            if found is None:
+                return f"there is no verb {word}"
+            if found.name == "psql":
+                return None  # the rest is psql's own
+            command = found
+    return None
+
+
+def test_mistakes_are_found() -> None:
+    assert mistake(["leaks", "x", "--format", "csv", "-o", "y"]) is None
+    assert mistake(["survey", "add", "--reference", "r.csv"]) is None
+    assert mistake(["leek"]) == "there is no verb leek"
+    assert mistake(["tunnel", "add", "--reference"]) == "add has no option --reference"
+    assert mistake(["run", "x", "--set", "section.step=5"]) == "there is no parameter section.step=5"
+
+
+@pages
+def test_parameters_exist(page: Path) -> None:
+    prefixes = {name.partition(".")[0] for name in PARAMETERS}
+    named = re.findall(r"`(\w+)\.(\w+)(?:=[^`]*)?`", page.read_text("utf-8"))
+    assert {f"{a}.{b}" for a, b in named if a in prefixes and b not in ("sql", "py", "csv")} <= PARAMETERS.keys()
+
+
+@pages
+def test_make_targets_exist(page: Path) -> None:
+    there = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
+    assert set(re.findall(r"(?:^|`)make (\w+)", page.read_text("utf-8"), re.MULTILINE)) <= there
