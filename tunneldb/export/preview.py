@@ -27,8 +27,8 @@ PIXEL = 0.05
 FILL = 0.3
 """Gaps are filled from values at most so far away, m."""
 
-OFFSET_SPAN = 0.1
-"""Offsets beyond this are shown in the full colour, m."""
+OFFSET_SPANS = (0.02, 0.05, 0.1, 0.2, 0.5)
+"""Offsets beyond one of these are shown in the full colour, m: the first that nine tenths of the image stay within."""
 
 _MARGIN, _HEAD, _GAP = 64, 40, 26
 _BACK, _INK, _GRID, _EMPTY, _LEAK = (255, 255, 255), (40, 40, 40), (150, 170, 200), (226, 229, 233), (0, 200, 255)
@@ -87,7 +87,7 @@ def draw(
         Heading.
     kind : {'raw', 'corrected', 'offset'}
         Intensities are drawn in grey between their 2nd and 98th percentile, offsets in blue (outside the
-        surface) to red (inside) within ±0.1 m.
+        surface) to red (inside).
     strips : sequence of Strip
         In order of chainage.
     top : float
@@ -132,11 +132,13 @@ def _clip(line: list[tuple[float, float]], left: float, right: float) -> list[tu
 
 
 def _span(kind: str, strips: Sequence[Strip]) -> tuple[float, float]:
-    if kind == "offset":
-        return -OFFSET_SPAN, OFFSET_SPAN
     held = np.concatenate([s.values[np.isfinite(s.values)] for s in strips])
     if len(held) == 0:
         return 0.0, 1.0
+    if kind == "offset":
+        usual = float(np.percentile(np.abs(held), 90))
+        span = next((s for s in OFFSET_SPANS if s >= usual), OFFSET_SPANS[-1])
+        return -span, span
     low, high = (float(v) for v in np.percentile(held, [2, 98]))
     return low, max(high, low + 0.1)
 

@@ -97,7 +97,7 @@ def detect(
             window = image.window(columns.start - size, columns.stop + size)
             inner = slice(columns.start - window.columns.start, columns.stop - window.columns.start)
             here = state[:, window.columns]
-            closed = (here == State.APPENDAGE) | (here == State.FLOOR)
+            closed = (here == State.OFF) | (here == State.FLOOR)
             found = wet_pixels(window.corrected, here == State.LINING, closed, dry.threshold, size)
             wet[:, columns] = found[:, inner]
     outlines = polygons(wet, grid.transform(), min_area)
