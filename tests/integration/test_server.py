@@ -151,10 +151,12 @@ def test_two_programs_that_start_it_at_once_share_it_and_it_outlives_them(other_
 
 
 def test_a_deep_folder_gets_a_short_socket_folder(other_home: Path) -> None:
+    other_home.chmod(0o755)  # else root's server would have its state elsewhere, below a short path
     deep = other_home / "very-long-name-of-a-folder" / "another-one-below-it" / "a-third-that-is-long-too" / "and-the-last"
     server = Server(deep, SETTINGS)
     try:
         assert query(server.start(), "SELECT 1") == 1
+        assert prepare_home(deep).state == deep
         run = prepare_home(deep).run
         assert not run.is_relative_to(deep)
         assert stat.S_IMODE(run.stat().st_mode) == 0o700
