@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import psycopg
-import sqlalchemy
-from sqlalchemy.pool import NullPool, StaticPool
 
 from tunneldb.database.binaries import MINIMUM_POSTGRESQL
 from tunneldb.database.server import Server
 from tunneldb.errors import UserError
+
+if TYPE_CHECKING:
+    import sqlalchemy
 
 MINIMUM_POSTGIS = (3, 3)
 
@@ -68,12 +69,18 @@ def connect(dsn: str | None) -> psycopg.Connection[Any]:
 
 def sqlalchemy_engine(dsn: str | None) -> sqlalchemy.Engine:
     """Return an SQLAlchemy engine on the database; None means the embedded server."""
+    import sqlalchemy
+    from sqlalchemy.pool import NullPool
+
     conninfo = resolve_dsn(dsn)
     return sqlalchemy.create_engine("postgresql+psycopg://", creator=lambda: psycopg.connect(conninfo), poolclass=NullPool)
 
 
 def engine_on(connection: psycopg.Connection[Any]) -> sqlalchemy.Engine:
     """Return an engine that uses one connection, which stays the caller's to close; it must be idle."""
+    import sqlalchemy
+    from sqlalchemy.pool import StaticPool
+
     return sqlalchemy.create_engine(
         "postgresql+psycopg://", creator=lambda: connection, poolclass=StaticPool, pool_reset_on_return=None
     )

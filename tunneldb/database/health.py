@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import psycopg
-from alembic.script import ScriptDirectory
 
 from tunneldb.database.connection import MINIMUM_POSTGIS, open_connection
 from tunneldb.database.schema import (
-    alembic_config,
+    HEAD,
     api_version,
     installed_api_version,
     postgis_schema,
     postgis_version,
+    revisions,
     schema_revision,
 )
 from tunneldb.database.server import Server
@@ -91,12 +91,11 @@ def _postgis(connection: psycopg.Connection[Any]) -> Finding:
 
 def _schema(connection: psycopg.Connection[Any]) -> Finding:
     revision = schema_revision(connection)
-    script = ScriptDirectory.from_config(alembic_config())
     if revision is None:
         return Finding("wrong", "schema tunnel", "missing", "tunneldb init")
-    if revision == script.get_current_head():
+    if revision == HEAD:
         return Finding("ok", "schema tunnel", f"revision {revision}, the newest")
-    if revision in {known.revision for known in script.walk_revisions()}:
+    if revision in revisions():
         return Finding("wrong", "schema tunnel", f"revision {revision}, older than this program", "tunneldb init")
     return Finding("wrong", "schema tunnel", f"revision {revision}, newer than this program", "pip install --upgrade tunneldb")
 

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import psycopg
-import sqlalchemy
-from alembic import command
-from alembic.config import Config
-from alembic.script import ScriptDirectory
 from psycopg import sql
 
 from tunneldb import __version__
 from tunneldb.database.connection import MINIMUM_POSTGIS, engine_on
 from tunneldb.database.resources import resource_dir
 from tunneldb.errors import UserError
+
+if TYPE_CHECKING:
+    import sqlalchemy
+    from alembic.config import Config
+
+HEAD = "0001"
+"""The newest migration. Known here so that a command whose database is up to date need not import Alembic."""
 
 _LOCK = 7088630451  # any number: two installations of one database wait for each other
 _PATIENCE = "30s"  # how long to wait for others that use what is to be changed
@@ -37,6 +40,8 @@ def install(connection: psycopg.Connection[Any], revision: str = "head") -> None
     UserError
         When PostGIS is missing and cannot be created, or the database is of a newer version.
     """
+    import sqlalchemy
+
     try:
         _install(connection, revision)
     except (psycopg.errors.LockNotAvailable, sqlalchemy.exc.OperationalError) as error:
@@ -49,13 +54,14 @@ def install(connection: psycopg.Connection[Any], revision: str = "head") -> None
 
 
 def _install(connection: psycopg.Connection[Any], revision: str) -> None:
+    from alembic import command
+
     with engine_on(connection).begin() as session:
         connection.execute(sql.SQL("SET LOCAL lock_timeout = {}").format(_PATIENCE))
         connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
         _require_postgis(connection, create=True)
-        known = ScriptDirectory.from_config(alembic_config())
         present = schema_revision(connection)
-        if present is not None and present not in {script.revision for script in known.walk_revisions()}:
+        if present is not None and present not in revisions():
             raise UserError(_newer(present))
         command.upgrade(alembic_config(session), revision)
         install_api(connection)
@@ -114,10 +120,19 @@ def installed_api_version(connection: psycopg.Connection[Any]) -> str | None:
 
 def alembic_config(session: sqlalchemy.Connection | None = None) -> Config:
     """Return Alembic's configuration, on a connection if one is given."""
+    from alembic.config import Config
+
     config = Config()
     config.set_main_option("script_location", str(resource_dir("migrations")).replace("%", "%%"))
     config.attributes["connection"] = session
     return config
+
+
+def revisions() -> set[str]:
+    """Return all migrations that this program knows."""
+    from alembic.script import ScriptDirectory
+
+    return {script.revision for script in ScriptDirectory.from_config(alembic_config()).walk_revisions()}
 
 
 def schema_revision(connection: psycopg.Connection[Any]) -> str | None:
@@ -144,15 +159,14 @@ def postgis_schema(connection: psycopg.Connection[Any]) -> str | None:
 def require_current_schema(connection: psycopg.Connection[Any]) -> None:
     """Raise a UserError unless PostGIS and this program's schema are there."""
     _require_postgis(connection, create=False)
-    script = ScriptDirectory.from_config(alembic_config())
     revision = schema_revision(connection)
-    if revision == script.get_current_head():
+    if revision == HEAD:
         if installed_api_version(connection) is None:
             raise UserError("schema tunnel_api is missing: tunneldb init")
         return
     if revision is None:
         raise UserError("the database has no schema tunnel yet: tunneldb init")
-    if revision in {known.revision for known in script.walk_revisions()}:
+    if revision in revisions():
         raise UserError(f"the database's schema is older ({revision}) than this program: tunneldb init upgrades it")
     raise UserError(_newer(revision))
 

@@ -11,7 +11,6 @@ import psycopg
 from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.geometry.store import load_alignment
-from tunneldb.job.detect import detect
 
 FEW_POINTS = 10_000
 """A kilometre with fewer points than this, at the end of a tunnel, may be without a section of its own."""
@@ -129,6 +128,13 @@ def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Map
         [survey.id, km],
     ).fetchall()
     return {"sections": built, **{f"classes_{state}": count for state, count in classes}}
+
+
+def detect(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
+    """Unrolled images at full density, and leaks (Xu et al., 2018)."""
+    from tunneldb.job.detect import detect as work  # brings GDAL along, which the other stages can do without
+
+    return work(conn, survey, km, values, progress)
 
 
 def _one(conn: psycopg.Connection[Any], query: LiteralString, *arguments: Any) -> int:
