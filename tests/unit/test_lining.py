@@ -1,0 +1,122 @@
+"""Floor, niches and edges on straight tunnels whose sections are drawn by hand."""
+
+import numpy as np
+import pytest
+
+from tunneldb.geometry.frame import segment_rows, tangents
+from tunneldb.geometry.surface import Surface
+from tunneldb.intensity.edge import Edges
+from tunneldb.leak.geometries import shapes
+from tunneldb.leak.lining import Floor, Recess
+
+LENGTH = 60.0
+
+
+def straight(radius: np.ndarray) -> Surface:
+    """A level tunnel along x (right is −y) with sections every 5 m; radius (k, 361) or (361,)."""
+    chainage = np.arange(0.0, LENGTH + 1, 10.0)
+    vertices = np.column_stack([chainage, np.zeros(len(chainage)), np.full(len(chainage), 100.0)])
+    at = np.arange(2.5, LENGTH, 5.0)
+    radius = np.broadcast_to(radius, (len(at), 361)).copy()
+    angle = np.radians(np.arange(361) - 180.0)
+    u, w = radius * np.sin(angle), radius * np.cos(angle)
+    length = np.concatenate([np.zeros((len(at), 1)), np.cumsum(np.hypot(np.diff(u), np.diff(w)), axis=1)], axis=1)
+    rows = segment_rows(vertices, tangents(vertices))
+    return Surface(
+        np.arange(len(rows)),
+        rows,
+        np.column_stack([chainage[:-1], chainage[1:]]),
+        at,
+        radius,
+        length - length[:, 180:181],
+        10.0,
+    )
+
+
+def box(half_width: float, up: float, down: float) -> np.ndarray:
+    """Radius of a rectangle about the axis at each degree."""
+    angle = np.radians(np.arange(361) - 180.0)
+    with np.errstate(divide="ignore"):
+        side = half_width / np.abs(np.sin(angle))
+        level = np.where(np.cos(angle) > 0, up, down) / np.abs(np.cos(angle))
+    return np.minimum(side, level)
+
+
+BOX = straight(box(3.0, 2.5, 2.5))
+ROUND = straight(np.full(361, 4.0))
+
+
+def test_the_floor_of_a_box_begins_at_its_corner():
+    floor = Floor.of(BOX, 5.0, 55.0)
+    # Crown to corner 3 m, wall 5 m, and a tenth of a metre of the wall goes with the floor.
+    np.testing.assert_allclose(floor.right, 8.0, atol=0.2)
+    np.testing.assert_allclose(floor.left, -8.0, atol=0.2)
+    arcs = np.array([0.0, 4.0, 7.5, 8.2, 9.0, 11.0, -7.5, -8.2, -11.0])
+    covered = floor.covers(np.full(len(arcs), 30.0), arcs)
+    assert covered.tolist() == [False, False, False, True, True, True, False, True, True]
+
+
+def test_the_floor_of_a_pipe_is_its_lower_quarter():
+    floor = Floor.of(ROUND, 5.0, 55.0)
+    np.testing.assert_allclose(floor.right, 4 * np.radians(135), atol=0.25)
+
+
+def test_a_rail_on_the_floor_is_floor():
+    radius = box(3.0, 2.5, 2.5)
+    radius[345:349] -= 0.15  # 15 to 12 degrees from straight down
+    floor = Floor.of(straight(radius), 5.0, 55.0)
+    arcs = np.arange(8.2, 11.0, 0.05)
+    assert floor.covers(np.full(len(arcs), 30.0), arcs).all()
+
+
+@pytest.mark.parametrize("inset", [0.005, 0.03, 0.1, 0.25])
+def test_along_an_edge_a_point_takes_the_normal_of_its_own_face(inset):
+    edges = Edges.of(BOX, 0.0, LENGTH)
+    wall = np.array([[30.2, -3.0, 102.5 - inset]])
+    ceiling = np.array([[30.2, -3.0 + inset, 102.5]])
+    for points, normal in ((wall, [0, 1, 0]), (ceiling, [0, 0, -1])):
+        found = edges.normals_of(points, BOX.unroll(points))[0]
+        assert found @ np.array(normal) > np.cos(np.radians(3))
+
+
+def test_a_round_tunnel_has_no_edges():
+    edges = Edges.of(ROUND, 0.0, LENGTH)
+    assert not edges.sharp[1:-1].any()
+
+
+def test_a_section_measured_in_a_niche_is_no_lining():
+    radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
+    radius[5, 250:300] += 0.8
+    surface = straight(radius)
+    recess = Recess.of(surface)
+    at = np.array([20.0, float(surface.chainages[5]), 40.0])
+    middle = np.interp(275, np.arange(361), surface.arcs[5])
+    covered = recess.covers(at, np.array([middle, -middle, 0.0]))
+    assert covered.tolist() == [[False, True, False], [False, False, False], [False, False, False]]
+
+
+def test_a_wider_stretch_is_no_niche():
+    radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
+    radius[6:] += 0.5
+    assert not Recess.of(straight(radius)).depth.any()
+    radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
+    radius[6] += 0.5
+    assert not Recess.of(straight(radius)).depth.any()
+
+
+@pytest.mark.parametrize(
+    ("degrees", "hours"), [(0.0, 12.0), (15.0, 0.5), (90.0, 3.0), (135.0, 4.5), (-90.0, 9.0), (-30.0, 11.0)]
+)
+def test_clock_area_and_coordinates_of_a_patch(degrees, hours):
+    arc = 4.0 * np.radians(degrees)
+    from shapely.geometry import box as rectangle
+
+    shaped = shapes(rectangle(30.0, arc - 0.5, 32.0, arc + 0.5), ROUND)
+    assert min(abs(shaped.clock - hours), 12 - abs(shaped.clock - hours)) < 0.01
+    assert 0 < shaped.clock <= 12
+    assert shaped.area == pytest.approx(2.0, rel=1e-3)
+    # The strip lies right of the axis, towards −y, for positive arcs.
+    assert shaped.strip.bounds == pytest.approx((30.0, -arc - 0.5, 32.0, -arc + 0.5), abs=1e-6)
+    points = np.array(shaped.surface.exterior.coords)
+    np.testing.assert_allclose(np.hypot(points[:, 1], points[:, 2] - 100.0), 4.0, atol=1e-3)
+    assert np.hypot(*np.diff(points[:, :2], axis=0).T).max() < 0.11
