@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from shapely.geometry import box as rectangle
 
 from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.surface import Surface
@@ -109,7 +110,6 @@ def test_a_wider_stretch_is_no_niche():
 )
 def test_clock_area_and_coordinates_of_a_patch(degrees, hours):
     arc = 4.0 * np.radians(degrees)
-    from shapely.geometry import box as rectangle
 
     shaped = shapes(rectangle(30.0, arc - 0.5, 32.0, arc + 0.5), ROUND)
     assert min(abs(shaped.clock - hours), 12 - abs(shaped.clock - hours)) < 0.01
