@@ -16,7 +16,7 @@ WITH neighbour AS (
         ST_MakePoint(ST_X(geom) - 10 * cos(azimuth), ST_Y(geom) + 10 * sin(azimuth)),
         ST_MakePoint(ST_X(geom) + 10 * cos(azimuth), ST_Y(geom) - 10 * sin(azimuth))), 25830) AS geom
     FROM direction
-), buffer AS MATERIALIZED (
+), buffer AS (
     SELECT n, azimuth, ST_Buffer(geom, 1.0, 'endcap=flat') AS geom
     FROM perpendicular
 ), average AS (
