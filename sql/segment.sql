@@ -162,7 +162,8 @@ BEGIN
                   ELSE 0 END AS number
               FROM (SELECT p.*, ST_X(p.geom) AS x, ST_Y(p.geom) AS y, ST_Z(p.geom) AS z,
                         clock_timestamp()  -- a fence that lets the scan be parallel: the coordinates are taken out once
-                    FROM tunnel.point p
+                    -- the partition by its name: no lock on its parent, whose partitions others may be swapping
+                    FROM tunnel.%I p
                     WHERE p.survey_id = $1 AND p.km = $2) p
               LEFT JOIN unnest($4, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, px, py, pz, pl, qx, qy, qz, ql)
                   ON s.n = floor(p.chainage / $3)::int) c
@@ -172,7 +173,7 @@ BEGIN
             SELECT c.x * s.px + c.y * s.py + c.z * s.pz - s.pl AS before,
                 s.ql - (c.x * s.qx + c.y * s.qy + c.z * s.qz) AS after) m
         ORDER BY 3
-    $query$, building)
+    $query$, building, tunnel_api.partition_name(survey_id, km))
     USING survey_id, km, spacing, n, px, py, pz, pl, qx, qy, qz, ql, a, b;
     PERFORM tunnel_api.partition_swap(segment_tag.survey_id, segment_tag.km);
 
