@@ -88,8 +88,9 @@ def detect(
     blocks = image.blocks()
     dry = _dry_statistics(image, state, blocks, dry_regions or [])
     lining = int(np.count_nonzero(state == State.LINING))
-    held = sum(state[:, block_columns(grid, b)].size for b in blocks)
-    size = filter_size(np.count_nonzero(state != State.EMPTY) / held) if held else 1
+    # Floor and niches are marked whether or not they hold points.
+    could = sum(int(np.count_nonzero(state[:, block_columns(grid, b)] <= State.LINING)) for b in blocks)
+    size = filter_size(lining / could) if could else 1
     wet = np.zeros(state.shape, np.bool_)
     if dry.count:
         for block in blocks:
