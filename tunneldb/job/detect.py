@@ -24,7 +24,7 @@ from tunneldb.job.sources import Source, sample, sources
 from tunneldb.leak.detection import Detection, dry_pixels
 from tunneldb.leak.detection import detect as find_leaks
 from tunneldb.leak.image import Accumulator, Grid
-from tunneldb.leak.lining import Floor, Recess, states
+from tunneldb.leak.lining import Recess, states
 from tunneldb.leak.raster import KINDS
 from tunneldb.leak.seen import Eye, Radiometer, Seen, Span
 from tunneldb.leak.store import (
@@ -54,13 +54,10 @@ class Sample:
         Where they lie and what they show.
     scan_id : (n,) int array
         Scan that each is of.
-    lining : (n,) bool array
-        Points used that don't lie on the floor.
     """
 
     seen: Seen
     scan_id: NDArray[np.int32]
-    lining: NDArray[np.bool_]
 
     @property
     def views(self) -> Views:
@@ -97,11 +94,10 @@ def detect(
             save_leaks(conn, survey, km, surface, [])
             pixels = save_images(conn, survey, image, ["offset"])
             return {**counts, "pixels": pixels, "leaks": 0, "note": "no intensity: offset image only, no leaks sought"}
-        floor = Floor.of(surface, km * 1000.0, (km + 1) * 1000.0)
-        view = _sample(conn, survey, eye, floor)
+        view = _sample(conn, survey, eye)
         roughness = _roughness(view, load_regions(conn, survey, km, "homogeneous"))
         counts = _gather(eye, files, image, roughness.sigma, progress)
-        state = states(image, floor, Recess.of(surface), values["appendage.distance"])
+        state = states(image, eye.floor, Recess.of(surface), values["appendage.distance"])
         dry_regions = load_regions(conn, survey, km, "dry")
         found = find_leaks(image, state, values["leak.min_area"], dry_regions)
         save_radiometry(conn, survey, km, roughness, found, _sigma(view, image, state, found, roughness, dry_regions))
@@ -142,12 +138,11 @@ def _grid(surface: Surface, km: int, pixel: float) -> Grid:
     return Grid.covering(km, pixel, float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max()))
 
 
-def _sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye, floor: Floor) -> Sample:
+def _sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye) -> Sample:
     """Look at points of survey density, and check their ranges against the reference curve before files are read."""
     points = sample(conn, survey, eye.km)
     seen = eye.see(points, f"survey {survey.name}")
-    unrolled = Sample(seen, points.scan_id, seen.use & ~floor.covers(seen.chainage, seen.arc))
-    if not unrolled.lining.any():
+    if not seen.lining.any():
         raise UserError(
             f"no point of kilometre {eye.km} lies on the lining: within {eye.tolerance:g} m of the sections and seen at"
             f" less than the incidence intensity.max_incidence"
@@ -157,7 +152,7 @@ def _sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye, floor: Floo
         span = Span()
         span.add(seen, eye.radiometer.reference)
         span.require(eye.radiometer.reference)
-    return unrolled
+    return Sample(seen, points.scan_id)
 
 
 def _roughness(view: Sample, drawn: list[Polygon]) -> Roughness:
@@ -168,7 +163,7 @@ def _roughness(view: Sample, drawn: list[Polygon]) -> Roughness:
         if len(regions) < 2:
             raise UserError(f"the {len(drawn)} homogeneous regions drawn hold too few points: draw larger ones, or none")
         return find_roughness(regions)
-    near = view.lining & (np.abs(seen.offset) <= NEAR_SURFACE)
+    near = seen.lining & (np.abs(seen.offset) <= NEAR_SURFACE)
     regions = automatic_regions(
         seen.chainage[near], seen.arc[near], view.scan_id[near], views.cosine[near], views.distance_db[near]
     )
@@ -231,9 +226,9 @@ def _sigma(
     """Standard deviation of dry lining points, raw and corrected by Lambert's law and Oren–Nayar (Table 1)."""
     seen, views = view.seen, view.views
     if dry_regions:
-        dry = view.lining & (_polygon_of(seen, dry_regions) >= 0)
+        dry = seen.lining & (_polygon_of(seen, dry_regions) >= 0)
     else:
-        dry = view.lining & image.grid.pick(dry_pixels(image, state, found), seen.chainage, seen.arc)
+        dry = seen.lining & image.grid.pick(dry_pixels(image, state, found), seen.chainage, seen.arc)
     return (
         plain_statistics(views.raw_db[dry]),
         plain_statistics(views.corrected(0.0)[dry]),

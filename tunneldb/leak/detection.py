@@ -88,9 +88,7 @@ def detect(
     blocks = image.blocks()
     dry = _dry_statistics(image, state, blocks, dry_regions or [])
     lining = int(np.count_nonzero(state == State.LINING))
-    # Floor and niches are marked whether or not they hold points.
-    could = sum(int(np.count_nonzero(state[:, block_columns(grid, b)] <= State.LINING)) for b in blocks)
-    size = filter_size(lining / could) if could else 1
+    size = filter_size(_filled(state))
     wet = np.zeros(state.shape, np.bool_)
     if dry.count:
         for block in blocks:
@@ -109,6 +107,16 @@ def detect(
         pixels=lining,
         wet_pixels=int(np.count_nonzero(wet & (state == State.LINING))),
     )
+
+
+def _filled(state: NDArray[np.uint8]) -> float:
+    """Share of the pixels that could show lining that do, from the first column that does to the last."""
+    columns = np.flatnonzero((state == State.LINING).any(axis=0))
+    if len(columns) == 0:
+        return 1.0
+    here = state[:, columns[0] : columns[-1] + 1]
+    # Floor and niches are marked whether or not they hold points.
+    return float(np.count_nonzero(here == State.LINING) / np.count_nonzero(here <= State.LINING))
 
 
 def dry_pixels(image: Accumulator, state: NDArray[np.uint8], found: Detection) -> NDArray[np.bool_]:

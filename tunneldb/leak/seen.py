@@ -11,6 +11,7 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.intensity.correct import Kind, Views, observe, range_span
 from tunneldb.intensity.edge import Edges
 from tunneldb.intensity.reference import ReferenceCurve
+from tunneldb.leak.lining import Floor
 from tunneldb.scan.pose import PoseModel
 from tunneldb.scan.reader import Points
 
@@ -49,6 +50,8 @@ class Seen:
         Unrolled, m.
     use : bool array
         Points within the tolerance of the surface, in the kilometre, and whose intensity can be corrected.
+    lining : bool array
+        Those of them that don't lie on the floor.
     views : Views or None
         Range, incidence and intensity; None when the survey has no intensity.
     """
@@ -57,6 +60,7 @@ class Seen:
     arc: Float
     offset: Float
     use: NDArray[np.bool_]
+    lining: NDArray[np.bool_]
     views: Views | None
 
 
@@ -74,6 +78,8 @@ class Eye:
         Points farther from the surface are not lining, m.
     radiometer : Radiometer or None
         None when the survey has no intensity.
+    floor : Floor
+        Where the floor begins.
     edges : Edges
         Where the surface bends sharply.
     box : (2, 3) float array
@@ -84,6 +90,7 @@ class Eye:
     km: int
     tolerance: float
     radiometer: Radiometer | None
+    floor: Floor
     edges: Edges
     box: Float
 
@@ -93,8 +100,16 @@ class Eye:
         touching = (surface.ends[:, 1] > km * 1000.0) & (surface.ends[:, 0] < (km + 1) * 1000.0)
         vertices = surface.segments[touching, :6].reshape(-1, 3)
         margin = float(surface.radius.max()) + tolerance
-        edges = Edges.of(surface, km * 1000.0, (km + 1) * 1000.0)
-        return cls(surface, km, tolerance, radiometer, edges, np.array([vertices.min(0) - margin, vertices.max(0) + margin]))
+        start, stop = km * 1000.0, (km + 1) * 1000.0
+        return cls(
+            surface,
+            km,
+            tolerance,
+            radiometer,
+            Floor.of(surface, start, stop),
+            Edges.of(surface, start, stop),
+            np.array([vertices.min(0) - margin, vertices.max(0) + margin]),
+        )
 
     def near(self, points: Points) -> Points:
         """Points in the kilometre's bounding box."""
@@ -138,12 +153,13 @@ class Eye:
             with np.errstate(invalid="ignore"):
                 use &= views.cosine >= np.cos(np.radians(radiometer.max_incidence))
             use &= np.isfinite(views.raw_db)
-        return Seen(unrolled.chainage, unrolled.arc, unrolled.offset, use, views)
+        lining = use & ~self.floor.covers(unrolled.chainage, unrolled.arc)
+        return Seen(unrolled.chainage, unrolled.arc, unrolled.offset, use, lining, views)
 
 
 @dataclass
 class Span:
-    """Ranges of the points used so far, against those of the reference curve."""
+    """Ranges of the lining points so far, against those of the reference curve."""
 
     nearest: float = np.inf
     farthest: float = -np.inf
@@ -153,7 +169,7 @@ class Span:
     def add(self, seen: Seen, reference: ReferenceCurve) -> None:
         """Count the points of a chunk."""
         assert seen.views is not None
-        nearest, farthest, outside, count = range_span(seen.views, seen.use, reference)
+        nearest, farthest, outside, count = range_span(seen.views, seen.lining, reference)
         self.nearest, self.farthest = min(self.nearest, nearest), max(self.farthest, farthest)
         self.outside += outside
         self.count += count
