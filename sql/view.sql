@@ -36,7 +36,7 @@ SELECT f.id, f.survey_id, s.name AS survey, f.name, f.path, f.checksum, f.bytes,
 COMMENT ON VIEW tunnel_api.file IS 'Scan files loaded, with what was dropped of each';
 COMMENT ON COLUMN tunnel_api.file.checksum IS 'SHA-256 of the file';
 COMMENT ON COLUMN tunnel_api.file.points IS 'Points in the file = noise + outside + thinned + kept';
-COMMENT ON COLUMN tunnel_api.file.noise IS 'Points dropped as isolated (Xu et al., 2018, section 2.2)';
+COMMENT ON COLUMN tunnel_api.file.noise IS 'Points dropped as isolated (Xu et al., 2018, section II-D)';
 COMMENT ON COLUMN tunnel_api.file.outside IS 'Points dropped as too far from the axis or beyond its ends';
 COMMENT ON COLUMN tunnel_api.file.thinned IS 'Points dropped by thinning to survey density';
 
@@ -53,7 +53,7 @@ COMMENT ON VIEW tunnel_api.point IS
     'Points at survey density, in chainage order; state survey_id and km (and chainage) to read only their part';
 COMMENT ON COLUMN tunnel_api.point.id IS 'Key within a survey, valid until the kilometre is loaded or tagged anew';
 COMMENT ON COLUMN tunnel_api.point.km IS 'floor(chainage / 1000) on the given axis, at loading';
-COMMENT ON COLUMN tunnel_api.point.chainage IS 'Chainage on the given axis, m';
+COMMENT ON COLUMN tunnel_api.point.chainage IS 'Chainage, m: on the given axis as loaded, on the axis found after stage segments';
 COMMENT ON COLUMN tunnel_api.point.segment IS 'Number of the segment that holds the point; NULL before stage segments or off the tunnel';
 COMMENT ON COLUMN tunnel_api.point.intensity IS 'As in the file, in the unit of the survey''s intensity_kind; 0 if none';
 
@@ -123,7 +123,7 @@ COMMENT ON VIEW tunnel_api.section IS 'Cross-sections at 25 % and 75 % of each s
 COMMENT ON COLUMN tunnel_api.section.half IS 'Place in the segment, %: 25 or 75';
 COMMENT ON COLUMN tunnel_api.section.half_width IS 'Half the length of tunnel whose points the section was made from, m';
 COMMENT ON COLUMN tunnel_api.section.angle_step IS 'Width of an angular class, degrees';
-COMMENT ON COLUMN tunnel_api.section.interpolated IS 'Angular classes without points, filled from their neighbours';
+COMMENT ON COLUMN tunnel_api.section.interpolated IS 'Angular classes that are not measured: empty, or rejected as something hung on the wall; filled from their neighbours';
 
 CREATE OR REPLACE VIEW tunnel_api.section_unrolled AS
 SELECT c.id, c.survey_id, s.name AS survey, c.km, c.segment, c.half, c.chainage,

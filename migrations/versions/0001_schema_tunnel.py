@@ -49,7 +49,7 @@ def upgrade() -> None:
             "chainage",
             sa.Double(),
             nullable=False,
-            comment="Chainage along the given axis, m; the rows' order",
+            comment="Chainage, m: along the given axis as loaded, along the axis found after stage segments; the rows' order",
         ),
         sa.Column("gps_time", sa.Double(), nullable=False, comment="Time of the shot, as in the file, s"),
         sa.Column("geom", _geometry("POINTZ"), nullable=False, comment="Position, tunnel's SRID, m"),
@@ -383,8 +383,8 @@ def upgrade() -> None:
         sa.Column("sigma_lambert", sa.Double(), nullable=True, comment="The same, incidence by Lambert, dB"),
         sa.Column("sigma_oren_nayar", sa.Double(), nullable=True, comment="The same, incidence by Oren-Nayar, dB"),
         sa.Column("regions", sa.Integer(), nullable=False, comment="Homogeneous regions that the roughness is from"),
-        sa.Column("pixels", sa.BigInteger(), nullable=False, comment="Pixels of the image that hold data"),
-        sa.Column("wet_pixels", sa.BigInteger(), nullable=False, comment="Pixels below the threshold"),
+        sa.Column("pixels", sa.BigInteger(), nullable=False, comment="Pixels of the image that show lining"),
+        sa.Column("wet_pixels", sa.BigInteger(), nullable=False, comment="Lining pixels found wet, after the median filter"),
         sa.ForeignKeyConstraint(
             ["survey_id"], ["tunnel.survey.id"], name=op.f("radiometry_survey_id_fkey"), ondelete="CASCADE"
         ),
@@ -587,7 +587,7 @@ def upgrade() -> None:
             comment="The section as a line in space, tunnel's SRID, m",
         ),
         sa.Column("points", sa.Integer(), nullable=False, comment="Points that it was made from"),
-        sa.Column("interpolated", sa.Integer(), nullable=False, comment="Classes without enough points of their own"),
+        sa.Column("interpolated", sa.Integer(), nullable=False, comment="Classes that are not measured: empty or rejected"),
         sa.CheckConstraint("half IN (25, 75)", name=op.f("section_half_check")),
         sa.ForeignKeyConstraint(["survey_id"], ["tunnel.survey.id"], name=op.f("section_survey_id_fkey"), ondelete="CASCADE"),
         sa.PrimaryKeyConstraint("id", name=op.f("section_pkey")),

@@ -413,3 +413,9 @@ def test_shapes_there_and_back(curve: tuple[psycopg.Connection, Survey, Path]) -
     assert conn.execute("SELECT tunnel_api.roll(%s, ST_GeomFromText(%s))", [survey.id, outside]).fetchone() == (None,)
     with pytest.raises(psycopg.errors.RaiseException, match="not a MULTIPOINT"):
         conn.execute("SELECT tunnel_api.roll(%s, ST_GeomFromText('MULTIPOINT (1 1)'))", [survey.id])
+
+
+@pytest.mark.parametrize(("stage", "says"), [("segments", "has no axis yet"), ("sections", "has no segments yet")])
+def test_a_stage_whose_forerunner_is_missing(loaded_curve: psycopg.Connection, stage: str, says: str) -> None:
+    result = CliRunner().invoke(main, ["run", NAME, "--km", "1", "--from", stage, "--to", stage])
+    assert (result.exit_code, says in result.output) == (2, True), result.output

@@ -89,6 +89,8 @@ def _describe_database_error(error: Exception) -> str | None:
         return f"the database refused: {_first_line(error)}; ask its owner for the role tunnel_operator"
     if isinstance(error, (psycopg.errors.QueryCanceled, psycopg.errors.LockNotAvailable)):
         return f"the database stopped the work, nothing was changed: {_first_line(error)}"
+    if isinstance(error, (psycopg.errors.DeadlockDetected, psycopg.errors.SerializationFailure)):
+        return f"another program was at the same rows, nothing was changed: {_first_line(error)}; run it again"
     if isinstance(error, psycopg.OperationalError):
         return f"the connection to the database broke, what was under way is undone: {_first_line(error)}"
     return None

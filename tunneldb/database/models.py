@@ -198,7 +198,12 @@ Point = Table(
     Base.metadata,
     Column("survey_id", Integer, nullable=False, comment=_SURVEY),
     Column("km", Integer, nullable=False, comment=_KM + " along the given axis"),
-    Column("chainage", Double, nullable=False, comment="Chainage along the given axis, m; the rows' order"),
+    Column(
+        "chainage",
+        Double,
+        nullable=False,
+        comment="Chainage, m: along the given axis as loaded, along the axis found after stage segments; the rows' order",
+    ),
     Column("gps_time", Double, nullable=False, comment="Time of the shot, as in the file, s"),
     Column("geom", _geometry("POINTZ"), nullable=False, comment="Position, tunnel's SRID, m"),
     Column("segment", Integer, comment="Number of the segment (segment.n) that the point lies in"),
@@ -296,7 +301,7 @@ class Section(Base):
         _geometry("LINESTRINGZ"), comment="The section as a line in space, tunnel's SRID, m"
     )
     points: Mapped[int] = mapped_column(comment="Points that it was made from")
-    interpolated: Mapped[int] = mapped_column(comment="Classes without enough points of their own")
+    interpolated: Mapped[int] = mapped_column(comment="Classes that are not measured: empty or rejected")
 
 
 class SectionClass(Base):
@@ -342,8 +347,8 @@ class Radiometry(Base):
     sigma_lambert: Mapped[float | None] = mapped_column(comment="The same, incidence by Lambert, dB")
     sigma_oren_nayar: Mapped[float | None] = mapped_column(comment="The same, incidence by Oren-Nayar, dB")
     regions: Mapped[int] = mapped_column(comment="Homogeneous regions that the roughness is from")
-    pixels: Mapped[int] = mapped_column(BigInteger, comment="Pixels of the image that hold data")
-    wet_pixels: Mapped[int] = mapped_column(BigInteger, comment="Pixels below the threshold")
+    pixels: Mapped[int] = mapped_column(BigInteger, comment="Pixels of the image that show lining")
+    wet_pixels: Mapped[int] = mapped_column(BigInteger, comment="Lining pixels found wet, after the median filter")
 
 
 class Region(Base):

@@ -80,7 +80,7 @@ class ReferenceCurve:
                 f"the reference curve spans {self.range_m[0]:g} to {self.range_m[-1]:g} m, the lining lies "
                 f"{nearest:.2f} to {farthest:.2f} m from the scanner: {_share(outside, count)} of its points "
                 f"are outside; give a curve that spans them, or leave out slanting views by a smaller "
-                f"detect.max_incidence"
+                f"intensity.max_incidence"
             )
 
 

@@ -105,6 +105,8 @@ def segments(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Map
 
 def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
     """Stage 4: two cross-sections a segment."""
+    if not _one(conn, "SELECT count(*) FROM tunnel.segment WHERE survey_id = %s AND km = %s", survey.id, km):
+        raise UserError(f"kilometre {km} has no segments yet: tunneldb run {survey.name} --km {km} --from segments")
     built = _one(
         conn,
         "SELECT tunnel_api.section_build(%s, %s, %s, %s, %s, %s, %s)",

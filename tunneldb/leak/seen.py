@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tunneldb.errors import UserError
 from tunneldb.geometry.surface import Surface
 from tunneldb.intensity.correct import Kind, Views, observe, range_span
 from tunneldb.intensity.edge import Edges
@@ -98,6 +99,8 @@ class Eye:
     def of(cls, surface: Surface, km: int, tolerance: float, radiometer: Radiometer | None) -> Eye:
         """Make the eye for a kilometre that the surface covers at least in part."""
         touching = (surface.ends[:, 1] > km * 1000.0) & (surface.ends[:, 0] < (km + 1) * 1000.0)
+        if not touching.any():
+            raise UserError(f"kilometre {km} has no segments yet: run its stages segments and sections first")
         vertices = surface.segments[touching, :6].reshape(-1, 3)
         margin = float(surface.radius.max()) + tolerance
         start, stop = km * 1000.0, (km + 1) * 1000.0

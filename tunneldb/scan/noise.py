@@ -1,4 +1,4 @@
-"""The noise filter of Xu et al. (2018, section III-A), with a search radius that follows the scan's density.
+"""The noise filter of Xu et al. (2018, section II-D), with a search radius that follows the scan's density.
 
 Xu et al. judge a point to be noise when fewer than 5 points lie within a neighbourhood of 0.05 m diameter. That is
 meant for a scan of a few millimetres; a sparser one would lose its walls. Here the radius is
@@ -156,7 +156,7 @@ def is_noise(xyz: Float, radius: Float, points: int = POINTS, judged: Bool | Non
 def noise_filter(xyz: Float, points: int = POINTS, diameter: float = DIAMETER) -> Bool:
     """Find the noise of a whole cloud (n, 3) held in memory; (n,) bool, True for noise.
 
-    Source: Xu et al. (2018), section III-A; the radius as at the head of this module.
+    Source: Xu et al. (2018), section II-D; the radius as at the head of this module.
     """
     cells = CellCounts()
     number = cells.add(np.ascontiguousarray(xyz, np.float64))
