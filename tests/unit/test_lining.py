@@ -8,7 +8,7 @@ from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.surface import Surface
 from tunneldb.intensity.edge import Edges
 from tunneldb.leak.geometries import shapes
-from tunneldb.leak.lining import Floor, Recess
+from tunneldb.leak.lining import Astray, Floor
 
 LENGTH = 60.0
 
@@ -85,24 +85,31 @@ def test_a_round_tunnel_has_no_edges():
     assert not edges.sharp[1:-1].any()
 
 
-def test_a_section_measured_in_a_niche_is_no_lining():
+@pytest.mark.parametrize("apart", [0.8, -0.15])
+def test_a_section_measured_in_a_niche_or_on_a_box_is_no_lining(apart):
     radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
-    radius[5, 250:300] += 0.8
+    radius[5, 250:300] += apart
     surface = straight(radius)
-    recess = Recess.of(surface)
+    astray = Astray.of(surface)
     at = np.array([20.0, float(surface.chainages[5]), 40.0])
     middle = np.interp(275, np.arange(361), surface.arcs[5])
-    covered = recess.covers(at, np.array([middle, -middle, 0.0]))
+    covered = astray.covers(at, np.array([middle, -middle, 0.0]))
     assert covered.tolist() == [[False, True, False], [False, False, False], [False, False, False]]
+
+
+def test_rock_that_differs_from_section_to_section_is_lining():
+    rng = np.random.default_rng(1)
+    radius = 4.0 + np.repeat(rng.normal(0, 0.1, (12, 73)), 5, axis=1)[:, :361]
+    assert (Astray.of(straight(radius)).apart > 0).mean() < 0.03
 
 
 def test_a_wider_stretch_is_no_niche():
     radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
     radius[6:] += 0.5
-    assert not Recess.of(straight(radius)).depth.any()
+    assert not Astray.of(straight(radius)).apart.any()
     radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
     radius[6] += 0.5
-    assert not Recess.of(straight(radius)).depth.any()
+    assert not Astray.of(straight(radius)).apart.any()
 
 
 @pytest.mark.parametrize(

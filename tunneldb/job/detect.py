@@ -24,7 +24,7 @@ from tunneldb.job.sources import Source, sample, sources
 from tunneldb.leak.detection import Detection, dry_pixels
 from tunneldb.leak.detection import detect as find_leaks
 from tunneldb.leak.image import Accumulator, Grid
-from tunneldb.leak.lining import Recess, states
+from tunneldb.leak.lining import Astray, states
 from tunneldb.leak.raster import KINDS
 from tunneldb.leak.seen import Eye, Radiometer, Seen, Span
 from tunneldb.leak.store import (
@@ -97,7 +97,7 @@ def detect(
         view = _sample(conn, survey, eye)
         roughness = _roughness(view, load_regions(conn, survey, km, "homogeneous"))
         counts = _gather(eye, files, image, roughness.sigma, progress)
-        state = states(image, eye.floor, Recess.of(surface), values["appendage.distance"])
+        state = states(image, eye.floor, Astray.of(surface), values["appendage.distance"])
         dry_regions = load_regions(conn, survey, km, "dry")
         found = find_leaks(image, state, values["leak.min_area"], dry_regions)
         save_radiometry(conn, survey, km, roughness, found, _sigma(view, image, state, found, roughness, dry_regions))

@@ -21,11 +21,14 @@ FLOOR_SLOPE = np.cos(np.radians(45.0))
 FLOOR_EDGE = 0.1
 """So much of the wall above the floor goes with it, m: there the section is rounded, and dirt lies."""
 
-NICHE = 0.1
-"""A section that stands back by more from those beside it was measured in a niche, m."""
+APART = 0.06
+"""A section that stands apart from those beside it by more was not measured on the wall, m."""
 
-STANDS_BACK = 0.03
-"""Surface that stands back by more is not lining, m."""
+MOST = 0.4
+"""Where a larger part of a section does, it is the tunnel that has another shape."""
+
+OFF_WALL = 0.03
+"""Surface that is farther off the wall is not lining, m."""
 
 MIN_SECTIONS = 4
 """With fewer sections there is nothing to compare with."""
@@ -91,51 +94,58 @@ class Floor:
 
 
 @dataclass(frozen=True)
-class Recess:
-    """Where the surface runs into a niche: a section that was measured in one stands back from those beside it.
+class Astray:
+    """Where the surface leaves the wall, because a section was measured in a niche or on something hung on the wall.
 
-    Up to the next sections the surface is then no wall, and what lies on it no lining.
+    Such a section stands apart from those beside it. From one of them to the other the surface is then no
+    wall there, and what lies on it no lining.
 
     Attributes
     ----------
     surface : Surface
         The tunnel.
-    depth : (k, 361) float array
-        How far each section stands back, m, at each whole degree; 0 where it is less than 0.1 m.
+    apart : (k, 361) float array
+        How far each section stands apart from those beside it, m, at each whole degree; 0 where it is on the
+        wall.
     """
 
     surface: Surface
-    depth: Float
+    apart: Float
 
     @classmethod
-    def of(cls, surface: Surface) -> Recess:
-        """Compare each section with the median of the seven about it, itself included."""
+    def of(cls, surface: Surface) -> Astray:
+        """Compare each section with the median of the three before and the three after it.
+
+        It must differ by more than the lining does there from section to section anyway, as rock does.
+        """
         count = len(surface.chainages)
         if count < MIN_SECTIONS:
             return cls(surface, np.zeros_like(surface.radius))
         first = np.clip(np.arange(count) - 3, 0, max(count - 7, 0))
-        beside = first[:, None] + np.arange(min(7, count))[None, :]
-        depth = surface.radius - np.median(surface.radius[beside], axis=1)
-        # A tunnel that is wider all round is no niche.
-        deep = (depth > NICHE) & (np.mean(depth > NICHE, axis=1) < 0.4)[:, None]
-        return cls(surface, np.where(deep, depth, 0.0))
+        beside = np.array([[n for n in range(f, f + min(7, count)) if n != k] for k, f in enumerate(first.tolist())])
+        apart = np.abs(surface.radius - np.median(surface.radius[beside], axis=1))
+        usual = 3.0 * 1.4826 * np.median(apart, axis=1)
+        astray = apart > np.maximum(usual, APART)[:, None]
+        # A tunnel that is wider or narrower all round has no niche.
+        astray[astray.mean(axis=1) > MOST] = False
+        return cls(surface, np.where(astray, apart, 0.0))
 
     def covers(self, chainage: Float, arc: Float) -> NDArray[np.bool_]:
-        """Tell which pixels, (rows,) arcs by (columns,) chainages, lie on surface that stands back."""
+        """Tell which pixels, (rows,) arcs by (columns,) chainages, lie on surface that left the wall."""
         out = np.zeros((len(arc), len(chainage)), np.bool_)
         at = self.surface.chainages
         after = np.clip(np.searchsorted(at, chainage, side="right"), 1, len(at) - 1) if len(at) > 1 else None
-        if after is None or not self.depth.any():
+        if after is None or not self.apart.any():
             return out
         share = np.clip((chainage - at[after - 1]) / (at[after] - at[after - 1]), 0.0, 1.0)
         for pair in np.unique(after):
-            if not self.depth[pair - 1 : pair + 1].any():
+            if not self.apart[pair - 1 : pair + 1].any():
                 continue
             for column in np.flatnonzero(after == pair):
                 g = share[column]
                 nodes = (1 - g) * self.surface.arcs[pair - 1] + g * self.surface.arcs[pair]
-                depth = (1 - g) * self.depth[pair - 1] + g * self.depth[pair]
-                out[:, column] = np.interp(arc, nodes, ndimage.maximum_filter1d(depth, 7)) > STANDS_BACK
+                apart = (1 - g) * self.apart[pair - 1] + g * self.apart[pair]
+                out[:, column] = np.interp(arc, nodes, ndimage.maximum_filter1d(apart, 7)) > OFF_WALL
         return out
 
 
@@ -146,7 +156,7 @@ def _begin(looks_up: NDArray[np.bool_]) -> NDArray[np.intp]:
     return np.where(np.any(kept, axis=1), np.argmax(kept, axis=1), looks_up.shape[1] - 1)
 
 
-def states(image: Accumulator, floor: Floor, recess: Recess, delta: float) -> NDArray[np.uint8]:
+def states(image: Accumulator, floor: Floor, astray: Astray, delta: float) -> NDArray[np.uint8]:
     """State of every pixel of a kilometre, found block by block.
 
     Parameters
@@ -155,8 +165,8 @@ def states(image: Accumulator, floor: Floor, recess: Recess, delta: float) -> ND
         The sums of all points.
     floor : Floor
         Where the floor begins.
-    recess : Recess
-        Where the surface runs into a niche.
+    astray : Astray
+        Where the surface leaves the wall.
     delta : float
         Distance from the lining's plane from which a pixel is an appendage, m.
 
@@ -168,7 +178,7 @@ def states(image: Accumulator, floor: Floor, recess: Recess, delta: float) -> ND
     grid = image.grid
     out = np.zeros((grid.rows, grid.columns), np.uint8)
     for block in image.blocks():
-        out[:, block_columns(grid, block)] = _block_states(image, floor, recess, delta, block)
+        out[:, block_columns(grid, block)] = _block_states(image, floor, astray, delta, block)
     return out
 
 
@@ -177,7 +187,7 @@ def block_columns(grid: Grid, block: int) -> slice:
     return slice(block * grid.block_columns, (block + 1) * grid.block_columns)
 
 
-def _block_states(image: Accumulator, floor: Floor, recess: Recess, delta: float, block: int) -> NDArray[np.uint8]:
+def _block_states(image: Accumulator, floor: Floor, astray: Astray, delta: float, block: int) -> NDArray[np.uint8]:
     grid = image.grid
     columns = block_columns(grid, block)
     halo = round(HALO / grid.pixel)
@@ -185,6 +195,6 @@ def _block_states(image: Accumulator, floor: Floor, recess: Recess, delta: float
     inner = slice(columns.start - window.columns.start, columns.stop - window.columns.start)
     off = appendages(window.offset, grid.pixel, delta)[:, inner]
     state = np.where(window.count[:, inner] > 0, State.LINING, State.EMPTY).astype(np.uint8)
-    state[off | recess.covers(grid.chainages(columns), grid.arcs())] = State.OFF
+    state[off | astray.covers(grid.chainages(columns), grid.arcs())] = State.OFF
     state[floor.covers(grid.chainages(columns)[None, :], grid.arcs()[:, None])] = State.FLOOR
     return state
