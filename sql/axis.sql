@@ -142,6 +142,7 @@ AS $$
 DECLARE
     spacing float8;
     halo constant int := 2;
+    share float8;
     vn int[]; vx float8[]; vy float8[]; vz float8[];
     gx float8[]; gy float8[]; gz float8[];
     fixed boolean[]; counts bigint[];
@@ -163,6 +164,8 @@ BEGIN
     gx := vx; gy := vy; gz := vz;
 
     FOR pass IN 1 .. axis_refine.max_iterations LOOP
+        -- a few millimetres may go to and fro for ever as points enter and leave the slab: later passes go a part of the way
+        share := least(1.0, 5.0 / pass);
         WITH frame AS (
             SELECT f.*, g.gx, g.gy, g.gz, g.fixed
             FROM tunnel_api.axis_frame(vn, vx, vy, vz) f
@@ -170,9 +173,9 @@ BEGIN
         ), shifted AS (
             SELECT f.n, f.gx, f.gy, f.gz, f.fixed, f.x, f.y, f.z, s.points,
                 -- in its plane, so that the given axis keeps its chainage
-                f.x + s."right" * f.ux + s.up * f.wx AS sx,
-                f.y + s."right" * f.uy + s.up * f.wy AS sy,
-                f.z + s.up * f.wz AS sz
+                f.x + share * (s."right" * f.ux + s.up * f.wx) AS sx,
+                f.y + share * (s."right" * f.uy + s.up * f.wy) AS sy,
+                f.z + share * s.up * f.wz AS sz
             FROM frame f
             LEFT JOIN tunnel_api.axis_shift(axis_refine.survey_id, vn, vx, vy, vz,
                 axis_refine.half_width, axis_refine.angle_step, axis_refine.min_points) s ON s.vertex = f.n AND NOT f.fixed
