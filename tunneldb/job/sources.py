@@ -10,6 +10,7 @@ import numpy as np
 import psycopg
 from psycopg import sql
 
+from tunneldb.database.fetch import fetch_array
 from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.job.files import checksum
@@ -18,8 +19,14 @@ from tunneldb.scan.reader import Points
 SAMPLE = 500_000
 """Points of survey density that are looked at, about."""
 
-_HEADER = 19
-_FIELDS = (("x", ">f8"), ("y", ">f8"), ("z", ">f8"), ("time", ">f8"), ("scan", ">i4"), ("intensity", ">f4"))
+_FIELDS = (
+    ("x", "f8", sql.SQL("public.ST_X(geom)")),
+    ("y", "f8", sql.SQL("public.ST_Y(geom)")),
+    ("z", "f8", sql.SQL("public.ST_Z(geom)")),
+    ("time", "f8", sql.Identifier("gps_time")),
+    ("scan", "i4", sql.Identifier("scan_id")),
+    ("intensity", "f4", sql.Identifier("intensity")),
+)
 
 
 @dataclass(frozen=True)
@@ -79,22 +86,18 @@ def sample(conn: psycopg.Connection[Any], survey: Survey, km: int, count: int = 
     assert row is not None
     if not row[0]:
         raise UserError(f"survey {survey.name} has no points in kilometre {km}")
-    query = sql.SQL(
-        "COPY (SELECT public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom), coalesce(gps_time, 0)::float8,"
-        " coalesce(scan_id, 0)::int4, intensity::float4 FROM tunnel.point TABLESAMPLE BERNOULLI ({share}) REPEATABLE (1)"
-        " WHERE survey_id = {survey} AND km = {km}) TO STDOUT (FORMAT binary)"
-    ).format(share=sql.Literal(min(100.0, 100.0 * count / row[0])), survey=sql.Literal(survey.id), km=sql.Literal(km))
-    with conn.cursor() as cursor, cursor.copy(query) as copy:
-        data = b"".join(bytes(part) for part in copy)
-    record: list[tuple[str, str]] = [("fields", ">i2")]
-    for name, kind in _FIELDS:
-        record += [(f"{name}_bytes", ">i4"), (name, kind)]
-    dtype = np.dtype(record)
-    rows = np.frombuffer(data, dtype, (len(data) - _HEADER - 2) // dtype.itemsize, _HEADER)
+    rows = fetch_array(
+        conn,
+        _FIELDS,
+        sql.SQL(
+            "FROM tunnel.point TABLESAMPLE BERNOULLI (%(share)s) REPEATABLE (1) WHERE survey_id = %(survey)s AND km = %(km)s"
+        ),
+        {"share": min(100.0, 100.0 * count / row[0]), "survey": survey.id, "km": km},
+    )
     return Points(
-        np.column_stack([rows[axis] for axis in "xyz"]).astype(np.float64),
-        rows["time"].astype(np.float64),
-        rows["scan"].astype(np.int32),
-        rows["intensity"].astype(np.float32),
+        np.column_stack([rows[axis] for axis in "xyz"]),
+        rows["time"],
+        rows["scan"],
+        rows["intensity"],
         np.zeros(len(rows), np.uint8),
     )
