@@ -10,8 +10,8 @@ from sqlalchemy import Connection, text
 
 from tunneldb.database.models import SCHEMA, Base
 
-# Partitions come and go with surveys and kilometres; the models know only their parent.
-PARTITION = re.compile(r"point_s\d+")
+# Partitions and fragments come and go with surveys, files and kilometres; the models know only the partitions' parent.
+PARTITION = re.compile(r"(point|fragment)_s\d+")
 
 
 def include_name(name: str | None, kind: str, parents: Any) -> bool:

@@ -29,7 +29,7 @@ from sqlalchemy import (
     UniqueConstraint,
     text,
 )
-from sqlalchemy.dialects.postgresql import ARRAY, JSONB
+from sqlalchemy.dialects.postgresql import ARRAY, INT8MULTIRANGE, JSONB
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 SCHEMA = "tunnel"
@@ -77,6 +77,7 @@ def _parent(table: str) -> ForeignKey:
 _SURVEY = "Survey that the row belongs to"
 _KM = "Kilometre: floor(chainage / 1000)"
 _NOW = text("now()")
+_CLOCK = text("clock_timestamp()")
 
 
 class Tunnel(Base):
@@ -191,6 +192,77 @@ class ScanFile(Base):
     )
     srid: Mapped[int | None] = mapped_column(comment="Spatial reference that the file states, if it states one")
     loaded_at: Mapped[dt.datetime] = mapped_column(server_default=_NOW, comment="When it was loaded")
+
+
+class FileKm(Base):
+    """A kilometre that a file touches."""
+
+    __tablename__ = "file_km"
+    __table_args__ = {  # noqa: RUF012
+        "comment": "Which kilometres a file touches. Points read and not loaded yet lie in fragment_s<survey>_f<file>_km<km>"
+    }
+
+    file_id: Mapped[int] = mapped_column(_parent("scan_file"), primary_key=True, comment="File (scan_file.id)")
+    km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=_KM)
+    rows: Mapped[int] = mapped_column(BigInteger, comment="Points of the file that wait or waited to be loaded there")
+    points: Mapped[Any] = mapped_column(
+        INT8MULTIRANGE,
+        comment="Where in the file the points of the kilometre and 10 m to both sides are: ranges of point numbers from 0",
+    )
+    read_at: Mapped[dt.datetime] = mapped_column(server_default=_CLOCK, comment="When the file was read")
+    loaded_at: Mapped[dt.datetime | None] = mapped_column(
+        comment="When they were loaded into the kilometre; none while they wait"
+    )
+
+
+class Incoming(Base):
+    """A file that waits to be read."""
+
+    __tablename__ = "incoming"
+    __table_args__ = {"comment": "Files that a batch is to read, until they are read"}  # noqa: RUF012
+
+    survey_id: Mapped[int] = mapped_column(_parent("survey"), primary_key=True, comment=_SURVEY)
+    name: Mapped[str] = mapped_column(primary_key=True, comment="File name without its folder")
+    path: Mapped[str] = mapped_column(comment="Where the file lies")
+    bytes: Mapped[int] = mapped_column(BigInteger, comment="Size of the file, bytes")
+    points: Mapped[int] = mapped_column(BigInteger, comment="Points that its header announces; 0 if it is unreadable")
+    km_from: Mapped[int | None] = mapped_column(comment="First kilometre that it may touch, by its header's box")
+    km_to: Mapped[int | None] = mapped_column(comment="Last kilometre that it may touch, by its header's box")
+    parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="How it is to be read")
+    requested_at: Mapped[dt.datetime] = mapped_column(server_default=_CLOCK, comment="When it was asked for")
+    failed_at: Mapped[dt.datetime | None] = mapped_column(comment="When reading it failed")
+    message: Mapped[str | None] = mapped_column(comment="Why it failed")
+
+
+class Goal(Base):
+    """What is wanted of a kilometre."""
+
+    __tablename__ = "goal"
+    __table_args__ = {"comment": "What batches want of each kilometre"}  # noqa: RUF012
+
+    survey_id: Mapped[int] = mapped_column(_parent("survey"), primary_key=True, comment=_SURVEY)
+    km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=_KM)
+    stage: Mapped[str] = mapped_column(comment="Stage up to which the kilometre is to be brought")
+    parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Parameters of the stages")
+    requested_at: Mapped[dt.datetime] = mapped_column(server_default=_CLOCK, comment="When it was asked for")
+    retry_after: Mapped[dt.datetime | None] = mapped_column(comment="Stages that failed before this moment are tried again")
+
+
+class Worker(Base):
+    """A worker."""
+
+    __tablename__ = "worker"
+    __table_args__ = {"comment": "Workers that serve the queue"}  # noqa: RUF012
+
+    id: Mapped[int] = mapped_column(
+        BigInteger, primary_key=True, autoincrement=False, comment="Key: that of the queue's worker"
+    )
+    host: Mapped[str] = mapped_column(comment="Machine that it runs on")
+    pid: Mapped[int] = mapped_column(comment="Its process there")
+    started_at: Mapped[dt.datetime] = mapped_column(server_default=_CLOCK, comment="When it started")
+    stop: Mapped[bool] = mapped_column(
+        server_default=text("false"), comment="Whether it was asked to finish what it is at and leave"
+    )
 
 
 Point = Table(
@@ -426,6 +498,28 @@ class Leak(Base):
     detected_at: Mapped[dt.datetime] = mapped_column(server_default=_NOW, comment="When it was last found")
 
 
+class LeakPart(Base):
+    """A wet region that an end of its kilometre cuts."""
+
+    __tablename__ = "leak_part"
+    __table_args__ = (
+        Index(None, "survey_id", "km"),
+        {"comment": "Wet regions cut by an end of their kilometre, from which leaks over several kilometres are put together"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(_parent("survey"), comment=_SURVEY)
+    km: Mapped[int] = mapped_column(comment=_KM)
+    pixel: Mapped[float] = mapped_column(comment="Edge of a pixel, m")
+    box: Mapped[list[int]] = mapped_column(
+        ARRAY(Integer), comment="First column (chainage / pixel), first row (arc / pixel), columns and rows of the mask"
+    )
+    mask: Mapped[bytes] = mapped_column(comment="Its wet pixels, a bit each, row by row from the lowest arc")
+    filled: Mapped[int] = mapped_column(BigInteger, comment="Its pixels that hold measured data")
+    drop_sum: Mapped[float] = mapped_column(comment="Sum over them of the drop below dry lining, dB")
+    drop_max: Mapped[float] = mapped_column(comment="Greatest drop below dry lining, dB")
+
+
 class Run(Base):
     """One run of a stage."""
 
@@ -439,7 +533,7 @@ class Run(Base):
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(_parent("survey"), comment=_SURVEY)
     km: Mapped[int | None] = mapped_column(comment="Kilometre; none for the whole survey")
-    stage: Mapped[str] = mapped_column(comment="load, axis, segments, sections, detect")
+    stage: Mapped[str] = mapped_column(comment="read, load, axis, segments, sections, detect")
     parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Parameters that it ran with")
     versions: Mapped[dict[str, Any]] = mapped_column(
         server_default=text("'{}'"), comment="Versions of the program and of its libraries"
@@ -453,3 +547,5 @@ class Run(Base):
     finished_at: Mapped[dt.datetime | None] = mapped_column(comment="When it ended")
     outcome: Mapped[str] = mapped_column(server_default=text("'running'"), comment="running, done or failed")
     message: Mapped[str | None] = mapped_column(comment="Why it failed")
+    worker: Mapped[str | None] = mapped_column(comment="Machine and process that it ran on")
+    job_id: Mapped[int | None] = mapped_column(BigInteger, comment="Job of the queue that it was, if it was one")
