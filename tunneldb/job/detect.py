@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -20,9 +19,10 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.intensity.correct import Kind, Views, needs_reference
 from tunneldb.intensity.dry import Dry, plain_statistics
 from tunneldb.intensity.roughness import Regions, Roughness, automatic_regions, drawn_regions, find_roughness
-from tunneldb.job.sources import Source, sample, sources
+from tunneldb.job.sources import sample, sources
 from tunneldb.leak.detection import Detection, dry_pixels
 from tunneldb.leak.detection import detect as find_leaks
+from tunneldb.leak.gather import Counts, gather
 from tunneldb.leak.image import Accumulator, Grid
 from tunneldb.leak.lining import Astray, states
 from tunneldb.leak.raster import KINDS
@@ -36,9 +36,6 @@ from tunneldb.leak.store import (
     save_radiometry,
 )
 from tunneldb.scan.pose import load_poses
-from tunneldb.scan.reader import Points, read_chunks
-
-Counts = dict[str, Any]
 
 NEAR_SURFACE = 0.05
 """Points that serve for the roughness lie no farther from the surface, m."""
@@ -89,14 +86,14 @@ def detect(
     eye = Eye.of(surface, km, values["lining.tolerance"], radiometer)
     with Accumulator(grid) as image:
         if radiometer is None:
-            counts = _gather(eye, files, image, 0.0, progress)
+            counts = gather(eye, files, image, 0.0, progress)
             drop_radiometry(conn, survey, km)
             save_leaks(conn, survey, km, surface, [])
             pixels = save_images(conn, survey, image, ["offset"])
             return {**counts, "pixels": pixels, "leaks": 0, "note": "no intensity: offset image only, no leaks sought"}
         view = _sample(conn, survey, eye)
         roughness = _roughness(view, load_regions(conn, survey, km, "homogeneous"))
-        counts = _gather(eye, files, image, roughness.sigma, progress)
+        counts = gather(eye, files, image, roughness.sigma, progress)
         state = states(image, eye.floor, Astray.of(surface), values["appendage.distance"])
         dry_regions = load_regions(conn, survey, km, "dry")
         found = find_leaks(image, state, values["leak.min_area"], dry_regions)
@@ -182,37 +179,6 @@ def _polygon_of(seen: Seen, polygons: list[Polygon]) -> NDArray[np.int64]:
     for k, polygon in enumerate(polygons):
         number[usable[shapely.contains_xy(polygon, seen.chainage[usable], seen.arc[usable])]] = k
     return number
-
-
-def _gather(eye: Eye, files: list[Source], image: Accumulator, roughness: float, progress: Callable[[float], None]) -> Counts:
-    """Read the files and put their points into the image."""
-    total, read, used = sum(file.points for file in files), 0, 0
-    span = Span()
-    reference = eye.radiometer.reference if eye.radiometer else None
-    for path, points in _chunks(files):
-        read += len(points)
-        near = eye.near(points)
-        if len(near):
-            seen = eye.see(near, path.name)
-            if reference:
-                span.add(seen, reference)
-            if seen.views is None:
-                raw = corrected = np.zeros(len(near), np.float32)
-            else:
-                raw, corrected = seen.views.raw_db, seen.views.corrected(roughness)
-            used += image.add(seen.chainage, seen.arc, seen.offset, raw, corrected, seen.use)
-        progress(0.9 * read / max(total, 1))
-    if reference:
-        span.require(reference)
-    if not used:
-        raise UserError(f"no point of {', '.join(file.path.name for file in files)} lies on the lining of kilometre {eye.km}")
-    return {"files": len(files), "points_read": read, "points_used": used}
-
-
-def _chunks(files: list[Source]) -> Iterator[tuple[Path, Points]]:
-    for file in files:
-        for points in read_chunks(file.path, file.dimension):
-            yield file.path, points
 
 
 def _sigma(
