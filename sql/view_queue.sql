@@ -1,0 +1,57 @@
+-- Views of the queue: what is wanted of each kilometre, files that wait to be read, jobs and workers. They read
+-- tunnel_queue, which is procrastinate's, with the rights of their owner.
+
+CREATE OR REPLACE VIEW tunnel_api.goal AS
+SELECT (g.survey_id::bigint * 1000000 + 500000 + g.km) AS id, g.survey_id, s.name AS survey, g.km, g.stage, g.parameters,
+       g.requested_at, g.retry_after
+  FROM tunnel.goal g
+  JOIN tunnel.survey s ON s.id = g.survey_id;
+COMMENT ON VIEW tunnel_api.goal IS 'What batches want of each kilometre';
+COMMENT ON COLUMN tunnel_api.goal.stage IS 'Stage up to which the kilometre is to be brought';
+COMMENT ON COLUMN tunnel_api.goal.retry_after IS 'Stages that failed before this moment are tried again';
+
+CREATE OR REPLACE VIEW tunnel_api.incoming AS
+SELECT row_number() OVER (ORDER BY i.survey_id, i.name) AS id, i.survey_id, s.name AS survey, i.name, i.path, i.bytes, i.points,
+       i.km_from, i.km_to, CASE WHEN i.failed_at IS NULL THEN 'waiting' ELSE 'failed' END AS state, i.requested_at, i.failed_at,
+       i.message
+  FROM tunnel.incoming i
+  JOIN tunnel.survey s ON s.id = i.survey_id;
+COMMENT ON VIEW tunnel_api.incoming IS 'Files that a batch is to read: waiting, or failed and why. A file that was read is in tunnel_api.file';
+COMMENT ON COLUMN tunnel_api.incoming.id IS 'Number in the list, as of this query';
+COMMENT ON COLUMN tunnel_api.incoming.points IS 'Points that its header announces; 0 if it is unreadable';
+COMMENT ON COLUMN tunnel_api.incoming.km_from IS 'First kilometre that it may touch, by its header; NULL if that is unreadable';
+COMMENT ON COLUMN tunnel_api.incoming.message IS 'Why it failed, and what to do';
+
+CREATE OR REPLACE VIEW tunnel_api.job AS
+SELECT j.id, (j.args->>'survey_id')::integer AS survey_id, s.name AS survey, (j.args->>'km')::integer AS km,
+       j.args->>'file' AS file, coalesce(j.args->>'stage', j.task_name) AS stage,
+       CASE j.status WHEN 'todo' THEN 'queued' WHEN 'doing' THEN 'running' WHEN 'succeeded' THEN 'done'
+                     ELSE j.status::text END AS state,
+       j.attempts, j.worker_id, w.host || ':' || w.pid AS worker, e.at AS since, r.message
+  FROM tunnel_queue.procrastinate_jobs j
+  LEFT JOIN tunnel.survey s ON s.id = (j.args->>'survey_id')::integer
+  LEFT JOIN tunnel.worker w ON w.id = j.worker_id
+  LEFT JOIN LATERAL (SELECT max(v.at) AS at FROM tunnel_queue.procrastinate_events v WHERE v.job_id = j.id) e ON true
+  LEFT JOIN LATERAL (SELECT u.message FROM tunnel.run u WHERE u.job_id = j.id ORDER BY u.id DESC LIMIT 1) r ON true;
+COMMENT ON VIEW tunnel_api.job IS 'Jobs of the queue: a stage of a kilometre, or the reading of a file';
+COMMENT ON COLUMN tunnel_api.job.file IS 'Name of the file to be read; NULL for a stage of a kilometre';
+COMMENT ON COLUMN tunnel_api.job.state IS 'queued, running, done, failed or cancelled';
+COMMENT ON COLUMN tunnel_api.job.attempts IS 'How often it was begun before';
+COMMENT ON COLUMN tunnel_api.job.worker IS 'Machine and process that runs or ran it';
+COMMENT ON COLUMN tunnel_api.job.since IS 'When it came into this state';
+COMMENT ON COLUMN tunnel_api.job.message IS 'Why it failed';
+
+CREATE OR REPLACE VIEW tunnel_api.worker AS
+SELECT w.id, w.host, w.pid, w.started_at, q.last_heartbeat AS heartbeat, w.stop AS stopping, d.doing, d.since
+  FROM tunnel.worker w
+  JOIN tunnel_queue.procrastinate_workers q ON q.id = w.id
+  LEFT JOIN LATERAL (SELECT string_agg(format('%s %s of %s', j.stage, coalesce(j.file, 'km ' || j.km), j.survey), ', ') AS doing,
+                            min(j.since) AS since
+                       FROM tunnel_api.job j WHERE j.worker_id = w.id AND j.state = 'running') d ON true;
+COMMENT ON VIEW tunnel_api.worker IS 'Workers that serve the queue';
+COMMENT ON COLUMN tunnel_api.worker.host IS 'Machine that it runs on';
+COMMENT ON COLUMN tunnel_api.worker.pid IS 'Its process there';
+COMMENT ON COLUMN tunnel_api.worker.heartbeat IS 'When it last said that it lives';
+COMMENT ON COLUMN tunnel_api.worker.stopping IS 'Whether it was asked to finish what it is at and leave';
+COMMENT ON COLUMN tunnel_api.worker.doing IS 'What it is at: stage and kilometre or file; NULL when idle';
+COMMENT ON COLUMN tunnel_api.worker.since IS 'Since when it is at it';
