@@ -10,6 +10,7 @@ from pyproj import CRS
 from pyproj.crs import CompoundCRS
 
 from tunneldb.errors import UserError
+from tunneldb.scan.raw import read_raw
 from tunneldb.scan.reader import check_header, read_chunks, read_header
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
@@ -56,21 +57,96 @@ def test_chunks_are_the_file(tmp_path: Path, suffix: str) -> None:
         np.testing.assert_array_equal(found, np.asarray(las[dimension]))
 
 
-def test_chunks_of_varying_size_as_in_copc(tmp_path: Path) -> None:
-    las = write(tmp_path / "a.las", 10_000)
+def write_copc(path: Path, count: int = 10_000) -> laspy.LasData:
+    las = write(path.with_suffix(".las"), count)
     las.update_header()
     vlr = lazrs.LazVlr.new_for_compression(6, las.point_format.num_extra_bytes, True)
     las.header.vlrs.append(LasZipVlr(vlr.record_data()))
     las.header.are_points_compressed = True
-    with (tmp_path / "a.copc.laz").open("wb") as file:
+    with path.open("wb") as file:
         las.header.write_to(file)
         compressor = lazrs.LasZipCompressor(file, vlr)
         for part in np.split(las.points.array, [3000, 3001, 8000]):
             compressor.compress_many(np.frombuffer(part.tobytes(), np.uint8))
             compressor.finish_current_chunk()
         compressor.done()
+    return las
+
+
+def test_chunks_of_varying_size_as_in_copc(tmp_path: Path) -> None:
+    las = write_copc(tmp_path / "a.copc.laz")
     chunks = list(read_chunks(tmp_path / "a.copc.laz", None, 2500))
     np.testing.assert_allclose(np.concatenate([chunk.xyz for chunk in chunks]), las.xyz, atol=1e-9)
+
+
+@pytest.fixture(params=[1, 2], ids=["one thread", "threads"])
+def decoding_threads(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
+    monkeypatch.setattr("tunneldb.scan.las.threads", lambda: request.param)
+    return request.param
+
+
+RANGES = [(2999, 3002), (7_999, 8_500), (0, 1), (8_000, 10_000), (4_000, 4_000), (9_999, 10_000)]
+
+
+@pytest.mark.parametrize("suffix", ["las", "laz", "copc.laz"])
+@pytest.mark.usefixtures("decoding_threads")
+def test_ranges_are_slices_of_the_whole(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a.{suffix}"
+    las = write_copc(path) if suffix.startswith("copc") else write(path, 10_000)
+    chunks = list(read_chunks(path, "Amplitude", 400, RANGES))
+    assert [len(chunk) for chunk in chunks] == [3, 400, 101, 1, 400, 400, 400, 400, 400, 1]
+    for name, dimension in (("time", "gps_time"), ("scan_id", "point_source_id"), ("intensity", "Amplitude")):
+        whole = np.asarray(las[dimension])
+        expected = np.concatenate([whole[begin:end] for begin, end in RANGES])
+        np.testing.assert_array_equal(np.concatenate([getattr(chunk, name) for chunk in chunks]), expected)
+    expected = np.concatenate([las.xyz[begin:end] for begin, end in RANGES])
+    np.testing.assert_allclose(np.concatenate([chunk.xyz for chunk in chunks]), expected, atol=1e-9)
+
+
+@pytest.mark.usefixtures("decoding_threads")
+def test_a_range_of_a_later_chunk_of_the_file(tmp_path: Path) -> None:
+    las = write(tmp_path / "a.laz")  # LAZ chunks of 50 000 points
+    (chunk,) = read_chunks(tmp_path / "a.laz", None, ranges=[(99_990, 100_010)])
+    np.testing.assert_array_equal(chunk.time, las.gps_time[99_990:100_010])
+
+
+@pytest.mark.parametrize("suffix", ["las", "laz"])
+@pytest.mark.usefixtures("decoding_threads")
+def test_ranges_of_a_truncated_file(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a.{suffix}"
+    write(path)
+    with pytest.raises(UserError, match="it announces 120000 points, points up to 120001 are wanted"):
+        list(read_chunks(path, None, ranges=[(0, 1), (100_000, 120_001)]))
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+    with pytest.raises(UserError, match=r"a\.la[sz]: .*(truncated|corrupt)"):
+        list(read_chunks(path, "Amplitude", ranges=[(0, 10)]))
+
+
+@pytest.mark.usefixtures("decoding_threads")
+def test_damage_inside_a_range_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.laz"
+    write(path)
+    data = bytearray(path.read_bytes())
+    middle = len(data) // 2  # the second of three chunks
+    data[middle : middle + 200_000] = bytes(200_000)
+    path.write_bytes(data)
+    (good,) = read_chunks(path, "Amplitude", ranges=[(0, 50_000)])
+    assert len(good) == 50_000
+    with contextlib.suppress(UserError):  # the LAZ format has no checksums: nonsense may decode
+        list(read_chunks(path, "Amplitude"))
+
+
+def test_raw_points_are_the_stored_ones(tmp_path: Path) -> None:
+    las = write(tmp_path / "a.laz", 1000)
+    (raw,) = read_raw(tmp_path / "a.laz", "Amplitude")
+    assert raw.x.dtype == raw.y.dtype == raw.z.dtype == np.int32
+    for stored, name in ((raw.x, "X"), (raw.y, "Y"), (raw.z, "Z"), (raw.time, "gps_time"), (raw.intensity, "Amplitude")):
+        np.testing.assert_array_equal(stored, np.asarray(las[name]))
+    np.testing.assert_array_equal(raw.scales, [0.001] * 3)
+    np.testing.assert_array_equal(raw.offsets, [500_000, 4_500_000, 100])
+    (bare,) = read_raw(tmp_path / "a.laz", None)
+    assert bare.intensity is None
 
 
 def test_without_a_dimension_intensity_is_nought(tmp_path: Path) -> None:

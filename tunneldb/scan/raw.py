@@ -1,0 +1,38 @@
+"""Points of scan files as they are stored, for who works through all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from tunneldb.scan.las import read_las
+from tunneldb.scan.points import CHUNK, Ranges, Raw
+
+
+def read_raw(path: Path, dimension: str | None, size: int = CHUNK, ranges: Ranges | None = None) -> Iterator[Raw]:
+    """Read a scan file chunk by chunk, without turning its numbers into others.
+
+    Parameters
+    ----------
+    path : Path
+        LAS or LAZ file; a COPC file is read as the LAZ file that it is.
+    dimension : str or None
+        Name of the dimension taken as intensity; None takes none.
+    size : int
+        Greatest number of points of a chunk.
+    ranges : sequence of (int, int), or None
+        Half-open ranges of point numbers, from 0, that are read, in this order; None reads the whole file. What lies
+        between them is skipped without decoding, to the bounds of the file's own chunks (50 000 points by default).
+
+    Yields
+    ------
+    Raw
+        In file order within a range, all chunks but the last of a range of `size` points.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, truncated or corrupt, has fewer points than the ranges say, lacks the dimension, or
+        holds NaN or infinite numbers.
+    """
+    return read_las(path, dimension, size, ranges)
