@@ -21,6 +21,7 @@ CREATE OR REPLACE FUNCTION tunnel_api.section_slab(survey_id int, chainage float
 RETURNS TABLE (u float8, w float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 1000
+SET plan_cache_mode = force_custom_plan  -- a generic plan is made for, and locks, every partition of every survey
 AS $$
 #variable_conflict use_variable
 BEGIN

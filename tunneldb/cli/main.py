@@ -85,6 +85,9 @@ def _describe_database_error(error: Exception) -> str | None:
 
     if isinstance(error, psycopg.errors.DiskFull):
         return f"the database's disk is full, nothing was changed: {_first_line(error)}"
+    if isinstance(error, psycopg.errors.OutOfMemory):
+        mend = "; raise the server's max_locks_per_transaction" if "shared memory" in str(error) else ""
+        return f"the database's memory is full, nothing was changed: {_first_line(error)}{mend}"
     if isinstance(error, psycopg.errors.InsufficientPrivilege):
         return f"the database refused: {_first_line(error)}; ask its owner for the role tunnel_operator"
     if isinstance(error, (psycopg.errors.QueryCanceled, psycopg.errors.LockNotAvailable)):

@@ -30,7 +30,14 @@ def open_connection(dsn: str | None) -> psycopg.Connection[Any]:
         When the server is down, refuses, or is too old.
     """
     try:
-        connection = psycopg.connect(resolve_dsn(dsn), application_name="tunneldb", client_encoding="UTF8", connect_timeout=15)
+        connection = psycopg.connect(
+            resolve_dsn(dsn),
+            application_name="tunneldb",
+            client_encoding="UTF8",
+            connect_timeout=15,
+            # what is prepared may get a generic plan, which is made for, and locks, every partition of every survey
+            prepare_threshold=None,
+        )
     except psycopg.ProgrammingError as error:
         raise UserError(f"the DSN is not one that libpq understands: {_first_line(error)}") from None
     except psycopg.OperationalError as error:
