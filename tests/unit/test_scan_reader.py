@@ -85,6 +85,7 @@ def decoding_threads(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
     return request.param
 
 
+# Across and at the ends of the chunks of `write_copc`, in no order.
 RANGES = [(2999, 3002), (7_999, 8_500), (0, 1), (8_000, 10_000), (4_000, 4_000), (9_999, 10_000)]
 
 
@@ -94,7 +95,10 @@ def test_ranges_are_slices_of_the_whole(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"a.{suffix}"
     las = write_copc(path) if suffix.startswith("copc") else write(path, 10_000)
     chunks = list(read_chunks(path, "Amplitude", 400, RANGES))
-    assert [len(chunk) for chunk in chunks] == [3, 400, 101, 1, 400, 400, 400, 400, 400, 1]
+    sizes = [len(chunk) for chunk in chunks]
+    assert max(sizes) <= 400
+    if not suffix.startswith("copc"):
+        assert sizes == [3, 400, 101, 1, 400, 400, 400, 400, 400, 1]
     for name, dimension in (("time", "gps_time"), ("scan_id", "point_source_id"), ("intensity", "Amplitude")):
         whole = np.asarray(las[dimension])
         expected = np.concatenate([whole[begin:end] for begin, end in RANGES])

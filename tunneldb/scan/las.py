@@ -18,6 +18,7 @@ from tunneldb.job.threads import threads
 from tunneldb.scan.envelope import check_envelope
 from tunneldb.scan.faults import check_finite, check_ranges, decoding, line_of, require_dimension
 from tunneldb.scan.points import Ranges, Raw, ScanHeader
+from tunneldb.scan.varied import VariedChunks
 
 KIND = "a LAS or LAZ"
 
@@ -84,21 +85,20 @@ def read_las(path: Path, dimension: str | None, size: int, ranges: Ranges | None
     with decoding(path, KIND):
         check_envelope(path)
         las = laspy.open(path, laz_backend=_backends())
-    with las:
+    with las, path.open("rb") as source:
         with decoding(path, KIND):
             header = las.header
             require_dimension(path, dimension, _dimensions(header))
             _check_scales(path, header.scales, header.offsets)
             take = _Taker(path, header, dimension)
             las.decompression_selection = take.selection()
+            varied = VariedChunks(source, header, take.selection()) if VariedChunks.has(header) else None
         for begin, end in check_ranges(path, ranges, int(header.point_count)):
+            records = varied.read(begin, end, size) if varied else _read(las, begin, end, size)
             done = begin
             while done < end:
                 with decoding(path, KIND):
-                    if las.points_read != done:
-                        las.seek(done)
-                    record = las.read_points(min(size, end - done))
-                    raw = take(record)
+                    raw = take(next(records))
                 if len(raw) == 0:
                     raise UserError(
                         f"{path}: truncated: {done} points read of the {header.point_count} that its header announces"
@@ -106,6 +106,13 @@ def read_las(path: Path, dimension: str | None, size: int, ranges: Ranges | None
                 check_finite(path, raw, dimension, done)
                 done += len(raw)
                 yield raw
+
+
+def _read(las: laspy.LasReader, begin: int, end: int, size: int) -> Iterator[laspy.ScaleAwarePointRecord]:
+    if las.points_read != begin:
+        las.seek(begin)
+    for at in range(begin, end, size):
+        yield las.read_points(min(size, end - at))
 
 
 class _Taker:

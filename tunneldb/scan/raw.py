@@ -27,7 +27,8 @@ def read_raw(path: Path, dimension: str | None, size: int = CHUNK, ranges: Range
     Yields
     ------
     Raw
-        In file order within a range, all chunks but the last of a range of `size` points.
+        In file order within a range. `size` points each but the last of a range; fewer where the file is compressed in
+        pieces of varying size (COPC).
 
     Raises
     ------

@@ -63,7 +63,7 @@ def read_chunks(path: Path, dimension: str | None, size: int = CHUNK, ranges: Ra
     Yields
     ------
     Points
-        In file order within a range, all chunks but the last of a range of `size` points.
+        In file order within a range.
     """
     return map(Points.of, read_raw(path, dimension, size, ranges))
 

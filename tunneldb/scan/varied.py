@@ -1,0 +1,72 @@
+"""LAZ files whose chunks vary in size, as those of COPC do.
+
+lazrs reads them in order, but its `seek` lands on wrong points (seen in 0.8.2, one thread and several); so the chunks
+that hold what is wanted are found here by the file's own table of chunks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import BinaryIO
+
+import laspy
+import lazrs
+import numpy as np
+from laspy import DecompressionSelection
+from numpy.typing import NDArray
+
+
+class VariedChunks:
+    """The chunks of a LAZ file.
+
+    Parameters
+    ----------
+    source : binary file
+        Open for reading; not closed here.
+    header : LasHeader
+        Of the file, with its LASzip record.
+    selection : DecompressionSelection
+        What is decompressed of each point.
+    """
+
+    def __init__(self, source: BinaryIO, header: laspy.LasHeader, selection: DecompressionSelection) -> None:
+        self.source, self.header, self.selection = source, header, selection
+        self.vlr = header.vlrs.get("LasZipVlr")[0].record_data
+        source.seek(header.offset_to_point_data)
+        table = np.array(lazrs.read_chunk_table(source, lazrs.LazVlr(self.vlr)), np.int64).reshape(-1, 2)
+        self.sizes = table
+        self.points = np.concatenate([[0], np.cumsum(table[:, 0])])
+        self.places = header.offset_to_point_data + 8 + np.concatenate([[0], np.cumsum(table[:, 1])])
+        if self.points[-1] != header.point_count:
+            raise ValueError(f"its chunks hold {self.points[-1]} points, its header announces {header.point_count}")
+
+    @staticmethod
+    def has(header: laspy.LasHeader) -> bool:
+        """Whether a file's chunks vary in size."""
+        if not header.are_points_compressed:
+            return False
+        return bool(lazrs.LazVlr(header.vlrs.get("LasZipVlr")[0].record_data).uses_variable_size_chunks())
+
+    def read(self, begin: int, end: int, size: int) -> Iterator[laspy.ScaleAwarePointRecord]:
+        """Read points begin to end (half-open), no more than `size` at a time."""
+        chunk = int(np.searchsorted(self.points, begin, side="right")) - 1
+        while begin < end:
+            last = chunk + 1  # whole chunks that together hold no more than `size` points, or one chunk
+            while last < len(self.sizes) and self.points[last] < end and self.points[last + 1] - self.points[chunk] <= size:
+                last += 1
+            array = self._decompress(chunk, last)
+            first = int(self.points[chunk])
+            stop = min(int(self.points[last]), end)
+            for at in range(begin, stop, size):
+                part = array[at - first : min(at + size, stop) - first]
+                yield laspy.ScaleAwarePointRecord(part, self.header.point_format, self.header.scales, self.header.offsets)
+            begin, chunk = stop, last
+
+    def _decompress(self, chunk: int, last: int) -> NDArray[np.void]:
+        dtype = self.header.point_format.dtype()
+        out = np.zeros(int(self.points[last] - self.points[chunk]), dtype)
+        self.source.seek(int(self.places[chunk]))
+        data = self.source.read(int(self.places[last] - self.places[chunk]))
+        table = [(int(points), int(length)) for points, length in self.sizes[chunk:last] if points]
+        lazrs.decompress_points_with_chunk_table(data, self.vlr, out.view(np.uint8), table, self.selection.to_lazrs())
+        return out
