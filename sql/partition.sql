@@ -1,4 +1,4 @@
--- Partitions of tunnel.point: one per survey and kilometre, built aside and swapped in whole.
+-- Partitions of tunnel.point: one per survey and kilometre, built aside and swapped in whole; and what waits to go into them.
 
 -- Name of the partition that holds a survey's kilometre.
 CREATE OR REPLACE FUNCTION tunnel_api.partition_name(survey_id int, km int)
@@ -40,3 +40,28 @@ END
 $$;
 COMMENT ON FUNCTION tunnel_api.partition_swap(int, int) IS
 'Puts the table <partition>_new in the place of a survey''s kilometre of tunnel.point, with its index, in the caller''s transaction.';
+
+
+-- Makes the empty table tunnel.fragment_s<survey>_f<file>_km<km>, in the place of an older one. It belongs to the owner of
+-- tunnel.point, so that any operator may load what another one read.
+CREATE OR REPLACE FUNCTION tunnel_api.fragment_create(survey_id int, file_id int, km int)
+RETURNS void
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
+AS $$
+DECLARE
+    name constant text := format('fragment_s%s_f%s_km%s', survey_id, file_id, km);
+    owner constant regrole := (SELECT c.relowner FROM pg_class c WHERE c.oid = 'tunnel.point'::regclass);
+BEGIN
+    IF to_regclass('tunnel.' || quote_ident(name)) IS NOT NULL THEN
+        EXECUTE format('DROP TABLE tunnel.%I', name);
+    END IF;
+    EXECUTE format('CREATE TABLE tunnel.%I (number int NOT NULL, rows bytea NOT NULL)', name);
+    -- numbers as they lie in memory: to compress them costs more than it saves
+    EXECUTE format('ALTER TABLE tunnel.%I ALTER rows SET STORAGE EXTERNAL', name);
+    IF owner <> current_user::regrole THEN
+        EXECUTE format('ALTER TABLE tunnel.%I OWNER TO %s', name, owner);
+    END IF;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.fragment_create(int, int, int) IS
+'Makes the empty table that takes what was read of a file until it is loaded into a kilometre: blocks of packed rows.';

@@ -101,6 +101,6 @@ def runs(conn: psycopg.Connection) -> list[tuple[object, ...]]:
 def assert_nothing_loaded(conn: psycopg.Connection) -> None:
     assert rows(conn) == set()
     assert files(conn) == {}
-    left = conn.execute("SELECT relname FROM pg_class WHERE relname ~ '_km|_new$' AND relkind = 'r'").fetchall()
+    left = conn.execute("SELECT relname FROM pg_class WHERE relname ~ '_km-?[0-9]+|_new$' AND relkind = 'r'").fetchall()
     conn.rollback()
     assert left == []

@@ -1,18 +1,22 @@
-"""The files of a survey, as tunnel.scan_file records them."""
+"""The files of a survey, as tunnel.scan_file and tunnel.file_km record them."""
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import psycopg
+from psycopg.types.multirange import Multirange
+from psycopg.types.range import Range
 
 from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.scan.filter import FilterCounts
-from tunneldb.scan.reader import ScanHeader
+
+COUNTED = ("points", "noise", "outside", "thinned", "kept")
 
 
 @dataclass(frozen=True)
@@ -26,7 +30,7 @@ class Loaded:
         ``loaded``, ``replaced`` (there was a file of this name with other content), ``reread`` (because of a file that
         was replaced), ``unchanged`` or ``moved`` (unchanged, but it lies elsewhere now, which was noted).
     points, noise, outside, thinned, kept : int
-        Its points, and what they came to; points = noise + outside + thinned + kept.
+        Its points, and what they came to; points = noise + outside + thinned + kept once all its kilometres are loaded.
     seconds : float
         Time that it took, its share of what was done for several files at once included; 0 when unchanged.
     """
@@ -49,33 +53,20 @@ class Recorded:
     name: str
     path: str
     checksum: str
+    bytes: int
     low: float
     high: float
 
 
-@dataclass
-class Source:
-    """A file to be loaded, and what came of it so far."""
+@dataclass(frozen=True)
+class Content:
+    """A file that was read, as it is to be recorded; srid is that of the tunnel, if the file states one."""
 
     path: Path
     checksum: str
-    size: int
+    bytes: int
     srid: int | None
-    state: str
     counts: FilterCounts
-    seconds: float = 0.0
-
-    @property
-    def name(self) -> str:
-        """Name by which the survey knows it."""
-        return self.path.name
-
-    @classmethod
-    def of(cls, header: ScanHeader, srid: int, state: str = "loaded") -> Source:
-        """Read a file's checksum; srid is the tunnel's, with which the file's own agrees where it states one."""
-        path = header.path.resolve()
-        stated = None if header.crs is None else srid
-        return cls(path, checksum(path), path.stat().st_size, stated, state, FilterCounts())
 
 
 def checksum(path: Path) -> str:
@@ -90,70 +81,120 @@ def checksum(path: Path) -> str:
 def recorded_files(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, Recorded]:
     """Files that a survey holds, by name."""
     rows = conn.execute(
-        "SELECT id, name, path, checksum, chainage_from, chainage_to FROM tunnel.scan_file WHERE survey_id = %s",
+        "SELECT id, name, path, checksum, bytes, chainage_from, chainage_to FROM tunnel.scan_file WHERE survey_id = %s",
         [survey.id],
     ).fetchall()
     return {row[1]: Recorded(*row) for row in rows}
 
 
-def already_loaded(conn: psycopg.Connection[Any], source: Source, recorded: Recorded) -> Loaded:
+def unchanged(conn: psycopg.Connection[Any], path: Path, recorded: Recorded | None) -> Loaded | None:
     """Leave a file of the same content as it is, but note where it lies now, for what reads it at full density."""
-    path = str(source.path)
-    state = "unchanged" if recorded.path == path else "moved"
+    if recorded is None or path.stat().st_size != recorded.bytes or checksum(path) != recorded.checksum:
+        return None
+    place = str(path.resolve())
+    state = "unchanged" if recorded.path == place else "moved"
     if state == "moved":
-        conn.execute("UPDATE tunnel.scan_file SET path = %s WHERE id = %s", [path, recorded.id])
+        conn.execute("UPDATE tunnel.scan_file SET path = %s WHERE id = %s", [place, recorded.id])
+    return outcome(conn, recorded.id, state)
+
+
+def outcome(conn: psycopg.Connection[Any], file_id: int, state: str, seconds: float = 0.0) -> Loaded:
+    """What a file's points have come to so far."""
     row = conn.execute(
-        "SELECT points, noise, outside, thinned, kept FROM tunnel.scan_file WHERE id = %s", [recorded.id]
+        "SELECT name, points, noise, outside, thinned, kept FROM tunnel.scan_file WHERE id = %s", [file_id]
     ).fetchone()
     assert row is not None
-    return Loaded(source.name, state, *row)
+    return Loaded(row[0], state, *row[1:], seconds=seconds)
 
 
-def record_file(conn: psycopg.Connection[Any], survey: Survey, source: Source) -> int:
-    """Enter a file, in the place of one of the same name; returns its id. `finish_file` gives it its final counts."""
-    counts = source.counts
+def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content) -> int:
+    """Enter a file, in the place of one of the same name, with none of its points loaded yet; returns its id."""
+    counts = content.counts
     row = conn.execute(
         """
         INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, thinned, kept,
                                       chainage_from, chainage_to, extent, srid)
-        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, 0, 0, %s, %s, %s, %s)
+        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s)
         ON CONFLICT (survey_id, name) DO UPDATE
            SET path = excluded.path, checksum = excluded.checksum, bytes = excluded.bytes, points = excluded.points,
-               noise = excluded.noise, outside = excluded.outside, chainage_from = excluded.chainage_from,
-               chainage_to = excluded.chainage_to, extent = excluded.extent, srid = excluded.srid
+               noise = excluded.noise, outside = excluded.outside, thinned = excluded.thinned, kept = 0,
+               chainage_from = excluded.chainage_from, chainage_to = excluded.chainage_to, extent = excluded.extent,
+               srid = excluded.srid
         RETURNING id
         """,
         [
             survey.id,
-            source.name,
-            str(source.path),
-            source.checksum,
-            source.size,
+            content.path.name,
+            str(content.path.resolve()),
+            content.checksum,
+            content.bytes,
             counts.points,
             counts.noise,
             counts.outside,
+            counts.thinned,
             *counts.chainage,
             counts.extent.tolist(),
-            source.srid,
+            content.srid,
         ],
     ).fetchone()
     assert row is not None
     return int(row[0])
 
 
-def finish_file(conn: psycopg.Connection[Any], source: Source, file_id: int, kept: int) -> Loaded:
-    """Enter how many rows a file has in the end."""
-    counts = source.counts
-    thinned = counts.points - counts.noise - counts.outside - kept
-    conn.execute(
-        "UPDATE tunnel.scan_file SET kept = %s, thinned = %s, loaded_at = clock_timestamp() WHERE id = %s",
-        [kept, thinned, file_id],
-    )
-    return Loaded(source.name, source.state, counts.points, counts.noise, counts.outside, thinned, kept, source.seconds)
+def kilometres_of(conn: psycopg.Connection[Any], file_ids: Iterable[int]) -> list[int]:
+    """Kilometres that files touch, or touched before and have not been taken out of yet."""
+    rows = conn.execute("SELECT DISTINCT km FROM tunnel.file_km WHERE file_id = ANY (%s) ORDER BY km", [list(file_ids)])
+    return [row[0] for row in rows.fetchall()]
 
 
-def change_kept(conn: psycopg.Connection[Any], file_id: int, change: int) -> None:
-    """Enter that another file has displaced points of this one, or that some came back."""
-    conn.execute(
-        "UPDATE tunnel.scan_file SET kept = kept + %s, thinned = thinned - %s WHERE id = %s", [change, change, file_id]
-    )
+def record_kilometres(
+    conn: psycopg.Connection[Any],
+    file_id: int,
+    held: Mapping[int, int],
+    ranges: Mapping[int, Sequence[tuple[int, int]]],
+    left: Iterable[int],
+) -> None:
+    """Enter which kilometres a file touches.
+
+    Parameters
+    ----------
+    held : mapping of int to int
+        Rows that wait to be loaded, by kilometre.
+    ranges : mapping of int to sequence of (int, int)
+        Where in the file the points of each kilometre and a little beyond are.
+    left : iterable of int
+        Kilometres that may hold rows of the file's former content, which have to go.
+    """
+    conn.execute("DELETE FROM tunnel.file_km WHERE file_id = %s", [file_id])
+    left = set(left)
+    with conn.cursor() as cursor:
+        cursor.executemany(
+            "INSERT INTO tunnel.file_km (file_id, km, rows, points, loaded_at)"
+            " VALUES (%s, %s, %s, %s, CASE WHEN %s THEN NULL ELSE clock_timestamp() END)",
+            [
+                (
+                    file_id,
+                    km,
+                    held.get(km, 0),
+                    Multirange([Range(begin, end) for begin, end in ranges.get(km, ())]),
+                    km in held or km in left,
+                )
+                for km in sorted({*held, *ranges, *left})
+            ],
+        )
+
+
+def change_counts(conn: psycopg.Connection[Any], changes: Mapping[int, tuple[int, int]]) -> None:
+    """Add to the rows that files have (by id) and to those thinned.
+
+    To be called last in a transaction: rows are locked in the order of their ids, so that two that load kilometres
+    with the same files wait for each other's end and never for each other.
+    """
+    for file_id in sorted(changes):
+        kept, thinned = changes[file_id]
+        if kept or thinned:
+            conn.execute(
+                "UPDATE tunnel.scan_file SET kept = kept + %s, thinned = thinned + %s, loaded_at = clock_timestamp()"
+                " WHERE id = %s",
+                [kept, thinned, file_id],
+            )

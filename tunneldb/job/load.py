@@ -1,8 +1,7 @@
-"""Loading scan files into a survey: filtered, thinned, in chainage order, each file whole or not at all."""
+"""Loading what was read of scan files into a survey's kilometres: thinned as a whole, in chainage order."""
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -11,34 +10,145 @@ from typing import Any
 
 import numpy as np
 import psycopg
-from numpy.typing import NDArray
 
 from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
-from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.alignment import KILOMETRE, Alignment
 from tunneldb.geometry.store import load_alignment
-from tunneldb.job.files import (
-    Loaded,
-    Recorded,
-    Source,
-    already_loaded,
-    change_kept,
-    checksum,
-    finish_file,
-    record_file,
-    recorded_files,
-)
+from tunneldb.job.files import COUNTED, Loaded, change_counts, kilometres_of, outcome, recorded_files, unchanged
+from tunneldb.job.fragment import drop_fragments, read_fragment
 from tunneldb.job.ledger import Run, lock, stage_run
-from tunneldb.job.partition import KILOMETRE, partition_exists, read_partition, voxel_reach, write_partition
-from tunneldb.scan.filter import MEMORY, FilterSettings, filter_file
-from tunneldb.scan.pose import PoseModel, load_poses
-from tunneldb.scan.reader import ScanHeader, check_header, read_header
-from tunneldb.scan.spool import BINS_PER_KM, Spool
+from tunneldb.job.partition import partition_exists, read_partition, write_partition
+from tunneldb.job.read import Begin, Counts, Read, Reading
+from tunneldb.job.settings import parameters_of, require_same_density, settings_of
+from tunneldb.scan.filter import MEMORY, FilterSettings
+from tunneldb.scan.reader import ScanHeader, read_header
+from tunneldb.scan.spool import Spool
+
+__all__ = ["header_kilometres", "load_files", "load_kilometre", "parameters_of", "settings_of"]
 
 BATCH = 20_000_000  # points of files of the same kilometre that are loaded in one go
 
-Begin = Callable[[str, int], Callable[[int], None]]
-"""Takes what begins and how much it is; returns what takes how much of it is done."""
+
+def load_kilometre(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    km: int,
+    settings: FilterSettings,
+    progress: Callable[[float], None] = lambda share: None,
+) -> Counts:
+    """Load what waits for a kilometre, in the caller's transaction.
+
+    The rows that were read of files and wait there, and those that it has of other files, are thinned as a whole,
+    written aside and swapped in. Which rows a kilometre has in the end does not depend on the order in which its files
+    are read or loaded.
+
+    Parameters
+    ----------
+    progress : callable
+        Takes the share that is done, 0 to 1.
+
+    Returns
+    -------
+    dict
+        ``files``, those that waited, and ``kept``, the rows that the kilometre has now.
+
+    Raises
+    ------
+    UserError
+        If another process is at work on the kilometre, or the survey is loaded with another density.
+    """
+    require_same_density(conn, survey, settings)
+
+    def begin(text: str, total: int) -> Callable[[int], None]:
+        done = 0
+
+        def advance(rows: int) -> None:
+            nonlocal done
+            done += rows
+            progress(done / total)
+
+        return advance
+
+    merged = merge(conn, survey, km, settings, begin)
+    change_counts(conn, merged.changes)
+    return {"files": merged.files, "kept": merged.kept}
+
+
+@dataclass(frozen=True)
+class Merged:
+    """What loading a kilometre came to.
+
+    Attributes
+    ----------
+    files, kept : int
+        Files that waited for it; rows that it has now.
+    changes : dict of int to (int, int)
+        By how much the rows kept and thinned of files (by id) have changed; to be entered with `change_counts`.
+    """
+
+    files: int
+    kept: int
+    changes: dict[int, tuple[int, int]]
+
+
+def merge(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    km: int,
+    settings: FilterSettings,
+    begin: Begin = lambda text, total: lambda done: None,
+    memory: int = MEMORY,
+) -> Merged:
+    """Load what waits for a kilometre, without the counts of its files."""
+    lock(conn, survey.id, km)
+    waiting = dict(
+        conn.execute(
+            "SELECT k.file_id, k.rows FROM tunnel.file_km k JOIN tunnel.scan_file f ON f.id = k.file_id"
+            " WHERE f.survey_id = %s AND k.km = %s AND k.loaded_at IS NULL ORDER BY k.file_id FOR UPDATE OF k",
+            [survey.id, km],
+        ).fetchall()
+    )
+    files = sorted(recorded_files(conn, survey).values(), key=lambda file: file.name)
+    file_ids = np.array([file.id for file in files], np.int32)
+    tags = {file.id: tag for tag, file in enumerate(files)}
+    before = np.zeros(len(files), np.int64)
+    with Spool(memory) as spool:
+        if waiting and len(waiting) < len(files) and partition_exists(conn, survey, km):
+            order = np.argsort(file_ids)
+            for rows in read_partition(conn, survey, km, load_alignment(conn, survey)):
+                rows = rows[~np.isin(rows["tag"], list(waiting))]
+                rows["tag"] = order[np.searchsorted(file_ids, rows["tag"], sorter=order)]
+                before += np.bincount(rows["tag"], minlength=len(files))
+                spool.add(rows)
+        total = int(before.sum()) + sum(waiting.values())
+        advance = begin(f"kilometre {km}", max(total, 1))
+        if not waiting:
+            row = conn.execute("SELECT count(*) FROM tunnel.point WHERE survey_id = %s AND km = %s", [survey.id, km]).fetchone()
+            assert row is not None
+            advance(1)
+            return Merged(0, row[0], {})
+        for file_id, count in waiting.items():
+            if count:
+                for rows in read_fragment(conn, survey, file_id, km, tags[file_id]):
+                    spool.add(rows)
+        written = write_partition(conn, survey, km, spool, settings.edge, file_ids, advance)
+    drop_fragments(conn, survey, [file_id for file_id, count in waiting.items() if count], [km])
+    _settle(conn, km, list(waiting))
+    changes = {}
+    for file_id, tag in tags.items():
+        change = int(written[tag] - before[tag])
+        # of a file that waited all points were counted as neither kept nor thinned there
+        changes[file_id] = (change, waiting.get(file_id, 0) - change)
+    return Merged(len(waiting), int(written.sum()), changes)
+
+
+def _settle(conn: psycopg.Connection[Any], km: int, file_ids: list[int]) -> None:
+    """Enter that files are loaded into a kilometre; those that have left it are forgotten there."""
+    conn.execute(
+        "DELETE FROM tunnel.file_km WHERE file_id = ANY (%s) AND km = %s AND isempty(points) AND rows = 0", [file_ids, km]
+    )
+    conn.execute("UPDATE tunnel.file_km SET loaded_at = clock_timestamp() WHERE file_id = ANY (%s) AND km = %s", [file_ids, km])
 
 
 def load_files(
@@ -49,7 +159,7 @@ def load_files(
     begin: Begin = lambda text, total: lambda done: None,
     memory: int = MEMORY,
 ) -> Iterator[Loaded]:
-    """Load scan files.
+    """Read scan files and load the kilometres that they touch.
 
     Files of the same kilometre are loaded together, as long as they have no more than BATCH points; each such batch is
     one transaction. Which points a survey holds does not depend on the order in which its files are loaded.
@@ -60,8 +170,8 @@ def load_files(
         Idle.
     survey : Survey
     paths : sequence of Path
-        LAS or LAZ files. A file is known by its name without the folder; one of the same name and other content that
-        was loaded before is replaced, one of the same content is left as it is.
+        Scan files. A file is known by its name without the folder; one of the same name and other content that was
+        loaded before is replaced, one of the same content is left as it is.
     settings : FilterSettings
     begin : callable
         Told of each step that begins; returns what is told of its progress.
@@ -79,15 +189,21 @@ def load_files(
         For a file that is unreadable or does not fit the survey. All are looked at before the first one is read; files
         that were yielded stay loaded, of the others nothing is.
     """
-    alignment, poses = load_alignment(conn, survey), load_poses(conn, survey)
-    _require_same_density(conn, survey, settings)
+    require_same_density(conn, survey, settings)
+    reading = Reading.of(conn, survey, settings, memory)
     conn.rollback()
-    headers = _check_files(survey, paths, poses)
-    for batch in _batches(headers, alignment, settings.max_distance):
-        yield from _Batch(conn, survey, alignment, poses, settings, begin, memory, paths).load(batch)
+    headers = _headers(reading, paths)
+    for batch in _batches(headers, reading.alignment, settings.max_distance):
+        recorded = recorded_files(conn, survey)
+        there = {header.path: unchanged(conn, header.path, recorded.get(header.path.name)) for header in batch}
+        conn.commit()
+        yield from (loaded for loaded in there.values() if loaded is not None)
+        changed = [header for header in batch if there[header.path] is None]
+        if changed:
+            yield from _load_batch(reading, changed, paths, begin)
 
 
-def _check_files(survey: Survey, paths: Sequence[Path], poses: PoseModel) -> list[ScanHeader]:
+def _headers(reading: Reading, paths: Sequence[Path]) -> list[ScanHeader]:
     names: dict[str, Path] = {}
     for path in paths:
         if path.name in names:
@@ -95,7 +211,7 @@ def _check_files(survey: Survey, paths: Sequence[Path], poses: PoseModel) -> lis
         names[path.name] = path
     headers = [read_header(path) for path in paths]
     for header in headers:
-        check_header(header, survey.intensity_dimension, survey.srid, needs_time=poses.mobile)
+        reading.check(header)
     return headers
 
 
@@ -104,7 +220,7 @@ def _batches(headers: Sequence[ScanHeader], alignment: Alignment, reach: float) 
     batch: list[ScanHeader] = []
     kilometres: set[int] = set()
     for header in headers:
-        touched = _kilometres(header, alignment, reach)
+        touched = set(header_kilometres(header, alignment, reach))
         points = header.points + sum(other.points for other in batch)
         if batch and (points > BATCH or not kilometres & touched):
             yield batch
@@ -115,181 +231,62 @@ def _batches(headers: Sequence[ScanHeader], alignment: Alignment, reach: float) 
         yield batch
 
 
-def _kilometres(header: ScanHeader, alignment: Alignment, reach: float) -> set[int]:
+def header_kilometres(header: ScanHeader, alignment: Alignment, reach: float) -> range:
+    """Kilometres that a file may touch by the box in its header, from the first to the last; empty if none.
+
+    Parameters
+    ----------
+    header : ScanHeader
+    alignment : Alignment
+        The given axis.
+    reach : float
+        How far from the axis the tunnel reaches, m.
+    """
     inside = np.all(
         (alignment.vertices[:, :2] >= header.low[:2] - reach) & (alignment.vertices[:, :2] <= header.high[:2] + reach), axis=1
     )
-    return set(np.floor(alignment.number[inside] * alignment.spacing / KILOMETRE).astype(int).tolist())
+    touched = np.floor(alignment.number[inside] * alignment.spacing / KILOMETRE).astype(int)
+    return range(int(touched.min()), int(touched.max()) + 1) if len(touched) else range(0)
 
 
-def _require_same_density(conn: psycopg.Connection[Any], survey: Survey, settings: FilterSettings) -> None:
-    """A survey has one density: another one would thin what is there, or leave it thinner than what comes."""
-    row = conn.execute(
-        """
-        SELECT r.parameters ->> 'load.density' FROM tunnel.run r
-         WHERE r.survey_id = %(survey)s AND r.stage = 'load' AND r.outcome = 'done' AND r.parameters ? 'load.density'
-           AND EXISTS (SELECT FROM tunnel.scan_file f WHERE f.survey_id = %(survey)s)
-         ORDER BY r.id DESC LIMIT 1
-        """,
-        {"survey": survey.id},
-    ).fetchone()
-    if row is not None and row[0] != _density(settings):
-        raise UserError(
-            f"survey {survey.name} is loaded with density {row[0]}: load with --density {row[0]}, or remove the survey "
-            "and load all its files anew"
-        )
-
-
-def _density(settings: FilterSettings) -> str:
-    return "all" if settings.density is None else f"{settings.density:g}"
-
-
-@dataclass
-class _Batch:
-    """Files that are loaded in one transaction."""
-
-    conn: psycopg.Connection[Any]
-    survey: Survey
-    alignment: Alignment
-    poses: PoseModel
-    settings: FilterSettings
-    begin: Begin
-    memory: int
-    given: Sequence[Path]
-
-    def load(self, headers: Sequence[ScanHeader]) -> Iterator[Loaded]:
-        sources = [Source.of(header, self.survey.srid) for header in headers]
-        recorded = recorded_files(self.conn, self.survey)
-        same = [source for source in sources if source.name in recorded and recorded[source.name].checksum == source.checksum]
-        there = [already_loaded(self.conn, source, recorded[source.name]) for source in same]
-        self.conn.commit()
-        yield from there
-        sources = [source for source in sources if source not in same]
-        if not sources:
-            return
-        parameters = {
-            "load.density": _density(self.settings),
-            "load.noise_points": self.settings.noise_points,
-            "load.noise_diameter": self.settings.noise_diameter,
-            "load.max_distance": self.settings.max_distance,
-            "files": [source.name for source in sources],
-        }
-        with stage_run(self.conn, self.survey.id, None, "load", parameters) as run, Spool(self.memory) as spool:
-            recorded = recorded_files(self.conn, self.survey)
-            sources += self._to_reread(sources, recorded)
-            for tag, source in enumerate(sources):
-                self._filter(source, spool, tag)
-            loaded = self._write(run, sources, spool, recorded)
-        yield from loaded
-
-    def _to_reread(self, sources: Sequence[Source], recorded: dict[str, Recorded]) -> list[Source]:
-        """Files that overlap one that is replaced: points of theirs may come back where it was nearer to the centre."""
-        again: dict[str, Source] = {}
-        names = {source.name for source in sources}
-        for source in sources:
-            old = recorded.get(source.name)
-            if old is None:
-                continue
-            source.state = "replaced"
-            if self.settings.edge is None:
-                continue
-            reach = voxel_reach(self.settings.edge)
-            for other in recorded.values():
-                if other.name in names or other.low > old.high + reach or other.high < old.low - reach:
-                    continue
-                again[other.name] = self._reread(source, other)
-        return list(again.values())
-
-    def _reread(self, source: Source, other: Recorded) -> Source:
-        path = next((path for path in self.given if path.name == other.name), Path(other.path))
-        if not path.is_file() or checksum(path) != other.checksum:
-            raise UserError(
-                f"{source.path} replaces a file that overlaps {other.name}, which has to be read again and is not at {path}"
-                " as it was loaded: give its place in the same command"
-            )
-        header = read_header(path)
-        check_header(header, self.survey.intensity_dimension, self.survey.srid, needs_time=self.poses.mobile)
-        return Source.of(header, self.survey.srid, "reread")
-
-    def _filter(self, source: Source, spool: Spool, tag: int) -> None:
+def _load_batch(reading: Reading, headers: Sequence[ScanHeader], given: Sequence[Path], begin: Begin) -> list[Loaded]:
+    """Read files and load their kilometres in one transaction."""
+    conn, survey, settings = reading.conn, reading.survey, reading.settings
+    parameters = {**parameters_of(settings), "files": [header.path.name for header in headers]}
+    with stage_run(conn, survey.id, None, "load", parameters) as run:
+        read = reading.read(headers, given, begin)
         started = time.monotonic()
-        header = read_header(source.path)
-        source.counts = filter_file(
-            source.path,
-            self.survey.intensity_dimension,
-            self.alignment,
-            self.poses,
-            self.settings,
-            spool,
-            tag,
-            self.begin(source.name, 2 * header.points),
-            self.memory,
-        )
-        source.seconds = time.monotonic() - started
-
-    def _write(self, run: Run, sources: Sequence[Source], spool: Spool, recorded: dict[str, Recorded]) -> list[Loaded]:
-        """Write the kilometres that the files touch, or touched before, and the files' own rows."""
-        started = time.monotonic()
-        files = [(source.name, record_file(self.conn, self.survey, source)) for source in sources]
-        gone = {recorded[source.name].id for source in sources if source.name in recorded}
-        files += [(other.name, other.id) for other in recorded.values() if other.id not in gone]
-        file_ids = np.array([number for _, number in files], np.int32)
-        rank = np.argsort(np.argsort([name for name, _ in files]))
-        kept = np.zeros(len(files), np.int64)
-        for km in self._touched(sources, spool, recorded):
-            lock(self.conn, self.survey.id, km)
-            before = self._add_existing(km, spool, file_ids, gone)
-            advance = self.begin(f"kilometre {km}", self._rows(spool, km))
-            written = write_partition(self.conn, self.survey, km, spool, self.settings.edge, file_ids, rank, advance)
-            kept += written - before
-            self._enter(run, km, int(written.sum()))
-        for file_id, change in zip(file_ids[len(sources) :].tolist(), kept[len(sources) :].tolist(), strict=True):
-            change_kept(self.conn, file_id, change)
-        share = (time.monotonic() - started) / len(sources)
-        loaded = []
-        for source, file_id, count in zip(sources, file_ids.tolist(), kept.tolist(), strict=False):
-            source.seconds += share
-            loaded.append(finish_file(self.conn, source, file_id, count))
-        for name in ("points", "noise", "outside", "thinned", "kept"):
+        changes: dict[int, tuple[int, int]] = {}
+        for km in _waiting(conn, [file.id for file in read]):
+            merged = merge(conn, survey, km, settings, begin, reading.memory)
+            for file_id, change in merged.changes.items():
+                kept, thinned = changes.get(file_id, (0, 0))
+                changes[file_id] = (kept + change[0], thinned + change[1])
+            _enter(conn, run, km, merged.kept)
+        change_counts(conn, changes)
+        share = (time.monotonic() - started) / len(read)
+        loaded = [outcome(conn, file.id, file.state, file.seconds + share) for file in read]
+        for name in COUNTED:
             run.counts[name] = sum(getattr(file, name) for file in loaded)
-        return loaded
+    return loaded
 
-    def _touched(self, sources: Sequence[Source], spool: Spool, recorded: dict[str, Recorded]) -> list[int]:
-        first, counts = spool.counts()
-        touched = set(np.unique(np.floor_divide(first + np.flatnonzero(counts), BINS_PER_KM)).tolist())
-        for source in sources:
-            if source.name in recorded:
-                old = recorded[source.name]
-                touched |= set(range(math.floor(old.low / KILOMETRE), math.floor(old.high / KILOMETRE) + 1))
-        return sorted(touched)
 
-    def _add_existing(self, km: int, spool: Spool, file_ids: NDArray[np.int32], gone: set[int]) -> NDArray[np.int64]:
-        """Add the rows that a kilometre has of other files; returns how many of each tag."""
-        before = np.zeros(len(file_ids), np.int64)
-        if not partition_exists(self.conn, self.survey, km):
-            return before
-        order = np.argsort(file_ids)
-        for rows in read_partition(self.conn, self.survey, km, self.alignment):
-            rows = rows[~np.isin(rows["tag"], list(gone))]
-            rows["tag"] = order[np.searchsorted(file_ids, rows["tag"], sorter=order)]
-            before += np.bincount(rows["tag"], minlength=len(file_ids))
-            spool.add(rows)
-        return before
+def _waiting(conn: psycopg.Connection[Any], file_ids: list[int]) -> list[int]:
+    rows = conn.execute(
+        "SELECT DISTINCT km FROM tunnel.file_km WHERE file_id = ANY (%s) AND loaded_at IS NULL ORDER BY km", [file_ids]
+    )
+    return [row[0] for row in rows.fetchall()]
 
-    @staticmethod
-    def _rows(spool: Spool, km: int) -> int:
-        first, counts = spool.counts()
-        return int(counts[max(km * BINS_PER_KM - first, 0) : max((km + 1) * BINS_PER_KM - first, 0)].sum())
 
-    def _enter(self, run: Run, km: int, kept: int) -> None:
-        """Enter the kilometre into the ledger, for what rests on its points."""
-        self.conn.execute(
-            """
-            INSERT INTO tunnel.run (survey_id, km, stage, parameters, versions, counts, backend_pid, backend_start,
-                                    started_at, finished_at, outcome)
-            SELECT survey_id, %s, stage, parameters, versions, jsonb_build_object('kept', %s::int8), backend_pid,
-                   backend_start, started_at, clock_timestamp(), 'done'
-              FROM tunnel.run WHERE id = %s
-            """,
-            [km, kept, run.id],
-        )
+def _enter(conn: psycopg.Connection[Any], run: Run, km: int, kept: int) -> None:
+    """Enter the kilometre into the ledger, for what rests on its points."""
+    conn.execute(
+        """
+        INSERT INTO tunnel.run (survey_id, km, stage, parameters, versions, counts, backend_pid, backend_start,
+                                started_at, finished_at, outcome)
+        SELECT survey_id, %s, stage, parameters, versions, jsonb_build_object('kept', %s::int8), backend_pid,
+               backend_start, started_at, clock_timestamp(), 'done'
+          FROM tunnel.run WHERE id = %s
+        """,
+        [km, kept, run.id],
+    )

@@ -15,7 +15,7 @@ from psycopg import sql
 from tunneldb.database.copy import PointZ, copy_binary, pack
 from tunneldb.database.fetch import fetch_array
 from tunneldb.database.survey import Survey
-from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.alignment import KILOMETRE, Alignment
 from tunneldb.scan.filter import STRETCHING, prefetch, thin_rows
 from tunneldb.scan.spool import BINS_PER_KM, BINS_PER_METRE, ROW, Rows, Spool, bin_of, windows
 
@@ -31,7 +31,6 @@ COLUMNS = (
     "classification",
 )
 WINDOW = 500_000  # rows read, thinned and packed at a time
-KILOMETRE = 1000.0
 
 
 def partition(survey: Survey, km: int, suffix: str = "") -> sql.Identifier:
@@ -97,7 +96,6 @@ def write_partition(
     spool: Spool,
     edge: float | None,
     file_ids: NDArray[np.int32],
-    rank: NDArray[np.int64],
     progress: Callable[[int], None],
 ) -> NDArray[np.int64]:
     """Build a kilometre's partition aside from all its rows, thinned as a whole, and swap it in.
@@ -112,9 +110,8 @@ def write_partition(
     edge : float or None
         Voxel edge of thinning, m; None keeps every row.
     file_ids : (k,) int32 array
-        scan_file.id for each tag.
-    rank : (k,) int64 array
-        Order of the files, for points that are equal in all else.
+        scan_file.id for each tag; tags are in the order of the files' names, which decides between points that are
+        equal in all else.
     progress : callable
         Called with the number of rows looked at.
 
@@ -132,7 +129,7 @@ def write_partition(
     def chunks() -> Iterator[bytes]:
         for low, high in windows(max(first, begin), counts, WINDOW):
             rows = spool.read(max(low - reach, begin), min(high + reach, end))
-            rows = thin_rows(rows, edge, rank)
+            rows = thin_rows(rows, edge)
             bins = bin_of(rows["chainage"])
             rows = rows[(bins >= low) & (bins < high)]
             rows = rows[np.argsort(rows["chainage"], kind="stable")]

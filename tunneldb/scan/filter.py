@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tunneldb.errors import UserError
-from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.alignment import KILOMETRE, Alignment
 from tunneldb.scan.noise import DIAMETER, POINTS, CellCounts, is_noise, search_radii
 from tunneldb.scan.pose import PoseFaults, PoseModel
 from tunneldb.scan.reader import CHUNK, Points, read_chunks
@@ -31,6 +31,8 @@ Progress = Callable[[int], None]
 MEMORY = 192 << 20  # bytes of rows that each spool holds before it goes to disk
 WINDOW = 500_000  # points filtered at a time by each thread
 CROWDED = 2_000_000  # from this many points in one window on, one thread, for the sake of memory
+BLOCK = 50_000  # points of a LAZ file that can be decoded by themselves
+MARGIN = 10.0  # m beyond its ends that a kilometre is looked up in a file for what happens at its end
 STRETCH = 5.0  # m of tunnel for which the noise filter's widest radius is found
 # A distance in space is at most this many times as long in chainage: a point 25 m inside a curve of 75 m radius.
 STRETCHING = 1.5
@@ -75,6 +77,8 @@ class FilterCounts:
         Least and greatest chainage of the points kept, m.
     extent : (6,) float64 array
         Least and greatest x, y, z of the points kept: x0, y0, z0, x1, y1, z1, m.
+    ranges : dict of int to list of (int, int)
+        Where in the file the points of each kilometre and MARGIN beyond are: ranges of point numbers from 0.
     """
 
     points: int = 0
@@ -83,11 +87,28 @@ class FilterCounts:
     kept: int = 0
     chainage: tuple[float, float] = (math.inf, -math.inf)
     extent: NDArray[np.float64] = field(default_factory=lambda: np.array([np.inf] * 3 + [-np.inf] * 3))
+    ranges: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
 
     @property
     def thinned(self) -> int:
         """Points that thinning left out."""
         return self.points - self.outside - self.noise - self.kept
+
+    def locate(self, first: int, near: NDArray[np.intp], chainage: NDArray[np.float64]) -> None:
+        """Note where in the file kilometres are: chainage of the points with numbers first + near, which grow."""
+        if len(near) == 0:
+            return
+        number = first + near
+        starts = np.flatnonzero(np.diff(number // BLOCK, prepend=-1))
+        low = np.floor((np.minimum.reduceat(chainage, starts) - MARGIN) / KILOMETRE).astype(int)
+        high = np.floor((np.maximum.reduceat(chainage, starts) + MARGIN) / KILOMETRE).astype(int)
+        for block, lowest, highest in zip((number[starts] // BLOCK).tolist(), low.tolist(), high.tolist(), strict=True):
+            for km in range(lowest, highest + 1):
+                ranges = self.ranges.setdefault(km, [])
+                if ranges and ranges[-1][1] >= block * BLOCK:
+                    ranges[-1] = (ranges[-1][0], (block + 1) * BLOCK)
+                else:
+                    ranges.append((block * BLOCK, (block + 1) * BLOCK))
 
     def keep(self, rows: Rows) -> None:
         """Count rows that are kept."""
@@ -226,6 +247,7 @@ def _spool_file(
             chainage, distance = alignment.locate(points.xyz)
             with np.errstate(invalid="ignore"):
                 near = np.flatnonzero(distance <= settings.max_distance)
+            counts.locate(counts.points, near, chainage[near])
             counts.points += len(points)
             counts.outside += len(points) - len(near)
             if len(near):
@@ -236,6 +258,8 @@ def _spool_file(
             elif counts.outside == counts.points:
                 nearest = min(nearest, float(cKDTree(alignment.vertices).query(points.xyz[::100])[0].min()))
             progress(len(points))
+    for ranges in counts.ranges.values():
+        ranges[-1] = (ranges[-1][0], min(ranges[-1][1], counts.points))
     if counts.outside == counts.points:
         raise UserError(
             f"{path}: no points near the axis: the nearest is about {nearest:.0f} m from it and the limit is "
@@ -299,19 +323,14 @@ def _judge(
     return int(noise.sum()), thin_rows(rows, settings.edge)
 
 
-def thin_rows(rows: Rows, edge: float | None, rank: NDArray[np.int64] | None = None) -> Rows:
-    """Thin rows by voxels of this edge (m); None keeps all.
-
-    `rank` orders the files (by their tag) between points that are equal in all else.
-    """
+def thin_rows(rows: Rows, edge: float | None) -> Rows:
+    """Thin rows by voxels of this edge (m); None keeps all. Between points that are equal in all else the tag decides."""
     if edge is None:
         return rows
-    names = ("time", "intensity", "scan_id", "classification")
-    ties = np.empty((len(rows), len(names) + (rank is not None)))
+    names = ("time", "intensity", "scan_id", "classification", "tag")
+    ties = np.empty((len(rows), len(names)))
     for column, name in enumerate(names):
         ties[:, column] = rows[name]
-    if rank is not None:
-        ties[:, -1] = rank[rows["tag"]]
     return rows[thin(rows_xyz(rows), edge, ties)]
 
 
