@@ -15,11 +15,11 @@ from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import KILOMETRE, Alignment
 from tunneldb.geometry.store import load_alignment
-from tunneldb.job.files import COUNTED, Loaded, change_counts, kilometres_of, outcome, recorded_files, unchanged
+from tunneldb.job.files import COUNTED, Loaded, change_counts, outcome, recorded_files, unchanged
 from tunneldb.job.fragment import drop_fragments, read_fragment
 from tunneldb.job.ledger import Run, lock, stage_run
 from tunneldb.job.partition import partition_exists, read_partition, write_partition
-from tunneldb.job.read import Begin, Counts, Read, Reading
+from tunneldb.job.read import Begin, Counts, Reading
 from tunneldb.job.settings import parameters_of, require_same_density, settings_of
 from tunneldb.scan.filter import MEMORY, FilterSettings
 from tunneldb.scan.reader import ScanHeader, read_header

@@ -22,7 +22,6 @@ from tunneldb.job.files import (
     Recorded,
     checksum,
     kilometres_of,
-    outcome,
     record_file,
     record_kilometres,
     recorded_files,
