@@ -64,14 +64,18 @@ def plan_lengths(vertices: Float, tangent: Float) -> Float:
     return np.asarray(chord / np.sinc(half / np.pi), dtype=np.float64)
 
 
-@njit(cache=True, nogil=True)
-def fraction(segment: Float, x: float, y: float, z: float) -> float:
-    """Fraction of a segment at which a point lies; below 0 before it, 1 or more after it.
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def fraction(segments: Float, k: int, x: float, y: float, z: float) -> float:
+    """Fraction of segment ``k`` at which a point lies; below 0 before it, 1 or more after it.
 
-    ``segment`` is one row of 12: vertex_from, vertex_to, tangent_from, tangent_to.
+    A segment is a row of 12: vertex_from, vertex_to, tangent_from, tangent_to.
     """
-    before = (x - segment[0]) * segment[6] + (y - segment[1]) * segment[7] + (z - segment[2]) * segment[8]
-    after = (segment[3] - x) * segment[9] + (segment[4] - y) * segment[10] + (segment[5] - z) * segment[11]
+    before = (
+        (x - segments[k, 0]) * segments[k, 6] + (y - segments[k, 1]) * segments[k, 7] + (z - segments[k, 2]) * segments[k, 8]
+    )
+    after = (
+        (segments[k, 3] - x) * segments[k, 9] + (segments[k, 4] - y) * segments[k, 10] + (segments[k, 5] - z) * segments[k, 11]
+    )
     if before < 0.0:
         return -1.0
     if after <= 0.0:
@@ -79,50 +83,46 @@ def fraction(segment: Float, x: float, y: float, z: float) -> float:
     return before / (before + after)
 
 
-@njit(cache=True, nogil=True)
-def frame_at(segment: Float, f: float, out: Float) -> None:
-    """Write origin, tangent, right and up (4 × 3 numbers) of the plane at fraction ``f`` of a segment into ``out``.
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def frame_of(segments: Float, k: int, f: float) -> tuple[float, float, float, float, float, float, float, float]:
+    """Plane at fraction ``f`` of segment ``k``: its origin (3), tangent (3) and the horizontal direction to the right (2).
 
-    The origin is where the cubic Hermite curve through the two vertices meets the plane.
+    The origin is where the cubic Hermite curve through the two vertices meets the plane. The direction up is
+    (uy nz, -ux nz, ux ny - uy nx).
     """
     g = 1.0 - f
-    nx = g * segment[6] + f * segment[9]
-    ny = g * segment[7] + f * segment[10]
-    nz = g * segment[8] + f * segment[11]
-    level = g * (segment[0] * segment[6] + segment[1] * segment[7] + segment[2] * segment[8]) + f * (
-        segment[3] * segment[9] + segment[4] * segment[10] + segment[5] * segment[11]
-    )
-    norm = np.sqrt(nx * nx + ny * ny + nz * nz)
-    nx /= norm
-    ny /= norm
-    nz /= norm
-    level /= norm
+    ax, ay, az = segments[k, 6], segments[k, 7], segments[k, 8]
+    bx, by, bz = segments[k, 9], segments[k, 10], segments[k, 11]
+    nx, ny, nz = g * ax + f * bx, g * ay + f * by, g * az + f * bz
+    flat = nx * nx + ny * ny
+    scale = 1.0 / np.sqrt(flat + nz * nz)
+    flat = 1.0 / np.sqrt(flat)
+    ux, uy = ny * flat, -nx * flat
+    nx *= scale
+    ny *= scale
+    nz *= scale
+    # From the first vertex on: coordinates of millions of metres would cost digits.
+    cx, cy, cz = segments[k, 3] - segments[k, 0], segments[k, 4] - segments[k, 1], segments[k, 5] - segments[k, 2]
+    length = np.sqrt(cx * cx + cy * cy + cz * cz)
+    h10, h01, h11 = f * g * g * length, f * f * (3.0 - 2.0 * f), -f * f * g * length
+    px = h10 * ax + h01 * cx + h11 * bx
+    py = h10 * ay + h01 * cy + h11 * by
+    pz = h10 * az + h01 * cz + h11 * bz
+    gap = f * (cx * bx + cy * by + cz * bz) * scale - (px * nx + py * ny + pz * nz)
+    return (
+        segments[k, 0] + px + gap * nx, segments[k, 1] + py + gap * ny, segments[k, 2] + pz + gap * nz,
+        nx, ny, nz, ux, uy,
+    )  # fmt: skip
 
-    length = np.sqrt((segment[3] - segment[0]) ** 2 + (segment[4] - segment[1]) ** 2 + (segment[5] - segment[2]) ** 2)
-    h00 = (1.0 + 2.0 * f) * g * g
-    h10 = f * g * g * length
-    h01 = f * f * (3.0 - 2.0 * f)
-    h11 = -f * f * g * length
-    px = h00 * segment[0] + h10 * segment[6] + h01 * segment[3] + h11 * segment[9]
-    py = h00 * segment[1] + h10 * segment[7] + h01 * segment[4] + h11 * segment[10]
-    pz = h00 * segment[2] + h10 * segment[8] + h01 * segment[5] + h11 * segment[11]
-    gap = level - (px * nx + py * ny + pz * nz)
 
-    out[0, 0] = px + gap * nx
-    out[0, 1] = py + gap * ny
-    out[0, 2] = pz + gap * nz
-    out[1, 0] = nx
-    out[1, 1] = ny
-    out[1, 2] = nz
-    flat = np.sqrt(nx * nx + ny * ny)
-    ux = ny / flat
-    uy = -nx / flat
-    out[2, 0] = ux
-    out[2, 1] = uy
-    out[2, 2] = 0.0
-    out[3, 0] = uy * nz
-    out[3, 1] = -ux * nz
-    out[3, 2] = ux * ny - uy * nx
+@njit(cache=True, nogil=True)
+def frame_at(segment: Float, f: float, out: Float) -> None:
+    """Write origin, tangent, right and up (4 × 3 numbers) of the plane at fraction ``f`` of a segment into ``out``."""
+    x, y, z, nx, ny, nz, ux, uy = frame_of(segment.reshape(1, 12), 0, f)
+    out[0, 0], out[0, 1], out[0, 2] = x, y, z
+    out[1, 0], out[1, 1], out[1, 2] = nx, ny, nz
+    out[2, 0], out[2, 1], out[2, 2] = ux, uy, 0.0
+    out[3, 0], out[3, 1], out[3, 2] = uy * nz, -ux * nz, ux * ny - uy * nx
 
 
 def segment_rows(vertices: Float, tangent: Float) -> Float:
@@ -144,7 +144,7 @@ def nearest_segment(segments: Float, x: float, y: float, z: float) -> int:
     return which
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def locate(segments: Float, number: NDArray[np.int64], start: int, x: float, y: float, z: float) -> tuple[int, float]:
     """Segment that holds a point and the fraction in it, walking from the segment ``start``; (-1, 0) if none does.
 
@@ -152,7 +152,7 @@ def locate(segments: Float, number: NDArray[np.int64], start: int, x: float, y: 
     """
     k = start
     for _ in range(segments.shape[0] + 1):
-        f = fraction(segments[k], x, y, z)
+        f = fraction(segments, k, x, y, z)
         if f < 0.0:
             if k == 0 or number[k - 1] != number[k] - 1:
                 return -1, 0.0
@@ -161,7 +161,7 @@ def locate(segments: Float, number: NDArray[np.int64], start: int, x: float, y: 
             if k == segments.shape[0] - 1 or number[k + 1] != number[k] + 1:
                 return -1, 0.0
             # A point between the planes of both (where they cross, far from the axis) belongs to the first.
-            following = fraction(segments[k + 1], x, y, z)
+            following = fraction(segments, k + 1, x, y, z)
             k += 1
             if following < 0.0:
                 return k, 0.0
