@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +51,20 @@ class Raw:
 
     def __len__(self) -> int:
         return len(self.x)
+
+    def part(self, begin: int, end: int) -> Raw:
+        """Points begin to end, half-open, of the chunk."""
+        chosen = slice(begin, end)
+        return replace(
+            self,
+            x=self.x[chosen],
+            y=self.y[chosen],
+            z=self.z[chosen],
+            time=None if self.time is None else self.time[chosen],
+            scan_id=self.scan_id[chosen],
+            intensity=None if self.intensity is None else self.intensity[chosen],
+            classification=None if self.classification is None else self.classification[chosen],
+        )
 
 
 @dataclass(frozen=True)

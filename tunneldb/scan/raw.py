@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from tunneldb.scan.e57 import is_e57, read_e57
 from tunneldb.scan.las import read_las
 from tunneldb.scan.points import CHUNK, Ranges, Raw
 
@@ -15,20 +16,21 @@ def read_raw(path: Path, dimension: str | None, size: int = CHUNK, ranges: Range
     Parameters
     ----------
     path : Path
-        LAS or LAZ file; a COPC file is read as the LAZ file that it is.
+        LAS, LAZ or E57 file (``.e57``); a COPC file is read as the LAZ file that it is.
     dimension : str or None
         Name of the dimension taken as intensity; None takes none.
     size : int
         Greatest number of points of a chunk.
     ranges : sequence of (int, int), or None
-        Half-open ranges of point numbers, from 0, that are read, in this order; None reads the whole file. What lies
-        between them is skipped without decoding, to the bounds of the file's own chunks (50 000 points by default).
+        Half-open ranges of point numbers, from 0, that are read, in this order; None reads the whole file. The numbers
+        are those that counting the points of the whole file gives. What lies between ranges is skipped without
+        decoding, to the bounds of the file's own chunks (LAZ: 50 000 points by default; E57: the scans).
 
     Yields
     ------
     Raw
-        In file order within a range. `size` points each but the last of a range; fewer where the file is compressed in
-        pieces of varying size (COPC).
+        In file order within a range. `size` points each but the last of a range; fewer where the file comes in
+        pieces of varying size (COPC, E57).
 
     Raises
     ------
@@ -36,4 +38,5 @@ def read_raw(path: Path, dimension: str | None, size: int = CHUNK, ranges: Range
         If the file is missing, truncated or corrupt, has fewer points than the ranges say, lacks the dimension, or
         holds NaN or infinite numbers.
     """
-    return read_las(path, dimension, size, ranges)
+    read = read_e57 if is_e57(path) else read_las
+    return read(path, dimension, size, ranges)

@@ -8,6 +8,7 @@ from pathlib import Path
 from pyproj import CRS
 
 from tunneldb.errors import UserError
+from tunneldb.scan.e57 import is_e57, read_e57_header
 from tunneldb.scan.faults import require_dimension
 from tunneldb.scan.las import read_las_header
 from tunneldb.scan.points import CHUNK, Points, Ranges, ScanHeader
@@ -17,14 +18,14 @@ __all__ = ["CHUNK", "Points", "ScanHeader", "check_header", "read_chunks", "read
 
 
 def read_header(path: Path) -> ScanHeader:
-    """Read the header of a LAS or LAZ file.
+    """Read the header of a LAS, LAZ or E57 file.
 
     Raises
     ------
     UserError
-        If the file is missing, is no LAS or LAZ file, holds no points, or its coordinate system cannot be read.
+        If the file is missing, is none of its kind, holds no points, or (LAS) its coordinate system cannot be read.
     """
-    return read_las_header(path)
+    return read_e57_header(path) if is_e57(path) else read_las_header(path)
 
 
 def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_time: bool) -> None:
