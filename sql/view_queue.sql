@@ -11,13 +11,13 @@ COMMENT ON COLUMN tunnel_api.goal.stage IS 'Stage up to which the kilometre is t
 COMMENT ON COLUMN tunnel_api.goal.retry_after IS 'Stages that failed before this moment are tried again';
 
 CREATE OR REPLACE VIEW tunnel_api.incoming AS
-SELECT row_number() OVER (ORDER BY i.survey_id, i.name) AS id, i.survey_id, s.name AS survey, i.name, i.path, i.bytes, i.points,
-       i.km_from, i.km_to, CASE WHEN i.failed_at IS NULL THEN 'waiting' ELSE 'failed' END AS state, i.requested_at, i.failed_at,
-       i.message
+SELECT ('x' || left(md5(i.survey_id || '/' || i.name), 13))::bit(52)::bigint AS id, i.survey_id, s.name AS survey, i.name,
+       i.path, i.bytes, i.points, i.km_from, i.km_to,
+       CASE WHEN i.failed_at IS NULL THEN 'waiting' ELSE 'failed' END AS state, i.requested_at, i.failed_at, i.message
   FROM tunnel.incoming i
   JOIN tunnel.survey s ON s.id = i.survey_id;
 COMMENT ON VIEW tunnel_api.incoming IS 'Files that a batch is to read: waiting, or failed and why. A file that was read is in tunnel_api.file';
-COMMENT ON COLUMN tunnel_api.incoming.id IS 'Number in the list, as of this query';
+COMMENT ON COLUMN tunnel_api.incoming.id IS 'Made from survey and name, for programs that need a key';
 COMMENT ON COLUMN tunnel_api.incoming.points IS 'Points that its header announces; 0 if it is unreadable';
 COMMENT ON COLUMN tunnel_api.incoming.km_from IS 'First kilometre that it may touch, by its header; NULL if that is unreadable';
 COMMENT ON COLUMN tunnel_api.incoming.message IS 'Why it failed, and what to do';

@@ -10,6 +10,7 @@ import psycopg
 import pytest
 import shapely
 from psycopg import sql
+from queued import add_file, add_goal, add_job, add_worker
 
 GEOMETRIES = {"axis": "LineStringZ", "axis_vertex": "PointZ", "segment": "LineStringZ", "section": "LineStringZ"}
 EDITED = dt.datetime(2024, 5, 6, tzinfo=dt.UTC)
@@ -62,7 +63,16 @@ def points(conn: psycopg.Connection, example: str) -> None:
             )
 
 
-def test_every_view_begins_with_a_stable_integer_key(conn: psycopg.Connection, example: str, points: None) -> None:
+@pytest.fixture
+def queue(conn: psycopg.Connection, example: str) -> None:
+    """A batch under way."""
+    for km in (12, 13):
+        add_goal(conn, example, km)
+        add_file(conn, example, f"km-{km}.laz", km)
+    add_job(conn, example, 12, "axis", add_worker(conn, "calc-1", 4711))
+
+
+def test_every_view_begins_with_a_stable_integer_key(conn: psycopg.Connection, example: str, points: None, queue: None) -> None:
     for view in views(conn):
         with conn.cursor() as cursor:
             cursor.execute(sql.SQL("SELECT * FROM tunnel_api.{}").format(sql.Identifier(view)))

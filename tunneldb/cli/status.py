@@ -2,62 +2,109 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
+from contextlib import suppress
 from typing import Any
 
 import click
-from rich.text import Text
+import psycopg
+from rich.console import Console
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
+from tunneldb.errors import UserError
 
 STAGES = ("load", "axis", "segments", "sections", "detect")
-STYLES = {"done": "green", "running": "cyan", "failed": "red", "interrupted": "red", "stale": "yellow", "never": "dim"}
 
 
 @click.command()
 @click.argument("survey", required=False)
+@click.option("--watch", is_flag=True, help="Look again and again until nothing is left to do, or Ctrl-C.")
+@click.option(
+    "--interval",
+    type=click.FloatRange(0.1, 3600.0),
+    default=2.0,
+    show_default=True,
+    metavar="S",
+    help="Time between two looks of --watch, seconds.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print what is to be seen of SURVEY as JSON, for programs.")
 @click.pass_obj
-def status(settings: Settings, survey: str | None) -> None:
-    """Show what is loaded and how far each kilometre has come; of one SURVEY or of all.
+def status(settings: Settings, survey: str | None, watch: bool, interval: float, as_json: bool) -> None:
+    """Show how far each kilometre of SURVEY has come, files, workers, speed and time left; or all surveys in short.
 
-    A stage is stale when what it rests on has changed since, interrupted when the program that ran it is gone.
-    """
+    \b
+    done         the result is in the database
+    running      a process is at it
+    queued       ready: the next free worker takes it
+    waits        for an earlier stage, of this kilometre or of a neighbour
+    failed       the reason is beside it
+    stale        done, but what it rests on has changed since
+    interrupted  the program that ran it is gone
+    never        not yet run
+    empty        the kilometre holds no points, and awaits none
+    """  # noqa: D301 - \b is click's
+    if survey is None and (watch or as_json):
+        raise UserError("--watch and --json are for one survey: tunneldb status SURVEY --watch")
     with connect(settings.dsn) as connection:
-        if survey is not None:
-            get_survey(connection, survey)
-        surveys = connection.execute(
-            """
-            SELECT name, tunnel, date, files, points,
-                   tunnel_api.chainage_label(chainage_from), tunnel_api.chainage_label(chainage_to)
-              FROM tunnel_api.survey WHERE %(survey)s::text IS NULL OR name = %(survey)s ORDER BY tunnel, date, name
-            """,
-            {"survey": survey},
-        ).fetchall()
-        stages = connection.execute(
-            """
-            SELECT survey, km, stage, CASE WHEN stale AND outcome = 'done' THEN 'stale' ELSE outcome END, reason, message
-              FROM tunnel_api.stage_status
-             WHERE %(survey)s::text IS NULL OR survey = %(survey)s ORDER BY survey, km, step
-            """,
-            {"survey": survey},
-        ).fetchall()
-    print_table(["survey", "tunnel", "date", "files", "points", "from", "to"], surveys, right=(3, 4, 5, 6))
-    if stages:
+        if survey is None:
+            _all(connection)
+            return
+        get_survey(connection, survey)
+        if not watch:
+            _one(connection, survey, as_json)
+            return
+    from tunneldb.cli.watch import watch as look_on
+
+    with suppress(KeyboardInterrupt):
+        look_on(settings.dsn, survey, interval)
+
+
+def _all(connection: psycopg.Connection[Any]) -> None:
+    """A line a survey: what is loaded, and at how many of its kilometres each stage is done."""
+    rows = connection.execute(
+        """
+        SELECT s.name, s.tunnel, s.date, s.files, s.points, tunnel_api.chainage_label(s.chainage_from),
+               tunnel_api.chainage_label(s.chainage_to), k.kilometres, k.done
+          FROM tunnel_api.survey s
+          LEFT JOIN LATERAL (
+               SELECT max(d.there) AS kilometres, array_agg(d.done ORDER BY d.step) AS done
+                 FROM (SELECT t.step, count(*) AS there, count(*) FILTER (WHERE t.outcome = 'done' AND NOT t.stale) AS done
+                         FROM tunnel_api.stage_status t
+                        WHERE t.survey_id = s.id AND t.stage = ANY (%s)
+                        GROUP BY t.step) d) k ON true
+         ORDER BY s.tunnel, s.date, s.name
+        """,
+        [list(STAGES)],
+    ).fetchall()
+    table = [[*fixed, there, *(done or [None] * len(STAGES))] for *fixed, there, done in rows]
+    print_table(["survey", "tunnel", "date", "files", "points", "from", "to", "km", *STAGES], table, right=range(3, 13))
+    if not rows:
+        click.echo("there is no survey yet: tunneldb tunnel add, then tunneldb survey add")
+
+
+def _one(connection: psycopg.Connection[Any], survey: str, as_json: bool) -> None:
+    from tunneldb.cli.overview import render
+    from tunneldb.job.overview import overview
+
+    seen = overview(connection, survey)
+    if as_json:
+        click.echo(json.dumps(dataclasses.asdict(seen), default=str, ensure_ascii=False, indent=1))
+        return
+    rows = connection.execute(
+        """
+        SELECT name, tunnel, date, files, points, tunnel_api.chainage_label(chainage_from),
+               tunnel_api.chainage_label(chainage_to)
+          FROM tunnel_api.survey WHERE name = %s
+        """,
+        [survey],
+    ).fetchall()
+    print_table(["survey", "tunnel", "date", "files", "points", "from", "to"], rows, right=(3, 4, 5, 6))
+    if seen.kilometres or seen.files:
+        console = Console()
+        if not console.is_terminal:
+            console = Console(width=1000)  # a pipe has no width: let nothing be cut there
         click.echo()
-        print_table(["survey", "km", *STAGES, ""], _kilometres(stages), right=(1,))
-
-
-def _kilometres(stages: list[tuple[Any, ...]]) -> list[list[Any]]:
-    """Return a row a kilometre: the outcome of each stage, and what there is to say of the first that is not done."""
-    outcomes: dict[tuple[str, int], dict[str, str]] = {}
-    remarks: dict[tuple[str, int], str] = {}
-    for survey, km, stage, outcome, reason, message in stages:
-        outcomes.setdefault((survey, km), {})[stage] = outcome
-        remark = message if outcome in ("failed", "interrupted") else reason if outcome == "stale" else None
-        if remark:
-            remarks.setdefault((survey, km), f"{stage}: {remark.splitlines()[0]}")
-    return [
-        [*key, *(Text(found[stage], STYLES[found[stage]]) for stage in STAGES), remarks.get(key, "")]
-        for key, found in outcomes.items()
-    ]
+        console.print(render(seen))
