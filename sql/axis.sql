@@ -60,7 +60,6 @@ RETURNS TABLE (vertex int, "right" float8, up float8, points bigint)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 100
 SET enable_nestloop = off  -- the planner expects few classes and would compare each with every other
-SET plan_cache_mode = force_custom_plan
 AS $$
 DECLARE
     spacing float8;
@@ -71,54 +70,55 @@ BEGIN
     FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = axis_shift.survey_id;
     SELECT (min(i) - 0.5) * spacing, (max(i) + 0.5) * spacing INTO low, high FROM unnest(axis_shift.n) i;
 
-    RETURN QUERY
-    WITH profile AS (
-        SELECT f.n, q.u, q.w
-        FROM (SELECT round(p.chainage / spacing)::int AS n, ST_X(p.geom) AS x, ST_Y(p.geom) AS y, ST_Z(p.geom) AS z,
-                  clock_timestamp()  -- a fence that lets the scan be parallel: the coordinates are taken out once
-              FROM tunnel.point p
-              WHERE p.survey_id = axis_shift.survey_id
-                AND p.km BETWEEN floor(low / 1000)::int AND floor(high / 1000)::int
-                AND p.chainage BETWEEN low AND high
-                -- chainage is good to a metre or so until the axis rests; the plane decides
-                AND abs(p.chainage - round(p.chainage / spacing) * spacing) <= axis_shift.half_width + 1.5) p
-        JOIN tunnel_api.axis_frame(axis_shift.n, axis_shift.x, axis_shift.y, axis_shift.z) f ON f.n = p.n
-        CROSS JOIN LATERAL (SELECT p.x - f.x AS dx, p.y - f.y AS dy, p.z - f.z AS dz) d
-        CROSS JOIN LATERAL (SELECT d.dx * f.ux + d.dy * f.uy AS u, d.dx * f.wx + d.dy * f.wy + d.dz * f.wz AS w) q
-        WHERE abs(d.dx * f.tx + d.dy * f.ty + d.dz * f.tz) <= axis_shift.half_width
-    ), class AS MATERIALIZED (
-        SELECT p.n, (floor(degrees(atan2(p.u, p.w)) / axis_shift.angle_step) + 0.5) * axis_shift.angle_step AS angle,
-            avg(sqrt(p.u * p.u + p.w * p.w)) AS radius, sum(p.u) AS u, sum(p.w) AS w, count(*) AS points
-        FROM profile p
-        GROUP BY 1, 2
-    ), floor_level AS (
-        SELECT c.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY -c.radius * cosd(c.angle)) AS depth, count(*) AS classes
-        FROM class c
-        WHERE abs(c.angle) > 135
-        GROUP BY c.n
-    ), upward AS (
-        SELECT c.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY (c.radius - f.depth / cosd(c.angle)) / 2) AS shift
-        FROM class c JOIN floor_level f ON f.n = c.n
-        WHERE abs(c.angle) < 45
-        GROUP BY c.n
-        HAVING count(*) >= 3 AND min(f.classes) >= 3
-    ), sideward AS (
-        SELECT a.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY (a.radius - b.radius) / 2) AS shift
-        FROM class a JOIN class b ON b.n = a.n AND b.angle = -a.angle
-        WHERE a.angle BETWEEN 45 AND 135
-        GROUP BY a.n
-        HAVING count(*) >= 3
-    ), total AS (
-        SELECT c.n, sum(c.points)::bigint AS points, sum(c.u) / sum(c.points) AS u, sum(c.w) / sum(c.points) AS w
-        FROM class c
-        GROUP BY c.n
-    )
-    SELECT t.n, coalesce(s.shift, t.u), coalesce(u.shift, t.w), t.points
-    FROM total t
-    LEFT JOIN sideward s ON s.n = t.n
-    LEFT JOIN upward u ON u.n = t.n
-    WHERE t.points >= axis_shift.min_points
-    ORDER BY t.n;
+    RETURN QUERY EXECUTE format($query$
+        WITH profile AS (
+            SELECT f.n, q.u, q.w
+            FROM (SELECT round(p.chainage / $3)::int AS n, ST_X(p.geom) AS x, ST_Y(p.geom) AS y, ST_Z(p.geom) AS z,
+                      clock_timestamp()  -- a fence that lets the scan be parallel: the coordinates are taken out once
+                  FROM %s p
+                  WHERE p.chainage BETWEEN $1 AND $2
+                    -- chainage is good to a metre or so until the axis rests; the plane decides
+                    AND abs(p.chainage - round(p.chainage / $3) * $3) <= $4 + 1.5) p
+            JOIN tunnel_api.axis_frame($7, $8, $9, $10) f ON f.n = p.n
+            CROSS JOIN LATERAL (SELECT p.x - f.x AS dx, p.y - f.y AS dy, p.z - f.z AS dz) d
+            CROSS JOIN LATERAL (SELECT d.dx * f.ux + d.dy * f.uy AS u, d.dx * f.wx + d.dy * f.wy + d.dz * f.wz AS w) q
+            WHERE abs(d.dx * f.tx + d.dy * f.ty + d.dz * f.tz) <= $4
+        ), class AS MATERIALIZED (
+            SELECT p.n, (floor(degrees(atan2(p.u, p.w)) / $5) + 0.5) * $5 AS angle,
+                avg(sqrt(p.u * p.u + p.w * p.w)) AS radius, sum(p.u) AS u, sum(p.w) AS w, count(*) AS points
+            FROM profile p
+            GROUP BY 1, 2
+        ), floor_level AS (
+            SELECT c.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY -c.radius * cosd(c.angle)) AS depth, count(*) AS classes
+            FROM class c
+            WHERE abs(c.angle) > 135
+            GROUP BY c.n
+        ), upward AS (
+            SELECT c.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY (c.radius - f.depth / cosd(c.angle)) / 2) AS shift
+            FROM class c JOIN floor_level f ON f.n = c.n
+            WHERE abs(c.angle) < 45
+            GROUP BY c.n
+            HAVING count(*) >= 3 AND min(f.classes) >= 3
+        ), sideward AS (
+            SELECT a.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY (a.radius - b.radius) / 2) AS shift
+            FROM class a JOIN class b ON b.n = a.n AND b.angle = -a.angle
+            WHERE a.angle BETWEEN 45 AND 135
+            GROUP BY a.n
+            HAVING count(*) >= 3
+        ), total AS (
+            SELECT c.n, sum(c.points)::bigint AS points, sum(c.u) / sum(c.points) AS u, sum(c.w) / sum(c.points) AS w
+            FROM class c
+            GROUP BY c.n
+        )
+        SELECT t.n, coalesce(s.shift, t.u), coalesce(u.shift, t.w), t.points
+        FROM total t
+        LEFT JOIN sideward s ON s.n = t.n
+        LEFT JOIN upward u ON u.n = t.n
+        WHERE t.points >= $6
+        ORDER BY t.n
+    $query$, tunnel_api.partition_source(axis_shift.survey_id, floor(low / 1000)::int, floor(high / 1000)::int))
+    USING low, high, spacing, axis_shift.half_width, axis_shift.angle_step, axis_shift.min_points,
+        axis_shift.n, axis_shift.x, axis_shift.y, axis_shift.z;
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.axis_shift(int, int[], float8[], float8[], float8[], float8, float8, int) IS

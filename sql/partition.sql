@@ -9,8 +9,93 @@ COMMENT ON FUNCTION tunnel_api.partition_name(int, int) IS
 'Name, in schema tunnel, of the partition of tunnel.point that holds a survey''s kilometre.';
 
 
+-- The partitions of a survey's kilometres as text for FROM: each by its name, so that what reads them holds no lock on their
+-- parent, whose other partitions may be swapped meanwhile; with none there, nothing to read.
+CREATE OR REPLACE FUNCTION tunnel_api.partition_source(survey_id int, km_from int, km_to int)
+RETURNS text
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+AS $$
+    SELECT '(' || coalesce(string_agg(format('SELECT * FROM tunnel.%I', n.name), ' UNION ALL ' ORDER BY k),
+        'SELECT * FROM tunnel.point WHERE false') || ')'
+    FROM generate_series(km_from, km_to) AS k, tunnel_api.partition_name(survey_id, k) AS n (name)
+    WHERE to_regclass('tunnel.' || quote_ident(n.name)) IS NOT NULL
+$$;
+COMMENT ON FUNCTION tunnel_api.partition_source(int, int, int) IS
+'What to read in FROM for the points of a survey''s kilometres km_from to km_to: their partitions by name, without a lock on the table that holds them.';
+
+
+-- Locks a survey's kilometre, and the table that holds its partitions, against readers: as late as possible in a transaction,
+-- for others wait until it ends.
+--
+-- Behind a lock that waits, everybody else waits too. So it waits for no more than a tenth of a second, lets those who came
+-- meanwhile pass, and tries again: who reads for long delays the swap alone. Gives up after the session's lock_timeout, or
+-- 10 minutes if it has none.
+CREATE OR REPLACE FUNCTION tunnel_api.partition_lock(survey_id int, km int)
+RETURNS void
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
+AS $$
+DECLARE
+    own constant text := current_setting('lock_timeout');
+    patience constant interval := coalesce(nullif(own::interval, '0'), '10 minutes');
+    since constant timestamptz := clock_timestamp();
+    parent constant text := 'point_s' || survey_id;
+    name constant text := tunnel_api.partition_name(survey_id, km);
+    others text;
+BEGIN
+    LOOP
+        BEGIN
+            PERFORM set_config('lock_timeout', '100ms', true);
+            EXECUTE format('LOCK TABLE ONLY tunnel.%I IN ACCESS EXCLUSIVE MODE', parent);
+            IF to_regclass('tunnel.' || quote_ident(name)) IS NOT NULL THEN
+                EXECUTE format('LOCK TABLE tunnel.%I IN ACCESS EXCLUSIVE MODE', name);
+            END IF;
+            PERFORM set_config('lock_timeout', own, true);
+            RETURN;
+        EXCEPTION WHEN lock_not_available THEN
+            IF clock_timestamp() - since > patience THEN
+                SELECT string_agg(DISTINCT l.pid::text, ', ') INTO others
+                FROM pg_locks l
+                WHERE l.relation IN (to_regclass('tunnel.' || quote_ident(parent)), to_regclass('tunnel.' || quote_ident(name)))
+                  AND l.granted AND l.pid <> pg_backend_pid();
+                RAISE EXCEPTION 'kilometre % cannot be swapped in: for % s its survey has been read without a break (sessions %)',
+                    km, round(extract(epoch FROM patience)), coalesce(others, 'unknown')
+                    USING ERRCODE = 'lock_not_available', HINT = 'End the long query, or run it again later.';
+            END IF;
+        END;
+        PERFORM pg_sleep(0.1 + 0.2 * random());
+    END LOOP;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.partition_lock(int, int) IS
+'Locks a survey''s kilometre and the table that holds it, to swap or drop it, without holding up readers while it waits; gives up after the session''s lock_timeout, or 10 minutes.';
+
+
+-- Makes the table that holds a survey's partitions, if there is none. Attached, for that lets others read on meanwhile.
+CREATE OR REPLACE FUNCTION tunnel_api.partition_parent(survey_id int)
+RETURNS void
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
+AS $$
+DECLARE
+    name constant text := 'point_s' || survey_id;
+    owner constant regrole := (SELECT c.relowner FROM pg_class c WHERE c.oid = 'tunnel.point'::regclass);
+BEGIN
+    IF to_regclass('tunnel.' || quote_ident(name)) IS NULL THEN
+        LOCK TABLE ONLY tunnel.point IN SHARE UPDATE EXCLUSIVE MODE;  -- two workers make it once
+    END IF;
+    IF to_regclass('tunnel.' || quote_ident(name)) IS NULL THEN
+        EXECUTE format('CREATE TABLE tunnel.%I (LIKE tunnel.point) PARTITION BY LIST (km)', name);
+        EXECUTE format('ALTER TABLE tunnel.%I OWNER TO %s', name, owner);
+        EXECUTE format('ALTER TABLE tunnel.point ATTACH PARTITION tunnel.%I FOR VALUES IN (%s)', name, survey_id);
+    END IF;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.partition_parent(int) IS
+'Makes the table that holds the partitions of a survey''s kilometres, if there is none.';
+
+
 -- Puts the table <partition>_new, built aside with the columns of tunnel.point and rows in chainage order, in the place of a
--- survey's kilometre: constraints and BRIN index are added, the old partition is dropped, all in the caller's transaction.
+-- survey's kilometre: constraints, BRIN index and statistics are made first, then the old partition is dropped and the new one
+-- attached, all in the caller's transaction. Those who read see the old kilometre until it ends, then the new one.
 CREATE OR REPLACE FUNCTION tunnel_api.partition_swap(survey_id int, km int)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
@@ -18,28 +103,32 @@ AS $$
 DECLARE
     name constant text := tunnel_api.partition_name(survey_id, km);
     parent constant text := 'point_s' || survey_id;
+    owner constant regrole := (SELECT c.relowner FROM pg_class c WHERE c.oid = 'tunnel.point'::regclass);
 BEGIN
-    -- The check spares ATTACH a second scan.
+    -- The check spares ATTACH a second scan. It is written once and analysed here: autovacuum has nothing to do on it.
     EXECUTE format($ddl$
         ALTER TABLE tunnel.%I
             ALTER survey_id SET NOT NULL, ALTER km SET NOT NULL, ALTER chainage SET NOT NULL, ALTER gps_time SET NOT NULL,
             ALTER geom SET NOT NULL, ALTER scan_id SET NOT NULL, ALTER file_id SET NOT NULL,
             ALTER intensity SET NOT NULL, ALTER classification SET NOT NULL,
-            ADD CONSTRAINT part CHECK (survey_id = %s AND km = %s)
+            ADD CONSTRAINT part CHECK (survey_id = %s AND km = %s),
+            SET (autovacuum_enabled = off)
     $ddl$, name || '_new', survey_id, km);
     EXECUTE format('CREATE INDEX ON tunnel.%I USING brin (chainage) WITH (pages_per_range = 16)', name || '_new');
-    EXECUTE format('CREATE TABLE IF NOT EXISTS tunnel.%I PARTITION OF tunnel.point FOR VALUES IN (%s) PARTITION BY LIST (km)',
-        parent, survey_id);
+    -- geometry is never searched by its box here: its statistics would cost more than the index
+    EXECUTE format('ANALYZE tunnel.%I (survey_id, km, chainage, segment)', name || '_new');
+    -- any operator may swap what another one loaded
+    EXECUTE format('ALTER TABLE tunnel.%I OWNER TO %s', name || '_new', owner);
+    PERFORM tunnel_api.partition_parent(survey_id);
+    PERFORM tunnel_api.partition_lock(survey_id, km);
     EXECUTE format('DROP TABLE IF EXISTS tunnel.%I', name);
     EXECUTE format('ALTER TABLE tunnel.%I RENAME TO %I', name || '_new', name);
     EXECUTE format('ALTER TABLE tunnel.%I ATTACH PARTITION tunnel.%I FOR VALUES IN (%s)', parent, name, km);
     EXECUTE format('ALTER TABLE tunnel.%I DROP CONSTRAINT part', name);
-    -- geometry is never searched by its box here: its statistics would cost more than the index
-    EXECUTE format('ANALYZE tunnel.%I (survey_id, km, chainage, segment)', name);
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.partition_swap(int, int) IS
-'Puts the table <partition>_new in the place of a survey''s kilometre of tunnel.point, with its index, in the caller''s transaction.';
+'Puts the table <partition>_new in the place of a survey''s kilometre of tunnel.point, with its index, in the caller''s transaction; to be called as late in it as possible. Long readers delay it and are not held up.';
 
 
 -- Makes the empty table tunnel.fragment_s<survey>_f<file>_km<km>, in the place of an older one. It belongs to the owner of
@@ -58,9 +147,7 @@ BEGIN
     EXECUTE format('CREATE TABLE tunnel.%I (number int NOT NULL, rows bytea NOT NULL)', name);
     -- numbers as they lie in memory: to compress them costs more than it saves
     EXECUTE format('ALTER TABLE tunnel.%I ALTER rows SET STORAGE EXTERNAL', name);
-    IF owner <> current_user::regrole THEN
-        EXECUTE format('ALTER TABLE tunnel.%I OWNER TO %s', name, owner);
-    END IF;
+    EXECUTE format('ALTER TABLE tunnel.%I OWNER TO %s', name, owner);
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.fragment_create(int, int, int) IS

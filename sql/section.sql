@@ -21,20 +21,18 @@ CREATE OR REPLACE FUNCTION tunnel_api.section_slab(survey_id int, chainage float
 RETURNS TABLE (u float8, w float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 1000
-SET plan_cache_mode = force_custom_plan  -- a generic plan is made for, and locks, every partition of every survey
 AS $$
 #variable_conflict use_variable
 BEGIN
-    RETURN QUERY
-    SELECT d.x * frame[7] + d.y * frame[8], d.x * frame[10] + d.y * frame[11] + d.z * frame[12]
-    FROM tunnel.point p
-    CROSS JOIN LATERAL (
-        SELECT ST_X(p.geom) - frame[1] AS x, ST_Y(p.geom) - frame[2] AS y, ST_Z(p.geom) - frame[3] AS z) d
-    WHERE p.survey_id = section_slab.survey_id
-      -- near the ends of a kilometre a point may lie in the partition next door
-      AND p.km BETWEEN floor((section_slab.chainage - half_width - 1) / 1000)::int
-                   AND floor((section_slab.chainage + half_width + 1) / 1000)::int
-      AND p.chainage BETWEEN section_slab.chainage - half_width AND section_slab.chainage + half_width;
+    RETURN QUERY EXECUTE format($query$
+        SELECT d.x * $1[7] + d.y * $1[8], d.x * $1[10] + d.y * $1[11] + d.z * $1[12]
+        FROM %s p
+        CROSS JOIN LATERAL (SELECT ST_X(p.geom) - $1[1] AS x, ST_Y(p.geom) - $1[2] AS y, ST_Z(p.geom) - $1[3] AS z) d
+        WHERE p.chainage BETWEEN $2 AND $3
+    $query$, tunnel_api.partition_source(section_slab.survey_id,
+        -- near the ends of a kilometre a point may lie in the partition next door
+        floor((section_slab.chainage - half_width - 1) / 1000)::int, floor((section_slab.chainage + half_width + 1) / 1000)::int))
+    USING frame, section_slab.chainage - half_width, section_slab.chainage + half_width;
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.section_slab(int, float8, float8[], float8) IS

@@ -176,16 +176,15 @@ BEGIN
         ORDER BY 3
     $query$, building, tunnel_api.partition_name(survey_id, km))
     USING survey_id, km, spacing, n, px, py, pz, pl, qx, qy, qz, ql, a, b;
-    PERFORM tunnel_api.partition_swap(segment_tag.survey_id, segment_tag.km);
 
-    SELECT array_agg(c.segment), array_agg(c.points), coalesce(sum(c.points), 0) INTO numbers, counts, tagged
-    FROM (SELECT p.segment, count(*) AS points
-          FROM tunnel.point p
-          WHERE p.survey_id = segment_tag.survey_id AND p.km = segment_tag.km AND p.segment IS NOT NULL
-          GROUP BY p.segment) c;
+    EXECUTE format($query$
+        SELECT array_agg(c.segment), array_agg(c.points), coalesce(sum(c.points), 0)
+        FROM (SELECT p.segment, count(*) AS points FROM tunnel.%I p WHERE p.segment IS NOT NULL GROUP BY p.segment) c
+    $query$, building) INTO numbers, counts, tagged;
     UPDATE tunnel.segment s SET points = c.points
     FROM unnest(numbers, counts) AS c (n, points)
     WHERE s.survey_id = segment_tag.survey_id AND s.km = segment_tag.km AND s.n = c.n;
+    PERFORM tunnel_api.partition_swap(segment_tag.survey_id, segment_tag.km);
     RETURN tagged;
 END
 $$;

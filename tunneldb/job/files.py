@@ -104,7 +104,8 @@ def outcome(conn: psycopg.Connection[Any], file_id: int, state: str, seconds: fl
         "SELECT name, points, noise, outside, thinned, kept FROM tunnel.scan_file WHERE id = %s", [file_id]
     ).fetchone()
     assert row is not None
-    return Loaded(row[0], state, *row[1:], seconds)
+    name, points, noise, outside, thinned, kept = row
+    return Loaded(name, state, points, noise, outside, thinned, kept, seconds)
 
 
 def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content) -> int:

@@ -18,7 +18,7 @@ from tunneldb.geometry.store import load_alignment
 from tunneldb.job.files import COUNTED, Loaded, change_counts, outcome, recorded_files, unchanged
 from tunneldb.job.fragment import drop_fragments, read_fragment
 from tunneldb.job.ledger import Run, lock, stage_run
-from tunneldb.job.partition import partition_exists, read_partition, write_partition
+from tunneldb.job.partition import partition_exists, read_partition, rows_in, swap_partition, write_partition
 from tunneldb.job.read import Begin, Counts, Reading
 from tunneldb.job.settings import parameters_of, require_same_density, settings_of
 from tunneldb.scan.filter import MEMORY, FilterSettings
@@ -71,22 +71,23 @@ def load_kilometre(
         return advance
 
     merged = merge(conn, survey, km, settings, begin)
-    change_counts(conn, merged.changes)
+    finish(conn, survey, [merged])
     return {"files": merged.files, "kept": merged.kept}
 
 
 @dataclass(frozen=True)
 class Merged:
-    """What loading a kilometre came to.
+    """A kilometre built aside.
 
     Attributes
     ----------
-    files, kept : int
-        Files that waited for it; rows that it has now.
+    km, files, kept : int
+        Number of the kilometre; files that waited for it; rows that it has now.
     changes : dict of int to (int, int)
-        By how much the rows kept and thinned of files (by id) have changed; to be entered with `change_counts`.
+        By how much the rows kept and thinned of files (by id) change.
     """
 
+    km: int
     files: int
     kept: int
     changes: dict[int, tuple[int, int]]
@@ -100,7 +101,7 @@ def merge(
     begin: Begin = lambda text, total: lambda done: None,
     memory: int = MEMORY,
 ) -> Merged:
-    """Load what waits for a kilometre, without the counts of its files."""
+    """Build a kilometre aside with what waits for it; `finish` puts it in place."""
     lock(conn, survey.id, km)
     waiting = dict(
         conn.execute(
@@ -124,10 +125,8 @@ def merge(
         total = int(before.sum()) + sum(waiting.values())
         advance = begin(f"kilometre {km}", max(total, 1))
         if not waiting:
-            row = conn.execute("SELECT count(*) FROM tunnel.point WHERE survey_id = %s AND km = %s", [survey.id, km]).fetchone()
-            assert row is not None
             advance(1)
-            return Merged(0, row[0], {})
+            return Merged(km, 0, rows_in(conn, survey, km), {})
         for file_id, count in waiting.items():
             if count:
                 for rows in read_fragment(conn, survey, file_id, km, tags[file_id]):
@@ -140,7 +139,19 @@ def merge(
         change = int(written[tag] - before[tag])
         # of a file that waited all points were counted as neither kept nor thinned there
         changes[file_id] = (change, waiting.get(file_id, 0) - change)
-    return Merged(len(waiting), int(written.sum()), changes)
+    return Merged(km, len(waiting), int(written.sum()), changes)
+
+
+def finish(conn: psycopg.Connection[Any], survey: Survey, merged: Sequence[Merged]) -> None:
+    """Put kilometres in place, and enter what their files have come to: last in a transaction, for others wait then."""
+    changes: dict[int, tuple[int, int]] = {}
+    for one in merged:
+        if one.files:
+            swap_partition(conn, survey, one.km, one.kept)
+        for file_id, change in one.changes.items():
+            kept, thinned = changes.get(file_id, (0, 0))
+            changes[file_id] = (kept + change[0], thinned + change[1])
+    change_counts(conn, changes)
 
 
 def _settle(conn: psycopg.Connection[Any], km: int, file_ids: list[int]) -> None:
@@ -256,14 +267,11 @@ def _load_batch(reading: Reading, headers: Sequence[ScanHeader], given: Sequence
     with stage_run(conn, survey.id, None, "load", parameters) as run:
         read = reading.read(headers, given, begin)
         started = time.monotonic()
-        changes: dict[int, tuple[int, int]] = {}
-        for km in _waiting(conn, [file.id for file in read]):
-            merged = merge(conn, survey, km, settings, begin, reading.memory)
-            for file_id, change in merged.changes.items():
-                kept, thinned = changes.get(file_id, (0, 0))
-                changes[file_id] = (kept + change[0], thinned + change[1])
-            _enter(conn, run, km, merged.kept)
-        change_counts(conn, changes)
+        waiting = _waiting(conn, [file.id for file in read])
+        merged = [merge(conn, survey, km, settings, begin, reading.memory) for km in waiting]
+        finish(conn, survey, merged)
+        for one in merged:
+            _enter(conn, run, one.km, one.kept)
         share = (time.monotonic() - started) / len(read)
         loaded = [outcome(conn, file.id, file.state, file.seconds + share) for file in read]
         for name in COUNTED:

@@ -44,6 +44,15 @@ def partition_exists(conn: psycopg.Connection[Any], survey: Survey, km: int) -> 
     return row is not None and row[0] is not None
 
 
+def rows_in(conn: psycopg.Connection[Any], survey: Survey, km: int) -> int:
+    """Rows of a survey's kilometre, 0 if there is no partition for it."""
+    if not partition_exists(conn, survey, km):
+        return 0
+    row = conn.execute(sql.SQL("SELECT count(*) FROM {}").format(partition(survey, km))).fetchone()
+    assert row is not None
+    return int(row[0])
+
+
 def read_partition(conn: psycopg.Connection[Any], survey: Survey, km: int, alignment: Alignment) -> Iterator[Rows]:
     """Rows of a kilometre, some at a time, with the file's id as tag.
 
@@ -98,10 +107,9 @@ def write_partition(
     file_ids: NDArray[np.int32],
     progress: Callable[[int], None],
 ) -> NDArray[np.int64]:
-    """Build a kilometre's partition aside from all its rows, thinned as a whole, and swap it in.
+    """Build a kilometre's partition aside from all its rows, thinned as a whole; `swap_partition` puts it in place.
 
-    The table is made, filled and swapped in in the caller's transaction: the embedded server writes no WAL for its
-    rows, and others see the old kilometre until the end.
+    The table is made and filled in the caller's transaction: the embedded server writes no WAL for its rows.
 
     Parameters
     ----------
@@ -142,12 +150,26 @@ def write_partition(
     conn.execute(sql.SQL("CREATE TABLE {} (LIKE tunnel.point)").format(new))
     with closing(prefetch(chunks())) as packed:
         copy_binary(conn, new, COLUMNS, packed)
-    if written.any():
-        conn.execute("SELECT tunnel_api.partition_swap(%s, %s)", [survey.id, km])
-    else:
-        conn.execute(sql.SQL("DROP TABLE {}").format(new))
-        conn.execute(sql.SQL("DROP TABLE IF EXISTS {}").format(partition(survey, km)))
     return written
+
+
+def swap_partition(conn: psycopg.Connection[Any], survey: Survey, km: int, rows: int) -> None:
+    """Put what `write_partition` has built, with so many rows, in the place of a kilometre; one without rows goes.
+
+    To be called late in a transaction: others see the old kilometre until its end, but wait for it from here on.
+
+    Raises
+    ------
+    psycopg.errors.LockNotAvailable
+        If others have read the survey for too long without a break.
+    """
+    if rows:
+        conn.execute("SELECT tunnel_api.partition_swap(%s, %s)", [survey.id, km])
+        return
+    conn.execute(sql.SQL("DROP TABLE {}").format(partition(survey, km, "_new")))
+    if partition_exists(conn, survey, km):
+        conn.execute("SELECT tunnel_api.partition_lock(%s, %s)", [survey.id, km])
+        conn.execute(sql.SQL("DROP TABLE {}").format(partition(survey, km)))
 
 
 def _pack(survey: Survey, km: int, rows: Rows, file_ids: NDArray[np.int32]) -> bytes:

@@ -14,6 +14,7 @@ from tunneldb.database.fetch import fetch_array
 from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.job.files import checksum
+from tunneldb.job.partition import partition, rows_in
 from tunneldb.scan.reader import Points
 
 SAMPLE = 500_000
@@ -82,17 +83,15 @@ def sample(conn: psycopg.Connection[Any], survey: Survey, km: int, count: int = 
     UserError
         If the kilometre holds no points.
     """
-    row = conn.execute("SELECT count(*) FROM tunnel.point WHERE survey_id = %s AND km = %s", (survey.id, km)).fetchone()
-    assert row is not None
-    if not row[0]:
+    # The partition by its name: no lock on its parent, whose other partitions may be swapped meanwhile.
+    count_there = rows_in(conn, survey, km)
+    if not count_there:
         raise UserError(f"survey {survey.name} has no points in kilometre {km}")
     rows = fetch_array(
         conn,
         _FIELDS,
-        sql.SQL(
-            "FROM tunnel.point TABLESAMPLE BERNOULLI (%(share)s) REPEATABLE (1) WHERE survey_id = %(survey)s AND km = %(km)s"
-        ),
-        {"share": min(100.0, 100.0 * count / row[0]), "survey": survey.id, "km": km},
+        sql.SQL("FROM {} TABLESAMPLE BERNOULLI (%(share)s) REPEATABLE (1)").format(partition(survey, km)),
+        {"share": min(100.0, 100.0 * count / count_there)},
     )
     return Points(
         np.column_stack([rows[axis] for axis in "xyz"]),
