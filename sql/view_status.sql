@@ -21,67 +21,127 @@ COMMENT ON VIEW tunnel_api.run IS 'Ledger: each run of a stage, with parameters,
 COMMENT ON COLUMN tunnel_api.run.km IS 'Kilometre; NULL for the whole survey';
 COMMENT ON COLUMN tunnel_api.run.outcome IS 'running, done, failed, or interrupted when its session is gone';
 
--- Last run of each stage on each kilometre that was ever loaded or worked on, and whether its result is out of date.
--- A run without a kilometre counts for all of its survey; only a load has a row for each kilometre that it touched
--- beside the one for all of its files.
---
--- A result is stale when, since its last successful run began,
---   * an earlier stage has succeeded on that kilometre, or
---   * a vertex of the axis in the kilometre or at most two beyond its ends was moved by hand (stages after axis), or
--- when the result of an earlier stage is stale itself.
+-- Last run of each stage on each kilometre of a survey that was ever loaded or worked on, waits to be loaded or is wanted,
+-- and whether its result is out of date. A result rests on
+--   load        the files that touch the kilometre,
+--   axis        load here and on both neighbours,
+--   segments    axis here and on both neighbours, and load,
+--   sections    segments here and on both neighbours,
+--   detect      sections here and on both neighbours, and all before here;
+-- segments and what follows also on the axis' vertices moved by hand, in the kilometre or at most two beyond its ends.
+-- It is stale when one of these came to be since its run began, or is stale itself. Runs are put in order by their times:
+-- a result commits under a lock that each run takes just before it begins (see queue_lock), so that none which it did not
+-- see bears an earlier time.
+CREATE OR REPLACE FUNCTION tunnel_api.stage_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
+RETURNS TABLE (km integer, step integer, stage text, run_id bigint, outcome text, started_at timestamptz,
+               finished_at timestamptz, message text, parameters jsonb, done_at timestamptz, done_parameters jsonb,
+               input_at timestamptz, outdated boolean, reason text)
+LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000
+SET search_path = pg_catalog, pg_temp
+SET jit = off
+SET enable_nestloop = off  -- how few or many rows there are is not known when it is planned
+AS $$
+    WITH RECURSIVE names (stages) AS (
+        VALUES ('{load,axis,segments,sections,detect}'::text[])
+    ), attempt AS MATERIALIZED (
+        SELECT r.km, array_position(n.stages, r.stage) AS step, r.id, r.outcome, r.started_at, r.finished_at, r.message,
+               r.parameters, r.backend_pid, r.backend_start
+          FROM tunnel.run r, names n
+         WHERE r.survey_id = $1 AND r.km BETWEEN $2 AND $3 AND r.stage = ANY (n.stages)
+    ), last AS (
+        SELECT DISTINCT ON (a.km, a.step) a.* FROM attempt a ORDER BY a.km, a.step, a.started_at DESC, a.id DESC
+    ), success AS (
+        SELECT DISTINCT ON (a.km, a.step) a.* FROM attempt a WHERE a.outcome = 'done'
+         ORDER BY a.km, a.step, a.started_at DESC, a.id DESC
+    ), pending AS (
+        SELECT k.km, max(k.read_at) AS read_at, (array_agg(f.name ORDER BY k.read_at DESC, f.name))[1] AS name
+          FROM tunnel.file_km k JOIN tunnel.scan_file f ON f.id = k.file_id
+         WHERE f.survey_id = $1 AND k.km BETWEEN $2 AND $3 AND k.loaded_at IS NULL
+         GROUP BY k.km
+    ), kilometre AS (
+        SELECT a.km FROM attempt a
+         UNION SELECT p.km FROM pending p
+         UNION SELECT g.km FROM tunnel.goal g WHERE g.survey_id = $1 AND g.km BETWEEN $2 AND $3
+    ), edit AS (
+        SELECT k.km, max(v.edited_at) AS edited_at
+          FROM tunnel.survey s
+          JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+          JOIN tunnel.axis_vertex v ON v.survey_id = s.id AND v.edited_at IS NOT NULL
+          CROSS JOIN LATERAL generate_series(ceil((v.n - 2) * t.spacing / 1000)::integer - 1,
+                                             floor((v.n + 2) * t.spacing / 1000)::integer) AS k (km)
+         WHERE s.id = $1
+         GROUP BY k.km
+    ), whole AS (  -- a row a kilometre: begin and end of the last success of each stage
+        SELECT k.km, array_agg(d.started_at ORDER BY g.step) AS begun, array_agg(d.finished_at ORDER BY g.step) AS ended
+          FROM kilometre k CROSS JOIN generate_series(1, 5) AS g (step)
+          LEFT JOIN success d ON d.km = k.km AND d.step = g.step
+         GROUP BY k.km
+    ), direct AS MATERIALIZED (
+        SELECT w.km, g.step, w.begun[g.step] IS NOT NULL AS done,
+               CASE g.step
+                   WHEN 1 THEN p.read_at
+                   ELSE greatest(w.ended[1], CASE WHEN g.step > 2 THEN w.ended[2] END, CASE WHEN g.step > 3 THEN w.ended[3] END,
+                                 CASE WHEN g.step > 4 THEN w.ended[4] END, b.ended[g.step - 1], a.ended[g.step - 1],
+                                 CASE WHEN g.step > 2 THEN e.edited_at END)
+               END AS input_at,
+               CASE
+                   WHEN w.begun[g.step] IS NULL THEN NULL
+                   WHEN g.step = 1 THEN p.name || ' read since'
+                   WHEN w.ended[1] > w.begun[g.step] THEN 'load ran since'
+                   WHEN g.step > 2 AND w.ended[2] > w.begun[g.step] THEN 'axis ran since'
+                   WHEN g.step > 3 AND w.ended[3] > w.begun[g.step] THEN 'segments ran since'
+                   WHEN g.step > 4 AND w.ended[4] > w.begun[g.step] THEN 'sections ran since'
+                   WHEN b.ended[g.step - 1] > w.begun[g.step]
+                       THEN format('%s of kilometre %s ran since', n.stages[g.step - 1], w.km - 1)
+                   WHEN a.ended[g.step - 1] > w.begun[g.step]
+                       THEN format('%s of kilometre %s ran since', n.stages[g.step - 1], w.km + 1)
+                   WHEN g.step > 2 AND e.edited_at > w.begun[g.step] THEN 'axis edited since'
+               END AS reason
+          FROM names n
+         CROSS JOIN whole w
+         CROSS JOIN generate_series(1, 5) AS g (step)
+          LEFT JOIN whole b ON b.km = w.km - 1
+          LEFT JOIN whole a ON a.km = w.km + 1
+          LEFT JOIN pending p ON p.km = w.km
+          LEFT JOIN edit e ON e.km = w.km
+    ), ripple AS (  -- what is stale, and what rests on it
+        SELECT d.km, d.step FROM direct d WHERE d.reason IS NOT NULL
+         UNION
+        SELECT d.km, d.step
+          FROM ripple r CROSS JOIN (VALUES (-1), (0), (1)) AS o (way)
+          JOIN direct d ON d.km = r.km + o.way AND d.step = r.step + 1 AND d.done
+    ), stale AS (
+        SELECT r.km, array_agg(r.step ORDER BY r.step) AS steps FROM ripple r GROUP BY r.km
+    )
+    SELECT d.km, d.step, n.stages[d.step], l.id,
+           CASE WHEN l.outcome = 'running' AND NOT tunnel_api.session_lives(l.backend_pid, l.backend_start)
+                THEN 'interrupted' ELSE coalesce(l.outcome, 'never') END,
+           l.started_at, l.finished_at, l.message, l.parameters, s.finished_at, s.parameters, d.input_at,
+           d.reason IS NOT NULL,
+           CASE
+               WHEN d.reason IS NOT NULL OR NOT d.done THEN d.reason
+               WHEN here.steps[1] < d.step THEN format('%s is stale', n.stages[here.steps[1]])
+               WHEN d.step - 1 = ANY (before.steps) THEN format('%s of kilometre %s is stale', n.stages[d.step - 1], d.km - 1)
+               WHEN d.step - 1 = ANY (after.steps) THEN format('%s of kilometre %s is stale', n.stages[d.step - 1], d.km + 1)
+           END
+      FROM names n
+     CROSS JOIN direct d
+      LEFT JOIN last l ON l.km = d.km AND l.step = d.step
+      LEFT JOIN success s ON s.km = d.km AND s.step = d.step
+      LEFT JOIN stale here ON here.km = d.km
+      LEFT JOIN stale before ON before.km = d.km - 1
+      LEFT JOIN stale after ON after.km = d.km + 1
+$$;
+COMMENT ON FUNCTION tunnel_api.stage_state(integer, integer, integer) IS
+    'How far kilometres of a survey have come: for each stage the last run, the last success, and what has changed since. What lies beyond the range is not looked at';
+
 CREATE OR REPLACE VIEW tunnel_api.stage_status AS
-WITH stage (step, stage) AS (
-    VALUES (1, 'load'), (2, 'axis'), (3, 'segments'), (4, 'sections'), (5, 'detect')
-), kilometre AS (
-    SELECT DISTINCT r.survey_id, r.km FROM tunnel.run r WHERE r.km IS NOT NULL
-), attempt AS (
-    SELECT k.survey_id, k.km, g.step, r.id, r.started_at, r.finished_at, r.outcome, r.counts, r.message
-      FROM kilometre k
-      JOIN tunnel_api.run r ON r.survey_id = k.survey_id AND (r.km = k.km OR r.km IS NULL AND r.stage <> 'load')
-      JOIN stage g ON g.stage = r.stage
-), last_attempt AS (
-    SELECT DISTINCT ON (survey_id, km, step) * FROM attempt ORDER BY survey_id, km, step, started_at DESC, id DESC
-), success AS (
-    SELECT survey_id, km, step, max(started_at) AS started_at, max(finished_at) AS finished_at
-      FROM attempt
-     WHERE outcome = 'done'
-     GROUP BY survey_id, km, step
-), edit AS (
-    SELECT k.survey_id, k.km, max(v.edited_at) AS edited_at
-      FROM kilometre k
-      JOIN tunnel.survey s ON s.id = k.survey_id
-      JOIN tunnel.tunnel t ON t.id = s.tunnel_id
-      JOIN tunnel.axis_vertex v ON v.survey_id = k.survey_id AND v.edited_at IS NOT NULL
-       AND v.n BETWEEN ceil(k.km * 1000 / t.spacing) - 2 AND floor((k.km + 1) * 1000 / t.spacing) + 2
-     GROUP BY k.survey_id, k.km
-), direct AS (
-    SELECT d.survey_id, d.km, d.step, d.finished_at AS done_at,
-           CASE WHEN u.stage IS NOT NULL THEN format('%s ran since', u.stage)
-                WHEN d.step > 2 AND e.edited_at > d.started_at THEN 'axis edited since' END AS reason
-      FROM success d
-      LEFT JOIN edit e ON e.survey_id = d.survey_id AND e.km = d.km
-      LEFT JOIN LATERAL (SELECT g.stage
-                           FROM success b JOIN stage g ON g.step = b.step
-                          WHERE b.survey_id = d.survey_id AND b.km = d.km AND b.step < d.step
-                            AND b.finished_at > d.started_at
-                          ORDER BY b.step LIMIT 1) u ON true
-), judged AS (
-    SELECT d.*, coalesce(d.reason, (SELECT format('%s is stale', g.stage)
-                                      FROM direct b JOIN stage g ON g.step = b.step
-                                     WHERE b.survey_id = d.survey_id AND b.km = d.km AND b.step < d.step
-                                       AND b.reason IS NOT NULL
-                                     ORDER BY b.step LIMIT 1)) AS stale_reason
-      FROM direct d
-)
-SELECT (k.survey_id::bigint * 1000000 + 500000 + k.km) * 10 + g.step AS id, k.survey_id, s.name AS survey, k.km, g.step,
-       g.stage,
-       coalesce(a.outcome, 'never') AS outcome, a.started_at, a.finished_at, j.done_at, a.counts, a.message,
-       j.stale_reason IS NOT NULL AS stale, j.stale_reason AS reason
-  FROM kilometre k
-  JOIN tunnel.survey s ON s.id = k.survey_id
- CROSS JOIN stage g
-  LEFT JOIN last_attempt a ON a.survey_id = k.survey_id AND a.km = k.km AND a.step = g.step
-  LEFT JOIN judged j ON j.survey_id = k.survey_id AND j.km = k.km AND j.step = g.step;
+SELECT (s.id::bigint * 1000000 + 500000 + t.km) * 10 + t.step AS id, s.id AS survey_id, s.name AS survey, t.km, t.step,
+       t.stage, t.outcome, t.started_at, t.finished_at, t.done_at, r.counts, t.message,
+       t.reason IS NOT NULL AS stale, t.reason
+  FROM tunnel.survey s
+ CROSS JOIN LATERAL tunnel_api.stage_state(s.id) t
+  LEFT JOIN tunnel.run r ON r.id = t.run_id;
 COMMENT ON VIEW tunnel_api.stage_status IS 'How far each kilometre of each survey has come: one row per stage';
 COMMENT ON COLUMN tunnel_api.stage_status.step IS 'Order of the stages: load, axis, segments, sections, detect';
 COMMENT ON COLUMN tunnel_api.stage_status.outcome IS 'Of the last run: running, done, failed, interrupted (its session is gone) or never';

@@ -92,6 +92,7 @@ def upgrade() -> None:
         sa.Column("job_id", sa.BigInteger(), nullable=True, comment="Job of the queue that it was, if it was one"),
         schema="tunnel",
     )
+    op.create_index(op.f("run_job_id_idx"), "run", ["job_id"], unique=False, schema="tunnel")
     op.alter_column("run", "stage", comment="read, load, axis, segments, sections, detect", schema="tunnel")
     op.create_table(
         "file_km",

@@ -69,7 +69,7 @@ def load(
     from tunneldb.job.load import load_files
     from tunneldb.scan.filter import FilterSettings
 
-    chosen = FilterSettings(_density(density), noise_points, noise_diameter, max_distance)
+    chosen = FilterSettings(density_of(density), noise_points, noise_diameter, max_distance)
     done: list[Loaded] = []
     with connect(settings.dsn) as connection:
         found = get_survey(connection, survey)
@@ -82,7 +82,8 @@ def load(
                 _summary(done)
 
 
-def _density(text: str) -> float | None:
+def density_of(text: str) -> float | None:
+    """Density that a text states, points per m²; None for all."""
     if text == "all":
         return None
     try:

@@ -527,6 +527,7 @@ class Run(Base):
     __table_args__ = (
         _one_of("outcome", "running", "done", "failed"),
         Index(None, "survey_id", "stage", "km"),
+        Index(None, "job_id"),
         {"comment": "Ledger of every stage that was run"},
     )
 

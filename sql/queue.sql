@@ -1,0 +1,306 @@
+-- The queue of jobs: which are ready, and their deferring; workers that were lost. What is wanted is in tunnel.goal and
+-- tunnel.incoming, what is done in tunnel.run; the jobs themselves are procrastinate's (schema tunnel_queue).
+
+-- Puts results of a survey in order: whoever commits one takes this lock first and holds it to the commit, and each run
+-- takes it just before it begins. A run thus sees every result that bears an earlier time than its own beginning, and the
+-- jobs that follow are found by one at a time.
+CREATE OR REPLACE FUNCTION tunnel_api.queue_lock(survey_id integer) RETURNS void
+LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
+AS $$ SELECT pg_advisory_xact_lock(-2, survey_id) $$;
+COMMENT ON FUNCTION tunnel_api.queue_lock(integer) IS
+    'Waits until nobody commits a result of the survey, and lets nobody else until the transaction ends';
+
+-- What becomes of each stage that is wanted of each kilometre:
+--   done     it is there, nothing that it rests on has changed since, and it was made with the parameters that are wanted
+--   running, queued  there is a job for it
+--   ready    there could be one
+--   waits    for a file, an earlier stage, or a neighbour's that is still to come
+--   failed   with a message: its last run failed, and neither the parameters nor what it rests on has changed since, nor was
+--            asked to try again (goal.retry_after); or, for load, a file that touches the kilometre failed
+--   blocked  an earlier stage of the kilometre failed
+--   empty    the kilometre holds no points, and awaits none
+-- A neighbour that is failed, blocked or empty, or of which the stage is not wanted, is not waited for. Five stages reach no
+-- farther than four kilometres: a range is judged with five more on both sides.
+CREATE OR REPLACE FUNCTION tunnel_api.queue_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
+RETURNS TABLE (km integer, step integer, stage text, state text, message text)
+LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000
+SET search_path = pg_catalog, pg_temp
+SET jit = off
+SET enable_nestloop = off  -- how few or many rows there are is not known when it is planned
+AS $$
+    WITH RECURSIVE goal AS (
+        SELECT g.km, array_position('{load,axis,segments,sections,detect}', g.stage) AS target, g.parameters, g.retry_after
+          FROM tunnel.goal g WHERE g.survey_id = $1 AND g.km BETWEEN $2 - 5 AND $3 + 5
+    ), family (prefix, step) AS (  -- parameters by stage; load's are those of its files
+        VALUES ('axis', 2), ('section', 4), ('lining', 5), ('image', 5), ('intensity', 5), ('appendage', 5), ('leak', 5)
+    ), wish AS (
+        SELECT p.parameters, f.step, jsonb_object_agg(e.key, e.value) AS part
+          FROM (SELECT DISTINCT g.parameters FROM goal g) AS p
+         CROSS JOIN LATERAL jsonb_each(p.parameters) AS e
+          JOIN family f ON f.prefix = split_part(e.key, '.', 1)
+         GROUP BY p.parameters, f.step
+    ), file AS (
+        SELECT k.km, bool_or(i.failed_at IS NULL) AS awaited,
+               min(format('file %s: %s', i.name, i.message)) FILTER (WHERE i.failed_at IS NOT NULL) AS message
+          FROM tunnel.incoming i
+         CROSS JOIN LATERAL generate_series(greatest(i.km_from, $2 - 5), least(i.km_to, $3 + 5)) AS k (km)
+         WHERE i.survey_id = $1
+         GROUP BY k.km
+    ), job AS (
+        SELECT j.queueing_lock, bool_or(j.status = 'doing') AS doing, min(j.args ->> 'stage') AS stage
+          FROM tunnel_queue.procrastinate_jobs j
+         WHERE j.status IN ('todo', 'doing')
+         GROUP BY j.queueing_lock
+    ), judged AS (
+        SELECT s.km, s.step, s.stage, s.outcome, s.started_at, s.finished_at, s.input_at, s.message, g.target, g.retry_after,
+               coalesce(w.part, '{}') AS part, s.parameters, f.message AS lost, coalesce(f.awaited, false) AS awaited,
+               s.step = 1 AND s.input_at IS NULL AND f.awaited IS NOT TRUE
+               AND to_regclass(format('tunnel.point_s%s_km%s', $1, s.km)) IS NULL AS empty,
+               CASE s.step WHEN 1 THEN s.input_at IS NOT NULL OR coalesce(f.awaited, false)
+                           ELSE s.done_at IS NULL OR s.outdated OR NOT s.done_parameters @> coalesce(w.part, '{}') END AS due
+          FROM tunnel_api.stage_state($1, $2 - 5, $3 + 5) s
+          JOIN goal g ON g.km = s.km
+          LEFT JOIN wish w ON w.parameters = g.parameters AND w.step = s.step
+          LEFT JOIN file f ON f.km = s.km
+         WHERE s.step <= g.target
+    ), failing AS (
+        SELECT j.*,
+               CASE WHEN j.step = 1 AND j.lost IS NOT NULL THEN j.lost
+                    WHEN j.due AND j.outcome = 'failed' AND j.parameters @> j.part
+                     AND NOT (j.step = 1 AND j.awaited)
+                     AND (j.input_at > j.started_at) IS NOT TRUE AND (j.finished_at < j.retry_after) IS NOT TRUE
+                    THEN coalesce(j.message, 'failed') END AS failure
+          FROM judged j
+    ), cell AS MATERIALIZED (
+        SELECT f.*, bool_or(f.failure IS NOT NULL OR f.empty) OVER (PARTITION BY f.km ORDER BY f.step) AS hopeless,
+               bool_or(f.empty) OVER (PARTITION BY f.km) AS void
+          FROM failing f
+    ), open AS (  -- what is still to be done, and what rests on it
+        SELECT c.km, c.step FROM cell c WHERE c.due AND NOT c.hopeless
+         UNION
+        SELECT c.km, c.step
+          FROM open o CROSS JOIN (VALUES (-1), (0), (1)) AS way (way)
+          JOIN cell c ON c.km = o.km + way AND c.step = o.step + 1 AND NOT c.hopeless
+    ), ahead AS (
+        SELECT o.km, array_agg(o.step) AS steps FROM open o GROUP BY o.km
+    )
+    SELECT c.km, c.step, c.stage,
+           CASE WHEN j.doing AND j.stage = c.stage THEN 'running'
+                WHEN j.stage = c.stage THEN 'queued'
+                WHEN c.failure IS NOT NULL THEN 'failed'
+                WHEN c.void THEN 'empty'
+                WHEN c.hopeless THEN 'blocked'
+                WHEN here.steps IS NULL OR c.step <> ALL (here.steps) THEN 'done'
+                WHEN NOT c.due OR j.queueing_lock IS NOT NULL OR c.step = 1 AND c.awaited
+                  OR c.step - 1 = ANY (here.steps) OR c.step - 1 = ANY (before.steps) OR c.step - 1 = ANY (after.steps)
+                THEN 'waits'
+                ELSE 'ready' END,
+           c.failure
+      FROM cell c
+      LEFT JOIN job j ON j.queueing_lock = format('s%s.km%s', $1, c.km)
+      LEFT JOIN ahead here ON here.km = c.km
+      LEFT JOIN ahead before ON before.km = c.km - 1
+      LEFT JOIN ahead after ON after.km = c.km + 1
+     WHERE c.km BETWEEN $2 AND $3
+$$;
+COMMENT ON FUNCTION tunnel_api.queue_state(integer, integer, integer) IS
+    'What becomes of each stage that is wanted of each kilometre of a survey: done, running, queued, ready, waits, failed, blocked or empty';
+
+-- Defers a job for each file to be read and for each stage of the kilometres that is ready; returns how many. Whoever commits
+-- a result calls it last, for the kilometre and four to both sides, so that the jobs come to be with what made them ready.
+--
+-- A kilometre goes before the next one, and in it a later stage before an earlier one, so that kilometres are finished one
+-- after the other and few fragments wait. Detection lags by three kilometres: it holds up nothing, and fills the workers'
+-- time at the end, when each of the other stages waits for the one before.
+CREATE OR REPLACE FUNCTION tunnel_api.queue_plan(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
+RETURNS integer
+LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
+AS $$
+DECLARE
+    found tunnel_queue.procrastinate_job_to_defer_v1[];
+BEGIN
+    PERFORM tunnel_api.queue_lock(survey_id);
+    WITH job AS (
+        SELECT j.queueing_lock FROM tunnel_queue.procrastinate_jobs j WHERE j.status IN ('todo', 'doing')
+    ), ready AS (
+        SELECT 'read' AS task, -10 * i.km_from AS priority, format('s%s.f%s', queue_plan.survey_id, i.name) AS lock,
+               jsonb_build_object('survey_id', queue_plan.survey_id, 'file', i.name, 'stage', 'read') AS args
+          FROM tunnel.incoming i
+         WHERE i.survey_id = queue_plan.survey_id AND i.failed_at IS NULL
+         UNION ALL
+        SELECT 'stage', CASE s.step WHEN 5 THEN -10 * (s.km + 3) ELSE -10 * s.km END + s.step,
+               format('s%s.km%s', queue_plan.survey_id, s.km),
+               jsonb_build_object('survey_id', queue_plan.survey_id, 'km', s.km, 'stage', s.stage)
+          FROM tunnel_api.queue_state(queue_plan.survey_id, queue_plan.km_from, queue_plan.km_to) s
+         WHERE s.state = 'ready'
+    )
+    SELECT array_agg(ROW ('tunneldb', r.task, r.priority, r.lock, r.lock, r.args, NULL)
+                         ::tunnel_queue.procrastinate_job_to_defer_v1 ORDER BY r.priority DESC, r.lock)
+      INTO found
+      FROM ready r
+     WHERE r.lock NOT IN (SELECT j.queueing_lock FROM job j WHERE j.queueing_lock IS NOT NULL);
+    PERFORM tunnel_queue.procrastinate_defer_jobs_v1(found);
+    RETURN coalesce(cardinality(found), 0);
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.queue_plan(integer, integer, integer) IS
+    'Defers the jobs of a survey that are ready: files to be read, and stages of the kilometres; returns how many. Under queue_lock until the transaction ends';
+
+-- Locks a job's row to the end of the transaction; true when the worker is still at it. False when it was taken to be lost, and
+-- another has the job: then the result must not be committed.
+CREATE OR REPLACE FUNCTION tunnel_api.queue_hold(job_id bigint, worker_id bigint) RETURNS boolean
+LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
+AS $$
+    SELECT EXISTS (SELECT FROM (SELECT j.status, j.worker_id FROM tunnel_queue.procrastinate_jobs j
+                                 WHERE j.id = $1 FOR UPDATE) AS j
+                    WHERE j.status = 'doing' AND j.worker_id = $2)
+$$;
+COMMENT ON FUNCTION tunnel_api.queue_hold(bigint, bigint) IS
+    'Locks a job, and says whether the worker is still at it';
+
+-- Ends a job that has done its work, and defers what is ready now. A file that was read is taken off the list, unless it was
+-- asked for anew after the job began; kilometres that points of it wait for are loaded, whether a batch has asked for them or
+-- not.
+CREATE OR REPLACE FUNCTION tunnel_api.queue_done(job_id bigint, started_at timestamptz) RETURNS void
+LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
+AS $$
+DECLARE
+    args jsonb := (SELECT j.args FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
+    survey integer := args ->> 'survey_id';
+    km integer := args ->> 'km';
+BEGIN
+    PERFORM tunnel_queue.procrastinate_finish_job_v1(job_id, 'succeeded', false);
+    IF km IS NOT NULL THEN
+        PERFORM tunnel_api.queue_plan(survey, km - 4, km + 4);
+        RETURN;
+    END IF;
+    INSERT INTO tunnel.goal (survey_id, km, stage, parameters)
+    SELECT DISTINCT i.survey_id, k.km, 'load', i.parameters
+      FROM tunnel.incoming i
+      JOIN tunnel.scan_file f ON f.survey_id = i.survey_id
+      JOIN tunnel.file_km k ON k.file_id = f.id AND k.loaded_at IS NULL
+     WHERE i.survey_id = survey AND i.name = args ->> 'file'
+        ON CONFLICT DO NOTHING;
+    DELETE FROM tunnel.incoming i
+     WHERE i.survey_id = survey AND i.name = args ->> 'file' AND i.requested_at < queue_done.started_at;
+    PERFORM tunnel_api.queue_plan(survey);
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.queue_done(bigint, timestamptz) IS
+    'Ends a job that has done its work since a moment, and defers what is ready now';
+
+-- Ends a job that has failed for good, and defers what need not wait for it any more.
+CREATE OR REPLACE FUNCTION tunnel_api.queue_fail(job_id bigint, message text) RETURNS void
+LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
+AS $$
+DECLARE
+    args jsonb := (SELECT j.args FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
+    survey integer := args ->> 'survey_id';
+BEGIN
+    PERFORM tunnel_queue.procrastinate_finish_job_v1(job_id, 'failed', false);
+    UPDATE tunnel.incoming i SET failed_at = clock_timestamp(), message = queue_fail.message
+     WHERE i.survey_id = survey AND i.name = args ->> 'file';
+    PERFORM tunnel_api.queue_plan(survey);
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.queue_fail(bigint, text) IS
+    'Ends a job that has failed for good, and defers what need not wait for it any more';
+
+-- Puts a job back into the queue whose worker, or the worker's session, was lost; the 20th time it fails for good, for then it
+-- is likely to be the job that kills them.
+CREATE OR REPLACE FUNCTION tunnel_api.queue_return(job_id bigint) RETURNS void
+LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
+AS $$
+DECLARE
+    job tunnel_queue.procrastinate_jobs := (SELECT j FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
+    reason constant text := 'its worker or the server went down 20 times while at it, perhaps for want of memory';
+BEGIN
+    IF job.attempts < 19 THEN
+        PERFORM tunnel_queue.procrastinate_retry_job_v2(job_id, clock_timestamp(), NULL, NULL, NULL);
+        PERFORM pg_notify('procrastinate_queue_v1#tunneldb', json_build_object('type', 'job_inserted', 'job_id', job_id)::text);
+        RETURN;
+    END IF;
+    PERFORM tunnel_api.queue_lock((job.args ->> 'survey_id')::integer);
+    INSERT INTO tunnel.run (survey_id, km, stage, started_at, finished_at, outcome, message, job_id)
+    SELECT (job.args ->> 'survey_id')::integer, (job.args ->> 'km')::integer, job.args ->> 'stage', clock_timestamp(),
+           clock_timestamp(), 'failed', reason, job_id;
+    PERFORM tunnel_api.queue_fail(job_id, reason);
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.queue_return(bigint) IS
+    'Puts a job back into the queue whose worker was lost; the 20th time it fails';
+
+-- Whether a worker is there: while it lives, a session of its own holds this lock (queue_register).
+CREATE OR REPLACE FUNCTION tunnel_api.queue_present(worker_id bigint) RETURNS boolean
+LANGUAGE sql VOLATILE STRICT PARALLEL RESTRICTED
+AS $$
+    SELECT EXISTS (SELECT FROM pg_locks l
+                    WHERE l.locktype = 'advisory' AND l.classid = 4294967295::oid AND l.objid = worker_id::oid
+                      AND l.objsubid = 2 AND l.granted
+                      AND l.database = (SELECT d.oid FROM pg_database d WHERE d.datname = current_database()))
+$$;
+COMMENT ON FUNCTION tunnel_api.queue_present(bigint) IS
+    'Whether the session lives that a worker keeps open while it lives';
+
+-- Enters a worker; the session that calls it must live as long as the worker does.
+CREATE OR REPLACE FUNCTION tunnel_api.queue_register(worker_id bigint, host text, pid integer) RETURNS void
+LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
+AS $$
+    SELECT pg_advisory_lock(-1, worker_id::integer);
+    INSERT INTO tunnel.worker (id, host, pid) VALUES (worker_id, host, pid) ON CONFLICT (id) DO NOTHING;
+$$;
+COMMENT ON FUNCTION tunnel_api.queue_register(bigint, text, integer) IS
+    'Enters a worker; it is there as long as the session lives that calls this';
+
+-- Takes jobs from workers that are lost: those without a heartbeat for the given time, whose sessions are ended, and those
+-- that were killed, so that both their own session and that of their job are gone. Returns how many jobs. Rows of lost workers
+-- go.
+CREATE OR REPLACE FUNCTION tunnel_api.queue_rescue(patience interval DEFAULT '25 seconds') RETURNS integer
+LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
+AS $$
+DECLARE
+    job record;
+    rescued integer := 0;
+BEGIN
+    FOR job IN
+        SELECT j.id
+          FROM tunnel_queue.procrastinate_jobs j
+          LEFT JOIN tunnel_queue.procrastinate_workers w ON w.id = j.worker_id
+         WHERE j.status = 'doing' AND j.queue_name = 'tunneldb'
+           AND CASE WHEN w.id IS NULL OR w.last_heartbeat < clock_timestamp() - patience THEN true
+                    WHEN tunnel_api.queue_present(w.id) THEN false
+                    ELSE NOT EXISTS (SELECT FROM tunnel.run r
+                                      WHERE r.job_id = j.id AND r.outcome = 'running'
+                                        AND tunnel_api.session_lives(r.backend_pid, r.backend_start)) END
+           FOR UPDATE OF j SKIP LOCKED
+    LOOP
+        BEGIN
+            PERFORM pg_terminate_backend(r.backend_pid) FROM tunnel.run r
+              WHERE r.job_id = job.id AND r.outcome = 'running' AND r.backend_pid <> pg_backend_pid()
+                AND tunnel_api.session_lives(r.backend_pid, r.backend_start);
+        EXCEPTION WHEN insufficient_privilege THEN NULL;  -- it ends by itself, and can't commit
+        END;
+        PERFORM tunnel_api.queue_return(job.id);
+        rescued := rescued + 1;
+    END LOOP;
+    DELETE FROM tunnel.worker v
+     WHERE NOT EXISTS (SELECT FROM tunnel_queue.procrastinate_workers w
+                        WHERE w.id = v.id AND w.last_heartbeat >= clock_timestamp() - patience)
+        OR NOT tunnel_api.queue_present(v.id)
+       AND NOT EXISTS (SELECT FROM tunnel_queue.procrastinate_jobs j WHERE j.worker_id = v.id AND j.status = 'doing');
+    RETURN rescued;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.queue_rescue(interval) IS
+    'Takes jobs from workers that are lost, and puts them back into the queue; returns how many';
+
+-- Whether there are jobs of a survey that wait or run. When there are none, there is nothing left to be done: each result brings
+-- along the jobs that it makes possible.
+CREATE OR REPLACE FUNCTION tunnel_api.queue_busy(survey_id integer) RETURNS boolean
+LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER SET search_path = pg_catalog, pg_temp
+AS $$
+    SELECT EXISTS (SELECT FROM tunnel_queue.procrastinate_jobs j
+                    WHERE j.status IN ('todo', 'doing') AND (j.args ->> 'survey_id')::integer = $1)
+$$;
+COMMENT ON FUNCTION tunnel_api.queue_busy(integer) IS
+    'Whether there are jobs of the survey that wait or run';
