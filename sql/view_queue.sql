@@ -27,7 +27,7 @@ SELECT j.id, (j.args->>'survey_id')::integer AS survey_id, s.name AS survey, (j.
        j.args->>'file' AS file, coalesce(j.args->>'stage', j.task_name) AS stage,
        CASE j.status WHEN 'todo' THEN 'queued' WHEN 'doing' THEN 'running' WHEN 'succeeded' THEN 'done'
                      ELSE j.status::text END AS state,
-       j.attempts, j.worker_id, w.host || ':' || w.pid AS worker, e.at AS since, r.message
+       j.attempts, j.worker_id, w.host || '/' || w.pid AS worker, e.at AS since, r.message
   FROM tunnel_queue.procrastinate_jobs j
   LEFT JOIN tunnel.survey s ON s.id = (j.args->>'survey_id')::integer
   LEFT JOIN tunnel.worker w ON w.id = j.worker_id

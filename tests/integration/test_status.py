@@ -114,7 +114,7 @@ def test_the_reason_stands_beside_and_what_to_type_below(batch: str) -> None:
     lines = [line.rstrip() for line in CliRunner().invoke(main, ["status", batch]).output.splitlines()]
     table = {line.split()[0]: line for line in lines if line[:1].isdigit()}
     assert table["2"].endswith("axis: too few points")
-    assert "segments on calc-1:4711 for" in table["3"]
+    assert "segments on calc-1/4711 for" in table["3"]
     assert table["6"].endswith("load: km-6.laz is damaged after point 1000 of 2000: copy it again")
     below = lines[lines.index("what to do") :]
     assert "km 6: km-6.laz is damaged after point 1000 of 2000: copy it again" in below
@@ -188,7 +188,7 @@ def test_views_of_the_queue_for_those_who_only_look(conn: psycopg.Connection, ba
     conn.execute("SET LOCAL ROLE tunnel_viewer")
     jobs = conn.execute("SELECT survey, km, file, stage, state, attempts, worker FROM tunnel_api.job ORDER BY id").fetchall()
     assert jobs == [
-        (batch, 3, None, "segments", "running", 0, "calc-1:4711"),
+        (batch, 3, None, "segments", "running", 0, "calc-1/4711"),
         (batch, 4, None, "axis", "queued", 0, None),
     ]
     workers = conn.execute("SELECT host, pid, doing, heartbeat > now() - interval '1 minute' FROM tunnel_api.worker ORDER BY 1")

@@ -166,8 +166,8 @@ def _workers(before: Overview, after: Overview) -> Iterator[tuple[bool, str]]:
     for worker in after.workers:
         former = there.pop((worker.host, worker.pid), None)
         if former is None:
-            yield False, f"worker {worker.host}:{worker.pid} came"
+            yield False, f"worker {worker.host}/{worker.pid} came"
         elif worker.lost and not former.lost:
-            yield False, f"worker {worker.host}:{worker.pid} has been silent for {duration(worker.silent)}"
+            yield False, f"worker {worker.host}/{worker.pid} has been silent for {duration(worker.silent)}"
     for host, pid in there:
-        yield False, f"worker {host}:{pid} left"
+        yield False, f"worker {host}/{pid} left"
