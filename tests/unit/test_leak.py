@@ -8,7 +8,9 @@ from shapely.geometry import Polygon, box
 
 from tunneldb.errors import UserError
 from tunneldb.leak.appendage import appendages, distance_from_plane
+from tunneldb.leak.detection import _filled
 from tunneldb.leak.image import Accumulator, Grid
+from tunneldb.leak.lining import State
 from tunneldb.leak.match import match
 from tunneldb.leak.polygon import polygons
 from tunneldb.leak.threshold import filter_size, wet_pixels
@@ -176,3 +178,11 @@ def test_leaks_found_again_by_mutual_best_overlap():
     assert match(before, []) == {}
     same = [Polygon(p.exterior.coords) for p in now]
     assert match(same, now) == {k: k for k in range(len(now))}
+
+
+def test_gap_in_the_scan_is_not_taken_for_a_sparse_scan() -> None:
+    state = np.full((10, 400), State.EMPTY, np.uint8)
+    state[:, 20:60] = state[:, 300:350] = State.LINING
+    state[:, 30:40:3] = State.EMPTY
+    assert _filled(state, 50) == pytest.approx(86 / 90)
+    assert _filled(state, 400) == pytest.approx(86 / 330)

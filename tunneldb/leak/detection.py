@@ -23,6 +23,9 @@ SAMPLE = 2_000_000
 WET_EDGE = 3
 """Pixels about a wet one that don't count as dry lining."""
 
+GAP = 5.0
+"""Lining that is seen nowhere along more of the tunnel was not scanned there, m; profiles lie closer."""
+
 
 @dataclass(frozen=True)
 class Found:
@@ -88,7 +91,7 @@ def detect(
     blocks = image.blocks()
     dry = _dry_statistics(image, state, blocks, dry_regions or [])
     lining = int(np.count_nonzero(state == State.LINING))
-    size = filter_size(_filled(state))
+    size = filter_size(_filled(state, round(GAP / grid.pixel)))
     wet = np.zeros(state.shape, np.bool_)
     if dry.count:
         for block in blocks:
@@ -109,14 +112,18 @@ def detect(
     )
 
 
-def _filled(state: NDArray[np.uint8]) -> float:
-    """Share of the pixels that could show lining that do, from the first column that does to the last."""
-    columns = np.flatnonzero((state == State.LINING).any(axis=0))
-    if len(columns) == 0:
+def _filled(state: NDArray[np.uint8], gap: int) -> float:
+    """Share of the pixels that could show lining that do, where the tunnel was scanned: not in gaps of more columns."""
+    lining = np.count_nonzero(state == State.LINING, axis=0)
+    seen = np.flatnonzero(lining)
+    if len(seen) == 0:
         return 1.0
-    here = state[:, columns[0] : columns[-1] + 1]
     # Floor and niches are marked whether or not they hold points.
-    return float(np.count_nonzero(here == State.LINING) / np.count_nonzero(here <= State.LINING))
+    possible = np.count_nonzero(state <= State.LINING, axis=0)
+    ends = np.concatenate([[-gap - 1], seen, [len(lining) + gap]])
+    for k in np.flatnonzero(np.diff(ends) > gap):
+        possible[max(ends[k] + 1, 0) : ends[k + 1]] = 0
+    return float(lining.sum() / possible.sum())
 
 
 def dry_pixels(image: Accumulator, state: NDArray[np.uint8], found: Detection) -> NDArray[np.bool_]:
