@@ -11,11 +11,11 @@ from sqlalchemy import Connection, text
 from tunneldb.database.models import SCHEMA, Base
 
 # Partitions and fragments come and go with surveys, files and kilometres; the models know only the partitions' parent.
-PARTITION = re.compile(r"(point|fragment)_s\d+")
+PARTITION = re.compile(r"(point|image|fragment)_s\d+")
 
 
 def include_name(name: str | None, kind: str, parents: Any) -> bool:
-    """Leave other schemas and the partitions of `point` out of comparisons."""
+    """Leave other schemas and partitions and fragments out of comparisons."""
     if kind == "schema":
         return name == SCHEMA
     return not (kind == "table" and name is not None and PARTITION.match(name))

@@ -448,10 +448,13 @@ class Image(Base):
     __tablename__ = "image"
     __table_args__ = (
         _one_of("kind", "raw", "corrected", "offset"),
-        {"comment": "Unrolled images in blocks of 50 m"},
+        {
+            "comment": "Unrolled images in blocks of 50 m: partition image_s<survey>",
+            "postgresql_partition_by": "LIST (survey_id)",
+        },
     )
 
-    survey_id: Mapped[int] = mapped_column(_parent("survey"), primary_key=True, comment=_SURVEY)
+    survey_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=_SURVEY)
     km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=_KM)
     kind: Mapped[str] = mapped_column(primary_key=True, comment="raw or corrected intensity, dB, or offset from the surface, m")
     block: Mapped[int] = mapped_column(
