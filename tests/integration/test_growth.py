@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import psycopg
@@ -263,6 +265,41 @@ def test_a_survey_of_a_thousand_kilometres_goes_within_the_locks_of_a_server_as_
     assert left == (0,)
     assert locks is not None
     assert SURVEYS["long"] < locks[0] < DEFAULT_LOCKS
+
+
+def test_a_removal_waits_for_who_reads_and_holds_up_nobody(dsn: str) -> None:
+    with psycopg.connect(dsn) as reader, psycopg.connect(dsn, options="-c statement_timeout=20s") as others:
+        reader.execute(TUNNEL)
+        reader.execute(
+            "INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)"
+            " SELECT id, n, '2024-05-04', 'none', 'mobile' FROM tunnel.tunnel, unnest(ARRAY['gone', 'kept']) n"
+        )
+        for name in ("gone", "kept"):
+            reader.execute(PARTITIONS.format(survey=survey_id(reader, name), first=0, last=0))
+        reader.commit()
+        gone, kept = survey_id(reader, "gone"), survey_id(reader, "kept")
+        reader.execute("SELECT FROM tunnel.point WHERE survey_id = %s", [kept])  # and stays in its transaction
+        reader.execute("SELECT FROM tunnel.image WHERE survey_id = %s", [kept])
+
+        def remove() -> None:
+            with connect(dsn) as connection:
+                remove_survey(connection, "gone")
+
+        with ThreadPoolExecutor(1) as pool:
+            removal = pool.submit(remove)
+            for _ in range(10):
+                others.execute("SELECT FROM tunnel.point WHERE survey_id = %s", [kept])
+                others.execute("SELECT FROM tunnel.image WHERE survey_id = %s", [kept])
+                others.commit()
+                time.sleep(0.1)
+            assert not removal.done()
+            reader.commit()
+            removal.result(timeout=30)
+        tables_left = others.execute(
+            "SELECT to_regclass(n) FROM unnest(%s::text[]) n",
+            [[f"tunnel.{table}_s{survey}" for survey in (gone, kept) for table in ("point", "image")]],
+        ).fetchall()
+        assert tables_left == [(None,), (None,), (f"tunnel.point_s{kept}",), (f"tunnel.image_s{kept}",)]
 
 
 def test_a_server_out_of_locks_says_which_setting_to_raise(conn: psycopg.Connection) -> None:
