@@ -44,7 +44,7 @@ AS $$
                min(format('file %s: %s', i.name, i.message)) FILTER (WHERE i.failed_at IS NOT NULL) AS message
           FROM tunnel.incoming i
          CROSS JOIN LATERAL generate_series(greatest(i.km_from, $2 - 5), least(i.km_to, $3 + 5)) AS k (km)
-         WHERE i.survey_id = $1
+         WHERE i.survey_id = $1 AND i.km_from IS NOT NULL  -- a file without kilometres fails none
          GROUP BY k.km
     ), job AS (
         SELECT j.queueing_lock, bool_or(j.status = 'doing') AS doing, min(j.args ->> 'stage') AS stage
