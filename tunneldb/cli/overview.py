@@ -174,7 +174,7 @@ def advise(seen: Overview) -> list[Advice]:
         stage, cell = entry
         what = f"{stage}: {_VERDICTS[cell.state]}" + (f": {_line(cell, seen.files)}" if cell.reason else "")
         found.setdefault((what, _command(seen.survey, cell)), []).append(km)
-    advices = [Advice(tuple(kms), what, _with_km(command, kms)) for (what, command), kms in found.items()]
+    advices = [Advice(tuple(kms), what, command) for (what, command), kms in found.items()]
     if seen.active and not seen.live:
         advices.insert(0, Advice((), "no worker serves the queue", "tunneldb worker"))
     return advices
@@ -186,14 +186,6 @@ def _range(file: File) -> list[int]:
 
 def _command(survey: str, cell: Cell) -> str:
     return f"tunneldb batch {survey}" + (" --retry-failed" if cell.state == "failed" else "")
-
-
-def _with_km(command: str, kilometres: Sequence[int]) -> str:
-    """Add the kilometres, as one range that covers them, to a command that names no file."""
-    if not kilometres or command.split()[-1].startswith("/"):
-        return command
-    first, last = min(kilometres), max(kilometres)
-    return f"{command} --km {first}" + (f"-{last}" if last > first else "")
 
 
 def spans(kilometres: Sequence[int]) -> str:

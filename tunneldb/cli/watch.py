@@ -15,7 +15,7 @@ from rich.text import Text
 from tunneldb.cli.overview import duration, render, summary
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.job.overview import STAGES, Overview, overview
+from tunneldb.job.overview import Overview, overview
 
 
 class Watch:
@@ -38,6 +38,7 @@ class Watch:
         self.console = console or Console()
         self.live = Live(console=self.console, auto_refresh=False) if self.console.is_terminal else None
         self.seen: Overview | None = None
+        self.ledger: Ledger | None = None
         self.conn: psycopg.Connection[Any] | None = None
         self.away = False
 
@@ -63,7 +64,10 @@ class Watch:
         try:
             if self.conn is None:
                 self.conn = connect(self.dsn)
+            if self.ledger is None:
+                self.ledger = Ledger(self.conn, self.survey)
             seen = overview(self.conn, self.survey)
+            ended = self.ledger.ended(self.conn)
             self.conn.rollback()
         except (psycopg.OperationalError, UserError) as error:
             if self.seen is None:
@@ -75,7 +79,7 @@ class Watch:
                 Group(Text(f"{seen.survey} at {seen.now.astimezone():%H:%M:%S}", "bold"), render(seen)), refresh=True
             )
         else:
-            self._print(seen)
+            self._print(seen, ended)
         self.seen, self.away = seen, False
         return seen.active
 
@@ -90,9 +94,12 @@ class Watch:
             self._say(text)
         self.away = True
 
-    def _print(self, seen: Overview) -> None:
-        lines = changes(self.seen, seen) if self.seen is not None else iter(())
-        for line in lines:
+    def _print(self, seen: Overview, ended: list[tuple[bool, str]]) -> None:
+        count = max(seen.done - sum(done for done, _ in ended), 0)
+        for done, line in ended:
+            count += done
+            self._say(f"[{count}/{seen.total}] {line}")
+        for line in changes(self.seen, seen) if self.seen is not None else ():
             self._say(line)
         if self.seen is None or self.seen.active != seen.active:
             text = summary(seen)
@@ -125,49 +132,54 @@ def watch(dsn: str | None, survey: str, interval: float, until: Callable[[], boo
             watcher.look()
 
 
+class Ledger:
+    """Runs of a survey that have ended since this was made, each told once.
+
+    Parameters
+    ----------
+    conn : Connection
+    survey : str
+        Name of a survey that exists.
+    """
+
+    def __init__(self, conn: psycopg.Connection[Any], survey: str) -> None:
+        self.survey = survey
+        row = conn.execute("SELECT clock_timestamp()").fetchone()
+        assert row is not None
+        self.told = row[0]
+
+    def ended(self, conn: psycopg.Connection[Any]) -> list[tuple[bool, str]]:
+        """Return whether it was a stage of a kilometre that is done, and a line, for each."""
+        rows = conn.execute(
+            """
+            SELECT stage, coalesce('km ' || km, parameters ->> 'file'), outcome, message,
+                   extract(epoch FROM duration)::float8, finished_at, km IS NOT NULL
+              FROM tunnel_api.run
+             WHERE survey = %s AND finished_at > %s AND (km IS NOT NULL OR stage = 'read') ORDER BY finished_at
+            """,
+            [self.survey, self.told],
+        ).fetchall()
+        lines = []
+        for stage, what, outcome, message, seconds, finished_at, of_km in rows:
+            said = f"{seconds:.1f} s" if outcome == "done" else f"{outcome}: {message}"
+            lines.append((of_km and outcome == "done", f"{stage} {what}: {said}"))
+            self.told = finished_at
+        return lines
+
+
 def changes(before: Overview, after: Overview) -> Iterator[str]:
-    """Yield a line for each thing that has come to pass between two looks at a survey, numbered by the steps done."""
-    lines = [*_files(before, after), *_cells(before, after), *_workers(before, after)]
-    count = after.done - sum(done for done, _ in lines)
-    for done, line in lines:
-        count += done
-        yield f"[{max(count, 0)}/{after.total}] {line}"
-
-
-def _files(before: Overview, after: Overview) -> Iterator[tuple[bool, str]]:
-    there = {file.name for file in after.files}
-    states = {file.name: file.state for file in before.files}
-    for file in before.files:
-        if file.name not in there and file.state != "failed":
-            yield False, f"{file.name}: read"
-    for file in after.files:
-        if file.state == "failed" and states.get(file.name) != "failed":
-            yield False, f"{file.name}: failed: {file.message}"
-
-
-def _cells(before: Overview, after: Overview) -> Iterator[tuple[bool, str]]:
-    """Yield whether a stage was done, and the line of it."""
+    """Yield a line for each stage that was begun between two looks, and each worker that came or went."""
     for km, cells in after.kilometres.items():
-        for stage in STAGES:
-            cell, was = cells[stage], before.kilometres.get(km, {}).get(stage)
-            if cell.state == (was.state if was is not None else "done"):
-                continue
-            if cell.state == "done":
-                took = f" in {duration((after.now - was.since).total_seconds())}" if was is not None and was.since else ""
-                yield True, f"km {km} {stage}: done{took}"
-            elif cell.state == "running":
-                yield False, f"km {km} {stage}: running" + (f" on {cell.worker}" if cell.worker else "")
-            elif cell.state in ("failed", "interrupted"):
-                yield False, f"km {km} {stage}: {cell.state}: {cell.reason}"
-
-
-def _workers(before: Overview, after: Overview) -> Iterator[tuple[bool, str]]:
+        for stage, cell in cells.items():
+            was = before.kilometres.get(km, {}).get(stage)
+            if cell.state == "running" and (was is None or was.state != "running"):
+                yield f"{stage} km {km}: begun" + (f" on {cell.worker}" if cell.worker else "")
     there = {(worker.host, worker.pid): worker for worker in before.workers}
     for worker in after.workers:
         former = there.pop((worker.host, worker.pid), None)
         if former is None:
-            yield False, f"worker {worker.host}/{worker.pid} came"
+            yield f"worker {worker.host}/{worker.pid} came"
         elif worker.lost and not former.lost:
-            yield False, f"worker {worker.host}/{worker.pid} has been silent for {duration(worker.silent)}"
+            yield f"worker {worker.host}/{worker.pid} has been silent for {duration(worker.silent)}"
     for host, pid in there:
-        yield False, f"worker {host}/{pid} left"
+        yield f"worker {host}/{pid} left"

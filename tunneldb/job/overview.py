@@ -11,15 +11,13 @@ import psycopg
 from psycopg.rows import class_row
 
 from tunneldb.job.pace import measure, points_per_second
+from tunneldb.job.worker import STALLED
 
 STAGES = ("load", "axis", "segments", "sections", "detect")
 """Stages of a kilometre, in their order."""
 
 TO_DO = ("queued", "waits", "running")
 """States of a step that is done without anybody typing anything, as long as there are workers."""
-
-LOST_AFTER = 30.0
-"""A worker that has been silent for so many seconds counts as lost; the queue takes its job over then."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +70,8 @@ class Worker:
 
     @property
     def lost(self) -> bool:
-        """Whether it has been silent for too long."""
-        return self.silent > LOST_AFTER
+        """Whether it has been silent for so long that its job is taken over."""
+        return self.silent > STALLED
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ class Overview:
     workers : tuple of Worker
         All that serve the database, whichever survey they are at.
     done, total : int
-        Steps that are done, and all: files to read and stages of kilometres, of what is wanted.
+        Steps that are done, and all: stages of kilometres that are wanted.
     share : float or None
         Share of the work that is done, 0 to 1; each step counts by the time that its stage takes in this survey. None as
         long as a stage that is still to be done has never been measured.
@@ -190,7 +188,7 @@ def overview(conn: psycopg.Connection[Any], survey: str) -> Overview:
         files,
         workers,
         done=sum(state in ("done", "empty") for state in wanted),
-        total=len(wanted) + len(files),
+        total=len(wanted),
         share=share,
         rate=points_per_second(conn, survey, share, asked, now[0]) if asked is not None and share is not None else None,
         left=pace.left(steps, to_read, sum(not worker.lost for worker in workers), now[0]),
