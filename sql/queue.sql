@@ -165,9 +165,9 @@ CREATE OR REPLACE FUNCTION tunnel_api.queue_done(job_id bigint, started_at times
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
 DECLARE
-    args jsonb := (SELECT j.args FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
-    survey integer := args ->> 'survey_id';
-    km integer := args ->> 'km';
+    args constant jsonb := (SELECT j.args FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
+    survey constant integer := (args ->> 'survey_id')::integer;
+    km constant integer := (args ->> 'km')::integer;
 BEGIN
     PERFORM tunnel_queue.procrastinate_finish_job_v1(job_id, 'succeeded', false);
     IF km IS NOT NULL THEN
@@ -194,8 +194,8 @@ CREATE OR REPLACE FUNCTION tunnel_api.queue_fail(job_id bigint, message text) RE
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
 DECLARE
-    args jsonb := (SELECT j.args FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
-    survey integer := args ->> 'survey_id';
+    args constant jsonb := (SELECT j.args FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
+    survey constant integer := (args ->> 'survey_id')::integer;
 BEGIN
     PERFORM tunnel_queue.procrastinate_finish_job_v1(job_id, 'failed', false);
     UPDATE tunnel.incoming i SET failed_at = clock_timestamp(), message = queue_fail.message

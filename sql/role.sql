@@ -50,6 +50,7 @@ REVOKE ALL ON SCHEMA tunnel FROM PUBLIC;
 REVOKE ALL ON SCHEMA tunnel_api FROM PUBLIC;
 REVOKE EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_api FROM PUBLIC;
 REVOKE EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api FROM PUBLIC;
+REVOKE ALL ON SCHEMA tunnel_queue FROM PUBLIC;
 
 -- Viewers: all views, and the functions that only read. One that reads tables must itself run with the owner's rights
 -- (SECURITY DEFINER) to be of use to them.
@@ -83,7 +84,7 @@ BEGIN
 END
 $$;
 
--- Operators: all functions, and schema tunnel as its owners, for to swap a partition one must own the table. Partitions
+-- Operators: all functions, the queue, and schema tunnel as its owners, for to swap a partition one must own the table. Partitions
 -- that an operator makes are his own; another may drop them as owner of the schema.
 DO $$
 DECLARE
@@ -94,6 +95,10 @@ BEGIN
     END IF;
     GRANT EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_api TO tunnel_operator;
     GRANT EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api TO tunnel_operator;
+    GRANT USAGE ON SCHEMA tunnel_queue TO tunnel_operator;
+    GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA tunnel_queue TO tunnel_operator;
+    GRANT USAGE ON ALL SEQUENCES IN SCHEMA tunnel_queue TO tunnel_operator;
+    GRANT EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_queue TO tunnel_operator;
     IF NOT pg_has_role(current_user, 'tunnel_operator', 'USAGE') THEN
         RETURN;
     END IF;

@@ -32,6 +32,9 @@ def one(conn: psycopg.Connection, query: str, *parameters: Any) -> Any:
     return row[0] if len(row) == 1 else row
 
 
+STALE = "SELECT km, stage, reason FROM tunnel_api.stage_status WHERE stale ORDER BY km, step"
+
+
 def stale(conn: psycopg.Connection) -> dict[str, str | None]:
     return dict(conn.execute("SELECT stage, reason FROM tunnel_api.stage_status WHERE stale ORDER BY step").fetchall())
 
@@ -260,12 +263,52 @@ def test_failed_run_changes_nothing_but_shows(conn: psycopg.Connection, example:
     assert done == dt.datetime(2024, 5, 5, 9, 30, tzinfo=dt.UTC)
 
 
-def test_another_load_makes_all_of_its_kilometre_stale_and_no_other(conn: psycopg.Connection, example: str) -> None:
-    run(conn, "axis", 0, km=13)
-    run(conn, "load", 1)
-    run(conn, "load", 1, km=None)
-    assert stale(conn) == dict.fromkeys(("axis", "segments", "sections", "detect"), "load ran since")
-    assert one(conn, "SELECT count(*) FROM tunnel_api.stage_status WHERE km = 13 AND stale") == 0
+def test_another_load_makes_all_of_its_kilometre_stale_and_the_neighbours_axes(conn: psycopg.Connection, example: str) -> None:
+    for km in (11, 13, 14):
+        run(conn, "axis", 0, km=km)
+    run(conn, "segments", 1, km=13)
+    run(conn, "load", 2)
+    run(conn, "load", 2, km=None)
+    reasons = {(km, stage): reason for km, stage, reason in conn.execute(STALE).fetchall()}
+    assert reasons == {
+        (11, "axis"): "load of kilometre 12 ran since",
+        (12, "axis"): "load ran since",
+        (12, "segments"): "load ran since",
+        (12, "sections"): "load ran since",
+        (12, "detect"): "load ran since",
+        (13, "axis"): "load of kilometre 12 ran since",
+        (13, "segments"): "axis is stale",
+    }
+
+
+def test_what_a_neighbour_does_anew_reaches_the_next_stage_only(conn: psycopg.Connection, example: str) -> None:
+    for hour, stage in enumerate(("load", "axis", "segments", "sections", "detect")):
+        run(conn, stage, hour, km=12)
+        run(conn, stage, hour, km=13)
+    assert conn.execute(STALE).fetchall() == []
+    run(conn, "segments", 10, km=13)
+    assert conn.execute(STALE).fetchall() == [
+        (12, "sections", "segments of kilometre 13 ran since"),
+        (12, "detect", "sections is stale"),
+        (13, "sections", "segments ran since"),
+        (13, "detect", "segments ran since"),
+    ]
+    run(conn, "sections", 11, km=13)
+    run(conn, "detect", 12, km=13)
+    assert conn.execute(STALE).fetchall() == [
+        (12, "sections", "segments of kilometre 13 ran since"),
+        (12, "detect", "sections of kilometre 13 ran since"),
+        (13, "detect", "sections of kilometre 12 is stale"),
+    ]
+
+
+def test_load_is_stale_while_a_file_that_was_read_waits(conn: psycopg.Connection, example: str) -> None:
+    conn.execute(
+        "INSERT INTO tunnel.file_km (file_id, km, rows, points) SELECT id, 12, 7, '{[0,7)}' FROM tunnel.scan_file LIMIT 1"
+    )
+    assert conn.execute(STALE).fetchall()[:2] == [(12, "load", "demo.laz read since"), (12, "axis", "load is stale")]
+    conn.execute("UPDATE tunnel.file_km SET loaded_at = clock_timestamp()")
+    assert conn.execute(STALE).fetchall() == []
 
 
 def test_vertex_edited_beyond_the_kilometre_counts_up_to_two_vertices(conn: psycopg.Connection, example: str) -> None:
