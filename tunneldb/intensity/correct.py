@@ -120,6 +120,37 @@ def range_span(views: Views, use: NDArray[np.bool_], reference: ReferenceCurve) 
     return nearest, farthest, outside, count
 
 
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def level_of(raw: float, linear: bool) -> float:
+    """Raw intensity in dB (eq. 4); NaN of counts that are not positive."""
+    if not linear:
+        return raw
+    return 10.0 * np.log10(raw) if raw > 0.0 else np.nan
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def reference_at(knots: Float, values: Float, r: float, hint: int) -> tuple[float, int]:
+    """Intensity of the reference target at range ``r`` (eq. 9), and the curve's interval, looked for from a hint on."""
+    last = knots.shape[0] - 1
+    if r <= knots[0]:
+        return values[0], 0
+    if r >= knots[last]:
+        return values[last], 0
+    k = hint
+    while knots[k] > r:
+        k -= 1
+    while knots[k + 1] <= r:
+        k += 1
+    share = (r - knots[k]) / (knots[k + 1] - knots[k])
+    return values[k] + share * (values[k + 1] - values[k]), k
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def incidence_loss(cosine: float, a: float, b: float) -> float:
+    """Loss by incidence (eq. 15), dB, of a surface with these coefficients, for a cosine above 0."""
+    return float(10.0 * np.log10(a * cosine + b * (1.0 - cosine * cosine)))
+
+
 @njit(cache=True, nogil=True, parallel=True)
 def _observe(
     points: Float, scanner: Float, normal: Float, raw: Single, linear: bool, knots: Float, values: Float
@@ -129,7 +160,6 @@ def _observe(
     cosine = np.empty(count, np.float32)
     raw_db = np.empty(count, np.float32)
     distance_db = np.empty(count, np.float32)
-    last = knots.shape[0] - 1
     for i in prange(count):
         x = scanner[i, 0] - points[i, 0]
         y = scanner[i, 1] - points[i, 1]
@@ -137,25 +167,10 @@ def _observe(
         r = np.sqrt(x * x + y * y + z * z)
         range_m[i] = r
         cosine[i] = min(1.0, (x * normal[i, 0] + y * normal[i, 1] + z * normal[i, 2]) / max(r, 1e-9))
-        level = float(raw[i])
-        if linear:
-            level = 10.0 * np.log10(level) if level > 0.0 else np.nan
+        level = level_of(raw[i], linear)
         raw_db[i] = level
-        if last > 0:
-            if r <= knots[0]:
-                level -= values[0]
-            elif r >= knots[last]:
-                level -= values[last]
-            else:
-                low, high = 0, last
-                while high - low > 1:
-                    middle = (low + high) // 2
-                    if knots[middle] <= r:
-                        low = middle
-                    else:
-                        high = middle
-                share = (r - knots[low]) / (knots[high] - knots[low])
-                level -= values[low] + share * (values[high] - values[low])
+        if knots.shape[0] > 0:
+            level -= reference_at(knots, values, r, 0)[0]
         distance_db[i] = level
     return range_m, cosine, raw_db, distance_db
 
@@ -165,10 +180,7 @@ def _corrected(distance_db: Single, cosine: Single, a: float, b: float) -> Singl
     corrected = np.empty(distance_db.shape[0], np.float32)
     for i in prange(distance_db.shape[0]):
         c = float(cosine[i])
-        if c > 0.0:
-            corrected[i] = distance_db[i] - 10.0 * np.log10(a * c + b * (1.0 - c * c))
-        else:
-            corrected[i] = np.nan
+        corrected[i] = distance_db[i] - incidence_loss(c, a, b) if c > 0.0 else np.nan
     return corrected
 
 

@@ -78,6 +78,32 @@ class Edges:
         return normal
 
 
+@njit(cache=True, nogil=True, forceinline=True)
+def face_at(
+    start: float, first: float, sharp: NDArray[np.bool_], chainage: float, arc: float
+) -> tuple[int, int]:  # pragma: no cover - compiled
+    """Node of the grid nearest to a place of the unrolled plane, (-1, -1) where the surface doesn't bend sharply."""
+    k = int(np.floor((chainage - start) / _ALONG + 0.5))
+    m = int(np.floor((arc - first) / _ACROSS + 0.5))
+    if k < 0 or k >= sharp.shape[0] or m < 0 or m >= sharp.shape[1] or not sharp[k, m]:
+        return -1, -1
+    return k, m
+
+
+@njit(cache=True, nogil=True)
+def face_normal(
+    feet: Float, normals: Float, k: int, m: int, x: float, y: float, z: float
+) -> tuple[float, float, float]:  # pragma: no cover - compiled
+    """Normal of the face, to the left or to the right of a node, whose plane a point lies nearer to."""
+    left, right = 0.0, 0.0
+    one, other = m - _SIDE, m + _SIDE
+    for c, at in enumerate((x, y, z)):
+        left += (at - feet[k, one, c]) * normals[k, one, c]
+        right += (at - feet[k, other, c]) * normals[k, other, c]
+    side = one if abs(left) <= abs(right) else other
+    return normals[k, side, 0], normals[k, side, 1], normals[k, side, 2]
+
+
 @njit(cache=True, nogil=True, parallel=True)
 def _normals(
     points: Float,
@@ -91,21 +117,10 @@ def _normals(
     sharp: NDArray[np.bool_],
 ) -> Float:  # pragma: no cover - compiled
     out = normal.copy()
-    along, across = sharp.shape
     for i in prange(points.shape[0]):
         if np.isnan(chainage[i]) or np.isnan(arc[i]):
             continue
-        k = int(np.floor((chainage[i] - start) / _ALONG + 0.5))
-        m = int(np.floor((arc[i] - first) / _ACROSS + 0.5))
-        if k < 0 or k >= along or m < 0 or m >= across or not sharp[k, m]:
-            continue
-        nearest = np.inf
-        for side in (m - _SIDE, m + _SIDE):
-            away = 0.0
-            for c in range(3):
-                away += (points[i, c] - feet[k, side, c]) * normals[k, side, c]
-            if abs(away) < nearest:
-                nearest = abs(away)
-                for c in range(3):
-                    out[i, c] = normals[k, side, c]
+        k, m = face_at(start, first, sharp, chainage[i], arc[i])
+        if k >= 0:
+            out[i, 0], out[i, 1], out[i, 2] = face_normal(feet, normals, k, m, points[i, 0], points[i, 1], points[i, 2])
     return out

@@ -16,7 +16,7 @@ from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.geometry.store import load_surface
 from tunneldb.geometry.surface import Surface
-from tunneldb.intensity.correct import Kind, Views, needs_reference
+from tunneldb.intensity.correct import Kind, Views, needs_reference, range_span
 from tunneldb.intensity.dry import Dry, plain_statistics
 from tunneldb.intensity.roughness import Regions, Roughness, automatic_regions, drawn_regions, find_roughness
 from tunneldb.job.sources import sample, sources
@@ -147,7 +147,8 @@ def _sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye) -> Sample:
     assert eye.radiometer is not None
     if eye.radiometer.reference:
         span = Span()
-        span.add(seen, eye.radiometer.reference)
+        assert seen.views is not None
+        span.add(*range_span(seen.views, seen.lining, eye.radiometer.reference))
         span.require(eye.radiometer.reference)
     return Sample(seen, points.scan_id)
 

@@ -16,10 +16,12 @@ from typing import BinaryIO
 
 import numpy as np
 from affine import Affine
-from numba import njit
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from tunneldb.errors import UserError
+from tunneldb.job.threads import threads
+from tunneldb.leak.kernel import Pixels
 
 Float = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -34,10 +36,16 @@ MEMORY = 400_000_000
 CHANNELS = 4
 """Sums a pixel holds: points, offset, raw, corrected."""
 
+OFFSET, LEVEL = 2.0**-16, 2.0**-10
+"""Offset (m) and intensity (dB) of a point are summed in whole multiples of these."""
+
 
 @dataclass(frozen=True)
 class Grid:
     """Pixels of one kilometre in the unrolled plane: columns along the chainage, rows from the greatest arc.
+
+    With a halo the grid has a block more before the kilometre and one after it, so that pixels at its ends can be judged by
+    what lies about them. Rows and columns of the grids of all kilometres line up.
 
     Attributes
     ----------
@@ -49,16 +57,19 @@ class Grid:
         Arc of the lower edge of the last row, in pixels.
     rows : int
         Number of rows.
+    halo : int
+        Columns beyond each end of the kilometre that take points, at most a block; 0 for the kilometre alone.
     """
 
     km: int
     pixel: float
     bottom: int
     rows: int
+    halo: int = 0
 
     @classmethod
-    def covering(cls, km: int, pixel: float, arc_min: float, arc_max: float) -> Grid:
-        """Make the grid that covers the given arcs, m.
+    def covering(cls, km: int, pixel: float, arc_min: float, arc_max: float, halo: int = 0) -> Grid:
+        """Make the grid that covers the given arcs, m, and a halo, pixels.
 
         Raises
         ------
@@ -68,7 +79,7 @@ class Grid:
         if not pixel >= 0.002 or abs(BLOCK / pixel - round(BLOCK / pixel)) > 1e-6:
             raise UserError(f"image.pixel must be at least 0.002 m and divide 50 m: {pixel:g} m does not")
         bottom, top = int(np.floor(arc_min / pixel)), int(np.ceil(arc_max / pixel))
-        return cls(km, pixel, bottom, top - bottom)
+        return cls(km, pixel, bottom, top - bottom, halo)
 
     @property
     def columns(self) -> int:
@@ -82,32 +93,59 @@ class Grid:
 
     @property
     def blocks(self) -> int:
-        """Number of blocks in the kilometre."""
-        return round(KILOMETRE / BLOCK)
+        """Number of blocks."""
+        return round(KILOMETRE / BLOCK) + 2 * self._ahead
+
+    @property
+    def _ahead(self) -> int:
+        """Blocks before the kilometre."""
+        return 1 if self.halo else 0
+
+    @property
+    def inner(self) -> slice:
+        """Columns of the kilometre itself."""
+        return slice(self._ahead * self.block_columns, (self.blocks - self._ahead) * self.block_columns)
+
+    @property
+    def near(self) -> slice:
+        """Columns that take points: the kilometre's and those of the halo."""
+        return slice(self.inner.start - self.halo, self.inner.stop + self.halo)
 
     @property
     def first_block(self) -> int:
-        """Number of the kilometre's first block, counted from chainage 0."""
-        return self.km * self.blocks
+        """Number of the first block, counted from chainage 0."""
+        return self.km * round(KILOMETRE / BLOCK) - self._ahead
+
+    @property
+    def first_column(self) -> int:
+        """Number of the first column, counted from chainage 0."""
+        return self.first_block * self.block_columns
+
+    @property
+    def west(self) -> float:
+        """Chainage at which the first column begins, m."""
+        return self.first_block * BLOCK
 
     def transform(self, column: int = 0) -> Affine:
         """Transform from pixels, counted from a column, to (chainage, arc)."""
-        west = self.km * KILOMETRE + column * self.pixel
-        return Affine(self.pixel, 0.0, west, 0.0, -self.pixel, (self.bottom + self.rows) * self.pixel)
+        return Affine(self.pixel, 0.0, self.west + column * self.pixel, 0.0, -self.pixel, (self.bottom + self.rows) * self.pixel)
+
+    def place(self, chainage: Float, arc: Float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Row and column of places (n,) in the unrolled plane, m; column -1 outside the grid."""
+        with np.errstate(invalid="ignore"):
+            column = np.floor((chainage - self.west) / self.pixel)
+            row = self.rows - 1 - (np.floor(arc / self.pixel) - self.bottom)
+            held = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
+        return np.where(held, row, 0).astype(np.int32), np.where(held, column, -1).astype(np.int32)
 
     def pick(self, mask: NDArray[np.bool_], chainage: Float, arc: Float) -> NDArray[np.bool_]:
-        """Value of a mask (rows, columns) at places (n,) in the unrolled plane; False outside the kilometre."""
-        held = np.isfinite(chainage) & np.isfinite(arc)
-        column = np.floor((np.where(held, chainage, 0.0) - self.km * KILOMETRE) / self.pixel).astype(np.int64)
-        row = self.rows - 1 - (np.floor(np.where(held, arc, 0.0) / self.pixel).astype(np.int64) - self.bottom)
-        held &= (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
-        values = np.zeros(len(held), np.bool_)
-        values[held] = mask[row[held], column[held]]
-        return values
+        """Value of a mask (rows, columns) at places (n,) in the unrolled plane; False outside the grid."""
+        row, column = self.place(chainage, arc)
+        return np.asarray((column >= 0) & mask[row, column], dtype=np.bool_)
 
     def chainages(self, columns: slice) -> Float:
         """Chainage of the centres of columns, m."""
-        return np.asarray(self.km * KILOMETRE + (np.arange(columns.start, columns.stop) + 0.5) * self.pixel)
+        return np.asarray(self.west + (np.arange(columns.start, columns.stop) + 0.5) * self.pixel)
 
     def arcs(self) -> Float:
         """Arc of the centres of the rows, m."""
@@ -171,47 +209,38 @@ class Accumulator:
         if self._file:
             self._file.close()
 
-    def add(
-        self,
-        chainage: Float,
-        arc: Float,
-        offset: Float,
-        raw: Single,
-        corrected: Single,
-        use: NDArray[np.bool_],
-    ) -> int:
-        """Add points; return how many fell on the image.
+    def add(self, pixels: Pixels, count: int) -> None:
+        """Add points.
+
+        Sums are exact, and so the same in whatever order points come, as long as a pixel holds no more than some hundred
+        points: offset and intensity are rounded to OFFSET and LEVEL first.
 
         Parameters
         ----------
-        chainage, arc, offset : (n,) float arrays
-            Coordinates in the unrolled plane and offset, m. Points of other kilometres are passed over.
-        raw, corrected : (n,) float32 arrays
-            Intensity, dB.
-        use : (n,) bool array
-            Which points to add; their offset and intensities must not be NaN.
+        pixels : Pixels
+            Where the points fall and what they add; those with column -1 are passed over.
+        count : int
+            How many of its points to add.
 
         Raises
         ------
         UserError
             If the temporary folder has no room for what memory doesn't hold.
         """
-        grid = self.grid
-        row, column = _pixels(grid.km * KILOMETRE, 1.0 / grid.pixel, grid.bottom, grid.rows, grid.columns, chainage, arc, use)
-        width = grid.block_columns
-        touched = np.unique(column[column >= 0] // width).tolist()
+        row, column, *values = (array[:count] for array in pixels)
+        width = self.grid.block_columns
+        touched = np.flatnonzero(_touched(column, width, self.grid.columns // width)).tolist()
         # Blocks in memory first, lest fetching another one puts them out.
         for block in sorted(touched, key=lambda b: b not in self._blocks):
-            _add(self._fetch(block), row, column - block * width, offset, raw, corrected)
+            _add(self._fetch(block), row, column, block * width, *values, threads())
             self._changed.add(block)
-        return int(np.count_nonzero(column >= 0))
 
     def blocks(self) -> list[int]:
         """Blocks, counted from 0, that hold points."""
         return sorted(self._spilled | self._blocks.keys())
 
     def window(self, start: int, stop: int) -> Window:
-        """Means over the columns from ``start`` up to ``stop``; columns outside the kilometre are cut off."""
+        """Means over the columns from ``start`` up to ``stop``; columns outside the grid are cut off."""
         start, stop = max(start, 0), min(stop, self.grid.columns)
         width = self.grid.block_columns
         held = set(self.blocks())
@@ -264,43 +293,36 @@ class Accumulator:
 
 
 @njit(cache=True, nogil=True)
-def _pixels(
-    start: float,
-    per_metre: float,
-    bottom: int,
-    rows: int,
-    columns: int,
-    chainage: Float,
-    arc: Float,
-    use: NDArray[np.bool_],
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:  # pragma: no cover - compiled
-    """Row and column of each point; column -1 for those not to be added."""
-    row = np.zeros(chainage.shape[0], np.int32)
-    column = np.full(chainage.shape[0], -1, np.int32)
-    for i in range(chainage.shape[0]):
-        if use[i]:
-            c = np.floor((chainage[i] - start) * per_metre)
-            r = rows - 1 - (np.floor(arc[i] * per_metre) - bottom)
-            if 0 <= c < columns and 0 <= r < rows:
-                row[i] = int(r)
-                column[i] = int(c)
-    return row, column
+def _touched(column: NDArray[np.int32], width: int, blocks: int) -> NDArray[np.bool_]:  # pragma: no cover - compiled
+    """Which blocks points fall into."""
+    touched = np.zeros(blocks, np.bool_)
+    first, stop = 0, 0  # columns of the block that the point before fell into
+    for i in range(column.shape[0]):
+        if column[i] >= 0 and not first <= column[i] < stop:
+            block = column[i] // width
+            touched[block] = True
+            first, stop = block * width, (block + 1) * width
+    return touched
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, parallel=True)
 def _add(
     sums: Single,
     row: NDArray[np.int32],
     column: NDArray[np.int32],
-    offset: Float,
+    first: int,
+    offset: Single,
     raw: Single,
     corrected: Single,
+    parts: int,
 ) -> None:  # pragma: no cover - compiled
+    """Add the points that fall into a block; each thread has rows of its own."""
     width = sums.shape[1]
-    for i in range(row.shape[0]):
-        if 0 <= column[i] < width:
-            pixel = sums[row[i], column[i]]
-            pixel[0] += 1.0
-            pixel[1] += offset[i]
-            pixel[2] += raw[i]
-            pixel[3] += corrected[i]
+    for part in prange(parts):
+        for i in range(row.shape[0]):
+            r, c = row[i], column[i] - first
+            if 0 <= c < width and r % parts == part:
+                sums[r, c, 0] += np.float32(1.0)
+                sums[r, c, 1] += np.float32(np.rint(offset[i] * (1.0 / OFFSET)) * OFFSET)
+                sums[r, c, 2] += np.float32(np.rint(raw[i] * (1.0 / LEVEL)) * LEVEL)
+                sums[r, c, 3] += np.float32(np.rint(corrected[i] * (1.0 / LEVEL)) * LEVEL)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tunneldb.errors import UserError
 from tunneldb.geometry.surface import Surface
-from tunneldb.intensity.correct import Kind, Views, observe, range_span
+from tunneldb.intensity.correct import Kind, Views, observe
 from tunneldb.intensity.edge import Edges
 from tunneldb.intensity.reference import ReferenceCurve
 from tunneldb.leak.lining import Floor
@@ -162,17 +162,23 @@ class Eye:
 
 @dataclass
 class Span:
-    """Ranges of the lining points so far, against those of the reference curve."""
+    """Ranges of the lining points so far, against those of the reference curve.
+
+    Attributes
+    ----------
+    nearest, farthest : float
+        m.
+    outside, count : int
+        How many lie outside the curve's span, and how many there are.
+    """
 
     nearest: float = np.inf
     farthest: float = -np.inf
     outside: int = 0
     count: int = 0
 
-    def add(self, seen: Seen, reference: ReferenceCurve) -> None:
+    def add(self, nearest: float, farthest: float, outside: int, count: int) -> None:
         """Count the points of a chunk."""
-        assert seen.views is not None
-        nearest, farthest, outside, count = range_span(seen.views, seen.lining, reference)
         self.nearest, self.farthest = min(self.nearest, nearest), max(self.farthest, farthest)
         self.outside += outside
         self.count += count

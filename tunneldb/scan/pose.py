@@ -62,7 +62,7 @@ class PoseFaults:
             more = f" and {len(self.unknown) - 10} more" if len(self.unknown) > 10 else ""
             return UserError(
                 f"{name}: no station for scan_id {scans}{more}; add them to the stations of the survey "
-                "(scan_id is the file's point_source_id)"
+                "(scan_id is a LAS file's point_source_id; an E57 file brings its own: survey add … --stations FILE.e57)"
             )
         where = [
             f"up to {seconds:.3f} s {side}"
@@ -187,24 +187,39 @@ def _count_scans(scan_id: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray
     return present + low, counts[present]
 
 
+@njit(cache=True, nogil=True, forceinline=True)
+def interval(time: NDArray[np.float64], wanted: float, hint: int) -> int:
+    """Number of the last of growing times that is not later than the one wanted, or 0; looked for from a hint on."""
+    last = len(time) - 1
+    k = hint
+    # Points come nearly in order of time, so the last interval, or the next, is mostly the right one.
+    if time[k] <= wanted and (k == last or wanted < time[k + 1]):
+        return k
+    if k + 2 <= last and time[k + 1] <= wanted < time[k + 2]:
+        return k + 1
+    return max(int(np.searchsorted(time, wanted, side="right")) - 1, 0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def position_at(time: NDArray[np.float64], track: NDArray[np.float64], wanted: float, k: int) -> tuple[float, float, float]:
+    """Place of the trajectory at a time in its interval ``k``."""
+    j = min(k + 1, len(time) - 1)
+    share = (wanted - time[k]) / (time[j] - time[k]) if j > k else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return (
+        track[k, 0] + share * (track[j, 0] - track[k, 0]),
+        track[k, 1] + share * (track[j, 1] - track[k, 1]),
+        track[k, 2] + share * (track[j, 2] - track[k, 2]),
+    )
+
+
 @njit(cache=True, nogil=True)
 def _interpolate(
     time: NDArray[np.float64], track: NDArray[np.float64], wanted: NDArray[np.float64]
 ) -> NDArray[np.float64]:  # pragma: no cover - compiled
     out = np.empty((len(wanted), 3))
-    last = len(time) - 1
     k = 0
     for i in range(len(wanted)):
-        t = wanted[i]
-        # Points come nearly in order of time, so the last interval, or the next, is mostly the right one.
-        if not (time[k] <= t and (k == last or t < time[k + 1])):
-            if k + 2 <= last and time[k + 1] <= t < time[k + 2]:
-                k += 1
-            else:
-                k = max(np.searchsorted(time, t, side="right") - 1, 0)
-        j = min(k + 1, last)
-        share = (t - time[k]) / (time[j] - time[k]) if j > k else 0.0
-        share = min(max(share, 0.0), 1.0)
-        for c in range(3):
-            out[i, c] = track[k, c] + share * (track[j, c] - track[k, c])
+        k = interval(time, wanted[i], k)
+        out[i, 0], out[i, 1], out[i, 2] = position_at(time, track, wanted[i], k)
     return out
