@@ -181,7 +181,8 @@ def _look(
     mobile = scanner.time.shape[0] > 0
     curve = optics.knots.shape[0] > 0
     low, high = target.low, target.high
-    row, column = pixels.row, pixels.column
+    # By names of their own: Numba drops what is written to a field of a tuple inside a parallel loop.
+    row, column, offsets, raws, correcteds = pixels.row, pixels.column, pixels.offset, pixels.raw, pixels.corrected
     for part in prange(parts):
         near = NOWHERE
         moment, knot = 0, 0
@@ -255,9 +256,9 @@ def _look(
                             outside += 1
             row[k] = int(r)
             column[k] = int(c)
-            pixels.offset[k] = offset
-            pixels.raw[k] = raw
-            pixels.corrected[k] = corrected
+            offsets[k] = offset
+            raws[k] = raw
+            correcteds[k] = corrected
             used += 1
         counts[part, 0], counts[part, 1], counts[part, 2], counts[part, 3] = used, lost, lining, outside
         ranges[part, 0], ranges[part, 1] = nearest, farthest
