@@ -41,7 +41,8 @@ AS $$
          GROUP BY p.parameters, f.step
     ), file AS (
         SELECT k.km, bool_or(i.failed_at IS NULL) AS awaited,
-               min(format('file %s: %s', i.name, i.message)) FILTER (WHERE i.failed_at IS NOT NULL) AS message
+               min(CASE WHEN strpos(i.message, i.name) = 0 THEN format('file %s: %s', i.name, i.message) ELSE i.message END)
+                   FILTER (WHERE i.failed_at IS NOT NULL) AS message
           FROM tunnel.incoming i
          CROSS JOIN LATERAL generate_series(greatest(i.km_from, $2 - 5), least(i.km_to, $3 + 5)) AS k (km)
          WHERE i.survey_id = $1 AND i.km_from IS NOT NULL  -- a file without kilometres fails none
@@ -54,7 +55,7 @@ AS $$
     ), judged AS (
         SELECT s.km, s.step, s.stage, s.outcome, s.started_at, s.finished_at, s.input_at, s.message, g.target, g.retry_after,
                coalesce(w.part, '{}') AS part, s.parameters, f.message AS lost, coalesce(f.awaited, false) AS awaited,
-               s.step = 1 AND s.input_at IS NULL AND f.awaited IS NOT TRUE
+               s.step = 1 AND s.input_at IS NULL AND f.km IS NULL
                AND to_regclass(format('tunnel.point_s%s_km%s', $1, s.km)) IS NULL AS empty,
                CASE s.step WHEN 1 THEN s.input_at IS NOT NULL OR coalesce(f.awaited, false)
                            ELSE s.done_at IS NULL OR s.outdated OR NOT s.done_parameters @> coalesce(w.part, '{}') END AS due
@@ -110,7 +111,7 @@ COMMENT ON FUNCTION tunnel_api.queue_state(integer, integer, integer) IS
 -- a result calls it last, for the kilometre and four to both sides, so that the jobs come to be with what made them ready.
 --
 -- A kilometre goes before the next one, and in it a later stage before an earlier one, so that kilometres are finished one
--- after the other and few fragments wait. Detection lags by three kilometres: it holds up nothing, and fills the workers'
+-- after the other and few fragments wait. Detection lags by eight kilometres: it holds up nothing, and fills the workers'
 -- time at the end, when each of the other stages waits for the one before.
 CREATE OR REPLACE FUNCTION tunnel_api.queue_plan(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS integer
@@ -128,7 +129,7 @@ BEGIN
           FROM tunnel.incoming i
          WHERE i.survey_id = queue_plan.survey_id AND i.failed_at IS NULL
          UNION ALL
-        SELECT 'stage', CASE s.step WHEN 5 THEN -10 * (s.km + 3) ELSE -10 * s.km END + s.step,
+        SELECT 'stage', CASE s.step WHEN 5 THEN -10 * (s.km + 8) ELSE -10 * s.km END + s.step,
                format('s%s.km%s', queue_plan.survey_id, s.km),
                jsonb_build_object('survey_id', queue_plan.survey_id, 'km', s.km, 'stage', s.stage)
           FROM tunnel_api.queue_state(queue_plan.survey_id, queue_plan.km_from, queue_plan.km_to) s
