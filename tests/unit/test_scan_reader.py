@@ -10,6 +10,7 @@ from pyproj import CRS
 from pyproj.crs import CompoundCRS
 
 from tunneldb.errors import UserError
+from tunneldb.scan.envelope import header_box
 from tunneldb.scan.raw import read_raw
 from tunneldb.scan.reader import check_header, read_chunks, read_header
 
@@ -262,3 +263,18 @@ def test_real_scans() -> None:
     assert sum(map(len, read_chunks(DATA / "extra-bytes.laz", "Deviation"))) == header.points
     with pytest.raises(UserError, match="EPSG:4326"):
         check_header(read_header(DATA / "lone-star.laz"), "intensity", 25830, needs_time=True)
+
+
+def test_the_box_of_a_file_is_read_even_when_the_rest_is_gone(tmp_path: Path) -> None:
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales = [0.001, 0.001, 0.001]
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = [1.5, 4.25], [20.0, 10.0], [-3.0, 7.5]
+    path = tmp_path / "a.laz"
+    las.write(path)
+    path.write_bytes(path.read_bytes()[:300])
+    assert header_box(path) == ((1.5, 10.0, -3.0), (4.25, 20.0, 7.5))
+    path.write_bytes(path.read_bytes()[:200])
+    assert header_box(path) is None
+    path.write_text("no scan " * 100)
+    assert header_box(path) is None

@@ -19,6 +19,8 @@ from tunneldb.job.parameters import PARAMETERS, settings
 if TYPE_CHECKING:
     import psycopg
 
+    from tunneldb.cli.watch import Watch
+
 
 @click.command()
 @click.argument("survey")
@@ -62,11 +64,9 @@ def batch(
         found = get_survey(conn, survey)
         asked = plan(conn, found, files, kilometres=_range(km), stage=last, reading=reading, parameters=chosen)
         register(conn, found, asked, retry=retry_failed)
-        for file in asked.files:
-            if file.error:
-                click.echo(f"{file.name}: failed: {file.error}")
-        _work(conn, found, settings_.dsn, workers or os.cpu_count() or 1)
-        raise SystemExit(_summary(conn, found))
+        began = time.monotonic()
+        watch = _work(conn, found, settings_.dsn, workers or os.cpu_count() or 1)
+        raise SystemExit(_summary(conn, found, watch, time.monotonic() - began))
 
 
 def _range(text: str | None) -> range | None:
@@ -81,66 +81,42 @@ def _range(text: str | None) -> range | None:
     return range(first, last + 1)
 
 
-def _work(conn: psycopg.Connection[Any], survey: Survey, dsn: str | None, count: int) -> None:
+def _work(conn: psycopg.Connection[Any], survey: Survey, dsn: str | None, count: int) -> Watch:
     """Let workers do what is to be done, and show what becomes of it."""
+    from tunneldb.cli.watch import Watch
     from tunneldb.job.team import Team, interrupts
     from tunneldb.job.worker import Orders
 
-    shown = _Lines(conn, survey)
     team = Team(Orders(dsn, 1, survey.id), count)
-    with interrupts(team):
-        if shown.busy():
+    with interrupts(team), Watch(dsn, survey.name) as watch:
+        watch.look()
+        if _busy(conn, survey):
             team.start()
         while team.tend():
-            shown.show()
-            time.sleep(0.5)
-        shown.show()
+            watch.look()
+            time.sleep(1.0)
+        watch.look()
+    return watch
 
 
-class _Lines:
-    """A line for each file and stage that has ended since this began."""
-
-    def __init__(self, conn: psycopg.Connection[Any], survey: Survey) -> None:
-        self.conn = conn
-        self.survey = survey
-        row = conn.execute("SELECT clock_timestamp()").fetchone()
-        assert row is not None
-        self.seen = row[0]
-
-    def busy(self) -> bool:
-        row = self.conn.execute("SELECT tunnel_api.queue_busy(%s)", [self.survey.id]).fetchone()
-        return row is not None and bool(row[0])
-
-    def show(self) -> None:
-        rows = self.conn.execute(
-            """
-            SELECT stage, coalesce('km ' || km, parameters ->> 'file'), outcome, message,
-                   extract(epoch FROM finished_at - started_at), finished_at
-              FROM tunnel.run WHERE survey_id = %s AND job_id IS NOT NULL AND finished_at > %s ORDER BY finished_at
-            """,
-            [self.survey.id, self.seen],
-        ).fetchall()
-        for stage, what, outcome, message, seconds, finished in rows:
-            said = f"{seconds:.1f} s" if outcome == "done" else f"failed: {message}"
-            click.echo(f"{stage} {what}: {said}")
-            self.seen = finished
+def _busy(conn: psycopg.Connection[Any], survey: Survey) -> bool:
+    row = conn.execute("SELECT tunnel_api.queue_busy(%s)", [survey.id]).fetchone()
+    return row is not None and bool(row[0])
 
 
-def _summary(conn: psycopg.Connection[Any], survey: Survey) -> int:
+def _summary(conn: psycopg.Connection[Any], survey: Survey, watch: Watch, seconds: float) -> int:
     """Say what became of it; returns the exit code."""
+    from tunneldb.cli.overview import advise, duration, number, spans
     from tunneldb.job.batch import failed_files, results
 
     found = results(conn, survey)
     files = failed_files(conn, survey)
     done = sum(result.state == "done" for result in found)
-    click.echo(f"{done} of {len(found)} kilometres done")
-    for name, message in files:
-        click.echo(f"file {name}: {message}")
-    failed = [result for result in found if result.state == "failed"]
-    for result in failed:
-        click.echo(f"km {result.km}, {result.stage}: {result.message}")
-    if failed or files:
-        click.echo(f"when that is mended: tunneldb batch {survey.name} --retry-failed")
-    elif done < len(found):
-        click.echo(f"to go on: tunneldb batch {survey.name}")
+    points = watch.ledger.points if watch.ledger is not None else 0
+    speed = f", {number(points / seconds)} points/s" if points else ""
+    click.echo(f"{done} of {len(found)} kilometres done; {duration(seconds)}{speed}")
+    if watch.live is None and watch.seen is not None:  # on a terminal it stands there already
+        for advice in advise(watch.seen):
+            where = f"km {spans(advice.kilometres)}: " if advice.kilometres else ""
+            click.echo(f"{where}{advice.what}: {advice.command}")
     return 0 if done == len(found) and not files else 1

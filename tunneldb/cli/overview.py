@@ -146,7 +146,7 @@ def _workers(workers: Iterable[Worker], survey: str) -> _Table:
         ]
         for worker in workers
     ]
-    return _Table(("worker", "pid", "doing", "for", "heard of", ""), rows, elastic=0)
+    return _Table(("worker", "pid", "doing", "for", "heartbeat", ""), rows, elastic=0)
 
 
 def _to_do(advices: Iterable[Advice]) -> Group:

@@ -140,10 +140,16 @@ class Ledger:
     conn : Connection
     survey : str
         Name of a survey that exists.
+
+    Attributes
+    ----------
+    points : int
+        Points of the files that were read since.
     """
 
     def __init__(self, conn: psycopg.Connection[Any], survey: str) -> None:
         self.survey = survey
+        self.points = 0
         row = conn.execute("SELECT clock_timestamp()").fetchone()
         assert row is not None
         self.told = row[0]
@@ -153,16 +159,17 @@ class Ledger:
         rows = conn.execute(
             """
             SELECT stage, coalesce('km ' || km, parameters ->> 'file'), outcome, message,
-                   extract(epoch FROM duration)::float8, finished_at, km IS NOT NULL
+                   extract(epoch FROM duration)::float8, finished_at, km IS NOT NULL, coalesce((counts ->> 'points')::bigint, 0)
               FROM tunnel_api.run
              WHERE survey = %s AND finished_at > %s AND (km IS NOT NULL OR stage = 'read') ORDER BY finished_at
             """,
             [self.survey, self.told],
         ).fetchall()
         lines = []
-        for stage, what, outcome, message, seconds, finished_at, of_km in rows:
+        for stage, what, outcome, message, seconds, finished_at, of_km, points in rows:
             said = f"{seconds:.1f} s" if outcome == "done" else f"{outcome}: {message}"
             lines.append((of_km and outcome == "done", f"{stage} {what}: {said}"))
+            self.points += points if stage == "read" else 0
             self.told = finished_at
         return lines
 

@@ -8,18 +8,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import psycopg
 from psycopg.rows import class_row
 from psycopg.types.json import Jsonb
 
 from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
+from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.store import load_alignment
 from tunneldb.job.load import header_kilometres, parameters_of, settings_of
 from tunneldb.job.run import loaded_kilometres
 from tunneldb.job.stages import STAGES
+from tunneldb.scan.e57 import is_e57
+from tunneldb.scan.envelope import header_box
 from tunneldb.scan.pose import load_poses
-from tunneldb.scan.reader import check_header, read_header
+from tunneldb.scan.reader import ScanHeader, check_header, read_header
 
 STEPS = ("load", *(stage.name for stage in STAGES))
 """Stages of a kilometre, in their order."""
@@ -38,7 +42,7 @@ class Incoming:
     bytes, points : int
         Its size, and how many points its header announces; 0 points if that is unreadable.
     km_from, km_to : int or None
-        First and last kilometre that it may touch; None if its header is unreadable, or it touches none.
+        First and last kilometre that it may touch; None if not even its box is readable, or it touches none.
     error : str or None
         Why it can't be read.
     there : bool
@@ -169,7 +173,9 @@ def _headers(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path
             points = header.points
             check_header(header, survey.intensity_dimension, survey.srid, needs_time=poses.mobile)
         except UserError as error:
-            files.append(Incoming(path.name, path, size, points, error=str(error)))
+            touched = _damaged_kilometres(path, alignment, reach)
+            first, last = (touched[0], touched[-1]) if touched else (None, None)
+            files.append(Incoming(path.name, path, size, points, first, last, str(error)))
             continue
         touched = header_kilometres(header, alignment, reach)
         if not touched:
@@ -179,6 +185,14 @@ def _headers(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path
         there = path.name in read and _untouched(path, size, *read[path.name])
         files.append(Incoming(path.name, path, size, points, touched[0], touched[-1], None, there))
     return files
+
+
+def _damaged_kilometres(path: Path, alignment: Alignment, reach: float) -> range:
+    """Kilometres of a file that can't be read, so that they are shown as failed: by its box, if it has one."""
+    box = None if is_e57(path) else header_box(path)
+    if box is None:
+        return range(0)
+    return header_kilometres(ScanHeader(path, 0, (), None, np.array(box[0]), np.array(box[1])), alignment, reach)
 
 
 def _untouched(path: Path, size: int, known_path: str, known_size: int, read_at: dt.datetime) -> bool:

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -83,12 +84,22 @@ class Team:
         environment = dict(os.environ)
         environment["TUNNELDB_DSN"] = self.orders.dsn or ""
         # The pipe stays open as long as this process lives; a session of its own keeps the terminal's Ctrl-C off.
-        return subprocess.Popen(
+        process = subprocess.Popen(
             [sys.executable, "-m", "tunneldb.job.worker", told],
             stdin=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             env=environment,
             start_new_session=True,
         )
+        threading.Thread(target=_pass_on, args=(process,), daemon=True).start()
+        return process
+
+
+def _pass_on(process: subprocess.Popen[bytes]) -> None:
+    """Say what a worker says, by this process' own stderr, which a table on the terminal gives way to."""
+    assert process.stderr is not None
+    for line in process.stderr:
+        print(line.decode(errors="replace"), end="", file=sys.stderr, flush=True)
 
 
 @contextmanager

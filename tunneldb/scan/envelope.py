@@ -8,6 +8,7 @@ Source: ASPRS LAS 1.4 R15, tables 3 and 24; LASzip's layout of the chunk table.
 
 from __future__ import annotations
 
+import math
 import struct
 from pathlib import Path
 
@@ -16,6 +17,26 @@ _LASZIP_ID = 22204
 _VARIABLE_CHUNKS = 0xFFFFFFFF
 _STREAMED = -1  # the place of the chunk table stands in the file's last 8 bytes
 _LARGEST_CHUNK = 1 << 32  # bytes
+_BOX_AT = 179
+_BOX = struct.Struct("<6d")  # max x, min x, max y, min y, max z, min z
+
+
+def header_box(path: Path) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:
+    """Read least and greatest coordinates from the header of a LAS or LAZ file of which the rest may be damaged.
+
+    Returns
+    -------
+    tuple or None
+        Two corners (x, y, z), m; None if the file is no LAS or LAZ, too short, or its box is none.
+    """
+    with path.open("rb") as file:
+        head = file.read(_BOX_AT + _BOX.size)
+    if head[:4] != b"LASF" or len(head) < _BOX_AT + _BOX.size:
+        return None
+    high_x, low_x, high_y, low_y, high_z, low_z = _BOX.unpack_from(head, _BOX_AT)
+    if not (-math.inf < low_x <= high_x < math.inf and -math.inf < low_y <= high_y < math.inf):
+        return None
+    return (low_x, low_y, low_z), (high_x, high_y, high_z)
 
 
 def check_envelope(path: Path) -> None:
