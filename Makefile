@@ -1,5 +1,6 @@
 # make demo   a simulated tunnel from its scan to leaks in QGIS, in ./demo
 # make test   lint, types and all tests, against the wheel as a user would install it
+# make faults 100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
 # make bench  the figures of the README and the docs
 # Each installs what it lacks: PostgreSQL with PostGIS by apt, and a virtual environment in .venv.
 
@@ -8,7 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find tunneldb sql migrations -type f -not -name '*.py[co]' -not -name '*.nb[ic]') pyproject.toml README.md LICENSE
 
-.PHONY: install demo test bench lint clean
+.PHONY: install demo test faults bench lint clean
 .DELETE_ON_ERROR:
 
 install: $(VENV)/wheel
@@ -46,6 +47,9 @@ lint: install
 # Not `python -m pytest`: that would put the source tree before the wheel.
 test: lint $(VENV)/tests
 	$(BIN)/pytest -n 2 -rs
+
+faults: install $(VENV)/tests
+	KILLS=$${KILLS:-100} $(BIN)/pytest -n 0 -s tests/faults/test_kills.py
 
 bench: install
 	$(BIN)/python -m benchmarks.run

@@ -1,0 +1,221 @@
+"""A survey in an embedded server of its own, driven by the real commands, and all that a batch leaves in its database."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+from faults.scene import NAME, SRID, THIN, Scene
+from psycopg import sql
+from psycopg.conninfo import make_conninfo
+
+from tunneldb.database.fetch import fetch_array
+from tunneldb.database.server import DATABASE, Server
+
+COMMAND = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
+PREPARED = "prepared"
+State = dict[str, Any]
+
+
+class Project:
+    """A folder with an embedded server in which tunnel and survey are made; `fresh` makes its database anew.
+
+    Attributes
+    ----------
+    home, scratch : Path
+        The server's folder, and that of the temporary files of all commands.
+    dsn : str
+        The server's database.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.home = Path(tempfile.mkdtemp(prefix="tunneldb-faults-"))
+        self.scratch = self.home / "scratch"
+        self.scratch.mkdir()
+        kept = {k: v for k, v in os.environ.items() if k not in ("TUNNELDB_DSN", "TUNNELDB_HOME")}
+        self.environment = {**kept, "TUNNELDB_HOME": str(self.home), "TMPDIR": str(self.scratch)}
+        self.dsn = Server(self.home).start()
+        folder = self.home / "poses"
+        folder.mkdir()
+        poses = scene.write_poses(folder)
+        self.run("init")
+        self.run("tunnel", "add", NAME, "--srid", SRID, "--axis", folder / "axis.csv", "--start-chainage", scene.start)
+        self.run(
+            "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04",
+            *poses, "--intensity", "Amplitude", "--intensity-kind", "amplitude",
+        )  # fmt: skip
+        with self._server() as conn:
+            conn.execute(sql.SQL("ALTER DATABASE {} RENAME TO {}").format(sql.Identifier(DATABASE), sql.Identifier(PREPARED)))
+        self.fresh()
+
+    def fresh(self) -> None:
+        """Begin anew with an empty survey."""
+        with self._server() as conn:
+            name = sql.Identifier(DATABASE)
+            conn.execute(sql.SQL("DROP DATABASE IF EXISTS {} WITH (FORCE)").format(name))
+            conn.execute(sql.SQL("CREATE DATABASE {} TEMPLATE {}").format(name, sql.Identifier(PREPARED)))
+
+    def close(self) -> None:
+        """Stop the server and remove the folder."""
+        server = Server(self.home)
+        state = server.home().state
+        server.stop()
+        shutil.rmtree(state, ignore_errors=True)
+        shutil.rmtree(self.home, ignore_errors=True)
+
+    def run(self, *arguments: object, code: int | None = 0) -> str:
+        """Run a command to its end; returns what it says."""
+        command = [*COMMAND, *map(str, arguments)]
+        found = subprocess.run(command, cwd=self.home, env=self.environment, capture_output=True, text=True, check=False)
+        assert code is None or found.returncode == code, f"{' '.join(map(str, arguments))}: {found.stdout}{found.stderr}"
+        return found.stdout + found.stderr
+
+    def begin(
+        self, *arguments: object, log: str = "batch.log", environment: dict[str, str] | None = None
+    ) -> subprocess.Popen[bytes]:
+        """Start a command; what it says goes to a file of the folder."""
+        with (self.home / log).open("ab") as output:
+            return subprocess.Popen(
+                [*COMMAND, *map(str, arguments)],
+                cwd=self.home,
+                env=self.environment,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+            )
+
+    def said(self, log: str = "batch.log") -> str:
+        """What commands have said."""
+        return (self.home / log).read_text(errors="replace")
+
+    def connect(self) -> psycopg.Connection[Any]:
+        """Connect to the database, as a test does; does not start the server."""
+        return psycopg.connect(self.dsn, autocommit=True)
+
+    def _server(self) -> psycopg.Connection[Any]:
+        return psycopg.connect(make_conninfo(self.dsn, dbname="postgres", user="postgres"), autocommit=True)
+
+
+def batch(files: Sequence[Path], *more: object, workers: int = 2) -> list[object]:
+    """Arguments of a batch of files."""
+    values = [text for value in THIN for text in ("--set", value)]
+    return ["batch", NAME, *files, "--workers", workers, *values, *more]
+
+
+_COORDINATES = "ARRAY(SELECT unnest(ARRAY[ST_X(d.geom), ST_Y(d.geom), coalesce(ST_Z(d.geom), 0)]) FROM ST_DumpPoints({}) d ORDER BY d.path)"
+_TABLES = {
+    "scan_file": "SELECT name, checksum, bytes, points, noise, outside, thinned, kept, chainage_from, chainage_to, extent, "
+    "srid FROM tunnel.scan_file ORDER BY name",
+    "file_km": "SELECT f.name, k.km, k.rows, k.points::text, k.loaded_at IS NOT NULL "
+    "FROM tunnel.file_km k JOIN tunnel.scan_file f ON f.id = k.file_id ORDER BY 1, 2",
+    "axis_vertex": f"SELECT n, km, {_COORDINATES.format('geom')}, {_COORDINATES.format('given')}, points, source "
+    "FROM tunnel.axis_vertex ORDER BY n",
+    "segment": "SELECT n, km, chainage_from, chainage_to, vertex_from, vertex_to, tangent_from, tangent_to, "
+    f"{_COORDINATES.format('geom')}, points FROM tunnel.segment ORDER BY n",
+    "section": "SELECT segment, half, km, chainage, half_width, angle_step, radius, arc, "
+    f"{_COORDINATES.format('geom')}, points, interpolated FROM tunnel.section ORDER BY 1, 2",
+    "section_class": "SELECT s.segment, s.half, c.class, c.angle, c.radius, c.slope, c.sigma, c.points, c.state "
+    "FROM tunnel.section_class c JOIN tunnel.section s ON s.id = c.section_id ORDER BY 1, 2, 3",
+    "radiometry": "SELECT km, roughness, dry_mean, dry_sigma, threshold, sigma_raw, sigma_lambert, sigma_oren_nayar, regions, "
+    "pixels, wet_pixels FROM tunnel.radiometry ORDER BY km",
+    "image": "SELECT km, kind, block, tiff FROM tunnel.image ORDER BY 1, 2, 3",
+    "leak": "SELECT km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max, image_share, "
+    f"{_COORDINATES.format('unrolled')}, {_COORDINATES.format('map')}, {_COORDINATES.format('surface')}, review, detected "
+    "FROM tunnel.leak ORDER BY 2, 4",
+    "leak_part": "SELECT km, pixel, box, mask, filled, drop_sum, drop_max FROM tunnel.leak_part ORDER BY km, box",
+    "tables": "SELECT relname FROM pg_class WHERE relnamespace = 'tunnel'::regnamespace AND relkind IN ('r', 'p') ORDER BY 1",
+    "goal": "SELECT km, stage, parameters::text FROM tunnel.goal ORDER BY km",
+    "incoming": "SELECT name, message FROM tunnel.incoming ORDER BY name",
+    "status": "SELECT km, stage, outcome, stale, reason FROM tunnel_api.stage_status ORDER BY km, step",
+    "jobs": "SELECT status::text, args::text FROM tunnel_queue.procrastinate_jobs WHERE status IN ('todo', 'doing')",
+}
+_ROWS = """
+    FROM tunnel.point p
+    JOIN (SELECT id, row_number() OVER (ORDER BY name) AS number FROM tunnel.scan_file) f ON f.id = p.file_id
+"""
+_FIELDS = (
+    ("survey", "i4", sql.SQL("p.survey_id")),
+    ("km", "i4", sql.SQL("p.km")),
+    ("chainage", "f8", sql.SQL("p.chainage")),
+    ("time", "f8", sql.SQL("p.gps_time")),
+    ("x", "f8", sql.SQL("ST_X(p.geom)")),
+    ("y", "f8", sql.SQL("ST_Y(p.geom)")),
+    ("z", "f8", sql.SQL("ST_Z(p.geom)")),
+    ("segment", "i4", sql.SQL("coalesce(p.segment, -1)")),
+    ("scan", "i4", sql.SQL("p.scan_id")),
+    ("file", "i4", sql.SQL("f.number::int")),
+    ("intensity", "f4", sql.SQL("p.intensity")),
+    ("classification", "i4", sql.SQL("p.classification::int")),
+)
+
+
+def state(project: Project) -> State:
+    """All that a batch leaves, without keys that count up, and times."""
+    with project.connect() as conn:
+        found: State = {name: conn.execute(query).fetchall() for name, query in _TABLES.items()}
+        found["point"] = np.sort(fetch_array(conn, _FIELDS, sql.SQL(_ROWS), {}), order=["km", "time", "x", "y", "z"])
+    found["scratch"] = sorted(path.name for path in project.scratch.iterdir())
+    return found
+
+
+def runs(project: Project) -> list[tuple[int | None, str, str, int]]:
+    """How many runs of each stage of each kilometre, and of each file, have ended well."""
+    with project.connect() as conn:
+        return conn.execute(
+            "SELECT km, stage, coalesce(parameters ->> 'file', ''), count(*) FROM tunnel.run WHERE outcome = 'done' "
+            "GROUP BY 1, 2, 3 ORDER BY 2, 1, 3"
+        ).fetchall()
+
+
+def differences(one: State, other: State) -> list[str]:
+    """What is not the same in two states: the first of each table."""
+    found = []
+    for name in one:
+        a, b = one[name], other[name]
+        if name == "point":
+            found += _points(a, b)
+        elif len(a) != len(b):
+            odd = [row for row in (a if len(a) > len(b) else b) if row not in (b if len(a) > len(b) else a)]
+            found.append(f"{name}: {len(a)} rows against {len(b)}, such as {str(odd[:1])[:300]}")
+        else:
+            unequal = [(x, y) for x, y in zip(a, b, strict=True) if not same(x, y)]
+            if unequal:
+                found.append(f"{name}: {len(unequal)} of {len(a)} rows, first {_pair(*unequal[0])}")
+    return found
+
+
+def _points(a: np.ndarray, b: np.ndarray) -> list[str]:
+    if len(a) != len(b):
+        return [f"point: {len(a)} rows against {len(b)}"]
+    found = []
+    for field in a.dtype.names or ():
+        # chainage comes from the axis, whose averages may be summed in another order
+        unequal = ~np.isclose(a[field], b[field], 1e-9, 0) if field == "chainage" else a[field] != b[field]
+        if unequal.any():
+            k = int(np.flatnonzero(unequal)[0])
+            found.append(f"point: {field} of {unequal.sum()} of {len(a)} rows, first {a[k]} against {b[k]}")
+    return found
+
+
+def same(a: object, b: object) -> bool:
+    """Whether values are the same; sums may have been added up in another order."""
+    if isinstance(a, float) and isinstance(b, float):
+        return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9)
+    if isinstance(a, (list, tuple)) and isinstance(b, (list, tuple)):
+        return len(a) == len(b) and all(map(same, a, b))
+    return a == b
+
+
+def _pair(a: Sequence[object], b: Sequence[object]) -> str:
+    key = " ".join(map(str, a[:3]))
+    unequal = [(i, str(x)[:80], str(y)[:80]) for i, (x, y) in enumerate(zip(a, b, strict=True)) if not same(x, y)]
+    return f"{key}: (column, one, other) {unequal[:3]}"

@@ -1,0 +1,44 @@
+"""Whatever is killed while a batch runs, and whenever: its end is that of a batch which nothing disturbed."""
+
+from __future__ import annotations
+
+import os
+import random
+import time
+
+from faults.conftest import Survey
+from faults.killer import Killer, reading, whole
+from faults.project import batch, differences, runs, state
+
+KILLS = int(os.environ.get("KILLS", "7"))
+SEED = int(os.environ.get("SEED", "1"))
+
+
+def test_kills_lose_nothing_and_double_nothing(long: Survey) -> None:
+    """As many batches as it takes for all the kills; `make faults` asks for a hundred."""
+    rounds = 0
+    started = time.monotonic()
+    killer = Killer(long.project, batch(long.files), random.Random(SEED))
+    while killer.killed.total() < KILLS:
+        rounds += 1
+        long.project.fresh()
+        with reading(long.project, long.kilometres()) as seen:
+            for kind in killer.run(KILLS - killer.killed.total()):
+                print(f"\r{killer.killed.total()} of {KILLS} kills, batch {rounds}: {kind:<8}", end="", flush=True)
+        assert differences(long.undisturbed, state(long.project)) == []
+        assert [row for row in runs(long.project) if row[3] != 1] == []
+        assert whole(seen, long.points()) == []
+    kinds = ", ".join(f"{kind} {count}" for kind, count in sorted(killer.killed.items()))
+    print(
+        f"\r{killer.killed.total()} kills ({kinds}) in {rounds} batches, typed {killer.typed} times, {time.monotonic() - started:.0f} s:"
+        " each ended as the undisturbed one, row for row"
+    )
+
+
+def test_two_batches_at_once(short: Survey) -> None:
+    short.project.fresh()
+    both = [short.project.begin(*batch(short.files, workers=1), log=f"batch-{n}.log") for n in (1, 2)]
+    codes = [process.wait(300) for process in both]
+    assert codes == [0, 0], short.project.said("batch-1.log") + short.project.said("batch-2.log")
+    assert differences(short.undisturbed, state(short.project)) == []
+    assert [row for row in runs(short.project) if row[3] != 1] == []
