@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from pye57 import E57, libe57
+from pye57 import libe57
 
 
 @dataclass
@@ -24,12 +24,17 @@ class Scan:
 
 
 def write(path: Path, scans: Sequence[Scan], metadata: str = "") -> Path:
-    with E57(str(path), "w") as file:
-        image = file.image_file
-        if metadata:
-            file.root["coordinateMetadata"]  # noqa: B018 - fails if the binding changes
-        for scan in scans:
-            _write_scan(file, image, scan)
+    image = libe57.ImageFile(str(path), "w")
+    image.extensionsAdd("", libe57.E57_V1_0_URI)
+    for name, text in (("formatName", "ASTM E57 3D Imaging Data File"), ("guid", "{F}"), ("coordinateMetadata", metadata)):
+        image.root().set(name, libe57.StringNode(image, text))
+    for name, number in (("versionMajor", libe57.E57_FORMAT_MAJOR), ("versionMinor", libe57.E57_FORMAT_MINOR)):
+        image.root().set(name, libe57.IntegerNode(image, number))
+    nodes = libe57.VectorNode(image, True)
+    image.root().set("data3D", nodes)
+    for index, scan in enumerate(scans):
+        _write_scan(image, nodes, f"Scan {index + 1}", scan)
+    image.close()
     return path
 
 
@@ -40,10 +45,10 @@ def structure(image: libe57.ImageFile, **values: float) -> libe57.StructureNode:
     return node
 
 
-def _write_scan(file: E57, image: libe57.ImageFile, scan: Scan) -> None:
+def _write_scan(image: libe57.ImageFile, nodes: libe57.VectorNode, name: str, scan: Scan) -> None:
     node = libe57.StructureNode(image)
     node.set("guid", libe57.StringNode(image, scan.guid))
-    node.set("name", libe57.StringNode(image, f"Scan {len(file.data3d) + 1}"))
+    node.set("name", libe57.StringNode(image, name))
     if scan.translation is not None:
         pose = libe57.StructureNode(image)
         pose.set("rotation", structure(image, **dict(zip("wxyz", scan.rotation, strict=True))))
@@ -67,7 +72,7 @@ def _write_scan(file: E57, image: libe57.ImageFile, scan: Scan) -> None:
         prototype.set(name, child)
     points = libe57.CompressedVectorNode(image, prototype, libe57.VectorNode(image, True))
     node.set("points", points)
-    file.data3d.append(node)
+    nodes.append(node)
     count = len(next(iter(scan.fields.values())))
     buffers = libe57.VectorSourceDestBuffer()
     kept = []

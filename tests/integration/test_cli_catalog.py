@@ -198,7 +198,7 @@ def test_a_trajectory_may_run_down_the_axis_when_that_is_said(tunnel: Path) -> N
     [
         ("scan_id,x,y,z\n", ["no station"]),
         ("scan_id,x,y,z\n1.5,500001,4640010,101\n", ["line 2", "scan_id 1.5"]),
-        ("scan_id,x,y,z\n70000,500001,4640010,101\n", ["line 2", "65535"]),
+        ("scan_id,x,y,z\n2147483648,500001,4640010,101\n", ["line 2", "2147483647"]),
         ("scan_id,x,y,z\n1,500001,4640010,101\n2,500001,4640020,101\n1,500001,4640030,101\n", ["line 4", "scan_id 1"]),
         ("scan_id,x,y,z\n1,600001,4640010,101\n", ["never within 50 m"]),
     ],

@@ -25,7 +25,13 @@ def survey() -> None:
 @click.option("--tunnel", required=True, help="Tunnel that was scanned.")
 @click.option("--date", type=click.DateTime(["%Y-%m-%d"]), required=True, metavar="YYYY-MM-DD", help="Day of the scan.")
 @click.option("--trajectory", type=FILE, help="CSV with time,x,y,z of a mobile scanner; time as gps_time in the files.")
-@click.option("--stations", type=FILE, help="CSV with scan_id,x,y,z of a static scanner; scan_id as point_source_id.")
+@click.option(
+    "--stations",
+    type=FILE,
+    multiple=True,
+    help="CSV with scan_id,x,y,z of a static scanner, scan_id as point_source_id; or an E57 file, for the poses of its scans; "
+    "or a folder of E57 files. May be given several times.",
+)
 @click.option("--backwards", is_flag=True, help="The trajectory was driven towards falling chainage.")
 @click.option("--reference", type=FILE, help="CSV with range_m,intensity_db: the scanner's intensity over range.")
 @click.option(
@@ -46,7 +52,7 @@ def add(
     tunnel: str,
     date: dt.datetime,
     trajectory: Path | None,
-    stations: Path | None,
+    stations: tuple[Path, ...],
     backwards: bool,
     reference: Path | None,
     intensity: str | None,
@@ -55,8 +61,7 @@ def add(
     """Add the survey NAME."""
     from tunneldb.database.catalog import Intensity, add_survey
 
-    poses = trajectory or stations
-    if poses is None or (trajectory is not None and stations is not None):
+    if (trajectory is None) == (not stations):
         raise UserError("say where the scanner was: exactly one of --trajectory and --stations")
     if backwards and trajectory is None:
         raise UserError("--backwards is about a trajectory; stations have no direction")
@@ -70,7 +75,7 @@ def add(
             name,
             tunnel,
             date.date(),
-            poses,
+            stations if trajectory is None else (trajectory,),
             mobile=trajectory is not None,
             backwards=backwards,
             reference=reference,

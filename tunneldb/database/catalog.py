@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,10 @@ from tunneldb.csvfile import CsvTable, read_csv
 from tunneldb.database.copy import PointZ, copy_binary, pack
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
+from tunneldb.scan.stations import read_stations
 
 XYZ = ("x", "y", "z")
 FARTHEST_SCANNER = 50.0  # m from the axis; a scanner that was never nearer stood in another tunnel
-SCAN_ID_LIMIT = 65536  # point_source_id of LAS has 16 bits
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ def add_survey(
     name: str,
     tunnel: str,
     date: dt.date,
-    poses: Path,
+    poses: Sequence[Path],
     *,
     mobile: bool,
     backwards: bool,
@@ -126,7 +127,8 @@ def add_survey(
     Parameters
     ----------
     poses
-        CSV of the trajectory (time,x,y,z) when `mobile`, else of the stations (scan_id,x,y,z).
+        The one CSV of the trajectory (time,x,y,z) when `mobile`, else the files of the stations, see
+        `tunneldb.scan.stations.read_stations`.
     backwards
         Whether the trajectory was driven towards falling chainage.
     reference
@@ -139,8 +141,14 @@ def add_survey(
     """
     _require_name(name)
     tunnel_id, srid, alignment = _alignment(connection, tunnel)
-    table = _read_trajectory(poses) if mobile else _read_stations(poses)
-    _require_near(table, alignment, tunnel)
+    keys: NDArray[Any]
+    if mobile:
+        table = _read_trajectory(poses[0])
+        kind, key, keys, xyz = "pose", "time", table["time"], table.columns(XYZ)
+    else:
+        stations = read_stations(poses)
+        kind, key, keys, xyz = "station", "scan_id", stations.scan_id, stations.xyz
+    _require_near(poses, xyz, alignment, tunnel)
     if mobile:
         _require_direction(table, alignment, backwards=backwards)
     curve = None if reference is None else _read_reference(reference)
@@ -155,18 +163,13 @@ def add_survey(
     except psycopg.errors.UniqueViolation:
         raise UserError(f"there is a survey {name!r} already: tunneldb survey list") from None
     assert row is not None
-    survey = np.full(len(table), row[0], dtype=np.int32)
-    points = PointZ(table.columns(XYZ), srid)
-    if mobile:
-        _insert(connection, "pose", ["survey_id", "time", "geom"], [survey, table["time"], points])
-    else:
-        ids = table["scan_id"].astype(np.int32)
-        _insert(connection, "station", ["survey_id", "scan_id", "geom"], [survey, ids, points])
+    survey = np.full(len(xyz), row[0], dtype=np.int32)
+    _insert(connection, kind, ["survey_id", key, "geom"], [survey, keys, PointZ(xyz, srid)])
     if curve is not None:
         survey = np.full(len(curve), row[0], dtype=np.int32)
         columns = [survey, curve["range_m"], curve["intensity_db"]]
         _insert(connection, "reference", ["survey_id", "range_m", "intensity_db"], columns)
-    return len(table)
+    return len(xyz)
 
 
 def _insert(connection: psycopg.Connection[Any], table: str, names: list[str], columns: list[Any]) -> None:
@@ -194,21 +197,6 @@ def _read_trajectory(path: Path) -> CsvTable:
     return table
 
 
-def _read_stations(path: Path) -> CsvTable:
-    table = read_csv(path, ("scan_id", *XYZ))
-    if not len(table):
-        raise UserError(f"{path} holds no station")
-    ids = table["scan_id"]
-    wrong = np.flatnonzero((ids != np.floor(ids)) | (ids < 0) | (ids >= SCAN_ID_LIMIT))
-    if len(wrong):
-        raise table.error(int(wrong[0]), f"scan_id {ids[wrong[0]]:g} is not a whole number from 0 to {SCAN_ID_LIMIT - 1}")
-    _, first = np.unique(ids, return_index=True)
-    repeated = np.setdiff1d(np.arange(len(ids)), first)
-    if len(repeated):
-        raise table.error(int(repeated[0]), f"scan_id {ids[repeated[0]]:g} stands above already; each station once")
-    return table
-
-
 def _read_reference(path: Path) -> CsvTable:
     table = read_csv(path, ("range_m", "intensity_db"))
     if len(table) < 2:
@@ -219,14 +207,14 @@ def _read_reference(path: Path) -> CsvTable:
     return table
 
 
-def _require_near(table: CsvTable, alignment: Alignment, tunnel: str) -> None:
+def _require_near(paths: Sequence[Path], xyz: NDArray[np.float64], alignment: Alignment, tunnel: str) -> None:
     """The scanner must have been near the axis at least once."""
-    distance = alignment.distance(table.columns(XYZ))
+    distance = alignment.distance(xyz)
     if np.isnan(distance).all() or np.nanmin(distance) > FARTHEST_SCANNER:
         nearest = "beyond its ends" if np.isnan(distance).all() else f"{np.nanmin(distance):.0f} m at the nearest"
         raise UserError(
-            f"{table.path}: the scanner was never within {FARTHEST_SCANNER:g} m of the axis of {tunnel!r} ({nearest}); "
-            "is it of another tunnel or in another SRID?"
+            f"{', '.join(map(str, paths))}: the scanner was never within {FARTHEST_SCANNER:g} m of the axis of {tunnel!r} "
+            f"({nearest}); is it of another tunnel or in another SRID?"
         )
 
 
