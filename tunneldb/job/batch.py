@@ -15,7 +15,7 @@ from psycopg.types.json import Jsonb
 
 from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
-from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.alignment import KILOMETRE, Alignment
 from tunneldb.geometry.store import load_alignment
 from tunneldb.job.load import header_kilometres, parameters_of, settings_of
 from tunneldb.job.run import loaded_kilometres
@@ -188,11 +188,50 @@ def _headers(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path
 
 
 def _damaged_kilometres(path: Path, alignment: Alignment, reach: float) -> range:
-    """Kilometres of a file that can't be read, so that they are shown as failed: by its box, if it has one."""
+    """Kilometres that fail with a file that can't be read: those of its box, if that is there."""
     box = None if is_e57(path) else header_box(path)
     if box is None:
         return range(0)
-    return header_kilometres(ScanHeader(path, 0, (), None, np.array(box[0]), np.array(box[1])), alignment, reach)
+    return _inner_kilometres(ScanHeader(path, 0, (), None, np.array(box[0]), np.array(box[1])), alignment, reach)
+
+
+def _inner_kilometres(header: ScanHeader, alignment: Alignment, reach: float) -> range:
+    """Kilometres in which the axis runs through the box of a file, not just past its ends; empty if none.
+
+    What `header_kilometres` finds beyond the ends is taken off: the reach, half as much again where the box stands
+    askew to the axis, and a step of the axis.
+    """
+    if not header_kilometres(header, alignment, reach):
+        return range(0)
+    low, high = header.low[:2] - reach, header.high[:2] + reach
+    inside = np.all((alignment.vertices[:, :2] >= low) & (alignment.vertices[:, :2] <= high), axis=1)
+    chainage = alignment.number[inside] * alignment.spacing
+    margin = min(1.5 * reach + alignment.spacing, float(np.ptp(chainage)) / 2.0)
+    first, last = chainage.min() + margin, chainage.max() - margin
+    return range(int(first // KILOMETRE), int(last // KILOMETRE) + 1)
+
+
+def give_up_file(conn: psycopg.Connection[Any], survey: Survey, name: str) -> None:
+    """Let a file that has failed fail only the kilometres that hold its points, not those that it just touches.
+
+    Does nothing for a file that has not failed for good, or of which not even the box can be read.
+    """
+    with conn.transaction():
+        conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey.id])
+        row = conn.execute(
+            "SELECT path, parameters FROM tunnel.incoming WHERE survey_id = %s AND name = %s AND failed_at IS NOT NULL",
+            [survey.id, name],
+        ).fetchone()
+        if row is None or not Path(row[0]).is_file():
+            return
+        reach = settings_of(row[1]).max_distance
+        held = _damaged_kilometres(Path(row[0]), load_alignment(conn, survey), reach)
+        if held:
+            conn.execute(
+                "UPDATE tunnel.incoming SET km_from = %s, km_to = %s WHERE survey_id = %s AND name = %s",
+                [held[0], held[-1], survey.id, name],
+            )
+            conn.execute("SELECT tunnel_api.queue_plan(%s)", [survey.id])
 
 
 def _untouched(path: Path, size: int, known_path: str, known_size: int, read_at: dt.datetime) -> bool:

@@ -145,6 +145,7 @@ def _survey(conn: psycopg.Connection[Any], survey_id: int) -> Survey:
 
 
 def _read(conn: psycopg.Connection[Any], job: Job, survey_id: int, name: str) -> None:
+    from tunneldb.job.batch import give_up_file
     from tunneldb.job.load import settings_of
     from tunneldb.job.read import read_file
 
@@ -156,8 +157,12 @@ def _read(conn: psycopg.Connection[Any], job: Job, survey_id: int, name: str) ->
     if row is None:
         raise GoneError(f"{name} is not to be read any more")
     path, parameters = row
-    with stage_run(conn, survey_id, None, "read", {**parameters, "file": name}, job) as run:
-        run.counts.update(read_file(conn, survey, Path(path), settings_of(parameters)))
+    try:
+        with stage_run(conn, survey_id, None, "read", {**parameters, "file": name}, job) as run:
+            run.counts.update(read_file(conn, survey, Path(path), settings_of(parameters)))
+    except UserError:
+        give_up_file(conn, survey, name)
+        raise
 
 
 def _stage(conn: psycopg.Connection[Any], job: Job, survey_id: int, km: int, name: str) -> None:
