@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs by apt what the embedded server, the tests and QGIS need, unless it is there.
-# Usage: scripts/system-packages.sh [server] [tests]
+# Installs by apt what the embedded server, the tests and QGIS, and the benchmarks' peers need, unless it is there.
+# Usage: scripts/system-packages.sh [server] [tests] [bench]
 set -euo pipefail
 
 wanted=("$@")
@@ -31,6 +31,9 @@ collect() {
                 need "postgresql-${version}-plpgsql-check" '/usr/share/postgresql/*/extension/plpgsql_check.control'
                 need python3-qgis '/usr/lib/python3/dist-packages/qgis/core/__init__.py'
                 need qgis-providers '/usr/lib/qgis/plugins/libprovider_postgres.so'
+                ;;
+            bench)
+                need "postgresql-${version}-pointcloud" '/usr/share/postgresql/*/extension/pointcloud.control'
                 ;;
         esac
     done
