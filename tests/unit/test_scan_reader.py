@@ -255,6 +255,98 @@ def test_no_points(tmp_path: Path) -> None:
         read_header(tmp_path / "a.laz")
 
 
+NUMBERS = ["u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8"]
+
+
+@pytest.mark.parametrize("suffix", ["las", "laz"])
+@pytest.mark.parametrize("kind", NUMBERS)
+def test_extra_bytes_of_any_number_type_with_scale_and_offset(tmp_path: Path, kind: str, suffix: str) -> None:
+    """As RIEGL writes them: Amplitude plain or scaled by 0.01, Reflectance signed, beside other dimensions."""
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.add_extra_dims([
+        laspy.ExtraBytesParams("Deviation", "u2"),
+        laspy.ExtraBytesParams("Plain", kind),
+        laspy.ExtraBytesParams("Scaled", kind, scales=np.array([0.01]), offsets=np.array([-30.0])),
+    ])  # fmt: skip
+    las = laspy.LasData(header)
+    stored = np.arange(0 if kind[0] == "u" else -100, 101, dtype=kind)
+    las.x = las.y = las.z = np.zeros(len(stored))
+    for name in ("Plain", "Scaled"):
+        las.points.array[name] = stored
+    path = tmp_path / f"a.{suffix}"
+    las.write(path)
+    assert read_header(path).dimensions[-3:] == ("Deviation", "Plain", "Scaled")
+    (plain,), (scaled,) = read_chunks(path, "Plain"), read_chunks(path, "Scaled")
+    np.testing.assert_array_equal(plain.intensity, stored.astype("f4"))
+    np.testing.assert_allclose(scaled.intensity, stored.astype("f8") * 0.01 - 30.0, rtol=1e-6)
+    np.testing.assert_allclose(scaled.intensity, np.asarray(laspy.read(path)["Scaled"]), rtol=1e-6)
+
+
+def test_names_of_dimensions_are_case_exact(tmp_path: Path) -> None:
+    write(tmp_path / "a.laz", 10)
+    with pytest.raises(
+        UserError, match=r"no dimension 'amplitude' \(did you mean 'Amplitude'\? capitals matter\); the file has X, Y"
+    ):
+        list(read_chunks(tmp_path / "a.laz", "amplitude"))
+
+
+def test_points_whose_intensity_is_no_data_are_told(tmp_path: Path) -> None:
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.add_extra_dim(laspy.ExtraBytesParams("Amplitude", "i2", no_data=[-999], scales=[0.01], offsets=[0.0]))
+    las = laspy.LasData(header)
+    las.x = las.y = las.z = np.zeros(20)
+    stored = np.arange(20)
+    las.points.array["Amplitude"] = stored
+    las.write(tmp_path / "good.laz")
+    (points,) = read_chunks(tmp_path / "good.laz", "Amplitude")
+    np.testing.assert_allclose(points.intensity, stored * 0.01, rtol=1e-6)
+    las.points.array["Amplitude"][[3, 7]] = -999
+    las.write(tmp_path / "bad.laz")
+    with pytest.raises(UserError, match=r"bad\.laz: 2 points of a chunk have no Amplitude: their value is -999"):
+        list(read_chunks(tmp_path / "bad.laz", "Amplitude"))
+    assert sum(map(len, read_chunks(tmp_path / "bad.laz", None))) == 20
+
+
+def test_several_values_a_point_are_no_intensity(tmp_path: Path) -> None:
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.add_extra_dim(laspy.ExtraBytesParams("Normal", "3f4"))
+    las = laspy.LasData(header)
+    las.x = las.y = las.z = np.zeros(2)
+    las.write(tmp_path / "a.laz")
+    with pytest.raises(UserError, match="Normal has several values a point"):
+        list(read_chunks(tmp_path / "a.laz", "Normal"))
+
+
+@pytest.mark.skipif(not DATA.exists(), reason="the real scans are not beside the checkout")
+@pytest.mark.parametrize(
+    ("name", "dimension"),
+    [("extra-bytes", "Deviation"), ("extra-bytes", "intensity"), ("lone-star", "intensity"), ("ringo", None)],
+)
+def test_real_scans_as_laspy_reads_them(name: str, dimension: str | None) -> None:
+    path = DATA / f"{name}.laz"
+    las = laspy.read(path)
+    chunks = list(read_chunks(path, dimension, 300_000))
+    np.testing.assert_allclose(np.concatenate([chunk.xyz for chunk in chunks]), las.xyz, atol=1e-9)
+    for field, theirs in (
+        ("time", "gps_time"),
+        ("scan_id", "point_source_id"),
+        ("classification", "classification"),
+        *([("intensity", dimension)] if dimension else []),
+    ):
+        np.testing.assert_array_equal(np.concatenate([getattr(chunk, field) for chunk in chunks]), np.asarray(las[theirs]))
+    (part,) = read_chunks(path, dimension, ranges=[(123_456, 123_987)])
+    np.testing.assert_allclose(part.xyz, las.xyz[123_456:123_987], atol=1e-9)
+
+
+@pytest.mark.skipif(not DATA.exists(), reason="the real scans are not beside the checkout")
+def test_real_extra_bytes_described_in_two_records() -> None:
+    """TerraScan describes each dimension in a record of its own; laspy looks at the first and calls the rest ExtraBytes."""
+    header = read_header(DATA / "extra-bytes.laz")
+    assert header.dimensions[-2:] == ("Deviation", "confidence")
+    found = np.concatenate([chunk.intensity for chunk in read_chunks(DATA / "extra-bytes.laz", "confidence")])
+    np.testing.assert_array_equal(found, np.asarray(laspy.read(DATA / "extra-bytes.laz")["ExtraBytes"]))
+
+
 @pytest.mark.skipif(not DATA.exists(), reason="the real scans are not beside the checkout")
 def test_real_scans() -> None:
     assert sum(map(len, read_chunks(DATA / "ringo.laz", None, 300_000))) == 1_139_889
