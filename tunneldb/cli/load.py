@@ -61,7 +61,7 @@ def load(
     noise_diameter: float,
     max_distance: float,
 ) -> None:
-    """Load LAS and LAZ FILES into SURVEY.
+    """Load LAS, LAZ and E57 FILES into SURVEY.
 
     Noise is dropped, the rest thinned to the survey's density and stored in the order of chainage. A file that is
     loaded already is left alone; a file of the same name with other content takes its place.
