@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -32,25 +33,32 @@ _FIELDS = (
 
 @dataclass(frozen=True)
 class Source:
-    """A scan file that was loaded.
+    """What a kilometre needs of a scan file that was read.
 
     Attributes
     ----------
     path : Path
         Where it lay then.
-    points : int
-        Points in it.
+    ranges : list of (int, int)
+        Point numbers, from 0, half-open, among which are all the file's points of the kilometre and 10 m to both sides.
     dimension : str or None
         The survey's intensity dimension.
     """
 
     path: Path
-    points: int
+    ranges: list[tuple[int, int]]
     dimension: str | None
+
+    @property
+    def points(self) -> int:
+        """Points to read."""
+        return sum(end - begin for begin, end in self.ranges)
 
 
 def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Source]:
     """Scan files of a survey that touch a kilometre, in order of chainage; each must be what was loaded.
+
+    A file's checksum is read once in the life of a process, and once more whenever its size or time of change is another.
 
     Raises
     ------
@@ -58,21 +66,29 @@ def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Sour
         If there is none, or one is gone or has other contents than when it was loaded.
     """
     rows = conn.execute(
-        "SELECT path, points, bytes, checksum FROM tunnel.scan_file"
-        " WHERE survey_id = %s AND chainage_to >= %s AND chainage_from < %s ORDER BY chainage_from, name",
-        (survey.id, km * 1000.0, (km + 1) * 1000.0),
+        "SELECT f.path, f.bytes, f.checksum, k.points FROM tunnel.scan_file f JOIN tunnel.file_km k ON k.file_id = f.id"
+        " WHERE f.survey_id = %s AND k.km = %s AND k.loaded_at IS NOT NULL AND NOT isempty(k.points)"
+        " ORDER BY f.chainage_from, f.name",
+        (survey.id, km),
     ).fetchall()
     if not rows:
         raise UserError(f"survey {survey.name} has no scan file in kilometre {km}: tunneldb load {survey.name} FILE")
     found = []
-    for name, points, size, known in rows:
+    for name, size, known, ranges in rows:
         path = Path(name)
         if not path.is_file():
             raise UserError(f"{path}: the scan file is gone since it was loaded; put it back or load it from elsewhere")
-        if path.stat().st_size != size or checksum(path) != known:
+        status = path.stat()
+        if status.st_size != size or _checksum(path, status.st_mtime_ns, size) != known:
             raise UserError(f"{path}: the scan file was changed since it was loaded; load it again")
-        found.append(Source(path, points, survey.intensity_dimension))
+        found.append(Source(path, [(part.lower, part.upper) for part in ranges], survey.intensity_dimension))
     return found
+
+
+@cache
+def _checksum(path: Path, changed: int, size: int) -> str:
+    """Checksum of a file that was last changed then and has that size."""
+    return checksum(path)
 
 
 def sample(conn: psycopg.Connection[Any], survey: Survey, km: int, count: int = SAMPLE) -> Points:

@@ -14,7 +14,7 @@ from tunneldb.intensity.oren_nayar import coefficients
 from tunneldb.intensity.reference import SPAN_TOLERANCE
 from tunneldb.job.sources import Source
 from tunneldb.job.threads import threads
-from tunneldb.leak.image import KILOMETRE, Accumulator, Grid
+from tunneldb.leak.image import Accumulator, Grid
 from tunneldb.leak.kernel import Faces, Optics, Pixels, Scanner, Shape, Tally, Target, look
 from tunneldb.leak.seen import Eye, Span
 from tunneldb.scan.reader import Points, read_chunks
@@ -71,7 +71,7 @@ def gather(eye: Eye, files: list[Source], image: Accumulator, roughness: float, 
 def _chunks(files: list[Source]) -> Iterator[tuple[Path, Points]]:
     size = CHUNK if threads() == 1 else 4 * CHUNK * threads()  # so that each thread has chunks to decode
     for file in files:
-        for points in read_chunks(file.path, file.dimension, size):
+        for points in read_chunks(file.path, file.dimension, size, file.ranges):
             yield file.path, points
 
 
@@ -99,11 +99,12 @@ class Lens:
                 eye.box[0],
                 eye.box[1],
                 eye.tolerance,
-                grid.km * KILOMETRE,
+                grid.west,
                 1.0 / grid.pixel,
                 grid.bottom,
                 grid.rows,
-                grid.columns,
+                grid.near.start,
+                grid.near.stop,
                 float(floor.chainage[0]),
                 floor.left,
                 floor.right,

@@ -82,8 +82,9 @@ class Target(NamedTuple):
     """Where points go.
 
     ``low`` and ``high`` (3) are the box of points to look at, m; ``tolerance`` the greatest distance from the surface,
-    m; ``west`` the chainage at column 0, m; ``bottom`` the arc of the lower edge of the last row, in pixels. The floor
-    begins at the arcs ``left`` and ``right`` (m) at each metre from ``floor`` on.
+    m; ``west`` the chainage at column 0, m; ``bottom`` the arc of the lower edge of the last row, in pixels; ``first``
+    to ``stop`` are the columns that take points. The floor begins at the arcs ``left`` and ``right`` (m) at each metre
+    from ``floor`` on.
     """
 
     low: Float
@@ -93,7 +94,8 @@ class Target(NamedTuple):
     per_metre: float
     bottom: int
     rows: int
-    columns: int
+    first: int
+    stop: int
     floor: float
     left: Float
     right: Float
@@ -209,7 +211,7 @@ def _look(
                 continue
             c = np.floor((chainage - target.west) * target.per_metre)
             r = target.rows - 1 - (np.floor(arc * target.per_metre) - target.bottom)
-            if c < 0 or c >= target.columns or r < 0 or r >= target.rows:
+            if c < target.first or c >= target.stop or r < 0 or r >= target.rows:
                 continue
             raw, corrected = 0.0, 0.0
             if optics.wanted:

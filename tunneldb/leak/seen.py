@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,14 +97,17 @@ class Eye:
     box: Float
 
     @classmethod
-    def of(cls, surface: Surface, km: int, tolerance: float, radiometer: Radiometer | None) -> Eye:
-        """Make the eye for a kilometre that the surface covers at least in part."""
-        touching = (surface.ends[:, 1] > km * 1000.0) & (surface.ends[:, 0] < (km + 1) * 1000.0)
+    def of(cls, surface: Surface, km: int, tolerance: float, radiometer: Radiometer | None, halo: float = 0.0) -> Eye:
+        """Make the eye for a kilometre that the surface covers at least in part, and so many metres beyond its ends."""
+        start, stop = km * 1000.0, (km + 1) * 1000.0
+        touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)
         if not touching.any():
             raise UserError(f"kilometre {km} has no segments yet: run its stages segments and sections first")
+        # Whole metres, so that what is laid out each metre lies at the same places from either kilometre.
+        start, stop = start - math.ceil(halo), stop + math.ceil(halo)
+        touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)
         vertices = surface.segments[touching, :6].reshape(-1, 3)
         margin = float(surface.radius.max()) + tolerance
-        start, stop = km * 1000.0, (km + 1) * 1000.0
         return cls(
             surface,
             km,
