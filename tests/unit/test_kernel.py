@@ -1,0 +1,241 @@
+"""The compiled pass over points against the same steps in NumPy, array by array."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tunneldb.errors import UserError
+from tunneldb.geometry.frame import plan_lengths, segment_rows, tangents
+from tunneldb.geometry.surface import Surface
+from tunneldb.intensity.correct import Kind, to_decibel
+from tunneldb.intensity.oren_nayar import incidence_db
+from tunneldb.intensity.reference import ReferenceCurve
+from tunneldb.job.sources import Source
+from tunneldb.job.threads import threads, use_threads
+from tunneldb.leak import gather as module
+from tunneldb.leak.gather import Lens, gather
+from tunneldb.leak.image import LEVEL, OFFSET, Accumulator, Grid
+from tunneldb.leak.seen import Eye, Radiometer
+from tunneldb.scan.pose import PoseModel
+from tunneldb.scan.reader import Points
+
+KM, START, LENGTH = 3, 3100.0, 60.0
+ORIGIN = np.array([512_000.0, 4_104_000.0, 414.0])
+CURVE = ReferenceCurve.from_rows(np.array([0.5, 2.0, 3.0, 4.5, 9.0]), np.array([31.0, 36.0, 34.0, 30.0, 22.0]))
+FAR = ReferenceCurve.from_rows(np.array([0.5, 2.0, 5.0, 60.0]), np.array([31.0, 36.0, 30.0, 5.0]))
+ROUGHNESS = 14.0
+MAX_INCIDENCE = 70.0
+
+
+def tunnel() -> Surface:
+    """A bend that climbs; sections from round to a box, with a niche in one of them and a hole where one is missing."""
+    s = np.arange(0.0, LENGTH + 1, 10.0)
+    angle = s / 150.0
+    vertices = ORIGIN + np.column_stack([150.0 * (1 - np.cos(angle)), 150.0 * np.sin(angle), 0.03 * s])
+    tangent = tangents(vertices)
+    ends = START + np.concatenate([[0.0], np.cumsum(plan_lengths(vertices, tangent))])
+    chainages = START + np.array([2.5, 7.5, 12.5, 17.5, 22.5, 37.5, 42.5, 47.5, 52.5, 57.5])
+    degree = np.radians(np.arange(-180.0, 181.0))
+    box = np.minimum(3.5 / np.maximum(np.abs(np.sin(degree)), 1e-9), 2.8 / np.maximum(np.abs(np.cos(degree)), 1e-9))
+    share = np.linspace(0.0, 1.0, len(chainages))[:, None]
+    radius = (1 - share) * 3.2 + share * box
+    radius[3, 265:285] += 1.2
+    step = np.hypot(*np.diff(np.stack([radius * np.sin(degree), radius * np.cos(degree)]), axis=2))
+    arcs = np.concatenate([np.zeros((len(step), 1)), np.cumsum(step, axis=1)], axis=1)
+    arcs -= arcs[:, 180:181]
+    return Surface(
+        np.arange(len(vertices) - 1),
+        segment_rows(vertices, tangent),
+        np.column_stack([ends[:-1], ends[1:]]),
+        chainages,
+        radius,
+        arcs,
+        10.0,
+    )
+
+
+SURFACE = tunnel()
+
+
+def poses(mobile: bool) -> PoseModel:
+    chainage = START + np.arange(1.0, LENGTH, 1.0)
+    origin = SURFACE.frames(chainage)[:, 0] + [0.2, 0.1, -0.4]
+    if mobile:
+        return PoseModel.from_trajectory(np.arange(len(chainage), dtype=float), origin)
+    return PoseModel.from_stations(np.array([40, 7, 12]), origin[[50, 10, 30]])
+
+
+def cloud(count: int, seed: int = 1) -> Points:
+    """Points in a spiral and points anywhere, near the surface and far from it, on planes and sections too."""
+    rng = np.random.default_rng(seed)
+    chainage = START + np.sort(rng.uniform(-3.0, LENGTH + 3.0, count))
+    arc = np.linspace(0.0, 60.0, count) * 20.0 % 24.0 - 12.0
+    offset = rng.normal(0.0, 0.05, count)
+    loose = rng.random(count) < 0.2
+    chainage[loose] = START + rng.uniform(-3.0, LENGTH + 3.0, loose.sum())
+    arc[loose] = rng.uniform(-13.0, 13.0, loose.sum())
+    offset[loose] = rng.uniform(-3.5, 3.5, loose.sum())
+    exact = np.flatnonzero(rng.random(count) < 0.02)
+    chainage[exact] = rng.choice(np.concatenate([SURFACE.ends[:, 0], SURFACE.chainages, [START]]), len(exact))
+    xyz = SURFACE.roll(chainage, arc, offset)
+    lost = np.isnan(xyz[:, 0])
+    xyz[lost] = ORIGIN + rng.uniform(-80.0, 80.0, (lost.sum(), 3))
+    time = np.clip(chainage - START - 1.0 + rng.normal(0.0, 0.01, count), 0.0, LENGTH - 2.0)
+    return Points(
+        xyz,
+        time,
+        rng.choice(np.array([7, 12, 40], np.int32), count),
+        rng.uniform(15.0, 40.0, count).astype(np.float32),
+        np.zeros(count, np.uint8),
+    )
+
+
+def eye(kind: str, mobile: bool, curve: ReferenceCurve = FAR) -> Eye:
+    if kind == "none":
+        return Eye.of(SURFACE, KM, 0.3, None)
+    reference = None if kind == "reflectance" else curve
+    typed: Kind = kind  # type: ignore[assignment]
+    return Eye.of(SURFACE, KM, 0.3, Radiometer(typed, poses(mobile), reference, MAX_INCIDENCE))
+
+
+def grid(pixel: float = 0.02) -> Grid:
+    return Grid.covering(KM, pixel, float(SURFACE.arcs.min()), float(SURFACE.arcs.max()))
+
+
+@pytest.mark.parametrize("mobile", [True, False])
+@pytest.mark.parametrize("kind", ["amplitude", "reflectance", "linear", "none"])
+def test_each_point_is_what_the_steps_in_numpy_make_of_it(kind: str, mobile: bool) -> None:
+    points = cloud(60_000)
+    points.intensity[::50] = np.nan
+    points.intensity[1::50] = 0.0
+    look = eye(kind, mobile, CURVE)
+    assert look.edges.sharp.any()
+    pixels, tally = Lens.of(look, grid(), ROUGHNESS).look(points)
+
+    unrolled = SURFACE.unroll(points.xyz)
+    row, column = grid().place(unrolled.chainage, unrolled.arc)
+    with np.errstate(invalid="ignore"):
+        use = (np.abs(unrolled.offset) <= 0.3) & (column >= 0)
+    raw = corrected = np.zeros(len(points))
+    if kind != "none":
+        scanner = poses(mobile).positions(points)
+        ray = scanner - points.xyz
+        distance = np.linalg.norm(ray, axis=1)
+        cosine = (ray * look.edges.normals_of(points.xyz, unrolled)).sum(axis=1) / distance
+        raw = to_decibel(points.intensity, kind)  # type: ignore[arg-type]
+        use &= np.isfinite(raw) & (cosine >= np.cos(np.radians(MAX_INCIDENCE)))
+        corrected = raw - incidence_db(np.where(use, cosine, 1.0), ROUGHNESS)
+        if kind != "reflectance":
+            corrected -= CURVE(distance)
+            lining = use & ~look.floor.covers(unrolled.chainage, unrolled.arc)
+            assert tally.lining == lining.sum()
+            assert tally.outside == CURVE.outside(distance[lining]).sum()
+            assert (tally.nearest, tally.farthest) == pytest.approx((distance[lining].min(), distance[lining].max()))
+    assert 5_000 < use.sum() < 55_000
+    assert tally.used == use.sum()
+    assert tally.lost == 0
+    np.testing.assert_array_equal(pixels.column[: len(points)], np.where(use, column, -1))
+    np.testing.assert_array_equal(pixels.row[: len(points)][use], row[use])
+    np.testing.assert_allclose(pixels.offset[: len(points)][use], unrolled.offset[use], atol=1e-7)
+    np.testing.assert_allclose(pixels.raw[: len(points)][use], raw[use], atol=1e-5)
+    np.testing.assert_allclose(pixels.corrected[: len(points)][use], corrected[use], atol=1e-5)
+
+
+def test_the_order_of_points_does_not_change_where_they_fall() -> None:
+    points = cloud(30_000, 2)
+    order = np.random.default_rng(3).permutation(len(points))
+    mixed = Points(*(getattr(points, name)[order] for name in Points.__dataclass_fields__))
+    lens = Lens.of(eye("amplitude", True), grid(), ROUGHNESS)
+    straight = [array[: len(points)].copy() for array in lens.look(points)[0]]
+    shuffled = [array[: len(points)].copy() for array in lens.look(mixed)[0]]
+    np.testing.assert_array_equal(straight[1][order], shuffled[1])
+    held = shuffled[1] >= 0
+    for one, other in zip(straight, shuffled, strict=True):
+        np.testing.assert_array_equal(one[order][held], other[held])
+
+
+def read(monkeypatch: pytest.MonkeyPatch, look: Eye, parts: list[list[Points]], pixel: float = 0.1) -> Accumulator:
+    """Image of files, each a list of chunks."""
+    files = {Path(f"{k}.laz"): chunks for k, chunks in enumerate(parts)}
+    monkeypatch.setattr(module, "read_chunks", lambda path, dimension, size, ranges: iter(files[path]))
+    image = Accumulator(grid(pixel))
+    sources = [Source(path, [(0, sum(map(len, chunks)))], "Amplitude") for path, chunks in files.items()]
+    gather(look, sources, image, ROUGHNESS, lambda share: None)
+    return image
+
+
+def part(points: Points, chosen: np.ndarray) -> Points:
+    return Points(*(getattr(points, name)[chosen] for name in Points.__dataclass_fields__))
+
+
+def test_the_image_depends_neither_on_files_nor_on_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    points, look, before = cloud(50_000, 4), eye("amplitude", True), threads()
+    index = np.arange(len(points))
+    splits = [
+        [[points]],
+        [[part(points, chunk) for chunk in np.array_split(index, 9)]],
+        [[part(points, chunk)] for chunk in np.array_split(np.random.default_rng(5).permutation(index), 3)[::-1]],
+    ]
+    images = []
+    try:
+        for count in (1, 2):
+            use_threads(count)
+            for files in splits:
+                with read(monkeypatch, look, files) as image:
+                    images.append(image.window(0, image.grid.columns))
+    finally:
+        use_threads(before)
+    assert images[0].count.max() > 3
+    for other in images[1:]:
+        for name in ("count", "offset", "raw", "corrected"):
+            np.testing.assert_array_equal(getattr(other, name), getattr(images[0], name))
+
+
+def test_a_pixel_is_the_mean_of_its_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    points, look = cloud(50_000, 6), eye("reflectance", False)
+    pixels, _ = Lens.of(look, grid(0.1), ROUGHNESS).look(points)
+    with read(monkeypatch, look, [[points]]) as image:
+        window = image.window(0, image.grid.columns)
+    row, column = np.argwhere(window.count >= 4)[0]
+    inside = np.flatnonzero((pixels.row[: len(points)] == row) & (pixels.column[: len(points)] == column))
+    assert window.count[row, column] == len(inside)
+    assert window.offset[row, column] == pytest.approx(pixels.offset[inside].mean(), abs=OFFSET)
+    assert window.raw[row, column] == pytest.approx(pixels.raw[inside].mean(), abs=LEVEL)
+    assert window.corrected[row, column] == pytest.approx(pixels.corrected[inside].mean(), abs=LEVEL)
+
+
+def test_points_of_unknown_scanner_position_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = cloud(20_000, 7)
+    points.time[15_000:] += 2.5
+    with pytest.raises(UserError, match=r"0\.laz: gps_time of \d+ points is outside the trajectory, up to 2\.[45]\d\d s after"):
+        read(monkeypatch, eye("amplitude", True), [[points]])
+    points.scan_id[points.scan_id == 12] = 13
+    with pytest.raises(UserError, match=r"0\.laz: no station for scan_id 13 \(\d+ points\)"):
+        read(monkeypatch, eye("amplitude", False), [[points]])
+
+
+def test_a_time_just_beyond_the_trajectory_is_that_of_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = cloud(20_000, 8)
+    points.time[:] = LENGTH - 2.0
+    with read(monkeypatch, eye("amplitude", True), [[points]], 0.5) as image:
+        at_end = image.window(0, image.grid.columns)
+    points.time[:] += 0.0009
+    with read(monkeypatch, eye("amplitude", True), [[points]], 0.5) as image:
+        beyond = image.window(0, image.grid.columns)
+    np.testing.assert_array_equal(at_end.corrected, beyond.corrected)
+
+
+def test_points_that_the_curve_does_not_span_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    short = ReferenceCurve.from_rows(np.array([0.5, 3.0]), np.array([30.0, 28.0]))
+    with pytest.raises(UserError, match=r"spans 0\.5 to 3 m, the lining lies .* % "):
+        read(monkeypatch, eye("amplitude", True, short), [[cloud(20_000, 9)]])
+
+
+def test_no_point_on_the_lining_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = cloud(5_000)
+    points.xyz[:, 2] += 30.0
+    with pytest.raises(UserError, match=r"no point of 0\.laz lies on the lining of kilometre 3"):
+        read(monkeypatch, eye("amplitude", True), [[points]])
