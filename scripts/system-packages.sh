@@ -31,6 +31,7 @@ collect() {
                 need "postgresql-${version}-plpgsql-check" '/usr/share/postgresql/*/extension/plpgsql_check.control'
                 need python3-qgis '/usr/lib/python3/dist-packages/qgis/core/__init__.py'
                 need qgis-providers '/usr/lib/qgis/plugins/libprovider_postgres.so'
+                need iproute2 '/usr/*bin/ip'
                 ;;
             bench)
                 need "postgresql-${version}-pointcloud" '/usr/share/postgresql/*/extension/pointcloud.control'

@@ -18,8 +18,10 @@ from faults.scene import NAME, SRID, THIN, Scene
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
+from tunneldb.database import connect, get_survey
 from tunneldb.database.fetch import fetch_array
 from tunneldb.database.server import DATABASE, Server
+from tunneldb.job import batch as job
 
 COMMAND = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
 PREPARED = "prepared"
@@ -105,13 +107,23 @@ class Project:
         return psycopg.connect(make_conninfo(self.dsn, dbname="postgres", user="postgres"), autocommit=True)
 
 
+def register(project: Project, files: Sequence[Path]) -> None:
+    """Ask for what a batch asks for, without workers of its own."""
+    chosen = {name: float(value) for name, value in (text.split("=") for text in THIN)}
+    with connect(project.dsn) as conn:
+        conn.autocommit = True
+        survey = get_survey(conn, NAME)
+        job.register(conn, survey, job.plan(conn, survey, files, parameters=chosen))
+
+
 def batch(files: Sequence[Path], *more: object, workers: int = 2) -> list[object]:
     """Arguments of a batch of files."""
     values = [text for value in THIN for text in ("--set", value)]
     return ["batch", NAME, *files, "--workers", workers, *values, *more]
 
 
-_COORDINATES = "ARRAY(SELECT unnest(ARRAY[ST_X(d.geom), ST_Y(d.geom), coalesce(ST_Z(d.geom), 0)]) FROM ST_DumpPoints({}) d ORDER BY d.path)"
+_COORDINATES = """ARRAY(SELECT unnest(ARRAY[ST_X(d.geom), ST_Y(d.geom), coalesce(ST_Z(d.geom), 0)])
+                          FROM ST_DumpPoints({}) d ORDER BY d.path)"""
 _TABLES = {
     "scan_file": "SELECT name, checksum, bytes, points, noise, outside, thinned, kept, chainage_from, chainage_to, extent, "
     "srid FROM tunnel.scan_file ORDER BY name",
