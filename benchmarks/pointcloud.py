@@ -90,7 +90,7 @@ def load_patches(dsn: str, scan: Path, axis: Path, compression: str) -> None:
     columns = (las.X, las.Y, las.Z, None, las["Amplitude"], las.gps_time, las.point_source_id, las.classification)
     for (name, *_), column in zip(DIMENSIONS, columns, strict=True):
         record[name] = np.rint(chainage / CHAINAGE_SCALE) if column is None else np.asarray(column)[order]
-    segment = np.floor(record["Chainage"] * CHAINAGE_SCALE / SEGMENT + 1e-9).astype(np.int64)
+    segment = np.floor(chainage / SEGMENT).astype(np.int64)
     starts = patches(segment)
     table = sql.Identifier(f"patch_{compression}")
     with psycopg.connect(dsn) as connection, connection.cursor() as cursor:
@@ -118,7 +118,7 @@ def questions(length: float, box: Sequence[float], survey: int) -> dict[str, tup
 
     `box`: xmin, ymin, zmin, xmax, ymax, zmax, m.
     """
-    at = length / 2
+    at = length / 2 + CHAINAGE_SCALE / 2  # between two steps of the chainage as the patches store it
     x0, y0, z0, x1, y1, z1 = box
     own = f"FROM tunnel_api.point WHERE survey_id = {survey} AND km BETWEEN 0 AND {int(length // 1000)}"
     span = "count(*), sum(ST_X(geom)), sum(ST_Z(geom)), sum(intensity::float8)"
@@ -127,7 +127,7 @@ def questions(length: float, box: Sequence[float], survey: int) -> dict[str, tup
     def stretch(a: float, b: float) -> tuple[str, str]:
         return (
             f"SELECT {span} {own} AND chainage BETWEEN {a} AND {b}",
-            f"SELECT {each} FROM (SELECT PC_Explode(PC_FilterBetween(pa, 'Chainage', {a} - 1e-9, {b} + 1e-9)) AS pt"
+            f"SELECT {each} FROM (SELECT PC_Explode(PC_FilterBetween(pa, 'Chainage', {a}, {b})) AS pt"
             f" FROM {{patch}} WHERE chainage_from <= {b} AND chainage_to >= {a}) p",
         )
 
@@ -146,11 +146,11 @@ def questions(length: float, box: Sequence[float], survey: int) -> dict[str, tup
         f" WHERE PC_EnvelopeGeometry(pa) && ST_MakeEnvelope({x0}, {y0}, {x1}, {y1}, {SRID})) p",
     )
     per_segment = (
-        f"SELECT floor(chainage / {SEGMENT} + 1e-9)::int, count(*) {own} GROUP BY 1 ORDER BY 1",
+        f"SELECT floor(chainage / {SEGMENT})::int, count(*) {own} GROUP BY 1 ORDER BY 1",
         "SELECT segment, sum(PC_NumPoints(pa))::bigint FROM {patch} GROUP BY 1 ORDER BY 1",
     )
     per_100 = (
-        f"SELECT floor(chainage / 100 + 1e-9)::int, round(min(ST_X(geom))::numeric, 2), round(max(ST_X(geom))::numeric, 2),"
+        f"SELECT floor(chainage / 100)::int, round(min(ST_X(geom))::numeric, 2), round(max(ST_X(geom))::numeric, 2),"
         f" round(min(ST_Z(geom))::numeric, 2), round(max(ST_Z(geom))::numeric, 2), round(avg(intensity)::numeric, 2)"
         f" {own} GROUP BY 1 ORDER BY 1",
         f"SELECT (segment / {100 / SEGMENT:g})::int, round(min(PC_PatchMin(pa, 'X')), 2), round(max(PC_PatchMax(pa, 'X')), 2),"
