@@ -31,6 +31,11 @@ if TYPE_CHECKING:
 @click.option("--density", help="Points per m² of surface to keep, 1 or more, or 'all'; 100, or what the survey has.")
 @click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE", help="Set a parameter, as for tunneldb run.")
 @click.option("--retry-failed", is_flag=True, help="Try again what has failed.")
+@click.option(
+    "--preview",
+    is_flag=True,
+    help="Only show what would be done: files, kilometres covered and missing, points, disk, time.",
+)
 @click.pass_obj
 def batch(
     settings_: Settings,
@@ -42,6 +47,7 @@ def batch(
     density: str | None,
     assignments: tuple[str, ...],
     retry_failed: bool,
+    preview: bool,
 ) -> None:
     """Bring FILES of SURVEY from their points to leaks, kilometre by kilometre, on all cores.
 
@@ -50,7 +56,8 @@ def batch(
 
     Ctrl-C ends the stages that are under way, and stops; a second one stops at once.
 
-    Exit code: 0 when all is done, 1 when something failed, 2 when nothing could be begun.
+    Exit code: 0 when all is done, 1 when something failed, 2 when nothing could be begun. Of --preview: 1 when the disk is too
+    small.
     """
     from tunneldb.job.batch import STEPS, plan, register
 
@@ -63,9 +70,17 @@ def batch(
         conn.autocommit = True
         found = get_survey(conn, survey)
         asked = plan(conn, found, files, kilometres=_range(km), stage=last, reading=reading, parameters=chosen)
+        count = workers or os.cpu_count() or 1
+        if preview:
+            from tunneldb.cli.preview import show
+            from tunneldb.job.preview import preview as look_ahead
+
+            seen = look_ahead(conn, found, asked, _range(km), settings_.dsn is None, count)
+            show(seen)
+            raise SystemExit(0 if seen.fits else 1)
         register(conn, found, asked, retry=retry_failed)
         began = time.monotonic()
-        watch = _work(conn, found, settings_.dsn, workers or os.cpu_count() or 1)
+        watch = _work(conn, found, settings_.dsn, count)
         raise SystemExit(_summary(conn, found, watch, time.monotonic() - began))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.console import Console, ConsoleOptions, Group, JustifyMethod, RenderableType, RenderResult
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -50,31 +50,33 @@ def render(seen: Overview) -> RenderableType:
     return Group(*between[1:])
 
 
-def _kilometres(seen: Overview) -> _Table:
+def _kilometres(seen: Overview) -> FittedTable:
     """Return a row a kilometre, or for several in a row of which the same is to be said."""
     entries = [(km, tuple(cells[stage].state for stage in STAGES), remark(km, seen)) for km, cells in seen.kilometres.items()]
     rows = [
         [Text(spans([km for km, *_ in group])), *(Text(state, STYLES[state]) for state in states), Text(said)]
         for (states, said), group in ((key, list(group)) for key, group in groupby(entries, key=lambda entry: entry[1:]))
     ]
-    return _Table(("km", *STAGES, ""), rows, elastic=len(STAGES) + 1)
+    return FittedTable(("km", *STAGES, ""), rows, elastic=len(STAGES) + 1)
 
 
 @dataclass(frozen=True)
-class _Table:
-    """A table as wide as there is room for: only one column is cut, so that the others can be read."""
+class FittedTable:
+    """A table as wide as there is room for: only column ``elastic`` is cut; those of ``right`` are aligned to the right."""
 
     header: Sequence[str]
     rows: Sequence[Sequence[Text]]
     elastic: int
+    right: Sequence[int] = ()
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         widths = [max([len(name), *(row[index].cell_len for row in self.rows)]) for index, name in enumerate(self.header)]
         others = sum(widths) - widths[self.elastic] + len(widths)
         widths[self.elastic] = max(min(widths[self.elastic], options.max_width - others), len(self.header[self.elastic]), 4)
         table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
-        for name, width in zip(self.header, widths, strict=True):
-            table.add_column(name, no_wrap=True, overflow="ellipsis", width=width)
+        for index, (name, width) in enumerate(zip(self.header, widths, strict=True)):
+            justify: JustifyMethod = "right" if index in self.right else "left"
+            table.add_column(name, no_wrap=True, overflow="ellipsis", width=width, justify=justify)
         for row in self.rows:
             table.add_row(*row)
         yield table
@@ -134,7 +136,7 @@ def summary(seen: Overview) -> Text | None:
     return Text(f"{share}; {rate}; {left} with {workers}")
 
 
-def _workers(workers: Iterable[Worker], survey: str) -> _Table:
+def _workers(workers: Iterable[Worker], survey: str) -> FittedTable:
     rows = [
         [
             Text(worker.host),
@@ -146,7 +148,7 @@ def _workers(workers: Iterable[Worker], survey: str) -> _Table:
         ]
         for worker in workers
     ]
-    return _Table(("worker", "pid", "doing", "for", "heartbeat", ""), rows, elastic=0)
+    return FittedTable(("worker", "pid", "doing", "for", "heartbeat", ""), rows, elastic=0, right=(1,))
 
 
 def _to_do(advices: Iterable[Advice]) -> Group:

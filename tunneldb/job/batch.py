@@ -196,19 +196,37 @@ def _damaged_kilometres(path: Path, alignment: Alignment, reach: float) -> range
 
 
 def _inner_kilometres(header: ScanHeader, alignment: Alignment, reach: float) -> range:
-    """Kilometres in which the axis runs through the box of a file, not just past its ends; empty if none.
+    """Kilometres in which the axis runs through the box of a file, not just past its ends; empty if none."""
+    ends = extent(header, alignment, reach)
+    return range(0) if ends is None else range(int(ends[0] // KILOMETRE), int(ends[1] // KILOMETRE) + 1)
 
-    What `header_kilometres` finds beyond the ends is taken off: the reach, half as much again where the box stands
-    askew to the axis, and a step of the axis.
+
+def extent(header: ScanHeader, alignment: Alignment, reach: float) -> tuple[float, float] | None:
+    """From where to where a file goes along the axis, by its box; rather too short than too long.
+
+    Of where the axis is within the reach of the box, the reach is taken off at both ends, half as much again since the
+    box may stand askew to the axis, and a step of the axis.
+
+    Parameters
+    ----------
+    header : ScanHeader
+    alignment : Alignment
+        The given axis.
+    reach : float
+        How far from the axis the tunnel reaches, m.
+
+    Returns
+    -------
+    tuple or None
+        Two chainages, m; None if the file is not at the axis.
     """
-    if not header_kilometres(header, alignment, reach):
-        return range(0)
     low, high = header.low[:2] - reach, header.high[:2] + reach
     inside = np.all((alignment.vertices[:, :2] >= low) & (alignment.vertices[:, :2] <= high), axis=1)
+    if not inside.any():
+        return None
     chainage = alignment.number[inside] * alignment.spacing
     margin = min(1.5 * reach + alignment.spacing, float(np.ptp(chainage)) / 2.0)
-    first, last = chainage.min() + margin, chainage.max() - margin
-    return range(int(first // KILOMETRE), int(last // KILOMETRE) + 1)
+    return float(chainage.min()) + margin, float(chainage.max()) - margin
 
 
 def give_up_file(conn: psycopg.Connection[Any], survey: Survey, name: str) -> None:
