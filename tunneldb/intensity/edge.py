@@ -47,9 +47,10 @@ class Edges:
     @classmethod
     def of(cls, surface: Surface, start: float, stop: float) -> Edges:
         """Lay the grid over a surface between two chainages, m."""
-        first, last = float(surface.arcs[:, 0].min()), float(surface.arcs[:, -1].max())
+        lowest, highest = float(surface.arcs[:, 0].min()), float(surface.arcs[:, -1].max())
         chainage = np.arange(start, stop + _ALONG, _ALONG)
-        arc = np.arange(first, last + _ACROSS, _ACROSS)
+        # Whole multiples, so that the nodes lie at the same places for the kilometres on both sides of a border.
+        arc = np.arange(np.floor(lowest / _ACROSS), np.ceil(highest / _ACROSS) + 1) * _ACROSS
         c, a = (grid.ravel() for grid in np.meshgrid(chainage, arc, indexing="ij"))
         feet = surface.roll(c, a, np.zeros(len(c)))
         shape = (len(chainage), len(arc), 3)
@@ -58,7 +59,7 @@ class Edges:
         with np.errstate(invalid="ignore"):
             turn = np.einsum("kmi,kmi->km", normals[:, : -2 * _SIDE], normals[:, 2 * _SIDE :])
             sharp[:, _SIDE:-_SIDE] = turn < BEND
-        return cls(start, first, feet.reshape(shape), normals, sharp)
+        return cls(start, float(arc[0]), feet.reshape(shape), normals, sharp)
 
     def normals_of(self, points: Float, unrolled: Unrolled) -> Float:
         """Normals (n, 3) of points (n, 3): that of the surface, or of the nearer face where it bends sharply."""
