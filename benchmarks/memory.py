@@ -17,10 +17,13 @@ POINTS_PER_METRE = 100_000  # of the simulated profiler: 1500 points a profile, 
 # Runs in a process of its own with nothing else in it: Linux counts the parent's memory at the start of a
 # child as the child's.
 WATCH = """
-import json, os, subprocess, sys
+import json, os, subprocess, sys, time
+start = time.perf_counter()
 child = subprocess.Popen(sys.argv[1:], stdout=subprocess.DEVNULL)
 _, status, usage = os.wait4(child.pid, 0)
-print(json.dumps({"status": os.waitstatus_to_exitcode(status), "peak": usage.ru_maxrss * 1024}))
+seconds = time.perf_counter() - start
+code, cpu = os.waitstatus_to_exitcode(status), usage.ru_utime + usage.ru_stime
+print(json.dumps({"status": code, "peak": usage.ru_maxrss * 1024, "cpu": cpu, "seconds": seconds}))
 """
 
 
