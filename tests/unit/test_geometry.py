@@ -87,7 +87,7 @@ def test_normal_points_to_the_axis() -> None:
     seed=st.integers(0, 2**32 - 1),
 )
 def test_there_and_back(radius: float, slope: float, seed: int) -> None:
-    """Sections of any smooth shape that changes along the tunnel: roll is the inverse of unroll to a micrometre."""
+    """Sections of any smooth shape that changes along the tunnel: roll is the inverse of unroll to 10 nm."""
     surface = circular_surface(Helix(radius, slope), 60.0)
     rng = np.random.default_rng(seed)
     angle = np.radians(np.arange(-180.0, 181.0))
@@ -106,9 +106,9 @@ def test_there_and_back(radius: float, slope: float, seed: int) -> None:
     points = varied.roll(chainage, arc, offset)
     assert not np.isnan(points).any()
     back = varied.unroll(points)
-    np.testing.assert_allclose(back.chainage, chainage, atol=1e-6)
-    np.testing.assert_allclose(back.arc, arc, atol=1e-6)
-    np.testing.assert_allclose(back.offset, offset, atol=1e-6)
+    np.testing.assert_allclose(back.chainage, chainage, atol=1e-8)
+    np.testing.assert_allclose(back.arc, arc, atol=1e-8)
+    np.testing.assert_allclose(back.offset, offset, atol=1e-8)
 
 
 def test_surface_is_continuous_across_planes() -> None:
