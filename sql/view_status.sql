@@ -14,12 +14,15 @@ CREATE OR REPLACE VIEW tunnel_api.run AS
 SELECT r.id, r.survey_id, s.name AS survey, r.km, r.stage,
        CASE WHEN r.outcome = 'running' AND NOT tunnel_api.session_lives(r.backend_pid, r.backend_start)
             THEN 'interrupted' ELSE r.outcome END AS outcome,
-       r.started_at, r.finished_at, r.finished_at - r.started_at AS duration, r.message, r.counts, r.parameters, r.versions
+       r.started_at, r.finished_at, r.finished_at - r.started_at AS duration, r.message, r.counts, r.parameters, r.versions,
+       r.worker, r.job_id
   FROM tunnel.run r
   JOIN tunnel.survey s ON s.id = r.survey_id;
 COMMENT ON VIEW tunnel_api.run IS 'Ledger: each run of a stage, with parameters, versions, counts and outcome';
 COMMENT ON COLUMN tunnel_api.run.km IS 'Kilometre; NULL for the whole survey';
 COMMENT ON COLUMN tunnel_api.run.outcome IS 'running, done, failed, or interrupted when its session is gone';
+COMMENT ON COLUMN tunnel_api.run.worker IS 'Machine and process that it ran on';
+COMMENT ON COLUMN tunnel_api.run.job_id IS 'Job of the queue that it was (tunnel_api.job); NULL when run by hand';
 
 -- Last run of each stage on each kilometre of a survey that was ever loaded or worked on, waits to be loaded or is wanted,
 -- and whether its result is out of date. A result rests on

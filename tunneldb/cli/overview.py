@@ -170,7 +170,9 @@ def advise(seen: Overview) -> list[Advice]:
             found[key] = _range(file)
     read = {file.message for file in seen.files}
     for km, cells in seen.kilometres.items():
-        entry = next(((stage, cell) for stage, cell in cells.items() if cell.state not in ("done", "empty", *TO_DO)), None)
+        last = STAGES.index(seen.targets.get(km, STAGES[-1]))
+        wanted = [(stage, cells[stage]) for stage in STAGES[: last + 1]]
+        entry = next(((stage, cell) for stage, cell in wanted if cell.state not in ("done", "empty", *TO_DO)), None)
         if entry is None or (entry[1].state == "failed" and entry[1].reason in read):
             continue
         stage, cell = entry

@@ -85,6 +85,8 @@ class Overview:
         The moment, by the server's clock.
     kilometres : dict
         Of each kilometre that is loaded, was worked on or is wanted, the cell of each stage.
+    targets : dict
+        Stage up to which each kilometre is wanted by a batch.
     files : tuple of File
     workers : tuple of Worker
         All that serve the database, whichever survey they are at.
@@ -102,6 +104,7 @@ class Overview:
     survey: str
     now: dt.datetime
     kilometres: dict[int, dict[str, Cell]]
+    targets: dict[int, str]
     files: tuple[File, ...]
     workers: tuple[Worker, ...]
     done: int
@@ -133,7 +136,6 @@ class _Status(NamedTuple):
     stale: bool
     reason: str | None
     message: str | None
-    started_at: dt.datetime | None
 
 
 class _Plan(NamedTuple):
@@ -141,7 +143,7 @@ class _Plan(NamedTuple):
     message: str | None
 
 
-class _Job(NamedTuple):
+class _Run(NamedTuple):
     worker: str | None
     since: dt.datetime | None
 
@@ -151,7 +153,7 @@ class _Known(NamedTuple):
 
     statuses: dict[tuple[int, str], _Status]
     plans: dict[tuple[int, str], _Plan]
-    jobs: dict[tuple[int, str], _Job]
+    runs: dict[tuple[int, str], _Run]
     active: bool
 
 
@@ -185,6 +187,7 @@ def overview(conn: psycopg.Connection[Any], survey: str) -> Overview:
         survey,
         now[0],
         kilometres,
+        {km: STAGES[goal.step] for km, goal in goals.items()},
         files,
         workers,
         done=sum(state in ("done", "empty") for state in wanted),
@@ -204,18 +207,19 @@ def _known(conn: psycopg.Connection[Any], survey: str, files: tuple[File, ...]) 
     of_survey = conn.execute("SELECT id FROM tunnel_api.survey WHERE name = %s", [survey]).fetchone()
     assert of_survey is not None
     statuses = conn.execute(
-        "SELECT km, stage, outcome, stale, reason, message, started_at FROM tunnel_api.stage_status WHERE survey_id = %s",
+        "SELECT km, stage, outcome, stale, reason, message FROM tunnel_api.stage_status WHERE survey_id = %s",
         of_survey,
     ).fetchall()
     plans = conn.execute("SELECT km, stage, state, message FROM tunnel_api.queue_state(%s)", of_survey).fetchall()
-    jobs = conn.execute(
-        "SELECT km, stage, worker, since FROM tunnel_api.job WHERE survey_id = %s AND state = 'running' AND km IS NOT NULL",
+    runs = conn.execute(
+        "SELECT km, stage, worker, started_at FROM tunnel_api.run"
+        " WHERE survey_id = %s AND outcome = 'running' AND km IS NOT NULL ORDER BY started_at",
         of_survey,
     ).fetchall()
     return _Known(
         {(km, stage): _Status(*rest) for km, stage, *rest in statuses},
         {(km, stage): _Plan(*rest) for km, stage, *rest in plans},
-        {(km, stage): _Job(*rest) for km, stage, *rest in jobs},
+        {(km, stage): _Run(*rest) for km, stage, *rest in runs},
         any(file.state != "failed" for file in files) or any(state in ("queued", "running") for _, _, state, _ in plans),
     )
 
@@ -254,13 +258,11 @@ def _touched(files: tuple[File, ...]) -> set[int]:
 
 
 def _cell(km: int, stage: str, known: _Known) -> Cell:
-    status = known.statuses.get((km, stage), _Status("never", False, None, None, None))
+    status = known.statuses.get((km, stage), _Status("never", False, None, None))
     plan = known.plans.get((km, stage))
-    if plan is not None and plan.state == "running":
-        job = known.jobs.get((km, stage), _Job(None, None))
-        return Cell("running", worker=job.worker, since=job.since)
-    if status.outcome == "running":
-        return Cell("running", since=status.started_at)
+    if status.outcome == "running" or (plan is not None and plan.state == "running"):
+        run = known.runs.get((km, stage), _Run(None, None))
+        return Cell("running", worker=run.worker, since=run.since)
     if plan is not None:
         if plan.state in ("done", "empty", "queued", "failed"):
             return Cell(plan.state, plan.message)
