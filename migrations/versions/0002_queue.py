@@ -183,10 +183,15 @@ def upgrade() -> None:
         sa.Column("filled", sa.BigInteger(), nullable=False, comment="Its pixels that hold measured data"),
         sa.Column("drop_sum", sa.Double(), nullable=False, comment="Sum over them of the drop below dry lining, dB"),
         sa.Column("drop_max", sa.Double(), nullable=False, comment="Greatest drop below dry lining, dB"),
+        sa.Column("leak_id", sa.BigInteger(), nullable=True, comment="Leak that it is a part of, if it is large enough"),
         _of_survey("leak_part"),
+        sa.ForeignKeyConstraint(
+            ["leak_id"], ["tunnel.leak.id"], name=op.f("leak_part_leak_id_fkey"), ondelete="SET NULL"
+        ),
         sa.PrimaryKeyConstraint("id", name=op.f("leak_part_pkey")),
         schema="tunnel",
         comment="Wet regions cut by an end of their kilometre, from which leaks over several kilometres are put together",
     )
     op.create_index(op.f("leak_part_survey_id_km_idx"), "leak_part", ["survey_id", "km"], unique=False, schema="tunnel")
+    op.create_index(op.f("leak_part_leak_id_idx"), "leak_part", ["leak_id"], unique=False, schema="tunnel")
     op.execute(DROP_POINTS)

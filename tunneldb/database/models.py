@@ -507,6 +507,7 @@ class LeakPart(Base):
     __tablename__ = "leak_part"
     __table_args__ = (
         Index(None, "survey_id", "km"),
+        Index(None, "leak_id"),
         {"comment": "Wet regions cut by an end of their kilometre, from which leaks over several kilometres are put together"},
     )
 
@@ -521,6 +522,9 @@ class LeakPart(Base):
     filled: Mapped[int] = mapped_column(BigInteger, comment="Its pixels that hold measured data")
     drop_sum: Mapped[float] = mapped_column(comment="Sum over them of the drop below dry lining, dB")
     drop_max: Mapped[float] = mapped_column(comment="Greatest drop below dry lining, dB")
+    leak_id: Mapped[int | None] = mapped_column(
+        ForeignKey(Leak.id, ondelete="SET NULL"), comment="Leak that it is a part of, if it is large enough"
+    )
 
 
 class Run(Base):

@@ -19,23 +19,21 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.intensity.correct import Kind, Views, needs_reference, range_span
 from tunneldb.intensity.dry import Dry, plain_statistics
 from tunneldb.intensity.roughness import Regions, Roughness, automatic_regions, drawn_regions, find_roughness
-from tunneldb.job.sources import sample, sources
-from tunneldb.leak.detection import Detection, dry_pixels
+from tunneldb.job.sources import Source, sample, sources
+from tunneldb.leak.detection import Detection, dry_places
 from tunneldb.leak.detection import detect as find_leaks
 from tunneldb.leak.gather import Counts, gather
-from tunneldb.leak.image import Accumulator, Grid
-from tunneldb.leak.lining import Astray, states
+from tunneldb.leak.image import KILOMETRE, Accumulator, Grid
+from tunneldb.leak.leaks import save_leaks
+from tunneldb.leak.lining import Astray
+from tunneldb.leak.picture import Picture, develop, halo
 from tunneldb.leak.raster import KINDS
 from tunneldb.leak.seen import Eye, Radiometer, Seen, Span
-from tunneldb.leak.store import (
-    drop_radiometry,
-    load_reference,
-    load_regions,
-    save_images,
-    save_leaks,
-    save_radiometry,
-)
+from tunneldb.leak.store import ImageStore, drop_radiometry, load_reference, load_regions, save_radiometry
 from tunneldb.scan.pose import load_poses
+
+ASIDE = 50.0
+"""Length of the surface beyond the ends that is loaded too: sections are judged by the three before and after them, m."""
 
 NEAR_SURFACE = 0.05
 """Points that serve for the roughness lie no farther from the surface, m."""
@@ -79,39 +77,69 @@ def detect(
     UserError
         If there are no sections, a file is gone or was changed, or intensity can't be corrected.
     """
-    surface = load_surface(conn, survey, km * 1000.0, (km + 1) * 1000.0)
+    surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
     grid = _grid(surface, km, values["image.pixel"])
     files = sources(conn, survey, km)
     radiometer = _radiometer(conn, survey, values["intensity.max_incidence"])
-    eye = Eye.of(surface, km, values["lining.tolerance"], radiometer)
+    eye = Eye.of(surface, km, values["lining.tolerance"], radiometer, grid.halo * grid.pixel)
     with Accumulator(grid) as image:
         if radiometer is None:
-            counts = gather(eye, files, image, 0.0, progress)
-            drop_radiometry(conn, survey, km)
-            save_leaks(conn, survey, km, surface, [])
-            pixels = save_images(conn, survey, image, ["offset"])
-            return {**counts, "pixels": pixels, "leaks": 0, "note": "no intensity: offset image only, no leaks sought"}
+            return _offset_only(conn, survey, eye, files, image, progress)
         view = _sample(conn, survey, eye)
         roughness = _roughness(view, load_regions(conn, survey, km, "homogeneous"))
-        counts = gather(eye, files, image, roughness.sigma, progress)
-        state = states(image, eye.floor, Astray.of(surface), values["appendage.distance"])
-        dry_regions = load_regions(conn, survey, km, "dry")
-        found = find_leaks(image, state, values["leak.min_area"], dry_regions)
-        save_radiometry(conn, survey, km, roughness, found, _sigma(view, image, state, found, roughness, dry_regions))
-        matched = save_leaks(conn, survey, km, surface, found.leaks)
-        pixels = save_images(conn, survey, image, KINDS)
+        counts = _gather(eye, files, image, roughness.sigma, progress)
+        images = ImageStore(conn, survey, grid, KINDS)
+        picture = develop(image, eye.floor, Astray.of(surface), values["appendage.distance"], images.save)
+    dry_regions = load_regions(conn, survey, km, "dry")
+    found = find_leaks(picture, values["leak.min_area"], dry_regions)
+    save_radiometry(conn, survey, km, roughness, found, _sigma(view, picture, found, roughness, dry_regions))
+    matched = save_leaks(conn, survey, km, surface, found.leaks, found.cut, values["leak.min_area"])
     return {
         **counts,
-        "pixels": pixels,
+        "points_used": images.points,
+        "pixels": images.pixels,
         "lining_pixels": found.pixels,
         "wet_pixels": found.wet_pixels,
-        "leaks": len(found.leaks),
+        "leaks": matched.new + matched.again,
+        "leaks_over_ends": matched.over_ends,
         "leaks_new": matched.new,
         "leaks_again": matched.again,
         "leaks_kept_for_review": matched.kept,
         "leaks_gone": matched.gone,
-        **_report(roughness),
+        **_report(roughness, matched.other_pixels),
     }
+
+
+def _offset_only(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    eye: Eye,
+    files: list[Source],
+    image: Accumulator,
+    progress: Callable[[float], None],
+) -> Counts:
+    """Make the offset image of a survey without intensity."""
+    counts = _gather(eye, files, image, 0.0, progress)
+    images = ImageStore(conn, survey, image.grid, ["offset"])
+    for block in image.inner_blocks():
+        images.save(image.window(block * image.grid.block_columns, (block + 1) * image.grid.block_columns))
+    drop_radiometry(conn, survey, eye.km)
+    save_leaks(conn, survey, eye.km, eye.surface, [], [], 0.0)
+    return {
+        **counts,
+        "points_used": images.points,
+        "pixels": images.pixels,
+        "leaks": 0,
+        "note": "no intensity: offset image only, no leaks sought",
+    }
+
+
+def _gather(eye: Eye, files: list[Source], image: Accumulator, roughness: float, progress: Callable[[float], None]) -> Counts:
+    """Read the files into the image, which must not show the halo alone."""
+    counts = gather(eye, files, image, roughness, progress)
+    if not image.inner_blocks():
+        raise UserError(f"no point of {', '.join(file.path.name for file in files)} lies on the lining of kilometre {eye.km}")
+    return counts
 
 
 def _radiometer(conn: psycopg.Connection[Any], survey: Survey, max_incidence: float) -> Radiometer | None:
@@ -128,11 +156,13 @@ def _radiometer(conn: psycopg.Connection[Any], survey: Survey, max_incidence: fl
 
 
 def _grid(surface: Surface, km: int, pixel: float) -> Grid:
-    """Grid of a kilometre, from the lowest to the highest arc of its sections."""
-    inside = (surface.chainages >= km * 1000.0 - surface.reach) & (surface.chainages <= (km + 1) * 1000.0 + surface.reach)
-    if not inside.any():
+    """Grid of a kilometre and its halo, from the lowest to the highest arc of their sections."""
+    first, last = km * KILOMETRE - surface.reach, (km + 1) * KILOMETRE + surface.reach
+    if not ((surface.chainages >= first) & (surface.chainages <= last)).any():
         raise UserError(f"kilometre {km} has no sections yet: run its stages segments and sections first")
-    return Grid.covering(km, pixel, float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max()))
+    beyond = halo(pixel)
+    inside = (surface.chainages >= first - beyond * pixel) & (surface.chainages <= last + beyond * pixel)
+    return Grid.covering(km, pixel, float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max()), beyond)
 
 
 def _sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye) -> Sample:
@@ -184,8 +214,7 @@ def _polygon_of(seen: Seen, polygons: list[Polygon]) -> NDArray[np.int64]:
 
 def _sigma(
     view: Sample,
-    image: Accumulator,
-    state: NDArray[np.uint8],
+    picture: Picture,
     found: Detection,
     roughness: Roughness,
     dry_regions: list[Polygon],
@@ -195,7 +224,7 @@ def _sigma(
     if dry_regions:
         dry = seen.lining & (_polygon_of(seen, dry_regions) >= 0)
     else:
-        dry = seen.lining & image.grid.pick(dry_pixels(image, state, found), seen.chainage, seen.arc)
+        dry = seen.lining & dry_places(picture, found, seen.chainage, seen.arc)
     return (
         plain_statistics(views.raw_db[dry]),
         plain_statistics(views.corrected(0.0)[dry]),
@@ -203,8 +232,8 @@ def _sigma(
     )
 
 
-def _report(roughness: Roughness) -> Counts:
-    """What the ledger says about the roughness."""
+def _report(roughness: Roughness, other_pixels: list[int]) -> Counts:
+    """What the ledger says about the roughness, and what else there is to note."""
 
     def known(value: float, digits: int) -> float | None:
         return round(value, digits) if np.isfinite(value) else None
@@ -217,9 +246,17 @@ def _report(roughness: Roughness) -> Counts:
         "incidence_from": known(roughness.incidence_from, 1),
         "incidence_to": known(roughness.incidence_to, 1),
     }
+    notes = []
     if not roughness.determined:
-        report["note"] = (
+        notes.append(
             "the lining is seen at too similar incidence angles to tell its roughness;"
             " whichever is taken hardly changes the corrected intensity"
         )
+    if other_pixels:
+        notes.append(
+            f"leaks over the end towards kilometre {' and '.join(map(str, other_pixels))} are in two pieces: its pixels are of"
+            " another size; detect both with the same image.pixel"
+        )
+    if notes:
+        report["note"] = "; ".join(notes)
     return report

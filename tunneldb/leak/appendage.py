@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
-from scipy import ndimage
 
 Single = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -30,9 +29,10 @@ SCALES = np.array([0.06, 0.05, 0.04, 0.03, 0.03])
 
 _BIN, _BINS, _REACH = 0.01, 8, 2
 _EVERY = 4  # of the pixels of a part every fourth is taken, in slanting lines: enough for three numbers
+_NONE = np.float32(1e9)  # an offset that no plane comes near
 
 
-def distance_from_plane(offset: Single, pixel: float) -> Single:
+def distance_from_plane(offset: Single, pixel: float, corner: tuple[int, int] = (0, 0)) -> Single:
     """Distance of each pixel from the local plane of the lining (eq. 22), signed.
 
     Each plane is fitted by reweighted least squares (Tukey's weights, ever narrower), so that appendages and
@@ -46,19 +46,20 @@ def distance_from_plane(offset: Single, pixel: float) -> Single:
         Offset image, m, NaN where there is no point.
     pixel : float
         Side of a pixel, m.
+    corner : (int, int)
+        Row and column of its first pixel in an image of which this is a part. A pixel farther than :func:`reach` from the
+        part's edges has the same distance whichever part it is seen in.
 
     Returns
     -------
     (rows, columns) float32 array
         m, positive into the tunnel, NaN where there is no point.
     """
-    step = max(1, round(STEP / pixel))
-    margin = max(1, round((PART - STEP) / 2 / pixel))
-    distance: Single = _distance(np.ascontiguousarray(offset), step, margin, SCALES, MIN_PIXELS)
+    distance: Single = _distance(np.ascontiguousarray(offset), *_sides(pixel), *corner, SCALES.astype(np.float32), MIN_PIXELS)
     return distance
 
 
-def appendages(offset: Single, pixel: float, delta: float = DELTA) -> Mask:
+def appendages(offset: Single, pixel: float, delta: float = DELTA, corner: tuple[int, int] = (0, 0)) -> Mask:
     """Mark pixels that don't lie on the lining (eq. 23), grown to swallow the mixed pixels of their edges.
 
     Parameters
@@ -69,19 +70,26 @@ def appendages(offset: Single, pixel: float, delta: float = DELTA) -> Mask:
         Side of a pixel, m.
     delta : float
         δ, m.
+    corner : (int, int)
+        As for :func:`distance_from_plane`.
 
     Returns
     -------
     (rows, columns) bool array
     """
-    distance = distance_from_plane(offset, pixel)
-    with np.errstate(invalid="ignore"):
-        off = np.abs(distance) >= delta
-    # A pixel alone is an outlier, which has no edge.
-    neighbours = ndimage.uniform_filter(off.astype(np.float32), 3, mode="constant") * 9.0
-    body = off & (neighbours > 1.5)
-    grown = ndimage.binary_dilation(body, ndimage.generate_binary_structure(2, 2), iterations=_growth(pixel))
-    return np.asarray(off | grown, dtype=np.bool_)
+    marked: Mask = _grown(distance_from_plane(offset, pixel, corner), delta, _growth(pixel))
+    return marked
+
+
+def reach(pixel: float) -> int:
+    """How far, in pixels, what a pixel is judged by lies from it at most."""
+    step, margin = _sides(pixel)
+    return step + margin + _growth(pixel) + 1
+
+
+def _sides(pixel: float) -> tuple[int, int]:
+    """Side of the middle of a part and width of what lies about it, pixels."""
+    return max(1, round(STEP / pixel)), max(1, round((PART - STEP) / 2 / pixel))
 
 
 def _growth(pixel: float) -> int:
@@ -89,9 +97,82 @@ def _growth(pixel: float) -> int:
     return max(1, round(0.04 / pixel))
 
 
+@njit(cache=True, nogil=True, parallel=True)
+def _distance(
+    offset: Single, step: int, margin: int, row: int, column: int, scales: Single, min_pixels: int
+) -> Single:  # pragma: no cover - compiled
+    rows, columns = offset.shape
+    out = np.empty((rows, columns), np.float32)
+    side = step + 2 * margin
+    down, across = row // step, column // step  # the first tiles, which may begin before the image
+    tall, wide = (row + rows - 1) // step - down + 1, (column + columns - 1) // step - across + 1
+    first_row, first_column = down * step - margin, across * step - margin
+    thin = _thinned(
+        offset, row - first_row, column - first_column, tall * step + 2 * margin, wide * step + 2 * margin, row - column
+    )
+    x, y = _places(side)
+    each = side // _EVERY
+    for tile_row in prange(tall):
+        z = np.full(x.shape[1], _NONE, np.float32)
+        counts = np.empty((2, 2 * _BINS + 2), np.int32)
+        top = (down + tile_row) * step - row
+        for tile in range(wide):
+            left = (across + tile) * step - column
+            r0, r1, c0, c1 = max(top, 0), min(top + step, rows), max(left, 0), min(left + step, columns)
+            if not _any(offset, r0, r1, c0, c1):
+                out[r0:r1, c0:c1] = np.nan
+                continue
+            counts[:] = 0
+            phase = (top + row - left - column) % _EVERY
+            for i in range(side):
+                # Where the row's first sample in the part lies among all its samples.
+                begin = (tile * step + (phase + i) % _EVERY) // _EVERY
+                for k in range(each):
+                    value = thin[tile_row * step + i, begin + k]
+                    z[i * each + k] = value
+                    counts[k & 1, _bin(value)] += 1
+            a, b, c = _plane(x[phase], y, z, _level(counts), scales, min_pixels)
+            for i in range(r0, r1):
+                down_part = (i - top - 0.5 * step) / side
+                for j in range(c0, c1):
+                    along = (j - left - 0.5 * step) / side
+                    out[i, j] = offset[i, j] - np.float32(a + b * along + c * down_part)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _thinned(
+    offset: Single, skip_rows: int, skip_columns: int, rows: int, columns: int, slant: int
+) -> Single:  # pragma: no cover - compiled
+    """Every fourth pixel of each row, in slanting lines, with a margin; _NONE where there is no point."""
+    thin = np.full((rows, columns // _EVERY + 2), _NONE, np.float32)
+    for i in range(offset.shape[0]):
+        # The columns whose number is that of the row, but for multiples of four.
+        shift = (i + slant + skip_columns) % _EVERY
+        for m in range(thin.shape[1]):
+            j = shift + _EVERY * m - skip_columns
+            if 0 <= j < offset.shape[1] and not np.isnan(offset[i, j]):
+                thin[i + skip_rows, m] = offset[i, j]
+    return thin
+
+
+@njit(cache=True, nogil=True)
+def _places(side: int) -> tuple[Single, Single]:  # pragma: no cover - compiled
+    """Where the samples of a part lie in it, for each of four phases: x (4, n) and y (n,), in sides from its middle."""
+    each = side // _EVERY
+    room = (side * each + 63) // 64 * 64  # whole vectors
+    x, y = np.zeros((_EVERY, room), np.float32), np.zeros(room, np.float32)
+    for i in range(side):
+        for k in range(each):
+            for phase in range(_EVERY):
+                x[phase, i * each + k] = ((phase + i) % _EVERY + _EVERY * k - 0.5 * side) / side
+            y[i * each + k] = (i - 0.5 * side) / side
+    return x, y
+
+
 @njit(cache=True, nogil=True)
 def _any(offset: Single, r0: int, r1: int, c0: int, c1: int) -> bool:  # pragma: no cover - compiled
-    """Tell whether a part holds points."""
+    """Tell whether a tile holds points."""
     for i in range(r0, r1):
         for j in range(c0, c1):
             if not np.isnan(offset[i, j]):
@@ -100,84 +181,97 @@ def _any(offset: Single, r0: int, r1: int, c0: int, c1: int) -> bool:  # pragma:
 
 
 @njit(cache=True, nogil=True)
-def _level(offset: Single, top: int, bottom: int, left: int, right: int) -> float:  # pragma: no cover - compiled
-    """Offset near which most pixels of a part lie, those near the section surface counting more."""
-    counts = np.zeros(2 * _BINS + 1)
-    for i in range(top, bottom):
-        for j in range(left + i % _EVERY, right, _EVERY):
-            z = offset[i, j]
-            if not np.isnan(z):
-                k = int(np.floor(z / _BIN + 0.5)) + _BINS
-                if 0 <= k <= 2 * _BINS:
-                    counts[k] += 1.0
+def _bin(z: np.float32) -> int:  # pragma: no cover - compiled
+    """Class of 1 cm of an offset, the last one for what lies nowhere near the section surface."""
+    k = (
+        np.int32(min(max(z * np.float32(1.0 / _BIN), np.float32(-_BINS - 1)), np.float32(_BINS + 1)) + np.float32(_BINS + 1.5))
+        - 1
+    )
+    return int(k) if 0 <= k <= 2 * _BINS else 2 * _BINS + 1
+
+
+@njit(cache=True, nogil=True)
+def _level(counts: NDArray[np.int32]) -> float:  # pragma: no cover - compiled
+    """Offset near which most samples lie, those near the section surface counting more."""
     best, level = 0.0, 0.0
     for k in range(2 * _BINS + 1):
         score = 0.0
         for m in range(max(k - _REACH, 0), min(k + _REACH, 2 * _BINS) + 1):
-            score += counts[m]
+            score += counts[0, m] + counts[1, m]
         score *= 1.0 - abs(k - _BINS) / (2.0 * _BINS)
         if score > best:
             best, level = score, (k - _BINS) * _BIN
     return level
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _distance(
-    offset: Single, step: int, margin: int, scales: NDArray[np.float64], min_pixels: int
-) -> Single:  # pragma: no cover - compiled
-    rows, columns = offset.shape
-    out = np.empty((rows, columns), np.float32)
-    across = (columns + step - 1) // step
-    for tile in prange(((rows + step - 1) // step) * across):
-        r0 = (tile // across) * step
-        c0 = (tile % across) * step
-        r1, c1 = min(r0 + step, rows), min(c0 + step, columns)
-        top, bottom = max(r0 - margin, 0), min(r1 + margin, rows)
-        left, right = max(c0 - margin, 0), min(c1 + margin, columns)
-        if not _any(offset, r0, r1, c0, c1):
-            out[r0:r1, c0:c1] = np.nan
-            continue
-        a, b, c = _level(offset, top, bottom, left, right), 0.0, 0.0
-        mr, mc = 0.5 * (r0 + r1), 0.5 * (c0 + c1)
-        for scale in scales:
-            s0, sx, sy, sxx, sxy, syy, sz, sxz, syz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            used = 0
-            for i in range(top, bottom):
-                y = (i - mr) / (step + 2.0 * margin)
-                for j in range(left + i % _EVERY, right, _EVERY):
-                    z = offset[i, j]
-                    if np.isnan(z):
-                        continue
-                    x = (j - mc) / (step + 2.0 * margin)
-                    u = (z - (a + b * x + c * y)) / scale
-                    if u >= 1.0 or u <= -1.0:
-                        continue
-                    w = (1.0 - u * u) ** 2
-                    used += 1
-                    s0 += w
-                    sx += w * x
-                    sy += w * y
-                    sxx += w * x * x
-                    sxy += w * x * y
-                    syy += w * y * y
-                    sz += w * z
-                    sxz += w * x * z
-                    syz += w * y * z
-            if used < min_pixels or s0 <= 0.0:
-                a, b, c = 0.0, 0.0, 0.0
-                break
-            xx, xy, yy = sxx - sx * sx / s0, sxy - sx * sy / s0, syy - sy * sy / s0
-            xz, yz = sxz - sx * sz / s0, syz - sy * sz / s0
-            determinant = xx * yy - xy * xy
-            if determinant > 1e-6 * s0 * s0 * 0.0069:  # spread in both directions: 1/144 is that of a full square
-                b = (xz * yy - yz * xy) / determinant
-                c = (yz * xx - xz * xy) / determinant
-            else:
-                b, c = 0.0, 0.0
-            a = (sz - b * sx - c * sy) / s0
-        for i in range(r0, r1):
-            y = (i - mr) / (step + 2.0 * margin)
-            for j in range(c0, c1):
-                x = (j - mc) / (step + 2.0 * margin)
-                out[i, j] = offset[i, j] - (a + b * x + c * y)
+@njit(cache=True, nogil=True)
+def _plane(
+    x: Single, y: Single, z: Single, level: float, scales: Single, min_pixels: int
+) -> tuple[float, float, float]:  # pragma: no cover - compiled
+    """Plane a + b x + c y through points, fitted from a level on."""
+    a, b, c = level, 0.0, 0.0
+    for scale in scales:
+        used, s0, sx, sy, sxx, sxy, syy, sz, sxz, syz = _weighted(
+            x, y, z, np.float32(a), np.float32(b), np.float32(c), np.float32(1.0) / scale
+        )
+        if used < min_pixels or s0 <= 0.0:
+            return 0.0, 0.0, 0.0
+        xx, xy, yy = sxx - sx * sx / s0, sxy - sx * sy / s0, syy - sy * sy / s0
+        xz, yz = sxz - sx * sz / s0, syz - sy * sz / s0
+        determinant = xx * yy - xy * xy
+        if determinant > 1e-6 * s0 * s0 * 0.0069:  # spread in both directions: 1/144 is that of a full square
+            b = (xz * yy - yz * xy) / determinant
+            c = (yz * xx - xz * xy) / determinant
+        else:
+            b, c = 0.0, 0.0
+        a = (sz - b * sx - c * sy) / s0
+    return a, b, c
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "nnan"})
+def _weighted(
+    x: Single, y: Single, z: Single, a: np.float32, b: np.float32, c: np.float32, per_scale: np.float32
+) -> tuple[float, ...]:  # pragma: no cover - compiled
+    """Sums over points weighted by their distance from a plane: how many have weight, weight, and its moments.
+
+    Sums may be taken in any order, so that several are taken at once.
+    """
+    one, zero = np.float32(1.0), np.float32(0.0)
+    used, s0, sx, sy, sxx, sxy, syy, sz, sxz, syz = zero, zero, zero, zero, zero, zero, zero, zero, zero, zero
+    for k in range(x.shape[0]):
+        u = (z[k] - (a + b * x[k] + c * y[k])) * per_scale
+        w = one - u * u
+        w = w if w > zero else zero
+        used += one if w > zero else zero
+        w = w * w
+        wx, wy = w * x[k], w * y[k]
+        s0 += w
+        sx += wx
+        sy += wy
+        sxx += wx * x[k]
+        sxy += wx * y[k]
+        syy += wy * y[k]
+        sz += w * z[k]
+        sxz += wx * z[k]
+        syz += wy * z[k]
+    return (
+        float(used), float(s0), float(sx), float(sy), float(sxx), float(sxy), float(syy), float(sz), float(sxz), float(syz),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def _grown(distance: Single, delta: float, growth: int) -> Mask:  # pragma: no cover - compiled
+    """Pixels off the plane, and those about them; a pixel alone is an outlier, which has no edge."""
+    rows, columns = distance.shape
+    out = np.zeros((rows, columns), np.bool_)
+    for i in range(rows):
+        for j in range(columns):
+            if abs(distance[i, j]) >= delta:
+                beside = 0
+                for m in range(max(i - 1, 0), min(i + 2, rows)):
+                    for n in range(max(j - 1, 0), min(j + 2, columns)):
+                        beside += abs(distance[m, n]) >= delta
+                out[i, j] = True
+                if 1 < beside < 9:  # from the rim the growth reaches as far as from within
+                    out[max(i - growth, 0) : i + growth + 1, max(j - growth, 0) : j + growth + 1] = True
     return out

@@ -1,4 +1,4 @@
-"""From the unrolled image of a kilometre to leaks: threshold, polygons, statistics."""
+"""From the picture of a kilometre to leaks: threshold, regions, statistics."""
 
 from __future__ import annotations
 
@@ -6,22 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 import rasterio.features
-import shapely
+from numba import njit
 from numpy.typing import NDArray
-from scipy import ndimage
 from shapely.geometry import Polygon
 
 from tunneldb.intensity.dry import Dry, plain_statistics, robust_statistics
-from tunneldb.leak.image import Accumulator, Window
-from tunneldb.leak.lining import State, block_columns
-from tunneldb.leak.polygon import polygons
+from tunneldb.leak.lining import State
+from tunneldb.leak.picture import WET_EDGE, Picture
+from tunneldb.leak.raster import STEP
+from tunneldb.leak.region import Region, regions
 from tunneldb.leak.threshold import filter_size, wet_pixels
+
+Float = NDArray[np.float64]
 
 SAMPLE = 2_000_000
 """Pixels, about, that the statistics of dry lining are drawn from."""
-
-WET_EDGE = 3
-"""Pixels about a wet one that don't count as dry lining."""
 
 GAP = 5.0
 """Lining that is seen nowhere along more of the tunnel was not scanned there, m; profiles lie closer."""
@@ -38,13 +37,21 @@ class Found:
     drop_mean, drop_max : float
         Mean and greatest drop below the mean of dry lining, dB.
     image_share : float
-        Share of the polygon's pixels into which points fell, 0 to 1.
+        Share of its pixels into which points fell, 0 to 1.
     """
 
     outline: Polygon
     drop_mean: float
     drop_max: float
     image_share: float
+
+    @classmethod
+    def of(cls, region: Region, min_area: float) -> Found | None:
+        """Make a leak of a region; None if it is smaller than ``min_area``, m², or holds no point."""
+        if region.area < min_area * (1 - 1e-12) or not region.filled:
+            return None
+        share = region.filled / np.count_nonzero(region.mask)
+        return cls(region.outline, region.drop_sum / region.filled, region.drop_max, float(share))
 
 
 @dataclass(frozen=True)
@@ -56,157 +63,150 @@ class Detection:
     dry : Dry
         Mean and standard deviation of dry lining pixels, dB.
     leaks : list of Found
-        In order of chainage.
+        Those within the kilometre, in order of chainage.
+    cut : list of Region
+        Wet regions that reach an end of the kilometre, whatever their size.
     wet : (rows, columns) bool array
         Pixels found wet, before small regions were left out.
     pixels, wet_pixels : int
-        Lining pixels, and how many of them are wet.
+        Lining pixels of the kilometre, and how many of them are wet.
     """
 
     dry: Dry
     leaks: list[Found]
+    cut: list[Region]
     wet: NDArray[np.bool_]
     pixels: int
     wet_pixels: int
 
 
-def detect(
-    image: Accumulator, state: NDArray[np.uint8], min_area: float, dry_regions: list[Polygon] | None = None
-) -> Detection:
+def detect(picture: Picture, min_area: float, dry_regions: list[Polygon] | None = None) -> Detection:
     """Find the leaks of a kilometre.
 
     Parameters
     ----------
-    image : Accumulator
-        The sums of all points.
-    state : (rows, columns) uint8 array
-        What each pixel shows, see :func:`tunneldb.leak.lining.states`.
+    picture : Picture
+        State and intensity of its pixels.
     min_area : float
         Smaller leaks are left out, m² in the unrolled plane.
     dry_regions : list of Polygon, optional
         Dry lining drawn by the user, in the unrolled plane; without it the dry pixels are told from the wet
         ones robustly.
     """
-    grid = image.grid
-    blocks = image.blocks()
-    dry = _dry_statistics(image, state, blocks, dry_regions or [])
-    lining = int(np.count_nonzero(state == State.LINING))
-    size = filter_size(_filled(state, round(GAP / grid.pixel)))
-    wet = np.zeros(state.shape, np.bool_)
-    if dry.count:
-        for block in blocks:
-            columns = block_columns(grid, block)
-            window = image.window(columns.start - size, columns.stop + size)
-            inner = slice(columns.start - window.columns.start, columns.stop - window.columns.start)
-            here = state[:, window.columns]
-            closed = (here == State.OFF) | (here == State.FLOOR)
-            found = wet_pixels(window.corrected, here == State.LINING, closed, dry.threshold, size)
-            wet[:, columns] = found[:, inner]
-    outlines = polygons(wet, grid.transform(), min_area)
-    return Detection(
-        dry=dry,
-        leaks=_statistics(image, blocks, outlines, dry.mean),
-        wet=wet,
-        pixels=lining,
-        wet_pixels=int(np.count_nonzero(wet & (state == State.LINING))),
-    )
+    grid, state, level = picture.grid, picture.state, picture.level
+    lining, could = _columns(state, grid.inner.start, grid.inner.stop)
+    dry = _dry_statistics(picture, int(lining.sum()), dry_regions or [])
+    if not dry.count:
+        return Detection(dry, [], [], np.zeros(state.shape, np.bool_), int(lining.sum()), 0)
+    size = filter_size(_filled(lining, could, round(GAP / grid.pixel)))
+    wet = wet_pixels(state, level, dry.threshold / STEP["corrected"], size)
+    leaks, cut = [], []
+    ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
+    for region in regions(wet, level, grid, dry.mean, min_area):
+        if region.column == ends[0] or region.stop == ends[1]:
+            cut.append(region)
+        elif (leak := Found.of(region, min_area)) is not None:
+            leaks.append(leak)
+    return Detection(dry, leaks, cut, wet, int(lining.sum()), _wet_lining(state, wet, grid.inner.start, grid.inner.stop))
 
 
-def _filled(state: NDArray[np.uint8], gap: int) -> float:
-    """Share of the pixels that could show lining that do, where the tunnel was scanned: not in gaps of more columns."""
-    lining = np.count_nonzero(state == State.LINING, axis=0)
-    seen = np.flatnonzero(lining)
-    if len(seen) == 0:
-        return 1.0
-    # Floor and niches are marked whether or not they hold points.
-    possible = np.count_nonzero(state <= State.LINING, axis=0)
-    ends = np.concatenate([[-gap - 1], seen, [len(lining) + gap]])
-    for k in np.flatnonzero(np.diff(ends) > gap):
-        possible[max(ends[k] + 1, 0) : ends[k + 1]] = 0
-    return float(lining.sum() / possible.sum())
-
-
-def dry_pixels(image: Accumulator, state: NDArray[np.uint8], found: Detection) -> NDArray[np.bool_]:
-    """Lining pixels that are neither wet nor next to a wet one."""
-    dry = state == State.LINING
-    for block in image.blocks():
-        columns = block_columns(image.grid, block)
-        near = slice(max(columns.start - WET_EDGE, 0), columns.stop + WET_EDGE)
-        wet = found.wet[:, near]
-        if wet.any():
-            edge = ndimage.maximum_filter(wet.view(np.uint8), 2 * WET_EDGE + 1)
-            dry[:, columns] &= edge[:, columns.start - near.start :][:, : columns.stop - columns.start] == 0
+def dry_places(picture: Picture, found: Detection, chainage: Float, arc: Float) -> NDArray[np.bool_]:
+    """Tell which places (n,) in the unrolled plane, m, lie on lining of the kilometre that is neither wet nor next to it."""
+    row, column = picture.grid.place(chainage, arc)
+    inner = picture.grid.inner
+    dry: NDArray[np.bool_] = _dry(picture.state, found.wet, row, column, inner.start, inner.stop)
     return dry
 
 
-def _dry_statistics(image: Accumulator, state: NDArray[np.uint8], blocks: list[int], dry_regions: list[Polygon]) -> Dry:
+def _filled(lining: NDArray[np.int64], could: NDArray[np.int64], gap: int) -> float:
+    """Share of the pixels that could show lining that do, where the tunnel was scanned: without gaps of more columns."""
+    columns = np.flatnonzero(lining)
+    if len(columns) == 0:
+        return 1.0
+    until = np.concatenate([[0], np.cumsum(could)])
+    step = np.diff(columns, append=columns[-1] + 1)
+    scanned = np.where(step > gap, 1, step)
+    # Floor and niches are marked whether or not they hold points.
+    return float(lining.sum() / (until[columns + scanned] - until[columns]).sum())
+
+
+def _dry_statistics(picture: Picture, lining: int, dry_regions: list[Polygon]) -> Dry:
     """Statistics of dry lining pixels (eq. 19): of those in the drawn regions, or of all, robustly."""
-    lining = int(np.count_nonzero(state == State.LINING))
-    every = 1 if dry_regions else max(1, lining // SAMPLE)
-    values = []
-    for block in blocks:
-        columns = block_columns(image.grid, block)
-        chosen = state[:, columns] == State.LINING
-        if dry_regions:
-            chosen &= _inside(image, columns, dry_regions)
-        if chosen.any():
-            values.append(image.window(columns.start, columns.stop).corrected[chosen][::every])
-    if not values:
-        return plain_statistics(np.zeros(0))
-    together = np.concatenate(values)
-    return plain_statistics(together) if dry_regions else robust_statistics(together)
+    inner, step = picture.grid.inner, STEP["corrected"]
+    if dry_regions:
+        parts = [picture.level[:, columns][chosen] for columns, chosen in _inside(picture, dry_regions)]
+        return plain_statistics(np.concatenate(parts) * step if parts else np.zeros(0))
+    sample = _sample(picture.state, picture.level, inner.start, inner.stop, max(1, lining // SAMPLE))
+    return robust_statistics(sample * step)
 
 
-def _inside(image: Accumulator, columns: slice, regions: list[Polygon]) -> NDArray[np.bool_]:
-    """Pixels whose centres lie in one of the polygons."""
-    shape = (image.grid.rows, columns.stop - columns.start)
-    transform = image.grid.transform(columns.start)
-    inside = rasterio.features.geometry_mask(regions, shape, transform, invert=True)
-    return np.asarray(inside, dtype=np.bool_)
+def _inside(picture: Picture, polygons: list[Polygon]) -> list[tuple[slice, NDArray[np.bool_]]]:
+    """Lining pixels of the kilometre whose centres lie in one of the polygons, block by block."""
+    grid, found = picture.grid, []
+    for start in range(grid.inner.start, grid.inner.stop, grid.block_columns):
+        columns = slice(start, start + grid.block_columns)
+        transform, shape = grid.transform(start), (grid.rows, grid.block_columns)
+        west, east = transform.c, transform.c + shape[1] * transform.a
+        near = [polygon for polygon in polygons if polygon.bounds[0] < east and polygon.bounds[2] > west]
+        if near:
+            inside = rasterio.features.geometry_mask(near, shape, transform, invert=True)
+            found.append((columns, inside & (picture.state[:, columns] == State.LINING)))
+    return found
 
 
-def _statistics(image: Accumulator, blocks: list[int], outlines: list[Polygon], dry_mean: float) -> list[Found]:
-    """Drop and image share of each leak, gathered block by block."""
-    count = len(outlines)
-    pixels, filled, total = np.zeros(count), np.zeros(count), np.zeros(count)
-    greatest = np.full(count, -np.inf)
-    for block in blocks if count else []:
-        columns = block_columns(image.grid, block)
-        transform = image.grid.transform(columns.start)
-        west, east = transform.c, transform.c + (columns.stop - columns.start) * transform.a
-        touching = [k for k, o in enumerate(outlines) if o.bounds[0] < east and o.bounds[2] > west]
-        if touching:
-            window = image.window(columns.start, columns.stop)
-            labels = rasterio.features.rasterize(
-                [(outlines[k], k + 1) for k in touching],
-                window.count.shape,
-                transform=transform,
-                dtype=np.int32,
-            )
-            _gather(window, labels, dry_mean, pixels, filled, total, greatest)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean, share = total / filled, filled / pixels
-    return [
-        Found(shapely.normalize(outline), float(mean[k]), float(greatest[k]), float(share[k]))
-        for k, outline in enumerate(outlines)
-        if filled[k]
-    ]
+@njit(cache=True, nogil=True)
+def _columns(
+    state: NDArray[np.uint8], first: int, stop: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:  # pragma: no cover - compiled
+    """Pixels of each column that show lining, and that could."""
+    lining, could = np.zeros(stop - first, np.int64), np.zeros(stop - first, np.int64)
+    for i in range(state.shape[0]):
+        for j in range(first, stop):
+            lining[j - first] += state[i, j] == 1
+            could[j - first] += state[i, j] <= 1
+    return lining, could
 
 
-def _gather(
-    window: Window,
-    labels: NDArray[np.int32],
-    dry_mean: float,
-    pixels: NDArray[np.float64],
-    filled: NDArray[np.float64],
-    total: NDArray[np.float64],
-    greatest: NDArray[np.float64],
-) -> None:
-    count = len(pixels)
-    pixels += np.bincount(labels.ravel(), minlength=count + 1)[1:]
-    inside = (labels > 0) & (window.count > 0)
-    leak = labels[inside] - 1
-    drop = dry_mean - window.corrected[inside].astype(np.float64)
-    filled += np.bincount(leak, minlength=count)
-    total += np.bincount(leak, weights=drop, minlength=count)
-    np.maximum.at(greatest, leak, drop)
+@njit(cache=True, nogil=True)
+def _sample(
+    state: NDArray[np.uint8], level: NDArray[np.int16], first: int, stop: int, every: int
+) -> NDArray[np.int16]:  # pragma: no cover - compiled
+    """Level of every n-th lining pixel."""
+    seen, kept = 0, np.empty(2 * SAMPLE, np.int16)
+    for i in range(state.shape[0]):
+        for j in range(first, stop):
+            if state[i, j] == 1:
+                if seen % every == 0:
+                    kept[seen // every] = level[i, j]
+                seen += 1
+    return kept[: (seen + every - 1) // every]
+
+
+@njit(cache=True, nogil=True)
+def _wet_lining(state: NDArray[np.uint8], wet: NDArray[np.bool_], first: int, stop: int) -> int:  # pragma: no cover - compiled
+    count = 0
+    for i in range(state.shape[0]):
+        for j in range(first, stop):
+            count += wet[i, j] and state[i, j] == 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _dry(
+    state: NDArray[np.uint8],
+    wet: NDArray[np.bool_],
+    row: NDArray[np.int32],
+    column: NDArray[np.int32],
+    first: int,
+    stop: int,
+) -> NDArray[np.bool_]:  # pragma: no cover - compiled
+    dry = np.zeros(len(row), np.bool_)
+    for k in range(len(row)):
+        i, j = row[k], column[k]
+        if first <= j < stop and state[i, j] == 1:
+            dry[k] = True
+            for m in range(max(i - WET_EDGE, 0), min(i + WET_EDGE + 1, state.shape[0])):
+                for n in range(max(j - WET_EDGE, 0), min(j + WET_EDGE + 1, state.shape[1])):
+                    if wet[m, n]:
+                        dry[k] = False
+    return dry

@@ -128,7 +128,9 @@ class Grid:
 
     def transform(self, column: int = 0) -> Affine:
         """Transform from pixels, counted from a column, to (chainage, arc)."""
-        return Affine(self.pixel, 0.0, self.west + column * self.pixel, 0.0, -self.pixel, (self.bottom + self.rows) * self.pixel)
+        return Affine(
+            self.pixel, 0.0, self.west + column * self.pixel, 0.0, -self.pixel, (self.bottom + self.rows) * self.pixel
+        )
 
     def place(self, chainage: Float, arc: Float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Row and column of places (n,) in the unrolled plane, m; column -1 outside the grid."""
@@ -173,6 +175,11 @@ class Window:
     offset: Single
     raw: Single
     corrected: Single
+
+    def cut(self, columns: slice) -> Window:
+        """Those of the columns that lie in a slice of the grid's columns."""
+        here = slice(columns.start - self.columns.start, columns.stop - self.columns.start)
+        return Window(columns, self.count[:, here], self.offset[:, here], self.raw[:, here], self.corrected[:, here])
 
 
 class Accumulator:
@@ -239,21 +246,25 @@ class Accumulator:
         """Blocks, counted from 0, that hold points."""
         return sorted(self._spilled | self._blocks.keys())
 
+    def inner_blocks(self) -> list[int]:
+        """Blocks of the kilometre itself that hold points."""
+        width, inner = self.grid.block_columns, self.grid.inner
+        return [block for block in self.blocks() if inner.start <= block * width < inner.stop]
+
     def window(self, start: int, stop: int) -> Window:
         """Means over the columns from ``start`` up to ``stop``; columns outside the grid are cut off."""
         start, stop = max(start, 0), min(stop, self.grid.columns)
         width = self.grid.block_columns
         held = set(self.blocks())
-        sums = np.zeros((self.grid.rows, stop - start, CHANNELS), np.float32)
+        count = np.zeros((self.grid.rows, stop - start), np.int32)
+        means = np.empty((CHANNELS - 1, *count.shape), np.float32)
         for block in range(start // width, (stop - 1) // width + 1):
+            first, last = max(block * width, start), min((block + 1) * width, stop)
             if block in held:
-                first, last = max(block * width, start), min((block + 1) * width, stop)
-                part = self._fetch(block)[:, first - block * width : last - block * width]
-                sums[:, first - start : last - start] = part
-        count = sums[:, :, 0]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            offset, raw, corrected = (sums[:, :, k] / count for k in (1, 2, 3))
-        return Window(slice(start, stop), count.astype(np.int32), offset, raw, corrected)
+                _means(self._fetch(block), first - block * width, count, means, first - start, last - start)
+            else:
+                means[:, :, first - start : last - start] = np.nan
+        return Window(slice(start, stop), count, *means)
 
     def _fetch(self, block: int) -> Single:
         """Sums of a block, brought into memory, from the file or new."""
@@ -326,3 +337,17 @@ def _add(
                 sums[r, c, 1] += np.float32(np.rint(offset[i] * (1.0 / OFFSET)) * OFFSET)
                 sums[r, c, 2] += np.float32(np.rint(raw[i] * (1.0 / LEVEL)) * LEVEL)
                 sums[r, c, 3] += np.float32(np.rint(corrected[i] * (1.0 / LEVEL)) * LEVEL)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _means(
+    sums: Single, skip: int, count: NDArray[np.int32], means: Single, first: int, stop: int
+) -> None:  # pragma: no cover - compiled
+    """Divide the sums of a block, from column ``skip`` on, into columns ``first`` to ``stop`` of a window."""
+    for i in range(count.shape[0]):
+        for j in range(first, stop):
+            pixel = sums[i, j - first + skip]
+            count[i, j] = np.int32(pixel[0])
+            per = np.float32(1.0) / pixel[0] if pixel[0] > 0.0 else np.float32(np.nan)
+            for k in range(3):
+                means[k, i, j] = pixel[k + 1] * per

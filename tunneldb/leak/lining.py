@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from tunneldb.geometry.surface import Surface
 from tunneldb.leak.appendage import appendages
-from tunneldb.leak.image import Accumulator, Grid
+from tunneldb.leak.image import Grid, Window
 
 Float = NDArray[np.float64]
 
@@ -32,9 +33,6 @@ OFF_WALL = 0.03
 
 MIN_SECTIONS = 4
 """With fewer sections there is nothing to compare with."""
-
-HALO = 1.0
-"""Width of the neighbouring strips that a block's planes look at, m."""
 
 _ALONG, _ACROSS = 1.0, 0.05
 
@@ -71,7 +69,9 @@ class Floor:
     def of(cls, surface: Surface, start: float, stop: float) -> Floor:
         """Find the floor of a surface between two chainages, m."""
         chainage = np.arange(start, stop + _ALONG, _ALONG)
-        arc = np.arange(float(surface.arcs[:, 0].min()), float(surface.arcs[:, -1].max()) + _ACROSS, _ACROSS)
+        # Whole multiples, so that any stretch of the tunnel is looked at in the same places.
+        lowest, highest = float(surface.arcs[:, 0].min()), float(surface.arcs[:, -1].max())
+        arc = np.arange(np.floor(lowest / _ACROSS), np.ceil(highest / _ACROSS) + 1) * _ACROSS
         c, a = (grid.ravel() for grid in np.meshgrid(chainage, arc, indexing="ij"))
         points = surface.roll(c, a, np.zeros(len(c)))
         normal = surface.unroll(points).normal[:, 2].reshape(len(chainage), len(arc))
@@ -85,12 +85,17 @@ class Floor:
         # What a single metre shows that its neighbours don't is not the tunnel's shape.
         return cls(chainage, ndimage.median_filter(left, 5), ndimage.median_filter(right, 5))
 
-    def covers(self, chainage: Float, arc: Float) -> NDArray[np.bool_]:
-        """Tell which places in the unrolled plane are floor; arrays that broadcast, m."""
+    def bounds(self, chainage: Float) -> tuple[Float, Float]:
+        """Arc at which the floor begins on the left and on the right, m."""
         place = np.where(np.isfinite(chainage), chainage, self.chainage[0])
         row = np.clip(np.rint((place - self.chainage[0]) / _ALONG).astype(np.intp), 0, len(self.chainage) - 1)
+        return self.left[row], self.right[row]
+
+    def covers(self, chainage: Float, arc: Float) -> NDArray[np.bool_]:
+        """Tell which places in the unrolled plane are floor; arrays that broadcast, m."""
+        left, right = self.bounds(chainage)
         with np.errstate(invalid="ignore"):
-            return np.asarray((arc <= self.left[row]) | (arc >= self.right[row]), dtype=np.bool_)
+            return np.asarray((arc <= left) | (arc >= right), dtype=np.bool_)
 
 
 @dataclass(frozen=True)
@@ -156,13 +161,17 @@ def _begin(looks_up: NDArray[np.bool_]) -> NDArray[np.intp]:
     return np.where(np.any(kept, axis=1), np.argmax(kept, axis=1), looks_up.shape[1] - 1)
 
 
-def states(image: Accumulator, floor: Floor, astray: Astray, delta: float) -> NDArray[np.uint8]:
-    """State of every pixel of a kilometre, found block by block.
+def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Astray, delta: float) -> NDArray[np.uint8]:
+    """State of the pixels of some columns.
 
     Parameters
     ----------
-    image : Accumulator
-        The sums of all points.
+    window : Window
+        Those columns and, to both sides, :func:`tunneldb.leak.appendage.reach` more.
+    columns : slice
+        Columns of the grid.
+    grid : Grid
+        The pixels.
     floor : Floor
         Where the floor begins.
     astray : Astray
@@ -175,26 +184,26 @@ def states(image: Accumulator, floor: Floor, astray: Astray, delta: float) -> ND
     (rows, columns) uint8 array
         Values of :class:`State`.
     """
-    grid = image.grid
-    out = np.zeros((grid.rows, grid.columns), np.uint8)
-    for block in image.blocks():
-        out[:, block_columns(grid, block)] = _block_states(image, floor, astray, delta, block)
-    return out
-
-
-def block_columns(grid: Grid, block: int) -> slice:
-    """Columns of a block, counted from 0."""
-    return slice(block * grid.block_columns, (block + 1) * grid.block_columns)
-
-
-def _block_states(image: Accumulator, floor: Floor, astray: Astray, delta: float, block: int) -> NDArray[np.uint8]:
-    grid = image.grid
-    columns = block_columns(grid, block)
-    halo = round(HALO / grid.pixel)
-    window = image.window(columns.start - halo, columns.stop + halo)
     inner = slice(columns.start - window.columns.start, columns.stop - window.columns.start)
-    off = appendages(window.offset, grid.pixel, delta)[:, inner]
-    state = np.where(window.count[:, inner] > 0, State.LINING, State.EMPTY).astype(np.uint8)
-    state[off | astray.covers(grid.chainages(columns), grid.arcs())] = State.OFF
-    state[floor.covers(grid.chainages(columns)[None, :], grid.arcs()[:, None])] = State.FLOOR
+    corner = (-grid.bottom - grid.rows, grid.first_column + window.columns.start)
+    off = appendages(window.offset, grid.pixel, delta, corner)[:, inner]
+    chainage, arc = grid.chainages(columns), grid.arcs()
+    left, right = floor.bounds(chainage)
+    state: NDArray[np.uint8] = _states(window.count[:, inner], off, astray.covers(chainage, arc), arc, left, right)
+    return state
+
+
+@njit(cache=True, nogil=True)
+def _states(
+    count: NDArray[np.int32], off: NDArray[np.bool_], astray: NDArray[np.bool_], arc: Float, left: Float, right: Float
+) -> NDArray[np.uint8]:  # pragma: no cover - compiled
+    state = np.empty(count.shape, np.uint8)
+    for i in range(count.shape[0]):
+        for j in range(count.shape[1]):
+            if arc[i] <= left[j] or arc[i] >= right[j]:
+                state[i, j] = 3
+            elif off[i, j] or astray[i, j]:
+                state[i, j] = 2
+            else:
+                state[i, j] = 1 if count[i, j] > 0 else 0
     return state

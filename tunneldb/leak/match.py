@@ -1,4 +1,4 @@
-"""Which leaks of an earlier run are found again."""
+"""Which leaks of an earlier run are found again, and which are parts of one found now."""
 
 from __future__ import annotations
 
@@ -37,6 +37,41 @@ def match(before: Sequence[Polygon], now: Sequence[Polygon], min_iou: float = MI
     iou = shared / (shapely.area(later[n]) + shapely.area(earlier[b]) - shared)
     best_now, best_before = _best(n, iou, len(later)), _best(b, iou, len(earlier))
     return {int(n[k]): int(b[k]) for k in range(len(n)) if iou[k] >= min_iou and best_now[n[k]] == k and best_before[b[k]] == k}
+
+
+def match_parts(
+    before: Sequence[Polygon], reviewed: Sequence[bool], now: Sequence[Polygon], min_share: float = MIN_IOU
+) -> dict[int, int]:
+    """Pair leaks over the end of a kilometre with earlier ones that may have been a part of them, or have them for a part.
+
+    They are the same when they share enough of the smaller one. Where there are several, one that was reviewed counts
+    first, then the one that shares most.
+
+    Parameters
+    ----------
+    before, now : sequences of Polygon
+        Outlines in the unrolled plane, m.
+    reviewed : sequence of bool
+        Which of the earlier ones were reviewed.
+    min_share : float
+        Smallest intersection of a pair over the area of the smaller one.
+
+    Returns
+    -------
+    dict
+        Index in ``now`` → index in ``before``; each index occurs at most once.
+    """
+    pairs = []
+    for n, later in enumerate(now):
+        for b, earlier in enumerate(before):
+            shared = later.intersection(earlier).area if later.intersects(earlier) else 0.0
+            if shared >= min_share * min(later.area, earlier.area) and shared > 0.0:
+                pairs.append((not reviewed[b], -shared, b, n))
+    found: dict[int, int] = {}
+    for _, _, b, n in sorted(pairs):
+        if n not in found and b not in found.values():
+            found[n] = b
+    return found
 
 
 def _best(owner: NDArray[Any], iou: NDArray[Any], count: int) -> NDArray[Any]:

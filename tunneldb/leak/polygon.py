@@ -1,4 +1,4 @@
-"""Polygons of wet pixels in the unrolled plane."""
+"""Polygons of wet regions in the unrolled plane."""
 
 from __future__ import annotations
 
@@ -13,41 +13,32 @@ SIMPLIFY = 0.75
 """Tolerance of the simplification, pixels: enough to straighten the stairs of a slanting edge."""
 
 
-def polygons(mask: NDArray[np.bool_] | NDArray[np.uint8], transform: Affine, min_area: float) -> list[Polygon]:
-    """Outline the connected regions of a mask, with their holes.
+def outline(mask: NDArray[np.bool_], transform: Affine) -> Polygon:
+    """Outline a connected region, with its holes.
 
     Parameters
     ----------
     mask : (rows, columns) bool array
-        Wet pixels. Those that share a side belong together.
+        Its pixels; they hang together by their sides.
     transform : Affine
         From pixels (column, row) to (chainage, arc), m.
-    min_area : float
-        Smaller regions are left out, m².
 
     Returns
     -------
-    list of Polygon
-        Valid, exterior counter-clockwise, ordered by where they begin along the tunnel.
+    Polygon
+        Valid, exterior counter-clockwise.
     """
-    columns = np.flatnonzero(mask.any(axis=0))
-    if len(columns) == 0:
-        return []
-    pixel, first = abs(transform.a), int(columns[0])
-    image = np.ascontiguousarray(mask[:, first : columns[-1] + 1], dtype=np.uint8)
-    transform = transform @ Affine.translation(first, 0)
-    found = []
-    for shape, _ in rasterio.features.shapes(image, mask=image.astype(bool), connectivity=4, transform=transform):
-        outline = shapely.geometry.shape(shape)
-        if outline.area >= min_area:
-            found.append(_straighten(outline, SIMPLIFY * pixel))
-    found.sort(key=lambda polygon: polygon.bounds)
-    return found
+    image = np.ascontiguousarray(mask, dtype=np.uint8)
+    # In whole pixels first: the outline of a region must not depend on the kilometre that it lies in.
+    ((shape, _),) = rasterio.features.shapes(image, mask=image.astype(bool), connectivity=4)
+    pixels = _straighten(shapely.geometry.shape(shape))
+    moved = shapely.transform(
+        pixels, lambda at: np.column_stack([at, np.ones(len(at))]) @ np.array(transform).reshape(3, 3).T[:, :2]
+    )
+    return shapely.geometry.polygon.orient(shapely.normalize(moved))
 
 
-def _straighten(outline: Polygon, tolerance: float) -> Polygon:
+def _straighten(stairs: Polygon) -> Polygon:
     """Simplify a polygon by less than the tolerance; one that would fall apart keeps its stairs."""
-    simple = shapely.simplify(outline, tolerance, preserve_topology=True)
-    if not isinstance(simple, Polygon) or simple.is_empty or not simple.is_valid:
-        simple = outline
-    return shapely.geometry.polygon.orient(simple)
+    simple = shapely.simplify(stairs, SIMPLIFY, preserve_topology=True)
+    return simple if isinstance(simple, Polygon) and not simple.is_empty and simple.is_valid else stairs

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy import ndimage
 
-Single = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 MEDIAN = 5
@@ -14,6 +13,9 @@ MEDIAN = 5
 
 MEDIAN_PIXELS = 12
 """The filter is widened until it holds so many pixels with points on average."""
+
+MAX_MEDIAN = 51
+"""Side of the widest median filter, pixels."""
 
 
 def filter_size(filled: float) -> int:
@@ -23,33 +25,75 @@ def filter_size(filled: float) -> int:
     values.
     """
     size = MEDIAN
-    while size * size * filled < MEDIAN_PIXELS and size < 51:
+    while size * size * filled < MEDIAN_PIXELS and size < MAX_MEDIAN:
         size += 2
     return size
 
 
-def wet_pixels(corrected: Single, lining: Mask, closed: Mask, threshold: float, size: int) -> Mask:
+def wet_pixels(state: NDArray[np.uint8], level: NDArray[np.int16], threshold: float, size: int) -> Mask:
     """Mark wet pixels.
 
     A lining pixel below the threshold is wet (eq. 20). The median of the wet and dry ones about each pixel
-    then decides: single ones go, and pixels without a point take the state of those about them.
+    then decides: single ones go, and pixels without a point take the state of those about them. Appendages and
+    floor are never wet.
 
     Parameters
     ----------
-    corrected : (rows, columns) float32 array
-        Corrected intensity, dB, NaN where there is no point.
-    lining : (rows, columns) bool array
-        Pixels that show lining.
-    closed : (rows, columns) bool array
-        Pixels that can't be wet lining: appendages, floor.
+    state : (rows, columns) uint8 array
+        Values of :class:`tunneldb.leak.lining.State`.
+    level : (rows, columns) int16 array
+        Corrected intensity where there is lining.
     threshold : float
-        dB.
+        In the unit of ``level``.
     size : int
         Side of the median filter, pixels.
     """
-    with np.errstate(invalid="ignore"):
-        wet = lining & (corrected < threshold)
-    votes = ndimage.uniform_filter(lining.astype(np.float32), size, mode="constant")
-    wet_votes = ndimage.uniform_filter(wet.astype(np.float32), size, mode="constant")
-    enough = votes > 0.2 * min(1.0, MEDIAN_PIXELS / (size * size))
-    return np.asarray((wet_votes > 0.5 * votes) & enough & ~closed, dtype=np.bool_)
+    wet: Mask = _wet(state, level, threshold, size // 2, 0.2 * min(size * size, MEDIAN_PIXELS))
+    return wet
+
+
+@njit(cache=True, nogil=True)
+def _wet(
+    state: NDArray[np.uint8], level: NDArray[np.int16], threshold: float, half: int, enough: float
+) -> Mask:  # pragma: no cover - compiled
+    rows, columns = state.shape
+    out = np.zeros((rows, columns), np.bool_)
+    # Lining and wet pixels of each column in the rows of the filter, with zeros beyond both ends.
+    lining, wet = np.zeros(columns + 2 * half + 1, np.int32), np.zeros(columns + 2 * half + 1, np.int32)
+    for i in range(-half, rows):
+        if i + half < rows:
+            _count(state[i + half], level[i + half], threshold, 1, lining, wet, half)
+        if i - half - 1 >= 0:
+            _count(state[i - half - 1], level[i - half - 1], threshold, -1, lining, wet, half)
+        if i < 0:
+            continue
+        votes, wet_votes = 0, 0
+        for j in range(2 * half):
+            votes += lining[j]
+            wet_votes += wet[j]
+        for j in range(columns):
+            votes += lining[j + 2 * half]
+            wet_votes += wet[j + 2 * half]
+            out[i, j] = 2 * wet_votes > votes and votes > enough and state[i, j] <= 1
+            votes -= lining[j]
+            wet_votes -= wet[j]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _count(
+    state: NDArray[np.uint8],
+    level: NDArray[np.int16],
+    threshold: float,
+    sign: int,
+    lining: NDArray[np.int32],
+    wet: NDArray[np.int32],
+    half: int,
+) -> None:  # pragma: no cover - compiled
+    """Add a row to the sums of columns, or take it away."""
+    limit = np.int32(np.ceil(min(max(threshold, -40000.0), 40000.0)))
+    step = np.int32(sign)
+    for j in range(state.shape[0]):
+        here = step if state[j] == 1 else np.int32(0)
+        lining[j + half] += here
+        wet[j + half] += here if np.int32(level[j]) < limit else np.int32(0)

@@ -1,0 +1,206 @@
+"""Leaks of a kilometre, and of what lies over its ends, into the database: matched with those of earlier runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import psycopg
+import shapely
+from shapely.geometry import Polygon
+
+from tunneldb.database.survey import Survey
+from tunneldb.geometry.store import load_surface
+from tunneldb.geometry.surface import Surface
+from tunneldb.leak.border import Border, Cluster, link, replace_parts
+from tunneldb.leak.detection import Found
+from tunneldb.leak.geometries import shapes
+from tunneldb.leak.image import KILOMETRE
+from tunneldb.leak.match import match, match_parts
+from tunneldb.leak.region import Region
+
+
+@dataclass(frozen=True)
+class Matched:
+    """What became of the leaks of an earlier run and of those found now.
+
+    Attributes
+    ----------
+    new, again : int
+        Leaks found for the first time, and found again; those over the ends of the kilometre among them.
+    kept, gone : int
+        Leaks not found again, kept for their review or taken away.
+    over_ends : int
+        Leaks of which a part lies in another kilometre.
+    other_pixels : list of int
+        Neighbours whose leaks can't be put together with this kilometre's, for their pixels are of another size.
+    """
+
+    new: int
+    again: int
+    kept: int
+    gone: int
+    over_ends: int
+    other_pixels: list[int]
+
+
+@dataclass(frozen=True)
+class _Earlier:
+    """A leak of an earlier run, and whether it may be a part of one over an end of the kilometre or the other way round."""
+
+    id: int
+    km: int
+    reviewed: bool
+    outline: Polygon
+    at_end: bool
+
+
+def save_leaks(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    km: int,
+    surface: Surface,
+    found: Sequence[Found],
+    cut: Sequence[Region],
+    min_area: float,
+) -> Matched:
+    """Replace the leaks of a kilometre and those over its ends; one that is found again keeps its id and its review.
+
+    A leak is found again when it and an earlier one overlap best with each other, by at least 0.3 of their union; over an
+    end of the kilometre, when it and an earlier one share 0.3 of the smaller, so that a leak of which only a part was known
+    remains the same one. Of those not found again the reviewed ones stay, marked as not detected.
+
+    Parameters
+    ----------
+    conn, survey, km
+        Where.
+    surface : Surface
+        The tunnel about the kilometre.
+    found : sequence of Found
+        Leaks within the kilometre.
+    cut : sequence of Region
+        Wet regions that reach its ends.
+    min_area : float
+        Smaller leaks over its ends are left out, m².
+    """
+    # What takes time comes before the lock.
+    rows = [_row(leak, surface, survey.srid) for leak in found]
+    border = replace_parts(conn, survey, km, cut)
+    over: list[tuple[Cluster, Found]] = []
+    for cluster in border.clusters:
+        leak = Found.of(cluster.region, min_area)
+        if leak is None:
+            link(conn, cluster, None)
+        else:
+            over.append((cluster, leak))
+    earlier = _earlier(conn, survey, km, border)
+    wholes = [leak.outline for _, leak in over]
+    at_end = [k for k, leak in enumerate(earlier) if leak.at_end]
+    pairs = match_parts([earlier[k].outline for k in at_end], [earlier[k].reviewed for k in at_end], wholes)
+    taken = {number: earlier[at_end[k]] for number, k in pairs.items()}
+    for number, (cluster, leak) in enumerate(over):
+        values = _row(leak, _surface_of(conn, survey, km, surface, leak), survey.srid)
+        link(conn, cluster, _write(conn, survey, values, taken.get(number)))
+    left = [leak for leak in earlier if leak not in taken.values()]
+    again = match([leak.outline for leak in left], [leak.outline for leak in found])
+    for number, values in enumerate(rows):
+        _write(conn, survey, values, left[again[number]] if number in again else None)
+    # One of a neighbour that was given up before stays as it is.
+    lost = [leak for k, leak in enumerate(left) if k not in again.values() and (leak.km == km or leak.id in border.leaks)]
+    kept, gone = [leak.id for leak in lost if leak.reviewed], [leak.id for leak in lost if not leak.reviewed]
+    conn.execute("UPDATE tunnel.leak SET detected = false WHERE id = ANY (%s)", (kept,))
+    conn.execute("DELETE FROM tunnel.leak WHERE id = ANY (%s)", (gone,))
+    once = len(taken) + len(again)
+    across = sum(len({part.km for part in cluster.parts}) > 1 for cluster, _ in over)
+    return Matched(len(over) + len(found) - once, once, len(kept), len(gone), across, border.other_pixels)
+
+
+def _earlier(conn: psycopg.Connection[Any], survey: Survey, km: int, border: Border) -> list[_Earlier]:
+    """Leaks that may be found again: the kilometre's and those over its ends, among them what was given up before.
+
+    Those that were written of parts elsewhere stay out.
+    """
+    rows = conn.execute(
+        """
+        SELECT l.id, l.km, l.review <> 'open', public.ST_AsBinary(l.unrolled), l.id = ANY (%(over)s)
+          FROM tunnel.leak l
+         WHERE l.survey_id = %(survey)s
+           AND (l.id = ANY (%(over)s)
+                OR (l.km BETWEEN %(first)s AND %(last)s AND (l.km = %(km)s OR NOT l.detected)
+                    AND NOT EXISTS (SELECT FROM tunnel.leak_part p WHERE p.survey_id = l.survey_id AND p.leak_id = l.id)))
+         ORDER BY l.id
+           FOR UPDATE OF l
+        """,
+        {"survey": survey.id, "km": km, "first": border.first, "last": border.last, "over": sorted(border.leaks)},
+    ).fetchall()
+    found = []
+    for key, of, reviewed, wkb, over in rows:
+        outline = shapely.from_wkb(bytes(wkb))
+        found.append(_Earlier(key, of, reviewed, outline, over or _near_end(outline, km, border)))
+    return found
+
+
+def _near_end(outline: Polygon, km: int, border: Border) -> bool:
+    """Tell whether an outline comes as near to an end of the kilometre as straightening can take it off."""
+    pixel = max((cluster.region.pixel for cluster in border.clusters), default=0.0)
+    west, _, east, _ = outline.bounds
+    return any(west - pixel <= plane * KILOMETRE <= east + pixel for plane in (km, km + 1))
+
+
+def _surface_of(conn: psycopg.Connection[Any], survey: Survey, km: int, surface: Surface, leak: Found) -> Surface:
+    """Surface under a leak: the kilometre's, or one that reaches on."""
+    west, _, east, _ = leak.outline.bounds
+    if km * KILOMETRE <= west and east <= (km + 1) * KILOMETRE:
+        return surface
+    return load_surface(conn, survey, west, east)
+
+
+_INSERT = """
+    INSERT INTO tunnel.leak (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max,
+                             image_share, unrolled, map, surface)
+    VALUES (%(survey)s, %(km)s, %(chainage_from)s, %(chainage_to)s, %(arc_from)s, %(arc_to)s, %(clock)s, %(area)s,
+            %(drop_mean)s, %(drop_max)s, %(image_share)s, public.ST_GeomFromWKB(%(unrolled)s, 0),
+            public.ST_GeomFromWKB(%(map)s, %(srid)s::int), public.ST_GeomFromWKB(%(surface)s, %(srid)s::int))
+    RETURNING id
+"""
+_UPDATE = """
+    UPDATE tunnel.leak
+       SET km = %(km)s, chainage_from = %(chainage_from)s, chainage_to = %(chainage_to)s, arc_from = %(arc_from)s,
+           arc_to = %(arc_to)s, clock = %(clock)s, area = %(area)s, drop_mean = %(drop_mean)s, drop_max = %(drop_max)s,
+           image_share = %(image_share)s, unrolled = public.ST_GeomFromWKB(%(unrolled)s, 0),
+           map = public.ST_GeomFromWKB(%(map)s, %(srid)s::int),
+           surface = public.ST_GeomFromWKB(%(surface)s, %(srid)s::int), detected = true, detected_at = now()
+     WHERE id = %(id)s
+"""
+
+
+def _write(conn: psycopg.Connection[Any], survey: Survey, values: dict[str, Any], before: _Earlier | None) -> int:
+    """Write a leak in the place of an earlier one, or as a new one; return its key."""
+    if before is not None:
+        conn.execute(_UPDATE, {**values, "id": before.id})
+        return before.id
+    row = conn.execute(_INSERT, {**values, "survey": survey.id}).fetchone()
+    assert row is not None
+    return int(row[0])
+
+
+def _row(leak: Found, surface: Surface, srid: int) -> dict[str, Any]:
+    west, south, east, north = leak.outline.bounds
+    shaped = shapes(leak.outline, surface)
+    return {
+        "km": int((west + east) / 2 // KILOMETRE),
+        "chainage_from": west,
+        "chainage_to": east,
+        "arc_from": south,
+        "arc_to": north,
+        "clock": shaped.clock,
+        "area": shaped.area,
+        "drop_mean": leak.drop_mean,
+        "drop_max": leak.drop_max,
+        "image_share": leak.image_share,
+        "unrolled": shapely.to_wkb(leak.outline),
+        "map": shapely.to_wkb(shaped.strip),
+        "surface": shapely.to_wkb(shaped.surface),
+        "srid": srid,
+    }
