@@ -3,17 +3,18 @@
 import numpy as np
 import pytest
 import shapely
-from affine import Affine
+import shapely.affinity
 from shapely.geometry import Polygon, box
 
 from tunneldb.errors import UserError
-from tunneldb.leak.appendage import appendages, distance_from_plane
-from tunneldb.leak.detection import _filled
+from tunneldb.leak.appendage import appendages, distance_from_plane, reach
+from tunneldb.leak.detection import _columns, _filled
 from tunneldb.leak.image import LEVEL, OFFSET, Accumulator, Grid
 from tunneldb.leak.kernel import Pixels
 from tunneldb.leak.lining import State
-from tunneldb.leak.match import match
-from tunneldb.leak.polygon import polygons
+from tunneldb.leak.match import match, match_parts
+from tunneldb.leak.raster import NODATA, Raster, decode, encode
+from tunneldb.leak.region import regions
 from tunneldb.leak.threshold import filter_size, wet_pixels
 
 PIXEL = 0.02
@@ -67,6 +68,36 @@ def test_windows_join_across_blocks_and_stop_at_the_kilometre():
         assert image.window(990, 1020).columns == slice(990, 1000)
 
 
+def test_with_a_halo_the_grid_has_a_block_more_at_either_end_and_lines_up_with_the_neighbours():
+    grid, following = Grid.covering(3, 0.5, -1.2, 1.0, 7), Grid.covering(4, 0.5, -1.9, 0.3, 7)
+    assert grid.inner == slice(100, 2100)
+    assert grid.near == slice(93, 2107)
+    assert grid.transform(100) @ (0, 0) == (3000.0, 1.0)
+    assert (grid.first_block, grid.first_column) == (59, 5900)
+    assert following.first_column + following.inner.start == grid.first_column + grid.inner.stop
+    place = np.array([4001.3]), np.array([0.2])
+    here, there = grid.place(*place), following.place(*place)
+    assert grid.first_column + here[1] == following.first_column + there[1]
+    assert grid.bottom + grid.rows - here[0] == following.bottom + following.rows - there[0]
+    with Accumulator(grid) as image:
+        chainage = np.array([2999.0, 4001.0])
+        add(image, chainage, np.zeros(2), np.zeros(2), np.ones(2, np.float32), np.ones(2, bool))
+        assert image.blocks() == [0, 21]
+        assert image.inner_blocks() == []
+
+
+@pytest.mark.parametrize("kind", ["raw", "offset"])
+def test_an_image_comes_back_from_its_file(kind):
+    values = np.random.default_rng(3).normal(0, 5, (70, 300)).astype(np.float32)
+    values[np.random.default_rng(4).random(values.shape) < 0.3] = np.nan
+    values[0, :3] = 1e4, -1e4, 0.0
+    step = {"raw": 0.01, "offset": 0.001}[kind]
+    raster = Raster(values, Grid.covering(2, 0.5, -1.0, 1.0).transform())
+    back = decode(encode(raster, kind))
+    assert back.transform == raster.transform
+    np.testing.assert_allclose(back.values, np.clip(values, -32767 * step, 32767 * step), atol=0.51 * step)
+
+
 @pytest.mark.parametrize("pixel", [0.03, 0.0, -1.0, np.nan, 0.001])
 def test_a_pixel_that_does_not_divide_a_block_is_refused(pixel):
     with pytest.raises(UserError, match=r"image\.pixel"):
@@ -111,6 +142,16 @@ def test_a_wide_tray_does_not_pass_for_the_wall():
     assert not found[108:].any()
 
 
+@pytest.mark.parametrize("pixel", [0.02, 0.05])
+def test_a_pixel_is_judged_alike_in_whichever_part_of_the_image(pixel):
+    offset, _, _ = _wall()
+    whole, far = appendages(offset, pixel, corner=(-37, 1234)), reach(pixel)
+    for first, stop, low, high in ((0, 200, 0, 150), (133, 333, 41, 300), (399, 600, 7, 222)):
+        part = appendages(offset[low:high, first:stop], pixel, corner=(-37 + low, 1234 + first))
+        within = np.s_[far if low else 0 : None if high == 300 else -far, far if first else 0 : None if stop == 600 else -far]
+        np.testing.assert_array_equal(part[within], whole[low:high, first:stop][within])
+
+
 def test_a_single_outlier_is_not_grown():
     offset = np.zeros((60, 60), np.float32)
     offset[30, 30] = 0.2
@@ -118,37 +159,64 @@ def test_a_single_outlier_is_not_grown():
 
 
 def _rings():
-    """Corrected intensity at 0 dB ± 0.3 with a wet disc of −3 dB that has a dry hole."""
+    """State and level of lining at 0 dB ± 0.3 with a wet disc of −3 dB that has a dry hole; levels in hundredths."""
     rng = np.random.default_rng(5)
-    corrected = rng.normal(0, 0.3, (200, 300)).astype(np.float32)
+    corrected = rng.normal(0, 0.3, (200, 300))
     row, column = np.mgrid[:200, :300]
     distance = np.hypot(row - 99.5, column - 149.5)
     wet = (distance < 60) & (distance > 20)
     corrected[wet] -= 3.0
-    lining = rng.random(corrected.shape) < 0.6
-    corrected[~lining] = np.nan
-    return corrected, lining, wet
+    state = (rng.random(corrected.shape) < 0.6).astype(np.uint8)
+    level = np.where(state == State.LINING, np.rint(corrected * 100), NODATA).astype(np.int16)
+    return state, level, wet
 
 
-def test_wet_polygon_with_a_hole_has_the_true_area():
-    corrected, lining, _ = _rings()
-    closed = np.zeros(corrected.shape, bool)
-    mask = wet_pixels(corrected, lining, closed, -0.9, filter_size(0.6))
-    (found,) = polygons(mask, Affine(PIXEL, 0, 500.0, 0, -PIXEL, 2.0), 0.05)
-    centre = shapely.Point(500.0 + 150 * PIXEL, 2.0 - 100 * PIXEL)
+def cut_out(mask, level, min_area, dry_mean=0.0):
+    """Outlines of the regions of a mask at the corner of a kilometre, with the regions."""
+    grid = Grid(0, PIXEL, 0, mask.shape[0])
+    whole = np.zeros((mask.shape[0], grid.columns), bool)
+    levels = np.full(whole.shape, NODATA, np.int16)
+    whole[:, 50 : 50 + mask.shape[1]], levels[:, 50 : 50 + mask.shape[1]] = mask, level
+    found = regions(whole, levels, grid, dry_mean, min_area)
+    return [shapely.affinity.translate(region.outline, -50 * PIXEL) for region in found], found
+
+
+def test_wet_polygon_with_a_hole_has_the_true_area_and_drop():
+    state, level, _ = _rings()
+    mask = wet_pixels(state, level, -90.0, filter_size(0.6))
+    (found,), (region,) = cut_out(mask, level, 0.05, 0.5)
+    centre = shapely.Point(150 * PIXEL, 100 * PIXEL)
     true = centre.buffer(60 * PIXEL, 64).difference(centre.buffer(20 * PIXEL, 64))
     assert found.is_valid
     assert len(found.interiors) == 1
     assert found.exterior.is_ccw
     assert found.area == pytest.approx(true.area, rel=0.02)
     assert found.intersection(true).area / found.union(true).area > 0.96
+    shown = mask & (level != NODATA)
+    assert region.filled == shown.sum()
+    assert region.drop_sum == pytest.approx((0.5 - level[shown] / 100).sum())
+    assert region.drop_max == pytest.approx(0.5 - level[shown].min() / 100)
+    np.testing.assert_array_equal(region.mask, mask[np.ix_(mask.any(axis=1), mask.any(axis=0))][::-1])
+
+
+def test_the_median_filter_is_a_vote_of_the_lining_about_a_pixel():
+    state, level, _ = _rings()
+    state[50:60, 20:90] = State.OFF
+    state[:30] = State.FLOOR
+    found = wet_pixels(state, level, -90.0, 7)
+    rng = np.random.default_rng(1)
+    for i, j in zip(rng.integers(0, 200, 500), rng.integers(0, 300, 500), strict=True):
+        about = np.s_[max(i - 3, 0) : i + 4, max(j - 3, 0) : j + 4]
+        lining = state[about] == State.LINING
+        wet = lining & (level[about] < -90)
+        assert found[i, j] == (2 * wet.sum() > lining.sum() > 0.2 * 12 and state[i, j] <= State.LINING)
 
 
 def test_an_appendage_is_never_wet():
-    corrected, lining, wet = _rings()
-    closed = np.zeros(corrected.shape, bool)
-    closed[:, 140:145] = True
-    mask = wet_pixels(corrected, lining & ~closed, closed, -0.9, 5)
+    state, level, wet = _rings()
+    state[:, 140:145] = State.OFF
+    mask = wet_pixels(state, level, -90.0, 5)
+    closed = state == State.OFF
     assert not mask[closed].any()
     assert mask[wet & ~closed].mean() > 0.95
 
@@ -157,15 +225,17 @@ def test_small_regions_are_left_out_and_outlines_stay_within_a_pixel():
     rng = np.random.default_rng(6)
     mask = np.zeros((400, 400), bool)
     row, column = np.mgrid[:400, :400]
-    truth = []
     for _ in range(12):
         r, c, size = rng.uniform(40, 360), rng.uniform(40, 360), rng.uniform(3, 30)
         mask |= np.hypot(row - r, column - c) < size
-    transform = Affine(PIXEL, 0, 0, 0, -PIXEL, 0)
-    found = polygons(mask, transform, 0.05)
-    truth = polygons(mask, transform, 0.0)
+    level = np.zeros(mask.shape, np.int16)
+    found, _ = cut_out(mask, level, 0.05)
+    truth, _ = cut_out(mask, level, 0.0)
+    assert 0 < len(found) < len(truth)
     assert all(p.is_valid and p.area > 0.045 for p in found)
-    stairs = shapely.union_all([box(c * PIXEL, -(r + 1) * PIXEL, (c + 1) * PIXEL, -r * PIXEL) for r, c in np.argwhere(mask)])
+    stairs = shapely.union_all(
+        [box(c * PIXEL, (399 - r) * PIXEL, (c + 1) * PIXEL, (400 - r) * PIXEL) for r, c in np.argwhere(mask)]
+    )
     assert shapely.union_all(truth).symmetric_difference(stairs).buffer(-PIXEL).is_empty
     assert sum(p.area for p in truth) == pytest.approx(mask.sum() * PIXEL**2, rel=0.02)
 
@@ -187,9 +257,21 @@ def test_leaks_found_again_by_mutual_best_overlap():
     assert match(same, now) == {k: k for k in range(len(now))}
 
 
+def test_a_part_known_before_and_the_whole_are_the_same_leak():
+    whole, apart = box(0, 0, 10, 1), box(20, 0, 21, 1)
+    assert match_parts([box(0, 0, 1, 1)], [False], [apart, whole]) == {1: 0}
+    # The reviewed half counts before the larger one, and is not used twice.
+    assert match_parts([box(1, 0, 10, 1), box(0, 0, 1, 1)], [False, True], [whole]) == {0: 1}
+    assert match_parts([whole], [False], [box(0, 0, 2, 1), box(4, 0, 10, 1)]) == {1: 0}
+    assert match_parts([box(-3, 0, 0.5, 1)], [True], [whole]) == {}
+    assert match_parts([box(10, 0, 11, 1)], [True], [whole]) == {}
+
+
 def test_gap_in_the_scan_is_not_taken_for_a_sparse_scan() -> None:
     state = np.full((10, 400), State.EMPTY, np.uint8)
     state[:, 20:60] = state[:, 300:350] = State.LINING
     state[:, 30:40:3] = State.EMPTY
-    assert _filled(state, 50) == pytest.approx(86 / 90)
-    assert _filled(state, 400) == pytest.approx(86 / 330)
+    columns = _columns(state, 0, 400)
+    assert _filled(*columns, 50) == pytest.approx(86 / 90)
+    assert _filled(*columns, 400) == pytest.approx(86 / 330)
+    assert _filled(*_columns(state, 20, 60), 50) == pytest.approx(36 / 40)
