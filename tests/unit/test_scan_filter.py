@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.scan import filter as scan_filter
-from tunneldb.scan.filter import FilterCounts, FilterSettings, filter_file, prefetch
+from tunneldb.scan.ahead import in_order, prefetch
+from tunneldb.scan.filter import FilterCounts, FilterSettings, filter_file
 from tunneldb.scan.noise import noise_filter
 from tunneldb.scan.pose import PoseModel
 from tunneldb.scan.spool import BINS_PER_KM, BINS_PER_METRE, ROW, Rows, Spool, windows
+from tunneldb.scan.thin import thin, voxel_edge
 
 ORIGIN = np.array([500_000.0, 4_500_000.0, 100.0])
 
@@ -92,10 +94,12 @@ def axis() -> Alignment:
     return Alignment.from_polyline(vertices, 995.0 - 5.0, 10.0)
 
 
-def filtered(path: Path, memory: int = 1 << 28, chunk: int = 1_000_000) -> tuple[FilterCounts, Rows]:
+def filtered(
+    path: Path, memory: int = 1 << 28, chunk: int = 1_000_000, density: float | None = None
+) -> tuple[FilterCounts, Rows]:
     poses = PoseModel.from_stations(np.array([0]), ORIGIN[None])
     with Spool(1 << 28) as survivors:
-        counts = filter_file(path, None, axis(), poses, FilterSettings(density=None), survivors, 3, memory=memory, chunk=chunk)
+        counts = filter_file(path, None, axis(), poses, FilterSettings(density), survivors, 3, memory=memory, chunk=chunk)
         first, bins = survivors.counts()
         rows = survivors.read(first, first + len(bins))
     return counts, np.sort(rows, order=["time"])
@@ -113,6 +117,40 @@ def test_noise_does_not_depend_on_parts_chunks_or_disk(scan: tuple[Path, np.ndar
             found_counts, found = filtered(path, memory, chunk)
             np.testing.assert_array_equal(found, expected)
             assert found_counts.noise == counts.noise
+
+
+def test_thinning_keeps_of_each_voxel_the_first_that_is_no_noise(
+    scan: tuple[Path, np.ndarray], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever chunks and windows it is done in: the same rows as with all points judged, and the same count of noise."""
+    path, xyz = scan
+    _, good = filtered(path)
+    kilometres = [good[good["chainage"] < 1000.0], good[good["chainage"] >= 1000.0]]  # each is thinned by itself
+    expected = np.concatenate([part[thin(rows_of(part), voxel_edge(100.0))] for part in kilometres])
+    expected = np.sort(expected, order=["time"])
+    noise = []
+    for window, memory, chunk in ((10**6, 1 << 28, 10**6), (1000, 0, 7_000), (30_000, 1 << 20, 50_000)):
+        monkeypatch.setattr(scan_filter, "WINDOW", window)
+        counts, found = filtered(path, memory, chunk, 100.0)
+        np.testing.assert_array_equal(found, expected)
+        assert counts.points == len(xyz) == counts.noise + counts.thinned + counts.kept
+        noise.append(counts.noise)
+    assert noise[0] == noise[1] == noise[2]
+    assert 20 < noise[0] <= len(xyz) - len(good)
+
+
+def rows_of(rows: Rows) -> np.ndarray:
+    return np.column_stack([rows[name] for name in "xyz"])
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_results_come_in_order(count: int) -> None:
+    def work(low: int, high: int) -> int:
+        time.sleep(0.002 * (low % 3))
+        return low * high
+
+    parts = [(n, n + 1) for n in range(20)]
+    assert list(in_order(count, work, parts)) == [low * high for low, high in parts]
 
 
 def test_progress_adds_up_to_twice_the_points(scan: tuple[Path, np.ndarray]) -> None:

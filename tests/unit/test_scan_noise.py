@@ -46,7 +46,7 @@ def test_agrees_with_a_search_tree(edge: float) -> None:
     radius = rng.uniform(edge / 4, edge, len(xyz))
     expected = cKDTree(xyz).query_ball_point(xyz, radius, return_length=True) < 5
     assert 0 < expected.sum() < len(xyz)
-    np.testing.assert_array_equal(is_noise(xyz, radius, 5), expected)
+    np.testing.assert_array_equal(is_noise(xyz, xyz, radius, 5), expected)
 
 
 @given(st.integers(0, 10_000), st.integers(1, 300), st.sampled_from([0.05, 0.3, 2.0]), st.integers(1, 8))
@@ -58,13 +58,24 @@ def test_agrees_with_a_search_tree_in_any_cloud(seed: int, count: int, spread: f
     # Rounded coordinates put neighbours exactly on the radius, where the last bit decides: leave those clouds out.
     distance = np.linalg.norm(xyz[:, None] - xyz[None], axis=2)
     if not np.any(np.abs(distance - 0.1) < 1e-9):
-        np.testing.assert_array_equal(is_noise(xyz, np.full(count, 0.1), points), expected)
+        np.testing.assert_array_equal(is_noise(xyz, xyz, np.full(count, 0.1), points), expected)
 
 
 def test_only_judged_points_are_noise_but_all_are_neighbours() -> None:
     xyz = np.array([[0.0, 0, 0], [0.01, 0, 0], [0.02, 0, 0], [5.0, 0, 0], [9.0, 0, 0]])
-    judged = np.array([True, False, False, True, False])
-    np.testing.assert_array_equal(is_noise(xyz, np.full(5, 0.05), 3, judged), [False, False, False, True, False])
+    np.testing.assert_array_equal(is_noise(xyz, xyz[[0, 3]], np.full(2, 0.05), 3), [False, True])
+
+
+@pytest.mark.parametrize("judged", [1, 40, 4000])
+def test_few_are_judged_as_all_are(judged: int) -> None:
+    """What is left out of a cloud because it is far from the few that are judged is no neighbour of theirs."""
+    rng = np.random.default_rng(2)
+    cloud = ORIGIN + rng.uniform(-2, 2, (20_000, 3)) * [1, 1, 0.1]
+    radius = rng.uniform(0.02, 0.15, len(cloud))
+    expected = cKDTree(cloud).query_ball_point(cloud, radius, return_length=True) < 5
+    assert 0.1 < expected.mean() < 0.9
+    chosen = rng.choice(len(cloud), judged, replace=False)
+    np.testing.assert_array_equal(is_noise(cloud, cloud[chosen], radius[chosen], 5), expected[chosen])
 
 
 def test_at_full_density_the_filter_is_the_papers() -> None:
@@ -104,7 +115,7 @@ def test_density_may_change_along_the_tunnel() -> None:
     stretch = np.floor(cells.centres[:, 0] / 5.0).astype(np.int64)
     radius = search_radii(cells.counts, cells.edge, stretch=stretch)[number]
     assert radius[len(sparse) :].max() < 0.05
-    noise = is_noise(xyz, radius)
+    noise = is_noise(xyz, xyz, radius)
     assert noise[: len(sparse)].mean() < 0.0005
     assert noise[-len(lone) :].all()
 

@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tunneldb.scan.thin import thin, voxel_edge
+from tunneldb.scan.spool import ROW
+from tunneldb.scan.thin import first_of_voxels, pick, thin, voxel_edge
 
 ORIGIN = np.array([500_000.0, 4_500_000.0, 100.0])
 
@@ -50,11 +51,58 @@ def test_each_voxel_keeps_its_point_nearest_to_the_centre(xyz: np.ndarray) -> No
 
 
 def test_points_at_one_place_are_told_apart_by_their_values() -> None:
-    xyz = np.zeros((3, 3))
-    ties = np.array([[2.0, 0.0], [1.0, 5.0], [1.0, 4.0]])
+    rows = np.zeros(3, ROW)
+    rows["time"], rows["intensity"] = [2.0, 1.0, 1.0], [0.0, 5.0, 4.0]
     for order in ([0, 1, 2], [2, 1, 0], [1, 2, 0]):
-        keep = thin(xyz[order], 0.1, ties[order])
-        np.testing.assert_array_equal(ties[order][keep], [[1.0, 4.0]])
+        chosen, before = first_of_voxels(rows[order], 0.1, np.ones(3, bool))
+        assert rows[order][chosen]["intensity"].tolist() == [4.0]
+        assert not before.any()
+
+
+@given(clouds, st.integers(0, 10**6))
+@settings(deadline=None)
+def test_the_first_good_one_is_chosen_and_what_stood_before_it_told(xyz: np.ndarray, seed: int) -> None:
+    edge = 0.1225
+    good = np.random.default_rng(seed).random(len(xyz)) < 0.5
+    rows = np.zeros(len(xyz), ROW)
+    for column, name in enumerate("xyz"):
+        rows[name] = xyz[:, column]
+    rows["time"] = np.arange(len(xyz))
+    chosen, before = first_of_voxels(rows, edge, good)
+    voxels: dict[tuple[float, ...], list[int]] = {}
+    for row in sorted(range(len(xyz)), key=lambda i: _standing(xyz[i], edge, i)):
+        voxels.setdefault(tuple(np.floor(xyz[row] / edge)), []).append(row)
+    for members in voxels.values():
+        first = next((k for k, row in enumerate(members) if good[row]), len(members))
+        assert before[members].tolist() == [k < first for k in range(len(members))]
+        assert chosen[members].tolist() == [k == first for k in range(len(members))]
+
+
+def _standing(point: np.ndarray, edge: float, number: int) -> tuple[float, ...]:
+    centre = (np.floor(point / edge) + 0.5) * edge
+    x, y, z = (float(p - c) for p, c in zip(point, centre, strict=True))
+    return (x**2 + y**2 + z**2, *point.tolist(), number)
+
+
+@given(clouds, st.integers(1, 6), st.integers(0, 10**6))
+@settings(deadline=None)
+def test_what_is_picked_of_chunks_holds_the_first_good_one(xyz: np.ndarray, points: int, seed: int) -> None:
+    """Thinning what was picked of each chunk, noise left out, is thinning all, noise left out."""
+    edge, limit = 0.1225, 0.03**2
+    apart = ((xyz[:, None] - xyz[None]) ** 2).sum(axis=2)
+    good = (apart <= limit).sum(axis=1) >= points
+    expected = as_set(xyz[good][thin(xyz[good], edge)])
+    found = []
+    for part in np.array_split(np.random.default_rng(seed).permutation(len(xyz)), 3):
+        cloud = np.ascontiguousarray(xyz[part])
+        none = np.zeros(len(part))
+        numbers, certain = pick(
+            cloud, none, none.astype("f4"), none.astype("i4"), none.astype("u1"), none == 0, edge, limit, points, 1024
+        )
+        assert good[part[numbers[certain]]].all()
+        found.append(part[numbers][good[part[numbers]]])
+    rows = np.concatenate(found).astype(int)
+    assert as_set(xyz[rows][thin(xyz[rows], edge)]) == expected
 
 
 @pytest.mark.parametrize("density", [100.0, 400.0])

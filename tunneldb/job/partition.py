@@ -16,8 +16,10 @@ from tunneldb.database.copy import PointZ, copy_binary, pack
 from tunneldb.database.fetch import fetch_array
 from tunneldb.database.survey import Survey
 from tunneldb.geometry.alignment import KILOMETRE, Alignment
-from tunneldb.scan.filter import STRETCHING, prefetch, thin_rows
+from tunneldb.scan.ahead import prefetch
+from tunneldb.scan.filter import voxel_reach
 from tunneldb.scan.spool import BINS_PER_KM, BINS_PER_METRE, ROW, Rows, Spool, bin_of, windows
+from tunneldb.scan.thin import first_of_voxels
 
 COLUMNS = (
     "survey_id",
@@ -93,11 +95,6 @@ def _ranges(counts: list[tuple[int, int]]) -> Iterator[tuple[float, float]]:
         yield float(low), counts[-1][0] + 1.0
 
 
-def voxel_reach(edge: float) -> float:
-    """Greatest difference of chainage between two points of one voxel, m."""
-    return edge * math.sqrt(3.0) * STRETCHING
-
-
 def write_partition(
     conn: psycopg.Connection[Any],
     survey: Survey,
@@ -137,7 +134,8 @@ def write_partition(
     def chunks() -> Iterator[bytes]:
         for low, high in windows(max(first, begin), counts, WINDOW):
             rows = spool.read(max(low - reach, begin), min(high + reach, end))
-            rows = thin_rows(rows, edge)
+            if edge is not None:
+                rows = rows[first_of_voxels(rows, edge, np.ones(len(rows), np.bool_))[0]]
             bins = bin_of(rows["chainage"])
             rows = rows[(bins >= low) & (bins < high)]
             rows = rows[np.argsort(rows["chainage"], kind="stable")]
@@ -149,7 +147,7 @@ def write_partition(
     conn.execute(sql.SQL("DROP TABLE IF EXISTS {}").format(new))
     conn.execute(sql.SQL("CREATE TABLE {} (LIKE tunnel.point)").format(new))
     with closing(prefetch(chunks())) as packed:
-        copy_binary(conn, new, COLUMNS, packed)
+        copy_binary(conn, new, COLUMNS, packed, fresh=True)
     return written
 
 

@@ -28,9 +28,8 @@ from tunneldb.job.files import (
     unchanged,
 )
 from tunneldb.job.fragment import drop_fragments, write_fragments
-from tunneldb.job.partition import voxel_reach
 from tunneldb.job.settings import require_same_density
-from tunneldb.scan.filter import MEMORY, FilterSettings, filter_file
+from tunneldb.scan.filter import MEMORY, FilterSettings, filter_file, voxel_reach
 from tunneldb.scan.pose import PoseModel, load_poses
 from tunneldb.scan.reader import ScanHeader, check_header, read_header
 from tunneldb.scan.spool import Spool

@@ -1,17 +1,18 @@
-"""One scan file, from its points to those that go into the database."""
+"""One scan file, from its points to those that go into the database.
+
+A point is looked at closely only where it may get a row. Of each voxel of thinning and each chunk of the file the point
+nearest to the voxel's centre is a candidate; on a dense wall enough of the chunk's points lie around it to tell that
+it is no noise, and the others of the voxel can be left out at once. Where that is not so they all stay candidates until
+the whole file is read; then those nearer to the centre than the nearest certain one are judged.
+"""
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from queue import Queue
-from threading import Event, Thread
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,23 +20,25 @@ from scipy.spatial import cKDTree
 
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.job.threads import threads
+from tunneldb.scan.ahead import in_order, prefetch
 from tunneldb.scan.noise import DIAMETER, POINTS, CellCounts, is_noise, search_radii
+from tunneldb.scan.place import STRETCHING, Places
+from tunneldb.scan.points import CHUNK, Points
 from tunneldb.scan.pose import PoseFaults, PoseModel
-from tunneldb.scan.reader import CHUNK, Points, read_chunks
-from tunneldb.scan.spool import BINS_PER_METRE, ROW, Rows, Spool, bin_of, rows_xyz, windows
-from tunneldb.scan.thin import thin, voxel_edge
+from tunneldb.scan.reader import read_chunks
+from tunneldb.scan.spool import BINS_PER_KM, BINS_PER_METRE, PLACE, Rows, Spool, bin_of, rows_xyz, windows
+from tunneldb.scan.thin import first_of_voxels, pick, voxel_edge
 
-T = TypeVar("T")
 Progress = Callable[[int], None]
 
 MEMORY = 192 << 20  # bytes of rows that each spool holds before it goes to disk
-WINDOW = 500_000  # points filtered at a time by each thread
-CROWDED = 2_000_000  # from this many points in one window on, one thread, for the sake of memory
+WINDOW = 1_000_000  # points whose neighbourhoods are looked at at a time by each thread
+CROWDED = 4_000_000  # from this many points in one window on, one thread, for the sake of memory
 BLOCK = 50_000  # points of a LAZ file that can be decoded by themselves
 MARGIN = 10.0  # m beyond its ends that a kilometre is looked up in a file for what happens at its end
 STRETCH = 5.0  # m of tunnel for which the noise filter's widest radius is found
-# A distance in space is at most this many times as long in chainage: a point 25 m inside a curve of 75 m radius.
-STRETCHING = 1.5
+CERTAIN = -1  # tag of a candidate that is certain to be no noise; the others have the number of their cell
 
 
 @dataclass(frozen=True)
@@ -94,16 +97,11 @@ class FilterCounts:
         """Points that thinning left out."""
         return self.points - self.outside - self.noise - self.kept
 
-    def locate(self, first: int, near: NDArray[np.intp], chainage: NDArray[np.float64]) -> None:
-        """Note where in the file kilometres are: chainage of the points with numbers first + near, which grow."""
-        if len(near) == 0:
-            return
-        number = first + near
-        starts = np.flatnonzero(np.diff(number // BLOCK, prepend=-1))
-        low = np.floor((np.minimum.reduceat(chainage, starts) - MARGIN) / KILOMETRE).astype(int)
-        high = np.floor((np.maximum.reduceat(chainage, starts) + MARGIN) / KILOMETRE).astype(int)
-        for block, lowest, highest in zip((number[starts] // BLOCK).tolist(), low.tolist(), high.tolist(), strict=True):
-            for km in range(lowest, highest + 1):
+    def locate(self, blocks: NDArray[np.int64], low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
+        """Note where in the file kilometres are: blocks of BLOCK points, with the chainage from and to of each, m."""
+        lowest, highest = (np.floor(ends / KILOMETRE).astype(int).tolist() for ends in (low - MARGIN, high + MARGIN))
+        for block, first, last in zip(blocks.tolist(), lowest, highest, strict=True):
+            for km in range(first, last + 1):
                 ranges = self.ranges.setdefault(km, [])
                 if ranges and ranges[-1][1] >= block * BLOCK:
                     ranges[-1] = (ranges[-1][0], (block + 1) * BLOCK)
@@ -163,133 +161,151 @@ def filter_file(
         If the file cannot be read, no point lies near the axis (says how far they are), all near it are noise, or the
         scanner position of any point near the axis is unknown.
     """
-    counts, cells = FilterCounts(), CellCounts()
-    with Spool(memory) as spool:
-        _spool_file(path, dimension, alignment, poses, settings, spool, cells, counts, progress, chunk)
-        stretch = _stretches(alignment, cells)
+    with _Filter(path, dimension, alignment, poses, settings, memory) as work:
+        work.read(progress, chunk)
+        for rows in work.judge(progress):
+            rows["tag"] = tag
+            survivors.add(rows)
+    if work.counts.kept == 0:
+        raise UserError(
+            f"{path}: all {work.counts.noise} points near the axis are noise: none has {settings.noise_points} points around it"
+        )
+    return work.counts
+
+
+def voxel_reach(edge: float) -> float:
+    """Greatest difference of chainage between two points of one voxel, m."""
+    return edge * math.sqrt(3.0) * STRETCHING
+
+
+class _Filter:
+    """A file under way: its candidates for a row, and the places of all its points, by chainage."""
+
+    def __init__(
+        self,
+        path: Path,
+        dimension: str | None,
+        alignment: Alignment,
+        poses: PoseModel,
+        settings: FilterSettings,
+        memory: int,
+    ) -> None:
+        self.path, self.dimension = path, dimension
+        self.poses, self.settings = poses, settings
+        self.counts, self.cells = FilterCounts(), CellCounts()
+        self.places = Places(alignment, settings.max_distance, self.cells.edge)
+        self.rows, self.cloud = Spool(memory // 2), Spool(memory // 2, PLACE)
+
+    def __enter__(self) -> _Filter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.rows.close()
+        self.cloud.close()
+
+    def read(self, progress: Progress, chunk: int) -> None:
+        """Read the file, and set aside what the noise filter has to look at."""
+        faults, nearest = PoseFaults(), math.inf
+        with closing(prefetch(read_chunks(self.path, self.dimension, chunk))) as chunks:
+            for points in chunks:
+                faults += self.poses.faults(self._near(points))
+                if self.counts.outside == self.counts.points:
+                    vertices = self.places.alignment.vertices
+                    nearest = min(nearest, float(cKDTree(vertices).query(points.xyz[::100])[0].min()))
+                progress(len(points))
+        for ranges in self.counts.ranges.values():
+            ranges[-1] = (ranges[-1][0], min(ranges[-1][1], self.counts.points))
+        if self.counts.outside == self.counts.points:
+            raise UserError(
+                f"{self.path}: no points near the axis: the nearest is about {nearest:.0f} m from it and the limit is "
+                f"{self.settings.max_distance:g} m; check the axis, the file's coordinates and the tunnel's SRID"
+            )
+        if faults:
+            raise faults.error(str(self.path))
+
+    def _near(self, points: Points) -> Points:
+        """Set the points of a chunk aside; returns those near the axis."""
+        cell = self.cells.add(points.xyz)
+        self.places.update(self.cells)
+        outside = self.places.outside(points, cell)
+        number = np.arange(self.counts.points, self.counts.points + len(points))
+        self.counts.points += len(points)
+        self.counts.outside += len(outside)
+        if len(outside):
+            self.cells.remove(cell[outside])
+            kept = np.delete(np.arange(len(points)), outside)
+            number, cell, points = number[kept], cell[kept], points.some(kept)
+        if len(points):
+            self.counts.locate(*self.places.span(number, cell, BLOCK))
+            picked, certain = self._pick(points, cell)
+            tag = np.where(certain, np.int32(CERTAIN), cell[picked])
+            self.rows.add(self.places.rows(points, cell, picked, tag))
+            self.cloud.add(points.xyz.view(PLACE).ravel(), self.places.bin[cell])
+        return points
+
+    def _pick(self, points: Points, cell: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+        if self.settings.edge is None:
+            return np.arange(len(points), dtype=np.int32), np.zeros(len(points), np.bool_)
+        return pick(
+            points.xyz, points.time, points.intensity, points.scan_id, points.classification, self.places.whole[cell],
+            self.settings.edge, (self.settings.noise_diameter / 2) ** 2, self.settings.noise_points,
+            1 << max(8, math.ceil(math.log2(2 * len(points) + 1))),
+        )  # fmt: skip
+
+    def judge(self, progress: Progress) -> Iterator[Rows]:
+        """Rows that stay, thinned within the file, a window of chainage after the other."""
+        counts, cells, settings = self.counts, self.cells, self.settings
+        stretch = np.floor(self.places.chainage / STRETCH).astype(np.int64)
         radii = search_radii(cells.counts, cells.edge, settings.noise_points, settings.noise_diameter, stretch)
         widest = _widest(stretch, radii)
-        first, bins = spool.counts()
+        first, bins = self.cloud.counts()
+        # A point's bin may be some farther than its cell's.
+        bins, first = np.pad(bins, self.places.bins_off), first - self.places.bins_off
         parts = list(windows(first, bins, WINDOW))
         crowded = max(int(bins[low - first : high - first].sum()) for low, high in parts) > CROWDED
 
-        def judge(low: int, high: int) -> tuple[int, Rows]:
-            return _judge(spool, low, high, _reach(low, high, widest), radii, settings)
+        def work(low: int, high: int) -> tuple[int, Rows]:
+            return self._judge(low, high, _reach(low, high, widest), radii)
 
-        with ThreadPoolExecutor(1 if crowded else 2, "filter") as pool:
-            for (low, high), (noise, rows) in zip(parts, _in_order(pool, judge, parts), strict=True):
-                rows["tag"] = tag
-                survivors.add(rows)
-                counts.noise += noise
-                counts.keep(rows)
-                progress(int(bins[low - first : high - first].sum()))
-    progress(counts.outside)
-    if counts.kept == 0:
-        raise UserError(
-            f"{path}: all {counts.noise} points near the axis are noise: none has {settings.noise_points} points around it"
-        )
-    return counts
+        for (low, high), (noise, rows) in zip(parts, in_order(1 if crowded else threads(), work, parts), strict=True):
+            counts.noise += noise
+            counts.keep(rows)
+            progress(int(bins[low - first : high - first].sum()))
+            yield rows
+        progress(counts.outside)
 
+    def _judge(self, low: int, high: int, reach: int, radii: NDArray[np.float64]) -> tuple[int, Rows]:
+        """Noise of a window, counted, and the rows that stay."""
+        edge = self.settings.edge
+        margin = 0 if edge is None else math.ceil(voxel_reach(edge) * BINS_PER_METRE)
+        begin = math.floor(low / BINS_PER_KM) * BINS_PER_KM  # each kilometre is thinned by itself
+        rows = self.rows.read(max(low - margin, begin), min(high + margin, begin + BINS_PER_KM))
+        wide = margin + reach + self.places.bins_off
+        good = rows["tag"] == CERTAIN
 
-def prefetch(items: Iterable[T], ahead: int = 1) -> Generator[T, None, None]:
-    """Make the next items in a thread of their own while the present one is worked on.
+        def judge(doubtful: NDArray[np.bool_]) -> None:
+            chosen = np.flatnonzero(doubtful)
+            if len(chosen):
+                cloud = self.cloud.read(low - wide, high + wide)["xyz"]
+                radius = radii[rows["tag"][chosen]]
+                good[chosen] = ~is_noise(cloud, rows_xyz(rows, chosen), radius, self.settings.noise_points)
 
-    To be closed by whoever may leave before the end (`contextlib.closing`), which also ends the thread.
-    """
-    queue: Queue[tuple[bool, T | BaseException | None]] = Queue(ahead)
-    stopped = Event()
-
-    def fill() -> None:
-        try:
-            for item in items:
-                queue.put((True, item))
-                if stopped.is_set():
-                    return
-            queue.put((False, None))
-        except BaseException as error:
-            queue.put((False, error))
-
-    thread = Thread(target=fill, name="prefetch", daemon=True)
-    thread.start()
-    try:
-        while True:
-            good, item = queue.get()
-            if good:
-                yield item  # type: ignore[misc]
-            elif isinstance(item, BaseException):
-                raise item
-            else:
-                return
-    finally:
-        stopped.set()
-        while thread.is_alive():
-            while not queue.empty():
-                queue.get()
-            thread.join(0.01)
-
-
-def _spool_file(
-    path: Path,
-    dimension: str | None,
-    alignment: Alignment,
-    poses: PoseModel,
-    settings: FilterSettings,
-    spool: Spool,
-    cells: CellCounts,
-    counts: FilterCounts,
-    progress: Progress,
-    chunk: int,
-) -> None:
-    faults = PoseFaults()
-    nearest = math.inf
-    with closing(prefetch(read_chunks(path, dimension, chunk))) as chunks:
-        for points in chunks:
-            chainage, distance = alignment.locate(points.xyz)
-            with np.errstate(invalid="ignore"):
-                near = np.flatnonzero(distance <= settings.max_distance)
-            counts.locate(counts.points, near, chainage[near])
-            counts.points += len(points)
-            counts.outside += len(points) - len(near)
-            if len(near):
-                rows = _rows(points, chainage, near)
-                rows["tag"] = cells.add(rows_xyz(rows))
-                spool.add(rows)
-                faults += poses.faults(_some(points, near))
-            elif counts.outside == counts.points:
-                nearest = min(nearest, float(cKDTree(alignment.vertices).query(points.xyz[::100])[0].min()))
-            progress(len(points))
-    for ranges in counts.ranges.values():
-        ranges[-1] = (ranges[-1][0], min(ranges[-1][1], counts.points))
-    if counts.outside == counts.points:
-        raise UserError(
-            f"{path}: no points near the axis: the nearest is about {nearest:.0f} m from it and the limit is "
-            f"{settings.max_distance:g} m; check the axis, the file's coordinates and the tunnel's SRID"
-        )
-    if faults:
-        raise faults.error(str(path))
-
-
-def _rows(points: Points, chainage: NDArray[np.float64], chosen: NDArray[np.intp]) -> Rows:
-    rows: Rows = np.empty(len(chosen), ROW)
-    for column, name in enumerate("xyz"):
-        rows[name] = points.xyz[chosen, column]
-    rows["chainage"] = chainage[chosen]
-    for name in ("time", "intensity", "scan_id", "classification"):
-        rows[name] = getattr(points, name)[chosen]
-    return rows
-
-
-def _some(points: Points, chosen: NDArray[np.intp]) -> Points:
-    if len(chosen) == len(points):
-        return points
-    return Points(*(getattr(points, name)[chosen] for name in Points.__dataclass_fields__))
-
-
-def _stretches(alignment: Alignment, cells: CellCounts) -> NDArray[np.int64]:
-    """Stretch of tunnel of each cell, by its centre; those beyond the ends of the axis go with the nearest one."""
-    chainage = np.clip(alignment.locate(cells.centres)[0], alignment.start, alignment.end)
-    chainage[np.isnan(chainage)] = alignment.start
-    return np.floor(chainage / STRETCH).astype(np.int64)
+        if edge is None:
+            judge(~good)
+            stays, noise = good, ~good
+        else:
+            # The first of each voxel is mostly good, and the others need not be looked at.
+            front, _ = first_of_voxels(rows, edge, np.ones(len(rows), np.bool_))
+            judge(front & ~good)
+            stays, noise = first_of_voxels(rows, edge, good)
+            rest = noise & ~front
+            if rest.any():
+                judge(rest)
+                part = np.flatnonzero(stays | noise)
+                stays[part], noise[part] = first_of_voxels(rows[part], edge, good[part])
+        bins = bin_of(rows["chainage"])
+        inside = (bins >= low) & (bins < high)
+        return int((noise & inside).sum()), rows[stays & inside]
 
 
 def _widest(stretch: NDArray[np.int64], radii: NDArray[np.float64]) -> tuple[int, NDArray[np.float64]]:
@@ -309,40 +325,3 @@ def _reach(low: int, high: int, widest: tuple[int, NDArray[np.float64]]) -> int:
     near = radii[max(begin, 0) : max(end, 1)]
     radius = float(near.max()) if len(near) else float(radii.max())
     return math.ceil(radius * STRETCHING * BINS_PER_METRE)
-
-
-def _judge(
-    spool: Spool, low: int, high: int, reach: int, radii: NDArray[np.float64], settings: FilterSettings
-) -> tuple[int, Rows]:
-    """Noise of a window, counted, and the rows that stay after thinning."""
-    rows = spool.read(low - reach, high + reach)
-    bins = bin_of(rows["chainage"])
-    judged = (bins >= low) & (bins < high)
-    noise = is_noise(rows_xyz(rows), radii[rows["tag"]], settings.noise_points, judged)
-    rows = rows[judged & ~noise]
-    return int(noise.sum()), thin_rows(rows, settings.edge)
-
-
-def thin_rows(rows: Rows, edge: float | None) -> Rows:
-    """Thin rows by voxels of this edge (m); None keeps all. Between points that are equal in all else the tag decides."""
-    if edge is None:
-        return rows
-    names = ("time", "intensity", "scan_id", "classification", "tag")
-    ties = np.empty((len(rows), len(names)))
-    for column, name in enumerate(names):
-        ties[:, column] = rows[name]
-    return rows[thin(rows_xyz(rows), edge, ties)]
-
-
-def _in_order(
-    pool: ThreadPoolExecutor, work: Callable[[int, int], tuple[int, Rows]], parts: list[tuple[int, int]]
-) -> Iterator[tuple[int, Rows]]:
-    """Results in the order of the parts, with no more under way than threads can take up at once."""
-    waiting: deque[Future[tuple[int, Rows]]] = deque()
-    todo = iter(parts)
-    for part in todo:
-        waiting.append(pool.submit(work, *part))
-        if len(waiting) > 2:
-            yield waiting.popleft().result()
-    while waiting:
-        yield waiting.popleft().result()

@@ -36,6 +36,8 @@ CELL = 0.5
 EXPECTED = 20
 SPARSE_SHARE = 0.05
 
+SELECTIVE = 4  # with this many times as many points as are to be judged it pays to leave out those far from them
+
 POINTS = 5
 DIAMETER = 0.05
 
@@ -76,6 +78,10 @@ class CellCounts:
         """Centre of each cell, (k, 3), m."""
         centres: Float = np.multiply(self._cells[: self._used] + 0.5, self.edge, dtype=np.float64)
         return centres
+
+    def remove(self, numbers: Int32) -> None:
+        """Take points out of the count of their cells (n,)."""
+        np.subtract.at(self._counts, numbers, 1)
 
     def _grow(self) -> None:
         size = 2 * len(self._cells)
@@ -123,19 +129,19 @@ def search_radii(
     return radii
 
 
-def is_noise(xyz: Float, radius: Float, points: int = POINTS, judged: Bool | None = None) -> Bool:
-    """Find points with fewer than `points` points, themselves included, within their search radius.
+def is_noise(cloud: Float, xyz: Float, radius: Float, points: int = POINTS) -> Bool:
+    """Find points with fewer than `points` points of a cloud within their search radius.
 
     Parameters
     ----------
+    cloud : (m, 3) float64 array
+        Coordinates of all points near those to be judged, themselves included, m.
     xyz : (n, 3) float64 array
-        Coordinates, m.
+        Points to be judged, m.
     radius : (n,) float64 array
-        Search radius of each point, m.
+        Search radius of each, m.
     points : int
         Least number of points in the neighbourhood of a good one.
-    judged : (n,) bool array, optional
-        Points to judge; the others only count as neighbours, and come out False.
 
     Returns
     -------
@@ -145,11 +151,11 @@ def is_noise(xyz: Float, radius: Float, points: int = POINTS, judged: Bool | Non
     noise = np.zeros(len(xyz), np.bool_)
     if len(xyz) == 0 or points <= 1:
         return noise
-    judged = np.ones(len(xyz), np.bool_) if judged is None else judged
-    if not judged.any():
-        return noise
-    order, start, edge, origin = _sort_by_cell(xyz, float(radius[judged].max()))
-    _judge(xyz[order], radius, judged, order, start, edge, origin, points, noise)
+    widest = float(radius.max())
+    if SELECTIVE * len(xyz) < len(cloud):
+        cloud = _near(cloud, _marks(xyz, radius, 2.0 * widest, 1 << max(8, math.ceil(math.log2(32 * len(xyz))))), 2.0 * widest)
+    ordered, start, origin = _sort_by_cell(cloud, widest)
+    _judge(ordered, xyz, radius, start, widest, origin, points, noise)
     return noise
 
 
@@ -161,7 +167,8 @@ def noise_filter(xyz: Float, points: int = POINTS, diameter: float = DIAMETER) -
     cells = CellCounts()
     number = cells.add(np.ascontiguousarray(xyz, np.float64))
     radii = search_radii(cells.counts, cells.edge, points, diameter)
-    return is_noise(np.ascontiguousarray(xyz, np.float64), radii[number], points)
+    xyz = np.ascontiguousarray(xyz, np.float64)
+    return is_noise(xyz, xyz, radii[number], points)
 
 
 def _radius(density: Float) -> Float:
@@ -169,12 +176,12 @@ def _radius(density: Float) -> Float:
         return np.sqrt(EXPECTED / (np.pi * density))
 
 
-def _sort_by_cell(xyz: Float, edge: float) -> tuple[Int32, Int32, float, Float]:
-    """Order the points by the bucket of their cell; start[b] is the first place of bucket b."""
+def _sort_by_cell(xyz: Float, edge: float) -> tuple[Float, Int32, Float]:
+    """Order the points by the bucket of their cell; start[b] is the first place of bucket b. Also the cells' origin."""
     origin = xyz.min(axis=0)
     buckets = 1 << max(8, math.ceil(math.log2(len(xyz) + 1)))
-    order, start = _bucket_sort(xyz, origin, 1.0 / edge, buckets)
-    return order, start, edge, origin
+    ordered, start = _bucket_sort(xyz, origin, 1.0 / edge, buckets)
+    return ordered, start, origin
 
 
 @njit(inline="always")
@@ -184,7 +191,7 @@ def _column(ix: int, iy: int) -> int:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True)
-def _bucket_sort(xyz: Float, origin: Float, scale: float, buckets: int) -> tuple[Int32, Int32]:  # pragma: no cover - compiled
+def _bucket_sort(xyz: Float, origin: Float, scale: float, buckets: int) -> tuple[Float, Int32]:  # pragma: no cover - compiled
     n = xyz.shape[0]
     mask = buckets - 1
     bucket = np.empty(n, np.int32)
@@ -199,33 +206,59 @@ def _bucket_sort(xyz: Float, origin: Float, scale: float, buckets: int) -> tuple
     for b in range(buckets):
         start[b + 1] += start[b]
     place = start[:-1].copy()
-    order = np.empty(n, np.int32)
+    ordered = np.empty((n, 3))
     for i in range(n):
-        b = bucket[i]
-        order[place[b]] = i
-        place[b] += 1
-    return order, start
+        k = place[bucket[i]]
+        ordered[k, 0], ordered[k, 1], ordered[k, 2] = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+        place[bucket[i]] += 1
+    return ordered, start
+
+
+@njit(cache=True, nogil=True)
+def _marks(xyz: Float, radius: Float, edge: float, buckets: int) -> Bool:  # pragma: no cover - compiled
+    """Mark the cells, by their hash, that the spheres around points reach into; edge is at least a diameter."""
+    marks = np.zeros(buckets, np.bool_)
+    mask = buckets - 1
+    scale = 1.0 / edge
+    for i in range(xyz.shape[0]):
+        r = radius[i] * (1.0 + 1e-9) + 1e-9  # rounding must not leave out a neighbour
+        for ix in range(math.floor((xyz[i, 0] - r) * scale), math.floor((xyz[i, 0] + r) * scale) + 1):
+            for iy in range(math.floor((xyz[i, 1] - r) * scale), math.floor((xyz[i, 1] + r) * scale) + 1):
+                column = _column(ix, iy)
+                for iz in range(math.floor((xyz[i, 2] - r) * scale), math.floor((xyz[i, 2] + r) * scale) + 1):
+                    marks[(column + iz) & mask] = True
+    return marks
+
+
+@njit(cache=True, nogil=True)
+def _near(cloud: Float, marks: Bool, edge: float) -> Float:  # pragma: no cover - compiled
+    """Points of a cloud that lie in marked cells; also some others, whose cells share a hash with them."""
+    mask = len(marks) - 1
+    scale = 1.0 / edge
+    chosen = np.empty(len(cloud), np.int32)
+    count = 0
+    for i in range(len(cloud)):
+        ix = math.floor(cloud[i, 0] * scale)
+        iy = math.floor(cloud[i, 1] * scale)
+        iz = math.floor(cloud[i, 2] * scale)
+        if marks[(_column(ix, iy) + iz) & mask]:
+            chosen[count] = i
+            count += 1
+    near = np.empty((count, 3))
+    for k in range(count):
+        for c in range(3):
+            near[k, c] = cloud[chosen[k], c]
+    return near
 
 
 @njit(cache=True, nogil=True)
 def _judge(
-    xyz: Float,
-    radius: Float,
-    judged: Bool,
-    order: Int32,
-    start: Int32,
-    edge: float,
-    origin: Float,
-    points: int,
-    noise: Bool,
+    cloud: Float, xyz: Float, radius: Float, start: Int32, edge: float, origin: Float, points: int, noise: Bool
 ) -> None:  # pragma: no cover - compiled
     mask = start.shape[0] - 2
     scale = 1.0 / edge
-    for k in range(xyz.shape[0]):
-        i = order[k]
-        if not judged[i]:
-            continue
-        x, y, z = xyz[k, 0], xyz[k, 1], xyz[k, 2]
+    for i in range(xyz.shape[0]):
+        x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
         ix = math.floor((x - origin[0]) * scale)
         iy = math.floor((y - origin[1]) * scale)
         iz = math.floor((z - origin[2]) * scale)
@@ -239,14 +272,14 @@ def _judge(
             for dz in range(-1, 2):
                 b = (column + iz + dz) & mask
                 for j in range(start[b], start[b + 1]):
-                    ex, ey, ez = xyz[j, 0] - x, xyz[j, 1] - y, xyz[j, 2] - z
+                    ex, ey, ez = cloud[j, 0] - x, cloud[j, 1] - y, cloud[j, 2] - z
                     if ex * ex + ey * ey + ez * ez > limit:
                         continue
                     # Other cells may share the bucket: count a neighbour in its own cell only.
                     if (
-                        math.floor((xyz[j, 0] - origin[0]) * scale) == ix + dx
-                        and math.floor((xyz[j, 1] - origin[1]) * scale) == iy + dy
-                        and math.floor((xyz[j, 2] - origin[2]) * scale) == iz + dz
+                        math.floor((cloud[j, 0] - origin[0]) * scale) == ix + dx
+                        and math.floor((cloud[j, 1] - origin[1]) * scale) == iy + dy
+                        and math.floor((cloud[j, 2] - origin[2]) * scale) == iz + dz
                     ):
                         found += 1
                         if found >= points:

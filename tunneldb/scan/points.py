@@ -94,6 +94,12 @@ class Points:
     def __len__(self) -> int:
         return len(self.xyz)
 
+    def some(self, chosen: NDArray[Any]) -> Points:
+        """The chosen points, by number or by mask."""
+        return Points(
+            self.xyz[chosen], self.time[chosen], self.scan_id[chosen], self.intensity[chosen], self.classification[chosen]
+        )
+
     @classmethod
     def of(cls, raw: Raw) -> Points:
         """Scaled coordinates, and each array in its own memory."""

@@ -32,6 +32,7 @@ ROW = np.dtype(
     ]
 )
 Rows = NDArray[Any]
+PLACE = np.dtype([("xyz", "f8", (3,))])  # a point that only counts as a neighbour
 
 # Points are found again by bins of 1/8 m of chainage: fine enough for a bin of the densest scan to fit in memory, and
 # a power of two, so that a bin never straddles a kilometre.
@@ -44,11 +45,11 @@ def bin_of(chainage: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.floor(chainage * BINS_PER_METRE).astype(np.int64)
 
 
-def rows_xyz(rows: Rows) -> NDArray[np.float64]:
-    """Coordinates (n, 3) of rows."""
-    xyz = np.empty((len(rows), 3))
+def rows_xyz(rows: Rows, chosen: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Coordinates (n, 3) of the chosen rows (n,)."""
+    xyz = np.empty((len(chosen), 3))
     for column, name in enumerate("xyz"):
-        xyz[:, column] = rows[name]
+        xyz[:, column] = rows[name][chosen]
     return xyz
 
 
@@ -72,10 +73,13 @@ class Spool:
     ----------
     memory : int
         Bytes of rows held in memory.
+    dtype : dtype
+        Of a row.
     """
 
-    def __init__(self, memory: int) -> None:
+    def __init__(self, memory: int, dtype: np.dtype[Any] = ROW) -> None:
         self.memory = memory
+        self.dtype = dtype
         self._runs: list[_Run] = []
         self._held = 0
         self._file: IO[bytes] | None = None
@@ -85,12 +89,16 @@ class Spool:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of all rows."""
         if self._file is not None:
             self._file.close()
         self._runs.clear()
 
-    def add(self, rows: Rows) -> None:
-        """Set rows aside.
+    def add(self, rows: Rows, bins: NDArray[np.int64] | None = None) -> None:
+        """Set rows aside, in these bins; without, in those of their chainage.
 
         Raises
         ------
@@ -99,10 +107,10 @@ class Spool:
         """
         if len(rows) == 0:
             return
-        bins = bin_of(rows["chainage"])
+        bins = bin_of(rows["chainage"]) if bins is None else bins
         first = int(bins.min())
-        order, start = _sort_by_bin(bins - first, int(bins.max()) - first + 1)
-        run = _Run(first, start, rows[order], 0)
+        ordered, start = _sort_by_bin(rows, bins, first, int(bins.max()) - first + 1)
+        run = _Run(first, start, ordered, 0)
         if self._held + rows.nbytes > self.memory:
             self._spill(run)
         else:
@@ -123,7 +131,7 @@ class Spool:
     def read(self, low: int, high: int) -> Rows:
         """Rows of the bins low ≤ bin < high; runs in order of `add`, each in order of bins."""
         parts = [part for run in self._runs if len(part := self._slice(run, low, high))]
-        return np.concatenate(parts) if parts else np.empty(0, ROW)
+        return np.concatenate(parts) if parts else np.empty(0, self.dtype)
 
     def _slice(self, run: _Run, low: int, high: int) -> Rows:
         last = len(run.start) - 1
@@ -132,10 +140,10 @@ class Spool:
         if run.rows is not None:
             return run.rows[begin:end]
         assert self._file is not None
-        rows: Rows = np.empty(end - begin, ROW)
+        rows: Rows = np.empty(end - begin, self.dtype)
         if end > begin:
             # preadv and not seek and read: two threads read at once.
-            _read_at(self._file.fileno(), rows, run.offset + begin * ROW.itemsize)
+            _read_at(self._file.fileno(), rows, run.offset + begin * self.dtype.itemsize)
         return rows
 
     def _spill(self, run: _Run) -> None:
@@ -152,7 +160,7 @@ class Spool:
                 "free some or set TMPDIR to a folder on a larger disk"
             ) from error
         run.offset, run.rows = self._spilt, None
-        self._spilt += int(run.start[-1]) * ROW.itemsize
+        self._spilt += int(run.start[-1]) * self.dtype.itemsize
 
 
 def windows(first: int, counts: NDArray[np.int64], limit: int) -> Iterator[tuple[int, int]]:
@@ -205,16 +213,17 @@ def _write_all(file: IO[bytes], view: memoryview) -> None:
 
 @njit(cache=True, nogil=True)
 def _sort_by_bin(
-    bins: NDArray[np.int64], count: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:  # pragma: no cover - compiled
+    rows: Rows, bins: NDArray[np.int64], first: int, count: int
+) -> tuple[Rows, NDArray[np.int64]]:  # pragma: no cover - compiled
     start = np.zeros(count + 1, np.int64)
     for i in range(len(bins)):
-        start[bins[i] + 1] += 1
+        start[bins[i] - first + 1] += 1
     for b in range(count):
         start[b + 1] += start[b]
     place = start[:-1].copy()
-    order = np.empty(len(bins), np.int64)
+    ordered = np.empty_like(rows)
     for i in range(len(bins)):
-        order[place[bins[i]]] = i
-        place[bins[i]] += 1
-    return order, start
+        b = bins[i] - first
+        ordered[place[b]] = rows[i]
+        place[b] += 1
+    return ordered, start

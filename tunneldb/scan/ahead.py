@@ -1,0 +1,64 @@
+"""Work done ahead of who wants it, in threads, a few pieces at a time."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from queue import Queue
+from threading import Event, Thread
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+def prefetch(items: Iterable[T], ahead: int = 1) -> Generator[T, None, None]:
+    """Make the next items in a thread of their own while the present one is worked on.
+
+    To be closed by whoever may leave before the end (`contextlib.closing`), which also ends the thread.
+    """
+    queue: Queue[tuple[bool, T | BaseException | None]] = Queue(ahead)
+    stopped = Event()
+
+    def fill() -> None:
+        try:
+            for item in items:
+                queue.put((True, item))
+                if stopped.is_set():
+                    return
+            queue.put((False, None))
+        except BaseException as error:
+            queue.put((False, error))
+
+    thread = Thread(target=fill, name="prefetch", daemon=True)
+    thread.start()
+    try:
+        while True:
+            good, item = queue.get()
+            if good:
+                yield item  # type: ignore[misc]
+            elif isinstance(item, BaseException):
+                raise item
+            else:
+                return
+    finally:
+        stopped.set()
+        while thread.is_alive():
+            while not queue.empty():
+                queue.get()
+            thread.join(0.01)
+
+
+def in_order(count: int, work: Callable[[int, int], T], parts: Iterable[tuple[int, int]]) -> Iterator[T]:
+    """Results of parts in their order, worked on by so many threads; few more are under way than are asked for."""
+    if count == 1:
+        yield from (work(*part) for part in parts)
+        return
+    waiting: deque[Future[T]] = deque()
+    with ThreadPoolExecutor(count, "filter") as pool:
+        for part in parts:
+            waiting.append(pool.submit(work, *part))
+            if len(waiting) > count:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
