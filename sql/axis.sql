@@ -212,9 +212,10 @@ BEGIN
         points = p.points,
         source = CASE WHEN p.points > 0 THEN 'measured' ELSE 'interpolated' END
     FROM unnest(vn, vx, vy, vz, counts) AS p (n, x, y, z, points)
-    -- a vertex next door that no points have placed (its kilometre may hold none) goes along
+    -- vertices next door go along where that kilometre holds no points; else it places them itself, first or last
     WHERE v.survey_id = axis_refine.survey_id AND v.n = p.n AND v.source <> 'edited'
-      AND (v.km = axis_refine.km OR v.points = 0);
+      AND (v.km = axis_refine.km
+           OR to_regclass(format('tunnel.%I', tunnel_api.partition_name(v.survey_id, v.km))) IS NULL);
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.axis_refine(int, int, float8, float8, float8, int, int) IS
