@@ -105,18 +105,28 @@ def copy_binary(
     conn: psycopg.Connection[Any],
     table: sql.Composable,
     columns: Sequence[str],
-    chunks: Iterable[bytes],
+    chunks: Iterable[bytes | memoryview],
+    *,
+    fresh: bool = False,
 ) -> int:
     """COPY rows packed by `pack` into a table, and return how many arrived.
 
     The rows arrive inside the connection's transaction; if the table was created in the same transaction,
     the embedded server writes no WAL for them.
+
+    Parameters
+    ----------
+    fresh
+        The table was created in the same transaction (and the same savepoint). Its rows are frozen: who reads them first
+        need not mark them committed, which the server would write to the WAL as whole pages, for its checksums.
     """
-    command = sql.SQL("COPY {} ({}) FROM STDIN (FORMAT binary)").format(table, sql.SQL(", ").join(map(sql.Identifier, columns)))
+    command = sql.SQL("COPY {} ({}) FROM STDIN (FORMAT binary, FREEZE {})").format(
+        table, sql.SQL(", ").join(map(sql.Identifier, columns)), sql.Literal(fresh)
+    )
     with conn.cursor() as cursor:
         with cursor.copy(command) as copy:
             copy.write(_HEADER)
             for chunk in chunks:
-                copy.write(chunk)
+                copy.write(chunk)  # type: ignore[arg-type]  # any buffer will do
             copy.write(_TRAILER)
         return cursor.rowcount
