@@ -69,7 +69,9 @@ def batch(
     with connect(settings_.dsn) as conn:
         conn.autocommit = True
         found = get_survey(conn, survey)
-        asked = plan(conn, found, files, kilometres=_range(km), stage=last, reading=reading, parameters=chosen)
+        asked = plan(
+            conn, found, files, kilometres=_range(km), stage=last, reading=reading, parameters=chosen, retry=retry_failed
+        )
         count = workers or os.cpu_count() or 1
         if preview:
             from tunneldb.cli.preview import show
@@ -79,8 +81,10 @@ def batch(
             show(seen)
             raise SystemExit(0 if seen.fits else 1)
         register(conn, found, asked, retry=retry_failed)
-        began = time.monotonic()
-        watch = _work(conn, found, settings_.dsn, count)
+        busy = _busy(conn, found)
+    began = time.monotonic()
+    watch = _work(found, settings_.dsn, count if busy else 0)
+    with connect(settings_.dsn) as conn:  # the server may have been restarted meanwhile
         raise SystemExit(_summary(conn, found, watch, time.monotonic() - began))
 
 
@@ -96,7 +100,7 @@ def _range(text: str | None) -> range | None:
     return range(first, last + 1)
 
 
-def _work(conn: psycopg.Connection[Any], survey: Survey, dsn: str | None, count: int) -> Watch:
+def _work(survey: Survey, dsn: str | None, count: int) -> Watch:
     """Let workers do what is to be done, and show what becomes of it."""
     from tunneldb.cli.watch import Watch
     from tunneldb.job.team import Team, interrupts
@@ -105,8 +109,7 @@ def _work(conn: psycopg.Connection[Any], survey: Survey, dsn: str | None, count:
     team = Team(Orders(dsn, 1, survey.id), count)
     with interrupts(team), Watch(dsn, survey.name) as watch:
         watch.look()
-        if _busy(conn, survey):
-            team.start()
+        team.start()
         while team.tend():
             watch.look()
             time.sleep(1.0)

@@ -93,6 +93,7 @@ def plan(
     stage: str | None = None,
     reading: Mapping[str, Any] | None = None,
     parameters: Mapping[str, float] | None = None,
+    retry: bool = False,
 ) -> Plan:
     """Look at the headers of files, and see which kilometres they and the options ask for; changes nothing.
 
@@ -111,23 +112,27 @@ def plan(
         one that the survey has, if it has one.
     parameters : mapping, optional
         Those of the stages that are set.
+    retry : bool
+        Whether to look again at files that have failed before; one that is gone stays failed.
 
     Raises
     ------
     UserError
         If a file is missing, two have the same name, or there is nothing to be done.
     """
-    paths = [path.resolve() for path in paths]
-    _require_files(paths)
+    named = [path.resolve() for path in paths]
+    _require_files(named)
+    again = _failed_paths(conn, survey, {path.name for path in named}) if retry else []
     how = parameters_of(settings_of({**_present_density(conn, survey), **(reading or {})}))
-    files = _headers(conn, survey, paths, float(how["load.max_distance"]))
+    files = _headers(conn, survey, [*named, *again], float(how["load.max_distance"]))
     if kilometres is not None:
         files = [file for file in files if file.error or _touches(file, kilometres)]
-    wanted = {km for file in files if not file.there for km in _kilometres(file)} if paths else set()
-    there = {km for file in files if file.there for km in _kilometres(file)}
-    if not paths:
-        there = set(loaded_kilometres(conn, survey)) | _goals(conn, survey)
-    chosen = {km for km in wanted | there if kilometres is None or km in kilometres}
+    wanted = {km for file in files for km in _kilometres(file)}
+    if not named:
+        goals = _goals(conn, survey)
+        options = kilometres is not None or stage is not None or parameters
+        wanted |= goals if goals and not options else goals | set(loaded_kilometres(conn, survey))
+    chosen = {km for km in wanted if kilometres is None or km in kilometres}
     if not chosen and not any(file.error for file in files) and not _awaits(conn, survey):
         where = "" if kilometres is None else f" in kilometres {kilometres[0]}-{kilometres[-1]}"
         raise UserError(f"survey {survey.name} has nothing to be done{where}: tunneldb batch {survey.name} FILES")
@@ -143,6 +148,14 @@ def _require_files(paths: Sequence[Path]) -> None:
         if path.name in names:
             raise UserError(f"{path} and {names[path.name]} have the same name: a survey's files are known by their names")
         names[path.name] = path
+
+
+def _failed_paths(conn: psycopg.Connection[Any], survey: Survey, others: set[str]) -> list[Path]:
+    rows = conn.execute(
+        "SELECT name, path FROM tunnel.incoming WHERE survey_id = %s AND failed_at IS NOT NULL ORDER BY km_from, name",
+        [survey.id],
+    ).fetchall()
+    return [Path(path) for name, path in rows if name not in others and Path(path).is_file()]
 
 
 def _present_density(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, Any]:
@@ -283,7 +296,7 @@ def register(conn: psycopg.Connection[Any], survey: Survey, asked: Plan, *, retr
     Parameters
     ----------
     retry : bool
-        Whether what has failed is to be tried again.
+        Whether stages that have failed are to be tried again; files that have are those of the plan.
     """
     with conn.transaction():
         conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey.id])
@@ -292,10 +305,6 @@ def register(conn: psycopg.Connection[Any], survey: Survey, asked: Plan, *, retr
             cursor.executemany(_GOAL, [_goal(survey, km, asked) for km in asked.kilometres])
         if retry:
             conn.execute("UPDATE tunnel.goal SET retry_after = clock_timestamp() WHERE survey_id = %s", [survey.id])
-            conn.execute(
-                "UPDATE tunnel.incoming SET failed_at = NULL, message = NULL WHERE survey_id = %s AND km_from IS NOT NULL",
-                [survey.id],
-            )
         row = conn.execute("SELECT tunnel_api.queue_plan(%s)", [survey.id]).fetchone()
     assert row is not None
     return int(row[0])
@@ -317,7 +326,7 @@ _GOAL = """
 INSERT INTO tunnel.goal AS g (survey_id, km, stage, parameters)
 VALUES (%(survey)s, %(km)s, coalesce(%(stage)s, 'detect'), %(reading)s || %(parameters)s)
 ON CONFLICT (survey_id, km) DO UPDATE
-   SET stage = CASE WHEN %(stage)s IS NOT NULL OR %(new)s
+   SET stage = CASE WHEN (%(stage)s IS NOT NULL OR %(new)s)
                      AND array_position(%(steps)s, excluded.stage) > array_position(%(steps)s, g.stage)
                     THEN excluded.stage ELSE g.stage END,
        parameters = g.parameters || %(parameters)s, requested_at = excluded.requested_at

@@ -63,12 +63,20 @@ class _Leave:
     """Whether to leave, and what is to be told of it."""
 
     def __init__(self) -> None:
-        self.wanted = False
+        self._wanted = asyncio.Event()
         self.worker: Worker | None = None
 
+    def wanted(self) -> bool:
+        return self._wanted.is_set()
+
     def now(self) -> None:
-        self.wanted = True
+        self._wanted.set()
         self.pause()
+
+    async def wait(self, seconds: float) -> None:
+        """Wait, but not if it is time to leave."""
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._wanted.wait(), seconds)
 
     def pause(self) -> None:
         """End the present connection to the queue after the job that is under way."""
@@ -95,7 +103,7 @@ async def _work(orders: Orders) -> None:
         loop.add_signal_handler(name, leave.now)
     away_since: float | None = None
     wait = 0.5
-    while not leave.wanted:
+    while not leave.wanted():
         try:
             async with _connected(orders) as (dsn, presence):
                 if away_since is not None:
@@ -103,16 +111,15 @@ async def _work(orders: Orders) -> None:
                 away_since, wait = None, 0.5
                 await _serve(orders, leave, dsn, presence)
         except _AWAY as error:
-            if leave.wanted:
+            if leave.wanted():
                 return
             if away_since is None:
                 away_since = time.monotonic()
                 log.warning("the database is away, waiting for it: %s", _line(error))
             if time.monotonic() - away_since > GIVE_UP:
                 raise UserError(f"the database has been away for {GIVE_UP / 60:.0f} minutes: {_line(error)}") from None
-        if not leave.wanted:
-            await asyncio.sleep(wait * random.uniform(0.7, 1.3))
-            wait = min(2 * wait, 15.0)
+        await leave.wait(wait * random.uniform(0.7, 1.3))
+        wait = min(2 * wait, 15.0)
 
 
 @contextlib.asynccontextmanager
@@ -161,7 +168,7 @@ async def _serve(orders: Orders, leave: _Leave, dsn: str, presence: psycopg.Asyn
             stalled_worker_timeout=STALLED,
         )
         try:
-            if not leave.wanted:
+            if not leave.wanted():
                 await leave.worker.run()  # type: ignore[no-untyped-call]
         finally:
             leave.worker = None
