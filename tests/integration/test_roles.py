@@ -179,3 +179,31 @@ def test_roles_need_a_superuser_where_the_owner_may_not_make_them(server_dsn: st
     assert any("GRANT tunnel_operator TO landlord" in message for message in said)
     with psycopg.connect(make_conninfo(server_dsn, dbname="postgres"), autocommit=True) as connection:
         connection.execute("DROP DATABASE landlords WITH (FORCE)")
+
+
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
+def test_operators_serve_the_queue(person: psycopg.Connection) -> None:
+    def one(query: str) -> object:
+        row = person.execute(query).fetchone()  # type: ignore[arg-type]
+        assert row is not None
+        return row[0]
+
+    person.execute("INSERT INTO tunnel.incoming (survey_id, name, path, bytes, points, km_from, km_to)"
+                   " SELECT id, 'a.laz', '/a.laz', 1, 1, 12, 12 FROM tunnel.survey")  # fmt: skip
+    assert one("SELECT tunnel_api.queue_plan(id) FROM tunnel.survey") == 1
+    worker = one("SELECT tunnel_queue.procrastinate_register_worker_v1()")
+    one(f"SELECT tunnel_api.queue_register({worker}, 'h', 1)")
+    job = one(f"SELECT id FROM tunnel_queue.procrastinate_fetch_job_v2(ARRAY['tunneldb'], {worker})")
+    one(f"SELECT tunnel_queue.procrastinate_update_heartbeat_v1({worker})")
+    assert one("SELECT tunnel_api.queue_rescue()") == 0
+    assert one(f"SELECT tunnel_api.queue_hold({job}, {worker})") is True
+    one(f"SELECT tunnel_api.queue_done({job}, clock_timestamp())")
+    assert one("SELECT count(*) FROM tunnel.incoming") == 0
+
+
+@pytest.mark.parametrize("person", ["vera", "ines"], indirect=True)
+def test_readers_leave_the_queue_alone(person: psycopg.Connection) -> None:
+    refused(person, "SELECT tunnel_api.queue_plan(1)")
+    refused(person, "SELECT tunnel_api.queue_rescue()")
+    refused(person, "SELECT count(*) FROM tunnel_queue.procrastinate_jobs")
+    refused(person, "SELECT tunnel_queue.procrastinate_register_worker_v1()")
