@@ -127,6 +127,6 @@ def copy_binary(
         with cursor.copy(command) as copy:
             copy.write(_HEADER)
             for chunk in chunks:
-                copy.write(chunk)  # type: ignore[arg-type]  # any buffer will do
+                copy.write(chunk)
             copy.write(_TRAILER)
         return cursor.rowcount

@@ -5,14 +5,12 @@ Rows lie packed in blocks as they lie in memory, in the order of chainage: writi
 
 from __future__ import annotations
 
-import math
 import struct
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 import psycopg
-from numpy.typing import NDArray
 from psycopg import sql
 
 from tunneldb.database.copy import copy_binary
@@ -20,9 +18,6 @@ from tunneldb.database.survey import Survey
 from tunneldb.scan.spool import BINS_PER_KM, ROW, Rows, Spool, windows
 
 BLOCK = 131_072  # rows in a block at most, so that none is larger than 8 MB
-
-# What of a row is stored; its tag is in the table's name. The order of bytes is this machine's, stated for the others.
-_STORED = np.dtype([(name, ROW[name].newbyteorder("<")) for name in ROW.names or () if name != "tag"])
 
 
 def write_fragments(conn: psycopg.Connection[Any], survey: Survey, file_id: int, spool: Spool) -> dict[int, int]:
@@ -38,14 +33,10 @@ def write_fragments(conn: psycopg.Connection[Any], survey: Survey, file_id: int,
     dict of int to int
         Number of rows of each kilometre that has any.
     """
-    first, counts = spool.counts()
-    held: dict[int, int] = {}
-    for km in np.unique(np.floor_divide(first + np.flatnonzero(counts), BINS_PER_KM)).tolist():
+    held = spool.kilometres()
+    for km in held:
         conn.execute("SELECT tunnel_api.fragment_create(%s, %s, %s)", [survey.id, file_id, km])
-        begin = max(km * BINS_PER_KM - first, 0)
-        part = counts[begin : max((km + 1) * BINS_PER_KM - first, 0)]
-        copy_binary(conn, _table(survey, file_id, km), ("number", "rows"), _blocks(spool, first + begin, part), fresh=True)
-        held[km] = int(part.sum())
+        copy_binary(conn, _table(survey, file_id, km), ("number", "rows"), _blocks(spool, km), fresh=True)
     return held
 
 
@@ -57,10 +48,7 @@ def read_fragment(conn: psycopg.Connection[Any], survey: Survey, file_id: int, k
     query = sql.SQL("SELECT rows FROM {} ORDER BY number").format(_table(survey, file_id, km))
     with conn.cursor(binary=True) as cursor:
         for (block,) in cursor.stream(query):
-            stored = np.frombuffer(block, _STORED)
-            rows: Rows = np.empty(len(stored), ROW)
-            for name in _STORED.names or ():
-                rows[name] = stored[name]
+            rows: Rows = np.frombuffer(block, ROW).copy()
             rows["tag"] = tag
             yield rows
 
@@ -77,13 +65,13 @@ def _table(survey: Survey, file_id: int, km: int) -> sql.Identifier:
     return sql.Identifier("tunnel", f"fragment_s{survey.id}_f{file_id}_km{km}")
 
 
-def _blocks(spool: Spool, first: int, counts: NDArray[np.int64]) -> Iterator[bytes]:
+def _blocks(spool: Spool, km: int) -> Iterator[bytes | memoryview]:
+    first = km * BINS_PER_KM
     number = 0
-    for low, high in windows(first, counts, BLOCK // 2):
+    for low, high in windows(first, spool.counts_of(first, first + BINS_PER_KM), BLOCK // 2):
         rows = spool.read(low, high)
-        for part in np.array_split(rows, max(1, math.ceil(len(rows) / BLOCK))):
-            stored = np.empty(len(part), _STORED)
-            for name in _STORED.names or ():
-                stored[name] = part[name]
-            yield struct.pack(">hiii", 2, 4, number, stored.nbytes) + stored.tobytes()
+        for at in range(0, len(rows), BLOCK):
+            block = rows[at : at + BLOCK]
+            yield struct.pack(">hiii", 2, 4, number, block.nbytes)
+            yield block.view(np.uint8).data
             number += 1

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -100,8 +101,13 @@ def merge(
     settings: FilterSettings,
     begin: Begin = lambda text, total: lambda done: None,
     memory: int = MEMORY,
+    held: Mapping[int, Spool] | None = None,
 ) -> Merged:
-    """Build a kilometre aside with what waits for it; `finish` puts it in place."""
+    """Build a kilometre aside with what waits for it; `finish` puts it in place.
+
+    What was read of the files in `held`, by id, is there and not in fragments.
+    """
+    held = held or {}
     lock(conn, survey.id, km)
     waiting = dict(
         conn.execute(
@@ -127,12 +133,16 @@ def merge(
         if not waiting:
             advance(1)
             return Merged(km, 0, rows_in(conn, survey, km), {})
-        for file_id, count in waiting.items():
-            if count:
-                for rows in read_fragment(conn, survey, file_id, km, tags[file_id]):
-                    spool.add(rows)
-        written = write_partition(conn, survey, km, spool, settings.edge, file_ids, advance)
-    drop_fragments(conn, survey, [file_id for file_id, count in waiting.items() if count], [km])
+        stored = [file_id for file_id, count in waiting.items() if count and file_id not in held]
+        for file_id in stored:
+            for rows in read_fragment(conn, survey, file_id, km, tags[file_id]):
+                spool.add(rows)
+        parts: list[tuple[Spool, int | None]] = [(spool, None)]
+        parts += [(held[file_id], tags[file_id]) for file_id in waiting if file_id in held]
+        # A file by itself is thinned already.
+        edge = None if len(waiting) == 1 and not before.any() else settings.edge
+        written = write_partition(conn, survey, km, parts, edge, file_ids, advance)
+    drop_fragments(conn, survey, stored, [km])
     _settle(conn, km, list(waiting))
     changes = {}
     for file_id, tag in tags.items():
@@ -264,11 +274,14 @@ def _load_batch(reading: Reading, headers: Sequence[ScanHeader], given: Sequence
     """Read files and load their kilometres in one transaction."""
     conn, survey, settings = reading.conn, reading.survey, reading.settings
     parameters = {**parameters_of(settings), "files": [header.path.name for header in headers]}
-    with stage_run(conn, survey.id, None, "load", parameters) as run:
+    held: dict[int, Spool] = {}
+    reading = replace(reading, held=held, share=len(headers))
+    with ExitStack() as stack, stage_run(conn, survey.id, None, "load", parameters) as run:
+        stack.callback(_close, held)
         read = reading.read(headers, given, begin)
         started = time.monotonic()
         waiting = _waiting(conn, [file.id for file in read])
-        merged = [merge(conn, survey, km, settings, begin, reading.memory) for km in waiting]
+        merged = [merge(conn, survey, km, settings, begin, reading.memory, held) for km in waiting]
         finish(conn, survey, merged)
         for one in merged:
             _enter(conn, run, one.km, one.kept)
@@ -277,6 +290,11 @@ def _load_batch(reading: Reading, headers: Sequence[ScanHeader], given: Sequence
         for name in COUNTED:
             run.counts[name] = sum(getattr(file, name) for file in loaded)
     return loaded
+
+
+def _close(held: Mapping[int, Spool]) -> None:
+    for spool in held.values():
+        spool.close()
 
 
 def _waiting(conn: psycopg.Connection[Any], file_ids: list[int]) -> list[int]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from typing import Any
 
@@ -12,26 +12,16 @@ import psycopg
 from numpy.typing import NDArray
 from psycopg import sql
 
-from tunneldb.database.copy import PointZ, copy_binary, pack
+from tunneldb.database.copy import copy_binary
 from tunneldb.database.fetch import fetch_array
 from tunneldb.database.survey import Survey
 from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.job.rows import COLUMNS, pack_rows
 from tunneldb.scan.ahead import prefetch
 from tunneldb.scan.filter import voxel_reach
 from tunneldb.scan.spool import BINS_PER_KM, BINS_PER_METRE, ROW, Rows, Spool, bin_of, windows
 from tunneldb.scan.thin import first_of_voxels
 
-COLUMNS = (
-    "survey_id",
-    "km",
-    "chainage",
-    "gps_time",
-    "geom",
-    "scan_id",
-    "file_id",
-    "intensity",
-    "classification",
-)
 WINDOW = 500_000  # rows read, thinned and packed at a time
 
 
@@ -99,7 +89,7 @@ def write_partition(
     conn: psycopg.Connection[Any],
     survey: Survey,
     km: int,
-    spool: Spool,
+    parts: Sequence[tuple[Spool, int | None]],
     edge: float | None,
     file_ids: NDArray[np.int32],
     progress: Callable[[int], None],
@@ -110,8 +100,8 @@ def write_partition(
 
     Parameters
     ----------
-    spool : Spool
-        Rows of at least this kilometre.
+    parts : sequence of (Spool, int or None)
+        Rows of at least this kilometre, and the tag that those of a spool get; None leaves them theirs.
     edge : float or None
         Voxel edge of thinning, m; None keeps every row.
     file_ids : (k,) int32 array
@@ -125,23 +115,21 @@ def write_partition(
     (k,) int64 array
         Rows written of each tag.
     """
-    first, counts = spool.counts()
     begin, end = km * BINS_PER_KM, (km + 1) * BINS_PER_KM
-    counts = counts[max(begin - first, 0) : max(end - first, 0)]
+    counts = sum((spool.counts_of(begin, end) for spool, _ in parts), np.zeros(BINS_PER_KM, np.int64))
     written = np.zeros(len(file_ids), np.int64)
     reach = 0 if edge is None else math.ceil(voxel_reach(edge) * BINS_PER_METRE)
 
-    def chunks() -> Iterator[bytes]:
-        for low, high in windows(max(first, begin), counts, WINDOW):
-            rows = spool.read(max(low - reach, begin), min(high + reach, end))
+    def chunks() -> Iterator[memoryview]:
+        for low, high in windows(begin, counts, WINDOW):
+            rows = _read(parts, max(low - reach, begin), min(high + reach, end))
             if edge is not None:
-                rows = rows[first_of_voxels(rows, edge, np.ones(len(rows), np.bool_))[0]]
-            bins = bin_of(rows["chainage"])
-            rows = rows[(bins >= low) & (bins < high)]
-            rows = rows[np.argsort(rows["chainage"], kind="stable")]
+                stays, _ = first_of_voxels(rows, edge, np.ones(len(rows), np.bool_))
+                bins = bin_of(rows["chainage"])
+                rows = rows[stays & (bins >= low) & (bins < high)]
             np.add(written, np.bincount(rows["tag"], minlength=len(written)), out=written)
-            yield _pack(survey, km, rows, file_ids)
-            progress(int(counts[low - max(first, begin) : high - max(first, begin)].sum()))
+            yield pack_rows(survey, km, rows, file_ids).data
+            progress(int(counts[low - begin : high - begin].sum()))
 
     new = partition(survey, km, "_new")
     conn.execute(sql.SQL("DROP TABLE IF EXISTS {}").format(new))
@@ -149,6 +137,16 @@ def write_partition(
     with closing(prefetch(chunks())) as packed:
         copy_binary(conn, new, COLUMNS, packed, fresh=True)
     return written
+
+
+def _read(parts: Sequence[tuple[Spool, int | None]], low: int, high: int) -> Rows:
+    pieces = []
+    for spool, tag in parts:
+        rows = spool.read(low, high)
+        if tag is not None:
+            rows["tag"] = tag
+        pieces.append(rows)
+    return pieces[0] if len(pieces) == 1 else np.concatenate([*pieces, np.empty(0, ROW)])
 
 
 def swap_partition(conn: psycopg.Connection[Any], survey: Survey, km: int, rows: int) -> None:
@@ -168,21 +166,3 @@ def swap_partition(conn: psycopg.Connection[Any], survey: Survey, km: int, rows:
     if partition_exists(conn, survey, km):
         conn.execute("SELECT tunnel_api.partition_lock(%s, %s)", [survey.id, km])
         conn.execute(sql.SQL("DROP TABLE {}").format(partition(survey, km)))
-
-
-def _pack(survey: Survey, km: int, rows: Rows, file_ids: NDArray[np.int32]) -> bytes:
-    count = len(rows)
-    xyz = np.column_stack([rows["x"], rows["y"], rows["z"]])
-    return pack(
-        [
-            np.full(count, survey.id, np.int32),
-            np.full(count, km, np.int32),
-            rows["chainage"],
-            rows["time"],
-            PointZ(xyz, survey.srid),
-            rows["scan_id"],
-            file_ids[rows["tag"]],
-            rows["intensity"],
-            rows["classification"].astype(np.int16),
-        ]
-    )

@@ -29,7 +29,7 @@ from tunneldb.job.files import (
 )
 from tunneldb.job.fragment import drop_fragments, write_fragments
 from tunneldb.job.settings import require_same_density
-from tunneldb.scan.filter import MEMORY, FilterSettings, filter_file, voxel_reach
+from tunneldb.scan.filter import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
 from tunneldb.scan.pose import PoseModel, load_poses
 from tunneldb.scan.reader import ScanHeader, check_header, read_header
 from tunneldb.scan.spool import Spool
@@ -110,7 +110,15 @@ class Read:
 
 @dataclass(frozen=True)
 class Reading:
-    """What reading files needs of their survey."""
+    """What reading files needs of their survey.
+
+    Attributes
+    ----------
+    held : dict of int to Spool, or None
+        Gets the rows of each file by its id, for who loads them in the same transaction; None writes them as fragments.
+    share : int
+        Number of files that share the memory for these rows.
+    """
 
     conn: psycopg.Connection[Any]
     survey: Survey
@@ -118,6 +126,8 @@ class Reading:
     alignment: Alignment
     poses: PoseModel
     memory: int
+    held: dict[int, Spool] | None = None
+    share: int = 1
 
     @classmethod
     def of(cls, conn: psycopg.Connection[Any], survey: Survey, settings: FilterSettings, memory: int = MEMORY) -> Reading:
@@ -184,26 +194,32 @@ class Reading:
 
     def _one(self, header: ScanHeader, former: Recorded | None, state: str, begin: Begin) -> Read:
         path, started = header.path, time.monotonic()
-        with Spool(self.memory) as survivors, ThreadPoolExecutor(1, "checksum") as pool:
-            digest = pool.submit(checksum, path)
-            counts = filter_file(
-                path,
-                self.survey.intensity_dimension,
-                self.alignment,
-                self.poses,
-                self.settings,
-                survivors,
-                0,
-                begin(path.name, 2 * header.points),
-                self.memory,
-            )
+        survivors = Spool(self.memory // self.share)
+        try:
+            counts, digest = self._filter(header, survivors, begin(path.name, 2 * header.points))
             stated = None if header.crs is None else self.survey.srid
-            content = Content(path, digest.result(), path.stat().st_size, stated, counts)
             left = [] if former is None else self._leave(former)
+            content = Content(path, digest, path.stat().st_size, stated, counts)
             file_id = record_file(self.conn, self.survey, content)
-            held = write_fragments(self.conn, self.survey, file_id, survivors)
-        record_kilometres(self.conn, file_id, held, counts.ranges, left)
+            record_kilometres(self.conn, file_id, survivors.kilometres(), counts.ranges, left)
+            if self.held is None:
+                write_fragments(self.conn, self.survey, file_id, survivors)
+            else:
+                self.held[file_id] = survivors
+        finally:
+            if self.held is None or survivors not in self.held.values():
+                survivors.close()
         return Read(file_id, state, time.monotonic() - started)
+
+    def _filter(self, header: ScanHeader, survivors: Spool, progress: Callable[[int], None]) -> tuple[FilterCounts, str]:
+        """Filter a file; returns its counts and its checksum, which another thread makes meanwhile."""
+        with ThreadPoolExecutor(1, "checksum") as pool:
+            digest = pool.submit(checksum, header.path)
+            dimension = self.survey.intensity_dimension
+            counts = filter_file(
+                header.path, dimension, self.alignment, self.poses, self.settings, survivors, 0, progress, self.memory
+            )
+            return counts, digest.result()
 
     def _leave(self, former: Recorded) -> list[int]:
         """Drop what waits of a file's former content; returns the kilometres that may hold rows of it."""

@@ -20,14 +20,14 @@ from tunneldb.errors import UserError
 # One row a point. `tag` is the noise filter's cell while a file is filtered, its file's number afterwards.
 ROW = np.dtype(
     [
-        ("x", "f8"),
-        ("y", "f8"),
-        ("z", "f8"),
-        ("chainage", "f8"),
-        ("time", "f8"),
-        ("intensity", "f4"),
-        ("scan_id", "i4"),
-        ("tag", "i4"),
+        ("x", "<f8"),
+        ("y", "<f8"),
+        ("z", "<f8"),
+        ("chainage", "<f8"),
+        ("time", "<f8"),
+        ("intensity", "<f4"),
+        ("scan_id", "<i4"),
+        ("tag", "<i4"),
         ("classification", "u1"),
     ]
 )
@@ -127,6 +127,23 @@ class Spool:
         for run in self._runs:
             total[run.first - first : run.first - first + len(run.start) - 1] += np.diff(run.start)
         return first, total
+
+    def counts_of(self, low: int, high: int) -> NDArray[np.int64]:
+        """Number of rows in each of the bins low ≤ bin < high."""
+        first, counts = self.counts()
+        found = np.zeros(high - low, np.int64)
+        begin, end = max(low, first), min(high, first + len(counts))
+        if begin < end:
+            found[begin - low : end - low] = counts[begin - first : end - first]
+        return found
+
+    def kilometres(self) -> dict[int, int]:
+        """Number of rows in each kilometre that has any."""
+        first, counts = self.counts()
+        place = np.flatnonzero(counts)
+        kms, inverse = np.unique((first + place) // BINS_PER_KM, return_inverse=True)
+        held = np.bincount(inverse, counts[place], len(kms)).astype(int)
+        return dict(zip(kms.tolist(), held.tolist(), strict=True))
 
     def read(self, low: int, high: int) -> Rows:
         """Rows of the bins low ≤ bin < high; runs in order of `add`, each in order of bins."""
