@@ -81,7 +81,8 @@ def _time(seen: Preview) -> list[RenderableType]:
     if seen.seconds is None:
         lines = [Text("time: unknown until a kilometre was done in this database")]
     else:
-        lines = [Text(f"time: about {duration(seen.seconds)} with {workers}, by what was measured in this database")]
+        most = "about" if all(not file.there for file in seen.plan.files) and seen.plan.files else "at most"
+        lines = [Text(f"time: {most} {duration(seen.seconds)} with {workers}, by what was measured in this database")]
     said = [
         f"read {number(1.0 / speed.seconds)} points/s"
         if speed.stage == "read"

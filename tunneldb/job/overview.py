@@ -93,10 +93,10 @@ class Overview:
     done, total : int
         Steps that are done, and all: stages of kilometres that are wanted.
     share : float or None
-        Share of the work that is done, 0 to 1; each step counts by the time that its stage takes in this survey. None as
-        long as a stage that is still to be done has never been measured.
+        Share of the work that is done since the last unfinished batch was called, 0 to 1; each step counts by the time that
+        its stage takes in this survey. None as long as a stage that is still to be done has never been measured.
     rate : float or None
-        Points of the files per second since the oldest unfinished batch was asked for.
+        Points of the files per second since the last batch was called that is not finished.
     left : float or None
         Time left, s; None when unknown.
     """
@@ -180,7 +180,7 @@ def overview(conn: psycopg.Connection[Any], survey: str) -> Overview:
     pace = measure(conn, survey)
     steps = [[(stage, cell.since) for stage, cell in cells.items() if cell.state in TO_DO] for cells in kilometres.values()]
     to_read = sum(file.state != "failed" for file in files)
-    asked = min((goals[km].requested_at for km in goals if _unfinished(kilometres[km])), default=None)
+    asked = max((goals[km].requested_at for km in goals if _unfinished(kilometres[km])), default=None)
     share = pace.share(steps, to_read, asked) if asked is not None else None
     wanted = [kilometres[km][stage].state for km, goal in goals.items() for stage in STAGES[: goal.step + 1]]
     return Overview(

@@ -153,7 +153,7 @@ def preview(
     missing = tuple(km for km in wanted if km not in covered) if stretches else ()
     new = [file for file in plan.files if not file.there and file.error is None]
     points = sum(file.points for file in new)
-    length = sum(high - low for low, high in _union(stretches))
+    length = sum(high - low for low, high in _union(sorted(of_files[file.name] for file in new if file.name in of_files)))
     kept = _kept(conn, survey, plan)
     rows = _rows(points, length, kept, plan)
     disk = _disk(conn, plan, rows, length or 1000.0 * len(plan.kilometres), workers)
