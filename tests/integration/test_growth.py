@@ -8,13 +8,14 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import numpy as np
 import psycopg
 import pytest
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
 from tunneldb.cli.main import _describe_database_error
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect, copy_binary, get_survey, pack
 from tunneldb.database.catalog import remove_survey
 from tunneldb.job.sources import sample
 
@@ -265,6 +266,26 @@ def test_a_survey_of_a_thousand_kilometres_goes_within_the_locks_of_a_server_as_
     assert left == (0,)
     assert locks is not None
     assert SURVEYS["long"] < locks[0] < DEFAULT_LOCKS
+
+
+def test_the_first_reader_of_a_new_kilometre_writes_no_wal(conn: psycopg.Connection) -> None:
+    """Rows that are not frozen are marked committed by who reads them first; with checksums, each page goes to the WAL."""
+    assert conn.execute("SHOW data_checksums").fetchone() == ("on",)
+    rows = 100_000
+    chunk = pack([np.arange(rows, dtype=np.int64), np.zeros(rows)])
+    for fresh in (False, True):
+        table = sql.Identifier("public", f"fresh_{fresh}")
+        conn.execute(sql.SQL("CREATE TABLE {} (n bigint, v float8) WITH (autovacuum_enabled = off)").format(table))
+        copy_binary(conn, table, ("n", "v"), [chunk], fresh=fresh)
+        conn.commit()
+        pages = conn.execute("SELECT pg_relation_size(%s::regclass)", [f'"public"."fresh_{fresh}"']).fetchone()
+        before = conn.execute("SELECT pg_current_wal_insert_lsn()").fetchone()
+        assert conn.execute(sql.SQL("SELECT count(*) FROM {}").format(table)).fetchone() == (rows,)
+        written = conn.execute("SELECT pg_current_wal_insert_lsn() - %s", before).fetchone()
+        conn.commit()
+        assert pages is not None
+        assert written is not None
+        assert (written[0] < 0.1 * pages[0]) == fresh
 
 
 def test_a_removal_waits_for_who_reads_and_holds_up_nobody(dsn: str) -> None:
