@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
@@ -14,8 +15,11 @@ import pytest
 from click.testing import CliRunner
 from psycopg import sql
 from queued import add_file, add_goal, add_job, add_run, add_worker, survey_id
+from rich.console import Console
 
 from tunneldb.cli.main import main
+from tunneldb.cli.overview import render
+from tunneldb.cli.watch import Watch
 from tunneldb.job.overview import STAGES, Overview, overview
 
 TUNNELDB = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
@@ -147,10 +151,6 @@ def test_25_kilometres_each_with_an_error_of_its_own_fit_a_terminal(conn: psycop
     conn.execute("DELETE FROM tunnel.run")
     for km in range(25):
         add_file(conn, example, f"km-{km}.laz", km, f"/scans/km-{km}.laz is damaged after point {km}: copy it again")
-    from rich.console import Console
-
-    from tunneldb.cli.overview import render
-
     console = Console(width=width, height=50, force_terminal=True, color_system=None)
     with console.capture() as capture:
         console.print(render(overview(conn, example)))
@@ -219,3 +219,25 @@ def test_views_of_the_queue_for_those_who_only_look(conn: psycopg.Connection, ba
     files = conn.execute("SELECT name, km_from, state, message FROM tunnel_api.incoming ORDER BY name").fetchall()
     assert files[:2] == [("km-5.laz", 5, "waiting", None), ("km-6.laz", 6, "failed", DAMAGED)]
     assert conn.execute("SELECT count(*) FROM tunnel_api.goal WHERE stage = 'detect'").fetchone() == (6,)
+
+
+def test_a_terminal_shows_the_table_and_goes_on_when_the_connection_breaks(
+    conn: psycopg.Connection, dsn: str, batch: str
+) -> None:
+    screen = io.StringIO()
+    with Watch(dsn, batch, Console(file=screen, force_terminal=True, width=80, height=50, color_system=None)) as watch:
+        assert watch.look()
+        assert "segments on calc-1/4711 for" in screen.getvalue()
+        assert watch.conn is not None
+        conn.execute("SELECT pg_terminate_backend(%s, 5000)", [watch.conn.info.backend_pid])
+        conn.commit()
+        assert watch.look()
+        assert "the database is away, trying again" in screen.getvalue()
+        screen.truncate(0)
+        conn.execute("UPDATE tunnel_queue.procrastinate_jobs SET status = 'succeeded'")
+        conn.execute("UPDATE tunnel.run SET outcome = 'done', finished_at = clock_timestamp() WHERE outcome = 'running'")
+        conn.execute("DELETE FROM tunnel.incoming WHERE failed_at IS NULL")
+        conn.commit()
+        assert not watch.look()
+        assert "away" not in screen.getvalue()
+        assert "running" not in screen.getvalue()
