@@ -49,12 +49,12 @@ def parameters(scanner: str, seed: int, **others: object) -> Parameters:
     )
 
 
-def prepare(folder: Path, scanner: str, kind: str = "amplitude") -> None:
+def prepare(folder: Path, scanner: str, kind: str = "amplitude", start: float = START) -> None:
     dimension = {"amplitude": "Amplitude", "reflectance": "Reflectance", "linear": "intensity", "none": None}[kind]
     poses = ["--stations", folder / f"{NAME}.stations.csv"]
     if scanner == "profiler":
         poses = ["--trajectory", folder / f"{NAME}.trajectory.csv"]
-    command("tunnel", "add", NAME, "--srid", 25830, "--axis", folder / f"{NAME}.axis.csv", "--start-chainage", START)
+    command("tunnel", "add", NAME, "--srid", 25830, "--axis", folder / f"{NAME}.axis.csv", "--start-chainage", start)
     command(
         "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04", *poses, "--intensity-kind", kind,
         *(["--intensity", dimension] if dimension else []),
