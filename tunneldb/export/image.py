@@ -158,7 +158,7 @@ def _strips(blocks: list[tuple[float, preview.Single]], pixel: float) -> Iterato
 def _leaks(conn: psycopg.Connection, survey: Survey, km: int) -> list[Polygon]:
     rows = conn.execute(
         "SELECT public.ST_AsBinary(unrolled) FROM tunnel.leak"
-        " WHERE survey_id = %s AND km = %s AND detected AND review <> 'rejected' ORDER BY id",
-        (survey.id, km),
+        " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected' ORDER BY id",
+        (survey.id, km * 1000.0, (km + 1) * 1000.0),
     )
     return [shapely.from_wkb(bytes(wkb)) for (wkb,) in rows]
