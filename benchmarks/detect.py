@@ -102,8 +102,8 @@ def timed(spent: dict[str, float], name: str) -> Iterator[None]:
     spent[name] = spent.get(name, 0.0) + time.process_time() - start
 
 
-def parts(dsn: str, path: Path) -> dict[str, float]:
-    """Seconds of one core for each part of what is done with a point, per point, from the middle of a file."""
+def parts(dsn: str, path: Path, count: int) -> dict[str, float]:
+    """Seconds of one core for each part of what is done with a point, per point, from the end of a file."""
     use_threads(1)  # before Numba is imported
     from tunneldb.database import connect, get_survey
     from tunneldb.geometry.store import load_surface
@@ -125,10 +125,11 @@ def parts(dsn: str, path: Path) -> dict[str, float]:
     grid = Grid.covering(km, 0.02, float(surface.arcs.min()), float(surface.arcs.max()))
     lens = Lens.of(eye, grid, 12.0)
     with Accumulator(grid) as image:
-        chunks = read_raw(path, "Amplitude", CHUNK)
+        wanted = min(PARTS, count // 4)
+        chunks = read_raw(path, "Amplitude", CHUNK, [(count - wanted - CHUNK, count)])
         image.add(lens.look(Points.of(next(chunks)))[0], CHUNK)  # compiled, and memory at hand
         done = 0
-        while done < PARTS:
+        while done < wanted:
             with timed(spent, "decoding what is needed"):
                 raw = next(chunks)
             with timed(spent, "coordinates"):
@@ -143,6 +144,12 @@ def parts(dsn: str, path: Path) -> dict[str, float]:
 
 def prepare(folder: Path, points: int, dsn: str) -> Scene:
     """Simulate a tunnel on both sides of a kilometre's border, load it, and run it up to its sections."""
+    with tempfile.TemporaryDirectory() as small:
+        progress("a short one, so that all is compiled")
+        warm = Scene.simulate(Path(small), "short", "--length", 12, "--scanner", "profiler", "--profile-spacing", 0.03)
+        warm.register(dsn)
+        warm.load(dsn)
+        warm.run(dsn)
     length = points / POINTS_PER_METRE
     start = BORDER - length / 2
     scene = Scene(folder, NAME, start)
@@ -169,7 +176,7 @@ def measure(dsn: str, scene: Scene) -> dict[str, Any]:
     points = sum(count for _, count in files)
     first, last = int(BORDER) // 1000 - 1, int(BORDER) // 1000
     progress("time of each part")
-    each = parts(dsn, scene.scans[-1])
+    each = parts(dsn, *files[-1])
     found: dict[str, Cost] = {}
     for processes, threads in ((2, 1), (1, 2)):
         what = "2 processes" if processes == 2 else "2 threads"
