@@ -133,7 +133,11 @@ def write_partition(
 
     new = partition(survey, km, "_new")
     conn.execute(sql.SQL("DROP TABLE IF EXISTS {}").format(new))
-    conn.execute(sql.SQL("CREATE TABLE {} (LIKE tunnel.point)").format(new))
+    conn.execute(
+        sql.SQL("CREATE TABLE {} (LIKE tunnel.point, CONSTRAINT part CHECK (survey_id = {} AND km = {}))").format(
+            new, sql.Literal(survey.id), sql.Literal(km)
+        )
+    )
     with closing(prefetch(chunks())) as packed:
         copy_binary(conn, new, COLUMNS, packed, fresh=True)
     return written
