@@ -19,8 +19,11 @@ from faults.project import Project
 PAUSE = (0.1, 4.0)
 """Least and greatest time between two kills, s."""
 
-KINDS = ("worker", "worker", "worker", "batch", "server", "backend")
-"""What is killed in six kills: a worker, the command, PostgreSQL's first process, or that of a session."""
+KINDS = ("worker", "worker", "worker", "batch", "server", "backend", "machine")
+"""What is killed in seven kills: a worker, the command, PostgreSQL's first process, that of a session, or all at once."""
+
+PATIENCE = 900.0
+"""Seconds within which a batch ends after the last kill; far more than it takes."""
 
 
 def workers(project: Project) -> list[psutil.Process]:
@@ -86,7 +89,7 @@ class Killer:
         process = self._type()
         due = self._next()
         try:
-            while True:
+            while time.monotonic() < due + PATIENCE:
                 code = process.poll()
                 if code == 0:
                     return
@@ -101,6 +104,7 @@ class Killer:
                         due = self._next()
                         yield kind
                 time.sleep(0.02)
+            raise AssertionError(f"it hangs: {self.project.said()[-3000:]}")
         finally:
             if process.poll() is None:
                 process.kill()
@@ -117,20 +121,22 @@ class Killer:
         if not self.deck:
             self.deck = self.chance.sample(KINDS, len(KINDS))
         kind = self.deck[-1]
-        if kind == "batch":
-            victims = [psutil.Process(command.pid)] if command.poll() is None else []
-        elif kind == "worker":
-            victims = workers(self.project)
-        elif kind == "server":
-            victims = [p for p in [postmaster(self.project)] if p is not None]
+        first = postmaster(self.project)
+        every = {
+            "batch": [psutil.Process(command.pid)] if command.poll() is None else [],
+            "worker": workers(self.project),
+            "server": [first] if first else [],
+            "backend": backends(self.project),
+        }
+        if kind == "machine":
+            victims = [process for processes in every.values() for process in processes]
         else:
-            victims = backends(self.project)
+            victims = self.chance.sample(every[kind], min(1, len(every[kind])))
         if not victims:
             return None
-        try:
-            self.chance.choice(victims).send_signal(signal.SIGKILL)
-        except psutil.NoSuchProcess:
-            return None
+        for process in victims:
+            with suppress(psutil.NoSuchProcess):
+                process.send_signal(signal.SIGKILL)
         self.killed[self.deck.pop()] += 1
         return kind
 
