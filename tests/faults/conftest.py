@@ -54,8 +54,8 @@ def _survey(folder: Path, last: int) -> Iterator[Survey]:
 
 @pytest.fixture(scope="session")
 def long(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Survey]:
-    """Twelve kilometres."""
-    yield from _survey(tmp_path_factory.mktemp("long"), 11)
+    """Ten kilometres."""
+    yield from _survey(tmp_path_factory.mktemp("long"), 9)
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import laspy
 import numpy as np
-import shapely
+import shapely.affinity
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
@@ -22,6 +22,8 @@ from tunneldb.simulate.scanner import BlockPlan
 
 SRID = 25830
 NAME = "long"
+REACH = 25.0  # m
+DENSITY = 100.0  # points per m²
 # Stage parameters that suit a thin scan.
 THIN = ("image.pixel=0.2", "axis.tolerance=0.005")
 
@@ -62,39 +64,38 @@ class Scene:
         return [o for name in ("trajectory", "reference") for o in (f"--{name}", folder / f"{name}.csv")]
 
 
-def make(first: int, last: int, reach: float = 25.0, density: float = 100.0, seed: int = 1, plane_leaks: bool = True) -> Scene:
-    """Scan the tunnel within ``reach`` metres of each kilometre plane from ``first`` to ``last``.
+def make(first: int, last: int) -> Scene:
+    """Scan the tunnel within REACH of each kilometre plane from ``first`` to ``last``.
 
     A leak lies near each plane; at every other one it lies across it.
     """
     planes = tuple(1000.0 * km for km in range(first, last + 1))
-    start = planes[0] - reach
+    start = planes[0] - REACH
     parameters = Parameters(
         name=NAME,
-        seed=seed,
         srid=SRID,
         section_radius=2.0,
         invert=1.4,
-        length=planes[-1] + reach - start,
+        length=planes[-1] + REACH - start,
         radius=4000.0,
         slope=1.7,
         start_chainage=start,
         scanner="profiler",
         speed=20.0,
-        density=density,
+        density=DENSITY,
         leaks=0,
         appendages=False,
         niches=False,
     )
     simulation = Simulation(parameters)
-    simulation.leaks = [leak for n, plane in enumerate(planes) for leak in _leaks(2 * n + 1, plane, plane_leaks and n % 2 == 1)]
+    simulation.leaks = [leak for n, plane in enumerate(planes) for leak in _leaks(2 * n + 1, plane, across=n % 2 == 1)]
     simulation._scene = scene(simulation.tunnel, [], [], simulation.leaks)
-    clouds = [simulation.make(BlockPlan(n, p - reach, 0, 0, 0, p + reach)) for n, p in enumerate(planes)]
+    clouds = [simulation.make(BlockPlan(n, p - REACH, 0, 0, 0, p + REACH)) for n, p in enumerate(planes)]
     scan = Scan(**{f.name: np.concatenate([getattr(cloud, f.name) for cloud in clouds]) for f in fields(Scan)})
     return Scene(simulation, scan, start)
 
 
-def _leaks(number: int, plane: float, across: bool) -> list[Leak]:
+def _leaks(number: int, plane: float, *, across: bool) -> list[Leak]:
     """Two leaks beside a plane, or one of them across it."""
     outlines = [
         shapely.affinity.scale(shapely.Point(plane + (0.0 if across else -8.0), -1.5).buffer(1.0), 2.2, 0.9),

@@ -1,4 +1,4 @@
-"""Workers that are there before the server is, and after."""
+"""A worker under which the server goes down."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import signal
 
 from faults.conftest import Survey
 from faults.killer import backends, postmaster, workers
-from faults.project import NAME, differences, register, runs, state
+from faults.project import differences, register, runs, state
 from faults.waiting import done, running, wait_for
 
 
@@ -26,22 +26,5 @@ def test_worker_outlives_the_server(short: Survey) -> None:
     wait_for(short.project, lambda: done(short.project), worker)
     short.project.run("stop", "--wait")
     assert worker.wait(60) == 0
-    assert differences(short.undisturbed, state(short.project)) == []
-    assert [row for row in runs(short.project) if row[3] != 1] == []
-
-
-def test_stopped_worker_leaves_a_whole_stage(short: Survey) -> None:
-    """Ctrl-C: the stage that is under way ends well; the next worker goes on."""
-    short.project.fresh()
-    register(short.project, short.files)
-    worker = short.project.begin("--dsn", short.project.dsn, "worker", "--concurrency", 2, log="worker.log")
-    wait_for(short.project, lambda: running(short.project), worker)
-    worker.send_signal(signal.SIGINT)
-    assert worker.wait(60) == 0
-    with short.project.connect() as conn:
-        assert conn.execute("SELECT DISTINCT outcome FROM tunnel_api.run").fetchall() == [("done",)]
-    assert not done(short.project)
-    assert not workers(short.project)
-    short.project.run("batch", NAME)
     assert differences(short.undisturbed, state(short.project)) == []
     assert [row for row in runs(short.project) if row[3] != 1] == []
