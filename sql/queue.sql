@@ -169,6 +169,8 @@ DECLARE
     args constant jsonb := (SELECT j.args FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
     survey constant integer := (args ->> 'survey_id')::integer;
     km constant integer := (args ->> 'km')::integer;
+    first integer;
+    last integer;
 BEGIN
     PERFORM tunnel_queue.procrastinate_finish_job_v1(job_id, 'succeeded', false);
     IF km IS NOT NULL THEN
@@ -182,9 +184,16 @@ BEGIN
       JOIN tunnel.file_km k ON k.file_id = f.id AND k.loaded_at IS NULL
      WHERE i.survey_id = survey AND i.name = args ->> 'file'
         ON CONFLICT DO NOTHING;
+    -- those that the file may touch, and those that were read anew
+    SELECT least(min(i.km_from), min(k.km)) - 4, greatest(max(i.km_to), max(k.km)) + 4
+      INTO first, last
+      FROM tunnel.incoming i
+      LEFT JOIN tunnel.scan_file f ON f.survey_id = i.survey_id
+      LEFT JOIN tunnel.file_km k ON k.file_id = f.id AND k.read_at >= queue_done.started_at
+     WHERE i.survey_id = survey AND i.name = args ->> 'file';
     DELETE FROM tunnel.incoming i
      WHERE i.survey_id = survey AND i.name = args ->> 'file' AND i.requested_at < queue_done.started_at;
-    PERFORM tunnel_api.queue_plan(survey);
+    PERFORM tunnel_api.queue_plan(survey, coalesce(first, -1000000), coalesce(last, 1000000));
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.queue_done(bigint, timestamptz) IS
@@ -197,11 +206,16 @@ AS $$
 DECLARE
     args constant jsonb := (SELECT j.args FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
     survey constant integer := (args ->> 'survey_id')::integer;
+    first integer;
+    last integer;
 BEGIN
     PERFORM tunnel_queue.procrastinate_finish_job_v1(job_id, 'failed', false);
     UPDATE tunnel.incoming i SET failed_at = clock_timestamp(), message = queue_fail.message
-     WHERE i.survey_id = survey AND i.name = args ->> 'file';
-    PERFORM tunnel_api.queue_plan(survey);
+     WHERE i.survey_id = survey AND i.name = args ->> 'file'
+    RETURNING i.km_from, i.km_to INTO first, last;
+    first := coalesce(first, (args ->> 'km')::integer, -1000000);
+    last := coalesce(last, (args ->> 'km')::integer, 1000000);
+    PERFORM tunnel_api.queue_plan(survey, first - 4, last + 4);
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.queue_fail(bigint, text) IS
