@@ -37,6 +37,7 @@ WINDOW = 1_000_000  # points whose neighbourhoods are looked at at a time by eac
 CROWDED = 4_000_000  # from this many points in one window on, one thread, for the sake of memory
 BLOCK = 50_000  # points of a LAZ file that can be decoded by themselves
 MARGIN = 10.0  # m beyond its ends that a kilometre is looked up in a file for what happens at its end
+FEW = 150  # points in a cell up to which hardly any has enough around it to be certain to be no noise
 STRETCH = 5.0  # m of tunnel for which the noise filter's widest radius is found
 CERTAIN = -1  # tag of a candidate that is certain to be no noise; the others have the number of their cell
 
@@ -244,7 +245,7 @@ class _Filter:
         return points
 
     def _pick(self, points: Points, cell: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-        if self.settings.edge is None:
+        if self.settings.edge is None or self.cells.counts[cell].mean() < FEW:
             return np.arange(len(points), dtype=np.int32), np.zeros(len(points), np.bool_)
         return pick(
             points.xyz, points.time, points.intensity, points.scan_id, points.classification, self.places.whole[cell],
