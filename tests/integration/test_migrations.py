@@ -164,6 +164,8 @@ def test_plpgsql_check_finds_nothing(conn: psycopg.Connection) -> None:
                p.oid, coalesce(t.tgrelid, 0), extra_warnings => true, performance_warnings => false) c
          WHERE p.pronamespace = ANY (ARRAY['tunnel', 'tunnel_api']::regnamespace[]) AND l.lanname = 'plpgsql'
            AND c.message <> 'name of parameter "offset" is reserved keyword'  -- the design's word
+           -- what RETURN QUERY EXECUTE returns the checker cannot see
+           AND c.detail IS DISTINCT FROM 'cannot to determine result of dynamic SQL'
         """
     ).fetchall()
     assert complaints == []
