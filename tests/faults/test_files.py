@@ -5,8 +5,11 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import pytest
 from faults.conftest import Survey
 from faults.project import NAME, batch, differences, state
+
+pytestmark = pytest.mark.xdist_group("short")
 
 
 def test_bad_file_fails_its_kilometres_alone(short: Survey, tmp_path: Path) -> None:
@@ -23,10 +26,11 @@ def test_bad_file_fails_its_kilometres_alone(short: Survey, tmp_path: Path) -> N
         done = conn.execute("SELECT km FROM tunnel_api.queue_state(1) GROUP BY km HAVING every(state = 'done') ORDER BY km")
         assert [row[0] for row in done.fetchall()] == [0, 1, 2]
         failed = conn.execute("SELECT km, message FROM tunnel_api.queue_state(1) WHERE state = 'failed' ORDER BY km").fetchall()
-        assert [km for km, _ in failed] == [3, 4]
+        # By its box, whose ends are known to some 30 m: of kilometre 4 it holds 25 m.
+        assert {3} <= {km for km, _ in failed} <= {3, 4}
         assert all("part-03.laz" in message and "\n" not in message for _, message in failed)
     status = short.project.run("status", NAME, code=None)
-    row = [line for line in status.splitlines() if line.startswith("3–4")]
+    row = [line for line in status.splitlines() if line.startswith(("3 ", "3–4 "))]
     assert len(row) == 1, status
     assert "failed" in row[0], status
     assert "load: part-03.laz: " in row[0], status

@@ -6,6 +6,7 @@ import os
 import random
 import time
 
+import pytest
 from faults.conftest import Survey
 from faults.killer import Killer, reading, whole
 from faults.project import batch, differences, runs, state
@@ -34,6 +35,7 @@ def test_kills_lose_nothing_and_double_nothing(long: Survey) -> None:
     print("each batch ended as the undisturbed one, row for row")
 
 
+@pytest.mark.xdist_group("short")
 def test_two_batches_at_once(short: Survey) -> None:
     short.project.fresh()
     both = [short.project.begin(*batch(short.files, workers=1), log=f"batch-{n}.log") for n in (1, 2)]

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import signal
 
+import pytest
 from faults.conftest import Survey
 from faults.killer import backends, postmaster, workers
 from faults.project import differences, register, runs, state
 from faults.waiting import done, running, wait_for
+
+pytestmark = pytest.mark.xdist_group("short")
 
 
 def test_worker_outlives_the_server(short: Survey) -> None:
