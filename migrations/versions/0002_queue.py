@@ -185,9 +185,7 @@ def upgrade() -> None:
         sa.Column("drop_max", sa.Double(), nullable=False, comment="Greatest drop below dry lining, dB"),
         sa.Column("leak_id", sa.BigInteger(), nullable=True, comment="Leak that it is a part of, if it is large enough"),
         _of_survey("leak_part"),
-        sa.ForeignKeyConstraint(
-            ["leak_id"], ["tunnel.leak.id"], name=op.f("leak_part_leak_id_fkey"), ondelete="SET NULL"
-        ),
+        sa.ForeignKeyConstraint(["leak_id"], ["tunnel.leak.id"], name=op.f("leak_part_leak_id_fkey"), ondelete="SET NULL"),
         sa.PrimaryKeyConstraint("id", name=op.f("leak_part_pkey")),
         schema="tunnel",
         comment="Wet regions cut by an end of their kilometre, from which leaks over several kilometres are put together",
