@@ -128,6 +128,7 @@ def plan(
     if kilometres is not None:
         files = [file for file in files if file.error or _touches(file, kilometres)]
     wanted = {km for file in files for km in _kilometres(file)}
+    wanted |= _near_damaged(conn, survey, files, float(how["load.max_distance"]))
     if not named:
         goals = _goals(conn, survey)
         options = kilometres is not None or stage is not None or parameters
@@ -200,12 +201,25 @@ def _headers(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path
     return files
 
 
+def _near_damaged(conn: psycopg.Connection[Any], survey: Survey, files: Sequence[Incoming], reach: float) -> set[int]:
+    """Kilometres that files that can't be read may touch: wanted as those of good ones, for when they are put right."""
+    damaged = [header for file in files if file.error and (header := _damaged_header(file.path)) is not None]
+    if not damaged:
+        return set()
+    alignment = load_alignment(conn, survey)
+    return {km for header in damaged for km in header_kilometres(header, alignment, reach)}
+
+
+def _damaged_header(path: Path) -> ScanHeader | None:
+    """What is known of a file that can't be read: its box, if that is there."""
+    box = None if is_e57(path) else header_box(path)
+    return None if box is None else ScanHeader(path, 0, (), None, np.array(box[0]), np.array(box[1]))
+
+
 def _damaged_kilometres(path: Path, alignment: Alignment, reach: float) -> range:
     """Kilometres that fail with a file that can't be read: those of its box, if that is there."""
-    box = None if is_e57(path) else header_box(path)
-    if box is None:
-        return range(0)
-    return _inner_kilometres(ScanHeader(path, 0, (), None, np.array(box[0]), np.array(box[1])), alignment, reach)
+    header = _damaged_header(path)
+    return range(0) if header is None else _inner_kilometres(header, alignment, reach)
 
 
 def _inner_kilometres(header: ScanHeader, alignment: Alignment, reach: float) -> range:
