@@ -11,7 +11,6 @@ from faults.project import Project, batch, state
 from faults.scene import NAME, Scan, make, split
 from rasterio.io import MemoryFile
 
-pytestmark = pytest.mark.xdist_group("borders")
 LAST = 2
 MILLIMETRE, PER_MILLE = 1e-3, 1e-3
 

@@ -5,11 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-import pytest
 from faults.conftest import Survey
 from faults.project import NAME, batch, differences, state
-
-pytestmark = pytest.mark.xdist_group("short")
 
 
 def test_bad_file_fails_its_kilometres_alone(short: Survey, tmp_path: Path) -> None:

@@ -6,7 +6,6 @@ import os
 import random
 import time
 
-import pytest
 from faults.conftest import Survey
 from faults.killer import Killer, reading, whole
 from faults.project import batch, differences, runs, state
@@ -33,13 +32,3 @@ def test_kills_lose_nothing_and_double_nothing(long: Survey) -> None:
     seconds = time.monotonic() - started
     print(f"\r{killer.killed.total()} kills ({kinds}) in {rounds} batches, typed {killer.typed} times, {seconds:.0f} s")
     print("each batch ended as the undisturbed one, row for row")
-
-
-@pytest.mark.xdist_group("short")
-def test_two_batches_at_once(short: Survey) -> None:
-    short.project.fresh()
-    both = [short.project.begin(*batch(short.files, workers=1), log=f"batch-{n}.log") for n in (1, 2)]
-    codes = [process.wait(300) for process in both]
-    assert codes == [0, 0], short.project.said("batch-1.log") + short.project.said("batch-2.log")
-    assert differences(short.undisturbed, state(short.project)) == []
-    assert [row for row in runs(short.project) if row[3] != 1] == []

@@ -20,7 +20,6 @@ from faults.waiting import done, wait_for
 
 from tunneldb.database.server import DATABASE, Server
 
-pytestmark = pytest.mark.xdist_group("short")
 NUMBER = os.getpid() % 250
 SERVER, MACHINES = f"10.213.{NUMBER}.1", {f"tda{NUMBER}": f"10.213.{NUMBER}.11", f"tdb{NUMBER}": f"10.213.{NUMBER}.12"}
 BRIDGE = f"tds{NUMBER}"

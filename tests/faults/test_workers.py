@@ -1,16 +1,13 @@
-"""A worker under which the server goes down."""
+"""Two batches of the same survey at once, and a worker under which the server goes down."""
 
 from __future__ import annotations
 
 import signal
 
-import pytest
 from faults.conftest import Survey
 from faults.killer import backends, postmaster, workers
-from faults.project import differences, register, runs, state
+from faults.project import batch, differences, register, runs, state
 from faults.waiting import done, running, wait_for
-
-pytestmark = pytest.mark.xdist_group("short")
 
 
 def test_worker_outlives_the_server(short: Survey) -> None:
@@ -29,5 +26,14 @@ def test_worker_outlives_the_server(short: Survey) -> None:
     wait_for(short.project, lambda: done(short.project), worker)
     short.project.run("stop", "--wait")
     assert worker.wait(60) == 0
+    assert differences(short.undisturbed, state(short.project)) == []
+    assert [row for row in runs(short.project) if row[3] != 1] == []
+
+
+def test_two_batches_at_once(short: Survey) -> None:
+    short.project.fresh()
+    both = [short.project.begin(*batch(short.files, workers=1), log=f"batch-{n}.log") for n in (1, 2)]
+    codes = [process.wait(300) for process in both]
+    assert codes == [0, 0], short.project.said("batch-1.log") + short.project.said("batch-2.log")
     assert differences(short.undisturbed, state(short.project)) == []
     assert [row for row in runs(short.project) if row[3] != 1] == []
