@@ -107,13 +107,13 @@ class Project:
         return psycopg.connect(make_conninfo(self.dsn, dbname="postgres", user="postgres"), autocommit=True)
 
 
-def register(project: Project, files: Sequence[Path]) -> None:
+def register(project: Project, files: Sequence[Path], kilometres: range | None = None) -> None:
     """Ask for what a batch asks for, without workers of its own."""
     chosen = {name: float(value) for name, value in (text.split("=") for text in THIN)}
     with connect(project.dsn) as conn:
         conn.autocommit = True
         survey = get_survey(conn, NAME)
-        job.register(conn, survey, job.plan(conn, survey, files, parameters=chosen))
+        job.register(conn, survey, job.plan(conn, survey, files, kilometres=kilometres, parameters=chosen))
 
 
 def batch(files: Sequence[Path], *more: object, workers: int = 2) -> list[object]:

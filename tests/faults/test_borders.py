@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from faults.project import Project, batch, state
+from faults.project import Project, register, state
 from faults.scene import NAME, Scan, make, split
+from faults.waiting import done, wait_for
 from rasterio.io import MemoryFile
 
 LAST = 2
@@ -38,18 +40,23 @@ def ways(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, dict[st
     project = Project(scene)
     try:
         yield {
-            "kilometres": _process(project, points, [batch([kilometres[km]], "--km", km) for km in (1, 0, 2)]),
-            "parts": _process(project, points, [batch([parts[n]]) for n in (1, 2, 0)]),
-            "whole": _process(project, points, [batch([whole])]),
+            "kilometres": _process(project, points, [(kilometres[km], range(km, km + 1)) for km in (1, 0, 2)]),
+            "parts": _process(project, points, [(parts[n], None) for n in (1, 2, 0)]),
+            "whole": _process(project, points, [(whole, None)]),
         }
     finally:
         project.close()
 
 
-def _process(project: Project, points: np.ndarray, batches: list[list[object]]) -> dict[str, Any]:
+def _process(project: Project, points: np.ndarray, asked: list[tuple[Path, range | None]]) -> dict[str, Any]:
+    """Ask for files, within kilometres, one after the other, each when the one before is done."""
     project.fresh()
-    for arguments in batches:
-        project.run(*arguments)
+    worker = project.begin("worker", "--concurrency", 2, log="worker.log")
+    for file, kilometres in asked:
+        register(project, [file], kilometres)
+        wait_for(project, lambda: done(project), worker)
+    project.run("stop", "--wait")
+    assert worker.wait(60) == 0
     found = state(project)
     table, unrolled = project.home / "points.csv", project.home / "unrolled.csv"
     np.savetxt(table, points, fmt="%.4f", delimiter=",", header="x,y,z", comments="")
