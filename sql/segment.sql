@@ -129,6 +129,7 @@ CREATE OR REPLACE FUNCTION tunnel_api.segment_tag(survey_id int, km int)
 RETURNS bigint
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
 SET work_mem = '256MB'  -- a kilometre at survey density is sorted in memory
+SET enable_mergejoin = off  -- it would sort all points by their segment first, though the segments fit a small hash
 SET plan_cache_mode = force_custom_plan  -- a generic plan is made for, and locks, every partition of every survey
 AS $$
 DECLARE
