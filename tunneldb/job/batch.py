@@ -17,7 +17,7 @@ from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import KILOMETRE, Alignment
 from tunneldb.geometry.store import load_alignment
-from tunneldb.job.load import header_kilometres, parameters_of, settings_of
+from tunneldb.job.load import chainages_near, header_kilometres, parameters_of, settings_of
 from tunneldb.job.run import loaded_kilometres
 from tunneldb.job.stages import STAGES
 from tunneldb.scan.e57 import is_e57
@@ -247,11 +247,9 @@ def extent(header: ScanHeader, alignment: Alignment, reach: float) -> tuple[floa
     tuple or None
         Two chainages, m; None if the file is not at the axis.
     """
-    low, high = header.low[:2] - reach, header.high[:2] + reach
-    inside = np.all((alignment.vertices[:, :2] >= low) & (alignment.vertices[:, :2] <= high), axis=1)
-    if not inside.any():
+    chainage = chainages_near(header, alignment, reach)
+    if not len(chainage):
         return None
-    chainage = alignment.number[inside] * alignment.spacing
     margin = min(1.5 * reach + alignment.spacing, float(np.ptp(chainage)) / 2.0)
     return float(chainage.min()) + margin, float(chainage.max()) - margin
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import psycopg
+from numpy.typing import NDArray
 
 from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
@@ -20,34 +21,23 @@ from tunneldb.job.files import COUNTED, Loaded, change_counts, outcome, recorded
 from tunneldb.job.fragment import drop_fragments, read_fragment
 from tunneldb.job.ledger import Run, lock, stage_run
 from tunneldb.job.partition import partition_exists, read_partition, rows_in, swap_partition, write_partition
-from tunneldb.job.read import Begin, Counts, Reading
+from tunneldb.job.read import Begin, Counts, Reading, silent
 from tunneldb.job.settings import parameters_of, require_same_density, settings_of
 from tunneldb.scan.filter import MEMORY, FilterSettings
 from tunneldb.scan.reader import ScanHeader, read_header
 from tunneldb.scan.spool import Spool
 
-__all__ = ["header_kilometres", "load_files", "load_kilometre", "parameters_of", "settings_of"]
+__all__ = ["chainages_near", "header_kilometres", "load_files", "load_kilometre", "parameters_of", "settings_of"]
 
 BATCH = 20_000_000  # points of files of the same kilometre that are loaded in one go
 
 
-def load_kilometre(
-    conn: psycopg.Connection[Any],
-    survey: Survey,
-    km: int,
-    settings: FilterSettings,
-    progress: Callable[[float], None] = lambda share: None,
-) -> Counts:
+def load_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, settings: FilterSettings) -> Counts:
     """Load what waits for a kilometre, in the caller's transaction.
 
     The rows that were read of files and wait there, and those that it has of other files, are thinned as a whole,
     written aside and swapped in. Which rows a kilometre has in the end does not depend on the order in which its files
     are read or loaded.
-
-    Parameters
-    ----------
-    progress : callable
-        Takes the share that is done, 0 to 1.
 
     Returns
     -------
@@ -60,18 +50,7 @@ def load_kilometre(
         If another process is at work on the kilometre, or the survey is loaded with another density.
     """
     require_same_density(conn, survey, settings)
-
-    def begin(text: str, total: int) -> Callable[[int], None]:
-        done = 0
-
-        def advance(rows: int) -> None:
-            nonlocal done
-            done += rows
-            progress(done / total)
-
-        return advance
-
-    merged = merge(conn, survey, km, settings, begin)
+    merged = merge(conn, survey, km, settings)
     finish(conn, survey, [merged])
     return {"files": merged.files, "kept": merged.kept}
 
@@ -99,7 +78,7 @@ def merge(
     survey: Survey,
     km: int,
     settings: FilterSettings,
-    begin: Begin = lambda text, total: lambda done: None,
+    begin: Begin = silent,
     memory: int = MEMORY,
     held: Mapping[int, Spool] | None = None,
 ) -> Merged:
@@ -177,7 +156,7 @@ def load_files(
     survey: Survey,
     paths: Sequence[Path],
     settings: FilterSettings,
-    begin: Begin = lambda text, total: lambda done: None,
+    begin: Begin = silent,
     memory: int = MEMORY,
 ) -> Iterator[Loaded]:
     """Read scan files and load the kilometres that they touch.
@@ -263,11 +242,15 @@ def header_kilometres(header: ScanHeader, alignment: Alignment, reach: float) ->
     reach : float
         How far from the axis the tunnel reaches, m.
     """
-    inside = np.all(
-        (alignment.vertices[:, :2] >= header.low[:2] - reach) & (alignment.vertices[:, :2] <= header.high[:2] + reach), axis=1
-    )
-    touched = np.floor(alignment.number[inside] * alignment.spacing / KILOMETRE).astype(int)
+    touched = np.floor(chainages_near(header, alignment, reach) / KILOMETRE).astype(int)
     return range(int(touched.min()), int(touched.max()) + 1) if len(touched) else range(0)
+
+
+def chainages_near(header: ScanHeader, alignment: Alignment, reach: float) -> NDArray[np.float64]:
+    """Chainages of the given axis' stations within the reach of the box in a file's header, in plan, m."""
+    low, high = header.low[:2] - reach, header.high[:2] + reach
+    inside = np.all((alignment.vertices[:, :2] >= low) & (alignment.vertices[:, :2] <= high), axis=1)
+    return np.asarray(alignment.number[inside] * alignment.spacing, dtype=np.float64)
 
 
 def _load_batch(reading: Reading, headers: Sequence[ScanHeader], given: Sequence[Path], begin: Begin) -> list[Loaded]:

@@ -39,23 +39,17 @@ Begin = Callable[[str, int], Callable[[int], None]]
 """Takes what begins and how much it is; returns what takes how much of it is done."""
 
 
-def read_file(
-    conn: psycopg.Connection[Any],
-    survey: Survey,
-    path: Path,
-    settings: FilterSettings,
-    progress: Callable[[float], None] = lambda share: None,
-) -> Counts:
+def silent(text: str, total: int) -> Callable[[int], None]:
+    """Begin something of which nobody is told."""
+    return lambda done: None
+
+
+def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, settings: FilterSettings) -> Counts:
     """Read a scan file and set its points aside for the kilometres that it touches, in the caller's transaction.
 
     A file is known by its name without the folder. One that was read before and is unchanged is left as it is, whether
     its kilometres are loaded yet or wait. One that replaces another of its name also has those read again that overlap
     the former one, and waits for runs of the kilometres that they touch.
-
-    Parameters
-    ----------
-    progress : callable
-        Takes the share that is done, 0 to 1.
 
     Returns
     -------
@@ -73,22 +67,12 @@ def read_file(
     header = read_header(path)
     reading = Reading.of(conn, survey, settings)
     reading.check(header)
-
-    def begin(text: str, total: int) -> Callable[[int], None]:
-        done = 0
-
-        def advance(points: int) -> None:
-            nonlocal done
-            done += points
-            progress(done / total)
-
-        return advance
-
-    known = unchanged(conn, path, recorded_files(conn, survey).get(path.name))
-    if known is not None:
-        files, state = [recorded_files(conn, survey)[path.name].id], known.state
+    recorded = recorded_files(conn, survey).get(path.name)
+    known = unchanged(conn, path, recorded)
+    if recorded is not None and known is not None:
+        files, state = [recorded.id], known.state
     else:
-        read = reading.read([header], [], begin)
+        read = reading.read([header], [])
         files, state = [file.id for file in read], read[0].state
     row = conn.execute(
         "SELECT points, noise, outside, ARRAY(SELECT DISTINCT km FROM tunnel.file_km"
@@ -138,7 +122,7 @@ class Reading:
         """Check a file against its survey."""
         check_header(header, self.survey.intensity_dimension, self.survey.srid, needs_time=self.poses.mobile)
 
-    def read(self, headers: Sequence[ScanHeader], given: Sequence[Path], begin: Begin) -> list[Read]:
+    def read(self, headers: Sequence[ScanHeader], given: Sequence[Path], begin: Begin = silent) -> list[Read]:
         """Read files, none of which is there unchanged, then those that have to be read again because of them.
 
         Parameters
