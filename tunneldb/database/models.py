@@ -283,6 +283,7 @@ Point = Table(
     Column("file_id", Integer, nullable=False, comment="File that it came from (scan_file.id)"),
     Column("intensity", REAL, nullable=False, comment="Intensity as the file has it; 0 when the kind is none"),
     Column("classification", SmallInteger, nullable=False, comment="Class as in the file (ASPRS)"),
+    Column("class", SmallInteger, comment="Class found by stage ground (tunnel_api.class); none before it has run"),
     Index("point_chainage_idx", "chainage", postgresql_using="brin", postgresql_with={"pages_per_range": "16"}),
     postgresql_partition_by="LIST (survey_id)",
     comment="Points at survey density: partition point_s<survey> and in it point_s<survey>_km<km>, "
@@ -401,6 +402,108 @@ class SectionClass(Base):
     state: Mapped[str] = mapped_column(
         comment="measured, rejected (an outlier among its neighbours) or interpolated (too few points)"
     )
+
+
+class Ground(Base):
+    """The ground across the tunnel at a metre of it."""
+
+    __tablename__ = "ground"
+    __table_args__ = (
+        Index(None, "survey_id", "km"),
+        {"comment": "The ground at each metre along the tunnel that has one, found by stage ground (Li et al. 2023)"},
+    )
+
+    survey_id: Mapped[int] = mapped_column(_parent("survey"), primary_key=True, comment=_SURVEY)
+    n: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment="Metre: plan distance along the axis, m")
+    km: Mapped[int] = mapped_column(comment=_KM)
+    across: Mapped[float] = mapped_column(
+        comment="Where the first height stands, m right of the axis; the next ones every 0.1 m"
+    )
+    height: Mapped[Floats] = mapped_column(comment="Height (z) of the ground, m; NaN where there is none")
+    gamma: Mapped[float] = mapped_column(comment="Points up to this height above it are ground, m")
+    foot: Mapped[Floats] = mapped_column(
+        comment="Where the left and the right wall meet the ground, m right of the axis; NaN where there is no wall"
+    )
+    lean: Mapped[Floats] = mapped_column(
+        comment="How far the left and the right wall lean to the right for each metre up there"
+    )
+    arc_left: Mapped[float | None] = mapped_column(comment="Arc at which the ground begins on the left, m")
+    arc_right: Mapped[float | None] = mapped_column(comment="Arc at which the ground begins on the right, m")
+    geom: Mapped[WKBElement] = mapped_column(
+        _geometry("LINESTRINGZ"), comment="The ground from the left to the right, tunnel's SRID, m"
+    )
+
+
+class Lining(Base):
+    """Where the lining lies in a kilometre, off the surface of the sections."""
+
+    __tablename__ = "lining"
+    __table_args__ = {  # noqa: RUF012
+        "comment": "Local planes of the lining, of each kilometre, found by stage ground: a grid in the unrolled plane"
+    }
+
+    survey_id: Mapped[int] = mapped_column(_parent("survey"), primary_key=True, comment=_SURVEY)
+    km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=_KM)
+    cell: Mapped[float] = mapped_column(comment="Edge of a cell, m")
+    box: Mapped[list[int]] = mapped_column(
+        ARRAY(Integer), comment="First column (chainage / cell), first row (arc / cell), columns and rows of the grid"
+    )
+    offset: Mapped[bytes] = mapped_column(
+        comment="Offset of the lining in each cell, m, by rows from the lowest arc; float32, little-endian, NaN for none"
+    )
+    spread: Mapped[bytes] = mapped_column(comment="Standard deviation of the lining's points about it, m; the same form")
+
+
+class Cluster(Base):
+    """Points that lie together and are neither ground nor lining."""
+
+    __tablename__ = "cluster"
+    __table_args__ = (
+        Index(None, "survey_id", "km"),
+        Index(None, "geom", postgresql_using="gist"),
+        {"comment": "What stands in the tunnel or hangs on its lining, found by stage ground (DBSCAN, Li et al. 2023)"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(_parent("survey"), comment=_SURVEY)
+    km: Mapped[int] = mapped_column(comment=_KM + " of its middle")
+    class_: Mapped[int] = mapped_column("class", SmallInteger, comment="Class of its points (tunnel_api.class)")
+    chainage_from: Mapped[float] = mapped_column(comment="Least chainage, m")
+    chainage_to: Mapped[float] = mapped_column(comment="Greatest chainage, m")
+    height_from: Mapped[float | None] = mapped_column(comment="Its lowest point above the ground, m; none without ground")
+    height_to: Mapped[float | None] = mapped_column(comment="Its highest point above the ground, m; none without ground")
+    points: Mapped[int] = mapped_column(BigInteger, comment="Points of survey density in it")
+    cell: Mapped[float] = mapped_column(comment="Edge of its cells, m")
+    cells: Mapped[list[int]] = mapped_column(
+        ARRAY(Integer), comment="Cells that its points fill: floor(x / cell), floor(y / cell), floor(z / cell) of each"
+    )
+    geom: Mapped[WKBElement] = mapped_column(_geometry("POLYGON"), comment="Hull of it on the map, tunnel's SRID, m")
+
+
+class TargetSphere(Base):
+    """A target sphere as one scan saw it."""
+
+    __tablename__ = "target_sphere"
+    __table_args__ = (
+        UniqueConstraint("survey_id", "number", "scan_id"),
+        Index(None, "geom", postgresql_using="gist"),
+        {"comment": "Target spheres, one row for each scan that saw one (Li et al. 2023)"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(_parent("survey"), comment=_SURVEY)
+    km: Mapped[int] = mapped_column(comment=_KM)
+    number: Mapped[int] = mapped_column(comment="Number of the sphere, along the tunnel; the same for all scans that saw it")
+    scan_id: Mapped[int] = mapped_column(comment="Scan that saw it (point_source_id)")
+    chainage: Mapped[float | None] = mapped_column(comment="Chainage of its centre, m; none where the tunnel has no segment")
+    geom: Mapped[WKBElement] = mapped_column(_geometry("POINTZ"), comment="Centre, tunnel's SRID, m")
+    radius: Mapped[float] = mapped_column(comment="Radius of the fitted sphere, m")
+    nominal: Mapped[float] = mapped_column(comment="Radius that was asked for, m")
+    rms: Mapped[float] = mapped_column(comment="Root mean square of its points' distances from the fitted sphere, m")
+    sigma: Mapped[float] = mapped_column(comment="Standard deviation of the centre, from the fit, m")
+    coverage: Mapped[float] = mapped_column(comment="Share of the sphere's surface that is seen, 0 to 1")
+    points: Mapped[int] = mapped_column(comment="Points that it was fitted to")
+    found_at: Mapped[dt.datetime] = mapped_column(server_default=_NOW, comment="When it was found")
 
 
 class Radiometry(Base):
@@ -541,7 +644,7 @@ class Run(Base):
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(_parent("survey"), comment=_SURVEY)
     km: Mapped[int | None] = mapped_column(comment="Kilometre; none for the whole survey")
-    stage: Mapped[str] = mapped_column(comment="read, load, axis, segments, sections, detect")
+    stage: Mapped[str] = mapped_column(comment="read, load, axis, segments, sections, ground, detect; spheres")
     parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Parameters that it ran with")
     versions: Mapped[dict[str, Any]] = mapped_column(
         server_default=text("'{}'"), comment="Versions of the program and of its libraries"
