@@ -47,7 +47,7 @@ CREATE OR REPLACE VIEW tunnel_api.point AS
 SELECT ((p.km::bigint & 65535) << 44) | ((p.ctid::text::pg_catalog.point)[0]::bigint << 12)
          | (p.ctid::text::pg_catalog.point)[1]::bigint AS id,
        p.survey_id, p.km, p.chainage, p.segment, p.gps_time, p.scan_id, p.file_id, p.intensity, p.classification,
-       p.geom::public.geometry AS geom
+       p.class, p.geom::public.geometry AS geom
   FROM tunnel.point p;
 COMMENT ON VIEW tunnel_api.point IS
     'Points at survey density, in chainage order; state survey_id and km (and chainage) to read only their part';

@@ -13,6 +13,7 @@ from shapely.geometry import Polygon
 from tunneldb.database import install, open_connection
 from tunneldb.geometry.frame import frame_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
+from tunneldb.ground.classes import Klass
 from tunneldb.leak.geometries import shapes
 from tunneldb.leak.image import BLOCK, Grid
 from tunneldb.leak.raster import KINDS, Raster, encode
@@ -62,6 +63,8 @@ def _fill(conn: psycopg.Connection) -> None:
     _sections(conn, survey_id, surface)
     outlines = _leaks(conn, survey_id, surface)
     _images(conn, survey_id, surface, outlines)
+    _ground(conn, survey_id, surface)
+    _things(conn, survey_id, surface)
     conn.execute(
         "INSERT INTO tunnel.region (survey_id, kind, geom) VALUES (%s, 'dry', ST_MakeEnvelope(12410, -3, 12414, 0, 0))",
         (survey_id,),
@@ -211,4 +214,68 @@ def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines
             conn.execute(
                 "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %s)",
                 (survey_id, KM, kind, block, encode(Raster(held, grid.transform(columns.start)), kind)),
+            )
+
+
+FLOOR, HALF_FLOOR = 2.5, float(np.sqrt(4.0**2 - 2.5**2))
+"""Depth of the floor below the axis, and half its width, m."""
+
+THINGS = (
+    # class, chainage, m right of the axis, length, width, height from, to
+    (Klass.OBJECT, 12352.0, 1.2, 0.4, 0.6, 0.0, 1.8),
+    (Klass.OBJECT, 12388.0, -1.5, 2.0, 1.0, 0.0, 1.1),
+    (Klass.RAIL, 12400.0, 0.72, 180.0, 0.1, 0.0, 0.17),
+    (Klass.APPENDAGE, 12450.0, -3.6, 60.0, 0.1, 1.0, 1.1),
+)
+SPHERES = ((12313.0, -2.0, 1.4), (12344.0, 2.2, 1.5), (12373.0, -2.4, 1.3), (12406.0, 2.0, 1.6), (12441.0, -2.2, 1.5))
+"""Chainage, m right of the axis, and height above the floor."""
+
+
+def beside(surface: Surface, chainage: float, across: np.ndarray, height: float) -> np.ndarray:
+    """Points (n, 3) beside the axis, at a height above the floor."""
+    origin, _, right, _ = surface.frames(np.array([chainage]))[0]
+    points = origin + np.asarray(across, dtype=float)[:, None] * right
+    points[:, 2] += height - FLOOR
+    return points
+
+
+def _ground(conn: psycopg.Connection, survey_id: int, surface: Surface) -> None:
+    across = np.arange(-31, 32) * 0.1
+    arc = 4.0 * float(np.arccos(-FLOOR / 4.0))
+    for n in range(int(FIRST * SPACING), int(LAST * SPACING)):
+        line = beside(surface, n, across, 0.0)
+        conn.execute(
+            "INSERT INTO tunnel.ground (survey_id, n, km, across, height, gamma, foot, lean, arc_left, arc_right, geom) "
+            "VALUES (%s, %s, %s, %s, %s, 0.05, %s, '{-0.8,0.8}', %s, %s, ST_GeomFromWKB(%s, %s))",
+            (
+                survey_id, n, KM, float(across[0]), line[:, 2].tolist(), [-HALF_FLOOR, HALF_FLOOR], -arc, arc,
+                shapely.to_wkb(shapely.LineString(line)), SRID,
+            ),
+        )  # fmt: skip
+
+
+def _things(conn: psycopg.Connection, survey_id: int, surface: Surface) -> None:
+    for klass, chainage, across, length, width, low, high in THINGS:
+        sides = across + np.array([-width, width]) / 2
+        along = np.linspace(chainage - length / 2, chainage + length / 2, max(2, round(length)))
+        left, right = (np.array([beside(surface, c, [side], 0.0)[0] for c in along]) for side in sides)
+        hull = Polygon(np.concatenate([left, right[::-1]])[:, :2])
+        filled = np.concatenate(
+            [beside(surface, c, np.arange(*sides, 0.1), h) for c in along for h in np.arange(low, high, 0.1)]
+        )
+        conn.execute(
+            "INSERT INTO tunnel.cluster (survey_id, km, class, chainage_from, chainage_to, height_from, height_to, points, "
+            "cell, cells, geom) VALUES (%s, %s, %s, %s, %s, %s, %s, 250, 0.1, %s, ST_GeomFromWKB(%s, %s))",
+            (
+                survey_id, KM, int(klass), chainage - length / 2, chainage + length / 2, low, high,
+                np.floor(filled / 0.1).astype(int).tolist(), shapely.to_wkb(hull), SRID,
+            ),
+        )  # fmt: skip
+    for number, (chainage, across, height) in enumerate(SPHERES, start=1):
+        for scan in (1, 2) if number % 2 else (1,):
+            centre = beside(surface, chainage, [across], height)[0] + 0.0002 * scan
+            conn.execute(
+                "INSERT INTO tunnel.target_sphere (survey_id, km, number, scan_id, chainage, geom, radius, nominal, rms, sigma, "
+                "coverage, points) VALUES (%s, %s, %s, %s, %s, ST_GeomFromWKB(%s, %s), 0.0726, 0.0725, 0.0028, 0.0002, 0.41, 900)",
+                (survey_id, KM, number, scan, chainage, shapely.to_wkb(shapely.Point(centre)), SRID),
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,16 @@ import shapely
 from psycopg import sql
 from queued import add_file, add_goal, add_job, add_worker
 
-GEOMETRIES = {"axis": "LineStringZ", "axis_vertex": "PointZ", "segment": "LineStringZ", "section": "LineStringZ"}
+from tunneldb.ground.classes import Klass
+
+GEOMETRIES = {
+    "axis": "LineStringZ",
+    "axis_vertex": "PointZ",
+    "segment": "LineStringZ",
+    "section": "LineStringZ",
+    "ground": "LineStringZ",
+    "target_sphere": "PointZ",
+}
 EDITED = dt.datetime(2024, 5, 6, tzinfo=dt.UTC)
 
 
@@ -344,6 +354,51 @@ def test_loaded_kilometre_that_was_never_processed_is_listed(conn: psycopg.Conne
     conn.execute("DELETE FROM tunnel.run WHERE stage <> 'load'")
     outcomes = conn.execute("SELECT stage, outcome FROM tunnel_api.stage_status ORDER BY step").fetchall()
     assert outcomes == [("load", "done"), ("axis", "never"), ("segments", "never"), ("sections", "never"), ("detect", "never")]
+
+
+def test_classes_are_those_of_the_program(conn: psycopg.Connection) -> None:
+    rows = conn.execute("SELECT id, name FROM tunnel_api.class ORDER BY id").fetchall()
+    assert rows == [(int(klass), klass.name.lower()) for klass in Klass]
+
+
+def test_cluster_says_what_it_is_and_where(conn: psycopg.Connection, example: str) -> None:
+    assert conn.execute(
+        "SELECT class_name, label, segment, round(area::numeric, 2), GeometryType(geom), ST_SRID(geom) FROM tunnel_api.cluster "
+        "WHERE class = 68 ORDER BY chainage_from"
+    ).fetchall() == [
+        ("object", "12+352.000", 1235, Decimal("0.24"), "POLYGON", 25830),
+        ("object", "12+388.000", 1238, Decimal("2.01"), "POLYGON", 25830),
+    ]
+
+
+def test_sphere_of_two_scans_has_one_number(conn: psycopg.Connection, example: str) -> None:
+    rows = conn.execute(
+        "SELECT number, label, segment, count(*), max(abs(x - ST_X(geom)) + abs(y - ST_Y(geom)) + abs(z - ST_Z(geom))) "
+        "FROM tunnel_api.target_sphere GROUP BY 1, 2, 3 ORDER BY 1"
+    ).fetchall()
+    assert [row[:4] for row in rows] == [
+        (1, "12+313.000", 1231, 2),
+        (2, "12+344.000", 1234, 1),
+        (3, "12+373.000", 1237, 2),
+        (4, "12+406.000", 1240, 1),
+        (5, "12+441.000", 1244, 2),
+    ]
+    assert max(row[4] for row in rows) == 0
+
+
+def test_sphere_off_the_tunnel_has_no_chainage(conn: psycopg.Connection, example: str) -> None:
+    conn.execute("UPDATE tunnel.target_sphere SET chainage = NULL WHERE number = 2")
+    assert one(conn, "SELECT chainage, label, segment FROM tunnel_api.target_sphere WHERE number = 2") == (None, None, None)
+
+
+def test_ground_lies_where_its_metre_is(conn: psycopg.Connection, example: str) -> None:
+    """The middle of each line lies below the axis, at its own chainage."""
+    assert one(
+        conn,
+        'SELECT count(*), bool_and(n.chainage = g.chainage AND abs(u.chainage - g.chainage) < 0.06 AND u."offset" < 0.001) '
+        "FROM tunnel_api.ground g JOIN LATERAL (SELECT g.chainage) n ON true CROSS JOIN LATERAL tunnel_api.unroll(g.survey_id, "
+        "ST_SetSRID(ST_PointN(g.geom, 32), 25830)) u WHERE g.chainage BETWEEN 12310 AND 12490",
+    ) == (181, True)
 
 
 def test_statistics_leave_out_rejected_and_vanished_leaks(conn: psycopg.Connection, example: str) -> None:
