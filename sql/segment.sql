@@ -157,7 +157,7 @@ BEGIN
         CREATE TABLE tunnel.%I AS
         SELECT c.survey_id, c.km,
             coalesce(s.a + (s.b - s.a) * m.before / nullif(m.before + m.after, 0), c.chainage) AS chainage,
-            c.gps_time, c.geom, s.n AS segment, c.scan_id, c.file_id, c.intensity, c.classification
+            c.gps_time, c.geom, s.n AS segment, c.scan_id, c.file_id, c.intensity, c.classification, c."class"
         FROM (SELECT p.*, s.n + CASE
                   WHEN p.x * s.px + p.y * s.py + p.z * s.pz < s.pl THEN -1
                   WHEN p.x * s.qx + p.y * s.qy + p.z * s.qz >= s.ql THEN 1
