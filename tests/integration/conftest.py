@@ -275,7 +275,8 @@ def _things(conn: psycopg.Connection, survey_id: int, surface: Surface) -> None:
         for scan in (1, 2) if number % 2 else (1,):
             centre = beside(surface, chainage, [across], height)[0] + 0.0002 * scan
             conn.execute(
-                "INSERT INTO tunnel.target_sphere (survey_id, km, number, scan_id, chainage, geom, radius, nominal, rms, sigma, "
-                "coverage, points) VALUES (%s, %s, %s, %s, %s, ST_GeomFromWKB(%s, %s), 0.0726, 0.0725, 0.0028, 0.0002, 0.41, 900)",
+                "INSERT INTO tunnel.target_sphere (survey_id, km, number, scan_id, chainage, geom, radius, nominal, rms, "
+                "sigma, coverage, points) "
+                "VALUES (%s, %s, %s, %s, %s, ST_GeomFromWKB(%s, %s), 0.0726, 0.0725, 0.0028, 0.0002, 0.41, 900)",
                 (survey_id, KM, number, scan, chainage, shapely.to_wkb(shapely.Point(centre)), SRID),
             )

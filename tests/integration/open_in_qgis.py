@@ -143,6 +143,7 @@ def add(project: QgsProject, view: str) -> dict[str, Any]:
         "loaded": loaded,
         "message": message,
         "renderer": layer.renderer().type(),
+        "alias": layer.attributeAlias(1),
         "wkb": QgsWkbTypes.displayString(layer.wkbType()),
         "crs": layer.crs().authid(),
     }

@@ -33,6 +33,9 @@ ON_MAP = {
     "segment": "LineStringZ",
     "section": "LineStringZ",
     "leak_map": "Polygon",
+    "target_sphere": "PointZ",
+    "cluster": "Polygon",
+    "ground": "LineStringZ",
     "leak_3d": "PolygonZ",
 }
 UNROLLED = {"leak_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon"}
@@ -132,10 +135,11 @@ def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str
 
 def test_height_reaches_qgis(rows: psycopg.Connection, seen: dict[str, Any]) -> None:
     layers = seen["layers"]
-    for name in ("axis_vertex", "axis", "segment", "section", "leak_3d"):
+    for name in ("axis_vertex", "axis", "segment", "section", "leak_3d", "target_sphere", "ground"):
         heights = rows.execute(f"SELECT ST_ZMax(geom) FROM tunnel_api.{name}").fetchall()  # type: ignore[arg-type]
         assert sorted(layers[name]["z"]) == pytest.approx(sorted(z for (z,) in heights)), name
-    for name in ("axis", "section", "leak_3d"):
+    assert layers["target_sphere"]["clamping"] == "absolute"
+    for name in ("axis", "section", "leak_3d", "ground"):
         assert (layers[name]["clamping"], layers[name]["binding"]) == ("absolute", "vertex")
 
 
@@ -145,12 +149,18 @@ def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
         assert (layers[name]["read_only"], layers[name]["editable"]) == (False, ["review", "remark"])
         assert layers[name]["widget"]["review"] == "ValueMap"
     assert (layers["axis_vertex"]["read_only"], layers["axis_vertex"]["editable"]) == (False, [])
-    assert all(layers[name]["read_only"] for name in ("axis", "segment", "section", "section_unrolled"))
+    assert all(
+        layers[name]["read_only"]
+        for name in ("axis", "segment", "section", "section_unrolled", "target_sphere", "cluster", "ground")
+    )
 
 
 def test_themes_and_views(seen: dict[str, Any]) -> None:
     assert set(seen["themes"]) == {"Map", "Unrolled", "3D"}
-    assert set(seen["themes"]["Map"]) == {"axis", "axis_vertex", "segment", "section", "leak_map"}
+    assert set(seen["themes"]["Map"]) == {
+        "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster",
+    }  # fmt: skip
+    assert set(seen["themes"]["3D"]) == {"axis", "section", "leak_3d", "target_sphere", "ground"}
     assert set(seen["themes"]["Unrolled"]) == {*UNROLLED, "demo-2024-km012-corrected"}
     assert seen["bookmarks"] == ["Map", "Unrolled", "Unrolled, km 12"]
     # the second canvas follows the theme, and starts where there is lining
@@ -226,12 +236,18 @@ def test_viewer_opens_the_project_but_cannot_edit(server_dsn: str, project: Path
     assert "cannot be edited" in done.stderr
 
 
-@pytest.mark.parametrize("view", ["leak_map", "leak_3d", "leak_unrolled", "axis_vertex", "segment", "section"])
+@pytest.mark.parametrize(
+    "view",
+    [
+        "leak_map", "leak_3d", "leak_unrolled", "axis_vertex", "segment", "section", "target_sphere", "cluster", "ground",
+    ],
+)  # fmt: skip
 def test_layer_added_by_hand_finds_its_style_srid_and_height(shared: Path, view: str) -> None:
     added = act(shared, "add", view)
     assert added["valid"]
     assert added["loaded"], "no default style"
-    assert added["renderer"] in ("categorizedSymbol", "RuleRenderer")
+    assert added["renderer"] in ("categorizedSymbol", "RuleRenderer", "singleSymbol")
+    assert added["alias"] == "Survey key"
     assert (added["wkb"], added["crs"]) == ((ON_MAP | UNROLLED)[view], "" if view in UNROLLED else "EPSG:25830")
 
 

@@ -59,9 +59,11 @@ class VectorLayer:
 LAYERS = (
     VectorLayer("axis_vertex", "Axis vertices (editable)", "axis_vertex", "PointZ", "axis_vertex", MAP, (MAP,), True),
     VectorLayer("leak_map", "Leaks beside the axis (review)", "leak_map", "Polygon", "leak", MAP, (MAP,), True),
+    VectorLayer("target_sphere", "Target spheres", "target_sphere", "PointZ", "target_sphere", MAP, (MAP, SPACE)),
     VectorLayer("axis", "Axis", "axis", "LineStringZ", "axis", MAP, (MAP, SPACE)),
     VectorLayer("segment", "Segments", "segment", "LineStringZ", "segment", MAP, (MAP,)),
     VectorLayer("section", "Sections", "section", "LineStringZ", "section", MAP, (MAP, SPACE)),
+    VectorLayer("cluster", "Objects, rails and appendages", "cluster", "Polygon", "cluster", MAP, (MAP,)),
     VectorLayer("leak_unrolled", "Leaks (review)", "leak_unrolled", "Polygon", "leak", UNROLLED, (UNROLLED,), True),
     VectorLayer("region", "Regions drawn by hand", "region", "Polygon", "region", UNROLLED, (UNROLLED,), True),
     VectorLayer(
@@ -69,4 +71,5 @@ LAYERS = (
         (UNROLLED,),
     ),
     VectorLayer("leak_3d", "Leaks in space (review)", "leak_3d", "PolygonZ", "leak_3d", SPACE, (SPACE,), True),
+    VectorLayer("ground", "Ground", "ground", "LineStringZ", "ground", SPACE, (SPACE,)),
 )  # fmt: skip
