@@ -83,6 +83,25 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("leak_area", "MIN MAX", "Area of leaks, m².", float, 2),
         _Option("leak_drop", "MIN MAX", "How much darker than dry lining leaks are, dB.", float, 2),
     ],
+    "Floor and what stands free": [
+        _Option("people", "N", "People standing about.", int),
+        _Option("equipment", "N", "Cases, trolleys and tripods in turn.", int),
+        _Option("bollards", "N", "Round-topped posts.", int),
+        _Option("globes", "N", "Round lamps on posts and on the wall in turn, no such radius as the target spheres.", int),
+        _Option(
+            "spheres",
+            "N",
+            "Target spheres on tripods and on wall brackets in turn; the third touches the wall, half of the fourth "
+            "is hidden behind a cable.",
+            int,
+        ),
+        _Option("sphere_radius", "M", "Radius of the target spheres."),
+        _Option("free_cables", "N", "Cables on hangers off the wall, from end to end.", int),
+        _Option("ballast", "M", "Standard deviation of the floor's height: stones of 3 to 6 cm, 0 for none."),
+        _Option("camber", "%", "Fall of the floor from its middle to both walls."),
+        _Option("walkway", "M", "Height of a walkway along the left wall and of a kerb along the right one, 0 for none."),
+        _Option("carriageway", "M", "Height of a second carriageway on the right, 0 for none."),
+    ],
     "Other": [
         _Option("name", "NAME", "First part of the file names.", str),
         _Option("seed", "N", "Seed; the same seed gives the same points.", int),
@@ -92,6 +111,8 @@ _FLAGS = {
     "s_curve": ("--s-curve", True, "Bend back in the second half.", "Tunnel"),
     "appendages": ("--no-appendages", False, "No cables, trays, boxes, lamps and rails.", "Intensity and contents"),
     "niches": ("--no-niches", False, "No refuge niches.", "Intensity and contents"),
+    "catenary": ("--catenary", True, "A contact line over the track.", "Floor and what stands free"),
+    "sleepers": ("--sleepers", True, "Sleepers under the rails.", "Floor and what stands free"),
 }
 
 
@@ -146,9 +167,9 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
     """Make a simulated scan of a tunnel, with its truth, in the folder OUT.
 
     A section is swept along a curved and sloping axis, perpendicular to it. A static scanner or a profiler on a
-    trolley shoots rays at the lining, which carries leaks, cables, a tray, boxes, lamps, rails and refuge niches;
-    what hides behind them is not seen. Intensity follows the range (with the loss of near ranges), the incidence
-    (Oren–Nayar), the material and the water, plus noise.
+    trolley shoots rays at the lining, which carries leaks, cables, a tray, boxes, lamps, rails and refuge niches, and
+    at what stands free, if asked for; what hides behind them is not seen. Intensity follows the range (with the loss
+    of near ranges), the incidence (Oren–Nayar), the material and the water, plus noise.
 
     \b
     OUT/NAME.laz             points: LAS 1.4, Amplitude and Reflectance in dB, intensity in linear counts
@@ -158,15 +179,18 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
     OUT/NAME.trajectory.csv  time,x,y,z (profiler)
     OUT/NAME.reference.csv   range_m,intensity_db of a 30 % target
     OUT/NAME.truth.npz       chainage, arc, offset, class and leak of each point, in file order;
-                             class 0 lining, 1 floor, 2 appendage, 3 niche, 4 outlier; leak -1 for none
+                             class 0 lining, 1 floor, 2 appendage, 3 niche, 4 outlier, 5 rail, 6 object, 7 target
+                             sphere; leak -1 for none; thing, where something stands free: its number, 0 for none
     OUT/NAME.truth.geojson   leaks as polygons in the plane (chainage, arc)
-    OUT/NAME.json            all parameters, appendages and niches
+    OUT/NAME.spheres.csv     id,x,y,z,radius,kind of the target spheres, if any; id is their number among the things
+    OUT/NAME.json            all parameters, appendages, niches, things that stand free
 
     \b
     Examples:
       tunneldb simulate demo --preset demo
       tunneldb simulate out --name bend --section horseshoe --length 100 --radius 300 --slope 4
       tunneldb simulate out --section box --scanner profiler --leaks 20 --leak-area 0.1 2 --seed 7
+      tunneldb simulate out --length 50 --people 4 --equipment 6 --spheres 6 --ballast 0.02 --sleepers --catenary
       tunneldb simulate out --name km --length 25000 --radius 4000 --scanner profiler --density 100 --no-truth
 
     Lengths are in metres, angles in degrees, levels in dB.

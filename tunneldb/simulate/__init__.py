@@ -8,7 +8,9 @@ from tunneldb.simulate.centreline import CentreLine, Element
 from tunneldb.simulate.generate import Cloud, Simulation, simulate
 from tunneldb.simulate.output import Files, write
 from tunneldb.simulate.parameters import PRESETS, Parameters
+from tunneldb.simulate.profile import rise
 from tunneldb.simulate.section import Section, box, circular, horseshoe
+from tunneldb.simulate.things import TargetSphere, Thing
 from tunneldb.simulate.tunnel import Tunnel, Unrolled
 
 __all__ = [
@@ -20,11 +22,14 @@ __all__ = [
     "Parameters",
     "Section",
     "Simulation",
+    "TargetSphere",
+    "Thing",
     "Tunnel",
     "Unrolled",
     "box",
     "circular",
     "horseshoe",
+    "rise",
     "simulate",
     "write",
 ]

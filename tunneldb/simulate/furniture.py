@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 TUBE, BAR = 0.0, 1.0
-LINING, FLOOR, APPENDAGE, NICHE, OUTLIER = 0, 1, 2, 3, 4
+LINING, FLOOR, APPENDAGE, NICHE, OUTLIER, RAIL, OBJECT, SPHERE = 0, 1, 2, 3, 4, 5, 6, 7
 
 # Chainages are looked up in bins this long; what lies within REACH of a bin is listed in it.
 BIN = 2.0
@@ -34,7 +34,7 @@ class Appendage:
     Attributes
     ----------
     kind : str
-        cable, tray, box, lamp or rail.
+        cable, tray, box, lamp or rail; walkway, kerb or carriageway.
     start, end : float
         Chainage, m.
     arc : float
@@ -63,8 +63,8 @@ class Appendage:
 
     @property
     def klass(self) -> int:
-        """Class of its points: rails count as floor."""
-        return FLOOR if self.kind == "rail" else APPENDAGE
+        """Class of its points: what one walks or drives on is floor."""
+        return {"rail": RAIL, "walkway": FLOOR, "kerb": FLOOR, "carriageway": FLOOR}.get(self.kind, APPENDAGE)
 
     def footprint(self) -> Polygon:
         """What it covers of the unrolled plane, seen along the normal."""

@@ -11,12 +11,17 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from tunneldb.simulate.furniture import FLOOR, Appendage, Niche, furnish, refuges
+from tunneldb.simulate import ground
+from tunneldb.simulate.furniture import FLOOR, RAIL, Appendage, Niche, furnish, refuges
 from tunneldb.simulate.intensity import counts, reference_curve
 from tunneldb.simulate.leaks import Leak, place
+from tunneldb.simulate.overhead import overhead, sleepers
 from tunneldb.simulate.parameters import Parameters
+from tunneldb.simulate.placing import stand
+from tunneldb.simulate.profile import slabs
 from tunneldb.simulate.ray import scene, trace
 from tunneldb.simulate.scanner import BlockPlan, Scanner
+from tunneldb.simulate.things import TargetSphere, Thing, parts_table
 from tunneldb.simulate.tunnel import Tunnel
 
 Array = NDArray[np.float64]
@@ -41,9 +46,11 @@ class Cloud:
     chainage, arc, offset : (n,)
         Of the point as stored, m.
     klass : (n,)
-        0 lining, 1 floor, 2 appendage, 3 niche, 4 outlier.
+        0 lining, 1 floor, 2 appendage, 3 niche, 4 outlier, 5 rail, 6 object, 7 target sphere.
     leak : (n,)
         Id of the leak that the laser met, -1 for none.
+    thing : (n,)
+        Number of the free-standing thing that it lies on, for a target sphere the sphere's; 0 for none.
     range, incidence : (n,)
         Distance from the scanner to the spot met, m, and angle to its normal, rad; without noise.
     """
@@ -59,6 +66,7 @@ class Cloud:
     offset: NDArray[np.float32]
     klass: NDArray[np.uint8]
     leak: NDArray[np.int32]
+    thing: NDArray[np.uint16]
     range: NDArray[np.float32]
     incidence: NDArray[np.float32]
 
@@ -76,6 +84,10 @@ class Simulation:
         Exact geometry.
     appendages, niches, leaks : list
         What is in it.
+    things : list of Thing
+        What stands or hangs free, thing i with number i + 1.
+    spheres : list of TargetSphere
+        Target spheres; sphere i is thing i.
     scanner : Scanner
         Poses.
     """
@@ -83,11 +95,12 @@ class Simulation:
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
         self.tunnel: Tunnel = parameters.tunnel()
-        furniture, wet, reference, self._seed = np.random.SeedSequence(parameters.seed).spawn(4)
+        furniture, wet, reference, self._seed, free, loose = np.random.SeedSequence(parameters.seed).spawn(6)
         self.appendages: list[Appendage] = (
             furnish(self.tunnel, np.random.default_rng(furniture)) if parameters.appendages else []
         )
         self.niches: list[Niche] = refuges(self.tunnel) if parameters.niches else []
+        self.appendages += slabs(parameters, self.tunnel)
         obstacles = [a.footprint() for a in self.appendages] + [n.footprint(self.tunnel) for n in self.niches]
         self.leaks: list[Leak] = place(
             self.tunnel,
@@ -99,7 +112,17 @@ class Simulation:
         )
         self.reference = reference_curve(parameters.max_range, np.random.default_rng(reference))
         self.scanner = Scanner(parameters, self.tunnel)
-        self._scene = scene(self.tunnel, self.appendages, self.niches, self.leaks)
+        standing, spheres = stand(parameters, self.tunnel, self.scanner, self.appendages, self.niches, free)
+        self.spheres: list[TargetSphere] = spheres
+        self.things: list[Thing] = standing + overhead(parameters, self.tunnel, loose, len(standing) + 1)
+        self._scene = scene(
+            self.tunnel,
+            self.appendages,
+            self.niches,
+            self.leaks,
+            parts_table(self.tunnel, self.things + sleepers(parameters, self.tunnel)),
+            ground.lay(parameters, self.tunnel.section, int(free.generate_state(1)[0])),
+        )
 
     def make(self, plan: BlockPlan) -> Cloud:
         """Points of one block; the same for the same seed and index, whenever it is made."""
@@ -108,7 +131,7 @@ class Simulation:
         rng = np.random.default_rng(sequence)
         rays = self.scanner.rays(plan, rng)
         n = len(rays.time)
-        out = np.empty((n, 12))
+        out = np.empty((n, 13))
         trace(
             self._scene,
             rays.origin,
@@ -126,7 +149,7 @@ class Simulation:
         radiometry = p.radiometry()
         klass = out[:, 7].astype(np.uint8)
         noise = rng.standard_normal(len(out)) * p.intensity_noise
-        reflectance = radiometry.reflectance(out[:, 10], klass == FLOOR, out[:, 9]) + noise
+        reflectance = radiometry.reflectance(out[:, 10], (klass == FLOOR) | (klass == RAIL), out[:, 9]) + noise
         amplitude = radiometry.amplitude(out[:, 11], reflectance)
         index = out[:, 8].astype(np.int32)
         return Cloud(
@@ -141,6 +164,7 @@ class Simulation:
             offset=out[:, 6].astype(np.float32),
             klass=klass,
             leak=np.where(index >= 0, index + 1, -1).astype(np.int32),
+            thing=out[:, 12].astype(np.uint16),
             range=out[:, 11].astype(np.float32),
             incidence=np.arccos(out[:, 10]).astype(np.float32),
         )

@@ -35,6 +35,8 @@ TRUTH: dict[str, np.dtype[Any]] = {
     "klass": np.dtype(np.uint8),
     "leak": np.dtype(np.int32),
 }
+# Only where something stands free.
+THING = {"thing": np.dtype(np.uint16)}
 TRUTH_NAMES = {"klass": "class"}
 
 
@@ -49,6 +51,7 @@ class Files:
     reference: Path = Path()
     leaks: Path = Path()
     parameters: Path = Path()
+    spheres: Path | None = None
     points: int = 0
 
     def moved(self, folder: Path) -> Files:
@@ -65,6 +68,7 @@ class Files:
             reference=to(self.reference),
             leaks=to(self.leaks),
             parameters=to(self.parameters),
+            spheres=None if self.spheres is None else to(self.spheres),
             points=self.points,
         )
 
@@ -72,19 +76,20 @@ class Files:
 class _TruthWriter:
     """Columns of truth, streamed to an .npz without holding them."""
 
-    def __init__(self, path: Path, scratch: Path) -> None:
+    def __init__(self, path: Path, scratch: Path, columns: dict[str, np.dtype[Any]]) -> None:
         self.path = path
+        self.columns = columns
         self.count = 0
-        self.files: dict[str, BinaryIO] = {n: (scratch / f"{path.name}.{n}").open("w+b") for n in TRUTH}
+        self.files: dict[str, BinaryIO] = {n: (scratch / f"{path.name}.{n}").open("w+b") for n in columns}
 
     def add(self, cloud: Cloud) -> None:
         self.count += len(cloud)
-        for name, dtype in TRUTH.items():
+        for name, dtype in self.columns.items():
             getattr(cloud, name).astype(dtype, copy=False).tofile(self.files[name])
 
     def close(self) -> None:
         with zipfile.ZipFile(self.path, "w", zipfile.ZIP_STORED) as archive:
-            for name, dtype in TRUTH.items():
+            for name, dtype in self.columns.items():
                 source = self.files[name]
                 source.flush()
                 source.seek(0)
@@ -139,6 +144,15 @@ def _csv(path: Path, columns: str, rows: NDArray[np.float64], formats: list[str]
     return path
 
 
+def _spheres(simulation: Simulation, path: Path) -> Path | None:
+    """Centres of the target spheres, as control points are given."""
+    if not simulation.spheres:
+        return None
+    lines = (f"{k.id},{k.centre[0]:.5f},{k.centre[1]:.5f},{k.centre[2]:.5f},{k.radius:g},{k.kind}" for k in simulation.spheres)
+    path.write_text("\n".join(["id,x,y,z,radius,kind", *lines]) + "\n")
+    return path
+
+
 def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
     p, line, scanner = simulation.parameters, simulation.tunnel.line, simulation.scanner
     base = folder / p.name
@@ -166,6 +180,7 @@ def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
         for leak in simulation.leaks
     ]
     files.leaks.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    files.spheres = _spheres(simulation, Path(f"{base}.spheres.csv"))
     section = simulation.tunnel.section
     record = {
         "software": f"tunneldb {tunneldb.__version__}",
@@ -176,11 +191,28 @@ def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
             "half_perimeter": section.half_perimeter,
             "floor_below_axis": -section.floor,
         },
-        "classes": {"lining": 0, "floor": 1, "appendage": 2, "niche": 3, "outlier": 4},
+        "classes": {
+            "lining": 0,
+            "floor": 1,
+            "appendage": 2,
+            "niche": 3,
+            "outlier": 4,
+            "rail": 5,
+            "object": 6,
+            "sphere": 7,
+        },
         "points": files.points,
         "files": [path.name for path in files.clouds],
         "appendages": [vars(a) for a in simulation.appendages],
         "niches": [vars(n) for n in simulation.niches],
+        "things": [
+            {"number": t.number, "kind": t.kind, "class": t.klass, "middle": np.round(t.middle(), 4).tolist()}
+            for t in simulation.things
+        ],
+        "spheres": [
+            {"id": k.id, "centre": np.round(k.centre, 5).tolist(), "radius": k.radius, "kind": k.kind}
+            for k in simulation.spheres
+        ],
     }
     files.parameters = Path(f"{base}.json")
     files.parameters.write_text(json.dumps(record, indent=1))
@@ -189,12 +221,12 @@ def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
 class _Sink:
     """Writers of the file that is being filled: points, and truth where wanted."""
 
-    def __init__(self, header: laspy.LasHeader, folder: Path, base: str, truth: bool) -> None:
+    def __init__(self, header: laspy.LasHeader, folder: Path, base: str, columns: dict[str, np.dtype[Any]]) -> None:
         self.header = header
         self.cloud = folder / f"{base}.laz"
         self.truth = folder / f"{base}.truth.npz"
         self.points = laspy.open(self.cloud, mode="w", header=header, laz_backend=laspy.LazBackend.LazrsParallel)
-        self.columns = _TruthWriter(self.truth, folder) if truth else None
+        self.columns = _TruthWriter(self.truth, folder, columns) if columns else None
 
     def add(self, cloud: Cloud) -> None:
         self.points.write_points(_record(self.header, cloud))
@@ -221,7 +253,7 @@ def write(
     Parameters
     ----------
     truth : bool
-        Also write the truth of each point (21 bytes a point).
+        Also write the truth of each point (21 bytes a point, 23 where something stands free).
     progress : callable, optional
         Called with the share done (0 to 1) and the points written after each block.
 
@@ -245,6 +277,7 @@ def _scan(simulation: Simulation, folder: Path, truth: bool, progress: Callable[
     p, line = simulation.parameters, simulation.tunnel.line
     files = Files()
     header = _header(simulation)
+    columns = (TRUTH | (THING if simulation.things else {})) if truth else {}
     current, sink = None, None
     for plan, cloud in simulation.blocks():
         km = math.floor(plan.chainage / 1000.0 + 1e-9) if p.length > 1000.0 else None
@@ -252,7 +285,7 @@ def _scan(simulation: Simulation, folder: Path, truth: bool, progress: Callable[
             if sink is not None:
                 sink.close()
             current = km
-            sink = _Sink(header, folder, p.name if km is None else f"{p.name}-km{km:03d}", truth)
+            sink = _Sink(header, folder, p.name if km is None else f"{p.name}-km{km:03d}", columns)
             files.clouds.append(sink.cloud)
             if truth:
                 files.truth.append(sink.truth)

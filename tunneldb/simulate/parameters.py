@@ -38,6 +38,17 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "roughness": (0.0, 60.0, "degrees"),
     "intensity_noise": (0.0, 5.0, "dB"),
     "leaks": (0, 100_000, "leaks"),
+    "people": (0, 5000, "people"),
+    "equipment": (0, 5000, "things"),
+    "bollards": (0, 5000, "bollards"),
+    "globes": (0, 5000, "lamps"),
+    "spheres": (0, 5000, "spheres"),
+    "sphere_radius": (0.02, 0.5, "m"),
+    "free_cables": (0, 50, "cables"),
+    "ballast": (0.0, 0.05, "m"),
+    "camber": (0.0, 10.0, "%"),
+    "walkway": (0.0, 0.6, "m"),
+    "carriageway": (0.0, 0.6, "m"),
 }
 
 
@@ -95,6 +106,20 @@ class Parameters:
     leak_drop: tuple[float, float] = (4.0, 8.0)
     appendages: bool = True
     niches: bool = True
+
+    people: int = 0
+    equipment: int = 0
+    bollards: int = 0
+    globes: int = 0
+    spheres: int = 0
+    sphere_radius: float = 0.0725
+    free_cables: int = 0
+    catenary: bool = False
+    ballast: float = 0.0
+    sleepers: bool = False
+    camber: float = 0.0
+    walkway: float = 0.0
+    carriageway: float = 0.0
 
     def __post_init__(self) -> None:
         for name, (low, high, unit) in LIMITS.items():

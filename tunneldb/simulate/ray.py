@@ -28,8 +28,10 @@ from tunneldb.simulate.furniture import (
     distance,
     niche_table,
 )
+from tunneldb.simulate.ground import Ground, meet_ground
 from tunneldb.simulate.leaks import EDGE, Leak, depth_inside, edge_table
 from tunneldb.simulate.section import LINE, nearest
+from tunneldb.simulate.things import BEAM, Parts, meet_parts
 from tunneldb.simulate.tunnel import Tunnel, gradient, newton_step
 
 Array = NDArray[np.float64]
@@ -37,6 +39,8 @@ Index = NDArray[np.int64]
 
 # Beyond this incidence the echo is lost, as scanners lose it.
 MINIMUM_COSINE = 0.087
+# Share of the rays past an edge of a free-standing thing that give a mixed pixel.
+MIXED = 0.2
 # Least range of the scanner, m.
 NEAREST = 1.0
 
@@ -63,9 +67,13 @@ class Scene(NamedTuple):
     leaks: Array
     leak_bins: Index
     leak_list: Index
+    parts_free: Parts
+    ground: Ground
 
 
-def scene(tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: list[Leak]) -> Scene:
+def scene(
+    tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: list[Leak], parts: Parts, ground: Ground
+) -> Scene:
     """Lay a tunnel and its contents out for the kernels."""
     line = tunnel.line
     item_rows, niche_rows = appendage_table(tunnel, items), niche_table(tunnel, niches)
@@ -84,6 +92,8 @@ def scene(tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: li
         first,
         leak_rows,
         *bins(leak_rows[:, 0], leak_rows[:, 2], line.start, line.end),
+        parts,
+        ground,
     )
 
 
@@ -236,6 +246,15 @@ def _niche(sc: Scene, o: Array, d: Array, s: float, r: float) -> tuple[float, fl
 
 
 @njit(cache=True, nogil=True)
+def _uneven(sc: Scene, o: Array, d: Array, s: float, r: float, on_floor: bool) -> tuple[float, float, bool]:
+    """Range to ballast or a cambered floor where a ray meets the section at range r, cosine, whether it is floor."""
+    x, y, z = o[0] + r * d[0], o[1] + r * d[1], o[2] + r * d[2]
+    _, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
+    gx, gy, gz = gradient(0.0, 1.0, u, w, c, n, k, g, q, det)
+    return meet_ground(sc.ground, o, d, r, u, w, c, n, gx * d[0] + gy * d[1] + gz * d[2], on_floor)
+
+
+@njit(cache=True, nogil=True)
 def _wetness(sc: Scene, s: float, arc: float) -> tuple[int, float]:
     """Number of the leak that holds a point of the lining (-1: none) and drop there, dB."""
     b = bin_of(s, sc.ends[0], sc.leak_bins)
@@ -298,23 +317,32 @@ def trace(
         Height of small-scale relief of the lining, m.
     furthest : float
         Greatest range, m.
-    out : (n, 12)
+    out : (n, 13)
         range (NaN: no echo), x, y, z, chainage, arc, offset, class, leak (-1: none), drop (dB), cosine of
-        incidence, true range. Chainage, arc and offset are those of the stored point; leak, drop and cosine
+        incidence, true range, thing (0: none). Chainage, arc and offset are those of the stored point; leak, drop and cosine
         those of the spot that the laser met.
     """
     for i in range(origin.shape[0]):
         o, d = origin[i], direction[i]
         wall, s, arc, cosine, offset0, s0 = _lining(sc, o, d, hint[i], 2.0 * furthest)
         out[i, 0] = np.nan
-        if math.isnan(wall) or offset0 <= 0.0:
+        is_open = math.isnan(wall)
+        if offset0 <= 0.0 or (is_open and sc.parts_free.rows.shape[0] == 0):
             continue
-        r = wall
         klass = FLOOR if abs(arc) > sc.ends[2] else LINING
         leak = -1
         drop = 0.0
         height = 0.0
-        if sc.items.shape[0] > 0:
+        thing = 0
+        edge = 1.0
+        if is_open:
+            wall = 2.0 * furthest
+        elif sc.ground.high > 0.0:
+            hit, c, is_floor = _uneven(sc, o, d, s, wall, klass == FLOOR)
+            if not math.isnan(hit):
+                wall, cosine, klass = hit, c, FLOOR if is_floor else LINING
+        r = wall
+        if not is_open and sc.items.shape[0] > 0:
             # The offset is concave along the ray, so it cannot fall below the appendages' reach before here.
             begin = wall * max(0.0, 1.0 - sc.ends[3] / offset0)
             hit, which, c = _item(sc, o, d, s0 + (s - s0) * begin / wall, begin, wall)
@@ -322,7 +350,7 @@ def trace(
                 r, cosine = hit, c
                 klass = int(sc.items[which, 9])
                 drop = sc.items[which, 10]
-        if r == wall and klass == LINING:
+        if r == wall and klass == LINING and not is_open:
             hit, c = _niche(sc, o, d, s, wall)
             if not math.isnan(hit):
                 r, cosine, klass = hit, c, NICHE
@@ -330,6 +358,18 @@ def trace(
                 leak, drop = _wetness(sc, s, arc)
                 if relief > 0.0:
                     height = relief * _bump(s, arc, 0.12)
+        behind = wall
+        if sc.parts_free.rows.shape[0] > 0:
+            hit, which, c, inside = meet_parts(sc.parts_free, sc.ends[0], o, d, s0, s, r)
+            if which >= 0:
+                s = s0 + (s - s0) * hit / r
+                behind = r
+                r, cosine, edge, height, leak = hit, c, inside, 0.0, -1
+                klass = int(sc.parts_free.labels[which, 0])
+                drop = sc.parts_free.labels[which, 1]
+                thing = int(sc.parts_free.labels[which, 2])
+            elif is_open:
+                continue
         if r > furthest or cosine < MINIMUM_COSINE:
             continue
         true_range = r
@@ -339,13 +379,16 @@ def trace(
             # Most isolated points hang in the air, some lie behind the wall (multipath).
             r = NEAREST + v / 0.7 * (0.95 * r - NEAREST) if v < 0.7 else r * (1.0 + 0.5 * (v - 0.7))
             klass = OUTLIER
-        elif klass == APPENDAGE and chance[i, 0] < outliers + 0.01:
-            r += v * (wall - r)  # a mixed pixel: the beam meets the appendage's edge and the wall behind it
+        elif (klass == APPENDAGE and thing == 0 and chance[i, 0] < outliers + 0.01) or (
+            thing > 0 and edge < BEAM and chance[i, 0] < outliers + MIXED
+        ):
+            r += v * (behind - r)  # a mixed pixel: the beam meets an edge and what lies behind it
             klass = OUTLIER
         if r < NEAREST or r > furthest:
             continue
         if klass == OUTLIER:
             leak = -1
+            thing = 0
             drop += 3.0
         x, y, z = o[0] + r * d[0], o[1] + r * d[1], o[2] + r * d[2]
         for _ in range(10):
@@ -366,5 +409,6 @@ def trace(
         out[i, 7] = klass
         out[i, 8] = leak
         out[i, 9] = drop
-        out[i, 10] = cosine
+        out[i, 10] = min(cosine, 1.0)
         out[i, 11] = true_range
+        out[i, 12] = thing
