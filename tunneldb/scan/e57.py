@@ -111,8 +111,8 @@ def read_e57_scans(path: Path) -> list[Scan]:
     UserError
         If the file cannot be read or holds no points, or pye57 is missing.
     """
-    with _open(path) as image, decoding(path, KIND):
-        return _scans(path, image)
+    with open_e57(path) as image, decoding(path, KIND):
+        return scans_of(path, image)
 
 
 def read_e57_header(path: Path) -> ScanHeader:
@@ -121,8 +121,8 @@ def read_e57_header(path: Path) -> ScanHeader:
     Its dimensions are ``intensity`` and ``gps_time``, where every scan has them. Where a scan's bounds are missing,
     its points are read.
     """
-    with _open(path) as image, decoding(path, KIND):
-        scans = _scans(path, image)
+    with open_e57(path) as image, decoding(path, KIND):
+        scans = scans_of(path, image)
         boxes = [_box(path, image, scan) for scan in scans]
         crs = _crs(image)
     dimensions = [name for name, has in _DIMENSIONS if all(map(has, scans))]
@@ -148,9 +148,9 @@ def read_e57(path: Path, dimension: str | None, size: int, ranges: Ranges | None
     Points are numbered through all scans, invalid ones left out. A scan before a range is passed over, for libE57Format
     cannot seek a point inside a scan: what lies before it there is decoded.
     """
-    with _open(path) as image:
+    with open_e57(path) as image:
         with decoding(path, KIND):
-            scans = _scans(path, image)
+            scans = scans_of(path, image)
         names = [name for name, has in _DIMENSIONS if all(map(has, scans))]
         require_dimension(path, dimension, names)
         if dimension == "gps_time":
@@ -224,12 +224,13 @@ class _Cursor:
 @cache
 def _count_good(path: Path, version: tuple[int, int], scan: int, flags: tuple[str, ...]) -> int:
     """Good points of a scan; `version` tells contents of the file apart."""
-    with _open(path) as image, decoding(path, KIND):
-        one = _scans(path, image)[scan]
-        return sum(int(_good_of(fields, flags).sum()) for fields in _read_fields(image, one, flags, CHUNK))
+    with open_e57(path) as image, decoding(path, KIND):
+        one = scans_of(path, image)[scan]
+        return sum(int(good_of(fields, flags).sum()) for fields in read_fields(image, one, flags, CHUNK))
 
 
-def _good_of(fields: dict[str, NDArray[Any]], flags: Sequence[str]) -> NDArray[np.bool_]:
+def good_of(fields: dict[str, NDArray[Any]], flags: Sequence[str]) -> NDArray[np.bool_]:
+    """Tell which points are good: those that no flag speaks against."""
     return np.logical_and.reduce([fields[flag] == 0 for flag in flags])
 
 
@@ -240,14 +241,11 @@ def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int) -> Iter
     names += ["intensity"] if dimension is not None else []
     names += ["timeStamp"] if scan.has_time else []
     offsets = np.zeros(3) if scan.position is None else scan.position
-    for fields in _read_fields(image, scan, names, size):
+    for fields in read_fields(image, scan, names, size):
         if flags:
-            good = _good_of(fields, flags)
+            good = good_of(fields, flags)
             fields = {name: values[good] for name, values in fields.items() if name not in flags}
-        own = np.column_stack([fields[name] for name in scan.coordinates])
-        if scan.coordinates is SPHERICAL:
-            own = _to_cartesian(own)
-        turned = own @ scan.rotation.T
+        turned = own_coordinates(scan, fields) @ scan.rotation.T
         if len(turned):
             yield Raw(
                 turned[:, 0],
@@ -262,6 +260,12 @@ def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int) -> Iter
             )
 
 
+def own_coordinates(scan: Scan, fields: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
+    """Coordinates (n, 3) in the scan's own frame, m."""
+    own = np.column_stack([fields[name] for name in scan.coordinates])
+    return _to_cartesian(own) if scan.coordinates is SPHERICAL else own
+
+
 def _to_cartesian(rae: NDArray[np.float64]) -> NDArray[np.float64]:
     """Range, azimuth and elevation (m, rad) to x, y, z (m)."""
     distance, azimuth, elevation = rae.T
@@ -269,7 +273,7 @@ def _to_cartesian(rae: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([plan * np.cos(azimuth), plan * np.sin(azimuth), distance * np.sin(elevation)])
 
 
-def _read_fields(image: Any, scan: Scan, names: Sequence[str], size: int) -> Iterator[dict[str, NDArray[Any]]]:
+def read_fields(image: Any, scan: Scan, names: Sequence[str], size: int) -> Iterator[dict[str, NDArray[Any]]]:
     """Fields of a scan's points, as views of buffers that the next chunk overwrites."""
     libe57 = _libe57()
     count = min(size, scan.records)
@@ -291,7 +295,8 @@ def _read_fields(image: Any, scan: Scan, names: Sequence[str], size: int) -> Ite
 
 
 @contextmanager
-def _open(path: Path) -> Iterator[Any]:
+def open_e57(path: Path) -> Iterator[Any]:
+    """Open a file with libE57Format, for the length of a with block."""
     libe57 = _libe57()
     with decoding(path, KIND):
         with path.open("rb") as file:
@@ -312,7 +317,8 @@ def _libe57() -> Any:
     return libe57
 
 
-def _scans(path: Path, image: Any) -> list[Scan]:
+def scans_of(path: Path, image: Any) -> list[Scan]:
+    """Scans of an open file that hold points."""
     root = image.root()
     nodes = root["data3D"] if root.isDefined("data3D") else []
     if len(nodes) == 0:
@@ -337,15 +343,15 @@ def _scan(index: int, node: Any) -> Scan:
     name = node["name"].value() if node.isDefined("name") else f"{index + 1}"
     guid = node["guid"].value() if node.isDefined("guid") else f"{name} {index}"
     rotation, position = _pose(node)
-    start = _value(node, "acquisitionStart/dateTimeValue")
+    start = value_of(node, "acquisitionStart/dateTimeValue")
     return Scan(index, name, scan_number(guid, position), points.childCount(), fields, rotation, position, start)
 
 
 def _pose(node: Any) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     if not node.isDefined("pose"):
         return np.eye(3), None
-    position = np.array([_value(node, f"pose/translation/{name}", 0.0) for name in "xyz"], np.float64)
-    quaternion = [_value(node, f"pose/rotation/{name}", float(name == "w")) for name in "wxyz"]
+    position = np.array([value_of(node, f"pose/translation/{name}", 0.0) for name in "xyz"], np.float64)
+    quaternion = [value_of(node, f"pose/rotation/{name}", float(name == "w")) for name in "wxyz"]
     return _rotation(np.array(quaternion, np.float64)), position
 
 
@@ -362,7 +368,7 @@ def _rotation(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
     )
 
 
-def _value(node: Any, name: str, missing: float | None = None) -> float | None:
+def value_of(node: Any, name: str, missing: float | None = None) -> float | None:
     """Number at a path below a node."""
     if not node.isDefined(name):
         return missing
@@ -374,7 +380,7 @@ def _value(node: Any, name: str, missing: float | None = None) -> float | None:
 def _box(path: Path, image: Any, scan: Scan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Box of a scan in the file's frame."""
     node = image.root()["data3D"][scan.index]
-    limits = [[_value(node, f"cartesianBounds/{axis}{end}", np.nan) for axis in "xyz"] for end in ("Minimum", "Maximum")]
+    limits = [[value_of(node, f"cartesianBounds/{axis}{end}", np.nan) for axis in "xyz"] for end in ("Minimum", "Maximum")]
     low, high = np.array(limits, np.float64)
     if not np.all(np.abs([low, high]) < FARTHEST):
         boxes = [(xyz.min(axis=0), xyz.max(axis=0)) for xyz in map(_xyz, _read_scan(image, scan, None, CHUNK))]
