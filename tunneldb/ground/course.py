@@ -1,0 +1,162 @@
+"""The course of a tunnel in plan, found from the points alone."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import cKDTree
+
+Float = NDArray[np.float64]
+
+_CELL = 1.0  # m in plan
+_REACH = 3.0  # cells closer than this are neighbours, m: profiles may lie apart
+_SHORT = 40.0  # m; below, a tunnel may be wider than long, and the way it looks from its end tells its direction
+_STEP = 5.0  # m between vertices
+_SAMPLE = 20_000
+
+
+def course(points: Float) -> Float:
+    """Vertices (k, 2) of a line along a tunnel, from the end that lies farther west.
+
+    A long tunnel's points are strung out by the way to one of its ends, through neighbouring cells of the plan. A
+    short piece is looked at from all sides: seen along the tunnel, its points hide one another the most. The line
+    is then moved to the middle between the walls and smoothed.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        m; those that are not finite are ignored.
+
+    Raises
+    ------
+    ValueError
+        No points.
+    """
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        raise ValueError("there are no points to lay a line through")
+    origin = np.floor(points.mean(axis=0))
+    local = points - origin
+    cells = _cells(local[:, :2])
+    way = _way(cells)
+    vertices = _strung(cells, way) if way.max() > _SHORT else _seen(local)
+    if vertices[-1, 0] < vertices[0, 0]:
+        vertices = vertices[::-1]
+    for _ in range(3):
+        vertices = _centred(vertices, local[:, :2])
+    return np.asarray(vertices + origin[:2])
+
+
+def _cells(plan: Float) -> Float:
+    """Middles (m, 2) of the plan's cells that hold points and hang together; single stray points don't count."""
+    key = np.floor(plan / _CELL).astype(np.int64)
+    cells, count = np.unique(key, axis=0, return_counts=True)
+    cells = cells[count >= 0.1 * np.median(count)]
+    middle = (cells + 0.5) * _CELL
+    _, label = connected_components(_graph(middle), directed=False)
+    return np.asarray(middle[label == np.argmax(np.bincount(label))])
+
+
+def _graph(middle: Float) -> coo_array:
+    pairs = cKDTree(middle).query_pairs(_REACH, output_type="ndarray")
+    length = np.hypot(*(middle[pairs[:, 0]] - middle[pairs[:, 1]]).T) if len(pairs) else np.empty(0)
+    return coo_array((length, (pairs[:, 0], pairs[:, 1])), shape=(len(middle), len(middle)))
+
+
+def _way(cells: Float) -> Float:
+    """Length of the way from one end of the cells to each of them, m."""
+    graph = _graph(cells).tocsr()
+    start = 0
+    for _ in range(2):
+        start = int(np.argmax(dijkstra(graph, directed=False, indices=start)))
+    return np.asarray(dijkstra(graph, directed=False, indices=start))
+
+
+def _strung(cells: Float, way: Float) -> Float:
+    """Mean of the cells of every 5 m of the way; the fronts of the first and last ones are skew."""
+    count = max(2, int(way.max() / (2 * _STEP)))
+    piece = np.minimum((way / way.max() * count).astype(int), count - 1)
+    number = np.bincount(piece, minlength=count)
+    mean = np.column_stack([np.bincount(piece, cells[:, k], minlength=count) / number for k in range(2)])
+    mean = mean[1:-1] if count > 4 else mean
+    step = np.diff(mean, axis=0)
+    unit = step / np.hypot(*step.T)[:, None]
+    ends = [_end(cells, mean[0], -unit[0]), _end(cells, mean[-1], unit[-1])]
+    return np.vstack([ends[0], mean, ends[1]])
+
+
+def _end(cells: Float, at: Float, unit: Float) -> Float:
+    """Where the cells end, straight on from a place."""
+    near = cells - at
+    near = near[np.hypot(*near.T) < 6 * _STEP]
+    return np.asarray(at + max(float((near @ unit).max()), 0.5) * unit)
+
+
+def _seen(local: Float) -> Float:
+    """Both ends of a short piece: along the direction in which its points fill the fewest cells of the picture."""
+    sample = local[:: max(1, len(local) // _SAMPLE)]
+    sample = sample - sample.mean(axis=0)
+    best, step = 0.0, np.pi / 90
+    angles = np.arange(0.0, np.pi, step)
+    for _ in range(3):
+        filled = [_filled(sample, angle) for angle in angles.tolist()]
+        best = float(angles[int(np.argmin(filled))])
+        angles, step = best + step * np.linspace(-1.0, 1.0, 11), step / 5
+    unit = np.array([np.cos(best), np.sin(best)])
+    ahead = local[:, :2] @ unit
+    middle = np.median(local[:, :2], axis=0)
+    middle = middle - (middle @ unit) * unit
+    low, high = float(ahead.min()), float(ahead.max())
+    if high - low < 1.0:
+        low, high = 0.5 * (low + high) - 0.5, 0.5 * (low + high) + 0.5
+    return np.vstack([middle + low * unit, middle + high * unit])
+
+
+def _filled(sample: Float, angle: float) -> int:
+    """How many cells of 0.2 m the points fill, seen in a direction of the plan."""
+    across = sample[:, 0] * np.sin(angle) - sample[:, 1] * np.cos(angle)
+    column, row = np.floor(across / 0.2).astype(np.int64), np.floor(sample[:, 2] / 0.2).astype(np.int64)
+    return len(np.unique(column * 1_000_003 + row))
+
+
+def _centred(vertices: Float, plan: Float) -> Float:
+    """The line again, with vertices every 5 m, in the middle between the walls, and smooth."""
+    from tunneldb.ground.line import Line
+
+    step = np.hypot(*np.diff(vertices, axis=0).T)
+    line = Line.of(vertices, np.concatenate([[0.0], np.cumsum(step)]))
+    length = float(line.distance[-1])
+    if length < 4 * _STEP:
+        return vertices
+    count = round(length / _STEP)
+    at = np.linspace(0.0, length, count + 1)
+    along, across = line.place(plan)
+    order = np.argsort(along, kind="stable")
+    along, across = along[order], across[order]
+    middle = np.full(len(at), np.nan)
+    low, high = (np.searchsorted(along, at + side * _STEP) for side in (-1.0, 1.0))
+    for k, (i, j) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
+        if j - i >= 10:
+            middle[k] = np.mean(np.quantile(across[i:j], (0.02, 0.98)))
+    return line.point(at, _smooth(middle))
+
+
+def _smooth(offset: Float) -> Float:
+    """Smooth offsets at even distances, those of niches and gaps after their neighbours (Whittaker, 1923)."""
+    weight = np.isfinite(offset).astype(np.float64)
+    value = np.where(weight > 0, offset, 0.0)
+    count = len(offset)
+    if count < 4 or weight.sum() < 4:
+        return np.zeros(count)
+    second = np.diff(np.eye(count), n=2, axis=0)
+    bend = 10.0 * second.T @ second
+    out = value
+    for _ in range(5):
+        out = solve(np.diag(weight) + bend + 1e-9 * np.eye(count), weight * value, assume_a="pos")
+        away = np.abs(value - out)
+        usual = max(3.0 * 1.4826 * float(np.median(away[np.isfinite(offset)])), 0.02)
+        weight = np.where(np.isfinite(offset), 1.0 / (1.0 + (away / usual) ** 2), 0.0)
+    return np.asarray(out)
