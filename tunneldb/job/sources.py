@@ -75,14 +75,26 @@ def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Sour
         raise UserError(f"survey {survey.name} has no scan file in kilometre {km}: tunneldb load {survey.name} FILE")
     found = []
     for name, size, known, ranges in rows:
-        path = Path(name)
-        if not path.is_file():
-            raise UserError(f"{path}: the scan file is gone since it was loaded; put it back or load it from elsewhere")
-        status = path.stat()
-        if status.st_size != size or _checksum(path, status.st_mtime_ns, size) != known:
-            raise UserError(f"{path}: the scan file was changed since it was loaded; load it again")
+        path = unchanged_file(name, size, known)
         found.append(Source(path, [(part.lower, part.upper) for part in ranges], survey.intensity_dimension))
     return found
+
+
+def unchanged_file(name: str, size: int, known: str) -> Path:
+    """Path of a scan file that has the size and the checksum with which it was loaded.
+
+    Raises
+    ------
+    UserError
+        If it is gone or has other contents.
+    """
+    path = Path(name)
+    if not path.is_file():
+        raise UserError(f"{path}: the scan file is gone since it was loaded; put it back or load it from elsewhere")
+    status = path.stat()
+    if status.st_size != size or _checksum(path, status.st_mtime_ns, size) != known:
+        raise UserError(f"{path}: the scan file was changed since it was loaded; load it again")
+    return path
 
 
 @cache
