@@ -79,6 +79,10 @@ class CellCounts:
         centres: Float = np.multiply(self._cells[: self._used] + 0.5, self.edge, dtype=np.float64)
         return centres
 
+    def find(self, xyz: Float) -> Int32:
+        """Number of the cell of each point (n, 3), (n,); -1 where none was ever counted."""
+        return _find(xyz, 1.0 / self.edge, self._cells, self._table)
+
     def remove(self, numbers: Int32) -> None:
         """Take points out of the count of their cells (n,)."""
         np.subtract.at(self._counts, numbers, 1)
@@ -329,6 +333,24 @@ def _count(
         counts[last] += 1
         numbers[i] = last
     return xyz.shape[0], used
+
+
+@njit(cache=True, nogil=True)
+def _find(xyz: Float, scale: float, cells: Int64, table: Int32) -> Int32:  # pragma: no cover - compiled
+    mask = table.shape[0] - 1
+    numbers = np.empty(xyz.shape[0], np.int32)
+    for i in range(xyz.shape[0]):
+        ix = math.floor(xyz[i, 0] * scale)
+        iy = math.floor(xyz[i, 1] * scale)
+        iz = math.floor(xyz[i, 2] * scale)
+        slot = ((ix * 73856093) ^ (iy * 19349663) ^ (iz * 83492791)) & mask
+        while True:
+            k = table[slot]
+            if k < 0 or (cells[k, 0] == ix and cells[k, 1] == iy and cells[k, 2] == iz):
+                break
+            slot = (slot + 1) & mask
+        numbers[i] = k
+    return numbers
 
 
 @njit(cache=True, nogil=True)

@@ -1,0 +1,225 @@
+"""Fitting a sphere to points, and how far it is one (Li et al., 2023, eq. 8 and 14-16).
+
+The centre comes from a fit whose radius is held at the nominal one. A free radius draws the centre along the line of sight:
+on half a sphere at 3 mm of range noise, it is two to three times as far off, the more the smaller the cap that is seen.
+The free radius serves to tell a target from a ball of another size.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+Float = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+GRAZING = 0.25
+"""Cosine of incidence (75.5°) below which a point isn't used where the scanner's place is known: at the limb of a sphere
+a beam measures a range between that of the sphere and that of what is behind it."""
+
+SLANT = 0.6
+"""The distance of a point from the sphere scatters by the noise of the range × the cosine of incidence, so points seen
+slantingly weigh more; no more than at this cosine, since beyond the sphere's curvature over the noise makes it untrue."""
+
+BAND = 3.0  # standard deviations from the sphere within which points are on it
+LEAST_SPREAD = 0.0005  # m; files round to as much
+
+BANDS, SECTORS = 8, 6
+"""Coverage is counted on cells of equal area: bands across the direction to the scanner, and sectors around it."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A sphere of the nominal radius through points.
+
+    Attributes
+    ----------
+    centre : (3,) float64 array
+        m.
+    covariance : (3, 3) float64 array
+        Of the centre, m².
+    radius, radius_sigma : float
+        Of the best sphere of any radius, and its standard deviation, m.
+    rms : float
+        Root mean square of the distances of the points from the sphere of the nominal radius, m.
+    on : (n,) bool array
+        Points that lie on the sphere, grazing ones included.
+    used : (n,) bool array
+        Those that it was fitted to.
+    """
+
+    centre: Float
+    covariance: Float
+    radius: float
+    radius_sigma: float
+    rms: float
+    on: Bool
+    used: Bool
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the centre in space, m: root of the sum of its variances along three axes."""
+        return math.sqrt(float(np.trace(self.covariance)))
+
+
+def fit_sphere(points: Float, eyes: Float, start: Float, radius: float, widest: float) -> Fit | None:
+    """Fit a sphere of known radius.
+
+    Points within three standard deviations of the sphere are on it; the standard deviation is that of the points found so,
+    from their median (so what else is near does not count), and the two are brought to agree by turns.
+
+    Parameters
+    ----------
+    points, eyes : (n, 3) float64 arrays
+        What is near the sphere, and where the scanner stood for each, m; NaN where that is not known.
+    start : (3,) float64 array
+        Where its centre is, to a fifth of the radius, m.
+    radius : float
+        m.
+    widest : float
+        Points farther from the sphere are never on it, m.
+
+    Returns
+    -------
+    Fit or None
+        None if fewer than 6 points are on it, or the fit leads away from the start by a radius.
+
+    Notes
+    -----
+    scipy's least squares with its soft L1 loss; residuals are distances from the sphere in units of their standard deviation.
+    """
+    centre, band = start, widest
+    for _ in range(6):
+        before = centre
+        distance, cosine = _seen(points, eyes, centre, radius)
+        used = (np.abs(distance) <= band) & ~(cosine < GRAZING)
+        if used.sum() < 6:
+            return None
+        spread = max(1.4826 * float(np.median(np.abs(distance[used]))), LEAST_SPREAD)
+        scale = spread * np.clip(cosine[used], SLANT, 1.0)
+        scale[np.isnan(scale)] = spread
+        centre, _ = _solve(points[used], scale, centre, radius, free=False)
+        if not np.linalg.norm(centre - start) < radius:
+            return None
+        narrower = min(widest, BAND * spread)
+        if np.linalg.norm(centre - before) < 1e-5 and abs(narrower - band) < 1e-5:
+            break
+        band = narrower
+    distance, cosine = _seen(points, eyes, centre, radius)
+    on = np.abs(distance) <= band
+    residual = distance[used]
+    _, covariance = _solve(points[used], scale, centre, radius, free=False)
+    solution, wider = _solve(points[used], scale, np.append(centre, radius), radius, free=True)
+    radius_sigma = math.sqrt(wider[3, 3]) if wider[3, 3] > 0.0 else math.inf  # a plane has no radius
+    rms = math.sqrt(float(residual @ residual) / len(residual))
+    return Fit(centre, covariance, float(solution[3]), radius_sigma, rms, on, used)
+
+
+def _seen(points: Float, eyes: Float, centre: Float, radius: float) -> tuple[Float, Float]:
+    """Distance of each point from the sphere, outwards positive, and cosine of incidence there (NaN without an eye)."""
+    out = points - centre
+    far = np.maximum(np.linalg.norm(out, axis=1), 1e-9)
+    sight = eyes - points
+    length = np.linalg.norm(sight, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cosine = np.einsum("ij,ij->i", out, sight) / (far * length)
+    return far - radius, cosine
+
+
+def _solve(points: Float, scale: Float, start: Float, radius: float, free: bool) -> tuple[Float, Float]:
+    """Best centre (and radius) and its covariance; ``scale`` is the standard deviation of each point's distance."""
+    middle = points.mean(axis=0)
+    near = points - middle
+    begin = np.array(start, float)
+    begin[:3] -= middle
+
+    def out_of(x: Float) -> tuple[Float, Float]:
+        out = near - x[:3]
+        return out, np.linalg.norm(out, axis=1)
+
+    def residuals(x: Float) -> Float:
+        return (out_of(x)[1] - (x[3] if free else radius)) / scale
+
+    def slopes(x: Float) -> Float:
+        out, far = out_of(x)
+        slope = -out / (far * scale)[:, None]
+        return np.column_stack([slope, -1.0 / scale]) if free else slope
+
+    result = least_squares(residuals, begin, slopes, method="trf", loss="soft_l1", f_scale=1.5, xtol=1e-10)
+    # Variance of robust estimates (Huber, 1981, section 7.6): the influence of each residual, and how fast it changes.
+    r = residuals(result.x)
+    jacobian = slopes(result.x)
+    bend = 1.0 + (r / 1.5) ** 2
+    influence, rate = r / np.sqrt(bend), bend**-1.5
+    inverse = np.linalg.pinv(jacobian.T @ (jacobian * rate[:, None]))
+    freedom = max(len(r) - len(begin), 1)
+    # As if residuals were alike in all directions: their own size in each would say less of it than of chance.
+    inner = (jacobian.T @ jacobian) * float(influence @ influence) / freedom
+    solution = result.x.copy()
+    solution[:3] += middle
+    return solution, inverse @ inner @ inverse
+
+
+def coverage(points: Float, centre: Float, towards: Float) -> float:
+    """Share of a sphere's surface that is seen: of 48 cells of equal area, those that hold a point; half for a hemisphere.
+
+    Parameters
+    ----------
+    points : (n, 3) float64 array
+        Points on the sphere, m.
+    centre : (3,) float64 array
+        m.
+    towards : (3,) float64 array
+        Direction that the cells are laid out by, to the scanner: 8 bands of equal height across it, so that the hemisphere
+        that faces it is 4 bands, each cut into 6 sectors of 60°.
+    """
+    return float(cells_of(points, centre, towards)[1].mean())
+
+
+def cells_of(points: Float, centre: Float, towards: Float) -> tuple[Int64, Bool]:
+    """Cell of each point (n,), and whether each of the cells (48,) holds one; as `coverage` says."""
+    axis = towards / np.linalg.norm(towards)
+    side = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
+    side /= np.linalg.norm(side)
+    other = np.cross(axis, side)
+    out = points - centre
+    out = out / np.maximum(np.linalg.norm(out, axis=1), 1e-12)[:, None]
+    band = np.clip(np.floor((1.0 - out @ axis) * BANDS / 2.0), 0, BANDS - 1)
+    sector = np.clip(np.floor((np.arctan2(out @ other, out @ side) / (2.0 * np.pi) + 0.5) * SECTORS), 0, SECTORS - 1)
+    cell = (band * SECTORS + sector).astype(np.int64)
+    held = np.zeros(BANDS * SECTORS, np.bool_)
+    held[cell] = True
+    return cell, held
+
+
+def distance_error(centre: Float, truth: Float) -> float:
+    """E_distance (eq. 14): distance of a centre from the true one, m."""
+    return float(np.linalg.norm(np.asarray(centre) - np.asarray(truth)))
+
+
+def fit_ratio(distance: float, radius: float, true_radius: float) -> float:
+    """R_fit (eq. 15 and 16): share of the true sphere's volume that the fitted one has in common with it, 0 to 1.
+
+    Parameters
+    ----------
+    distance : float
+        Of the two centres, m.
+    radius, true_radius : float
+        m.
+    """
+    smaller, larger = sorted((radius, true_radius))
+    whole = 4.0 / 3.0 * math.pi * true_radius**3
+    if distance >= smaller + larger:
+        return 0.0
+    if distance <= larger - smaller:  # one lies within the other: eq. 16 has no angle then
+        return 4.0 / 3.0 * math.pi * smaller**3 / whole
+    alpha = (radius**2 + distance**2 - true_radius**2) / (2.0 * radius * distance)
+    beta = (true_radius**2 + distance**2 - radius**2) / (2.0 * true_radius * distance)
+    h1, h2 = radius * (1.0 - alpha), true_radius * (1.0 - beta)
+    common = math.pi / 3.0 * ((3.0 * radius - h1) * h1**2 + (3.0 * true_radius - h2) * h2**2)
+    return common / whole
