@@ -130,3 +130,52 @@ def copy_binary(
                 copy.write(chunk)
             copy.write(_TRAILER)
         return cursor.rowcount
+
+
+def pack_row(fields: Sequence[bytes | None]) -> bytes:
+    """Pack one row of binary COPY, of fields as they are sent; None is NULL. For rows whose arrays differ in length."""
+    parts = [struct.pack(">h", len(fields))]
+    for value in fields:
+        parts.append(struct.pack(">i", -1 if value is None else len(value)))
+        if value is not None:
+            parts.append(value)
+    return b"".join(parts)
+
+
+def pack_value(value: float | int | None, kind: str) -> bytes | None:
+    """One number as it is sent: ``kind`` is that of `struct`, ``h``, ``i``, ``q`` (int2, int4, int8) or ``d`` (float8)."""
+    return None if value is None else struct.pack(f">{kind}", value)
+
+
+def pack_array(values: NDArray[np.float64] | NDArray[np.int32]) -> bytes:
+    """One array of float8 or int4 as it is sent.
+
+    Format: ``array_send`` of PostgreSQL: dimensions, whether there are NULLs, type, length, lower bound, elements.
+
+    Parameters
+    ----------
+    values : (n,) float64 or int32 array
+
+    Raises
+    ------
+    TypeError
+        For an array of another type.
+    """
+    if values.dtype not in _ARRAYS:
+        raise TypeError(f"arrays of {values.dtype} are not sent")
+    kind, oid = _ARRAYS[values.dtype]
+    if len(values) == 0:
+        return struct.pack(">iii", 0, 0, oid)
+    elements = np.empty(len(values), [("length", ">i4"), ("value", kind)])
+    elements["length"], elements["value"] = values.dtype.itemsize, values
+    return struct.pack(">iiiii", 1, 0, oid, len(values), 1) + elements.tobytes()
+
+
+def unpack_array(sent: bytes, dtype: type[np.float64] | type[np.int32]) -> NDArray[Any]:
+    """Array (n,) of what ``array_send`` or ``float8[]``, ``int4[]`` without NULLs gives."""
+    kind, _ = _ARRAYS[np.dtype(dtype)]
+    elements = np.frombuffer(sent, [("length", ">i4"), ("value", kind)], offset=20) if len(sent) > 12 else None
+    return np.empty(0, dtype) if elements is None else elements["value"].astype(dtype)
+
+
+_ARRAYS = {np.dtype(np.float64): (">f8", 701), np.dtype(np.int32): (">i4", 23)}

@@ -1,0 +1,36 @@
+-- Stage ground: the class of each point. The models themselves are made outside the database (tunneldb.ground).
+
+-- Gives the points of a kilometre their classes: the partition is rewritten, its rows in the order that they have, and swapped
+-- in. An UPDATE of as many rows takes four times as long and leaves the old ones behind.
+--
+-- classes: one byte a row, in the order in which a scan of the partition by itself comes upon them.
+CREATE OR REPLACE FUNCTION tunnel_api.class_write(survey_id int, km int, classes bytea)
+RETURNS bigint
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
+SET synchronize_seqscans = off  -- from the first row to the last one
+SET max_parallel_workers_per_gather = 0
+SET plan_cache_mode = force_custom_plan
+AS $$
+DECLARE
+    name constant text := tunnel_api.partition_name(survey_id, km);
+    written bigint;
+BEGIN
+    EXECUTE format('DROP TABLE IF EXISTS tunnel.%I', name || '_new');
+    EXECUTE format('CREATE TABLE tunnel.%I (LIKE tunnel.point, CONSTRAINT part CHECK (survey_id = %s AND km = %s))',
+        name || '_new', survey_id, km);
+    EXECUTE format($query$
+        INSERT INTO tunnel.%I (survey_id, km, chainage, gps_time, geom, segment, scan_id, file_id, intensity, classification, "class")
+        SELECT p.survey_id, p.km, p.chainage, p.gps_time, p.geom, p.segment, p.scan_id, p.file_id, p.intensity, p.classification,
+            get_byte($1, (row_number() OVER () - 1)::int)
+        FROM tunnel.%I p
+    $query$, name || '_new', name) USING classes;
+    GET DIAGNOSTICS written = ROW_COUNT;
+    IF written <> length(classes) THEN
+        RAISE EXCEPTION 'kilometre % holds % points, not %', km, written, length(classes);
+    END IF;
+    PERFORM tunnel_api.partition_swap(survey_id, km);
+    RETURN written;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.class_write(int, int, bytea) IS
+'Classes of the points of one kilometre: rewrites their partition with one byte of classes a row, in the rows'' order, and swaps it in; returns the number of points.';
