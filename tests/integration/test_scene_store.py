@@ -94,7 +94,7 @@ def test_clusters_belong_to_the_kilometre_of_their_middle(conn: psycopg.Connecti
     rng = np.random.default_rng(1)
 
     def cluster(along: float, height: float) -> Cluster:
-        xyz = rng.uniform(-0.5, 0.5, (200, 3)) + [500_000.0, 4_640_000.0 + along, 600.0]
+        xyz = rng.uniform(-0.5, 0.5, (200, 3)) + np.array([500_000.0, 4_640_000.0 + along, 600.0])
         return Cluster.of(Klass.OBJECT, xyz, along + xyz[:, 0] - 500_000.0, np.full(200, height))
 
     given = [cluster(12_000.3, 1.0), cluster(12_700.0, np.nan), cluster(12_999.9, 2.0)]

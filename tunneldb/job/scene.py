@@ -181,9 +181,12 @@ def load_clusters(conn: psycopg.Connection[Any], survey: Survey, first: float, s
         binary=True,
     ).fetchall()
     return [
-        Cluster(klass, unpack_array(cells, np.int32).reshape(-1, 3), points, *extent, shapely.get_coordinates(_hull(wkb))[:-1])
-        for klass, cells, points, *extent, wkb in rows
-    ]
+        Cluster(
+            klass, unpack_array(cells, np.int32).reshape(-1, 3), points, along_from, along_to, height_from, height_to,
+            shapely.get_coordinates(shapely.from_wkb(hull))[:-1],
+        )
+        for klass, cells, points, along_from, along_to, height_from, height_to, hull in rows
+    ]  # fmt: skip
 
 
 def load_scene(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_to: int) -> Scene:
@@ -224,7 +227,3 @@ def _forget(conn: psycopg.Connection[Any], survey: Survey, km: int, table: str) 
 
 def _ewkb(geometry: shapely.Geometry, survey: Survey) -> bytes:
     return bytes(shapely.to_wkb(shapely.set_srid(geometry, survey.srid), include_srid=True))
-
-
-def _hull(wkb: bytes) -> shapely.Polygon:
-    return shapely.from_wkb(wkb)
