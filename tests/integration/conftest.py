@@ -9,11 +9,11 @@ import shapely
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from shapely.geometry import Polygon
+from things import CORNER, HALF_FLOOR, SPHERES, THINGS, beside, boxed, relief
 
 from tunneldb.database import install, open_connection
 from tunneldb.geometry.frame import frame_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
-from tunneldb.ground.classes import Klass
 from tunneldb.leak.geometries import shapes
 from tunneldb.leak.image import BLOCK, Grid
 from tunneldb.leak.raster import KINDS, Raster, encode
@@ -108,7 +108,7 @@ def _files_and_runs(conn: psycopg.Connection, survey_id: int) -> None:
         "(%s, 'demo.laz', '/scans/demo.laz', repeat('0', 64), 1000, 100, 1, 2, 37, 60, 12300.1, 12499.9, '2024-05-05 08:00Z')",
         (survey_id,),
     )
-    for hour, stage in enumerate(["load", "axis", "segments", "sections", "detect"], start=8):
+    for hour, stage in enumerate(["load", "axis", "segments", "sections", "ground", "detect"], start=8):
         conn.execute(
             "INSERT INTO tunnel.run (survey_id, km, stage, started_at, finished_at, outcome) "
             "VALUES (%s, %s, %s, make_timestamptz(2024, 5, 5, %s, 0, 0, 'UTC'), "
@@ -197,7 +197,7 @@ def _leaks(conn: psycopg.Connection, survey_id: int, surface: Surface) -> list[P
 
 
 def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines: list[Polygon]) -> None:
-    """Lining in bands of shade, darker where it leaks; the floor has no pixels."""
+    """Lining in bands of shade, darker where it leaks; the floor, with what stands on it, has an offset only."""
     rng = np.random.default_rng(2)
     grid = Grid.covering(KM, PIXEL, *surface.arc_range(12402.5))
     for block in range(int(12300 / BLOCK), int(12500 / BLOCK)):
@@ -207,51 +207,50 @@ def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines
         for outline in outlines:
             wet |= shapely.contains_xy(outline, x, y)
         shade = -12 + 0.5 * rng.standard_normal(x.shape) + 0.3 * np.sin(x / 1.2) - 3.5 * wet
-        offset = 0.004 * rng.standard_normal(x.shape) + 0.03 * np.sin(y) * np.cos(x / 15)
+        offset = 0.004 * rng.standard_normal(x.shape) + np.where(np.abs(y) < CORNER, relief(x, y), 0.0)
+        for thing in THINGS:
+            _lay(offset, grid, columns, surface, thing)
         values = {"corrected": shade, "raw": shade - 0.08 * (x % 20 - 10) ** 2 / 2, "offset": offset}
         for kind in KINDS:
-            held = np.where(np.abs(y) < 9.0, values[kind], np.nan).astype(np.float32)
+            held = np.where((np.abs(y) < 9.0) | (kind == "offset"), values[kind], np.nan).astype(np.float32)
             conn.execute(
                 "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %s)",
                 (survey_id, KM, kind, block, encode(Raster(held, grid.transform(columns.start)), kind)),
             )
 
 
-FLOOR, HALF_FLOOR = 2.5, float(np.sqrt(4.0**2 - 2.5**2))
-"""Depth of the floor below the axis, and half its width, m."""
-
-THINGS = (
-    # class, chainage, m right of the axis, length, width, height from, to
-    (Klass.OBJECT, 12352.0, 1.2, 0.4, 0.6, 0.0, 1.8),
-    (Klass.OBJECT, 12388.0, -1.5, 2.0, 1.0, 0.0, 1.1),
-    (Klass.RAIL, 12400.0, 0.72, 180.0, 0.1, 0.0, 0.17),
-    (Klass.APPENDAGE, 12450.0, -3.6, 60.0, 0.1, 1.0, 1.1),
-)
-SPHERES = ((12313.0, -2.0, 1.4), (12344.0, 2.2, 1.5), (12373.0, -2.4, 1.3), (12406.0, 2.0, 1.6), (12441.0, -2.2, 1.5))
-"""Chainage, m right of the axis, and height above the floor."""
-
-
-def beside(surface: Surface, chainage: float, across: np.ndarray, height: float) -> np.ndarray:
-    """Points (n, 3) beside the axis, at a height above the floor."""
-    origin, _, right, _ = surface.frames(np.array([chainage]))[0]
-    points = origin + np.asarray(across, dtype=float)[:, None] * right
-    points[:, 2] += height - FLOOR
-    return points
-
-
 def _ground(conn: psycopg.Connection, survey_id: int, surface: Surface) -> None:
     across = np.arange(-31, 32) * 0.1
-    arc = 4.0 * float(np.arccos(-FLOOR / 4.0))
-    for n in range(int(FIRST * SPACING), int(LAST * SPACING)):
+    for n in range(int(FIRST * SPACING), int(LAST * SPACING) + 1):
         line = beside(surface, n, across, 0.0)
         conn.execute(
             "INSERT INTO tunnel.ground (survey_id, n, km, across, height, gamma, foot, lean, arc_left, arc_right, geom) "
             "VALUES (%s, %s, %s, %s, %s, 0.05, %s, '{-0.8,0.8}', %s, %s, ST_GeomFromWKB(%s, %s))",
             (
-                survey_id, n, KM, float(across[0]), line[:, 2].tolist(), [-HALF_FLOOR, HALF_FLOOR], -arc, arc,
+                survey_id, n, KM, float(across[0]), line[:, 2].tolist(), [-HALF_FLOOR, HALF_FLOOR], -CORNER, CORNER,
                 shapely.to_wkb(shapely.LineString(line)), SRID,
             ),
         )  # fmt: skip
+
+    columns, rows = np.arange(int(FIRST * SPACING * 4), int(LAST * SPACING * 4)), np.arange(-36, 36)
+    middles = np.meshgrid((columns + 0.5) / 4, (rows + 0.5) / 4)
+    conn.execute(
+        "INSERT INTO tunnel.lining (survey_id, km, cell, box, \"offset\", spread) VALUES (%s, %s, 0.25, %s, %s, %s)",
+        (
+            survey_id, KM, [int(columns[0]), -36, len(columns), 72], relief(*middles).astype("<f4").tobytes(),
+            np.full((72, len(columns)), 0.004, "<f4").tobytes(),
+        ),
+    )  # fmt: skip
+
+
+def _lay(offset: np.ndarray, grid: Grid, columns: slice, surface: Surface, thing: tuple[float, ...]) -> None:
+    """Let the columns of an offset image show a thing where it lies within half a metre of the surface."""
+    if thing[1] + thing[3] / 2 < grid.chainages(columns)[0] or thing[1] - thing[3] / 2 > grid.chainages(columns)[-1]:
+        return
+    place = surface.unroll(boxed(surface, thing, 0.05))
+    row, column = grid.place(place.chainage, place.arc)
+    held = (np.abs(place.offset) < 0.5) & (column >= columns.start) & (column < columns.stop)
+    np.maximum.at(offset, (row[held], column[held] - columns.start), place.offset[held])
 
 
 def _things(conn: psycopg.Connection, survey_id: int, surface: Surface) -> None:
@@ -260,15 +259,13 @@ def _things(conn: psycopg.Connection, survey_id: int, surface: Surface) -> None:
         along = np.linspace(chainage - length / 2, chainage + length / 2, max(2, round(length)))
         left, right = (np.array([beside(surface, c, [side], 0.0)[0] for c in along]) for side in sides)
         hull = Polygon(np.concatenate([left, right[::-1]])[:, :2])
-        filled = np.concatenate(
-            [beside(surface, c, np.arange(*sides, 0.1), h) for c in along for h in np.arange(low, high, 0.1)]
-        )
+        filled = np.unique(np.floor(boxed(surface, (klass, chainage, across, length, width, low, high), 0.05) / 0.1), axis=0)
         conn.execute(
             "INSERT INTO tunnel.cluster (survey_id, km, class, chainage_from, chainage_to, height_from, height_to, points, "
             "cell, cells, geom) VALUES (%s, %s, %s, %s, %s, %s, %s, 250, 0.1, %s, ST_GeomFromWKB(%s, %s))",
             (
                 survey_id, KM, int(klass), chainage - length / 2, chainage + length / 2, low, high,
-                np.floor(filled / 0.1).astype(int).tolist(), shapely.to_wkb(hull), SRID,
+                filled.astype(int).ravel().tolist(), shapely.to_wkb(hull), SRID,
             ),
         )  # fmt: skip
     for number, (chainage, across, height) in enumerate(SPHERES, start=1):

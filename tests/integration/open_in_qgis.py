@@ -1,7 +1,7 @@
 """Open a project with real QGIS and say what it sees, as JSON; runs under the Python that has PyQGIS.
 
 Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK [LAYER]
-       | draw KIND | add VIEW
+       | draw KIND | add VIEW | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from qgis.core import (
     QgsMapLayer,
     QgsMapRendererParallelJob,
     QgsMapSettings,
+    QgsPalettedRasterRenderer,
     QgsPointXY,
     QgsProject,
     QgsReadWriteContext,
@@ -64,6 +65,8 @@ def describe(project: QgsProject, canvas: QgsMapCanvas) -> dict[str, Any]:
                 layer.exportNamedStyle(document, QgsReadWriteContext(), QgsMapLayer.Symbology3D)
                 data = document.documentElement().firstChildElement("renderer-3d").elementsByTagName("data").at(0).toElement()
                 seen |= {"clamping": data.attribute("alt-clamping"), "binding": data.attribute("alt-binding")}
+        elif isinstance(layer.renderer(), QgsPalettedRasterRenderer):
+            seen["legend"] = [[entry.value, entry.label, entry.color.name()] for entry in layer.renderer().classes()]
         layers[layer.id().removeprefix(PREFIX)] = seen
     collection = project.mapThemeCollection()
     return {
@@ -86,7 +89,18 @@ def render(project: QgsProject, theme: str, path: str) -> dict[str, Any]:
     settings = QgsMapSettings()
     settings.setLayers(project.mapThemeCollection().mapThemeVisibleLayers(theme))
     settings.setDestinationCrs(bookmark.extent().crs())
-    settings.setExtent(QgsRectangle(bookmark.extent()))
+    return _paint(settings, QgsRectangle(bookmark.extent()), path)
+
+
+def draw_layer(project: QgsProject, layer_id: str, box: str, path: str) -> dict[str, Any]:
+    """Draw a rectangle of one layer of the unrolled plane and report the errors."""
+    settings = QgsMapSettings()
+    settings.setLayers([project.mapLayer(PREFIX + layer_id)])
+    return _paint(settings, QgsRectangle(*map(float, box.split(","))), path)
+
+
+def _paint(settings: QgsMapSettings, extent: QgsRectangle, path: str) -> dict[str, Any]:
+    settings.setExtent(extent)
     settings.setOutputSize(QSize(WIDTH, HEIGHT))
     settings.setBackgroundColor(QColor("white"))
     settings.setFlag(QgsMapSettings.Antialiasing)

@@ -22,6 +22,8 @@ from psycopg.conninfo import make_conninfo
 from rasterio.errors import NotGeoreferencedWarning
 
 from tunneldb.cli.main import main
+from tunneldb.export.palette import COLOURS, hexadecimal
+from tunneldb.ground.classes import Klass
 
 SCRIPT = Path(__file__).with_name("open_in_qgis.py")
 PYTHON = "/usr/bin/python3"
@@ -38,6 +40,7 @@ ON_MAP = {
     "ground": "LineStringZ",
     "leak_3d": "PolygonZ",
 }
+IMAGES = ("raw", "corrected", "offset", "class")
 UNROLLED = {"leak_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon"}
 
 
@@ -121,7 +124,7 @@ def qgs(path: Path) -> str:
 def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str, Any]) -> None:
     layers = seen["layers"]
     assert {name for name, layer in layers.items() if not layer["valid"]} == set()
-    assert set(layers) == {*ON_MAP, *UNROLLED, *(f"demo-2024-km012-{kind}" for kind in ("raw", "corrected", "offset"))}
+    assert set(layers) == {*ON_MAP, *UNROLLED, *(f"demo-2024-km012-{kind}" for kind in IMAGES)}
     assert seen["crs"] == "EPSG:25830"
     for name, kind in (ON_MAP | UNROLLED).items():
         layer = layers[name]
@@ -129,7 +132,7 @@ def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str
         assert (layer["wkb"], layer["features"]) == (kind, count), name
         assert layer["crs"] == ("EPSG:25830" if name in ON_MAP else ""), name
         assert layer["error"] == "", name
-    for kind in ("raw", "corrected", "offset"):
+    for kind in IMAGES:
         assert layers[f"demo-2024-km012-{kind}"]["crs"] == ""
 
 
@@ -189,6 +192,25 @@ def test_themes_are_drawn(shared: Path, tmp_path: Path, theme: str) -> None:
     if theme == "Unrolled":
         rows = np.flatnonzero(inked.mean(axis=1) > 0.9)
         assert rows[-1] - rows[0] > 0.4 * inked.shape[0], "the lining"
+
+
+def test_classes_are_named_and_drawn_in_their_colours(shared: Path, seen: dict[str, Any], tmp_path: Path) -> None:
+    legend = {klass: (klass.name.lower(), hexadecimal(colour)) for klass, colour in COLOURS.items()}
+    assert seen["layers"]["demo-2024-km012-class"]["legend"] == [[int(k), name, colour] for k, (name, colour) in legend.items()]
+    picture = tmp_path / "class.png"
+    # 160 m along the tunnel by 64 m across in 1600 × 640 pixels: one of the image is one of the picture
+    assert act(shared, "draw_layer", "demo-2024-km012-class", "12320,-32,12480,32", str(picture))["saved"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        image = rasterio.open(picture)
+    with image:
+        pixels = image.read([1, 2, 3])
+    shares = {klass: (pixels == np.array(colour)[:, None, None]).all(axis=0).mean() for klass, colour in COLOURS.items()}
+    # the wall is 18.0 m round and the floor 6.2 m wide, of 64 m
+    assert shares[Klass.LINING] == pytest.approx(17.96 / 64, rel=0.02)
+    assert shares[Klass.GROUND] == pytest.approx(6.24 / 64, rel=0.05)
+    for klass in (Klass.OBJECT, Klass.RAIL, Klass.APPENDAGE):
+        assert shares[klass] > 0, klass
 
 
 def test_vertex_moved_in_qgis_is_saved_with_its_stamp(conn: psycopg.Connection, project: Path) -> None:

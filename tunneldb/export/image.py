@@ -1,40 +1,23 @@
-"""Images of the unrolled lining: Cloud Optimized GeoTIFFs and previews, three a kilometre."""
+"""Images of the unrolled lining: Cloud Optimized GeoTIFFs and previews, of each kind one a kilometre."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psycopg
-import rasterio.shutil
 import shapely
-from affine import Affine
-from rasterio.windows import Window
+from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from tunneldb.database import Survey
 from tunneldb.export import preview
 from tunneldb.export.atomic import replacing
-from tunneldb.leak.raster import KINDS, UNIT, Raster, decode, write_tiff
-
-
-@dataclass(frozen=True)
-class Extent:
-    """The pixels that the blocks of one image cover together.
-
-    Attributes
-    ----------
-    transform : Affine
-        From (column, row) to (chainage, arc), m.
-    rows, columns : int
-        Size.
-    """
-
-    transform: Affine
-    rows: int
-    columns: int
+from tunneldb.export.classes import ClassPainter
+from tunneldb.export.cog import Extent, write_cog
+from tunneldb.leak.raster import KINDS, Raster, decode
 
 
 def image_kilometres(conn: psycopg.Connection, survey: Survey) -> list[int]:
@@ -46,8 +29,9 @@ def image_kilometres(conn: psycopg.Connection, survey: Survey) -> list[int]:
 def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> list[Path]:
     """Write the images of a kilometre: ``SURVEY-kmNNN-KIND.tif`` and ``.png`` for each kind that it has.
 
-    The GeoTIFFs hold dB or m as single-precision numbers, NaN where no point fell; x is the chainage and y
-    the arc, m. Each file appears whole.
+    The GeoTIFFs hold dB or m as single-precision numbers, NaN where no point fell, or the code of a class, 0 where no point
+    fell; x is the chainage and y the arc, m. Each file appears whole. Classes are there when stage ground has run: they are
+    computed from the offset image and what that stage has stored.
 
     Returns
     -------
@@ -56,25 +40,87 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
     """
     written = []
     leaks = _leaks(conn, survey, km)
-    for kind in KINDS:
-        blocks = _blocks(conn, survey, km, kind)
+    for kind in (*KINDS, "class"):
+        stored = "offset" if kind == "class" else kind
+        blocks = _blocks(conn, survey, km, stored)
         if not blocks:
             continue
+        painter = ClassPainter.load(conn, survey, km) if kind == "class" else None
+        if kind == "class" and painter is None:
+            continue
+        first = _read(conn, survey, km, stored, blocks[0])
+        rows, width = first.values.shape
+        extent = Extent(first.transform, rows, width * (blocks[-1] - blocks[0] + 1))
         stem = f"{survey.name}-km{km:03d}-{kind}"
-        extent = _extent(conn, survey, km, kind, blocks)
         tiff, png = folder / f"{stem}.tif", folder / f"{stem}.png"
+        sheet = _Sheet(extent.transform.a)
         with replacing(tiff) as temporary:
-            strips = _write_cog(conn, survey, km, kind, blocks, extent, temporary)
-        pixel = extent.transform.a * preview_factor(extent.transform.a)
+            write_cog(temporary, kind, extent, _pixels(conn, survey, km, stored, blocks, painter, sheet))
         title = f"{survey.name}  km {km}  {_TITLES[kind]}"
         with replacing(png) as temporary:
             outlines = leaks if kind == "corrected" else []
-            preview.draw(temporary, title, kind, strips, extent.transform.f, pixel, outlines)
+            preview.draw(temporary, title, kind, list(sheet.strips()), extent.transform.f, sheet.pixel, outlines)
         written += [tiff, png]
     return written
 
 
-_TITLES = {"raw": "raw intensity", "corrected": "corrected intensity", "offset": "offset from the section surface"}
+_TITLES = {
+    "raw": "raw intensity",
+    "corrected": "corrected intensity",
+    "offset": "offset from the section surface",
+    "class": "classes",
+}
+
+
+class _Sheet:
+    """Shrinks the blocks that pass through it to what the preview shows.
+
+    Parameters
+    ----------
+    pixel : float
+        Side of the image's pixels, m.
+    """
+
+    def __init__(self, pixel: float) -> None:
+        self._factor = preview_factor(pixel)
+        self.pixel = pixel * self._factor
+        self._blocks: list[tuple[float, preview.Single]] = []
+
+    def note(self, west: float, pixels: NDArray[Any]) -> None:
+        """Take a block that begins at a chainage, m."""
+        shrink: Callable[[NDArray[Any], int], preview.Single] = (
+            preview.shrink_classes if pixels.dtype == np.uint8 else preview.shrink
+        )
+        self._blocks.append((west, shrink(pixels, self._factor)))
+
+    def strips(self) -> Iterator[preview.Strip]:
+        """Lay the blocks into strips of a hectometre."""
+        width = round(preview.STRIP / self.pixel)
+        by_start: dict[float, preview.Single] = {}
+        for west, values in self._blocks:
+            start = np.floor(west / preview.STRIP + 1e-9) * preview.STRIP
+            strip = by_start.setdefault(start, np.full((values.shape[0], width), np.nan, np.float32))
+            column = round((west - start) / self.pixel)
+            strip[:, column : column + values.shape[1]] = values[:, : width - column]
+        for start in sorted(by_start):
+            yield preview.Strip(float(start), by_start[start])
+
+
+def _pixels(
+    conn: psycopg.Connection,
+    survey: Survey,
+    km: int,
+    kind: str,
+    blocks: Sequence[int],
+    painter: ClassPainter | None,
+    sheet: _Sheet,
+) -> Iterator[tuple[int, NDArray[Any]]]:
+    """First column and pixels of each stored block, or their classes; the sheet takes note of them."""
+    for block in blocks:
+        raster = _read(conn, survey, km, kind, block)
+        pixels: NDArray[Any] = raster.values if painter is None else painter.paint(raster)
+        sheet.note(raster.transform.c, pixels)
+        yield (block - blocks[0]) * pixels.shape[1], pixels
 
 
 def preview_factor(pixel: float) -> int:
@@ -86,7 +132,7 @@ def preview_factor(pixel: float) -> int:
     return factor
 
 
-def _blocks(conn: psycopg.Connection, survey: Survey, km: int, kind: str) -> list[int]:
+def _blocks(conn: psycopg.Connection, survey: Survey, km: int, kind: str) -> Sequence[int]:
     rows = conn.execute(
         "SELECT block FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s ORDER BY block",
         (survey.id, km, kind),
@@ -102,57 +148,6 @@ def _read(conn: psycopg.Connection, survey: Survey, km: int, kind: str, block: i
     ).fetchone()
     assert row is not None
     return decode(row[0])
-
-
-def _extent(conn: psycopg.Connection, survey: Survey, km: int, kind: str, blocks: Sequence[int]) -> Extent:
-    first = _read(conn, survey, km, kind, blocks[0])
-    rows, columns = first.values.shape
-    return Extent(first.transform, rows, columns * (blocks[-1] - blocks[0] + 1))
-
-
-def _write_cog(
-    conn: psycopg.Connection, survey: Survey, km: int, kind: str, blocks: Sequence[int], extent: Extent, path: Path
-) -> list[preview.Strip]:
-    """Write the blocks side by side as a Cloud Optimized GeoTIFF; return the strips of the preview."""
-    plain = path.with_name(f"plain-{path.name}")
-    factor = preview_factor(extent.transform.a)
-    shrunk = []
-    with write_tiff(str(plain), (extent.rows, extent.columns), extent.transform) as image:
-        image.units = (UNIT[kind],)
-        image.set_band_description(1, kind)
-        for block in blocks:
-            raster = _read(conn, survey, km, kind, block)
-            width = raster.values.shape[1]
-            column = (block - blocks[0]) * width
-            image.write(raster.values, 1, window=Window(column, 0, width, extent.rows))
-            shrunk.append((raster.transform.c, preview.shrink(raster.values, factor)))
-        for gap in sorted(set(range(blocks[0], blocks[-1])) - set(blocks)):
-            empty = np.full((extent.rows, width), np.nan, np.float32)
-            image.write(empty, 1, window=Window((gap - blocks[0]) * width, 0, width, extent.rows))
-    rasterio.shutil.copy(
-        str(plain),
-        str(path),
-        driver="COG",
-        compress="DEFLATE",
-        predictor="YES",
-        overview_resampling="AVERAGE",
-        bigtiff="IF_SAFER",
-    )
-    plain.unlink()
-    return list(_strips(shrunk, extent.transform.a * factor))
-
-
-def _strips(blocks: list[tuple[float, preview.Single]], pixel: float) -> Iterator[preview.Strip]:
-    """Lay the blocks' previews into strips of a hectometre."""
-    width = round(preview.STRIP / pixel)
-    by_start: dict[float, preview.Single] = {}
-    for west, values in blocks:
-        start = np.floor(west / preview.STRIP + 1e-9) * preview.STRIP
-        strip = by_start.setdefault(start, np.full((values.shape[0], width), np.nan, np.float32))
-        column = round((west - start) / pixel)
-        strip[:, column : column + values.shape[1]] = values[:, : width - column]
-    for start in sorted(by_start):
-        yield preview.Strip(float(start), by_start[start])
 
 
 def _leaks(conn: psycopg.Connection, survey: Survey, km: int) -> list[Polygon]:

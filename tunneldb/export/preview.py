@@ -16,6 +16,8 @@ from PIL import Image, ImageDraw, ImageFont
 from scipy import ndimage
 from shapely.geometry import Polygon
 
+from tunneldb.export.palette import COLOURS
+
 Single = NDArray[np.float32]
 
 STRIP = 100.0
@@ -63,6 +65,21 @@ def shrink(values: Single, factor: int) -> Single:
     return np.where(count > 0, total / np.maximum(count, 1), np.nan).astype(np.float32)
 
 
+def shrink_classes(values: NDArray[np.uint8], factor: int) -> Single:
+    """Take the commonest class of ``factor`` × ``factor`` pixels, the greater of two; without 0, which becomes NaN."""
+    rows, columns = (-(-n // factor) * factor for n in values.shape)
+    padded = np.zeros((rows, columns), np.uint8)
+    padded[: values.shape[0], : values.shape[1]] = values
+    blocks = padded.reshape(rows // factor, factor, columns // factor, factor)
+    out = np.full((rows // factor, columns // factor), np.nan, np.float32)
+    most = np.ones(out.shape, np.int64)
+    for code in np.flatnonzero(np.bincount(values.ravel(), minlength=256)[1:]) + 1:
+        count = (blocks == code).sum(axis=(1, 3))
+        out[count >= most] = code
+        most = np.maximum(most, count)
+    return out
+
+
 def fill_gaps(values: Single, reach: float) -> Single:
     """Give pixels without a value that of the nearest one within ``reach`` pixels."""
     empty = np.isnan(values)
@@ -85,9 +102,9 @@ def draw(
         File to write.
     title : str
         Heading.
-    kind : {'raw', 'corrected', 'offset'}
+    kind : {'raw', 'corrected', 'offset', 'class'}
         Intensities are drawn in grey between their 2nd and 98th percentile, offsets in blue (outside the
-        surface) to red (inside).
+        surface) to red (inside), classes in their colours.
     strips : sequence of Strip
         In order of chainage.
     top : float
@@ -101,13 +118,17 @@ def draw(
     sheet = Image.new("RGB", (width + _MARGIN + 20, _HEAD + len(strips) * (height + _GAP) + 10), _BACK)
     pen = ImageDraw.Draw(sheet)
     low, high = _span(kind, strips)
-    scale = (
-        f"blue {low:+.2f} m (outside) to red {high:+.2f} m (inside)"
-        if kind == "offset"
-        else f"black {low:.2f} dB to white {high:.2f} dB"
-    )
-    pen.text((_MARGIN, 8), f"{title}:  {scale}", _INK, ImageFont.load_default(18))
-    small = ImageFont.load_default(13)
+    large, small = ImageFont.load_default(18), ImageFont.load_default(13)
+    if kind == "class":
+        pen.text((_MARGIN, 8), f"{title}:", _INK, large)
+        _legend(pen, _MARGIN + int(pen.textlength(f"{title}:  ", large)), strips, large)
+    else:
+        scale = (
+            f"blue {low:+.2f} m (outside) to red {high:+.2f} m (inside)"
+            if kind == "offset"
+            else f"black {low:.2f} dB to white {high:.2f} dB"
+        )
+        pen.text((_MARGIN, 8), f"{title}:  {scale}", _INK, large)
     for number, strip in enumerate(strips):
         y = _HEAD + number * (height + _GAP)
         colours = _colours(kind, fill_gaps(strip.values, FILL / pixel), low, high)
@@ -131,9 +152,21 @@ def _clip(line: list[tuple[float, float]], left: float, right: float) -> list[tu
     return [(min(max(x, left), right), y) for x, y in line]
 
 
+def _legend(
+    pen: ImageDraw.ImageDraw, x: int, strips: Sequence[Strip], font: ImageFont.ImageFont | ImageFont.FreeTypeFont
+) -> None:
+    """Colour and name of each class that is there."""
+    there = np.unique(np.concatenate([s.values[np.isfinite(s.values)] for s in strips]))
+    for klass, colour in COLOURS.items():
+        if klass in there:
+            pen.rectangle([(x, 11), (x + 14, 25)], colour, _INK)
+            pen.text((x + 20, 8), klass.name.lower(), _INK, font)
+            x += 40 + int(pen.textlength(klass.name.lower(), font))
+
+
 def _span(kind: str, strips: Sequence[Strip]) -> tuple[float, float]:
     held = np.concatenate([s.values[np.isfinite(s.values)] for s in strips])
-    if len(held) == 0:
+    if len(held) == 0 or kind == "class":
         return 0.0, 1.0
     if kind == "offset":
         usual = float(np.percentile(np.abs(held), 90))
@@ -145,6 +178,10 @@ def _span(kind: str, strips: Sequence[Strip]) -> tuple[float, float]:
 
 def _colours(kind: str, values: Single, low: float, high: float) -> NDArray[np.uint8]:
     """Colours (rows, columns, 3) of values; places without one in a pale grey."""
+    if kind == "class":
+        table = np.full((256, 3), _EMPTY, np.uint8)
+        table[list(COLOURS)] = list(COLOURS.values())
+        return np.asarray(table[np.nan_to_num(values).astype(np.uint8)])
     with np.errstate(invalid="ignore"):
         share = np.clip((values - low) / (high - low), 0.0, 1.0)[..., None]
     if kind == "offset":

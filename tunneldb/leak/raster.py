@@ -87,25 +87,6 @@ def decode(tiff: bytes) -> Raster:
             return Raster(values, image.transform)
 
 
-def write_tiff(path: str, shape: tuple[int, int], transform: Affine) -> Any:
-    """Open a tiled GeoTIFF of single-precision numbers for writing, NaN for nodata."""
-    return rasterio.open(
-        path,
-        "w",
-        driver="GTiff",
-        height=shape[0],
-        width=shape[1],
-        count=1,
-        dtype="float32",
-        nodata=float("nan"),
-        transform=transform,
-        tiled=True,
-        blockxsize=256,
-        blockysize=256,
-        bigtiff="if_safer",
-    )
-
-
 @njit(cache=True, nogil=True)
 def _whole(values: Single, per_step: float) -> NDArray[np.int16]:  # pragma: no cover - compiled
     steps = np.empty(values.shape, np.int16)

@@ -19,7 +19,7 @@ from tunneldb.export.atomic import replacing
 from tunneldb.export.qgis.crs import crs_element, no_crs
 from tunneldb.export.qgis.extent import Extent, View, first_window, map_extent, unrolled_extents
 from tunneldb.export.qgis.layer import LAYERS, MAP, SPACE, UNROLLED, VectorLayer
-from tunneldb.export.qgis.raster import KINDS, grey_range, image_kind, pipe
+from tunneldb.export.qgis.raster import KINDS, image_kind, pipe
 from tunneldb.export.qgis.source import Source
 from tunneldb.export.qgis.styles import style_elements
 
@@ -131,7 +131,7 @@ def _rasters(images: Sequence[Path], folder: Path) -> list[_Entry]:
     shown = next((kind for kind, paths in of_kind.items() if paths), None)
     for kind, title in KINDS.items():
         paths = of_kind[kind]
-        limits = grey_range(paths) if kind != "offset" else (0.0, 0.0)
+        drawn = pipe(kind, paths)
         for path in paths:
             element = ET.Element("maplayer", type="raster", styleCategories="AllStyleCategories")
             ET.SubElement(element, "id").text = layer_id(path.stem)
@@ -140,7 +140,7 @@ def _rasters(images: Sequence[Path], folder: Path) -> list[_Entry]:
             ET.SubElement(element, "layername").text = path.stem
             ET.SubElement(element, "srs").append(no_crs())
             ET.SubElement(element, "provider").text = "gdal"
-            element.append(pipe(kind, limits))
+            element.append(deepcopy(drawn))
             ET.SubElement(element, "blendMode").text = "0"
             themes = (UNROLLED,) if kind == shown else ()
             entries.append(_Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))

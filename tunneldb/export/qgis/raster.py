@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import rasterio
 
-KINDS = {"corrected": "Intensity, corrected", "raw": "Intensity, raw", "offset": "Offset"}
+from tunneldb.export.palette import COLOURS, hexadecimal
+
+KINDS = {"corrected": "Intensity, corrected", "raw": "Intensity, raw", "offset": "Offset", "class": "Classes"}
 """Kinds of image, the one shown at first in front, with the names of their groups."""
 
 OFFSET_RANGE = 0.1
@@ -45,10 +47,21 @@ def grey_range(paths: Sequence[Path]) -> tuple[float, float]:
     return float(min(low, middle - 4.0)), float(max(high, middle + 1.6))
 
 
-def pipe(kind: str, limits: tuple[float, float]) -> ET.Element:
-    """Return the element that says how an image is drawn: intensity in grey, offset in diverging colours."""
+def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
+    """Return the element that says how an image is drawn, and all of its kind alike.
+
+    Intensity is drawn in grey, offset in diverging colours, each class in its own.
+    """
     element = ET.Element("pipe")
-    if kind == "offset":
+    if kind == "class":
+        renderer = ET.SubElement(element, "rasterrenderer", type="paletted", band="1")
+        entries = ET.SubElement(renderer, "colorPalette")
+        for klass in COLOURS:
+            ET.SubElement(
+                entries, "paletteEntry", value=str(int(klass)), color=hexadecimal(COLOURS[klass]), label=klass.name.lower(),
+                alpha="255",
+            )  # fmt: skip
+    elif kind == "offset":
         renderer = ET.SubElement(
             element, "rasterrenderer", type="singlebandpseudocolor", band="1",
             classificationMin=str(-OFFSET_RANGE), classificationMax=str(OFFSET_RANGE),
@@ -63,6 +76,7 @@ def pipe(kind: str, limits: tuple[float, float]) -> ET.Element:
             value = share * OFFSET_RANGE
             ET.SubElement(shader, "item", value=f"{value:g}", label=f"{value * 1000:+.0f} mm", color=colour, alpha="255")
     else:
+        limits = grey_range(paths)
         renderer = ET.SubElement(element, "rasterrenderer", type="singlebandgray", grayBand="1", gradient="BlackToWhite")
         _origin(renderer)
         enhancement = ET.SubElement(renderer, "contrastEnhancement")
@@ -72,7 +86,9 @@ def pipe(kind: str, limits: tuple[float, float]) -> ET.Element:
     renderer.attrib.update({"opacity": "1", "alphaBand": "-1", "nodataColor": ""})
     ET.SubElement(element, "brightnesscontrast", brightness="0", contrast="0", gamma="1")
     ET.SubElement(element, "huesaturation", saturation="0", colorizeOn="0", grayscaleMode="0")
-    ET.SubElement(element, "rasterresampler", maxOversampling="2", zoomedOutResampler="bilinear")
+    resampler = ET.SubElement(element, "rasterresampler", maxOversampling="2")
+    if kind != "class":
+        resampler.set("zoomedOutResampler", "bilinear")
     return element
 
 
