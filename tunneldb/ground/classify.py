@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from tunneldb.geometry.surface import Surface
 from tunneldb.ground.classes import Klass
 from tunneldb.ground.cluster import Cluster, Lookup, look_up
-from tunneldb.ground.lining import Relief, level_at
-
-if TYPE_CHECKING:
-    from tunneldb.ground.line import Line
-    from tunneldb.ground.model import Ground
+from tunneldb.ground.line import Line
+from tunneldb.ground.lining import Prior, Relief, Wall, level_at
+from tunneldb.ground.model import COLUMN, Ground
+from tunneldb.ground.spacing import Spacing
+from tunneldb.ground.things import ClusterSettings, Rest, find_clusters
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -166,3 +166,84 @@ def _in_sphere(x: float, y: float, z: float, spheres: Float, near: Int) -> bool:
         if dx * dx + dy * dy + dz * dz <= reach * reach:
             return True
     return False
+
+
+def find_scene(
+    points: Float, line: Line, surface: Surface, ground: Ground | None, settings: ClusterSettings | None = None
+) -> Scene:
+    """Find lining and clusters in points of survey density about the surface of the sections.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        In the tunnel's SRID, m.
+    line : Line
+        The axis, along which is chainage.
+    surface : Surface
+        Surface of the sections.
+    ground : Ground or None
+        The ground, if there is one.
+    settings : ClusterSettings, optional
+        Parameters ``cluster.*``.
+
+    Returns
+    -------
+    Scene
+        Without target spheres.
+    """
+    settings = settings or ClusterSettings()
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    places = surface.unroll(points)
+    along, across = line.place(points)
+    off = np.isfinite(places.chainage)
+    if ground is not None:
+        off &= ~ground.is_ground(along, across, points[:, 2])
+    chainage, arc, offset = places.chainage[off], places.arc[off], places.offset[off]
+    along, across, points = along[off], across[off], points[off]
+    relief = Relief.of(chainage, arc, offset, Wall.of(ground, line, surface), Prior.of(surface))
+    plane, tolerance = relief.level(chainage, arc)
+    depth = offset - plane
+    with np.errstate(invalid="ignore"):
+        lining = np.abs(depth) <= tolerance
+    spacing = Spacing.of(chainage[lining], arc[lining]) or Spacing.of(chainage, arc)
+    clusters: list[Cluster] = []
+    if spacing is not None:
+        height = heights(ground, along, across, points[:, 2])
+        top = settings.region * tops(along, height)
+        rest = ~lining
+        left = Rest(points[rest], along[rest], across[rest], height[rest], depth[rest], top[rest])
+        clusters = find_clusters(left, spacing, settings, ground)
+    return Scene(line, ground, clusters, surface, relief)
+
+
+def heights(ground: Ground | None, along: Float, across: Float, z: Float) -> Float:
+    """Height of points (n,) above the ground, m, or above the lowest point of their metre where there is no ground.
+
+    Where the ground has a gap, or ends, it goes on level from its nearest place in the row.
+    """
+    if ground is None or not np.isfinite(ground.height).any():
+        return z - _of_metre(along, z, 0.0)
+    hidden = np.isnan(ground.height)
+    nearest = ndimage.distance_transform_edt(hidden, sampling=(10.0, 1.0), return_distances=False, return_indices=True)
+    whole = replace(ground, height=ground.height[tuple(nearest)])
+    rows, columns = ground.height.shape
+    inside = np.clip(along, ground.start, ground.start + rows - 1)
+    beside = np.clip(across, ground.first * COLUMN, (ground.first + columns - 1) * COLUMN - 1e-9)
+    return z - whole.height_at(inside, np.maximum(beside, ground.first * COLUMN))
+
+
+def tops(along: Float, height: Float) -> Float:
+    """Height of the tunnel at each point (n,), m: that of all but the highest thousandth of points of its metre."""
+    return _of_metre(along, height, 0.999)
+
+
+def _of_metre(along: Float, value: Float, share: float) -> Float:
+    """Quantile of the values of each point's metre along the tunnel."""
+    if len(along) == 0:
+        return np.empty(0)
+    metre = np.floor(along).astype(np.int64)
+    order = np.lexsort((value, metre))
+    first = np.searchsorted(metre[order], np.arange(metre.min(), metre.max() + 2))
+    at = first[:-1] + np.floor(share * (np.diff(first) - 1)).astype(np.int64)
+    found = value[order[np.clip(at, 0, len(value) - 1)]]  # metres without points are not asked for
+    return np.asarray(found[metre - metre.min()], dtype=np.float64)

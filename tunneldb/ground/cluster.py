@@ -9,7 +9,6 @@ from numba import njit, prange
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Cells = NDArray[np.int32]

@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from tunneldb.geometry.surface import Surface
+from tunneldb.ground.arcs import foot_arcs
+from tunneldb.ground.line import Line
+from tunneldb.ground.model import Ground
 from tunneldb.leak.appendage import DELTA
 
 Float = NDArray[np.float64]
@@ -132,21 +135,29 @@ class Wall:
     Attributes
     ----------
     chainage : (k,) float array
-        Places along the tunnel, m, growing.
+        Places along the tunnel, m, growing, one at least.
     left, right : (k,) float arrays
-        Arc of the left and the right wall's foot, m; infinite where the wall has none.
+        Arc of the left and the right wall's foot, m.
     """
 
     chainage: Float
     left: Float
     right: Float
 
+    @classmethod
+    def of(cls, ground: Ground | None, line: Line, surface: Surface) -> Wall | None:
+        """Find it by the feet of the walls; None without ground."""
+        if ground is None:
+            return None
+        arcs = foot_arcs(ground, line, surface)
+        metres = ground.start + np.arange(len(arcs), dtype=np.float64)
+        known = np.isfinite(arcs).all(axis=1)
+        return cls(metres[known], arcs[known, 0], arcs[known, 1]) if known.any() else None
+
     def holds(self, chainage: Float, arc: Float) -> NDArray[np.bool_]:
         """Tell which places lie above the ground; (rows,) arcs by (columns,) chainages."""
-        if len(self.chainage) == 0:
-            return np.ones((len(arc), len(chainage)), np.bool_)
-        row = np.abs(self.chainage[:, None] - chainage[None, :]).argmin(axis=0) if len(chainage) else np.empty(0, np.intp)
-        return np.asarray((arc[:, None] > self.left[row]) & (arc[:, None] < self.right[row]))
+        left, right = np.interp(chainage, self.chainage, self.left), np.interp(chainage, self.chainage, self.right)
+        return np.asarray((arc[:, None] > left) & (arc[:, None] < right))
 
 
 @dataclass(frozen=True)
