@@ -18,6 +18,9 @@ from tunneldb.leak.raster import Raster
 
 Float = NDArray[np.float64]
 
+CHUNK = 1_000_000
+"""Pixels that are classed at a time: some 150 bytes each."""
+
 
 @dataclass(frozen=True)
 class ClassPainter:
@@ -51,12 +54,19 @@ class ClassPainter:
     def paint(self, offset: Raster) -> NDArray[np.uint8]:
         """Class of each pixel of an offset image (rows, columns), NO_CLASS where no point fell."""
         classes = np.full(offset.values.shape, NO_CLASS, np.uint8)
-        row, column = np.nonzero(np.isfinite(offset.values))
+        rows, columns = np.nonzero(np.isfinite(offset.values))
+        for first in range(0, len(rows), CHUNK):
+            row, column = rows[first : first + CHUNK], columns[first : first + CHUNK]
+            classes[row, column] = self._classes(offset, row, column)
+        return classes
+
+    def _classes(self, offset: Raster, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.uint8]:
+        """Class of pixels (n,) that hold points."""
         place = offset.transform
         chainage = np.asarray(place.c + (column + 0.5) * place.a, dtype=np.float64)
         arc = np.asarray(place.f + (row + 0.5) * place.e, dtype=np.float64)
         points = self.surface.roll(chainage, arc, offset.values[row, column].astype(np.float64))
         held = np.isfinite(points[:, 0])
-        classes[row, column] = Klass.UNASSIGNED
-        classes[row[held], column[held]] = self.classes(points[held])
+        classes = np.full(len(row), Klass.UNASSIGNED, np.uint8)
+        classes[held] = self.classes(points[held])
         return classes
