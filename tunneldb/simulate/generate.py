@@ -120,9 +120,10 @@ class Simulation:
             self.appendages,
             self.niches,
             self.leaks,
-            parts_table(self.tunnel, self.things + sleepers(parameters, self.tunnel)),
-            ground.lay(parameters, self.tunnel.section, int(free.generate_state(1)[0])),
         )
+        solid = self.things + sleepers(parameters, self.tunnel)
+        self._parts = parts_table(self.tunnel, solid) if solid else None
+        self._ground = ground.lay(parameters, self.tunnel.section, int(free.generate_state(1)[0]))
 
     def make(self, plan: BlockPlan) -> Cloud:
         """Points of one block; the same for the same seed and index, whenever it is made."""
@@ -134,6 +135,8 @@ class Simulation:
         out = np.empty((n, 13))
         trace(
             self._scene,
+            self._parts,
+            self._ground,
             rays.origin,
             rays.direction,
             rays.hint,

@@ -1,4 +1,4 @@
-"""The floor's shape over the flat floor of the section: camber, and ballast as a field of stones.
+"""Unevenness: camber and ballast, a field of stones, over the flat floor of the section; relief of the lining.
 
 Ballast is a height over plan coordinates, so that a ray meets the same stones from wherever it comes. A stone is a dome
 in each cell of a grid, displaced, its size and its height by chance (Worley, 1996, with paraboloids).
@@ -85,8 +85,10 @@ def _moments() -> tuple[float, float]:
     return float(out.mean()), float(out.std())
 
 
-def lay(parameters: Parameters, section: Section, salt: int) -> Ground:
+def lay(parameters: Parameters, section: Section, salt: int) -> Ground | None:
     """Camber and ballast as asked; ballast's mean height is 0 and its standard deviation ``parameters.ballast``."""
+    if parameters.ballast == 0.0 and parameters.camber == 0.0:
+        return None
     mean, spread = _moments() if parameters.ballast > 0.0 else (0.0, 1.0)
     scale = parameters.ballast / spread
     camber = parameters.camber / 100.0
@@ -153,3 +155,19 @@ def meet_ground(
     gx = (height(ground, x + h, y, v + h * n) - height(ground, x - h, y, v - h * n)) / (2.0 * h)
     gy = (height(ground, x, y + h, v - h * c) - height(ground, x, y - h, v + h * c)) / (2.0 * h)
     return r, (gx * d[0] + gy * d[1] - dw) / math.sqrt(1.0 + gx * gx + gy * gy), True
+
+
+@njit(cache=True, nogil=True)
+def bump(s: float, arc: float, size: float) -> float:
+    """Smooth pseudo-random relief, -1 to 1, with a wavelength of about two ``size`` (value noise)."""
+    x, y = s / size, arc / size
+    fx, fy = math.floor(x), math.floor(y)
+    tx, ty = x - fx, y - fy
+    tx, ty = tx * tx * (3.0 - 2.0 * tx), ty * ty * (3.0 - 2.0 * ty)
+    total = 0.0
+    for i in range(2):
+        for j in range(2):
+            h = math.sin((fx + i) * 12.9898 + (fy + j) * 78.233) * 43758.5453
+            value = 2.0 * (h - math.floor(h)) - 1.0
+            total += value * (tx if i else 1.0 - tx) * (ty if j else 1.0 - ty)
+    return total

@@ -74,7 +74,7 @@ class _Floor:
         """Chainage and across of a free spot, which is then taken."""
         line, room = self.tunnel.line, ROOM[kind]
         half = self.tunnel.section.half_width - room
-        for _ in range(TRIES):
+        for _ in range(TRIES if half > 0.0 else 0):
             s, u = float(rng.uniform(line.start + END, line.end - END)), float(rng.uniform(-half, half))
             if self.is_free(s, u, room):
                 self.take(s, u, room)

@@ -28,7 +28,7 @@ from tunneldb.simulate.furniture import (
     distance,
     niche_table,
 )
-from tunneldb.simulate.ground import Ground, meet_ground
+from tunneldb.simulate.ground import Ground, bump, meet_ground
 from tunneldb.simulate.leaks import EDGE, Leak, depth_inside, edge_table
 from tunneldb.simulate.section import LINE, nearest
 from tunneldb.simulate.things import BEAM, Parts, meet_parts
@@ -40,7 +40,7 @@ Index = NDArray[np.int64]
 # Beyond this incidence the echo is lost, as scanners lose it.
 MINIMUM_COSINE = 0.087
 # Share of the rays past an edge of a free-standing thing that give a mixed pixel.
-MIXED = 0.2
+MIXED = 0.1
 # Least range of the scanner, m.
 NEAREST = 1.0
 
@@ -67,13 +67,9 @@ class Scene(NamedTuple):
     leaks: Array
     leak_bins: Index
     leak_list: Index
-    parts_free: Parts
-    ground: Ground
 
 
-def scene(
-    tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: list[Leak], parts: Parts, ground: Ground
-) -> Scene:
+def scene(tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: list[Leak]) -> Scene:
     """Lay a tunnel and its contents out for the kernels."""
     line = tunnel.line
     item_rows, niche_rows = appendage_table(tunnel, items), niche_table(tunnel, niches)
@@ -92,8 +88,6 @@ def scene(
         first,
         leak_rows,
         *bins(leak_rows[:, 0], leak_rows[:, 2], line.start, line.end),
-        parts,
-        ground,
     )
 
 
@@ -246,12 +240,12 @@ def _niche(sc: Scene, o: Array, d: Array, s: float, r: float) -> tuple[float, fl
 
 
 @njit(cache=True, nogil=True)
-def _uneven(sc: Scene, o: Array, d: Array, s: float, r: float, on_floor: bool) -> tuple[float, float, bool]:
+def _uneven(sc: Scene, ground: Ground, o: Array, d: Array, s: float, r: float, on_floor: bool) -> tuple[float, float, bool]:
     """Range to ballast or a cambered floor where a ray meets the section at range r, cosine, whether it is floor."""
     x, y, z = o[0] + r * d[0], o[1] + r * d[1], o[2] + r * d[2]
     _, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)
     gx, gy, gz = gradient(0.0, 1.0, u, w, c, n, k, g, q, det)
-    return meet_ground(sc.ground, o, d, r, u, w, c, n, gx * d[0] + gy * d[1] + gz * d[2], on_floor)
+    return meet_ground(ground, o, d, r, u, w, c, n, gx * d[0] + gy * d[1] + gz * d[2], on_floor)
 
 
 @njit(cache=True, nogil=True)
@@ -271,24 +265,10 @@ def _wetness(sc: Scene, s: float, arc: float) -> tuple[int, float]:
 
 
 @njit(cache=True, nogil=True)
-def _bump(s: float, arc: float, size: float) -> float:
-    """Smooth pseudo-random relief, -1 to 1, with a wavelength of about two ``size`` (value noise)."""
-    x, y = s / size, arc / size
-    fx, fy = math.floor(x), math.floor(y)
-    tx, ty = x - fx, y - fy
-    tx, ty = tx * tx * (3.0 - 2.0 * tx), ty * ty * (3.0 - 2.0 * ty)
-    total = 0.0
-    for i in range(2):
-        for j in range(2):
-            h = math.sin((fx + i) * 12.9898 + (fy + j) * 78.233) * 43758.5453
-            value = 2.0 * (h - math.floor(h)) - 1.0
-            total += value * (tx if i else 1.0 - tx) * (ty if j else 1.0 - ty)
-    return total
-
-
-@njit(cache=True, nogil=True)
 def trace(
     sc: Scene,
+    parts: Parts | None,
+    ground: Ground | None,
     origin: Array,
     direction: Array,
     hint: Array,
@@ -303,6 +283,8 @@ def trace(
 
     Parameters
     ----------
+    parts, ground
+        What stands free and the uneven floor. Without them (None) the kernel is compiled without what they need.
     origin, direction : (n, 3)
         From the line's origin, m; unit vectors.
     hint : (n,)
@@ -319,15 +301,17 @@ def trace(
         Greatest range, m.
     out : (n, 13)
         range (NaN: no echo), x, y, z, chainage, arc, offset, class, leak (-1: none), drop (dB), cosine of
-        incidence, true range, thing (0: none). Chainage, arc and offset are those of the stored point; leak, drop and cosine
-        those of the spot that the laser met.
+        incidence, true range, thing (0: none). Chainage, arc and offset are those of the stored point; leak, drop
+        and cosine those of the spot that the laser met.
     """
     for i in range(origin.shape[0]):
         o, d = origin[i], direction[i]
         wall, s, arc, cosine, offset0, s0 = _lining(sc, o, d, hint[i], 2.0 * furthest)
         out[i, 0] = np.nan
         is_open = math.isnan(wall)
-        if offset0 <= 0.0 or (is_open and sc.parts_free.rows.shape[0] == 0):
+        if offset0 <= 0.0:
+            continue
+        if parts is None and is_open:
             continue
         klass = FLOOR if abs(arc) > sc.ends[2] else LINING
         leak = -1
@@ -337,8 +321,8 @@ def trace(
         edge = 1.0
         if is_open:
             wall = 2.0 * furthest
-        elif sc.ground.high > 0.0:
-            hit, c, is_floor = _uneven(sc, o, d, s, wall, klass == FLOOR)
+        elif ground is not None:
+            hit, c, is_floor = _uneven(sc, ground, o, d, s, wall, klass == FLOOR)
             if not math.isnan(hit):
                 wall, cosine, klass = hit, c, FLOOR if is_floor else LINING
         r = wall
@@ -357,17 +341,17 @@ def trace(
             else:
                 leak, drop = _wetness(sc, s, arc)
                 if relief > 0.0:
-                    height = relief * _bump(s, arc, 0.12)
+                    height = relief * bump(s, arc, 0.12)
         behind = wall
-        if sc.parts_free.rows.shape[0] > 0:
-            hit, which, c, inside = meet_parts(sc.parts_free, sc.ends[0], o, d, s0, s, r)
+        if parts is not None:
+            hit, which, c, inside = meet_parts(parts, sc.ends[0], o, d, s0, s, r)
             if which >= 0:
                 s = s0 + (s - s0) * hit / r
                 behind = r
                 r, cosine, edge, height, leak = hit, c, inside, 0.0, -1
-                klass = int(sc.parts_free.labels[which, 0])
-                drop = sc.parts_free.labels[which, 1]
-                thing = int(sc.parts_free.labels[which, 2])
+                klass = int(parts.labels[which, 0])
+                drop = parts.labels[which, 1]
+                thing = int(parts.labels[which, 2])
             elif is_open:
                 continue
         if r > furthest or cosine < MINIMUM_COSINE:
