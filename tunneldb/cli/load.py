@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.progress import points_bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from tunneldb.job.files import Loaded
 
 
@@ -74,8 +72,8 @@ def load(
     with connect(settings.dsn) as connection:
         found = get_survey(connection, survey)
         try:
-            with _progress() as progress:
-                for file in load_files(connection, found, files, chosen, _begin(progress)):
+            with points_bar() as progress:
+                for file in load_files(connection, found, files, chosen, step(progress)):
                     done.append(file)  # noqa: PERF402 - those before a failure are in the summary too
         finally:
             if done:
@@ -93,27 +91,6 @@ def density_of(text: str) -> float | None:
     if not 1.0 <= value <= 1e6:
         raise UserError(f"--density takes points per m², 1 or more, or 'all', not {text!r}")
     return value
-
-
-def _progress() -> Progress:
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
-    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-
-
-def _begin(progress: Progress) -> Callable[[str, int], Callable[[int], None]]:
-    """Show one step at a time."""
-
-    def begin(text: str, total: int) -> Callable[[int], None]:
-        for task in progress.task_ids:
-            progress.remove_task(task)
-        task = progress.add_task(text, total=total)
-        return lambda count: progress.advance(task, count)
-
-    return begin
 
 
 def _summary(done: list[Loaded]) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import laspy
 import numpy as np
-from laspy import LazBackend
+from laspy import DecompressionSelection, LazBackend
 from numpy.typing import NDArray
 
 from tunneldb.errors import UserError
@@ -29,6 +29,9 @@ from tunneldb.scan.records import FORMAT_OF, Bytes, coordinates, fields, record_
 
 Classes = Callable[[NDArray[np.float64]], NDArray[np.uint8]]
 """Gives points (n, 3) their classes (n,)."""
+
+
+_EVERYTHING = DecompressionSelection.all()
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,26 @@ def rewrite(
     return counts
 
 
+def read_coordinates(path: Path, size: int = CHUNK) -> Iterator[NDArray[np.float64]]:
+    """Read the coordinates (n, 3) of a scan file's points, m, chunk by chunk, and nothing else of them.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, or holds no points.
+    """
+    if is_e57(path):
+        source = E57Records(path)
+        for records in source.read(size):
+            yield coordinates(records, source.head.scales, source.head.offsets)
+        return
+    count = read_las_header(path).points
+    with decoding(path, KIND):
+        head = read_head(path)
+    for records in _read(path, count, size, DecompressionSelection.base() | DecompressionSelection.Z):
+        yield coordinates(records, head.scales, head.offsets)
+
+
 def _of_las(path: Path, size: int) -> _Source:
     header = read_las_header(path)
     with decoding(path, KIND):
@@ -105,10 +128,10 @@ def _of_las(path: Path, size: int) -> _Source:
     return _Source(head, (upgraded(records, before) for records in _read(path, header.points, size)), lambda: None)
 
 
-def _read(path: Path, count: int, size: int) -> Iterator[Bytes]:
+def _read(path: Path, count: int, size: int, selection: DecompressionSelection = _EVERYTHING) -> Iterator[Bytes]:
     backends = (LazBackend.Lazrs,) if threads() == 1 else (LazBackend.LazrsParallel, LazBackend.Lazrs)
     with decoding(path, KIND):
-        las = laspy.open(path, laz_backend=backends, read_evlrs=False)
+        las = laspy.open(path, laz_backend=backends, read_evlrs=False, decompression_selection=selection)
     with las:
         done = 0
         while done < count:

@@ -1,0 +1,139 @@
+"""Scan files of a survey written again with the classes that stage ground has found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import laspy
+import numpy as np
+import psycopg
+import pytest
+from click.testing import CliRunner
+
+from tunneldb.cli.main import main
+from tunneldb.database import get_survey
+from tunneldb.ground.classes import Klass
+from tunneldb.job.scene import load_scene
+from tunneldb.simulate import Parameters, Simulation, write
+
+NAME = "s"
+START, LENGTH, BORDER = 970.0, 60.0, 1015.0  # a kilometre ends in the middle of the first file
+FLOOR, LINING = 1, 0  # of the truth
+FAR = 100.0  # m above the tunnel: points of nothing
+
+
+def command(*arguments: object, code: int = 0) -> str:
+    result = CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, np.ndarray]]:
+    """A folder with two files, of which the first lies in two kilometres, and the truth of their points."""
+    folder = tmp_path_factory.mktemp("scans")
+    simulation = Simulation(
+        Parameters(
+            name="whole", length=LENGTH, start_chainage=START, section="horseshoe", scanner="profiler", density=900.0,
+            leaks=0, people=2, equipment=2, ballast=0.01,
+        )
+    )  # fmt: skip
+    made = write(simulation, folder)
+    las = laspy.read(made.clouds[0])
+    truth = np.load(made.truth[0])
+    first = truth["chainage"] < BORDER
+    klass = {}
+    for name, chosen in (("a.laz", first), ("b.las", ~first)):
+        part = laspy.LasData(las.header, las.points[chosen].copy())
+        # At the end of the first file points that belong to no tunnel.
+        part.Z[-10:] += round(FAR / las.header.scales[2])
+        part.write(folder / name)
+        klass[name] = truth["class"][chosen]
+    made.clouds[0].unlink()
+    return folder, klass
+
+
+@pytest.fixture
+def loaded(scans: tuple[Path, dict[str, np.ndarray]], dsn: str) -> Path:
+    folder, _ = scans
+    command("tunnel", "add", NAME, "--srid", 25830, "--axis", folder / "whole.axis.csv", "--start-chainage", START)
+    command(
+        "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04", "--trajectory", folder / "whole.trajectory.csv",
+        "--intensity", "Amplitude", "--intensity-kind", "amplitude",
+    )  # fmt: skip
+    command("load", NAME, folder / "a.laz", folder / "b.las")
+    return folder
+
+
+def export(out: Path, *options: object, code: int = 0) -> str:
+    return command("export", NAME, "--classified", "-o", out, *options, code=code)
+
+
+def test_files_get_the_classes(
+    loaded: Path, conn: psycopg.Connection, scans: tuple[Path, dict[str, np.ndarray]], tmp_path: Path
+) -> None:
+    command("run", NAME, "--to", "ground")
+    text = export(tmp_path / "out")
+    scene = load_scene(conn, get_survey(conn, NAME), 0, 1)
+    total = np.zeros(256, int)
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.laz", "b.laz"]
+    for name, klass in scans[1].items():
+        before, after = laspy.read(loaded / name), laspy.read((tmp_path / "out" / name).with_suffix(".laz"))
+        np.testing.assert_array_equal(before.xyz, after.xyz)
+        for dimension in set(before.point_format.dimension_names) - {"classification"}:
+            np.testing.assert_array_equal(before[dimension], after[dimension], err_msg=dimension)
+        found = np.asarray(after.classification)
+        assert (found[-10:] == Klass.UNASSIGNED).all()
+        found, klass = found[:-10], klass[:-10]
+        assert np.mean(found[klass == FLOOR] == Klass.GROUND) > 0.98
+        assert np.mean(found[klass == LINING] == Klass.LINING) > 0.95
+        assert np.mean(klass[found == Klass.GROUND] == FLOOR) > 0.98
+        np.testing.assert_array_equal(found, scene.classes(np.asarray(before.xyz))[:-10])
+        total += np.bincount(after.classification, minlength=256)
+    for klass in (Klass.GROUND, Klass.LINING, Klass.UNASSIGNED):
+        assert f"{total[klass]:,}".replace(",", " ") in text
+
+    export(tmp_path / "second", "--km", 1)  # both files touch it
+    assert len(list((tmp_path / "second").iterdir())) == 2
+    assert (tmp_path / "second" / "a.laz").read_bytes() == (tmp_path / "out" / "a.laz").read_bytes()
+    export(tmp_path / "first", "--km", 0)
+    assert [path.name for path in (tmp_path / "first").iterdir()] == ["a.laz"]
+
+    bytes_before = (loaded / "a.laz").read_bytes()
+    assert "never written over" in export(loaded, code=2)
+    assert (loaded / "a.laz").read_bytes() == bytes_before
+    assert not (loaded / "b.laz").exists()
+
+    command("run", NAME, "--km", 1, "--from", "sections", "--to", "sections")
+    text = export(tmp_path / "stale", code=2)
+    assert "out of date" in text
+    assert f"tunneldb run {NAME} --km 0-1 --from ground --to ground" in text
+    assert not list((tmp_path / "stale").iterdir())
+    command("run", NAME, "--km", "0-1", "--from", "ground", "--to", "ground")
+    export(tmp_path / "stale")
+
+
+def test_without_ground_it_says_what_to_type(loaded: Path, tmp_path: Path) -> None:
+    assert "say what to export" in command("export", NAME, "-o", tmp_path / "out", code=2)
+    text = export(tmp_path / "out", code=2)
+    assert text.count("\n") == 1
+    assert f"kilometres 0, 1 without ground: tunneldb run {NAME} --km 0-1 --from axis --to ground" in text
+    assert not list((tmp_path / "out").iterdir())
+    command("run", NAME, "--to", "sections")
+    command("run", NAME, "--km", 0, "--from", "ground", "--to", "ground")
+    text = export(tmp_path / "out", "--km", 0, code=2)  # the file lies in both
+    assert f"kilometre 1 without ground: tunneldb run {NAME} --km 1 --from ground --to ground" in text
+
+
+def test_a_file_that_was_changed_is_refused(loaded: Path, tmp_path: Path) -> None:
+    command("run", NAME, "--to", "ground")
+    path = loaded / "b.las"
+    data = path.read_bytes()
+    try:
+        path.write_bytes(data[:-1] + bytes([data[-1] ^ 1]))
+        assert "changed since it was loaded" in export(tmp_path / "out", code=2)
+        path.unlink()
+        assert "gone since it was loaded" in export(tmp_path / "out", code=2)
+    finally:
+        path.write_bytes(data)
+    assert [path.name for path in (tmp_path / "out").iterdir()] in ([], ["a.laz"])

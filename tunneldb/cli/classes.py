@@ -1,0 +1,39 @@
+"""What the verbs that write classes have in common."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.cli.tables import print_table
+from tunneldb.ground.classes import Klass
+
+
+def print_classes(counts: NDArray[np.int64]) -> None:
+    """Print a table of the classes that points (256,) have."""
+    total = int(counts.sum())
+    rows = [
+        (int(klass), klass.name.lower(), f"{int(counts[klass]):,}".replace(",", " "), f"{100.0 * counts[klass] / total:.2f} %")
+        for klass in Klass
+        if counts[klass]
+    ]
+    print_table(("class", "", "points", "share"), rows, right=(0, 2, 3))
+
+
+@contextmanager
+def told_to_end() -> Iterator[None]:
+    """Leave by an exception at SIGTERM, as at Ctrl-C, so that what is half-written is removed."""
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise SystemExit(128 + number)
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
