@@ -19,7 +19,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from benchmarks.common import print_table, progress, save, scratch_database
-from benchmarks.scene import APPENDAGE, FLOOR, Scene
+from benchmarks.scene import APPENDAGE, FLOOR, RAIL, Scene
 from tunneldb.database import connect
 
 Figures = dict[str, Any]
@@ -104,8 +104,8 @@ def compare(scene: Scene, found: list[BaseGeometry]) -> Figures:
         "mean_iou": float(np.mean([leak_iou(leak, judged) for leak in large])),
         "missed": sum(not leak.intersects(detected) for leak in large),
         "false": sum(not polygon.intersects(true) for polygon in judged),
-        "on_appendage": lying_on(scene, judged, APPENDAGE),
-        "on_floor": lying_on(scene, judged, FLOOR),
+        "on_appendage": lying_on(scene, judged, [APPENDAGE]),
+        "on_floor": lying_on(scene, judged, [FLOOR, RAIL]),
     }
 
 
@@ -115,8 +115,8 @@ def leak_iou(leak: BaseGeometry, found: list[BaseGeometry]) -> float:
     return float(leak.intersection(touching).area / leak.union(touching).area)
 
 
-def lying_on(scene: Scene, found: list[BaseGeometry], truth_class: int) -> int:
-    """Count polygons in which at least half the points are of a class."""
+def lying_on(scene: Scene, found: list[BaseGeometry], classes: list[int]) -> int:
+    """Count polygons in which at least half the points are of any of some classes."""
     truth = scene.truth
     order = np.argsort(truth["chainage"])
     chainage = truth["chainage"][order]
@@ -125,7 +125,7 @@ def lying_on(scene: Scene, found: list[BaseGeometry], truth_class: int) -> int:
         west, _, east, _ = polygon.bounds
         near = order[np.searchsorted(chainage, west) : np.searchsorted(chainage, east)]
         inside = near[shapely.contains_xy(polygon, truth["chainage"][near], truth["arc"][near])]
-        count += bool(len(inside)) and float((truth["class"][inside] == truth_class).mean()) >= 0.5
+        count += bool(len(inside)) and float(np.isin(truth["class"][inside], classes).mean()) >= 0.5
     return count
 
 

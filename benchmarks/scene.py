@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 from benchmarks.common import tunneldb
 
 Float = NDArray[np.float64]
-LINING, FLOOR, APPENDAGE, NICHE, OUTLIER = range(5)  # classes of the truth
+LINING, FLOOR, APPENDAGE, NICHE, OUTLIER, RAIL, OBJECT, SPHERE = range(8)  # classes of the truth
 
 
 @dataclass(frozen=True)
