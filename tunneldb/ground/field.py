@@ -1,0 +1,117 @@
+"""Heights of the ground row by row: levels of the segments blended, then refined by the points about them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from tunneldb.ground.model import COLUMN
+
+Float = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_ALONG = 1.0  # half of the window of a row's points, m
+_PRIOR = 4.0  # points that the segments' level counts for
+_GAP = 20  # columns across which a hidden floor is filled in
+
+
+def blended(rows: Float, columns: Float, centres: Float, planes: Float, level: Float, step: float) -> Float:
+    """Heights (rows, columns) of the segments' levels, passing evenly from each segment's middle to the next.
+
+    Parameters
+    ----------
+    rows, columns : (r,), (c,) float arrays
+        Distance along the line and to its right, m.
+    centres, planes, level : (g,), (g, 3), (g, c) float arrays
+        Segments, ``step`` m apart: middle, plane, and level about it; NaN where there is none.
+    """
+    height = planes[:, :1] + planes[:, 2:] * columns + level
+    place = (rows - centres[0]) / step
+    before = np.floor(place).astype(int)
+    total, weight = np.zeros((len(rows), len(columns))), np.zeros((len(rows), len(columns)))
+    for k in (before, before + 1):
+        inside = (k >= 0) & (k < len(centres))
+        at = np.clip(k, 0, len(centres) - 1)
+        here = height[at] + (planes[at, 1] * (rows - centres[at]))[:, None]
+        share = np.where(inside, 1.0 - np.abs(place - k), 0.0)
+        # A level that only one of both segments has goes to the end of the other's part.
+        share = np.maximum(share, np.where(inside, 1e-9, 0.0))[:, None] * np.isfinite(here)
+        total += share * np.nan_to_num(here)
+        weight += share
+    with np.errstate(invalid="ignore"):
+        return np.asarray(total / np.where(weight > 0, weight, np.nan))
+
+
+def filled(height: Float) -> Float:
+    """Fill columns hidden between others of their row, up to 2 m wide."""
+    out = height.copy()
+    for row in out:
+        known = np.flatnonzero(np.isfinite(row))
+        for left, right in zip(known[:-1], known[1:], strict=True):
+            if 1 < right - left <= _GAP:
+                row[left + 1 : right] = np.interp(np.arange(left + 1, right), [left, right], row[[left, right]])
+    return out
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def refined(
+    along: Float, across: Float, z: Float, spread: Float, cells: Index, start: int, first: int, height: Float, gate: float
+) -> tuple[Float, Float, Float]:  # pragma: no cover - compiled
+    """Heights moved to the mean of the points about them; of each row the number and sum of squares of what is left.
+
+    Parameters
+    ----------
+    along, across, z, spread : (n,) float arrays
+        Points in rows and columns, and the standard deviation of the heights that each stands for.
+    cells : (rows * columns + 1,) int array
+        First point of each cell.
+    height : (rows + 1, columns) float array
+        m; row i stands at ``start + i``, where the cells of row i begin.
+    gate : float
+        Points farther off than this don't count, m.
+    """
+    columns = height.shape[1]
+    metres = (cells.shape[0] - 1) // columns
+    out = height.copy()
+    number = np.zeros(height.shape[0])
+    square = np.zeros(height.shape[0])
+    for i in prange(height.shape[0]):
+        for c in range(columns):
+            if np.isnan(height[i, c]):
+                continue
+            total, weight = _PRIOR * 0.0, _PRIOR
+            for row in range(max(i - 1, 0), min(i + 1, metres)):
+                for n in range(cells[row * columns + c], cells[row * columns + c + 1]):
+                    e = z[n] - _at(height, along[n] - start, across[n] / COLUMN - first)
+                    if abs(e) < gate:
+                        w = 1.0 - (abs(along[n] - start - i) / _ALONG) ** 2
+                        total += w * e
+                        weight += w
+            out[i, c] += total / weight
+    for i in prange(height.shape[0]):
+        for row in range(max(i - 2, 0), min(i + 2, metres)):
+            for c in range(columns):
+                for n in range(cells[row * columns + c], cells[row * columns + c + 1]):
+                    e = z[n] - _at(out, along[n] - start, across[n] / COLUMN - first)
+                    if abs(e) < gate:
+                        number[i] += 1.0
+                        square[i] += e * e + spread[n] ** 2
+    return out, number, square
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _at(height: Float, row: float, column: float) -> float:
+    """Height between rows and columns; NaN beside a missing one."""
+    i = min(max(int(row), 0), height.shape[0] - 2)
+    j = min(max(int(math.floor(column)), 0), height.shape[1] - 2)
+    g, f = row - i, column - j
+    one = (1.0 - g) * height[i, j] + g * height[i + 1, j]
+    two = (1.0 - g) * height[i, j + 1] + g * height[i + 1, j + 1]
+    if np.isnan(one) or f > 1.0:
+        return two
+    if np.isnan(two):
+        return one
+    return (1.0 - f) * one + f * two

@@ -1,0 +1,226 @@
+"""The ground of a tunnel, found from its points (Li et al. 2023, section 2.1, segment by segment)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.ground.field import blended, filled, refined
+from tunneldb.ground.foot import steady, walls
+from tunneldb.ground.line import Line
+from tunneldb.ground.model import COLUMN, Ground
+from tunneldb.ground.plane import planes
+from tunneldb.ground.profile import profiles, steps_out
+from tunneldb.ground.voxels import Voxels
+
+Float = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+MARGIN = 20
+"""Rows depend on no points farther than this along the line, m: what is found of two stretches agrees where they overlap."""
+
+_STEP = 4  # of the segments along, m
+_LOWER = 0.4  # share of the height in which the ground lies (eq. 1)
+_LEAST_LOWER = 1.0  # m
+_WIDEST = 30.0  # farther from the line, m, nothing is looked at
+_SPREADS = 3.5  # γ in standard deviations of the ground
+_LEAST_GAMMA = 0.02  # m
+
+
+@dataclass(frozen=True)
+class GroundSettings:
+    """How the ground is looked for.
+
+    Attributes
+    ----------
+    voxel : float
+        Edge of the voxels that the points are thinned to, m.
+    distance : float
+        τ: points nearer to a plane lie on it, m.
+    angle : float
+        δ: normals of the ground depart less from the vertical, degrees.
+    gamma : float
+        The largest γ: ground is not thicker above its height, m.
+    radius : float
+        R: points so near make a normal, m.
+    """
+
+    voxel: float = 0.1
+    distance: float = 0.05
+    angle: float = 15.0
+    gamma: float = 0.1
+    radius: float = 0.3
+
+    @classmethod
+    def of(cls, values: Mapping[str, float]) -> GroundSettings:
+        """Settings of the parameters ``ground.*``."""
+        return cls(*(values[f"ground.{name}"] for name in ("voxel", "distance", "angle", "gamma", "radius")))
+
+
+@dataclass(frozen=True)
+class _Points:
+    """Points of the tunnel's lower part, by rows of 1 m and columns of 0.1 m."""
+
+    along: Float
+    across: Float
+    z: Float
+    spread: Float
+    cells: Index
+    start: int
+    first: int
+    rows: int
+    columns: int
+
+
+def find_ground(
+    points: Float, line: Line, settings: GroundSettings, seed: int = 0, spread: Float | None = None
+) -> Ground | None:
+    """Find the ground of a tunnel.
+
+    Points are thinned to voxels (step 1). Each 4 m a plane is found in the lower 40 % of the tunnel by RANSAC with
+    checked normals (steps 2, 3). About it, column by column, the level is sought that is seen along the segment:
+    carriageways, walkways and camber, but not what stands on them. Levels pass evenly from segment to segment and
+    follow the points about them; γ (step 4) is 3.5 times their spread. Walls are fitted just above.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        m; those not finite are left out.
+    line : Line
+        What the tunnel follows.
+    settings : GroundSettings
+        Parameters.
+    seed : int
+        Start of the random numbers; the result depends on it alone, not on the order of the points.
+    spread : (n,) float array, optional
+        Standard deviation of the heights that each point stands for, m, where it is the centroid of others.
+
+    Returns
+    -------
+    Ground or None
+        None where there is no ground: too few points, or a tunnel without a floor.
+    """
+    held = _lower(points, line, settings, spread)
+    if held is None:
+        return None
+    centres, coefficients = _segments(held, settings, seed)
+    level = _levels(held, centres, coefficients, settings)
+    rows = held.start + np.arange(held.rows + 1, dtype=np.float64)
+    columns = (held.first + np.arange(held.columns)) * COLUMN
+    height = filled(blended(rows, columns, centres, coefficients, level, _STEP))
+    if not np.isfinite(height).any():
+        return None
+    height, gamma = _refine(held, height, settings)
+    foot, lean = walls(
+        held.along, held.across, held.z, held.cells, held.start, held.first, height, np.maximum(gamma, settings.distance), seed
+    )
+    foot, lean = steady(foot, lean)
+    height = _to_walls(height, columns, foot, gamma)
+    return Ground(held.start, held.first, height, gamma, foot, lean)
+
+
+def _lower(points: Float, line: Line, settings: GroundSettings, spread: Float | None) -> _Points | None:
+    """Thin points, place them, keep the lower part of each segment's, and sort them."""
+    voxels = Voxels(settings.voxel)
+    voxels.add(points)
+    if len(voxels) < 3:
+        return None
+    xyz, within = voxels.centroids(), voxels.spread()
+    if spread is not None:
+        number = voxels.index(points)
+        kept = number >= 0
+        mean = np.bincount(number[kept], spread[kept] ** 2, minlength=len(voxels)) / voxels.counts()
+        within = np.sqrt(within**2 + mean)
+    along, across = line.place(xyz)
+    kept = _below(along, across, xyz[:, 2])
+    along, across, z, within = along[kept], across[kept], xyz[kept, 2], within[kept]
+    if len(along) < 3:
+        return None
+    start, stop = math.floor(along.min()), math.floor(along.max()) + 1
+    first = math.floor(across.min() / COLUMN + 0.5) - 1
+    columns = math.floor(across.max() / COLUMN + 0.5) + 2 - first
+    cell = (np.floor(along).astype(np.int64) - start) * columns + np.floor(across / COLUMN + 0.5).astype(np.int64) - first
+    order = np.lexsort((z, along, cell))
+    cells = np.zeros((stop - start) * columns + 1, np.int64)
+    np.cumsum(np.bincount(cell, minlength=len(cells) - 1), out=cells[1:])
+    return _Points(
+        along[order], across[order], z[order], within[order], cells, start, first, stop - start, columns
+    )  # fmt: skip
+
+
+def _below(along: Float, across: Float, z: Float) -> NDArray[np.bool_]:
+    """Which points lie in the lower part of the segment's heights (eq. 1)."""
+    near = np.abs(across) < _WIDEST
+    segment = np.floor(along / _STEP).astype(np.int64)
+    segment -= segment[near].min() if near.any() else 0
+    order = np.lexsort((z, np.where(near, segment, -1)))
+    order = order[np.count_nonzero(~near) :]
+    bounds = np.searchsorted(segment[order], np.arange(segment[near].max() + 2)) if near.any() else np.zeros(1, int)
+    kept = np.zeros(len(z), np.bool_)
+    for low, high in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        if high > low:
+            heights = z[order[low:high]]
+            bottom, top = np.quantile(heights, (0.005, 0.995))
+            limit = bottom + max(_LOWER * (top - bottom), _LEAST_LOWER)
+            kept[order[low:high]] = heights <= limit
+    return kept
+
+
+def _segments(held: _Points, settings: GroundSettings, seed: int) -> tuple[Float, Float]:
+    """Middle of each segment, at multiples of 4 m, and its plane."""
+    number = np.arange(held.start // _STEP, (held.start + held.rows - 1) // _STEP + 1)
+    metre = np.clip(np.stack([number * _STEP, (number + 1) * _STEP], axis=1) - held.start, 0, held.rows)
+    bounds = held.cells[metre * held.columns]
+    centres = (number + 0.5) * _STEP
+    middle = np.repeat(centres, np.diff(bounds, axis=1)[:, 0])
+    local = np.column_stack([held.along - middle, held.across, held.z])
+    starts = (np.int64(seed) << 32) + number.astype(np.int64) + 1_000_000
+    found = planes(local, bounds, settings.distance, settings.angle, settings.radius, starts)
+    return centres, found.coefficients
+
+
+def _levels(held: _Points, centres: Float, coefficients: Float, settings: GroundSettings) -> Float:
+    """Levels of the ground about each segment's plane, column by column."""
+    found = profiles(
+        held.along, held.across, held.z, held.cells, held.start, held.first, held.columns,
+        centres, coefficients, float(_STEP), settings.distance,
+    )  # fmt: skip
+    slope = math.tan(math.radians(settings.angle))
+    for k, level in enumerate(found):
+        kept, is_round = steps_out(level, slope)
+        found[k] = np.nan if is_round else kept
+    return found
+
+
+def _refine(held: _Points, height: Float, settings: GroundSettings) -> tuple[Float, Float]:
+    """Heights that follow the points, and γ."""
+    gate = settings.gamma
+    for _ in range(2):
+        out, number, square = refined(
+            held.along, held.across, held.z, held.spread, held.cells, held.start, held.first, height, gate
+        )
+    with np.errstate(invalid="ignore"):
+        gamma = _SPREADS * np.sqrt(square / np.where(number > 0, number, np.nan))
+    return out, np.clip(np.where(np.isfinite(gamma), gamma, settings.gamma), _LEAST_GAMMA, settings.gamma)
+
+
+def _to_walls(height: Float, columns: Float, foot: Float, gamma: Float) -> Float:
+    """Carry the heights on to the walls, or end them there."""
+    out = height.copy()
+    for i, row in enumerate(out):
+        known = np.flatnonzero(np.isfinite(row))
+        if not len(known):
+            continue
+        low, high = known[0], known[-1]
+        beyond = gamma[i] + COLUMN
+        if np.isfinite(foot[i, 0]):
+            row[:low] = np.where(columns[:low] > foot[i, 0] - beyond, row[low], np.nan)
+            row[columns < foot[i, 0] - beyond] = np.nan
+        if np.isfinite(foot[i, 1]):
+            row[high + 1 :] = np.where(columns[high + 1 :] < foot[i, 1] + beyond, row[high], np.nan)
+            row[columns > foot[i, 1] + beyond] = np.nan
+    return out

@@ -1,0 +1,159 @@
+"""Level stretches of ground across the tunnel: main floor, further carriageways, walkways, kerbs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from tunneldb.ground.model import COLUMN
+
+Float = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+LOW, HIGH = -0.8, 1.2
+"""Ground lies between these heights about the plane of a segment, m: walkways, platforms, ditches."""
+
+_BIN = 0.01  # of heights, m
+_PIECE = 0.5  # along, m
+_SEEN = 0.5  # share of the pieces along the segment in which a level must be seen
+_RAISED = 0.06  # a level that stands higher over the ground beside it must run along the whole segment, m
+_RUNS = 0.7  # share of pieces for that
+_NARROW = 0.16  # m; a raised level that is narrower is a rail or a cable
+_CUT = 1.0  # half of the reach across within which two ends of a level are compared, m
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def profiles(
+    along: Float, across: Float, z: Float, cells: Index, start: int, first: int, columns: int,
+    centres: Float, planes: Float, half: float, distance: float,
+) -> Float:  # pragma: no cover - compiled  # fmt: skip
+    """Level of the ground about each segment's plane in each column, (g, columns), m; NaN where there is none.
+
+    A column's level is the lowest height about which, within τ, points lie in most of the pieces of the segment
+    in which the column shows anything at all.
+
+    Parameters
+    ----------
+    along, across, z : (n,) float arrays
+        Points, by rows of 1 m from ``start`` and in them by columns of 0.1 m from ``first``.
+    cells : (rows * columns + 1,) int array
+        First point of each of them.
+    centres, planes : (g,), (g, 3) float arrays
+        Segments: middle, and the plane z = c0 + c1 (along - middle) + c2 across.
+    half : float
+        Half of the segment's window, m.
+    distance : float
+        τ, m.
+    """
+    out = np.full((centres.shape[0], columns), np.nan)
+    bins = int(round((HIGH - LOW) / _BIN))
+    reach = int(round(distance / _BIN))
+    pieces = int(round(2 * half / _PIECE))
+    rows = (cells.shape[0] - 1) // columns
+    for g in prange(centres.shape[0]):
+        if np.isnan(planes[g, 0]):
+            continue
+        low = int(np.floor(centres[g] - half)) - start
+        high = int(np.ceil(centres[g] + half)) - start
+        count = np.empty(bins + 1, np.int64)
+        seen = np.empty((bins, pieces), np.bool_)
+        here = np.empty(pieces, np.bool_)
+        for c in range(columns):
+            count[:] = 0
+            seen[:] = False
+            here[:] = False
+            for row in range(max(low, 0), min(high, rows)):
+                for n in range(cells[row * columns + c], cells[row * columns + c + 1]):
+                    from_middle = along[n] - centres[g]
+                    piece = int(np.floor((from_middle + half) / _PIECE))
+                    if piece < 0 or piece >= pieces:
+                        continue
+                    e = z[n] - planes[g, 0] - planes[g, 1] * from_middle - planes[g, 2] * across[n]
+                    b = int(np.floor((e - LOW) / _BIN))
+                    if b >= 0 and b < bins:
+                        count[b + 1] += 1
+                        seen[b, piece] = True
+                        here[piece] = True
+            shown = here.sum()
+            if shown < 3:
+                continue
+            for b in range(bins):
+                count[b + 1] += count[b]
+            out[g, c] = _lowest(count, seen, shown, reach, bins)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _lowest(count: Index, seen: NDArray[np.bool_], shown: int, reach: int, bins: int) -> float:
+    """The lowest level: where most points lie within τ, of those places where enough pieces show something."""
+    best, most = -1, 0
+    for b in range(reach, bins - reach):
+        n = count[b + reach + 1] - count[b - reach]
+        if best >= 0 and (b > best + reach):
+            break
+        if n > most and n >= 3:
+            pieces = 0
+            for p in range(seen.shape[1]):
+                for k in range(b - reach, b + reach + 1):
+                    if seen[k, p]:
+                        pieces += 1
+                        break
+            if pieces >= _SEEN * shown and pieces >= 3:
+                most, best = n, b
+    if best < 0:
+        return np.nan
+    # Median of what lies within τ.
+    below = count[best - reach]
+    middle = below + 0.5 * (count[best + reach + 1] - below)
+    k = best - reach
+    while count[k + 1] < middle:
+        k += 1
+    inside = count[k + 1] - count[k]
+    return LOW + _BIN * (k + (middle - count[k]) / inside)
+
+
+def steps_out(level: Float, slope: float) -> tuple[Float, bool]:
+    """Keep of a segment's levels those that make up ground; and tell whether it rather is the bottom of a round tunnel.
+
+    Columns whose levels rise or fall by less than δ from one to the next make up a stretch. Ground is the widest
+    one, and any other that is as wide as a kerb. In a round tunnel the surface grows steeper bit by bit where the
+    stretch ends, on both sides; where a wall stands on a floor it does so at once.
+
+    Parameters
+    ----------
+    level : (columns,) float array
+        m.
+    slope : float
+        tan δ.
+    """
+    kept = np.full_like(level, np.nan)
+    runs = _stretches(level, slope)
+    if not runs:
+        return kept, False
+    widest = max(runs, key=lambda r: r[1] - r[0])
+    for low, high in runs:
+        if (high - low) * COLUMN >= _NARROW or (low, high) == widest:
+            kept[low:high] = level[low:high]
+    return kept, _is_round(level, *widest, slope)
+
+
+def _stretches(level: Float, slope: float) -> list[tuple[int, int]]:
+    """First column, and the one after the last, of stretches without steep or missing columns."""
+    flat = np.abs(np.diff(level)) <= slope * COLUMN + 0.01
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flat, [False]]).astype(np.int8)))
+    return [(int(low), int(high) + 1) for low, high in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _is_round(level: Float, low: int, high: int, slope: float) -> bool:
+    half = 0.5 * (high - low)
+    return _gentle(level[high - 1 :], slope) > 0.5 * half and _gentle(level[: low + 1][::-1], slope) > 0.5 * half
+
+
+def _gentle(level: Float, slope: float) -> int:
+    """How many columns on the surface rises by more than δ but less than 2.5 δ, from a stretch's last column."""
+    if len(level) < 4:
+        return 0
+    rise = np.diff(level) / COLUMN
+    steep = np.flatnonzero(~(rise < 2.5 * slope))
+    return int(steep[0]) if len(steep) else len(rise)
