@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 import click
@@ -20,24 +20,26 @@ if TYPE_CHECKING:
     from tunneldb.job.stages import Stage
 
 
-def _parameter_table() -> str:
-    width = max(map(len, PARAMETERS))
-    return "\n".join(f"  {name:<{width}}  {p.text} [{f'{p.default:g} {p.unit}'.rstrip()}]" for name, p in PARAMETERS.items())
+def parameter_table(names: Iterable[str] = PARAMETERS) -> str:
+    """Parameters, what they mean and their defaults, a line each."""
+    chosen = {name: PARAMETERS[name] for name in names}
+    width = max(map(len, chosen), default=0)
+    return "\n".join(f"  {name:<{width}}  {p.text} [{f'{p.default:g} {p.unit}'.rstrip()}]" for name, p in chosen.items())
 
 
 @click.command(
-    epilog="\b\nParameters for --set, with their defaults:\n" + _parameter_table(),
+    epilog="\b\nParameters for --set, with their defaults:\n" + parameter_table(),
 )
 @click.argument("survey")
 @click.option("--km", metavar="A[-B]", help="Only these kilometres, 511 or 511-512; all that are loaded by default.")
-@click.option("--from", "first", metavar="STAGE", help="Begin with this stage: axis, segments, sections or detect.")
+@click.option("--from", "first", metavar="STAGE", help="Begin with this stage: axis, segments, sections, ground or detect.")
 @click.option("--to", "last", metavar="STAGE", help="End with this stage.")
 @click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see below. May be repeated.")
 @click.pass_obj
 def run(
     settings_: Settings, survey: str, km: str | None, first: str | None, last: str | None, assignments: tuple[str, ...]
 ) -> None:
-    """Run the stages of SURVEY: axis, segments, sections, detect.
+    """Run the stages of SURVEY: axis, segments, sections, ground, detect.
 
     Each stage of each kilometre is one transaction that replaces what the stage made there before, so a run may be
     stopped at any moment and repeated. Axis vertices moved by hand and reviews of leaks stay.

@@ -1,0 +1,44 @@
+"""The verb ``ground``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tunneldb.cli.classes import print_classes, told_to_end
+from tunneldb.cli.progress import points_bar, step
+from tunneldb.cli.run import parameter_table
+from tunneldb.errors import UserError
+from tunneldb.job.parameters import PARAMETERS, settings
+
+_PREFIXES = ("ground.", "cluster.")
+_NAMES = [name for name in PARAMETERS if name.startswith(_PREFIXES)]
+
+
+@click.command(epilog="\b\nParameters for --set, with their defaults:\n" + parameter_table(_NAMES))
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", required=True, type=click.Path(dir_okay=False, path_type=Path), help="File to write, .laz; not FILE."
+)
+@click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see below. May be repeated.")
+def ground(file: Path, output: Path, assignments: tuple[str, ...]) -> None:
+    """Class the points of FILE by itself: ground, lining and what stands or hangs before it; needs no database.
+
+    FILE is LAS, LAZ or E57; what is written is LAZ 1.4 with the classes 2 ground, 64 lining, 65 niche, 66 appendage, 67
+    rail, 68 object, 70 noise. Of LAS and LAZ all else stays as it is. With a survey, tunneldb export --classified knows
+    the lining better.
+    """
+    for assignment in assignments:
+        if not assignment.startswith(_PREFIXES):
+            raise UserError(f"{assignment.partition('=')[0]!r} is no parameter of this verb; there are {', '.join(_NAMES)}")
+    values = settings(assignments)
+    from tunneldb.export.bare import classify_file
+
+    with told_to_end(), points_bar() as progress:
+        found = classify_file(file, output, values, step(progress))
+    print_classes(found.counts)
+    if not found.ground:
+        click.echo("no ground: nothing in the file is a floor")
+    if not found.lining:
+        click.echo("no lining: nothing in the file is a wall or a vault")
