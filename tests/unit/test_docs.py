@@ -10,6 +10,7 @@ import click
 import pytest
 
 from tunneldb.cli.main import main
+from tunneldb.ground.classes import Klass
 from tunneldb.job.parameters import PARAMETERS
 
 ROOT = Path(__file__).parents[2]
@@ -94,6 +95,11 @@ def test_parameters_exist(page: Path) -> None:
     prefixes = {name.partition(".")[0] for name in PARAMETERS}
     named = re.findall(r"`(\w+)\.(\w+)(?:=[^`]*)?`", page.read_text("utf-8"))
     assert {f"{a}.{b}" for a, b in named if a in prefixes and b not in ("sql", "py", "csv")} <= PARAMETERS.keys()
+
+
+def test_classes_are_those_of_the_program() -> None:
+    rows = re.findall(r"^\| (\d+) \| (\w+) \|", (ROOT / "docs" / "classes.md").read_text("utf-8"), re.MULTILINE)
+    assert [(int(code), name) for code, name in rows] == [(int(klass), klass.name.lower()) for klass in Klass]
 
 
 @pages
