@@ -22,7 +22,7 @@ def measure(dsn: str, folder: Path, length: float, seed: int) -> dict[str, float
     points = len(scene.xyz)
     scene.register(dsn)
     load = scene.load(dsn)
-    scene.run(dsn, "axis", "sections")
+    scene.run(dsn, "axis", "ground")
     detect = scene.run(dsn, "detect", "detect")
     with connect(dsn) as connection:
         surface = load_surface(connection, get_survey(connection, scene.name))

@@ -107,6 +107,7 @@ def parts(dsn: str, path: Path, count: int) -> dict[str, float]:
     use_threads(1)  # before Numba is imported
     from tunneldb.database import connect, get_survey
     from tunneldb.geometry.store import load_surface
+    from tunneldb.job.detect import load_floor
     from tunneldb.leak.gather import CHUNK, Lens
     from tunneldb.leak.image import Accumulator, Grid
     from tunneldb.leak.seen import Eye, Radiometer
@@ -121,7 +122,8 @@ def parts(dsn: str, path: Path, count: int) -> dict[str, float]:
         survey = get_survey(conn, NAME)
         surface = load_surface(conn, survey, km * 1000.0, (km + 1) * 1000.0)
         radiometer = Radiometer("amplitude", load_poses(conn, survey), load_reference(conn, survey), 80.0)
-    eye = Eye.of(surface, km, 0.5, radiometer)
+        floor = load_floor(conn, survey, km, 0.0)
+    eye = Eye.of(surface, km, 0.5, radiometer, floor)
     grid = Grid.covering(km, 0.02, float(surface.arcs.min()), float(surface.arcs.max()))
     lens = Lens.of(eye, grid, 12.0)
     with Accumulator(grid) as image:
@@ -143,7 +145,7 @@ def parts(dsn: str, path: Path, count: int) -> dict[str, float]:
 
 
 def prepare(folder: Path, points: int, dsn: str) -> Scene:
-    """Simulate a tunnel on both sides of a kilometre's border, load it, and run it up to its sections."""
+    """Simulate a tunnel on both sides of a kilometre's border, load it, and run it up to its ground."""
     with tempfile.TemporaryDirectory() as small:
         progress("a short one, so that all is compiled")
         warm = Scene.simulate(Path(small), "short", "--length", 12, "--scanner", "profiler", "--profile-spacing", 0.03)
@@ -160,8 +162,8 @@ def prepare(folder: Path, points: int, dsn: str) -> Scene:
     scene.register(dsn)
     progress("loading")
     scene.load(dsn)
-    progress("axis, segments, sections")
-    scene.run(dsn, "axis", "sections")
+    progress("axis, segments, sections, ground")
+    scene.run(dsn, "axis", "ground")
     return scene
 
 

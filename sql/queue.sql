@@ -19,8 +19,8 @@ COMMENT ON FUNCTION tunnel_api.queue_lock(integer) IS
 --            asked to try again (goal.retry_after); or, for load, a file that touches the kilometre failed
 --   blocked  an earlier stage of the kilometre failed
 --   empty    the kilometre holds no points, and awaits none
--- A neighbour that is failed, blocked or empty, or of which the stage is not wanted, is not waited for. Five stages reach no
--- farther than four kilometres: a range is judged with five more on both sides.
+-- A neighbour that is failed, blocked or empty, or of which the stage is not wanted, is not waited for. Six stages reach no
+-- farther than five kilometres: a range is judged with six more on both sides.
 CREATE OR REPLACE FUNCTION tunnel_api.queue_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS TABLE (km integer, step integer, stage text, state text, message text)
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000
@@ -29,10 +29,11 @@ SET jit = off
 SET enable_nestloop = off  -- how few or many rows there are is not known when it is planned
 AS $$
     WITH RECURSIVE goal AS (
-        SELECT g.km, array_position('{load,axis,segments,sections,detect}', g.stage) AS target, g.parameters, g.retry_after
-          FROM tunnel.goal g WHERE g.survey_id = $1 AND g.km BETWEEN $2 - 5 AND $3 + 5
+        SELECT g.km, array_position('{load,axis,segments,sections,ground,detect}', g.stage) AS target, g.parameters, g.retry_after
+          FROM tunnel.goal g WHERE g.survey_id = $1 AND g.km BETWEEN $2 - 6 AND $3 + 6
     ), family (prefix, step) AS (  -- parameters by stage; load's are those of its files
-        VALUES ('axis', 2), ('section', 4), ('lining', 5), ('image', 5), ('intensity', 5), ('appendage', 5), ('leak', 5)
+        VALUES ('axis', 2), ('section', 4), ('ground', 5), ('cluster', 5), ('lining', 6), ('image', 6), ('intensity', 6), ('appendage', 6),
+               ('leak', 6)
     ), wish AS (
         SELECT p.parameters, f.step, jsonb_object_agg(e.key, e.value) AS part
           FROM (SELECT DISTINCT g.parameters FROM goal g) AS p
@@ -44,7 +45,7 @@ AS $$
                min(CASE WHEN strpos(i.message, i.name) = 0 THEN format('file %s: %s', i.name, i.message) ELSE i.message END)
                    FILTER (WHERE i.failed_at IS NOT NULL) AS message
           FROM tunnel.incoming i
-         CROSS JOIN LATERAL generate_series(greatest(i.km_from, $2 - 5), least(i.km_to, $3 + 5)) AS k (km)
+         CROSS JOIN LATERAL generate_series(greatest(i.km_from, $2 - 6), least(i.km_to, $3 + 6)) AS k (km)
          WHERE i.survey_id = $1 AND i.km_from IS NOT NULL  -- a file without kilometres fails none
          GROUP BY k.km
     ), job AS (
@@ -59,7 +60,7 @@ AS $$
                AND to_regclass(format('tunnel.point_s%s_km%s', $1, s.km)) IS NULL AS empty,
                CASE s.step WHEN 1 THEN s.input_at IS NOT NULL OR coalesce(f.awaited, false)
                            ELSE s.done_at IS NULL OR s.outdated OR NOT s.done_parameters @> coalesce(w.part, '{}') END AS due
-          FROM tunnel_api.stage_state($1, $2 - 5, $3 + 5) s
+          FROM tunnel_api.stage_state($1, $2 - 6, $3 + 6) s
           JOIN goal g ON g.km = s.km
           LEFT JOIN wish w ON w.parameters = g.parameters AND w.step = s.step
           LEFT JOIN file f ON f.km = s.km
@@ -108,7 +109,7 @@ COMMENT ON FUNCTION tunnel_api.queue_state(integer, integer, integer) IS
     'What becomes of each stage that is wanted of each kilometre of a survey: done, running, queued, ready, waits, failed, blocked or empty';
 
 -- Defers a job for each file to be read and for each stage of the kilometres that is ready; returns how many. Whoever commits
--- a result calls it last, for the kilometre and four to both sides, so that the jobs come to be with what made them ready.
+-- a result calls it last, for the kilometre and five to both sides, so that the jobs come to be with what made them ready.
 --
 -- A kilometre goes before the next one, and in it a later stage before an earlier one, so that kilometres are finished one
 -- after the other and few fragments wait. Detection lags by eight kilometres: it holds up nothing, and fills the workers'
@@ -129,7 +130,7 @@ BEGIN
           FROM tunnel.incoming i
          WHERE i.survey_id = queue_plan.survey_id AND i.failed_at IS NULL
          UNION ALL
-        SELECT 'stage', CASE s.step WHEN 5 THEN -10 * (s.km + 8) ELSE -10 * s.km END + s.step,
+        SELECT 'stage', CASE s.step WHEN 6 THEN -10 * (s.km + 8) ELSE -10 * s.km END + s.step,
                format('s%s.km%s', queue_plan.survey_id, s.km),
                jsonb_build_object('survey_id', queue_plan.survey_id, 'km', s.km, 'stage', s.stage)
           FROM tunnel_api.queue_state(queue_plan.survey_id, queue_plan.km_from, queue_plan.km_to) s
@@ -174,7 +175,7 @@ DECLARE
 BEGIN
     PERFORM tunnel_queue.procrastinate_finish_job_v1(job_id, 'succeeded', false);
     IF km IS NOT NULL THEN
-        PERFORM tunnel_api.queue_plan(survey, km - 4, km + 4);
+        PERFORM tunnel_api.queue_plan(survey, km - 5, km + 5);
         RETURN;
     END IF;
     INSERT INTO tunnel.goal (survey_id, km, stage, parameters)
@@ -185,7 +186,7 @@ BEGIN
      WHERE i.survey_id = survey AND i.name = args ->> 'file'
         ON CONFLICT DO NOTHING;
     -- those that the file may touch, and those that were read anew
-    SELECT least(min(i.km_from), min(k.km)) - 4, greatest(max(i.km_to), max(k.km)) + 4
+    SELECT least(min(i.km_from), min(k.km)) - 5, greatest(max(i.km_to), max(k.km)) + 5
       INTO first, last
       FROM tunnel.incoming i
       LEFT JOIN tunnel.scan_file f ON f.survey_id = i.survey_id
@@ -215,7 +216,7 @@ BEGIN
     RETURNING i.km_from, i.km_to INTO first, last;
     first := coalesce(first, (args ->> 'km')::integer, -1000000);
     last := coalesce(last, (args ->> 'km')::integer, 1000000);
-    PERFORM tunnel_api.queue_plan(survey, first - 4, last + 4);
+    PERFORM tunnel_api.queue_plan(survey, first - 5, last + 5);
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.queue_fail(bigint, text) IS

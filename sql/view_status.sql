@@ -30,9 +30,11 @@ COMMENT ON COLUMN tunnel_api.run.job_id IS 'Job of the queue that it was (tunnel
 --   axis        load here and on both neighbours,
 --   segments    axis here and on both neighbours, and load,
 --   sections    segments here and on both neighbours,
---   detect      sections here and on both neighbours, and all before here;
+--   ground      sections here and on both neighbours,
+--   detect      ground here and on both neighbours, and all before here;
 -- segments and what follows also on the axis' vertices moved by hand, in the kilometre or at most two beyond its ends.
--- It is stale when one of these came to be since its run began, or is stale itself. Runs are put in order by their times:
+-- It is stale when one of these came to be since its run began, is stale itself, or never ran here, as ground in a database
+-- that was made before there was that stage. Runs are put in order by their times:
 -- a result commits under a lock that each run takes just before it begins (see queue_lock), so that none which it did not
 -- see bears an earlier time.
 CREATE OR REPLACE FUNCTION tunnel_api.stage_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
@@ -45,7 +47,7 @@ SET jit = off
 SET enable_nestloop = off  -- how few or many rows there are is not known when it is planned
 AS $$
     WITH RECURSIVE names (stages) AS (
-        VALUES ('{load,axis,segments,sections,detect}'::text[])
+        VALUES ('{load,axis,segments,sections,ground,detect}'::text[])
     ), attempt AS MATERIALIZED (
         SELECT r.km, array_position(n.stages, r.stage) AS step, r.id, r.outcome, r.started_at, r.finished_at, r.message,
                r.parameters, r.backend_pid, r.backend_start
@@ -76,7 +78,7 @@ AS $$
          GROUP BY k.km
     ), whole AS (  -- a row a kilometre: begin and end of the last success of each stage
         SELECT k.km, array_agg(d.started_at ORDER BY g.step) AS begun, array_agg(d.finished_at ORDER BY g.step) AS ended
-          FROM kilometre k CROSS JOIN generate_series(1, 5) AS g (step)
+          FROM kilometre k CROSS JOIN generate_series(1, 6) AS g (step)
           LEFT JOIN success d ON d.km = k.km AND d.step = g.step
          GROUP BY k.km
     ), direct AS MATERIALIZED (
@@ -84,8 +86,8 @@ AS $$
                CASE g.step
                    WHEN 1 THEN p.read_at
                    ELSE greatest(w.ended[1], CASE WHEN g.step > 2 THEN w.ended[2] END, CASE WHEN g.step > 3 THEN w.ended[3] END,
-                                 CASE WHEN g.step > 4 THEN w.ended[4] END, b.ended[g.step - 1], a.ended[g.step - 1],
-                                 CASE WHEN g.step > 2 THEN e.edited_at END)
+                                 CASE WHEN g.step > 4 THEN w.ended[4] END, CASE WHEN g.step > 5 THEN w.ended[5] END,
+                                 b.ended[g.step - 1], a.ended[g.step - 1], CASE WHEN g.step > 2 THEN e.edited_at END)
                END AS input_at,
                CASE
                    WHEN w.begun[g.step] IS NULL THEN NULL
@@ -94,6 +96,8 @@ AS $$
                    WHEN g.step > 2 AND w.ended[2] > w.begun[g.step] THEN 'axis ran since'
                    WHEN g.step > 3 AND w.ended[3] > w.begun[g.step] THEN 'segments ran since'
                    WHEN g.step > 4 AND w.ended[4] > w.begun[g.step] THEN 'sections ran since'
+                   WHEN g.step > 5 AND w.ended[5] > w.begun[g.step] THEN 'ground ran since'
+                   WHEN g.step > 5 AND w.ended[5] IS NULL THEN 'ground never ran'
                    WHEN b.ended[g.step - 1] > w.begun[g.step]
                        THEN format('%s of kilometre %s ran since', n.stages[g.step - 1], w.km - 1)
                    WHEN a.ended[g.step - 1] > w.begun[g.step]
@@ -102,7 +106,7 @@ AS $$
                END AS reason
           FROM names n
          CROSS JOIN whole w
-         CROSS JOIN generate_series(1, 5) AS g (step)
+         CROSS JOIN generate_series(1, 6) AS g (step)
           LEFT JOIN whole b ON b.km = w.km - 1
           LEFT JOIN whole a ON a.km = w.km + 1
           LEFT JOIN pending p ON p.km = w.km
@@ -146,7 +150,7 @@ SELECT (s.id::bigint * 1000000 + 500000 + t.km) * 10 + t.step AS id, s.id AS sur
  CROSS JOIN LATERAL tunnel_api.stage_state(s.id) t
   LEFT JOIN tunnel.run r ON r.id = t.run_id;
 COMMENT ON VIEW tunnel_api.stage_status IS 'How far each kilometre of each survey has come: one row per stage';
-COMMENT ON COLUMN tunnel_api.stage_status.step IS 'Order of the stages: load, axis, segments, sections, detect';
+COMMENT ON COLUMN tunnel_api.stage_status.step IS 'Order of the stages: load, axis, segments, sections, ground, detect';
 COMMENT ON COLUMN tunnel_api.stage_status.outcome IS 'Of the last run: running, done, failed, interrupted (its session is gone) or never';
 COMMENT ON COLUMN tunnel_api.stage_status.done_at IS 'End of the last successful run, whose result is in the database';
 COMMENT ON COLUMN tunnel_api.stage_status.counts IS 'What the last run counted';

@@ -121,15 +121,15 @@ def test_status_of_all_surveys_counts_kilometres_by_stage(example: str) -> None:
     result = run("status")
     assert result.exit_code == 0
     lines = [line.split() for line in result.output.splitlines()]
-    assert lines[0][-6:] == ["km", "load", "axis", "segments", "sections", "detect"]
-    assert lines[1] == [example, "demo", "2024-05-04", "1", "60", "12+300.100", "12+499.900", *"111111"]
+    assert lines[0][-7:] == ["km", "load", "axis", "segments", "sections", "ground", "detect"]
+    assert lines[1] == [example, "demo", "2024-05-04", "1", "60", "12+300.100", "12+499.900", *"1111111"]
     assert len(lines) == 2
 
 
 def test_status_of_a_survey(example: str) -> None:
     lines = [line.split() for line in run("status", example).output.splitlines()]
     assert [example, "demo", "2024-05-04", "1", "60", "12+300.100", "12+499.900"] in lines
-    assert lines[-1] == ["12", "done", "done", "done", "done", "done"]
+    assert lines[-1] == ["12", *["done"] * 6]
     unknown = run("status", "other")
     assert unknown.exit_code == 2
     assert example in unknown.stderr

@@ -19,12 +19,13 @@ from tunneldb.geometry.store import load_surface
 from tunneldb.intensity.dry import Dry
 from tunneldb.intensity.roughness import Roughness
 from tunneldb.job import detect as job
+from tunneldb.job.scene import load_arcs
 from tunneldb.job.sources import sources
 from tunneldb.leak import detection
 from tunneldb.leak.border import replace_parts
 from tunneldb.leak.gather import gather
 from tunneldb.leak.image import Accumulator
-from tunneldb.leak.lining import Astray
+from tunneldb.leak.lining import Astray, Floor
 from tunneldb.leak.picture import develop
 from tunneldb.leak.region import Region
 from tunneldb.leak.seen import Eye
@@ -65,9 +66,9 @@ def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def sections(conn: psycopg.Connection, scan: Path) -> psycopg.Connection:
-    """Two kilometres up to their sections."""
+    """Two kilometres up to their ground."""
     prepare(scan, "profiler", start=START)
-    command("run", NAME, "--to", "sections")
+    command("run", NAME, "--to", "ground")
     return conn
 
 
@@ -79,7 +80,9 @@ def uncut(sections: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> list
     there = load_surface(conn, survey)
     surface = replace(there, ends=there.ends - SHIFT, chainages=there.chainages - SHIFT)
     grid = job._grid(surface, 12, PIXEL)
-    eye = Eye.of(surface, 12, 0.5, job._radiometer(conn, survey, 80.0), grid.halo * PIXEL)
+    first = int(START - SHIFT)
+    floor = Floor.of(first, *load_arcs(conn, survey, int(START), int(START) + 24))
+    eye = Eye.of(surface, 12, 0.5, job._radiometer(conn, survey, 80.0), floor, grid.halo * PIXEL)
     (points,) = conn.execute("SELECT points FROM tunnel.scan_file").fetchone()
     files = [replace(file, ranges=[(0, points)]) for file in sources(conn, survey, 12)]
     with Accumulator(grid) as image:

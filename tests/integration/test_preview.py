@@ -121,7 +121,7 @@ def test_time_comes_from_the_ledger_and_is_unknown_without(conn: psycopg.Connect
     path = scan(tmp_path, 2000, 3000)
     assert "time: unknown until a kilometre was done" in run(path).output
     survey = get_survey(conn, tunnel)
-    for stage, seconds in {"load": 20, "axis": 10, "segments": 10, "sections": 20, "detect": 60}.items():
+    for stage, seconds in {"load": 20, "axis": 10, "segments": 10, "sections": 20, "ground": 20, "detect": 40}.items():
         add_run(conn, tunnel, 1, stage, seconds)
     add_run(conn, tunnel, None, "read", 10, points=4000)
     conn.execute("UPDATE tunnel.run SET job_id = 1")

@@ -1,4 +1,4 @@
-"""Which jobs are ready, on ledgers made by hand: one letter a stage, load, axis, segments, sections, detect.
+"""Which jobs are ready, on ledgers made by hand: one letter a stage, of load, axis, segments, sections, ground and detect.
 
 d done, R ready, w waits, f failed, b blocked by an earlier failure, e empty, q queued, r running.
 """
@@ -14,7 +14,7 @@ import pytest
 from psycopg import sql
 from psycopg.types.json import Jsonb
 
-STAGES = ("load", "axis", "segments", "sections", "detect")
+STAGES = ("load", "axis", "segments", "sections", "ground", "detect")
 LETTERS = {"ready": "R", "running": "r"}
 # What each stage needs, (kilometre, stage) relative to its own: written down apart from the SQL.
 NEEDS = {
@@ -22,7 +22,8 @@ NEEDS = {
     "axis": [(-1, "load"), (0, "load"), (1, "load")],
     "segments": [(-1, "axis"), (0, "axis"), (1, "axis"), (0, "load")],
     "sections": [(-1, "segments"), (0, "segments"), (1, "segments")],
-    "detect": [(-1, "sections"), (0, "sections"), (1, "sections")],
+    "ground": [(-1, "sections"), (0, "sections"), (1, "sections")],
+    "detect": [(-1, "ground"), (0, "ground"), (1, "ground")],
 }
 
 
@@ -138,91 +139,106 @@ def ledger(conn: psycopg.Connection) -> Ledger:
 
 
 CASES: dict[str, tuple[Callable[[Ledger], object], dict[int, str]]] = {
-    "a file is awaited": (lambda s: s.want(0).await_file("a", 0, 0), {0: "wwwww"}),
-    "a file was read": (lambda s: s.want(0).read("a", 0), {0: "Rwwww"}),
-    "one was read, another is awaited": (lambda s: s.want(0).read("a", 0).await_file("b", 0, 0), {0: "wwwww"}),
+    "a file is awaited": (lambda s: s.want(0).await_file("a", 0, 0), {0: "wwwwww"}),
+    "a file was read": (lambda s: s.want(0).read("a", 0), {0: "Rwwwww"}),
+    "one was read, another is awaited": (lambda s: s.want(0).read("a", 0).await_file("b", 0, 0), {0: "wwwwww"}),
     "the axis waits for the neighbours' points": (
         lambda s: s.want(0, 1, 2).ran(0, "load").ran(1, "load").read("a", 2),
-        {0: "dRwww", 1: "dwwww", 2: "Rwwww"},
+        {0: "dRwwww", 1: "dwwwww", 2: "Rwwwww"},
     ),
     "segments wait for the neighbours' axes": (
         lambda s: s.want(0, 1, 2).through(0, 1, 2, stage="load").ran(0, "axis").ran(1, "axis"),
-        {0: "ddRww", 1: "ddwww", 2: "dRwww"},
+        {0: "ddRwww", 1: "ddwwww", 2: "dRwwww"},
     ),
-    "detection waits for the neighbours' sections": (
+    "the ground waits for the neighbours' sections": (
         lambda s: s.want(0, 1).through(0, 1, stage="segments").ran(0, "sections"),
-        {0: "ddddw", 1: "dddRw"},
+        {0: "ddddww", 1: "dddRww"},
     ),
-    "all is done": (lambda s: s.want(0, 1).through(0, 1), {0: "ddddd", 1: "ddddd"}),
+    "detection waits for the neighbours' ground": (
+        lambda s: s.want(0, 1).through(0, 1, stage="sections").ran(0, "ground"),
+        {0: "dddddw", 1: "ddddRw"},
+    ),
+    "detection of a database from before there was a ground": (
+        lambda s: s.want(0).through(0, stage="sections").ran(0, "detect"),
+        {0: "ddddRw"},
+    ),
+    "other parameters of the ground are wanted": (
+        lambda s: s.want(0, cluster__region=0.2).through(0, stage="sections").ran(0, "ground", cluster__region=0.4),
+        {0: "ddddRw"},
+    ),
+    "all is done": (lambda s: s.want(0, 1).through(0, 1), {0: "dddddd", 1: "dddddd"}),
     "the goal ends before the last stage": (lambda s: s.want(0, stage="segments").through(0, stage="axis"), {0: "ddR"}),
     "a neighbour that failed is not waited for": (
         lambda s: s.want(0, 1).ran(0, "load").read("a", 1).ran(1, "load", "failed", "why"),
-        {0: "dRwww", 1: "fbbbb"},
+        {0: "dRwwww", 1: "fbbbbb"},
     ),
     "nor one that failed earlier": (
         lambda s: s.want(0, 1).through(0, 1, stage="load").ran(0, "axis").ran(1, "axis", "failed", "why"),
-        {0: "ddRww", 1: "dfbbb"},
+        {0: "ddRwww", 1: "dfbbbb"},
     ),
     "nor one whose file failed": (
         lambda s: s.want(0, 1).ran(0, "load").await_file("a", 1, 1, "torn"),
-        {0: "dRwww", 1: "fbbbb"},
+        {0: "dRwwww", 1: "fbbbbb"},
     ),
-    "nor an empty one": (lambda s: s.want(0, 1).ran(0, "load"), {0: "dRwww", 1: "eeeee"}),
-    "nor one that is not wanted": (lambda s: s.want(0).ran(0, "load").ran(1, "load"), {0: "dRwww"}),
+    "nor an empty one": (lambda s: s.want(0, 1).ran(0, "load"), {0: "dRwwww", 1: "eeeeee"}),
+    "nor one that is not wanted": (lambda s: s.want(0).ran(0, "load").ran(1, "load"), {0: "dRwwww"}),
     "nor one that is wanted less far": (
         lambda s: s.want(0).want(1, stage="load").through(0, stage="axis").ran(1, "load").ran(0, "axis"),
-        {0: "ddRww", 1: "d"},
+        {0: "ddRwww", 1: "d"},
     ),
     "a file that may lie anywhere holds up nothing": (
         lambda s: s.want(0).ran(0, "load").await_file("a", None, None, "torn"),
-        {0: "dRwww"},
+        {0: "dRwwww"},
     ),
     "a file that failed holds up its kilometres, loaded or not": (
         lambda s: s.want(0, 1, 2).through(0, 1, 2, stage="load").await_file("a", 1, 1, "torn"),
-        {0: "dRwww", 1: "fbbbb", 2: "dRwww"},
+        {0: "dRwwww", 1: "fbbbbb", 2: "dRwwww"},
     ),
     "a neighbour that comes later is taken in": (
         lambda s: s.want(0, 1, 2).through(0, 1).read("a", 2).ran(2, "load"),
-        {0: "ddwww", 1: "dRwww", 2: "dRwww"},
+        {0: "ddwwww", 1: "dRwwww", 2: "dRwwww"},
     ),
     "what rests on an open neighbour waits, though it was done": (
         lambda s: s.want(0, 1, 2).through(0, 1, 2).read("a", 2),
-        {0: "ddwww", 1: "dwwww", 2: "Rwwww"},
+        {0: "ddwwww", 1: "dwwwww", 2: "Rwwwww"},
     ),
-    "a stage that failed is left": (lambda s: s.want(0).ran(0, "load").ran(0, "axis", "failed", "why"), {0: "dfbbb"}),
+    "a stage that failed is left": (lambda s: s.want(0).ran(0, "load").ran(0, "axis", "failed", "why"), {0: "dfbbbb"}),
     "until what it rests on changes": (
         lambda s: s.want(0).ran(0, "load").ran(0, "axis", "failed", "why").ran(0, "load"),
-        {0: "dRwww"},
+        {0: "dRwwww"},
     ),
     "or a neighbour does": (
         lambda s: s.want(0, 1).ran(0, "load").ran(0, "axis", "failed", "why").ran(1, "load"),
-        {0: "dRwww", 1: "dRwww"},
+        {0: "dRwwww", 1: "dRwwww"},
     ),
     "or its parameters": (
         lambda s: s.want(0, axis__tolerance=0.1).ran(0, "load").ran(0, "axis", "failed", "why", axis__tolerance=0.2),
-        {0: "dRwww"},
+        {0: "dRwwww"},
     ),
     "but not those of other stages": (
         lambda s: s.want(0, leak__min_area=0.1).ran(0, "load").ran(0, "axis", "failed", "why", axis__tolerance=0.2),
-        {0: "dfbbb"},
+        {0: "dfbbbb"},
     ),
     "a load that failed is tried again with another file": (
         lambda s: s.want(0).read("a", 0).ran(0, "load", "failed", "why").read("b", 0),
-        {0: "Rwwww"},
+        {0: "Rwwwww"},
     ),
-    "a run whose session is gone is repeated": (lambda s: s.want(0).ran(0, "load").ran(0, "axis", "interrupted"), {0: "dRwww"}),
+    "a run whose session is gone is repeated": (
+        lambda s: s.want(0).ran(0, "load").ran(0, "axis", "interrupted"),
+        {0: "dRwwww"},
+    ),
     "a later failure does not undo what is there": (
         lambda s: s.want(0).through(0).ran(0, "sections", "failed", "why"),
-        {0: "ddddd"},
+        {0: "dddddd"},
     ),
     "other parameters are wanted": (
         lambda s: s.want(0, section__angle_step=10).through(0, stage="segments").ran(0, "sections", section__angle_step=5),
-        {0: "dddRw"},
+        {0: "dddRww"},
     ),
     "the same parameters are wanted": (
         lambda s: s.want(0, section__angle_step=5).through(0, stage="segments").ran(
             0, "sections", section__angle_step=5.0, section__min_points=5),
-        {0: "ddddR"},
+        {0: "ddddRw"},
     ),
 }  # fmt: skip
 
@@ -251,9 +267,9 @@ def test_failures_say_why(ledger: Ledger) -> None:
 def test_what_failed_before_it_was_asked_for_again_is_tried_again(ledger: Ledger) -> None:
     ledger.want(0).ran(0, "load").ran(0, "axis", "failed", "why")
     ledger.conn.execute("UPDATE tunnel.goal SET retry_after = '2024-05-05 00:02:29'")  # it failed at 00:02:30
-    assert ledger.states() == {0: "dfbbb"}
+    assert ledger.states() == {0: "dfbbbb"}
     ledger.conn.execute("UPDATE tunnel.goal SET retry_after = '2024-05-05 00:02:31'")
-    assert ledger.states() == {0: "dRwww"}
+    assert ledger.states() == {0: "dRwwww"}
 
 
 def test_a_vertex_moved_by_hand_has_segments_made_anew(ledger: Ledger) -> None:
@@ -264,28 +280,28 @@ def test_a_vertex_moved_by_hand_has_segments_made_anew(ledger: Ledger) -> None:
         "   FROM (SELECT ST_SetSRID(ST_MakePoint(500, 0, 0), 25830)) AS p (g)",
         [ledger.survey],
     )
-    assert ledger.states() == {0: "ddRww", 1: "dddww"}
+    assert ledger.states() == {0: "ddRwww", 1: "dddwww"}
 
 
 def test_jobs_are_deferred_once(ledger: Ledger) -> None:
     ledger.want(0, 1).ran(0, "load").read("a", 1).await_file("b", 3, 4)
     assert ledger.plan() == [(1, "load"), ("b", "read")]
     assert ledger.plan() == [(1, "load"), ("b", "read")]
-    assert ledger.states() == {0: "dwwww", 1: "qwwww"}
+    assert ledger.states() == {0: "dwwwww", 1: "qwwwww"}
     ledger.conn.execute("UPDATE tunnel_queue.procrastinate_jobs SET status = 'doing'")
     assert ledger.plan() == []
-    assert ledger.states() == {0: "dwwww", 1: "rwwww"}
+    assert ledger.states() == {0: "dwwwww", 1: "rwwwww"}
 
 
 def test_a_kilometre_is_finished_before_the_next_is_begun(ledger: Ledger) -> None:
-    ledger.want(0, 2, 4, 5).through(0, stage="sections").through(2, stage="segments").read("a", 4)
+    ledger.want(0, 2, 4, 5).through(0, stage="ground").through(2, stage="segments").read("a", 4)
     ledger.await_file("b", 5, 5).await_file("c", 9, 9)
     # detection holds nothing up, and lags behind
     assert ledger.plan() == [(2, "sections"), (4, "load"), ("b", "read"), (0, "detect"), ("c", "read")]
 
 
 def test_a_part_is_planned_as_the_whole_is(ledger: Ledger) -> None:
-    """The end of a stage looks at four kilometres to both sides only: no other can have become ready."""
+    """The end of a stage looks at five kilometres to both sides only: no other can have become ready."""
     rng = random.Random(1)
     ledger.want(*range(30))
     for km in range(30):

@@ -83,19 +83,19 @@ def states(seen: Overview) -> dict[int, str]:
 
 def test_each_kilometre_says_how_far_it_is(conn: psycopg.Connection, batch: str) -> None:
     assert states(overview(conn, batch)) == {
-        1: "done done done done done",
-        2: "done failed never never never",
-        3: "done done running waits waits",
-        4: "done queued waits waits waits",
-        5: "waits waits waits waits waits",
-        6: "failed never never never never",
+        1: "done done done done done done",
+        2: "done failed never never never never",
+        3: "done done running waits waits waits",
+        4: "done queued waits waits waits waits",
+        5: "waits waits waits waits waits waits",
+        6: "failed never never never never never",
     }
 
 
 def test_counts_and_workers(conn: psycopg.Connection, batch: str) -> None:
     seen = overview(conn, batch)
     assert seen.active
-    assert (seen.done, seen.total) == (5 + 1 + 2 + 1, 6 * 5)
+    assert (seen.done, seen.total) == (6 + 1 + 2 + 1, 6 * 6)
     assert [(worker.host, worker.lost, worker.doing) for worker in seen.workers] == [
         ("calc-1", False, f"segments km 3 of {batch}"),
         ("calc-2", True, None),
@@ -109,10 +109,10 @@ def test_time_left_is_unknown_until_every_stage_was_measured(conn: psycopg.Conne
     add_run(conn, batch, None, "read", 30, ago=1000)
     conn.execute("UPDATE tunnel.goal SET requested_at = requested_at - interval '20 minutes'")
     seen = overview(conn, batch)
-    # reading 30, load 40, axis 2 × 10, segments, sections and detect 3 × 20 each; that of km 3 has just begun
-    assert seen.left == pytest.approx(30 + 40 + 2 * 10 + 9 * 20, abs=3)
-    behind = 30 + 4 * 40 + 2 * 10 + 3 * 20
-    assert seen.share == pytest.approx(behind / (behind + 270))
+    # reading 30, load 40, axis 2 × 10, segments, sections, ground and detect 3 × 20 each; that of km 3 has just begun
+    assert seen.left == pytest.approx(30 + 40 + 2 * 10 + 12 * 20, abs=3)
+    behind = 30 + 4 * 40 + 2 * 10 + 4 * 20
+    assert seen.share == pytest.approx(behind / (behind + 330))
     assert seen.rate == pytest.approx(2000 * seen.share / 1200, rel=0.02)
 
 
@@ -143,7 +143,7 @@ def test_equal_kilometres_share_a_row(conn: psycopg.Connection, example: str) ->
     conn.commit()
     output = CliRunner().invoke(main, ["status", example]).output
     rows = [line.split() for line in output.splitlines() if line[:1].isdigit()]
-    assert rows == [["12", *["done"] * 5], ["14–20,", "22", "done", *["never"] * 4]]
+    assert rows == [["12", *["done"] * 6], ["14–20,", "22", "done", *["never"] * 5]]
 
 
 @pytest.mark.parametrize("width", [80, 140])
@@ -186,7 +186,7 @@ def test_watch_in_a_pipe_says_what_changes_and_ends_when_nothing_is_left(conn: p
         [*TUNNELDB, "status", batch, "--watch", "--interval", "0.1"], stdout=subprocess.PIPE, text=True, env=dict(os.environ)
     )
     assert watcher.stdout is not None
-    assert watcher.stdout.readline().startswith("9 of 30 steps done; — points/s")
+    assert watcher.stdout.readline().startswith("10 of 36 steps done; — points/s")
     conn.execute("UPDATE tunnel_queue.procrastinate_jobs SET status = 'succeeded'")
     conn.execute("UPDATE tunnel.run SET outcome = 'done', finished_at = clock_timestamp() WHERE outcome = 'running'")
     conn.execute("DELETE FROM tunnel.incoming WHERE name = 'km-5.laz'")
@@ -194,7 +194,7 @@ def test_watch_in_a_pipe_says_what_changes_and_ends_when_nothing_is_left(conn: p
     conn.commit()
     lines = watcher.communicate(timeout=30)[0].splitlines()
     assert watcher.returncode == 0
-    assert lines[0].startswith("[9/15] segments km 3: ")
+    assert lines[0].startswith("[10/18] segments km 3: ")
     assert lines[-1].endswith("steps done")
 
 

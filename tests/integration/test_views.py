@@ -174,7 +174,7 @@ def test_moving_a_vertex_marks_it_and_what_rests_on_it(conn: psycopg.Connection,
     )
     assert (source, by, recent) == ("edited", one(conn, "SELECT session_user::text"), True)
     assert z == pytest.approx(602.05)
-    assert stale(conn) == dict.fromkeys(("segments", "sections", "detect"), "axis edited since")
+    assert stale(conn) == dict.fromkeys(("segments", "sections", "ground", "detect"), "axis edited since")
     segments = conn.execute("SELECT n FROM tunnel_api.segment WHERE stale ORDER BY n").fetchall()
     # the two that end there, and their neighbours, whose end planes turn with it
     assert [n for (n,) in segments] == [1238, 1239, 1240, 1241]
@@ -255,13 +255,28 @@ def run(conn: psycopg.Connection, stage: str, hour: int, outcome: str = "done", 
 
 def test_later_stages_are_stale_until_run_again(conn: psycopg.Connection, example: str) -> None:
     run(conn, "segments", 1)
-    assert stale(conn) == {"sections": "segments ran since", "detect": "segments ran since"}
+    assert stale(conn) == dict.fromkeys(("sections", "ground", "detect"), "segments ran since")
     # a stage run out of order rests on what is stale
     run(conn, "detect", 2)
-    assert stale(conn) == {"sections": "segments ran since", "detect": "sections is stale"}
+    assert stale(conn) == {
+        "sections": "segments ran since", "ground": "segments ran since", "detect": "sections is stale",
+    }  # fmt: skip
     run(conn, "sections", 3)
-    assert stale(conn) == {"detect": "sections ran since"}
-    run(conn, "detect", 4)
+    assert stale(conn) == {"ground": "segments ran since", "detect": "sections ran since"}
+    run(conn, "ground", 4)
+    run(conn, "detect", 5)
+    run(conn, "ground", 6)
+    assert stale(conn) == {"detect": "ground ran since"}
+    run(conn, "detect", 7)
+    assert stale(conn) == {}
+
+
+def test_leaks_of_a_database_from_before_there_was_a_ground_are_stale(conn: psycopg.Connection, example: str) -> None:
+    conn.execute("DELETE FROM tunnel.run WHERE stage = 'ground'")
+    assert stale(conn) == {"detect": "ground never ran"}
+    run(conn, "ground", 1)
+    assert stale(conn) == {"detect": "ground ran since"}
+    run(conn, "detect", 2)
     assert stale(conn) == {}
 
 
@@ -285,6 +300,7 @@ def test_another_load_makes_all_of_its_kilometre_stale_and_the_neighbours_axes(c
         (12, "axis"): "load ran since",
         (12, "segments"): "load ran since",
         (12, "sections"): "load ran since",
+        (12, "ground"): "load ran since",
         (12, "detect"): "load ran since",
         (13, "axis"): "load of kilometre 12 ran since",
         (13, "segments"): "axis is stale",
@@ -292,23 +308,28 @@ def test_another_load_makes_all_of_its_kilometre_stale_and_the_neighbours_axes(c
 
 
 def test_what_a_neighbour_does_anew_reaches_the_next_stage_only(conn: psycopg.Connection, example: str) -> None:
-    for hour, stage in enumerate(("load", "axis", "segments", "sections", "detect")):
+    for hour, stage in enumerate(("load", "axis", "segments", "sections", "ground", "detect")):
         run(conn, stage, hour, km=12)
         run(conn, stage, hour, km=13)
     assert conn.execute(STALE).fetchall() == []
     run(conn, "segments", 10, km=13)
     assert conn.execute(STALE).fetchall() == [
         (12, "sections", "segments of kilometre 13 ran since"),
+        (12, "ground", "sections is stale"),
         (12, "detect", "sections is stale"),
         (13, "sections", "segments ran since"),
+        (13, "ground", "segments ran since"),
         (13, "detect", "segments ran since"),
     ]
     run(conn, "sections", 11, km=13)
-    run(conn, "detect", 12, km=13)
+    run(conn, "ground", 12, km=13)
+    run(conn, "detect", 13, km=13)
     assert conn.execute(STALE).fetchall() == [
         (12, "sections", "segments of kilometre 13 ran since"),
-        (12, "detect", "sections of kilometre 13 ran since"),
-        (13, "detect", "sections of kilometre 12 is stale"),
+        (12, "ground", "sections of kilometre 13 ran since"),
+        (12, "detect", "ground of kilometre 13 ran since"),
+        (13, "ground", "sections of kilometre 12 is stale"),
+        (13, "detect", "ground is stale"),
     ]
 
 
@@ -329,7 +350,7 @@ def test_vertex_edited_beyond_the_kilometre_counts_up_to_two_vertices(conn: psyc
     conn.execute(insert, {"n": 1303, "at": EDITED})
     assert stale(conn) == {}
     conn.execute(insert, {"n": 1302, "at": EDITED})
-    assert set(stale(conn)) == {"segments", "sections", "detect"}
+    assert set(stale(conn)) == {"segments", "sections", "ground", "detect"}
 
 
 def test_run_whose_session_is_gone_is_interrupted(conn: psycopg.Connection, dsn: str, example: str) -> None:
@@ -343,7 +364,7 @@ def test_run_whose_session_is_gone_is_interrupted(conn: psycopg.Connection, dsn:
         other.commit()
         conn.execute(begin, ("detect",))
         conn.commit()
-        states = "SELECT stage, outcome FROM tunnel_api.stage_status WHERE step >= 4 ORDER BY step"
+        states = "SELECT stage, outcome FROM tunnel_api.stage_status WHERE stage IN ('sections', 'detect') ORDER BY step"
         assert conn.execute(states).fetchall() == [("sections", "running"), ("detect", "running")]
         conn.rollback()
     assert conn.execute(states).fetchall() == [("sections", "interrupted"), ("detect", "running")]
@@ -353,7 +374,14 @@ def test_run_whose_session_is_gone_is_interrupted(conn: psycopg.Connection, dsn:
 def test_loaded_kilometre_that_was_never_processed_is_listed(conn: psycopg.Connection, example: str) -> None:
     conn.execute("DELETE FROM tunnel.run WHERE stage <> 'load'")
     outcomes = conn.execute("SELECT stage, outcome FROM tunnel_api.stage_status ORDER BY step").fetchall()
-    assert outcomes == [("load", "done"), ("axis", "never"), ("segments", "never"), ("sections", "never"), ("detect", "never")]
+    assert outcomes == [
+        ("load", "done"),
+        ("axis", "never"),
+        ("segments", "never"),
+        ("sections", "never"),
+        ("ground", "never"),
+        ("detect", "never"),
+    ]
 
 
 def test_classes_are_those_of_the_program(conn: psycopg.Connection) -> None:

@@ -18,6 +18,7 @@ from tunneldb.job.threads import threads, use_threads
 from tunneldb.leak import gather as module
 from tunneldb.leak.gather import Lens, gather
 from tunneldb.leak.image import LEVEL, OFFSET, Accumulator, Grid
+from tunneldb.leak.lining import Floor
 from tunneldb.leak.seen import Eye, Radiometer
 from tunneldb.scan.pose import PoseModel
 from tunneldb.scan.reader import Points
@@ -58,6 +59,8 @@ def tunnel() -> Surface:
 
 
 SURFACE = tunnel()
+# The floor rises to the left, and there is none for the last metres on the right.
+FLOOR = Floor.of(int(START), np.linspace(-7.5, -6.0, 61), np.where(np.arange(61) < 50, 7.0, np.nan))
 
 
 def poses(mobile: bool) -> PoseModel:
@@ -95,10 +98,10 @@ def cloud(count: int, seed: int = 1) -> Points:
 
 def eye(kind: str, mobile: bool, curve: ReferenceCurve = FAR) -> Eye:
     if kind == "none":
-        return Eye.of(SURFACE, KM, 0.3, None)
+        return Eye.of(SURFACE, KM, 0.3, None, FLOOR)
     reference = None if kind == "reflectance" else curve
     typed: Kind = kind  # type: ignore[assignment]
-    return Eye.of(SURFACE, KM, 0.3, Radiometer(typed, poses(mobile), reference, MAX_INCIDENCE))
+    return Eye.of(SURFACE, KM, 0.3, Radiometer(typed, poses(mobile), reference, MAX_INCIDENCE), FLOOR)
 
 
 def grid(pixel: float = 0.02) -> Grid:

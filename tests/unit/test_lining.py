@@ -1,14 +1,19 @@
 """Floor, niches and edges on straight tunnels whose sections are drawn by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shapely.geometry import box as rectangle
 
 from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.surface import Surface
+from tunneldb.ground.arcs import foot_arcs
+from tunneldb.ground.line import Line
+from tunneldb.ground.model import COLUMN, Ground
 from tunneldb.intensity.edge import Edges
 from tunneldb.leak.geometries import shapes
-from tunneldb.leak.lining import Astray, Floor
+from tunneldb.leak.lining import FLOOR_EDGE, Astray, Floor
 
 LENGTH = 60.0
 
@@ -47,27 +52,61 @@ BOX = straight(box(3.0, 2.5, 2.5))
 ROUND = straight(np.full(361, 4.0))
 
 
-def test_the_floor_of_a_box_begins_at_its_corner():
-    floor = Floor.of(BOX, 5.0, 55.0)
-    # Crown to corner 3 m, wall 5 m, and a tenth of a metre of the wall goes with the floor.
-    np.testing.assert_allclose(floor.right, 8.0, atol=0.2)
-    np.testing.assert_allclose(floor.left, -8.0, atol=0.2)
-    arcs = np.array([0.0, 4.0, 7.5, 8.2, 9.0, 11.0, -7.5, -8.2, -11.0])
-    covered = floor.covers(np.full(len(arcs), 30.0), arcs)
-    assert covered.tolist() == [False, False, False, True, True, True, False, True, True]
+def flat(half_width: float, level: float, **others: object) -> Ground:
+    """Level ground from wall to wall, 5 to 55 m along."""
+    columns = np.arange(-round(half_width / COLUMN), round(half_width / COLUMN) + 1)
+    rows = np.arange(5, 56)
+    return replace(
+        Ground(
+            5, int(columns[0]), np.full((len(rows), len(columns)), level), np.full(len(rows), 0.03),
+            np.tile([-half_width, half_width], (len(rows), 1)), np.zeros((len(rows), 2)),
+        ),
+        **others,
+    )  # fmt: skip
 
 
-def test_the_floor_of_a_pipe_is_its_lower_quarter():
-    floor = Floor.of(ROUND, 5.0, 55.0)
-    np.testing.assert_allclose(floor.right, 4 * np.radians(135), atol=0.25)
+LINE = Line.of([[0.0, 0.0], [LENGTH, 0.0]], [0.0, LENGTH])
 
 
-def test_a_rail_on_the_floor_is_floor():
-    radius = box(3.0, 2.5, 2.5)
-    radius[345:349] -= 0.15  # 15 to 12 degrees from straight down
-    floor = Floor.of(straight(radius), 5.0, 55.0)
-    arcs = np.arange(8.2, 11.0, 0.05)
-    assert floor.covers(np.full(len(arcs), 30.0), arcs).all()
+def test_the_ground_of_a_box_begins_at_its_corner():
+    # crown to corner 3 m, wall 5 m; the sections, one node a degree, cut the corners a little
+    arcs = foot_arcs(flat(3.0, 97.5), LINE, BOX)
+    np.testing.assert_allclose(arcs, np.tile([-8.0, 8.0], (51, 1)), atol=0.04)
+
+
+def test_ground_half_way_up_the_wall_begins_there():
+    np.testing.assert_allclose(foot_arcs(flat(3.0, 99.0), LINE, BOX), np.tile([-6.5, 6.5], (51, 1)), atol=0.02)
+    half = np.sqrt(4.0**2 - 2.0**2)
+    arc = 4.0 * np.arccos(-0.5)
+    np.testing.assert_allclose(foot_arcs(flat(half, 98.0), LINE, ROUND), np.tile([-arc, arc], (51, 1)), atol=0.02)
+
+
+def test_a_wall_that_is_missing_is_thought_on():
+    foot = np.tile([-3.0, 3.0], (51, 1))
+    foot[20:25, 1] = np.nan
+    np.testing.assert_allclose(foot_arcs(flat(3.0, 99.0, foot=foot), LINE, BOX), np.tile([-6.5, 6.5], (51, 1)), atol=0.02)
+    foot[:, 0] = np.nan  # no wall anywhere on the left: from where the ground is last seen
+    np.testing.assert_allclose(foot_arcs(flat(3.0, 99.0, foot=foot), LINE, BOX)[:, 0], -6.5, atol=0.11)
+
+
+def test_without_ground_nothing_is_floor():
+    assert foot_arcs(None, LINE, BOX).shape == (0, 2)
+    height = np.full((51, 61), 97.5)
+    height[10:20] = np.nan
+    arcs = foot_arcs(flat(3.0, 97.5, height=height), LINE, BOX)
+    assert np.isnan(arcs[10:20]).all()
+    floor = Floor.of(5, *arcs.T)
+    arc = np.array([-9.0, 0.0, 9.0])
+    assert floor.covers(np.full(3, 30.0), arc).tolist() == [True, False, True]
+    assert floor.covers(np.full(3, 20.0), arc).tolist() == [False, False, False]
+    assert floor.covers(np.full(3, np.nan), np.full(3, np.nan)).tolist() == [False, False, False]
+
+
+def test_the_wall_above_its_foot_is_lining():
+    floor = Floor.of(5, *foot_arcs(flat(3.0, 99.0), LINE, BOX).T)
+    arcs = np.array([6.5 - FLOOR_EDGE - 0.02, 6.5 - FLOOR_EDGE + 0.02])
+    assert floor.covers(np.full(2, 30.0), arcs).tolist() == [False, True]
+    assert floor.covers(np.full(2, 30.0), -arcs).tolist() == [False, True]
 
 
 @pytest.mark.parametrize("inset", [0.005, 0.03, 0.1, 0.25])

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 @click.argument("files", nargs=-1, type=click.Path(path_type=Path), metavar="[FILES...]")
 @click.option("--workers", type=click.IntRange(1, 1000), metavar="N", help="Worker processes to start; one a core by default.")
 @click.option("--km", metavar="A[-B]", help="Only these kilometres, 511 or 511-512.")
-@click.option("--to", "last", metavar="STAGE", help="End with this stage: load, axis, segments, sections or detect (default).")
+@click.option(
+    "--to", "last", metavar="STAGE", help="End with this stage: load, axis, segments, sections, ground or detect (default)."
+)
 @click.option("--density", help="Points per m² of surface to keep, 1 or more, or 'all'; 100, or what the survey has.")
 @click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE", help="Set a parameter, as for tunneldb run.")
 @click.option("--retry-failed", is_flag=True, help="Try again what has failed.")

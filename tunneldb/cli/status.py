@@ -16,7 +16,7 @@ from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
 
-STAGES = ("load", "axis", "segments", "sections", "detect")
+STAGES = ("load", "axis", "segments", "sections", "ground", "detect")
 
 
 @click.command()
@@ -80,7 +80,7 @@ def _all(connection: psycopg.Connection[Any]) -> None:
         [list(STAGES)],
     ).fetchall()
     table = [[*fixed, there, *(done or [None] * len(STAGES))] for *fixed, there, done in rows]
-    print_table(["survey", "tunnel", "date", "files", "points", "from", "to", "km", *STAGES], table, right=range(3, 13))
+    print_table(["survey", "tunnel", "date", "files", "points", "from", "to", "km", *STAGES], table, right=range(3, 14))
     if not rows:
         click.echo("there is no survey yet: tunneldb tunnel add, then tunneldb survey add")
 

@@ -19,13 +19,14 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.intensity.correct import Kind, Views, needs_reference, range_span
 from tunneldb.intensity.dry import Dry, plain_statistics
 from tunneldb.intensity.roughness import Regions, Roughness, automatic_regions, drawn_regions, find_roughness
+from tunneldb.job.scene import load_arcs
 from tunneldb.job.sources import Source, sample, sources
 from tunneldb.leak.detection import Detection, dry_places
 from tunneldb.leak.detection import detect as find_leaks
 from tunneldb.leak.gather import Counts, gather
 from tunneldb.leak.image import KILOMETRE, Accumulator, Grid
 from tunneldb.leak.leaks import save_leaks
-from tunneldb.leak.lining import Astray
+from tunneldb.leak.lining import Astray, Floor
 from tunneldb.leak.picture import Picture, develop, halo
 from tunneldb.leak.raster import KINDS
 from tunneldb.leak.seen import Eye, Radiometer, Seen, Span
@@ -75,13 +76,14 @@ def detect(
     Raises
     ------
     UserError
-        If there are no sections, a file is gone or was changed, or intensity can't be corrected.
+        If there are no sections, the ground was not sought, a file is gone or was changed, or intensity can't be corrected.
     """
     surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
     grid = _grid(surface, km, values["image.pixel"])
     files = sources(conn, survey, km)
     radiometer = _radiometer(conn, survey, values["intensity.max_incidence"])
-    eye = Eye.of(surface, km, values["lining.tolerance"], radiometer, grid.halo * grid.pixel)
+    halo = grid.halo * grid.pixel
+    eye = Eye.of(surface, km, values["lining.tolerance"], radiometer, load_floor(conn, survey, km, halo), halo)
     with Accumulator(grid) as image:
         if radiometer is None:
             return _offset_only(conn, survey, eye, files, image, progress)
@@ -108,6 +110,18 @@ def detect(
         "leaks_gone": matched.gone,
         **_report(roughness, matched.other_pixels),
     }
+
+
+def load_floor(conn: psycopg.Connection[Any], survey: Survey, km: int, halo: float) -> Floor:
+    """Where the floor of a kilometre begins, and of so many metres beyond its ends: where stage ``ground`` has found it."""
+    done = conn.execute(
+        "SELECT FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage = 'ground' AND outcome = 'done' LIMIT 1",
+        (survey.id, km),
+    ).fetchone()
+    if done is None:
+        raise UserError(f"the ground of kilometre {km} is not known yet: tunneldb run {survey.name} --km {km} --from ground")
+    first = int(km * KILOMETRE - np.ceil(halo))
+    return Floor.of(first, *load_arcs(conn, survey, first, int((km + 1) * KILOMETRE + np.ceil(halo))))
 
 
 def _offset_only(

@@ -13,7 +13,7 @@ from psycopg.rows import class_row
 from tunneldb.job.pace import measure, points_per_second
 from tunneldb.job.worker import STALLED
 
-STAGES = ("load", "axis", "segments", "sections", "detect")
+STAGES = ("load", "axis", "segments", "sections", "ground", "detect")
 """Stages of a kilometre, in their order."""
 
 TO_DO = ("queued", "waits", "running")

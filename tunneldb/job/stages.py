@@ -132,6 +132,13 @@ def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Map
     return {"sections": built, **{f"classes_{state}": count for state, count in classes}}
 
 
+def ground(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
+    """Ground, lining, what else there is, and the class of each point (Li et al., 2023)."""
+    from tunneldb.job.ground import ground as work  # brings compiled code along, which the stages before can do without
+
+    return work(conn, survey, km, values, progress)
+
+
 def detect(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
     """Unrolled images at full density, and leaks (Xu et al., 2018)."""
     from tunneldb.job.detect import detect as work  # brings GDAL along, which the other stages can do without
@@ -149,5 +156,6 @@ STAGES: tuple[Stage, ...] = (
     Stage("axis", axis, ("axis",)),
     Stage("segments", segments, ()),
     Stage("sections", sections, ("section",)),
+    Stage("ground", ground, ("ground", "cluster")),
     Stage("detect", detect, ("lining", "image", "intensity", "appendage", "leak")),
 )

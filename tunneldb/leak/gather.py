@@ -105,7 +105,7 @@ class Lens:
                 grid.rows,
                 grid.near.start,
                 grid.near.stop,
-                float(floor.chainage[0]),
+                float(floor.start),
                 floor.left,
                 floor.right,
             ),

@@ -16,11 +16,8 @@ from tunneldb.leak.image import Grid, Window
 
 Float = NDArray[np.float64]
 
-FLOOR_SLOPE = np.cos(np.radians(45.0))
-"""Surface whose normal points up more steeply than this, below the axis, is floor."""
-
 FLOOR_EDGE = 0.1
-"""So much of the wall above the floor goes with it, m: there the section is rounded, and dirt lies."""
+"""So much of the wall above the floor goes with it, m: its foot is known no better."""
 
 APART = 0.06
 """A section that stands apart from those beside it by more was not measured on the wall, m."""
@@ -34,8 +31,6 @@ OFF_WALL = 0.03
 MIN_SECTIONS = 4
 """With fewer sections there is nothing to compare with."""
 
-_ALONG, _ACROSS = 1.0, 0.05
-
 
 class State(IntEnum):
     """What a pixel shows."""
@@ -48,47 +43,32 @@ class State(IntEnum):
 
 @dataclass(frozen=True)
 class Floor:
-    """Where the floor begins, on both sides, each metre along the tunnel.
+    """Where the floor begins, on both sides, each metre along the tunnel: at the foot of the walls.
 
-    The floor is the surface below the axis that looks up by more than 45°. Going down a wall it begins where
-    that holds for 0.3 m, and all that lies beyond, rails or whatever stands there, belongs to it.
+    All that lies beyond, rails or whatever stands there, belongs to it. Where the tunnel has no ground nothing does.
 
     Attributes
     ----------
-    chainage : (k,) float array
-        m, growing.
+    start : int
+        Chainage of the first place, m.
     left, right : (k,) float arrays
-        Arc at which the floor begins, m; the middle where there is no surface.
+        Arc at which the floor begins at each metre from there on, m; infinite where it doesn't.
     """
 
-    chainage: Float
+    start: int
     left: Float
     right: Float
 
     @classmethod
-    def of(cls, surface: Surface, start: float, stop: float) -> Floor:
-        """Find the floor of a surface between two chainages, m."""
-        chainage = np.arange(start, stop + _ALONG, _ALONG)
-        # Whole multiples, so that any stretch of the tunnel is looked at in the same places.
-        lowest, highest = float(surface.arcs[:, 0].min()), float(surface.arcs[:, -1].max())
-        arc = np.arange(np.floor(lowest / _ACROSS), np.ceil(highest / _ACROSS) + 1) * _ACROSS
-        c, a = (grid.ravel() for grid in np.meshgrid(chainage, arc, indexing="ij"))
-        points = surface.roll(c, a, np.zeros(len(c)))
-        normal = surface.unroll(points).normal[:, 2].reshape(len(chainage), len(arc))
-        axis = surface.frames(chainage)[:, 0, 2]
-        height = points[:, 2].reshape(normal.shape) - axis[:, None]
-        with np.errstate(invalid="ignore"):
-            looks_up = ((normal > FLOOR_SLOPE) & (height < 0)) | np.isnan(normal)
-        crown = int(np.argmin(np.abs(arc)))
-        right = arc[crown + _begin(looks_up[:, crown:])] - FLOOR_EDGE
-        left = arc[crown - _begin(looks_up[:, crown::-1])] + FLOOR_EDGE
-        # What a single metre shows that its neighbours don't is not the tunnel's shape.
-        return cls(chainage, ndimage.median_filter(left, 5), ndimage.median_filter(right, 5))
+    def of(cls, start: int, left: Float, right: Float) -> Floor:
+        """Make a floor of the arcs of the walls' feet (k,), m, NaN for none, at each metre from ``start`` on."""
+        none = np.isnan(left), np.isnan(right)
+        return cls(start, np.where(none[0], -np.inf, left + FLOOR_EDGE), np.where(none[1], np.inf, right - FLOOR_EDGE))
 
     def bounds(self, chainage: Float) -> tuple[Float, Float]:
         """Arc at which the floor begins on the left and on the right, m."""
-        place = np.where(np.isfinite(chainage), chainage, self.chainage[0])
-        row = np.clip(np.rint((place - self.chainage[0]) / _ALONG).astype(np.intp), 0, len(self.chainage) - 1)
+        place = np.where(np.isfinite(chainage), chainage, self.start)
+        row = np.clip(np.rint(place - self.start).astype(np.intp), 0, len(self.left) - 1)
         return self.left[row], self.right[row]
 
     def covers(self, chainage: Float, arc: Float) -> NDArray[np.bool_]:
@@ -152,13 +132,6 @@ class Astray:
                 apart = (1 - g) * self.apart[pair - 1] + g * self.apart[pair]
                 out[:, column] = np.interp(arc, nodes, ndimage.maximum_filter1d(apart, 7)) > OFF_WALL
         return out
-
-
-def _begin(looks_up: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Index in each row from which on it holds for 0.3 m, or the last one."""
-    run = round(0.3 / _ACROSS)
-    kept = np.asarray(np.lib.stride_tricks.sliding_window_view(looks_up, run, axis=1)).all(axis=-1)
-    return np.where(np.any(kept, axis=1), np.argmax(kept, axis=1), looks_up.shape[1] - 1)
 
 
 def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Astray, delta: float) -> NDArray[np.uint8]:

@@ -97,7 +97,9 @@ class Eye:
     box: Float
 
     @classmethod
-    def of(cls, surface: Surface, km: int, tolerance: float, radiometer: Radiometer | None, halo: float = 0.0) -> Eye:
+    def of(
+        cls, surface: Surface, km: int, tolerance: float, radiometer: Radiometer | None, floor: Floor, halo: float = 0.0
+    ) -> Eye:
         """Make the eye for a kilometre that the surface covers at least in part, and so many metres beyond its ends."""
         start, stop = km * 1000.0, (km + 1) * 1000.0
         touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)
@@ -113,7 +115,7 @@ class Eye:
             km,
             tolerance,
             radiometer,
-            Floor.of(surface, start, stop),
+            floor,
             Edges.of(surface, start, stop),
             np.array([vertices.min(0) - margin, vertices.max(0) + margin]),
         )
