@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from numba import njit, prange
@@ -15,6 +16,7 @@ Index = NDArray[np.int64]
 
 _ALONG = 1.0  # half of the window of a row's points, m
 _PRIOR = 4.0  # points that the segments' level counts for
+_STEP = 0.02  # between columns, m, that is no slope
 _GAP = 20  # columns across which a hidden floor is filled in
 
 
@@ -50,15 +52,41 @@ def filled(height: Float) -> Float:
     out = height.copy()
     for row in out:
         known = np.flatnonzero(np.isfinite(row))
-        for left, right in zip(known[:-1], known[1:], strict=True):
+        for left, right in pairwise(known.tolist()):
             if 1 < right - left <= _GAP:
                 row[left + 1 : right] = np.interp(np.arange(left + 1, right), [left, right], row[[left, right]])
     return out
 
 
+def carried_on(height: Float, count: int) -> Float:
+    """Replace the outermost columns of each row, which the wall may touch, by those inside them, carried straight on.
+
+    They keep the slope of the four columns inside, unless there is a step.
+
+    Parameters
+    ----------
+    height : (rows, columns) float array
+        m.
+    count : int
+        Columns at each end.
+    """
+    out = height.copy()
+    for row in out:
+        known = np.flatnonzero(np.isfinite(row))
+        if len(known) < 2 * count + 2:
+            continue
+        for edge, way in ((int(known[0]), 1), (int(known[-1]), -1)):
+            inner = edge + way * count
+            beside = row[inner : inner + way * 5 : way] if inner + way * 5 >= 0 else row[inner::way]
+            rise = -np.diff(beside)
+            slope = float(rise.mean()) if len(rise) and bool((np.abs(rise) < _STEP).all()) else 0.0
+            row[edge:inner:way] = row[inner] + slope * np.arange(count, 0, -1)
+    return out
+
+
 @njit(cache=True, nogil=True, parallel=True)
 def refined(
-    along: Float, across: Float, z: Float, spread: Float, cells: Index, start: int, first: int, height: Float, gate: float
+    along: Float, across: Float, z: Float, spread: Float, cells: Index, start: int, first: int, height: Float, gate: Float
 ) -> tuple[Float, Float, Float]:  # pragma: no cover - compiled
     """Heights moved to the mean of the points about them; of each row the number and sum of squares of what is left.
 
@@ -70,7 +98,7 @@ def refined(
         First point of each cell.
     height : (rows + 1, columns) float array
         m; row i stands at ``start + i``, where the cells of row i begin.
-    gate : float
+    gate : (rows,) float array
         Points farther off than this don't count, m.
     """
     columns = height.shape[1]
@@ -82,11 +110,11 @@ def refined(
         for c in range(columns):
             if np.isnan(height[i, c]):
                 continue
-            total, weight = _PRIOR * 0.0, _PRIOR
+            total, weight = 0.0, _PRIOR
             for row in range(max(i - 1, 0), min(i + 1, metres)):
                 for n in range(cells[row * columns + c], cells[row * columns + c + 1]):
                     e = z[n] - _at(height, along[n] - start, across[n] / COLUMN - first)
-                    if abs(e) < gate:
+                    if abs(e) < gate[i]:
                         w = 1.0 - (abs(along[n] - start - i) / _ALONG) ** 2
                         total += w * e
                         weight += w
@@ -96,7 +124,7 @@ def refined(
             for c in range(columns):
                 for n in range(cells[row * columns + c], cells[row * columns + c + 1]):
                     e = z[n] - _at(out, along[n] - start, across[n] / COLUMN - first)
-                    if abs(e) < gate:
+                    if abs(e) < gate[i]:
                         number[i] += 1.0
                         square[i] += e * e + spread[n] ** 2
     return out, number, square
@@ -106,7 +134,7 @@ def refined(
 def _at(height: Float, row: float, column: float) -> float:
     """Height between rows and columns; NaN beside a missing one."""
     i = min(max(int(row), 0), height.shape[0] - 2)
-    j = min(max(int(math.floor(column)), 0), height.shape[1] - 2)
+    j = min(max(math.floor(column), 0), height.shape[1] - 2)
     g, f = row - i, column - j
     one = (1.0 - g) * height[i, j] + g * height[i + 1, j]
     two = (1.0 - g) * height[i, j + 1] + g * height[i + 1, j + 1]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tunneldb.ground.field import blended, filled, refined
+from tunneldb.ground.field import blended, carried_on, filled, refined
 from tunneldb.ground.foot import steady, walls
 from tunneldb.ground.line import Line
 from tunneldb.ground.model import COLUMN, Ground
@@ -28,7 +28,9 @@ _LOWER = 0.4  # share of the height in which the ground lies (eq. 1)
 _LEAST_LOWER = 1.0  # m
 _WIDEST = 30.0  # farther from the line, m, nothing is looked at
 _SPREADS = 3.5  # γ in standard deviations of the ground
-_LEAST_GAMMA = 0.02  # m
+_LEAST_GAMMA = 0.01  # m
+_PASSES = 3
+_TOUCHED = 2  # columns at the walls
 
 
 @dataclass(frozen=True)
@@ -198,14 +200,16 @@ def _levels(held: _Points, centres: Float, coefficients: Float, settings: Ground
 
 def _refine(held: _Points, height: Float, settings: GroundSettings) -> tuple[Float, Float]:
     """Heights that follow the points, and γ."""
-    gate = settings.gamma
-    for _ in range(2):
-        out, number, square = refined(
-            held.along, held.across, held.z, held.spread, held.cells, held.start, held.first, height, gate
+    gamma = np.full(len(height), settings.gamma)
+    for _ in range(_PASSES):
+        # What stands on the ground spoils both less and less.
+        height, number, square = refined(
+            held.along, held.across, held.z, held.spread, held.cells, held.start, held.first, height, gamma
         )
-    with np.errstate(invalid="ignore"):
-        gamma = _SPREADS * np.sqrt(square / np.where(number > 0, number, np.nan))
-    return out, np.clip(np.where(np.isfinite(gamma), gamma, settings.gamma), _LEAST_GAMMA, settings.gamma)
+        height = carried_on(height, _TOUCHED)
+        spread = np.sqrt(square / np.maximum(number, 1.0))
+        gamma = np.where(number > 0, np.clip(_SPREADS * spread, _LEAST_GAMMA, settings.gamma), settings.gamma)
+    return height, gamma
 
 
 def _to_walls(height: Float, columns: Float, foot: Float, gamma: Float) -> Float:

@@ -31,7 +31,7 @@ def profiles(
     """Level of the ground about each segment's plane in each column, (g, columns), m; NaN where there is none.
 
     A column's level is the lowest height about which, within τ, points lie in most of the pieces of the segment
-    in which the column shows anything at all.
+    in which the column shows anything at all. It must show something in half of the segment: a niche does not.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ def profiles(
         τ, m.
     """
     out = np.full((centres.shape[0], columns), np.nan)
-    bins = int(round((HIGH - LOW) / _BIN))
-    reach = int(round(distance / _BIN))
-    pieces = int(round(2 * half / _PIECE))
+    bins = round((HIGH - LOW) / _BIN)
+    reach = round(distance / _BIN)
+    pieces = round(2 * half / _PIECE)
     rows = (cells.shape[0] - 1) // columns
     for g in prange(centres.shape[0]):
         if np.isnan(planes[g, 0]):
@@ -59,6 +59,7 @@ def profiles(
         count = np.empty(bins + 1, np.int64)
         seen = np.empty((bins, pieces), np.bool_)
         here = np.empty(pieces, np.bool_)
+        length = _pieces(along, cells, columns, start, max(low, 0), min(high, rows), centres[g] - half, pieces)
         for c in range(columns):
             count[:] = 0
             seen[:] = False
@@ -76,12 +77,23 @@ def profiles(
                         seen[b, piece] = True
                         here[piece] = True
             shown = here.sum()
-            if shown < 3:
+            if shown < max(3.0, _SEEN * length):
                 continue
             for b in range(bins):
                 count[b + 1] += count[b]
             out[g, c] = _lowest(count, seen, shown, reach, bins)
     return out
+
+
+@njit(cache=True, nogil=True)
+def _pieces(along: Float, cells: Index, columns: int, start: int, low: int, high: int, begin: float, pieces: int) -> int:
+    """How many pieces of a segment hold points at all."""
+    seen = np.zeros(pieces, np.bool_)
+    for n in range(cells[min(low * columns, cells.shape[0] - 1)], cells[max(high, low) * columns]):
+        piece = int(np.floor((along[n] - begin) / _PIECE))
+        if 0 <= piece < pieces:
+            seen[piece] = True
+    return seen.sum()
 
 
 @njit(cache=True, nogil=True)
