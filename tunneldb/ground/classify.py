@@ -67,24 +67,33 @@ class Scene:
         """Class (:class:`tunneldb.ground.classes.Klass`) of each point (n, 3) in the tunnel's SRID.
 
         What is within a target sphere is a sphere; else what the ground model holds is ground; what is near enough to the
-        lining's plane is lining; the rest belongs to the cluster in whose cells it lies, or is noise. Points that the surface
-        does not reach are unassigned.
+        lining's plane is lining; the rest belongs to the cluster in whose cells it lies, or is noise. Points off the ground
+        that the surface does not reach are unassigned.
         """
         xyz = np.ascontiguousarray(xyz, dtype=np.float64)
+        spheres = np.ascontiguousarray(self.spheres, dtype=np.float64)
+        if self.ground is None:
+            return self._off_ground(xyz, spheres)
         along, across = self.line.place(xyz)
-        ground = np.zeros(len(xyz), np.bool_) if self.ground is None else self.ground.is_ground(along, across, xyz[:, 2])
-        if self.surface is None:
-            unrolled = np.zeros((3, len(xyz)))
+        ground = self.ground.is_ground(along, across, xyz[:, 2])
+        out = np.full(len(xyz), _GROUND, np.uint8)
+        out[~ground] = self._off_ground(xyz[~ground], spheres)
+        if len(spheres):
+            out[ground & _in_spheres(xyz, spheres)] = _SPHERE
+        return out
+
+    def _off_ground(self, xyz: Float, spheres: Float) -> Bytes:
+        """Class of points that are not ground; these alone need to be unrolled."""
+        if self.surface is None or self.relief is None:
+            unrolled, relief = np.zeros((3, len(xyz))), Relief.none()
         else:
-            places = self.surface.unroll(xyz)
+            places, relief = self.surface.unroll(xyz), self.relief
             unrolled = np.stack([places.chainage, places.arc, places.offset])
         inner, outer = self._lookups
-        relief = self.relief if self.relief is not None and self.surface is not None else Relief.none()
         return np.asarray(
             _classes(
-                xyz, unrolled, ground, relief.cell, relief.column, relief.row, relief.offset, relief.spread,
-                inner.first, inner.last, inner.keys, inner.klass, outer.first, outer.last, outer.keys, outer.klass,
-                np.ascontiguousarray(self.spheres, dtype=np.float64),
+                xyz, unrolled, relief.cell, relief.column, relief.row, relief.offset, relief.spread,
+                inner.first, inner.last, inner.keys, inner.klass, outer.first, outer.last, outer.keys, outer.klass, spheres,
             )
         )  # fmt: skip
 
@@ -99,7 +108,7 @@ class Scene:
 
 @njit(cache=True, nogil=True, parallel=True)
 def _classes(
-    xyz: Float, unrolled: Float, ground: Bool, cell: float, column: int, row: int,
+    xyz: Float, unrolled: Float, cell: float, column: int, row: int,
     relief: NDArray[np.float32], spread: NDArray[np.float32],
     inner_first: Int, inner_last: Int, inner_keys: Int, inner_klass: Bytes,
     outer_first: Int, outer_last: Int, outer_keys: Int, outer_klass: Bytes, spheres: Float,
@@ -117,9 +126,6 @@ def _classes(
             if np.isnan(unrolled[0, i]):
                 out[i] = _UNASSIGNED
                 continue
-            if ground[i]:
-                out[i] = _GROUND
-                continue
             plane, tolerance = level_at(unrolled[0, i], unrolled[1, i], cell, column, row, relief, spread)
             off = (unrolled[2, i] - plane) / tolerance
             if abs(off) <= 1.0:
@@ -132,6 +138,20 @@ def _classes(
             if klass == 0:  # no cluster: of the lining's rough edge, or in the air
                 klass = _LINING if abs(off) <= 2.0 else _NOISE
             out[i] = klass
+    return out
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _in_spheres(xyz: Float, spheres: Float) -> Bool:  # pragma: no cover - compiled
+    """Tell which points lie within a target sphere."""
+    count = xyz.shape[0]
+    out = np.zeros(count, np.bool_)
+    for block in prange((count + _BLOCK - 1) // _BLOCK):
+        first, last = block * _BLOCK, min(count, (block + 1) * _BLOCK)
+        near = _spheres_near(xyz, first, last, spheres)
+        if near.shape[0] > 0:
+            for i in range(first, last):
+                out[i] = _in_sphere(xyz[i, 0], xyz[i, 1], xyz[i, 2], spheres, near)
     return out
 
 

@@ -157,7 +157,8 @@ class Wall:
     def holds(self, chainage: Float, arc: Float) -> NDArray[np.bool_]:
         """Tell which places lie above the ground; (rows,) arcs by (columns,) chainages."""
         left, right = np.interp(chainage, self.chainage, self.left), np.interp(chainage, self.chainage, self.right)
-        return np.asarray((arc[:, None] > left) & (arc[:, None] < right))
+        # Half a cell farther, so that the last of the wall lies in a cell, too.
+        return np.asarray((arc[:, None] > left - CELL / 2) & (arc[:, None] < right + CELL / 2))
 
 
 @dataclass(frozen=True)
@@ -384,7 +385,7 @@ def level_at(
                 total += weight
                 plane += weight * relief[p, q]
                 sigma += weight * spread[p, q]
-    if total < 0.25:  # past the end of the lining by half a cell
+    if total < 0.5:  # past the end of the lining by half a cell
         return np.nan, np.nan
     return plane / total, max(DELTA, SIGMAS * sigma / total)
 

@@ -161,17 +161,24 @@ def bars(along: Float, across: Float, height: Float) -> Bool:
     widths = np.bincount(runs.ravel())
     widths[0] = 0
     thin = (runs > 0) & (widths[runs] <= round(RAIL_WIDTH / _COLUMN) + 2)
-    thin &= _long(thin, metres)
-    inside = low & (i >= row) & (i < row + shape[0]) & (j >= column) & (j < column + shape[1])
-    out[inside] = (thin & wide)[i[inside] - row, j[inside] - column]
+    bar = _long(thin, metres)[i[low] - row, j[low] - column]
+    # What stands on a bar or beside it is higher than the bar is elsewhere.
+    top = ndimage.labeled_comprehension(height[low], bar, np.arange(bar.max() + 1), _highest, np.float64, 0.0)
+    top[0] = 0.0
+    out[low] = height[low] <= top[bar]
     return out
 
 
-def _long(thin: Bool, metres: int) -> Bool:
-    """Those bars that are long enough; they may shift by a column from one metre to the next."""
+def _highest(height: Float) -> float:
+    """Height of most points of a bar, and a little more."""
+    return float(np.quantile(height, 0.9)) + 0.02
+
+
+def _long(thin: Bool, metres: int) -> Int:
+    """Number of each bar that is long enough, 0 for none; it may shift by a column from one metre to the next."""
     labels, count = ndimage.label(thin, structure=np.ones((3, 3)))
     lengths = np.array([0, *(rows.stop - rows.start for rows, _ in ndimage.find_objects(labels, count))])
-    return np.asarray(lengths[labels] >= metres)
+    return np.where(lengths[labels] >= metres, labels, 0).astype(np.int64)
 
 
 def _groups(rest: Rest, spacing: Spacing, settings: ClusterSettings) -> list[Rest]:
@@ -201,7 +208,7 @@ def _sorted(group: Rest, radius: float, spacing: Spacing, settings: ClusterSetti
         return group.clusters(Klass.OBJECT if free else Klass.APPENDAGE, known)
     if not on_wall:
         return group.clusters(Klass.OBJECT, known)
-    if float(np.quantile(depth, 0.95)) <= FLAT:
+    if (depth <= FLAT).mean() >= 0.95:
         return group.clusters(Klass.APPENDAGE, known)
     off = depth > radius
     parted = group[off]
