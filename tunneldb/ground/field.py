@@ -14,10 +14,77 @@ from tunneldb.ground.model import COLUMN
 Float = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+_LOWER = 0.4  # share of the height in which the ground lies
+_LEAST_LOWER = 1.0  # m
+_OUTERMOST = 0.005  # share of points below and above all others that are no measure of the height
+_SLICE = 0.05  # of the heights, m
+_WIDEST = 30.0  # m
 _ALONG = 1.0  # half of the window of a row's points, m
 _PRIOR = 4.0  # points that the segments' level counts for
 _STEP = 0.02  # between columns, m, that is no slope
 _GAP = 20  # columns across which a hidden floor is filled in
+
+
+def below(along: Float, across: Float, z: Float, step: float) -> NDArray[np.bool_]:
+    """Tell which points lie in the lower 40 % of the heights of their segment (eq. 1), or its lowest metre.
+
+    Parameters
+    ----------
+    along, across, z : (n,) float arrays
+        Points, m; those not finite, or farther than 30 m from the line, are not kept.
+    step : float
+        Length of a segment, m.
+    """
+    kept = np.abs(across) < _WIDEST
+    kept &= np.isfinite(along) & np.isfinite(z)
+    if not kept.any():
+        return kept
+    segment = np.where(kept, np.floor(along / step), 0.0).astype(np.int64)
+    segment -= segment[kept].min()
+    _below(segment, z, int(segment[kept].max()) + 1, kept)
+    return kept
+
+
+@njit(cache=True, nogil=True)
+def _below(segment: Index, z: Float, segments: int, kept: NDArray[np.bool_]) -> None:  # pragma: no cover - compiled
+    """Keep of the points those that lie low, by histograms of heights; the outermost 0.5 % of points don't count."""
+    low, high = np.full(segments, np.inf), np.full(segments, -np.inf)
+    number = np.zeros(segments, np.int64)
+    for n in range(z.shape[0]):
+        if kept[n]:
+            k = segment[n]
+            low[k], high[k] = min(low[k], z[n]), max(high[k], z[n])
+            number[k] += 1
+    first = np.zeros(segments + 1, np.int64)
+    for k in range(segments):
+        bins = 0
+        if number[k] > 0:
+            # On whole multiples of a bin, so that what lies farther off does not move them.
+            low[k] = math.floor(low[k] / _SLICE) * _SLICE
+            bins = int(min((high[k] - low[k]) / _SLICE, 1e5)) + 1
+        first[k + 1] = first[k] + bins
+    count = np.zeros(first[segments], np.int64)
+    for n in range(z.shape[0]):
+        if kept[n]:
+            k = segment[n]
+            count[min(first[k] + int((z[n] - low[k]) / _SLICE), first[k + 1] - 1)] += 1
+    limit = np.empty(segments)
+    for k in range(segments):
+        few = _OUTERMOST * number[k]
+        i, j = first[k], first[k + 1] - 1
+        total = 0
+        while i < j and total + count[i] <= few:
+            total += count[i]
+            i += 1
+        total = 0
+        while j > i and total + count[j] <= few:
+            total += count[j]
+            j -= 1
+        bottom = low[k] + (i - first[k]) * _SLICE
+        limit[k] = bottom + max(_LOWER * (j + 1 - i) * _SLICE, _LEAST_LOWER)
+    for n in range(z.shape[0]):
+        if kept[n] and z[n] > limit[segment[n]]:
+            kept[n] = False
 
 
 def blended(rows: Float, columns: Float, centres: Float, planes: Float, level: Float, step: float) -> Float:
@@ -58,7 +125,8 @@ def filled(height: Float) -> Float:
     return out
 
 
-def carried_on(height: Float, count: int) -> Float:
+@njit(cache=True, nogil=True)
+def carried_on(height: Float, count: int) -> Float:  # pragma: no cover - compiled
     """Replace the outermost columns of each row, which the wall may touch, by those inside them, carried straight on.
 
     They keep the slope of the four columns inside, unless there is a step.
@@ -71,16 +139,23 @@ def carried_on(height: Float, count: int) -> Float:
         Columns at each end.
     """
     out = height.copy()
-    for row in out:
-        known = np.flatnonzero(np.isfinite(row))
-        if len(known) < 2 * count + 2:
-            continue
-        for edge, way in ((int(known[0]), 1), (int(known[-1]), -1)):
+    columns = height.shape[1]
+    for i in range(height.shape[0]):
+        for way in (1, -1):
+            edge = 0 if way == 1 else columns - 1
+            while 0 <= edge < columns and np.isnan(height[i, edge]):
+                edge += way
             inner = edge + way * count
-            beside = row[inner : inner + way * 5 : way] if inner + way * 5 >= 0 else row[inner::way]
-            rise = -np.diff(beside)
-            slope = float(rise.mean()) if len(rise) and bool((np.abs(rise) < _STEP).all()) else 0.0
-            row[edge:inner:way] = row[inner] + slope * np.arange(count, 0, -1)
+            beyond = inner + way * 4
+            if beyond < 0 or beyond >= columns or np.isnan(height[i, inner]):
+                continue
+            slope = (height[i, inner] - height[i, beyond]) / 4.0
+            for k in range(4):
+                rise = height[i, inner + way * k] - height[i, inner + way * (k + 1)]
+                if not abs(rise) < _STEP:
+                    slope = 0.0
+            for k in range(1, count + 1):
+                out[i, inner - way * k] = height[i, inner] + slope * k
     return out
 
 

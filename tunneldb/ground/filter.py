@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tunneldb.ground.field import blended, carried_on, filled, refined
+from tunneldb.ground.field import below, blended, carried_on, filled, refined
 from tunneldb.ground.foot import steady, walls
 from tunneldb.ground.line import Line
 from tunneldb.ground.model import COLUMN, Ground
@@ -24,9 +24,7 @@ MARGIN = 20
 """Rows depend on no points farther than this along the line, m: what is found of two stretches agrees where they overlap."""
 
 _STEP = 4  # of the segments along, m
-_LOWER = 0.4  # share of the height in which the ground lies (eq. 1)
-_LEAST_LOWER = 1.0  # m
-_WIDEST = 30.0  # farther from the line, m, nothing is looked at
+_LEAST_VOXELS = 12
 _SPREADS = 3.5  # γ in standard deviations of the ground
 _LEAST_GAMMA = 0.01  # m
 _PASSES = 3
@@ -126,50 +124,31 @@ def find_ground(
 
 
 def _lower(points: Float, line: Line, settings: GroundSettings, spread: Float | None) -> _Points | None:
-    """Thin points, place them, keep the lower part of each segment's, and sort them."""
+    """Keep the lower part of each segment's points, thin them, place them and sort them."""
+    points = np.asarray(points, dtype=np.float64)
+    kept = below(*line.place(points), points[:, 2], float(_STEP))
+    points = points[kept]
     voxels = Voxels(settings.voxel)
     voxels.add(points)
-    if len(voxels) < 3:
+    if len(voxels) < _LEAST_VOXELS:
         return None
     xyz, within = voxels.centroids(), voxels.spread()
     if spread is not None:
         number = voxels.index(points)
-        kept = number >= 0
-        mean = np.bincount(number[kept], spread[kept] ** 2, minlength=len(voxels)) / voxels.counts()
+        mean = np.bincount(number, np.asarray(spread)[kept] ** 2, minlength=len(voxels)) / voxels.counts()
         within = np.sqrt(within**2 + mean)
     along, across = line.place(xyz)
-    kept = _below(along, across, xyz[:, 2])
-    along, across, z, within = along[kept], across[kept], xyz[kept, 2], within[kept]
-    if len(along) < 3:
-        return None
     start, stop = math.floor(along.min()), math.floor(along.max()) + 1
     first = math.floor(across.min() / COLUMN + 0.5) - 1
     columns = math.floor(across.max() / COLUMN + 0.5) + 2 - first
     cell = (np.floor(along).astype(np.int64) - start) * columns + np.floor(across / COLUMN + 0.5).astype(np.int64) - first
-    order = np.lexsort((z, along, cell))
+    # In an order that is the points' own: sums and random draws don't depend on how they came.
+    order = np.lexsort((xyz[:, 2], along, cell))
     cells = np.zeros((stop - start) * columns + 1, np.int64)
     np.cumsum(np.bincount(cell, minlength=len(cells) - 1), out=cells[1:])
     return _Points(
-        along[order], across[order], z[order], within[order], cells, start, first, stop - start, columns
+        along[order], across[order], xyz[order, 2], within[order], cells, start, first, stop - start, columns
     )  # fmt: skip
-
-
-def _below(along: Float, across: Float, z: Float) -> NDArray[np.bool_]:
-    """Which points lie in the lower part of the segment's heights (eq. 1)."""
-    near = np.abs(across) < _WIDEST
-    segment = np.floor(along / _STEP).astype(np.int64)
-    segment -= segment[near].min() if near.any() else 0
-    order = np.lexsort((z, np.where(near, segment, -1)))
-    order = order[np.count_nonzero(~near) :]
-    bounds = np.searchsorted(segment[order], np.arange(segment[near].max() + 2)) if near.any() else np.zeros(1, int)
-    kept = np.zeros(len(z), np.bool_)
-    for low, high in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
-        if high > low:
-            heights = z[order[low:high]]
-            bottom, top = np.quantile(heights, (0.005, 0.995))
-            limit = bottom + max(_LOWER * (top - bottom), _LEAST_LOWER)
-            kept[order[low:high]] = heights <= limit
-    return kept
 
 
 def _segments(held: _Points, settings: GroundSettings, seed: int) -> tuple[Float, Float]:

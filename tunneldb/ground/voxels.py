@@ -14,6 +14,7 @@ _BITS = 21  # of a voxel's number along each axis
 _HALF = 1 << (_BITS - 1)
 _FINE = 1024  # steps of a voxel's edge in which places are summed: exact whole numbers
 _MOST = (1 << 22) - 1  # points of a voxel that are summed; more would not move its centroid
+_ROOM = 1 << 16  # voxels, to begin with
 _EMPTY = np.uint32(0xFFFFFFFF)
 
 
@@ -35,11 +36,11 @@ class Voxels:
         self.edge = edge
         self._base: Index | None = None
         self._size = 0
-        self._key = np.empty(1024, np.int64)
-        self._count = np.zeros(1024, np.uint32)
-        self._sum = np.zeros((1024, 3), np.uint32)
-        self._square = np.zeros(1024, np.uint64)
-        self._table = np.full(2048, _EMPTY, np.uint32)
+        self._key = np.empty(_ROOM, np.int64)
+        self._count = np.zeros(_ROOM, np.uint32)
+        self._sum = np.zeros((_ROOM, 3), np.uint32)
+        self._square = np.zeros(_ROOM, np.uint64)
+        self._table = np.full(2 * _ROOM, _EMPTY, np.uint32)
 
     def __len__(self) -> int:
         return self._size
@@ -99,7 +100,7 @@ class Voxels:
         return out
 
     def _grow(self) -> None:
-        room = len(self._key) + max(1024, len(self._key) // 2)
+        room = len(self._key) + len(self._key) // 2
         for name in ("_key", "_count", "_sum", "_square"):
             old = getattr(self, name)
             new = np.zeros((room, *old.shape[1:]), old.dtype)
@@ -124,7 +125,7 @@ def _key_of(x: float, y: float, z: float, edge: float, base: Index) -> int:
     top = 2.0 * _HALF
     if i < 0 or j < 0 or k < 0 or i >= top or j >= top or k >= top:
         return -1
-    return (np.int64(i) << (2 * _BITS)) | (np.int64(j) << _BITS) | np.int64(k)
+    return (int(i) << (2 * _BITS)) | (int(j) << _BITS) | int(k)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -135,7 +136,7 @@ def _slot(key: int, keys: Index, table: Count) -> int:
     at = (h ^ (h >> np.uint64(32))) & mask
     while table[at] != _EMPTY and keys[table[at]] != key:
         at = (at + np.uint64(1)) & mask
-    return np.int64(at)
+    return int(at)
 
 
 @njit(cache=True, nogil=True)
