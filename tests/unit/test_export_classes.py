@@ -61,6 +61,19 @@ def test_pixel_has_the_class_of_the_point_in_its_middle(tube: Surface) -> None:
     assert seen[0][0] == pytest.approx([RADIUS * np.sin(angle), 2.05, 50.0 + RADIUS * np.cos(angle)], abs=2e-3)
 
 
+def test_pixel_across_the_seam_is_that_beside_it(tube: Surface) -> None:
+    """The section ends at an arc of 4π = 12.57 m; the middle of the outermost pixel lies at 12.6 m."""
+    seen: list[NDArray[np.float64]] = []
+
+    def classes(points: NDArray[np.float64]) -> NDArray[np.uint8]:
+        seen.append(points)
+        return np.full(len(points), Klass.GROUND, np.uint8)
+
+    painted = ClassPainter(tube, classes).paint(Raster(np.zeros((253, 3), np.float32), Affine(0.1, 0, 1050, 0, -0.1, 12.65)))
+    assert (painted == Klass.GROUND).all()
+    assert seen[0][0] == pytest.approx([0.0, 50.05, 46.0], abs=2e-3)
+
+
 def test_pixel_off_the_tunnel_is_unassigned(tube: Surface) -> None:
     def classes(points: NDArray[np.float64]) -> NDArray[np.uint8]:
         return np.full(len(points), Klass.LINING, np.uint8)

@@ -18,6 +18,9 @@ from tunneldb.leak.raster import Raster
 
 Float = NDArray[np.float64]
 
+SEAM = 1e-3
+"""Points are kept so far from the ends of a section, m."""
+
 CHUNK = 1_000_000
 """Pixels that are classed at a time: some 150 bytes each."""
 
@@ -65,6 +68,9 @@ class ClassPainter:
         place = offset.transform
         chainage = np.asarray(place.c + (column + 0.5) * place.a, dtype=np.float64)
         arc = np.asarray(place.f + (row + 0.5) * place.e, dtype=np.float64)
+        # The last pixel before the seam straight below the axis may reach beyond it by a part of itself.
+        at, arcs = self.surface.chainages, self.surface.arcs
+        arc = np.clip(arc, np.interp(chainage, at, arcs[:, 0]) + SEAM, np.interp(chainage, at, arcs[:, -1]) - SEAM)
         points = self.surface.roll(chainage, arc, offset.values[row, column].astype(np.float64))
         held = np.isfinite(points[:, 0])
         classes = np.full(len(row), Klass.UNASSIGNED, np.uint8)

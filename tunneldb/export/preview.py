@@ -17,6 +17,7 @@ from scipy import ndimage
 from shapely.geometry import Polygon
 
 from tunneldb.export.palette import COLOURS
+from tunneldb.ground.classes import Klass
 
 Single = NDArray[np.float32]
 
@@ -91,6 +92,14 @@ def fill_gaps(values: Single, reach: float) -> Single:
     return np.asarray(filled, dtype=np.float32)
 
 
+def _filled(kind: str, values: Single, reach: float) -> Single:
+    """Fill the gaps of an image; what floats in them is no colour for its surroundings."""
+    if kind != "class":
+        return fill_gaps(values, reach)
+    floating = values == Klass.NOISE
+    return np.where(floating, values, fill_gaps(np.where(floating, np.float32(np.nan), values), reach))
+
+
 def draw(
     path: Path, title: str, kind: str, strips: Sequence[Strip], top: float, pixel: float, leaks: Sequence[Polygon] = ()
 ) -> None:
@@ -131,7 +140,7 @@ def draw(
         pen.text((_MARGIN, 8), f"{title}:  {scale}", _INK, large)
     for number, strip in enumerate(strips):
         y = _HEAD + number * (height + _GAP)
-        colours = _colours(kind, fill_gaps(strip.values, FILL / pixel), low, high)
+        colours = _colours(kind, _filled(kind, strip.values, FILL / pixel), low, high)
         sheet.paste(Image.fromarray(colours), (_MARGIN, y))
         _ticks(pen, strip, (_MARGIN, y), (width, height), top, pixel, small)
         for leak in leaks:
