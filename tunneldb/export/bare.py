@@ -66,7 +66,7 @@ def classify_file(source: Path, target: Path, values: Mapping[str, float], begin
     if target.suffix.lower() != ".laz":
         raise UserError(f"{target}: what is written is LAZ: let its name end in .laz")
     if same_file(source, target):
-        raise UserError(f"{target} is the file that is read, which is never written over: choose another name with -o")
+        raise UserError(f"{target} is the file that is read, never to be written over: choose another name with -o")
     if not target.parent.is_dir():
         raise UserError(f"{target.parent}: no such folder")
     count = read_header(source).points

@@ -87,7 +87,7 @@ def export_classified(
     """
     every = _files(conn, survey)
     wanted = [file for file in every if set(file.kilometres) & set(kilometres)]
-    targets = _targets(wanted, every, folder)
+    targets = _targets(conn, wanted, every, folder)
     _require_ground(conn, survey, {km for file in wanted for km in file.kilometres})
     conn.rollback()
     for number, (file, target) in enumerate(zip(wanted, targets, strict=True), start=1):
@@ -113,28 +113,36 @@ def _files(conn: psycopg.Connection[Any], survey: Survey) -> list[ScanFile]:
         " FROM tunnel.scan_file f WHERE f.survey_id = %s ORDER BY f.chainage_from, f.name",
         [survey.id],
     ).fetchall()
-    return [ScanFile(*row, tuple(km for km in touched if km in there)) for *row, touched in rows]
+    return [ScanFile(*row[:5], tuple(km for km in row[5] if km in there)) for row in rows]
 
 
-def _targets(files: Sequence[ScanFile], every: Sequence[ScanFile], folder: Path) -> list[Path]:
+def _targets(conn: psycopg.Connection[Any], files: Sequence[ScanFile], every: Sequence[ScanFile], folder: Path) -> list[Path]:
     """Where the files go; those that differ in their endings alone keep them."""
     stems = Counter(Path(file.name).stem for file in every)
+    rows = conn.execute("SELECT DISTINCT path FROM tunnel.scan_file").fetchall()
+    scans = {_identity(Path(path)) for (path,) in rows} - {None}
     targets = []
     for file in files:
         stem = Path(file.name).stem
         target = folder / f"{stem if stems[stem] == 1 else file.name}.laz"
-        for other in every:
-            if same_file(target, Path(other.path)):
-                raise UserError(
-                    f"{target} is a scan file of the survey, which is never written over: choose another folder with -o"
-                )
+        if _identity(target) in scans:
+            raise UserError(f"{target} is a scan file that was loaded, never to be written over: choose another folder with -o")
         targets.append(target)
     return targets
 
 
+def _identity(path: Path) -> tuple[int, int] | None:
+    """What tells a file from all others, whichever way leads there; None if there is none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
+
+
 def same_file(one: Path, other: Path) -> bool:
     """Whether two paths lead to one file that exists."""
-    return one.exists() and other.exists() and one.samefile(other)
+    return _identity(one) is not None and _identity(one) == _identity(other)
 
 
 def _require_ground(conn: psycopg.Connection[Any], survey: Survey, kilometres: Collection[int]) -> None:
