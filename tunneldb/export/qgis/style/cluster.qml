@@ -26,7 +26,7 @@
       <symbol name="1" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="59,59,59,60"/>
+            <Option type="QString" name="color" value="59,59,59,0"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="59,59,59,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
