@@ -113,7 +113,10 @@ def _files(conn: psycopg.Connection[Any], survey: Survey) -> list[ScanFile]:
         " FROM tunnel.scan_file f WHERE f.survey_id = %s ORDER BY f.chainage_from, f.name",
         [survey.id],
     ).fetchall()
-    return [ScanFile(*row[:5], tuple(km for km in row[5] if km in there)) for row in rows]
+    return [
+        ScanFile(name, path, checksum, size, points, tuple(km for km in touched if km in there))
+        for name, path, checksum, size, points, touched in rows
+    ]
 
 
 def _targets(conn: psycopg.Connection[Any], files: Sequence[ScanFile], every: Sequence[ScanFile], folder: Path) -> list[Path]:
