@@ -1,191 +1,26 @@
-"""The class of every point of a scene: the models of ground, lining, clusters and target spheres put together."""
+"""Finding the scene: lining and clusters, with the sections of a survey or without."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from tunneldb.geometry.surface import Surface
-from tunneldb.ground.classes import Klass
-from tunneldb.ground.cluster import Cluster, Lookup, look_up
+from tunneldb.ground.bare import lining, surface_through
+from tunneldb.ground.cluster import Cluster
 from tunneldb.ground.line import Line
-from tunneldb.ground.lining import Prior, Relief, Wall, level_at
+from tunneldb.ground.lining import Prior, Relief, Wall
 from tunneldb.ground.model import COLUMN, Ground
+from tunneldb.ground.scene import Scene
 from tunneldb.ground.spacing import Spacing
-from tunneldb.ground.things import ClusterSettings, Rest, find_clusters
+from tunneldb.ground.things import ClusterSettings, Rest, find_clusters, sort_clusters
+
+__all__ = ["Scene", "find_bare_scene", "find_scene"]
 
 Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Bool = NDArray[np.bool_]
-Bytes = NDArray[np.uint8]
-
-SPHERE_SKIN = 0.01
-"""Points up to this far outside a target sphere are its own, m: three times a scanner's noise."""
-
-BEHIND = (Klass.NICHE, Klass.LINING)
-"""Classes of clusters that lie behind the lining's plane."""
-
-_BLOCK = 4096
-_UNASSIGNED, _GROUND, _LINING = int(Klass.UNASSIGNED), int(Klass.GROUND), int(Klass.LINING)
-_SPHERE, _NOISE = int(Klass.SPHERE), int(Klass.NOISE)
-
-
-@dataclass(frozen=True)
-class Scene:
-    """What was found in a stretch of tunnel, from which any point of it gets its class.
-
-    Attributes
-    ----------
-    line : Line
-        Line along the tunnel, in whose frame the ground stands.
-    ground : Ground or None
-        The ground, if there is one.
-    clusters : sequence of Cluster
-        What stands in the tunnel or hangs on its lining; pieces of lining, too.
-    surface : Surface or None
-        Surface of the sections, if there is one.
-    relief : Relief or None
-        The lining about that surface, if there is one.
-    spheres : (k, 4) float array
-        Target spheres: x, y, z of the centre and radius, m.
-    """
-
-    line: Line
-    ground: Ground | None
-    clusters: Sequence[Cluster]
-    surface: Surface | None
-    relief: Relief | None
-    spheres: Float = field(default_factory=lambda: np.empty((0, 4)))
-
-    def classes(self, xyz: Float) -> Bytes:
-        """Class (:class:`tunneldb.ground.classes.Klass`) of each point (n, 3) in the tunnel's SRID.
-
-        What is within a target sphere is a sphere; else what the ground model holds is ground; what is near enough to the
-        lining's plane is lining; the rest belongs to the cluster in whose cells it lies, or is noise. Points off the ground
-        that the surface does not reach are unassigned.
-        """
-        xyz = np.ascontiguousarray(xyz, dtype=np.float64)
-        spheres = np.ascontiguousarray(self.spheres, dtype=np.float64)
-        if self.ground is None:
-            return self._off_ground(xyz, spheres)
-        along, across = self.line.place(xyz)
-        ground = self.ground.is_ground(along, across, xyz[:, 2])
-        out = np.full(len(xyz), _GROUND, np.uint8)
-        out[~ground] = self._off_ground(xyz[~ground], spheres)
-        if len(spheres):
-            out[ground & _in_spheres(xyz, spheres)] = _SPHERE
-        return out
-
-    def _off_ground(self, xyz: Float, spheres: Float) -> Bytes:
-        """Class of points that are not ground; these alone need to be unrolled."""
-        if self.surface is None or self.relief is None:
-            unrolled, relief = np.zeros((3, len(xyz))), Relief.none()
-        else:
-            places, relief = self.surface.unroll(xyz), self.relief
-            unrolled = np.stack([places.chainage, places.arc, places.offset])
-        inner, outer = self._lookups
-        return np.asarray(
-            _classes(
-                xyz, unrolled, relief.cell, relief.column, relief.row, relief.offset, relief.spread,
-                inner.first, inner.last, inner.keys, inner.klass, outer.first, outer.last, outer.keys, outer.klass, spheres,
-            )
-        )  # fmt: skip
-
-    @cached_property
-    def _lookups(self) -> tuple[Lookup, Lookup]:
-        """Cells of the clusters before the lining and of those behind it."""
-        if self.relief is None:
-            return Lookup.of(list(self.clusters)), Lookup.of([])
-        behind = [cluster for cluster in self.clusters if cluster.klass in BEHIND]
-        return Lookup.of([cluster for cluster in self.clusters if cluster.klass != Klass.NICHE]), Lookup.of(behind)
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _classes(
-    xyz: Float, unrolled: Float, cell: float, column: int, row: int,
-    relief: NDArray[np.float32], spread: NDArray[np.float32],
-    inner_first: Int, inner_last: Int, inner_keys: Int, inner_klass: Bytes,
-    outer_first: Int, outer_last: Int, outer_keys: Int, outer_klass: Bytes, spheres: Float,
-) -> Bytes:  # fmt: skip  # pragma: no cover - compiled
-    count = xyz.shape[0]
-    out = np.empty(count, np.uint8)
-    for block in prange((count + _BLOCK - 1) // _BLOCK):
-        first, last = block * _BLOCK, min(count, (block + 1) * _BLOCK)
-        near = _spheres_near(xyz, first, last, spheres)
-        for i in range(first, last):
-            x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-            if _in_sphere(x, y, z, spheres, near):
-                out[i] = _SPHERE
-                continue
-            if np.isnan(unrolled[0, i]):
-                out[i] = _UNASSIGNED
-                continue
-            plane, tolerance = level_at(unrolled[0, i], unrolled[1, i], cell, column, row, relief, spread)
-            off = (unrolled[2, i] - plane) / tolerance
-            if abs(off) <= 1.0:
-                out[i] = _LINING
-                continue
-            if off < 0.0:
-                klass = look_up(x, y, z, outer_first, outer_last, outer_keys, outer_klass)
-            else:
-                klass = look_up(x, y, z, inner_first, inner_last, inner_keys, inner_klass)
-            if klass == 0:  # no cluster: of the lining's rough edge, or in the air
-                klass = _LINING if abs(off) <= 2.0 else _NOISE
-            out[i] = klass
-    return out
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _in_spheres(xyz: Float, spheres: Float) -> Bool:  # pragma: no cover - compiled
-    """Tell which points lie within a target sphere."""
-    count = xyz.shape[0]
-    out = np.zeros(count, np.bool_)
-    for block in prange((count + _BLOCK - 1) // _BLOCK):
-        first, last = block * _BLOCK, min(count, (block + 1) * _BLOCK)
-        near = _spheres_near(xyz, first, last, spheres)
-        if near.shape[0] > 0:
-            for i in range(first, last):
-                out[i] = _in_sphere(xyz[i, 0], xyz[i, 1], xyz[i, 2], spheres, near)
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _spheres_near(xyz: Float, first: int, last: int, spheres: Float) -> Int:  # pragma: no cover - compiled
-    """Numbers of the spheres that reach into the box of a block of points."""
-    near = np.empty(spheres.shape[0], np.int64)
-    if spheres.shape[0] == 0:
-        return near
-    low, high = xyz[first].copy(), xyz[first].copy()
-    for i in range(first + 1, last):
-        for axis in range(3):
-            low[axis] = min(low[axis], xyz[i, axis])
-            high[axis] = max(high[axis], xyz[i, axis])
-    count = 0
-    for k in range(spheres.shape[0]):
-        reach = spheres[k, 3] + SPHERE_SKIN
-        apart = False
-        for axis in range(3):
-            apart |= spheres[k, axis] + reach < low[axis] or spheres[k, axis] - reach > high[axis]
-        if not apart:
-            near[count] = k
-            count += 1
-    return near[:count]
-
-
-@njit(cache=True, nogil=True)
-def _in_sphere(x: float, y: float, z: float, spheres: Float, near: Int) -> bool:  # pragma: no cover - compiled
-    for k in near:
-        dx, dy, dz = x - spheres[k, 0], y - spheres[k, 1], z - spheres[k, 2]
-        reach = spheres[k, 3] + SPHERE_SKIN
-        if dx * dx + dy * dy + dz * dz <= reach * reach:
-            return True
-    return False
 
 
 def find_scene(
@@ -225,7 +60,8 @@ def find_scene(
     depth = offset - plane
     with np.errstate(invalid="ignore"):
         lining = np.abs(depth) <= tolerance
-    spacing = Spacing.of(chainage[lining], arc[lining]) or Spacing.of(chainage, arc)
+    unrolled = np.column_stack([chainage, arc])
+    spacing = Spacing.of(unrolled[lining]) or Spacing.of(unrolled)
     clusters: list[Cluster] = []
     if spacing is not None:
         height = heights(ground, along, across, points[:, 2])
@@ -234,6 +70,52 @@ def find_scene(
         left = Rest(points[rest], along[rest], across[rest], height[rest], depth[rest], top[rest])
         clusters = find_clusters(left, spacing, settings, ground)
     return Scene(line, ground, clusters, surface, relief)
+
+
+def find_bare_scene(points: Float, line: Line, ground: Ground | None, settings: ClusterSettings | None = None) -> Scene:
+    """Find lining and clusters in a cloud that has no axis and no sections.
+
+    Clusters of the region of interest (Li et al. 2023, eq. 1–4) that are large and whose normals are coherent are lining, and
+    so is, to begin with, all above the region. If they close around the middle of the tunnel, sections are laid through them
+    and the ground, and on these lining, niches, appendages and objects are told as in a survey; what the paper takes for
+    lining above the region is so freed of what hangs there. If they don't, there is no tunnel and no lining.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        m; thinned to voxels serves best.
+    line : Line
+        What the cloud follows.
+    ground : Ground or None
+        The ground, if there is one.
+    settings : ClusterSettings, optional
+        Parameters ``cluster.*``.
+
+    Returns
+    -------
+    Scene
+        Without surface and relief if there is no lining.
+    """
+    settings = settings or ClusterSettings()
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    if len(points) == 0:
+        return Scene(line, ground, [], None, None)
+    along, across = line.place(points)
+    z = points[:, 2]
+    floor = np.zeros(len(points), np.bool_) if ground is None else ground.is_ground(along, across, z)
+    height = heights(ground, along, across, z)
+    spacing = Spacing.of(np.column_stack([along, across, z])[~floor])
+    if spacing is None:
+        return Scene(line, ground, [], None, None)
+    top = settings.region * tops(along, height)
+    off = np.flatnonzero(~floor)
+    rest = Rest(points[off], along[off], across[off], height[off], np.full(len(off), np.nan), top[off])
+    kept = floor.copy()
+    kept[off] = lining(rest, spacing, settings)
+    surface = surface_through(line, along[kept], across[kept], z[kept], kept[kept] & ~floor[kept])
+    if surface is None:
+        return Scene(line, ground, sort_clusters(rest, spacing, settings, ground), None, None)
+    return find_scene(points, line, surface, ground, settings)
 
 
 def heights(ground: Ground | None, along: Float, across: Float, z: Float) -> Float:

@@ -27,30 +27,41 @@ class Spacing:
     across: float
 
     @classmethod
-    def of(cls, along: Float, across: Float) -> Spacing | None:
-        """Measure it on points (n,) of a surface laid flat, m; None for points without two different places.
+    def of(cls, places: Float) -> Spacing | None:
+        """Measure it on points; None without two different places.
 
         Of each of some points that neighbour is taken that is the nearest among those more along than across of it, and the
-        nearest among the others; their medians are the spacings.
+        nearest among the others; the medians of their distances, rounded to steps of a tenth, so that two stretches of the
+        same survey have the same, are the spacings.
+
+        Parameters
+        ----------
+        places : (n, k) float array
+            Distance along the tunnel, then one or two coordinates across it, m.
         """
-        plane = np.column_stack([along, across])
-        plane = plane[np.isfinite(plane).all(axis=1)]
-        if len(plane) < 2:
+        places = places[np.isfinite(places).all(axis=1)]
+        if len(places) < 2:
             return None
-        chosen = plane[np.unique(np.linspace(0, len(plane) - 1, _SAMPLES).astype(np.int64))]
-        _, near = cKDTree(plane).query(chosen, k=min(_NEIGHBOURS, len(plane)))
-        step = np.abs(plane[near] - chosen[:, None, :])
-        length = np.hypot(step[..., 0], step[..., 1])
+        chosen = places[np.unique(np.linspace(0, len(places) - 1, _SAMPLES).astype(np.int64))]
+        _, near = cKDTree(places).query(chosen, k=min(_NEIGHBOURS, len(places)))
+        step = np.abs(places[near] - chosen[:, None, :])
+        beside = np.linalg.norm(step[..., 1:], axis=-1)
+        length = np.hypot(step[..., 0], beside)
         length[length == 0.0] = np.inf
-        ahead = step[..., 0] > step[..., 1]
+        ahead = step[..., 0] > beside
         found = [np.where(mask, length, np.inf).min(axis=1) for mask in (ahead, ~ahead)]
         medians = [float(np.median(f[np.isfinite(f)])) if np.isfinite(f).any() else np.inf for f in found]
         shortest = min(medians)
         if not np.isfinite(shortest):
             return None
-        return cls(*(m if np.isfinite(m) else shortest for m in medians))
+        return cls(*(_rounded(m if np.isfinite(m) else shortest) for m in medians))
 
     @property
     def shrink(self) -> float:
         """Number that distances along are multiplied by to be as close as those across; 1 where they are no wider."""
         return min(1.0, self.across / self.along)
+
+
+def _rounded(length: float) -> float:
+    """Nearest of the lengths that grow by a tenth."""
+    return float(1.1 ** round(np.log(length) / np.log(1.1)))

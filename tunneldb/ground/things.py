@@ -53,8 +53,8 @@ class ClusterSettings:
         t of eq. 1: the region of interest reaches up to this share of the tunnel's height.
     """
 
-    radius: float = 2.5
-    min_points: int = 5
+    radius: float = 3.0
+    min_points: int = 4
     region: float = 0.4
 
     @classmethod
@@ -109,20 +109,26 @@ def find_clusters(rest: Rest, spacing: Spacing, settings: ClusterSettings, groun
     region is an object. What touches both the ground and the wall is an appendage if it is flat; else it is parted into
     what is on the wall and what is off it.
     """
-    known = ground is not None
-    found: list[Cluster] = []
     with np.errstate(invalid="ignore"):
         behind = rest.depth < 0.0
-    for recess in _groups(rest[behind], spacing, settings):
-        klass = Klass.NICHE if _is_wide(recess, spacing) else None
-        if klass is not None:
-            found += recess.clusters(klass, known)
-    before = rest[~behind]
-    rails = bars(before.along, before.across, before.height) if known else np.zeros(len(before), np.bool_)
+    found = [
+        cluster
+        for recess in _groups(rest[behind], spacing, settings)
+        if _is_wide(recess)
+        for cluster in recess.clusters(Klass.NICHE, ground is not None)
+    ]
+    return found + sort_clusters(rest[~behind], spacing, settings, ground)
+
+
+def sort_clusters(rest: Rest, spacing: Spacing, settings: ClusterSettings, ground: Ground | None) -> list[Cluster]:
+    """Clusters of points that are neither ground nor behind the lining: rails, objects and appendages."""
+    known = ground is not None
+    found: list[Cluster] = []
+    rails = bars(rest.along, rest.across, rest.height) if known else np.zeros(len(rest), np.bool_)
     if rails.any():
-        found += before[rails].clusters(Klass.RAIL, known)
+        found += rest[rails].clusters(Klass.RAIL, known)
     radius = settings.radius * spacing.across
-    for group in _groups(before[~rails], spacing, settings):
+    for group in _groups(rest[~rails], spacing, settings):
         found += _sorted(group, radius, spacing, settings, known)
     return found
 
@@ -192,11 +198,10 @@ def _groups(rest: Rest, spacing: Spacing, settings: ClusterSettings) -> list[Res
     return [rest[order[first:last]] for first, last in itertools.pairwise(bounds)]
 
 
-def _is_wide(group: Rest, spacing: Spacing) -> bool:
-    """Tell whether a cluster is larger than ``RECESS``, and than the gap between profiles, in two directions."""
-    places = np.column_stack([group.along, group.across, group.xyz[:, 2]])
-    extent = np.sort(np.ptp(places, axis=0))[::-1]
-    return bool(extent[0] >= max(RECESS, 1.5 * spacing.along) and extent[1] >= RECESS)
+def _is_wide(group: Rest) -> bool:
+    """Tell whether a cluster is larger than ``RECESS`` in two directions."""
+    extent = np.ptp(np.column_stack([group.along, group.across, group.xyz[:, 2]]), axis=0)
+    return int((extent >= RECESS).sum()) >= 2
 
 
 def _sorted(group: Rest, radius: float, spacing: Spacing, settings: ClusterSettings, known: bool) -> list[Cluster]:
