@@ -174,6 +174,31 @@ def test_without_truth_and_nothing_left_over(tmp_path: Path) -> None:
     ]
 
 
+def test_truth_of_what_stands_free(tmp_path: Path) -> None:
+    p = Parameters(**{**PRESETS["small"], "profile_spacing": 0.4}, people=1, spheres=3, catenary=True)
+    made = write(Simulation(p), tmp_path)
+    simulation, cloud = Simulation(p), simulate(p)
+    truth = np.load(made.truth[0])
+    np.testing.assert_array_equal(truth["thing"], cloud.thing)
+    np.testing.assert_array_equal(truth["class"], cloud.klass)
+    assert made.spheres == tmp_path / "small.spheres.csv"
+    header, *lines = made.spheres.read_text().splitlines()
+    assert header == "id,x,y,z,radius,kind"
+    fields = [line.split(",") for line in lines]
+    assert [(int(f[0]), float(f[4]), f[5]) for f in fields] == [
+        (1, 0.0725, "tripod"), (2, 0.0725, "bracket"), (3, 0.0725, "touching"),
+    ]  # fmt: skip
+    centres = np.array([f[1:4] for f in fields], dtype=float)
+    np.testing.assert_allclose(centres, [k.centre for k in simulation.spheres], atol=1e-5)
+    record = json.loads(made.parameters.read_text())
+    assert [k["kind"] for k in record["things"]] == [
+        "sphere", "sphere", "sphere", "tripod", "bracket", "person", "catenary",
+    ]  # fmt: skip
+    assert [k["number"] for k in record["things"]] == list(range(1, 8))
+    np.testing.assert_allclose([k["centre"] for k in record["spheres"]], centres, atol=1e-5)
+    assert {v: k for k, v in record["classes"].items()}[record["things"][5]["class"]] == "object"
+
+
 def test_full_disk_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
@@ -207,6 +232,9 @@ def test_full_disk_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ({"section": "horseshoe", "wall_lean": 30.0, "wall_height": 9.0}, "leave a floor"),
         ({"section": "horseshoe", "section_radius": 0.0}, "radius of the arch"),
         ({"section_radius": 50.0}, "radius of the section"),
+        ({"ballast": 0.2}, "ballast is 0.2: give 0 to 0.05 m"),
+        ({"spheres": -1}, "spheres is -1"),
+        ({"sphere_radius": 0.0}, "sphere radius is 0: give 0.02 to 0.5 m"),
         ({"scanner_offset": 3.8}, "less than 0.5 m from the lining"),
     ],
 )
@@ -218,7 +246,24 @@ def test_bad_parameters_are_the_users_errors(values: dict[str, Any], message: st
 def test_command_line(tmp_path: Path) -> None:
     out = str(tmp_path / "out")
     done = CliRunner().invoke(
-        main, ["simulate", out, "--preset", "small", "--profile-spacing", "0.4", "--leak-area", "0.1", "1", "--s-curve"]
+        main,
+        [
+            "simulate",
+            out,
+            "--preset",
+            "small",
+            "--profile-spacing",
+            "0.4",
+            "--leak-area",
+            "0.1",
+            "1",
+            "--s-curve",
+            "--bollards",
+            "2",
+            "--ballast",
+            "0.02",
+            "--sleepers",
+        ],
     )
     assert done.exit_code == 0, done.output
     assert "points, 3 leaks of" in done.output
@@ -227,6 +272,9 @@ def test_command_line(tmp_path: Path) -> None:
     assert record["parameters"]["leak_area"] == [0.1, 1.0]
     assert record["parameters"]["s_curve"] is True
     assert record["parameters"]["niches"] is True
+    assert record["parameters"]["sleepers"] is True
+    assert record["parameters"]["ballast"] == 0.02
+    assert [k["kind"] for k in record["things"]] == ["bollard", "bollard"]
 
 
 def test_command_line_says_what_is_wrong(tmp_path: Path) -> None:

@@ -97,10 +97,10 @@ _GROUPS: dict[str, list[_Option]] = {
         ),
         _Option("sphere_radius", "M", "Radius of the target spheres."),
         _Option("free_cables", "N", "Cables on hangers off the wall, from end to end.", int),
-        _Option("ballast", "M", "Standard deviation of the floor's height: stones of 3 to 6 cm, 0 for none."),
+        _Option("ballast", "M", "Standard deviation of the floor's height: stones of 3 to 6 cm."),
         _Option("camber", "%", "Fall of the floor from its middle to both walls."),
-        _Option("walkway", "M", "Height of a walkway along the left wall and of a kerb along the right one, 0 for none."),
-        _Option("carriageway", "M", "Height of a second carriageway on the right, 0 for none."),
+        _Option("walkway", "M", "Height of a walkway 0.9 m wide along the left wall and of a kerb 0.4 m wide along the right one."),
+        _Option("carriageway", "M", "Height of a second carriageway on the right."),
     ],
     "Other": [
         _Option("name", "NAME", "First part of the file names.", str),

@@ -133,12 +133,12 @@ def meet_ground(
     end = (ground.low - above) / dw + step if on_floor else 0.0
     before = t
     while t <= end:
-        gap = above + t * dw - height(ground, o[0] + (r + t) * d[0], o[1] + (r + t) * d[1], u + t * du)
-        if gap <= 0.0:
-            break
-        if on_floor and abs(u + t * du) > ground.half_width:
+        v = u + t * du
+        if on_floor and abs(v) > ground.half_width and v * du > 0.0:
             # Below the corner of the section the wall goes on.
-            return r + t, abs(du), False
+            return r + (math.copysign(ground.half_width, v) - u) / du, abs(du), False
+        if above + t * dw <= height(ground, o[0] + (r + t) * d[0], o[1] + (r + t) * d[1], v):
+            break
         before = t
         t += step
     if t > end:

@@ -13,10 +13,10 @@ from tunneldb.simulate.tunnel import Tunnel
 Array = NDArray[np.float64]
 
 WALKWAY = 0.9  # width along the left wall, m
-KERB = 0.25  # width along the right wall, m
+KERB = 0.4  # width along the right wall, m
 # The raised carriageway begins right of the rails, or at this share of half the width.
 CARRIAGEWAY = (1.0, 0.3)
-# How far a slab reaches into the wall, m, so that no gap is left where the wall leans outward.
+# How far a slab reaches into the wall, m, at most its width, so that no gap is left where the wall leans outward.
 INTO_WALL = 0.5
 
 
@@ -36,8 +36,9 @@ def rise(parameters: Parameters, section: Section, across: Array) -> Array:
 
     This is the truth of a ground model: the floor of the section lies at w = ``section.floor``.
     """
-    u = np.asarray(across, float)
-    height = parameters.camber / 100.0 * np.maximum(section.half_width - np.abs(u), 0.0)
+    # What lies along a wall goes on behind the corner where the wall leans outward.
+    u = np.clip(np.asarray(across, float), -section.half_width, section.half_width)
+    height = parameters.camber / 100.0 * (section.half_width - np.abs(u))
     for _, low, high, top in _slabs(parameters, section):
         height = np.where((u >= low) & (u <= high), np.maximum(height, top), height)
     return np.asarray(height)
@@ -48,8 +49,9 @@ def slabs(parameters: Parameters, tunnel: Tunnel) -> list[Appendage]:
     line, section = tunnel.line, tunnel.section
     bars = []
     for kind, low, high, top in _slabs(parameters, section):
-        low = low - INTO_WALL if low <= -section.half_width else low
-        high = high + INTO_WALL if high >= section.half_width else high
+        hidden = min(INTO_WALL, high - low)
+        low = low - hidden if low <= -section.half_width else low
+        high = high + hidden if high >= section.half_width else high
         middle = 0.5 * (low + high)
         # On the floor, arc runs from the corner towards the middle.
         arc = np.copysign(section.half_perimeter - abs(middle), middle)
