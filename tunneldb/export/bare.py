@@ -13,9 +13,11 @@ from tunneldb.errors import UserError
 from tunneldb.export.atomic import replacing
 from tunneldb.export.classified import CLASS_NAMES, same_file
 from tunneldb.ground.classes import Klass
-from tunneldb.ground.classify import Scene, find_bare_scene
+from tunneldb.ground.classify import find_bare_scene
 from tunneldb.ground.filter import GroundSettings, find_ground
 from tunneldb.ground.line import Line
+from tunneldb.ground.scene import Scene
+from tunneldb.ground.things import ClusterSettings
 from tunneldb.ground.voxels import Voxels
 from tunneldb.scan.reader import read_header
 from tunneldb.scan.rewrite import read_coordinates, rewrite
@@ -97,4 +99,5 @@ def find_scene_of(source: Path, values: Mapping[str, float], progress: Callable[
         progress(len(xyz))
     thinned = voxels.centroids()
     line = Line.through(thinned)
-    return find_bare_scene(thinned, line, find_ground(thinned, line, settings, spread=voxels.spread()), settings)
+    ground = find_ground(thinned, line, settings, spread=voxels.spread())
+    return find_bare_scene(thinned, line, ground, ClusterSettings.from_parameters(values))
