@@ -146,6 +146,8 @@ def carried_on(height: Float, count: int) -> Float:  # pragma: no cover - compil
             while 0 <= edge < columns and np.isnan(height[i, edge]):
                 edge += way
             inner = edge + way * count
+            if 0 <= inner < columns and height[i, inner - way] - height[i, inner] > 2.0 * _STEP:
+                inner -= way  # a kerb at the wall
             beyond = inner + way * 4
             if beyond < 0 or beyond >= columns or np.isnan(height[i, inner]):
                 continue
@@ -154,7 +156,7 @@ def carried_on(height: Float, count: int) -> Float:  # pragma: no cover - compil
                 rise = height[i, inner + way * k] - height[i, inner + way * (k + 1)]
                 if not abs(rise) < _STEP:
                     slope = 0.0
-            for k in range(1, count + 1):
+            for k in range(1, abs(inner - edge) + 1):
                 out[i, inner - way * k] = height[i, inner] + slope * k
     return out
 
@@ -196,7 +198,9 @@ def refined(
             out[i, c] += total / weight
     for i in prange(height.shape[0]):
         for row in range(max(i - 2, 0), min(i + 2, metres)):
-            for c in range(columns):
+            for c in range(1, columns - 1):
+                if abs(out[i, c + 1] - out[i, c - 1]) > 2.0 * _STEP:
+                    continue
                 for n in range(cells[row * columns + c], cells[row * columns + c + 1]):
                     e = z[n] - _at(out, along[n] - start, across[n] / COLUMN - first)
                     if abs(e) < gate[i]:

@@ -52,8 +52,8 @@ class Ground:
     def is_ground(self, along: Float, across: Float, z: Float) -> Bool:
         """Tell which points (n,) are ground (Li et al. 2023, section 2.1, step 4).
 
-        They lie up to γ above the ground's height and no more than γ below; where it steps up or down between two
-        columns (a kerb), from the lower to the higher. In the corner before a wall a point belongs to that of both
+        They lie up to γ above the ground's height and no more than γ below; beside a step (a kerb)
+        the step's face belongs to it. In the corner before a wall a point belongs to that of both
         surfaces to which it is nearer; what lies beyond a wall by more than γ is no ground.
 
         Parameters
@@ -86,27 +86,48 @@ def _mix(one: float, two: float, share: float) -> float:
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _levels(start: int, first: int, height: Float, along: float, across: float) -> tuple[int, float, float, float, float]:
-    """Row before a place (-1: outside), share of the way to the next; height there, and its low and high in the columns."""
+def _place(start: int, first: int, height: Float, along: float, across: float) -> tuple[int, int, float, float]:
+    """Row and column before a place (-1: outside) and the shares of the way to the next ones."""
     rows, columns = height.shape
     row, column = along - start, across / COLUMN - first
     if not (row >= 0.0 and row <= rows - 1 and column >= 0.0 and column <= columns - 1):
-        return -1, 0.0, np.nan, np.nan, np.nan
+        return -1, -1, 0.0, 0.0
     i, j = min(int(row), max(rows - 2, 0)), min(int(column), max(columns - 2, 0))
-    g, f = row - i, column - j
-    below, beside = min(i + 1, rows - 1), min(j + 1, columns - 1)
-    one = _mix(height[i, j], height[below, j], g)
-    two = _mix(height[i, beside], height[below, beside], g)
-    mean = _mix(one, two, f)
-    if np.isnan(one) or np.isnan(two):
-        return i, g, mean, mean, mean
-    return i, g, mean, min(one, two), max(one, two)
+    return i, j, row - i, column - j
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _column(height: Float, i: int, j: int, g: float) -> float:
+    """Height in a column between two rows."""
+    return _mix(height[i, j], height[min(i + 1, height.shape[0] - 1), j], g)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _height(height: Float, i: int, j: int, g: float, f: float) -> float:
+    return _mix(_column(height, i, j, g), _column(height, i, min(j + 1, height.shape[1] - 1), g), f)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _reach(height: Float, i: int, j: int, g: float, mean: float, gamma: float) -> tuple[float, float]:
+    """Lowest and highest ground at a place: its own height, or from foot to top of a step beside it.
+
+    The face of a kerb stands somewhere in the column that holds it, and so up to a column beyond the place's own.
+    """
+    low, high = mean, mean
+    for k in range(max(j - 1, 0), min(j + 3, height.shape[1])):
+        h = _column(height, i, k, g)
+        if h < low - gamma:
+            low = h
+        if h > high + gamma:
+            high = h
+    return low, high
 
 
 @njit(cache=True, nogil=True, parallel=True)
 def _heights(start: int, first: int, height: Float, along: Float, across: Float, out: Float) -> None:  # pragma: no cover
     for n in prange(along.shape[0]):
-        out[n] = _levels(start, first, height, along[n], across[n])[2]
+        i, j, g, f = _place(start, first, height, along[n], across[n])
+        out[n] = _height(height, i, j, g, f) if i >= 0 else np.nan
 
 
 @njit(cache=True, nogil=True, parallel=True)
@@ -116,11 +137,15 @@ def _grounds(
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     for n in prange(along.shape[0]):
         out[n] = False
-        i, g, mean, low, high = _levels(start, first, height, along[n], across[n])
-        if i < 0 or np.isnan(mean):
+        i, j, g, f = _place(start, first, height, along[n], across[n])
+        if i < 0:
+            continue
+        mean = _height(height, i, j, g, f)
+        if np.isnan(mean):
             continue
         after = min(i + 1, height.shape[0] - 1)
         most = _mix(gamma[i], gamma[after], g)
+        low, high = _reach(height, i, j, g, mean, most)
         if not (z[n] <= high + most and z[n] >= low - most):
             continue
         up = z[n] - mean
