@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from tunneldb.ground.moments import eigenvalues
 from tunneldb.scan.noise import CellCounts
 
 Float = NDArray[np.float64]
@@ -103,20 +104,6 @@ def _sum(xyz: Float, numbers: Int32, scale: float, sums: Float32) -> None:  # pr
         row[9] += 1.0
 
 
-@njit(cache=True, nogil=True, inline="always")
-def least_eigenvalue(a: float, b: float, c: float, d: float, e: float, f: float) -> float:  # pragma: no cover - compiled
-    """Least eigenvalue of the symmetric matrix [[a, d, e], [d, b, f], [e, f, c]] (Smith, 1961, Comm. ACM 4)."""
-    mean = (a + b + c) / 3.0
-    off = d * d + e * e + f * f
-    spread = math.sqrt(((a - mean) ** 2 + (b - mean) ** 2 + (c - mean) ** 2 + 2.0 * off) / 6.0)
-    if spread <= 1e-300:
-        return mean
-    a, b, c, d, e, f = (a - mean) / spread, (b - mean) / spread, (c - mean) / spread, d / spread, e / spread, f / spread
-    half = (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / 2.0
-    angle = math.acos(min(max(half, -1.0), 1.0)) / 3.0
-    return mean + 2.0 * spread * math.cos(angle + 2.0 * math.pi / 3.0)
-
-
 @njit(cache=True, nogil=True, parallel=True)
 def _curved(place: Int64, key: Int64, sums: Float32, points: int, limit: float) -> Bool:  # pragma: no cover - compiled
     n = len(place)
@@ -160,7 +147,7 @@ def _curved(place: Int64, key: Int64, sums: Float32, points: int, limit: float) 
             if m < points:
                 continue
             x, y, z = total[0] / m, total[1] / m, total[2] / m
-            least = least_eigenvalue(
+            least, _, _ = eigenvalues(
                 total[3] / m - x * x, total[4] / m - y * y, total[5] / m - z * z,
                 total[6] / m - x * y, total[7] / m - x * z, total[8] / m - y * z,
             )  # fmt: skip

@@ -31,6 +31,8 @@ LEAST_COVERAGE = 0.15
 # and mostly nothing on it.
 SHARE = 0.6
 
+ROUGH = 0.8  # the quick fit's figures may fall short by so much of what the final ones must reach
+
 # Cylinders about the centre: their rim in sectors of 22.5°, of which one sees 8; the wall behind a sphere fills 3 at most.
 SECTORS, RIM = 16, 5
 SLICES = 3  # along it, that must all hold points, so that a plane across it doesn't tell
@@ -104,16 +106,24 @@ def find_spheres(xyz: Float, eyes: Float, radius: float, tolerance: float) -> tu
     """
     points = Scattered(xyz, REACH * radius)
     centres, _ = candidates(points, eyes, radius)
-    centres, on, off = settle(points, centres, radius)
-    likely = np.flatnonzero((on >= LEAST_POINTS) & (on >= SHARE / 2.0 * (on + off)))
+    there = settle(points, centres, radius)
+    near_radius = np.abs(there.radius - radius) <= tolerance + 3.0 * there.radius_sigma
+    other_ball = (there.radius_sigma <= tolerance / 4.0) & (there.seen >= 2.0 * LEAST_COVERAGE)  # for the report
+    likely = np.flatnonzero(
+        (there.on >= LEAST_POINTS)
+        & (there.share >= ROUGH * SHARE)
+        & (there.seen >= ROUGH * LEAST_COVERAGE)
+        & (there.radius_sigma <= tolerance / ROUGH)
+        & (near_radius | other_ball)
+    )
     spheres: list[Sphere] = []
     refusals: list[Refusal] = []
-    for k in likely[np.argsort(-on[likely], kind="stable")]:
+    for k in likely[np.argsort(-there.on[likely], kind="stable")]:
         # Spheres are solid: there is no second one within a radius of a centre.
-        if _taken(centres[k], radius, spheres) or _taken(centres[k], radius, refusals):
+        if _taken(there.centres[k], radius, spheres) or _taken(there.centres[k], radius, refusals):
             continue
-        near = points.around(centres[k], 2.0 * radius)
-        found = _judge(xyz[near], eyes[near], centres[k], radius, tolerance)
+        near = points.around(there.centres[k], 2.0 * radius)
+        found = _judge(xyz[near], eyes[near], there.centres[k], radius, tolerance)
         if isinstance(found, Sphere):
             if not _taken(found.centre, radius, spheres):
                 spheres.append(found)

@@ -94,13 +94,15 @@ def fit_sphere(points: Float, eyes: Float, start: Float, radius: float, widest: 
     scipy's least squares with its soft L1 loss; residuals are distances from the sphere in units of their standard deviation.
     """
     centre, band = start, widest
-    for _ in range(6):
+    for _ in range(8):
         before = centre
         distance, cosine = _seen(points, eyes, centre, radius)
-        used = (np.abs(distance) <= band) & ~(cosine < GRAZING)
+        near = (np.abs(distance) <= widest) & ~(cosine < GRAZING)
+        # From all that is near, not only from what is within the band: that would be less from turn to turn.
+        spread = max(1.4826 * float(np.median(np.abs(distance[near]))), LEAST_SPREAD) if near.any() else widest
+        used = near & (np.abs(distance) <= band)
         if used.sum() < 6:
             return None
-        spread = max(1.4826 * float(np.median(np.abs(distance[used]))), LEAST_SPREAD)
         scale = spread * np.clip(cosine[used], SLANT, 1.0)
         scale[np.isnan(scale)] = spread
         centre, _ = _solve(points[used], scale, centre, radius, free=False)

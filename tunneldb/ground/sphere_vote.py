@@ -14,6 +14,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from tunneldb.ground.moments import eigenvalues, normal
+
 Float = NDArray[np.float64]
 Int64 = NDArray[np.int64]
 
@@ -23,7 +25,7 @@ VOTE = 1.0 / 6.0  # edge of the cells of votes
 NEAR = 1.35  # around a centre, what can lie on the sphere or tell that it is none
 
 VOTERS = 8  # points that vote, of each cell of REACH: as many as a sphere of 60 points needs; more say the same again
-NEIGHBOURS = 256  # points looked at around one, about
+NEIGHBOURS = 128  # points looked at around one, about
 LEAST_NEIGHBOURS = 6
 VOTES = 12  # that make a candidate; a fifth of a sphere of 60 points has as many
 SHARE = 0.25  # of the voters near a candidate that have voted for it; of a plane 0.14 do
@@ -110,6 +112,7 @@ def _run(key: Int64, first: int, last: int) -> tuple[int, int]:  # pragma: no co
 
 @njit(cache=True, nogil=True)
 def around(xyz: Float, key: Int64, span: Int64, edge: float, place: Float, reach: float) -> Int64:  # pragma: no cover
+    """Numbers of the points in order within a distance of a place, both from their low corner."""
     found = np.empty(64, np.int64)
     count = 0
     low = np.floor((place - reach) / edge).astype(np.int64)
@@ -159,7 +162,6 @@ def _vote(
             there += ends[column] - begins[column]
         stride = max(1, there // NEIGHBOURS)
         held, asked = stop[c] - start[c], first[c + 1] - first[c]
-        moments = np.empty((3, 3))
         for v in range(asked):
             i = start[c] + v * held // asked
             voters[first[c] + v] = i
@@ -178,28 +180,22 @@ def _vote(
             if n < LEAST_NEIGHBOURS:
                 continue
             sx, sy, sz = sx / n, sy / n, sz / n
-            moments[0, 0], moments[1, 1], moments[2, 2] = xx / n - sx * sx, yy / n - sy * sy, zz / n - sz * sz
-            moments[0, 1] = moments[1, 0] = xy / n - sx * sy
-            moments[0, 2] = moments[2, 0] = xz / n - sx * sz
-            moments[1, 2] = moments[2, 1] = yz / n - sy * sz
-            values, vectors = np.linalg.eigh(moments)
+            xx, yy, zz = xx / n - sx * sx, yy / n - sy * sy, zz / n - sz * sz
+            xy, xz, yz = xy / n - sx * sy, xz / n - sx * sz, yz / n - sy * sz
+            least, middle, greatest = eigenvalues(xx, yy, zz, xy, xz, yz)
             # A thread of points has no normal, a heap of them neither.
-            if values[1] < 0.05 * values[2] or values[0] > 0.25 * values[1]:
+            if middle < 0.05 * greatest or least > 0.25 * middle:
                 continue
+            nx, ny, nz = normal(xx, yy, zz, xy, xz, yz, least)
             # The middle of a cap lies below its top, by half of what its points lie from the axis, squared, over the radius.
-            deep = radius - (values[1] + values[2]) / (2.0 * radius)
-            side = 0.0
-            for a in range(3):
-                side += vectors[a, 0] * (eyes[i, a] - xyz[i, a])
+            deep = radius - (middle + greatest) / (2.0 * radius)
+            side = nx * (eyes[i, 0] - x) + ny * (eyes[i, 1] - y) + nz * (eyes[i, 2] - z)
             at = 2 * (first[c] + v)
             if side <= 0.0 or math.isnan(side):
-                votes[at, 0] = x + sx + deep * vectors[0, 0]
-                votes[at, 1] = y + sy + deep * vectors[1, 0]
-                votes[at, 2] = z + sz + deep * vectors[2, 0]
+                votes[at, 0], votes[at, 1], votes[at, 2] = x + sx + deep * nx, y + sy + deep * ny, z + sz + deep * nz
             if side > 0.0 or math.isnan(side):
-                votes[at + 1, 0] = x + sx - deep * vectors[0, 0]
-                votes[at + 1, 1] = y + sy - deep * vectors[1, 0]
-                votes[at + 1, 2] = z + sz - deep * vectors[2, 0]
+                at += 1
+                votes[at, 0], votes[at, 1], votes[at, 2] = x + sx - deep * nx, y + sy - deep * ny, z + sz - deep * nz
     return votes, voters
 
 
