@@ -125,8 +125,8 @@ def _tilt(points: Float, at: int, radius: float) -> float:
     m[0, 1], m[0, 2], m[1, 2] = suv - su * sv / n, suz - su * sz / n, svz - sv * sz / n
     m[1, 0], m[2, 0], m[2, 1] = m[0, 1], m[0, 2], m[1, 2]
     values, vectors = np.linalg.eigh(m)
-    if values[1] < 1e-3 * values[2]:
-        return np.inf  # points on a line: one profile
+    if values[1] < 0.1 * values[2]:
+        return np.inf  # points on a line, if a rough one: one profile
     up = abs(vectors[2, 0])
     return math.sqrt(max(1.0 - up * up, 0.0)) / up if up > 1e-9 else np.inf
 
