@@ -12,7 +12,8 @@ import shapely
 from click.testing import CliRunner, Result
 
 from tunneldb.cli.main import main
-from tunneldb.simulate import Parameters, Simulation, write
+from tunneldb.simulate import Parameters, Simulation, generate, write
+from tunneldb.simulate.leaks import Leak
 
 NAME = "wet"
 START = 12_310.0
@@ -108,6 +109,31 @@ def test_leaks_are_found(conn: psycopg.Connection, tmp_path: Path, scanner: str,
 
     _check_radiometry(conn, simulation, scanner)
     _check_statistics(conn, simulation)
+
+
+@pytest.mark.parametrize(("scanner", "ballast"), [("profiler", 0.0), ("static", 0.02)])
+def test_leaks_at_the_foot_of_the_wall_are_found(
+    conn: psycopg.Connection, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scanner: str, ballast: float
+) -> None:
+    """Down to the ground, which is darker than they are; and no leak where there is none."""
+    made = parameters(scanner, 2, length=16.0, ballast=ballast, niches=False)
+    foot = Simulation(made).tunnel.section.floor_arc
+    wet = [
+        shapely.box(START + 4.0, -foot, START + 5.0, -foot + 0.5),
+        shapely.box(START + 7.0, foot - 0.6, START + 7.8, foot),
+        shapely.box(START + 11.0, -foot, START + 12.0, -foot + 0.25),
+    ]
+    monkeypatch.setattr(generate, "place", lambda *_: [Leak(k, leak, leak.area, 3.0) for k, leak in enumerate(wet, 1)])
+    write(Simulation(made), tmp_path)
+    prepare(tmp_path, scanner)
+    command("run", NAME)
+    found = list(outlines(conn).values())
+    assert len(found) == len(wet)
+    for leak in wet:
+        (same,) = (polygon for polygon in found if polygon.intersects(leak))
+        assert same.intersection(leak).area / leak.area > 0.62  # the lowest is 0.25 m high
+        assert same.difference(leak.buffer(0.05)).area < 0.01
+        assert abs(abs(same.bounds[1] if leak.bounds[1] < 0 else same.bounds[3]) - foot) < 0.09
 
 
 def _check_radiometry(conn: psycopg.Connection, simulation: Simulation, scanner: str) -> None:

@@ -17,6 +17,7 @@ from psycopg.conninfo import make_conninfo
 from tunneldb.cli.main import _describe_database_error
 from tunneldb.database import connect, copy_binary, get_survey, pack
 from tunneldb.database.catalog import remove_survey
+from tunneldb.job.ground import read_points
 from tunneldb.job.sources import sample
 
 DATABASE = "tunneldb_growth"
@@ -207,6 +208,18 @@ def test_detection_samples_one_kilometre_however_many_a_worker_has_done(conn: ps
     survey = get_survey(conn, "short")
     for _ in range(REPEATS):
         assert len(sample(conn, survey, KM)) == 1000
+        assert locked(conn) == tables(survey.id, KM)
+        conn.commit()
+
+
+def test_the_ground_holds_up_none_of_its_neighbours_however_many_a_worker_has_done(conn: psycopg.Connection) -> None:
+    """Neighbours read each other's points: were they to keep their locks, none could swap in what it has made."""
+    survey = get_survey(conn, "short")
+    for _ in range(REPEATS):
+        points, own = read_points(conn, survey, KM, 1000.0 * KM - 30.0, 1000.0 * (KM + 1) + 30.0)
+        assert (own, len(points)) == (1000, 1030)
+        assert locked(conn) == set()
+        conn.execute("SELECT tunnel_api.class_write(%s, %s, %b)", [survey.id, KM, bytes(own)])
         assert locked(conn) == tables(survey.id, KM)
         conn.commit()
 

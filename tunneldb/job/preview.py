@@ -31,8 +31,8 @@ FRAGMENT_BYTES = 51.0
 PIXEL_BYTES = 3.5
 """Of the three images, per pixel of lining."""
 
-KILOMETRE_BYTES = 8e6
-"""Of axis, segments, sections and leaks, per kilometre."""
+KILOMETRE_BYTES = 17e6
+"""Of axis, segments, sections, ground, lining, clusters and leaks, per kilometre."""
 
 GIRTH = 25.0
 """Length around a cross-section that is taken for a tunnel of which nothing is known yet, m: 8 m in diameter."""
@@ -48,7 +48,7 @@ class Disk:
     Attributes
     ----------
     points, images, others : float
-        What stays: rows of points, images, and axis, segments, sections and leaks.
+        What stays: rows of points, images, and axis, segments, sections, ground, lining, clusters and leaks.
     passing : float
         What goes again: points that were read and wait to be loaded, and the kilometres that are being rewritten.
     wal : float

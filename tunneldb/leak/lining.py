@@ -16,8 +16,8 @@ from tunneldb.leak.image import Grid, Window
 
 Float = NDArray[np.float64]
 
-FLOOR_EDGE = 0.1
-"""So much of the wall above the floor goes with it, m: its foot is known no better."""
+FLOOR_EDGE = 0.02
+"""So much of the wall above the floor goes with it, m: its foot, found from points of survey density, is known no better."""
 
 APART = 0.06
 """A section that stands apart from those beside it by more was not measured on the wall, m."""
