@@ -8,19 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from tunneldb.ground.field import below, blended, carried_on, filled, refined
 from tunneldb.ground.foot import steady, walls
 from tunneldb.ground.line import Line
 from tunneldb.ground.model import COLUMN, Ground
 from tunneldb.ground.plane import planes
-from tunneldb.ground.profile import profiles, steps_out
+from tunneldb.ground.profile import is_round, level_ground, profiles
 from tunneldb.ground.voxels import Voxels
 
 Float = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-MARGIN = 20
+MARGIN = 40
 """Rows depend on no points farther than this along the line, m: what is found of two stretches agrees where they overlap."""
 
 _STEP = 4  # of the segments along, m
@@ -171,9 +172,12 @@ def _levels(held: _Points, centres: Float, coefficients: Float, settings: Ground
         centres, coefficients, float(_STEP), settings.distance,
     )  # fmt: skip
     slope = math.tan(math.radians(settings.angle))
+    columns = (held.first + np.arange(held.columns)) * COLUMN
+    # A floor that ends for a few metres only is not a tunnel without floor: two of three segments say it.
+    bare = np.array([is_round(plane[2] * columns + level, slope) for plane, level in zip(coefficients, found, strict=True)])
+    bare = ndimage.median_filter(bare.astype(np.uint8), 3, mode="nearest") > 0
     for k, level in enumerate(found):
-        kept, is_round = steps_out(level, slope)
-        found[k] = np.nan if is_round else kept
+        found[k] = np.nan if bare[k] else level_ground(level, slope)
     return found
 
 

@@ -17,10 +17,9 @@ LOW, HIGH = -0.8, 1.2
 _BIN = 0.01  # of heights, m
 _PIECE = 0.5  # along, m
 _SEEN = 0.5  # share of the pieces along the segment in which a level must be seen
-_RAISED = 0.06  # a level that stands higher over the ground beside it must run along the whole segment, m
-_RUNS = 0.7  # share of pieces for that
-_NARROW = 0.16  # m; a raised level that is narrower is a rail or a cable
-_CUT = 1.0  # half of the reach across within which two ends of a level are compared, m
+_RAISED = 0.04  # m; a stretch that stands higher over those on both sides of it is no ground
+_NARROW = 0.35  # m; if it is no wider: a rail, a cable
+_GRADUAL = 0.15  # of the width of the widest stretch, over which the surface grows steeper in a round tunnel
 
 
 @njit(cache=True, nogil=True, parallel=True)
@@ -125,12 +124,11 @@ def _lowest(count: Index, seen: NDArray[np.bool_], shown: int, reach: int, bins:
     return LOW + _BIN * (k + (middle - count[k]) / inside)
 
 
-def steps_out(level: Float, slope: float) -> tuple[Float, bool]:
-    """Keep of a segment's levels those that make up ground; and tell whether it rather is the bottom of a round tunnel.
+def level_ground(level: Float, slope: float) -> Float:
+    """Keep of a segment's levels those that make up ground.
 
     Columns whose levels rise or fall by less than δ from one to the next make up a stretch. Ground is the widest
-    one, and any other that is as wide as a kerb. In a round tunnel the surface grows steeper bit by bit where the
-    stretch ends, on both sides; where a wall stands on a floor it does so at once.
+    one, and the others but for narrow ones that stand out: rails.
 
     Parameters
     ----------
@@ -141,31 +139,50 @@ def steps_out(level: Float, slope: float) -> tuple[Float, bool]:
     """
     kept = np.full_like(level, np.nan)
     runs = _stretches(level, slope)
-    if not runs:
-        return kept, False
-    widest = max(runs, key=lambda r: r[1] - r[0])
-    for low, high in runs:
-        if (high - low) * COLUMN >= _NARROW or (low, high) == widest:
+    for k, (low, high) in enumerate(runs):
+        outermost = k == 0 or k == len(runs) - 1
+        if outermost or (high - low) * COLUMN > _NARROW or not _raised(level, runs, k):
             kept[low:high] = level[low:high]
-    return kept, _is_round(level, *widest, slope)
+    return kept
+
+
+def is_round(height: Float, slope: float) -> bool:
+    """Tell whether a segment rather shows the bottom of a round tunnel.
+
+    There the surface grows steeper bit by bit on both sides of its widest stretch; where a wall stands on a floor
+    it does so at once.
+
+    Parameters
+    ----------
+    height : (columns,) float array
+        Height of the segment's levels, m.
+    slope : float
+        tan δ.
+    """
+    runs = _stretches(height, slope)
+    if not runs:
+        return False
+    low, high = max(runs, key=lambda run: run[1] - run[0])
+    enough = _GRADUAL * (high - low)
+    return _gentle(height[high - 1 :], slope) > enough and _gentle(height[: low + 1][::-1], slope) > enough
+
+
+def _raised(level: Float, runs: list[tuple[int, int]], k: int) -> bool:
+    """Whether a stretch stands out over those on both sides of it."""
+    (low, high), before, after = runs[k], runs[k - 1][1] - 1, runs[k + 1][0]
+    beside = max(level[before], level[after])
+    return bool(np.median(level[low:high]) > beside + _RAISED)
 
 
 def _stretches(level: Float, slope: float) -> list[tuple[int, int]]:
     """First column, and the one after the last, of stretches without steep or missing columns."""
-    flat = np.abs(np.diff(level)) <= slope * COLUMN + 0.01
+    flat = np.abs(np.diff(level)) <= slope * COLUMN + _BIN
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flat, [False]]).astype(np.int8)))
     return [(int(low), int(high) + 1) for low, high in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _is_round(level: Float, low: int, high: int, slope: float) -> bool:
-    half = 0.5 * (high - low)
-    return _gentle(level[high - 1 :], slope) > 0.5 * half and _gentle(level[: low + 1][::-1], slope) > 0.5 * half
-
-
-def _gentle(level: Float, slope: float) -> int:
-    """How many columns on the surface rises by more than δ but less than 2.5 δ, from a stretch's last column."""
-    if len(level) < 4:
-        return 0
-    rise = np.diff(level) / COLUMN
-    steep = np.flatnonzero(~(rise < 2.5 * slope))
-    return int(steep[0]) if len(steep) else len(rise)
+def _gentle(height: Float, slope: float) -> int:
+    """How many columns on the surface rises, by less than 3 δ, from a stretch's last column."""
+    rise = (height[2:] - height[:-2]) / (2.0 * COLUMN)
+    ends = np.flatnonzero(~((rise > 0.5 * slope) & (rise < 3.0 * slope)))
+    return int(ends[0]) if len(ends) else len(rise)
