@@ -68,10 +68,6 @@ class Curved:
         self._kept = np.zeros(len(counts), np.bool_)
         self._kept[order] = kept
 
-    def kept(self) -> tuple[Float, Int64]:
-        """Centres (k, 3) of the cells that are kept, m, and the points in each (k,)."""
-        return self.cells.centres[self._kept], self.cells.counts[self._kept]
-
     def holds(self, xyz: Float) -> Bool:
         """Whether points (n, 3) that were added lie in cells that are kept, (n,)."""
         return self._kept[self.cells.find(np.ascontiguousarray(xyz))]

@@ -107,7 +107,7 @@ def candidates(points: Scattered, eyes: Float, radius: float) -> tuple[Float, In
 
 @njit(cache=True, nogil=True, inline="always")
 def _run(key: Int64, first: int, last: int) -> tuple[int, int]:  # pragma: no cover - compiled
-    return np.searchsorted(key, first), np.searchsorted(key, last + 1)
+    return int(np.searchsorted(key, first)), int(np.searchsorted(key, last + 1))
 
 
 @njit(cache=True, nogil=True)

@@ -1,0 +1,105 @@
+"""The verb ``spheres``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.progress import points_bar, step
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect, get_survey
+from tunneldb.errors import UserError
+
+
+@click.command()
+@click.argument("survey")
+@click.option(
+    "--radius",
+    type=click.FloatRange(0.02, 0.5),
+    required=True,
+    metavar="M",
+    help="Radius of the spheres, m, 0.0725 for example.",
+)
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(0.0005, 0.05),
+    default=0.005,
+    show_default=True,
+    metavar="M",
+    help="The fitted radius may differ by so much, and the points lie off the sphere by so much (rms), m.",
+)
+@click.option(
+    "--control",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="CSV",
+    help="Control points, id,x,y,z, in the tunnel's system or another one.",
+)
+@click.option(
+    "--within",
+    type=click.FloatRange(0.001, 10.0),
+    default=0.1,
+    show_default=True,
+    metavar="M",
+    help="A control point belongs to the sphere within this distance, m.",
+)
+@click.option("--report", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE", help="Report to write, as Markdown.")
+@click.pass_obj
+def spheres(
+    settings: Settings,
+    survey: str,
+    radius: float,
+    tolerance: float,
+    control: Path | None,
+    within: float,
+    report: Path | None,
+) -> None:
+    """Find the target spheres in the scan files of SURVEY, and compare them with control points.
+
+    The files are read at full density. What is found replaces what was found before (tunnel_api.target_sphere). Residuals
+    and the best rigid motion onto the control points are reported, never applied. Stages need not have been run; after
+    sections the spheres have a chainage, and after ground the search leaves out the ground.
+    """
+    from tunneldb.export.atomic import replacing
+    from tunneldb.export.spheres import (
+        CONTROL_HEADER,
+        HEADER,
+        control_rows,
+        how_line,
+        motion_lines,
+        sphere_rows,
+        unmatched_lines,
+    )
+    from tunneldb.export.spheres import report as as_report
+    from tunneldb.job.control import compare, read_control
+    from tunneldb.job.spheres import search
+
+    if tolerance >= radius / 4.0:
+        raise UserError(f"--tolerance {tolerance:g} is too much for a radius of {radius:g} m: give less than a quarter of it")
+    points = read_control(control) if control else None
+    if report is not None and not report.parent.is_dir():
+        raise UserError(f"{report}: there is no folder {report.parent}")
+    with connect(settings.dsn) as conn:
+        chosen = get_survey(conn, survey)
+        conn.rollback()
+        bar = points_bar()
+        with bar:
+            found = search(conn, chosen, radius, tolerance, step(bar))
+    comparison = compare(found.spheres, points, within) if points else None
+    count = len({row.number for row in found.spheres})
+    if found.spheres:
+        print_table(HEADER, sphere_rows(found.spheres), right=(0, 1, 3, 4, 5, 6, 7, 8, 9, 10))
+    click.echo(f"{count} target spheres, seen {len(found.spheres)} times; {len(found.refusals)} other round things")
+    if comparison is not None:
+        click.echo(how_line(comparison))
+        if comparison.motion is not None:
+            print_table(CONTROL_HEADER, control_rows(comparison), right=(0, 2, 3, 4, 5, 6))
+            for line in motion_lines(comparison.motion):
+                click.echo(line)
+        for line in unmatched_lines(comparison):
+            click.echo(line)
+    if report is not None:
+        with replacing(report) as temporary:
+            temporary.write_text(as_report(chosen, found, radius, tolerance, comparison), encoding="utf-8")
+        click.echo(f"report to {report}", err=True)

@@ -1,0 +1,223 @@
+"""Target spheres against control points: which is which, how far apart they are, and the motion that would join them best."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.transform import Rotation
+
+Float = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+
+WITHIN = 0.1
+"""A control point belongs to the sphere within this distance of it, by default, m."""
+
+CONGRUENT = 0.02
+"""Distances between spheres and between control points that differ by no more may be the same distance, m."""
+
+BASES = 3000  # pairs of spheres that are tried as a beginning, the longest first
+
+TURN_LIMIT = math.radians(1.0)
+"""A rotation about a line whose standard deviation is greater is not determined."""
+
+LEAST_NOISE = 0.001  # m; residuals of a few points say little: no centre is taken to be known better
+
+
+@dataclass(frozen=True)
+class Match:
+    """Which sphere is which control point.
+
+    Attributes
+    ----------
+    pairs : (k, 2) int array
+        Numbers of sphere and control point, from 0.
+    how : str
+        ``place`` (they lie near each other), ``distances`` (they don't, but their distances among themselves agree),
+        ``ambiguous`` (so, but in several ways) or ``none``.
+    """
+
+    pairs: Int64
+    how: str
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Rigid motion q = rotation · (p − pivot) + pivot + shift that brings points nearest to others.
+
+    Attributes
+    ----------
+    rotation : (3, 3) float64 array
+    pivot, shift : (3,) float64 arrays
+        Centre of gravity of the points that were moved, and how far it moves, m.
+    angles : (3,) float64 array
+        Rotations about the x, the y and the z axis, one after the other, degrees.
+    rms_before, rms_after : float
+        Root mean square distance of the pairs, m.
+    freedom : int
+        Coordinates more than unknowns.
+    determined : str
+        ``all``; ``line`` (points on a line: the turn about it is not known, none is made), ``shift`` (one point: no
+        rotation is known).
+    turn_sigma : float
+        Standard deviation of the rotation that is least certain, degrees; NaN where it isn't determined.
+    """
+
+    rotation: Float
+    pivot: Float
+    shift: Float
+    angles: Float
+    rms_before: float
+    rms_after: float
+    freedom: int
+    determined: str
+    turn_sigma: float
+
+    def apply(self, points: Float) -> Float:
+        """Points (n, 3) moved, m."""
+        moved: Float = (points - self.pivot) @ self.rotation.T + self.pivot + self.shift
+        return moved
+
+
+def match(spheres: Float, control: Float, within: float = WITHIN) -> Match:
+    """Tell which sphere is which control point.
+
+    By place, if three pairs or all that there can be lie within the distance; the sum of distances is the least. Else by
+    congruence: distances do not change with the frame that they are measured in. Three pairs at least, and only one way.
+
+    Parameters
+    ----------
+    spheres, control : (n, 3) and (m, 3) float64 arrays
+        m.
+    within : float
+        m.
+    """
+    near = _by_place(spheres, control, within)
+    if len(near) >= min(3, len(spheres), len(control)) and len(near):
+        return Match(near, "place")
+    pairs, ways = _by_distances(spheres, control)
+    if ways > 1:
+        return Match(np.zeros((0, 2), np.int64), "ambiguous")
+    if ways == 1 and len(pairs) > len(near):
+        return Match(pairs, "distances")
+    return Match(near, "place" if len(near) else "none")
+
+
+def best_motion(points: Float, onto: Float) -> Motion:
+    """Rotation and shift, without scale, that bring points (n, 3) nearest to others (n, 3), n ≥ 1, by least squares.
+
+    Source: Kabsch (1976), Acta Crystallographica A32; Umeyama (1991), IEEE PAMI 13(4), for the sign that rules out a mirror.
+    """
+    pivot, target = points.mean(axis=0), onto.mean(axis=0)
+    a, b = points - pivot, onto - target
+    count = len(points)
+    left, _, right = np.linalg.svd(b.T @ a)
+    sign = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    rotation = left @ sign @ right
+    rms_before = _rms(onto - points)
+    freedom = 3 * count - 6
+    noise = max(_rms(b - a @ rotation.T) * math.sqrt(count / max(freedom, 1)), LEAST_NOISE)
+    across = float(np.linalg.svd(a, compute_uv=False)[1]) if count > 1 else 0.0
+    if count == 1:
+        determined, rotation, freedom = "shift", np.eye(3), 0
+    elif across == 0.0 or noise / across > TURN_LIMIT:
+        determined, rotation, freedom = "line", _turn(_direction(a), _direction(b), a, b), 3 * count - 5
+    else:
+        determined = "all"
+    turn_sigma = math.degrees(noise / across) if determined == "all" else math.nan
+    angles = Rotation.from_matrix(rotation).as_euler("xyz", degrees=True)
+    rms_after = _rms(b - a @ rotation.T)
+    return Motion(rotation, pivot, target - pivot, angles, rms_before, rms_after, freedom, determined, turn_sigma)
+
+
+def _by_place(spheres: Float, control: Float, within: float) -> Int64:
+    """Pairs within a distance; those that lie farther apart cost the same as being left alone."""
+    if len(spheres) == 0 or len(control) == 0:
+        return np.zeros((0, 2), np.int64)
+    gap = np.linalg.norm(spheres[:, None] - control[None], axis=2)
+    rows, columns = linear_sum_assignment(np.minimum(gap, 2.0 * within))
+    near = gap[rows, columns] <= within
+    return np.column_stack([rows[near], columns[near]]).astype(np.int64)
+
+
+def _by_distances(spheres: Float, control: Float) -> tuple[Int64, int]:
+    """Largest set of pairs whose distances agree, and in how many ways one as large can be had (0: none of three)."""
+    if min(len(spheres), len(control)) < 3:
+        return np.zeros((0, 2), np.int64), 0
+    ours = np.linalg.norm(spheres[:, None] - spheres[None], axis=2)
+    theirs = np.linalg.norm(control[:, None] - control[None], axis=2)
+    begins, ends = np.nonzero(~np.eye(len(control), dtype=bool))
+    order = np.argsort(theirs[begins, ends], kind="stable")
+    begins, ends = begins[order], ends[order]
+    length = theirs[begins, ends]
+    i, j = np.triu_indices(len(spheres), 1)
+    longest = np.argsort(-ours[i, j], kind="stable")[:BASES]
+    best: dict[tuple[tuple[int, int], ...], Int64] = {}
+    size = 2
+    for base in longest:
+        one, two = int(i[base]), int(j[base])
+        low, high = np.searchsorted(length, ours[one, two] + np.array([-CONGRUENT, CONGRUENT]))
+        for other in range(low, high):
+            pairs = _grow(spheres, control, ours, theirs, (one, two), (int(begins[other]), int(ends[other])))
+            if len(pairs) < max(size, 3):
+                continue
+            if len(pairs) > size:
+                best.clear()
+                size = len(pairs)
+            best[tuple(map(tuple, pairs.tolist()))] = pairs
+        if size == min(len(spheres), len(control)):
+            break
+    if not best:
+        return np.zeros((0, 2), np.int64), 0
+    return next(iter(best.values())), len(best)
+
+
+def _grow(spheres: Float, control: Float, ours: Float, theirs: Float, base: tuple[int, int], onto: tuple[int, int]) -> Int64:
+    """Pairs that agree with two of them: a third by its distances from both, then all that the motion brings together."""
+    best = np.zeros((0, 2), np.int64)
+    fits = (np.abs(ours[base[0]][:, None] - theirs[onto[0]][None]) <= CONGRUENT) & (
+        np.abs(ours[base[1]][:, None] - theirs[onto[1]][None]) <= CONGRUENT
+    )
+    fits[list(base)] = False
+    fits[:, list(onto)] = False
+    for third, point in np.argwhere(fits):
+        if len(best) and (best == [third, point]).all(axis=1).any():
+            continue  # already among those that an earlier third brought
+        motion = best_motion(spheres[[*base, third]], control[[*onto, point]])
+        if motion.rms_after > CONGRUENT:
+            continue
+        pairs = _by_place(motion.apply(spheres), control, 2.0 * CONGRUENT)
+        if len(pairs) >= 3:
+            refined = best_motion(spheres[pairs[:, 0]], control[pairs[:, 1]])
+            pairs = _by_place(refined.apply(spheres), control, 2.0 * CONGRUENT)
+        if len(pairs) > len(best):
+            best = pairs
+    return best
+
+
+def _direction(centred: Float) -> Float:
+    """Direction (3,) of the line that points (n, 3) about their middle lie along."""
+    direction: Float = np.linalg.svd(centred)[2][0]
+    return direction
+
+
+def _turn(one: Float, other: Float, a: Float, b: Float) -> Float:
+    """Least rotation that brings one direction to another, in the sense in which the points run."""
+    if float((a @ one) @ (b @ other)) < 0.0:
+        other = -other
+    axis = np.cross(one, other)
+    sine, cosine = float(np.linalg.norm(axis)), float(one @ other)
+    if sine < 1e-12:
+        if cosine > 0.0:
+            return np.eye(3)
+        axis = np.cross(one, np.eye(3)[int(np.argmin(np.abs(one)))])
+        axis /= np.linalg.norm(axis)
+        return np.asarray(Rotation.from_rotvec(np.pi * axis).as_matrix())
+    return np.asarray(Rotation.from_rotvec(axis / sine * math.atan2(sine, cosine)).as_matrix())
+
+
+def _rms(difference: Float) -> float:
+    return math.sqrt(float((difference**2).sum()) / len(difference))
