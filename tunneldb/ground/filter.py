@@ -183,7 +183,7 @@ def _levels(held: _Points, centres: Float, coefficients: Float, settings: Ground
 
 def _refine(held: _Points, height: Float, settings: GroundSettings) -> tuple[Float, Float]:
     """Heights that follow the points, and γ."""
-    gamma = np.full(len(height), settings.gamma)
+    gamma = np.full(len(height), min(settings.gamma, settings.distance))
     for _ in range(_PASSES):
         # What stands on the ground spoils both less and less.
         height, number, square = refined(
