@@ -132,7 +132,7 @@ class Simulation:
         rng = np.random.default_rng(sequence)
         rays = self.scanner.rays(plan, rng)
         n = len(rays.time)
-        out = np.empty((n, 13))
+        out = np.empty((n, 12 if self._parts is None else 13))
         trace(
             self._scene,
             self._parts,
@@ -167,7 +167,7 @@ class Simulation:
             offset=out[:, 6].astype(np.float32),
             klass=klass,
             leak=np.where(index >= 0, index + 1, -1).astype(np.int32),
-            thing=out[:, 12].astype(np.uint16),
+            thing=out[:, 12].astype(np.uint16) if self._parts is not None else np.zeros(len(out), dtype=np.uint16),
             range=out[:, 11].astype(np.float32),
             incidence=np.arccos(out[:, 10]).astype(np.float32),
         )

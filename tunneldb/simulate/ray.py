@@ -299,7 +299,7 @@ def trace(
         Height of small-scale relief of the lining, m.
     furthest : float
         Greatest range, m.
-    out : (n, 13)
+    out : (n, 13), without ``parts`` (n, 12)
         range (NaN: no echo), x, y, z, chainage, arc, offset, class, leak (-1: none), drop (dB), cosine of
         incidence, true range, thing (0: none). Chainage, arc and offset are those of the stored point; leak, drop
         and cosine those of the spot that the laser met.
@@ -395,4 +395,5 @@ def trace(
         out[i, 9] = drop
         out[i, 10] = min(cosine, 1.0)
         out[i, 11] = true_range
-        out[i, 12] = thing
+        if parts is not None:
+            out[i, 12] = thing
