@@ -152,10 +152,9 @@ def _medians(key: Int, value: Float, count: int) -> Float:
 
 def _nodes(radius: Float) -> Float:
     """Radius at each whole degree from those of the classes; gaps are bridged, along the tunnel where they are wide."""
-    typical = np.nanmedian(radius, axis=0)
     centres = (np.arange(_CLASSES) + 0.5) * _DEGREES
-    known = np.isfinite(typical)
-    typical = np.interp(centres, centres[known], typical[known], period=360.0)
+    known = np.isfinite(radius).any(axis=0)
+    typical = np.interp(centres, centres[known], np.nanmedian(radius[:, known], axis=0), period=360.0)
     out = np.empty((len(radius), NODES))
     for row, classes in zip(out, radius, strict=True):
         apart = classes - typical
