@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numba import njit, prange
 from numpy.typing import NDArray
 from scipy import ndimage
 
@@ -21,6 +22,7 @@ from tunneldb.ground.things import ClusterSettings, Rest, find_clusters, sort_cl
 __all__ = ["Scene", "find_bare_scene", "find_scene"]
 
 Float = NDArray[np.float64]
+Int = NDArray[np.int64]
 
 
 def find_scene(
@@ -144,8 +146,23 @@ def _of_metre(along: Float, value: Float, share: float) -> Float:
     if len(along) == 0:
         return np.empty(0)
     metre = np.floor(along).astype(np.int64)
-    order = np.lexsort((value, metre))
-    first = np.searchsorted(metre[order], np.arange(metre.min(), metre.max() + 2))
-    at = first[:-1] + np.floor(share * (np.diff(first) - 1)).astype(np.int64)
-    found = value[order[np.clip(at, 0, len(value) - 1)]]  # metres without points are not asked for
-    return np.asarray(found[metre - metre.min()], dtype=np.float64)
+    metre -= metre.min()
+    first = np.concatenate([[0], np.cumsum(np.bincount(metre))])
+    return np.asarray(_quantiles(metre, value, first, share)[metre], dtype=np.float64)
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _quantiles(metre: Int, value: Float, first: Int, share: float) -> Float:  # pragma: no cover - compiled
+    """Quantile of the values of each metre, NaN where it has none; ``first`` tells how many come before it."""
+    held = np.empty(len(value))
+    end = first[:-1].copy()
+    for i in range(len(value)):
+        held[end[metre[i]]] = value[i]
+        end[metre[i]] += 1
+    out = np.full(len(end), np.nan)
+    for m in prange(len(end)):
+        count = first[m + 1] - first[m]
+        if count > 0:
+            at = int(np.floor(share * (count - 1)))
+            out[m] = np.partition(held[first[m] : first[m + 1]], at)[at]
+    return out

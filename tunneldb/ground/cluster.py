@@ -23,6 +23,9 @@ NEAR = 2
 """A point belongs to the cell within so many cells: points of survey density leave cells of a surface empty."""
 
 
+_SQUARE = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
+
+
 @dataclass(frozen=True)
 class Cluster:
     """Something in the tunnel, or a piece of it.
@@ -55,7 +58,7 @@ class Cluster:
     @classmethod
     def of(cls, klass: int, xyz: Float, along: Float, height: Float) -> Cluster:
         """Make one of its points (n, 3), n ≥ 1, their places along the tunnel and heights above the ground (n,; NaN: none)."""
-        cells = np.unique(np.floor(xyz / CELL).astype(np.int32), axis=0)
+        cells = _distinct(np.floor(xyz / CELL).astype(np.int32))
         known = height[np.isfinite(height)]
         low, high = (float(known.min()), float(known.max())) if len(known) else (None, None)
         return cls(int(klass), cells, len(xyz), float(along.min()), float(along.max()), low, high, _hull(cells))
@@ -69,10 +72,26 @@ def pieces(klass: int, xyz: Float, along: Float, height: Float) -> list[Cluster]
     return [Cluster.of(klass, xyz[m], along[m], height[m]) for m in (piece == p for p in np.unique(piece))]
 
 
+def _distinct(cells: Cells) -> Cells:
+    """Cells (n, 2 or 3) once each, sorted: as whole numbers, for rows of an array are compared slowly."""
+    low = cells.min(axis=0)
+    width = (cells.max(axis=0) - low).astype(np.int64) + 1
+    number = (cells[:, 0] - low[0]).astype(np.int64)
+    for axis in range(1, cells.shape[1]):
+        number = number * width[axis] + (cells[:, axis] - low[axis])
+    number = np.sort(number)
+    number = number[np.diff(number, prepend=-1) > 0]
+    columns = []
+    for axis in range(cells.shape[1] - 1, -1, -1):
+        number, rest = np.divmod(number, width[axis])
+        columns.append(rest + low[axis])
+    return np.column_stack(columns[::-1]).astype(np.int32)
+
+
 def _hull(cells: Cells) -> Float:
     """Convex hull in plan of cells, each a square, so that it always has an area."""
-    flat = np.unique(cells[:, :2], axis=0)
-    corners = np.concatenate([flat + step for step in ((0, 0), (0, 1), (1, 0), (1, 1))]).astype(np.float64)
+    flat = _distinct(cells[:, :2])
+    corners = (flat[None] + _SQUARE[:, None]).reshape(-1, 2).astype(np.float64)
     # From the first corner on: millions of metres would cost the hull its digits.
     origin = corners[0]
     return np.asarray((corners[ConvexHull(corners - origin).vertices]) * CELL)
