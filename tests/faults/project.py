@@ -137,6 +137,11 @@ _TABLES = {
     f"{_COORDINATES.format('geom')}, points, interpolated FROM tunnel.section ORDER BY 1, 2",
     "section_class": "SELECT s.segment, s.half, c.class, c.angle, c.radius, c.slope, c.sigma, c.points, c.state "
     "FROM tunnel.section_class c JOIN tunnel.section s ON s.id = c.section_id ORDER BY 1, 2, 3",
+    "ground": "SELECT n, km, across, height, gamma, foot, lean, arc_left, arc_right, "
+    f"{_COORDINATES.format('geom')} FROM tunnel.ground ORDER BY n",
+    "lining": 'SELECT km, cell, box, "offset", spread FROM tunnel.lining ORDER BY km',
+    "cluster": "SELECT km, class, chainage_from, chainage_to, height_from, height_to, points, cell, cells, "
+    f"{_COORDINATES.format('geom')} FROM tunnel.cluster ORDER BY 1, 3, 4, 2, 9",
     "radiometry": "SELECT km, roughness, dry_mean, dry_sigma, threshold, sigma_raw, sigma_lambert, sigma_oren_nayar, regions, "
     "pixels, wet_pixels FROM tunnel.radiometry ORDER BY km",
     "image": "SELECT km, kind, block, tiff FROM tunnel.image ORDER BY 1, 2, 3",
@@ -167,6 +172,7 @@ _FIELDS = (
     ("file", "i4", sql.SQL("f.number::int")),
     ("intensity", "f4", sql.SQL("p.intensity")),
     ("classification", "i4", sql.SQL("p.classification::int")),
+    ("class", "i4", sql.SQL('coalesce(p."class", 0)::int')),
 )
 
 
@@ -195,6 +201,8 @@ def differences(one: State, other: State) -> list[str]:
         a, b = one[name], other[name]
         if name == "point":
             found += _points(a, b)
+        elif name == "lining" and len(a) == len(b):
+            found += _lining(a, b)
         elif len(a) != len(b):
             odd = [row for row in (a if len(a) > len(b) else b) if row not in (b if len(a) > len(b) else a)]
             found.append(f"{name}: {len(a)} rows against {len(b)}, such as {str(odd[:1])[:300]}")
@@ -218,10 +226,23 @@ def _points(a: np.ndarray, b: np.ndarray) -> list[str]:
     return found
 
 
+def _lining(a: list[Any], b: list[Any]) -> list[str]:
+    """Grids are kept in single precision, whose last digit may tip."""
+    found = []
+    for one, other in zip(a, b, strict=True):
+        alike = one[:3] == other[:3] and all(
+            np.allclose(np.frombuffer(x, "<f4"), np.frombuffer(y, "<f4"), rtol=0, atol=1e-5, equal_nan=True)
+            for x, y in zip(one[3:], other[3:], strict=True)
+        )
+        if not alike:
+            found.append(f"lining: kilometre {one[0]}")
+    return found
+
+
 def same(a: object, b: object) -> bool:
     """Whether values are the same; sums may have been added up in another order."""
     if isinstance(a, float) and isinstance(b, float):
-        return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9)
+        return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9) or (math.isnan(a) and math.isnan(b))
     if isinstance(a, (list, tuple)) and isinstance(b, (list, tuple)):
         return len(a) == len(b) and all(map(same, a, b))
     return a == b

@@ -92,6 +92,20 @@ def test_points_axis_and_sections_are_the_same(ways: dict[str, Any], way: str) -
 
 
 @pytest.mark.parametrize("way", WAYS)
+def test_ground_and_classes_are_the_same(ways: dict[str, Any], way: str) -> None:
+    one, other = ways[way], ways["whole"]
+    assert [row[:2] for row in one["ground"]] == [row[:2] for row in other["ground"]]
+    (x, a), (y, b) = (_heights(found["ground"]) for found in (one, other))
+    _, i, j = np.intersect1d(x, y, return_indices=True)
+    assert len(i) >= (1 - PER_MILLE) * max(len(a), len(b))
+    assert (np.abs(a[i] - b[j]) <= MILLIMETRE).mean() >= 1 - PER_MILLE
+    arcs = [np.array([row[7:9] for row in found["ground"]], np.float64) for found in (one, other)]
+    assert (np.abs(arcs[0] - arcs[1]) <= 2 * MILLIMETRE).mean() >= 1 - 10 * PER_MILLE
+    _, i, j = np.intersect1d(_points(one)[0], _points(other)[0], return_indices=True)
+    assert (one["point"]["class"][i] == other["point"]["class"][j]).mean() >= 1 - PER_MILLE
+
+
+@pytest.mark.parametrize("way", WAYS)
 def test_unrolling_is_the_same(ways: dict[str, Any], way: str) -> None:
     one, other = ways[way]["unrolled"], ways["whole"]["unrolled"]
     for name in ("chainage", "arc", "offset"):
@@ -132,6 +146,14 @@ def _points(found: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     rows = found["point"]
     columns = [rows["time"].round(6), *(rows[axis].round(6) for axis in "xyz")]
     return np.rec.fromarrays(columns, names="t,x,y,z").view(np.ndarray), np.column_stack([rows["km"], rows["segment"]])
+
+
+def _heights(ground: list[Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Places of the ground, each a metre along and a column across, and the height there."""
+    places = [(row[0], round(row[2] * 10) + k) for row in ground for k in range(len(row[3]))]
+    heights = np.array([height for row in ground for height in row[3]])
+    known = np.isfinite(heights)
+    return np.rec.array(places, dtype="i8,i8").view(np.ndarray)[known], heights[known]
 
 
 def _raster(tiff: bytes) -> np.ndarray:
