@@ -72,17 +72,26 @@ def classify_file(source: Path, target: Path, values: Mapping[str, float], begin
     if not target.parent.is_dir():
         raise UserError(f"{target.parent}: no such folder")
     count = read_header(source).points
-    scene = find_scene_of(source, values, begin("points", count))
+    scene, origin = find_scene_of(source, values, begin("points", count))
     lining = any(cluster.klass == Klass.LINING for cluster in scene.clusters) or scene.relief is not None
     if scene.ground is None and not lining:
         raise UserError(f"{source}: neither ground nor lining is found in its {count} points: is it the scan of a tunnel?")
     with replacing(target) as temporary:
-        counts = rewrite(source, temporary, scene.classes, CLASS_NAMES, begin("classes", count))
+        counts = rewrite(source, temporary, lambda xyz: scene.classes(xyz - origin), CLASS_NAMES, begin("classes", count))
     return Classified(counts, scene.ground is not None, lining)
 
 
-def find_scene_of(source: Path, values: Mapping[str, float], progress: Callable[[int], None]) -> Scene:
+def find_scene_of(
+    source: Path, values: Mapping[str, float], progress: Callable[[int], None]
+) -> tuple[Scene, NDArray[np.float64]]:
     """Make the models of a file in one pass over its points.
+
+    Returns
+    -------
+    scene : Scene
+    origin : (3,) float64 array
+        Whole kilometres near the points, m. The scene is for coordinates less these: cells are numbered from there, however
+        far away the file's own origin is.
 
     Raises
     ------
@@ -91,13 +100,16 @@ def find_scene_of(source: Path, values: Mapping[str, float], progress: Callable[
     """
     settings = GroundSettings.of(values)
     voxels = Voxels(settings.voxel)
+    origin = np.zeros(3)
     for xyz in read_coordinates(source):
+        if not len(voxels):
+            origin = np.round(xyz[0], -3)
         try:
-            voxels.add(xyz)
+            voxels.add(xyz - origin)
         except ValueError as error:
             raise UserError(f"{source}: {error}") from error
         progress(len(xyz))
     thinned = voxels.centroids()
     line = Line.through(thinned)
     ground = find_ground(thinned, line, settings, spread=voxels.spread())
-    return find_bare_scene(thinned, line, ground, ClusterSettings.from_parameters(values))
+    return find_bare_scene(thinned, line, ground, ClusterSettings.from_parameters(values)), origin
