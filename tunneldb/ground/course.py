@@ -55,7 +55,7 @@ def _cells(plan: Float) -> Float:
     key = np.floor(plan / _CELL).astype(np.int64)
     cells, count = np.unique(key, axis=0, return_counts=True)
     cells = cells[count >= 0.1 * np.median(count)]
-    middle: Float = (cells + 0.5) * _CELL
+    middle = np.asarray((cells + 0.5) * _CELL, dtype=np.float64)
     _, label = connected_components(_graph(middle), directed=False)
     return np.asarray(middle[label == np.argmax(np.bincount(label))], dtype=np.float64)
 

@@ -21,7 +21,7 @@ from tunneldb.ground.voxels import Voxels
 Float = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-MARGIN = 40
+MARGIN = 32
 """Rows depend on no points farther than this along the line, m: what is found of two stretches agrees where they overlap."""
 
 _STEP = 4  # of the segments along, m
@@ -111,7 +111,7 @@ def find_ground(
     centres, coefficients = _segments(held, settings, seed)
     level = _levels(held, centres, coefficients, settings)
     rows = held.start + np.arange(held.rows + 1, dtype=np.float64)
-    columns = (held.first + np.arange(held.columns)) * COLUMN
+    columns = (held.first + np.arange(held.columns, dtype=np.float64)) * COLUMN
     height = filled(blended(rows, columns, centres, coefficients, level, _STEP))
     if not np.isfinite(height).any():
         return None
@@ -162,7 +162,7 @@ def _segments(held: _Points, settings: GroundSettings, seed: int) -> tuple[Float
     local = np.column_stack([held.along - middle, held.across, held.z])
     starts = (np.int64(seed) << 32) + number.astype(np.int64) + 1_000_000
     found = planes(local, bounds, settings.distance, settings.angle, settings.radius, starts)
-    return centres, found.coefficients
+    return np.asarray(centres, dtype=np.float64), found.coefficients
 
 
 def _levels(held: _Points, centres: Float, coefficients: Float, settings: GroundSettings) -> Float:
