@@ -30,7 +30,7 @@ __all__ = ["find", "ground", "load_ground", "load_scene", "read_points"]
 Counts = dict[str, Any]
 Float = NDArray[np.float64]
 
-MARGIN = 30.0
+MARGIN = 32.0
 """Points so far beyond the ends of a kilometre are looked at too, so that its neighbours find the same there, m."""
 
 _XYZ: tuple[tuple[str, str, sql.Composable], ...] = tuple(
