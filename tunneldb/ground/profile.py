@@ -15,7 +15,7 @@ LOW, HIGH = -0.8, 1.2
 """Ground lies between these heights about the plane of a segment, m: walkways, platforms, ditches."""
 
 _BIN = 0.01  # of heights, m
-_PIECE = 0.5  # along, m
+_PIECE = 0.5  # along, m; longer where points are few
 _SEEN = 0.5  # share of the pieces along the segment in which a level must be seen
 _RAISED = 0.04  # m; a stretch that stands higher over those on both sides of it is no ground
 _NARROW = 0.35  # m; if it is no wider: a rail, a cable
@@ -48,25 +48,28 @@ def profiles(
     out = np.full((centres.shape[0], columns), np.nan)
     bins = round((HIGH - LOW) / _BIN)
     reach = round(distance / _BIN)
-    pieces = round(2 * half / _PIECE)
+    most = round(2 * half / _PIECE)
     rows = (cells.shape[0] - 1) // columns
     for g in prange(centres.shape[0]):
         if np.isnan(planes[g, 0]):
             continue
         low = int(np.floor(centres[g] - half)) - start
         high = int(np.ceil(centres[g] + half)) - start
+        low, high = max(low, 0), min(high, rows)
+        pieces = _cut(cells, columns, low, high, most)
+        piece_length = 2 * half / pieces
         count = np.empty(bins + 1, np.int64)
         seen = np.empty((bins, pieces), np.bool_)
         here = np.empty(pieces, np.bool_)
-        length = _pieces(along, cells, columns, start, max(low, 0), min(high, rows), centres[g] - half, pieces)
+        length = _pieces(along, cells, columns, low, high, centres[g] - half, pieces, piece_length)
         for c in range(columns):
             count[:] = 0
             seen[:] = False
             here[:] = False
-            for row in range(max(low, 0), min(high, rows)):
+            for row in range(low, high):
                 for n in range(cells[row * columns + c], cells[row * columns + c + 1]):
                     from_middle = along[n] - centres[g]
-                    piece = int(np.floor((from_middle + half) / _PIECE))
+                    piece = int(np.floor((from_middle + half) / piece_length))
                     if piece < 0 or piece >= pieces:
                         continue
                     e = z[n] - planes[g, 0] - planes[g, 1] * from_middle - planes[g, 2] * across[n]
@@ -85,11 +88,27 @@ def profiles(
 
 
 @njit(cache=True, nogil=True)
-def _pieces(along: Float, cells: Index, columns: int, start: int, low: int, high: int, begin: float, pieces: int) -> int:
+def _cut(cells: Index, columns: int, low: int, high: int, most: int) -> int:
+    """How many pieces a segment is cut into: as many as hold two points of a usual column, but four at least."""
+    number = np.zeros(columns)
+    for c in range(columns):
+        for row in range(low, high):
+            number[c] += cells[row * columns + c + 1] - cells[row * columns + c]
+    known = number[number > 0]
+    pieces = most
+    while pieces > 4 and known.size and np.median(known) < 2.0 * pieces:
+        pieces //= 2
+    return pieces
+
+
+@njit(cache=True, nogil=True)
+def _pieces(
+    along: Float, cells: Index, columns: int, low: int, high: int, begin: float, pieces: int, piece_length: float
+) -> int:
     """How many pieces of a segment hold points at all."""
     seen = np.zeros(pieces, np.bool_)
-    for n in range(cells[min(low * columns, cells.shape[0] - 1)], cells[max(high, low) * columns]):
-        piece = int(np.floor((along[n] - begin) / _PIECE))
+    for n in range(cells[low * columns], cells[max(high, low) * columns]):
+        piece = int(np.floor((along[n] - begin) / piece_length))
         if 0 <= piece < pieces:
             seen[piece] = True
     return seen.sum()
