@@ -10,6 +10,7 @@ import pytest
 import rasterio
 from click.testing import CliRunner
 from numpy.typing import NDArray
+from psycopg import sql
 from things import CORNER, FLOOR, HALF_FLOOR, THINGS
 
 from tunneldb.cli.main import main
@@ -76,9 +77,12 @@ def test_pixels_without_points_have_no_class(conn: psycopg.Connection, example: 
     assert (classes[~gap] != 0).all()
 
 
-def test_before_stage_ground_there_is_no_image_of_classes(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
-    conn.execute("DELETE FROM tunnel.ground")
-    conn.execute("DELETE FROM tunnel.lining")
+@pytest.mark.parametrize("gone", [("ground", "lining"), ("section",)])
+def test_before_stage_ground_there_is_no_image_of_classes(
+    conn: psycopg.Connection, example: str, tmp_path: Path, gone: tuple[str, ...]
+) -> None:
+    for table in gone:
+        conn.execute(sql.SQL("DELETE FROM tunnel.{}").format(sql.Identifier(table)))
     conn.commit()
     assert image(tmp_path) == [
         f"demo-2024-km012-{kind}.{end}" for kind in ("corrected", "offset", "raw") for end in ("png", "tif")

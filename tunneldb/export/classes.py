@@ -42,10 +42,11 @@ class ClassPainter:
 
     @classmethod
     def load(cls, conn: psycopg.Connection, survey: Survey, km: int) -> ClassPainter | None:
-        """Load what is stored of a kilometre; None when stage ``ground`` has found nothing there, or has not run."""
+        """Load what is stored of a kilometre; None when stage ``ground`` has found nothing there, or stages have not run."""
         held = conn.execute(
-            "SELECT EXISTS (SELECT FROM tunnel.lining WHERE survey_id = %(survey)s AND km = %(km)s)"
-            " OR EXISTS (SELECT FROM tunnel.ground WHERE survey_id = %(survey)s AND km = %(km)s)",
+            "SELECT EXISTS (SELECT FROM tunnel.section WHERE survey_id = %(survey)s AND km = %(km)s)"
+            " AND (EXISTS (SELECT FROM tunnel.lining WHERE survey_id = %(survey)s AND km = %(km)s)"
+            " OR EXISTS (SELECT FROM tunnel.ground WHERE survey_id = %(survey)s AND km = %(km)s))",
             {"survey": survey.id, "km": km},
         ).fetchone()
         if held is None or not held[0]:
