@@ -188,13 +188,18 @@ def refined(
             if np.isnan(height[i, c]):
                 continue
             total, weight = 0.0, _PRIOR
-            for row in range(max(i - 1, 0), min(i + 1, metres)):
-                for n in range(cells[row * columns + c], cells[row * columns + c + 1]):
-                    e = z[n] - _at(height, along[n] - start, across[n] / COLUMN - first)
-                    if abs(e) < gate[i]:
-                        w = 1.0 - (abs(along[n] - start - i) / _ALONG) ** 2
-                        total += w * e
-                        weight += w
+            for k in range(max(c - 1, 0), min(c + 2, columns)):
+                # Columns beside it count half, but not beyond a step.
+                if not abs(height[i, k] - height[i, c]) <= _STEP:
+                    continue
+                near = 1.0 if k == c else 0.5
+                for row in range(max(i - 1, 0), min(i + 1, metres)):
+                    for n in range(cells[row * columns + k], cells[row * columns + k + 1]):
+                        e = z[n] - _at(height, along[n] - start, across[n] / COLUMN - first)
+                        if abs(e) < gate[i]:
+                            w = near * (1.0 - (abs(along[n] - start - i) / _ALONG) ** 2)
+                            total += w * e
+                            weight += w
             out[i, c] += total / weight
     for i in prange(height.shape[0]):
         for row in range(max(i - 2, 0), min(i + 2, metres)):
