@@ -389,6 +389,15 @@ def test_classes_are_those_of_the_program(conn: psycopg.Connection) -> None:
     assert rows == [(int(klass), klass.name.lower()) for klass in Klass]
 
 
+def test_points_have_the_class_that_was_found_beside_that_of_the_file(conn: psycopg.Connection, points: None) -> None:
+    conn.execute("UPDATE tunnel.point SET class = 68 WHERE survey_id = 1 AND km = 12 AND chainage < 12010")
+    rows = conn.execute(
+        "SELECT k.name, p.classification, count(*) FROM tunnel_api.point p LEFT JOIN tunnel_api.class k ON k.id = p.class "
+        "WHERE p.survey_id = 1 AND p.km = 12 GROUP BY 1, 2 ORDER BY 3"
+    ).fetchall()
+    assert rows == [("object", 0, 20), (None, 0, 1979)]
+
+
 def test_cluster_says_what_it_is_and_where(conn: psycopg.Connection, example: str) -> None:
     assert conn.execute(
         "SELECT class_name, label, segment, round(area::numeric, 2), GeometryType(geom), ST_SRID(geom) FROM tunnel_api.cluster "
