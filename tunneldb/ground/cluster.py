@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import shapely
 from numba import njit, prange
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -73,7 +73,7 @@ def pieces(klass: int, xyz: Float, along: Float, height: Float) -> list[Cluster]
 
 
 def _distinct(cells: Cells) -> Cells:
-    """Cells (n, 2 or 3) once each, sorted: as whole numbers, for rows of an array are compared slowly."""
+    """Cells (n, 3) once each, sorted: as whole numbers, for rows of an array are compared slowly."""
     low = cells.min(axis=0)
     width = (cells.max(axis=0) - low).astype(np.int64) + 1
     number = (cells[:, 0] - low[0]).astype(np.int64)
@@ -90,11 +90,14 @@ def _distinct(cells: Cells) -> Cells:
 
 def _hull(cells: Cells) -> Float:
     """Convex hull in plan of cells, each a square, so that it always has an area."""
-    flat = _distinct(cells[:, :2])
-    corners = (flat[None] + _SQUARE[:, None]).reshape(-1, 2).astype(np.float64)
-    # From the first corner on: millions of metres would cost the hull its digits.
-    origin = corners[0]
-    return np.asarray((corners[ConvexHull(corners - origin).vertices]) * CELL)
+    flat = cells[np.r_[True, (np.diff(cells[:, :2], axis=0) != 0).any(axis=1)], :2]  # sorted by x and y
+    # From a corner on: millions of metres would cost the hull its digits.
+    corners = (flat - flat[0] + _SQUARE[:, None]).reshape(-1, 2)
+    ring = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(corners)))[:-1]
+    x, y = ring.T
+    if np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) < 0.0:
+        ring = ring[::-1]
+    return np.asarray((ring + flat[0]) * CELL)
 
 
 @dataclass(frozen=True)
