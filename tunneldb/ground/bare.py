@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from numpy.typing import NDArray
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from tunneldb.geometry.frame import segment_rows, tangents
+from tunneldb.geometry.frame import frame_of, locate, nearest_segment, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
 from tunneldb.geometry.unrolling import CROWN, NODES
 from tunneldb.ground.dbscan import dbscan
 from tunneldb.ground.line import Line
 from tunneldb.ground.spacing import Spacing
 from tunneldb.ground.things import ClusterSettings, Rest
+from tunneldb.leak.appendage import DELTA
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -34,8 +36,9 @@ CLOSED = 0.6
 VERTICES, SECTIONS = 10.0, 2.5
 """Distance of the vertices of the axis and of the sections, m."""
 
-_DEGREES = 5  # width of an angular class of a section
+_DEGREES = 2  # width of an angular class of a section
 _CLASSES = 360 // _DEGREES
+_NOTCH = 5  # classes: 10 degrees, of which what hangs on the wall takes less
 _LEAST = 3  # points that fill a class
 _NEIGHBOURS = 16  # of a normal
 
@@ -99,22 +102,26 @@ def _coherence(points: Float, index: Int) -> float:  # pragma: no cover - compil
 
 def surface_through(line: Line, along: Float, across: Float, z: Float, wall: Bool) -> Surface | None:
     """Sections through points in the frame of a line; None where walls and roof (``wall``) don't close around the middle."""
-    if not wall.any():
+    if wall.sum() < _LEAST:
         return None
     first, last = float(along[wall].min()) - 0.5, float(along[wall].max()) + 0.5
     segments = max(1, round((last - first) / VERTICES))
     at = np.linspace(first, last, segments + 1)
-    middle = _middles(at, along[wall], across[wall], z[wall], along, z)
+    middle = _middles(at, along, across, z, wall)
     vertices = np.column_stack([line.point(at, middle[:, 0]), middle[:, 1]])
+    rows = segment_rows(vertices, tangents(vertices))
+    ends = np.column_stack([at[:-1], at[1:]])
     count = max(1, round((last - first) / SECTIONS))
     sections = first + (np.arange(count) + 0.5) * (last - first) / count
-    u = across - np.interp(along, at, middle[:, 0])
-    w = z - np.interp(along, at, middle[:, 1])
+    places = _placed(rows, np.arange(segments), ends, np.column_stack([line.point(along, across), z]))
+    held = np.isfinite(places[:, 0])
+    (along, u, w), wall = places[held].T, wall[held]
     angle = np.mod(np.degrees(np.arctan2(u, w)) + 180.0, 360.0)
     bins = np.minimum((angle / _DEGREES).astype(np.int64), _CLASSES - 1)
     slab = np.clip(((along - first) * count / (last - first)).astype(np.int64), 0, count - 1)
     key = slab * _CLASSES + bins
     radius = _medians(key, np.hypot(u, w), count * _CLASSES).reshape(count, _CLASSES)
+    radius = _without_notches(radius)
     walls = np.bincount(key[wall], minlength=count * _CLASSES).reshape(count, _CLASSES) >= _LEAST
     floor = np.isfinite(radius) & ~walls
     closed = walls.sum(axis=1) / np.maximum(_CLASSES - floor.sum(axis=1), 1)
@@ -123,22 +130,46 @@ def surface_through(line: Line, along: Float, across: Float, z: Float, wall: Boo
         return None
     nodes = _nodes(radius)
     arcs = _arcs(nodes)
-    rows = segment_rows(vertices, tangents(vertices))
-    ends = np.column_stack([at[:-1], at[1:]])
     return Surface(np.arange(segments), rows, ends, sections, nodes, arcs, 2.0 * VERTICES)
 
 
-def _middles(at: Float, along: Float, across: Float, z: Float, all_along: Float, all_z: Float) -> Float:
-    """Middle between the walls and between floor and roof at each vertex: across and z, m."""
-    half = 0.5 * (at[1] - at[0])
-    found = np.full((len(at), 2), np.nan)
+def _middles(at: Float, along: Float, across: Float, z: Float, wall: Bool) -> Float:
+    """Middle between the walls and between floor and roof at each vertex: across and z, m.
+
+    That of each stretch as long as a section's is taken, and a line laid through those about a vertex.
+    """
+    stretch = np.floor((along - at[0]) / SECTIONS).astype(np.int64)
+    order = np.argsort(stretch, kind="stable")
+    found = []
+    for part in np.split(order, np.flatnonzero(np.diff(stretch[order])) + 1):
+        sides = part[wall[part]]
+        if len(sides) >= _LEAST:
+            middle = np.mean(np.quantile(across[sides], (0.02, 0.98)))
+            height = 0.5 * (np.quantile(z[part], 0.02) + np.quantile(z[sides], 0.98))
+            found.append((float(along[part].mean()), float(middle), float(height)))
+    where, *middles = np.array(found or [(at[0], across[wall].mean(), z[wall].mean())]).T
+    out = np.empty((len(at), 2))
     for k, a in enumerate(at):
-        near, beside = np.abs(along - a) <= half, np.abs(all_along - a) <= half
-        if near.sum() >= _LEAST:
-            found[k, 0] = np.mean(np.quantile(across[near], (0.02, 0.98)))
-            found[k, 1] = 0.5 * (np.quantile(all_z[beside], 0.02) + np.quantile(z[near], 0.98))
-    known = np.isfinite(found[:, 0])
-    return np.column_stack([np.interp(at, at[known], found[known, c]) for c in range(2)])
+        near = np.abs(where - a) <= max(VERTICES, float(np.abs(where - a).min()) + 2.0 * SECTIONS)
+        for c, values in enumerate(middles):
+            _, level = np.polyfit(where[near] - a, values[near], 1) if near.sum() > 2 else (0.0, values[near].mean())
+            out[k, c] = level
+    return out
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _placed(segments: Float, number: Int, ends: Float, points: Float) -> Float:  # pragma: no cover - compiled
+    """Chainage of points (n, 3) and their place right and up of the axis, (n, 3), m; NaN beyond its ends."""
+    out = np.full((points.shape[0], 3), np.nan)
+    for i in prange(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        k, f = locate(segments, number, nearest_segment(segments, x, y, z), x, y, z)
+        if k >= 0:
+            ox, oy, oz, tx, ty, tz, rx, ry = frame_of(segments, k, f)
+            out[i, 0] = ends[k, 0] + f * (ends[k, 1] - ends[k, 0])
+            out[i, 1] = (x - ox) * rx + (y - oy) * ry
+            out[i, 2] = (x - ox) * ry * tz - (y - oy) * rx * tz + (z - oz) * (rx * ty - ry * tx)
+    return out
 
 
 def _medians(key: Int, value: Float, count: int) -> Float:
@@ -148,6 +179,13 @@ def _medians(key: Int, value: Float, count: int) -> Float:
     size = np.diff(bounds)
     at = np.minimum(bounds[:-1] + size // 2, max(len(value) - 1, 0))
     return np.where(size >= _LEAST, value[order][at], np.nan)
+
+
+def _without_notches(radius: Float) -> Float:
+    """Sections freed of what stands in from both its sides by more than δ: a cable or a box on the wall, not the wall."""
+    filled = np.where(np.isnan(radius), 0.0, radius)
+    closed = ndimage.grey_closing(filled, size=(1, _NOTCH), mode="wrap")
+    return np.where(closed - radius > DELTA, closed, radius)
 
 
 def _nodes(radius: Float) -> Float:

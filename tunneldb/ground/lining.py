@@ -43,6 +43,7 @@ _BIN, _BINS, _SMOOTH = 0.02, 25, 2  # of the histogram that finds the level: 2 c
 _FINE, _FINES = 0.002, 128  # of the histogram that finds the spread
 _TUKEY = 4.685  # Tukey's weights end at so many standard deviations
 _FIRST, _FITS = 0.12, 5  # width of the first fit's weights, m
+_REST = 2e-4  # the fit rests when a cell moves by less, m
 _ALONG, _ROUND = 12, 4  # cells to each side that a cell's offset is compared with: 6 m by 2 m
 
 
@@ -337,12 +338,16 @@ def _plane(part: Float, level: float, fine: NDArray[np.int64]) -> tuple[float, f
         xx, xy, yy = sxx - sx * sx / s0, sxy - sx * sy / s0, syy - sy * sy / s0
         xz, yz = sxz - sx * sz / s0, syz - sy * sz / s0
         determinant = xx * yy - xy * xy
+        before, lean, slant = a, b, c
         b, c = 0.0, 0.0
         if determinant > 0.05 * s0 * s0:  # spread in both directions: that of a full part is 4.3
             b = (xz * yy - yz * xy) / determinant
             c = (yz * xx - xz * xy) / determinant
         a = (sz - b * sx - c * sy) / s0
+        rests = max(abs(a - before), abs(b - lean), abs(c - slant)) < _REST
         sigma = _spread(part, a, b, c, fine)
+        if rests:
+            break
         scale = min(max(_TUKEY * sigma, DELTA), 2.0 * _FIRST)
     return a, sigma
 
@@ -372,9 +377,10 @@ def level_at(
     """Offset of the lining at one place, between the cells' middles, and its tolerance; NaN where there is none."""
     rows, columns = relief.shape
     y, x = arc / cell - row - 0.5, chainage / cell - column - 0.5
-    if not (-1.0 < y < rows and -1.0 < x < columns):
+    if not (-0.5 <= y <= rows - 0.5 and -0.5 <= x <= columns - 0.5):
         return np.nan, np.nan
-    i, j = int(np.floor(y)), int(np.floor(x))
+    y, x = min(max(y, 0.0), rows - 1.0), min(max(x, 0.0), columns - 1.0)
+    i, j = int(y), int(x)
     fy, fx = y - i, x - j
     total, plane, sigma = 0.0, 0.0, 0.0
     for m in range(2):
