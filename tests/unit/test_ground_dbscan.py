@@ -9,7 +9,7 @@ from tunneldb.ground.dbscan import dbscan
 def cloud(seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
     blobs = [rng.normal(rng.uniform(0, 8, 3), rng.uniform(0.1, 0.5), (rng.integers(10, 300), 3)) for _ in range(7)]
-    return np.concatenate([*blobs, rng.uniform(0, 8, (150, 3))]) + [5e5, 4.7e6, 600.0]
+    return np.concatenate([*blobs, rng.uniform(0, 8, (150, 3))]) + np.array([5e5, 4.7e6, 600.0])
 
 
 def by_definition(points: np.ndarray, radius: float, least: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
