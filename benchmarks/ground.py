@@ -168,8 +168,8 @@ def open3d(xyz: Float) -> Bool:
 
 
 def tuned_csf(length: float) -> tuple[float, int, float]:
-    """The cloth's resolution, rigidness and class threshold that err the least over one scene of each section and ballast."""
-    clouds = [simulate(p) for n, p in scenes(1, True, length) if "curve" in n and "profiler" in n and "2 %" not in n]
+    """The cloth's resolution, rigidness and class threshold that err the least over one scene of each section, on ballast."""
+    clouds = [simulate(p) for n, p in scenes(1, True, length) if "curve" in n and "profiler" in n and "2 %" in n]
     best, least = (0.5, 3, 0.1), np.inf
     for resolution, rigidness, threshold in product((0.1, 0.2, 0.5, 1.0), (1, 3), (0.03, 0.06, 0.1, 0.2)):
         total = []

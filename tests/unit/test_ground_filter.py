@@ -157,6 +157,35 @@ def test_a_wall_alone_has_no_ground_and_a_floor_alone_no_feet():
     assert ground.is_ground(*line.place(floor), floor[:, 2]).mean() > 0.98
 
 
+def test_floor_is_found_beside_a_parked_train_that_hides_it():
+    """A box of 8 m by 6 m, 40 m long; from 10 to 30 m a train 3.2 m wide, seen from 0.3 to 4 m over the floor."""
+    rng = np.random.default_rng(9)
+
+    def sheet(origin: list[float], one: list[float], two: list[float]) -> np.ndarray:
+        count = int(150 * np.linalg.norm(one) * np.linalg.norm(two))
+        return np.array(origin) + rng.random((count, 1)) * one + rng.random((count, 1)) * two
+
+    floor = sheet([0, -4, 0], [40, 0, 0], [0, 8, 0])
+    floor = floor[~((np.abs(floor[:, 0] - 20) < 10) & (np.abs(floor[:, 1]) < 1.6))]
+    other = [sheet([0, side, 0], [40, 0, 0], [0, 0, 6]) for side in (-4, 4)]
+    other += [sheet([10, side, 0.3], [20, 0, 0], [0, 0, 3.7]) for side in (-1.6, 1.6)]
+    other += [sheet([0, -4, 6], [40, 0, 0], [0, 8, 0]), sheet([10, -1.6, 4], [20, 0, 0], [0, 3.2, 0])]
+    cloud = np.vstack([floor, *other]) + rng.normal(0, 0.003, (len(floor) + sum(map(len, other)), 3))
+    cloud[:, 2] += 0.03 * cloud[:, 0]
+    line = Line.of([[0, 0], [40, 0]], [0, 40])
+    ground = find_ground(cloud, line, SETTINGS)
+    assert ground is not None
+    found = ground.is_ground(*line.place(cloud), cloud[:, 2])
+    assert Agreement.of(np.arange(len(cloud)) < len(floor), found).total < 0.002
+    assert np.abs(ground.foot - [-4, 4]).max() < 0.01
+
+
+@pytest.mark.parametrize("density", [10, 30])
+def test_few_points_show_the_ground_too(density):
+    parameters = Parameters(section="horseshoe", slope=2, radius=300, length=40, density=density, leaks=1, scanner="profiler")
+    assert _agreement(simulate(parameters), _axis(parameters)).total < 0.005
+
+
 def test_plane_of_many_points_stands_up_to_a_larger_one_that_is_steep():
     """A floor of 30 % beside a wall of 70 % of the points: only checked normals find it."""
     rng = np.random.default_rng(8)
