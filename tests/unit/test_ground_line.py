@@ -99,3 +99,13 @@ def test_single_point_gets_a_line_and_no_points_an_error():
     assert abs(across[0]) < 1.0
     with pytest.raises(ValueError, match="no points"):
         Line.through(np.full((4, 3), np.nan))
+
+
+def test_a_point_far_away_does_not_lead_the_line_astray():
+    rng = np.random.default_rng(10)
+    angle = rng.uniform(0, 2 * np.pi, 20_000)
+    tube = np.column_stack([rng.uniform(0, 12, 20_000), 4 * np.sin(angle), 4 * np.cos(angle)])
+    line = Line.through(np.vstack([tube, [[9e5, -4e5, 3e3]]]))
+    _, across = line.place(tube)
+    assert np.abs(across).max() < 4.2
+    assert line.distance[-1] == pytest.approx(12.0, abs=0.5)

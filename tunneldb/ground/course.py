@@ -15,7 +15,10 @@ _CELL = 1.0  # m in plan
 _REACH = 3.0  # cells closer than this are neighbours, m: profiles may lie apart
 _SHORT = 40.0  # m; below, a tunnel may be wider than long, and the way it looks from its end tells its direction
 _STEP = 5.0  # m between vertices
-_SAMPLE = 20_000
+_SAMPLE = 10_000  # points that are looked at from all sides
+_CENTRED = 200_000  # and that tell the middle
+_PICTURE = 0.2  # edge of a cell of the picture, m
+_FAR = 1 << 24  # cells; more than any tunnel is long
 
 
 def course(points: Float) -> Float:
@@ -45,15 +48,17 @@ def course(points: Float) -> Float:
     vertices = _strung(cells, way) if way.max() > _SHORT else _seen(local)
     if vertices[-1, 0] < vertices[0, 0]:
         vertices = vertices[::-1]
+    spaced = local[:: max(1, len(local) // _CENTRED), :2]
     for _ in range(3):
-        vertices = _centred(vertices, local[:, :2])
+        vertices = _centred(vertices, spaced)
     return np.asarray(vertices + origin[:2])
 
 
 def _cells(plan: Float) -> Float:
     """Middles (m, 2) of the plan's cells that hold points and hang together; single stray points don't count."""
     key = np.floor(plan / _CELL).astype(np.int64)
-    cells, count = np.unique(key, axis=0, return_counts=True)
+    key, count = np.unique(key[:, 0] * _FAR + key[:, 1] + _FAR // 2, return_counts=True)
+    cells = np.column_stack([key // _FAR, key % _FAR - _FAR // 2])
     cells = cells[count >= 0.1 * np.median(count)]
     middle = np.asarray((cells + 0.5) * _CELL, dtype=np.float64)
     _, label = connected_components(_graph(middle), directed=False)
@@ -97,6 +102,7 @@ def _end(cells: Float, at: Float, unit: Float) -> Float:
 
 def _seen(local: Float) -> Float:
     """Both ends of a short piece: along the direction in which its points fill the fewest cells of the picture."""
+    local = local[np.abs(local - np.median(local, axis=0)).max(axis=1) < _SHORT]
     sample = local[:: max(1, len(local) // _SAMPLE)]
     sample = sample - sample.mean(axis=0)
     best, step = 0.0, np.pi / 90
@@ -118,8 +124,8 @@ def _seen(local: Float) -> Float:
 def _filled(sample: Float, angle: float) -> int:
     """How many cells of 0.2 m the points fill, seen in a direction of the plan."""
     across = sample[:, 0] * np.sin(angle) - sample[:, 1] * np.cos(angle)
-    column, row = np.floor(across / 0.2).astype(np.int64), np.floor(sample[:, 2] / 0.2).astype(np.int64)
-    return len(np.unique(column * 1_000_003 + row))
+    column, row = (np.floor((v - v.min()) / _PICTURE).astype(np.int64) for v in (across, sample[:, 2]))
+    return int(np.count_nonzero(np.bincount(column * (row.max() + 1) + row)))
 
 
 def _centred(vertices: Float, plan: Float) -> Float:
