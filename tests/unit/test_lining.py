@@ -107,6 +107,7 @@ def test_the_wall_above_its_foot_is_lining():
     arcs = np.array([6.5 - FLOOR_EDGE - 0.02, 6.5 - FLOOR_EDGE + 0.02])
     assert floor.covers(np.full(2, 30.0), arcs).tolist() == [False, True]
     assert floor.covers(np.full(2, 30.0), -arcs).tolist() == [False, True]
+    assert floor.covers(np.full(2, 30.0), arcs - 0.1, above=0.1).tolist() == [False, True]
 
 
 @pytest.mark.parametrize("inset", [0.005, 0.03, 0.1, 0.25])

@@ -36,6 +36,10 @@ from tunneldb.scan.pose import load_poses
 ASIDE = 50.0
 """Length of the surface beyond the ends that is loaded too: sections are judged by the three before and after them, m."""
 
+CORNER = 0.1
+"""Points that serve for the roughness lie farther above the foot of the wall, m: there sections are rounded, and the incidence
+angles wrong."""
+
 NEAR_SURFACE = 0.05
 """Points that serve for the roughness lie no farther from the surface, m."""
 
@@ -50,10 +54,13 @@ class Sample:
         Where they lie and what they show.
     scan_id : (n,) int array
         Scan that each is of.
+    clear : (n,) bool array
+        Those on the lining, clear of its foot.
     """
 
     seen: Seen
     scan_id: NDArray[np.int32]
+    clear: NDArray[np.bool_]
 
     @property
     def views(self) -> Views:
@@ -194,7 +201,7 @@ def _sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye) -> Sample:
         assert seen.views is not None
         span.add(*range_span(seen.views, seen.lining, eye.radiometer.reference))
         span.require(eye.radiometer.reference)
-    return Sample(seen, points.scan_id)
+    return Sample(seen, points.scan_id, seen.lining & ~eye.floor.covers(seen.chainage, seen.arc, CORNER))
 
 
 def _roughness(view: Sample, drawn: list[Polygon]) -> Roughness:
@@ -205,7 +212,7 @@ def _roughness(view: Sample, drawn: list[Polygon]) -> Roughness:
         if len(regions) < 2:
             raise UserError(f"the {len(drawn)} homogeneous regions drawn hold too few points: draw larger ones, or none")
         return find_roughness(regions)
-    near = seen.lining & (np.abs(seen.offset) <= NEAR_SURFACE)
+    near = view.clear & (np.abs(seen.offset) <= NEAR_SURFACE)
     regions = automatic_regions(
         seen.chainage[near], seen.arc[near], view.scan_id[near], views.cosine[near], views.distance_db[near]
     )
@@ -238,7 +245,7 @@ def _sigma(
     if dry_regions:
         dry = seen.lining & (_polygon_of(seen, dry_regions) >= 0)
     else:
-        dry = seen.lining & dry_places(picture, found, seen.chainage, seen.arc)
+        dry = view.clear & dry_places(picture, found, seen.chainage, seen.arc)
     return (
         plain_statistics(views.raw_db[dry]),
         plain_statistics(views.corrected(0.0)[dry]),

@@ -71,11 +71,11 @@ class Floor:
         row = np.clip(np.rint(place - self.start).astype(np.intp), 0, len(self.left) - 1)
         return self.left[row], self.right[row]
 
-    def covers(self, chainage: Float, arc: Float) -> NDArray[np.bool_]:
-        """Tell which places in the unrolled plane are floor; arrays that broadcast, m."""
+    def covers(self, chainage: Float, arc: Float, above: float = 0.0) -> NDArray[np.bool_]:
+        """Tell which places in the unrolled plane are floor, or wall so far ``above`` it; arrays that broadcast, m."""
         left, right = self.bounds(chainage)
         with np.errstate(invalid="ignore"):
-            return np.asarray((arc <= left) | (arc >= right), dtype=np.bool_)
+            return np.asarray((arc <= left + above) | (arc >= right - above), dtype=np.bool_)
 
 
 @dataclass(frozen=True)
