@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from tunneldb.ground.sphere_fit import Fit, cells_of, coverage, fit_sphere
 from tunneldb.ground.sphere_settle import settle
@@ -32,6 +33,8 @@ LEAST_COVERAGE = 0.15
 SHARE = 0.6
 
 ROUGH = 0.8  # the quick fit's figures may fall short by so much of what the final ones must reach
+
+NEIGHBOURS = 4  # of a point, whose residuals are compared with its own
 
 # Cylinders about the centre: their rim in sectors of 22.5°, of which one sees 8; the wall behind a sphere fills 3 at most.
 SECTORS, RIM = 16, 5
@@ -86,7 +89,9 @@ class Refusal:
     reason: str
 
 
-def find_spheres(xyz: Float, eyes: Float, radius: float, tolerance: float) -> tuple[list[Sphere], list[Refusal]]:
+def find_spheres(
+    xyz: Float, eyes: Float, radius: float, tolerance: float, noise: float = math.inf
+) -> tuple[list[Sphere], list[Refusal]]:
     """Find the target spheres in one scan.
 
     Parameters
@@ -105,7 +110,7 @@ def find_spheres(xyz: Float, eyes: Float, radius: float, tolerance: float) -> tu
         What is a ball or nearly, but no such sphere.
     """
     points = Scattered(xyz, REACH * radius)
-    centres, _ = candidates(points, eyes, radius)
+    centres, noise = candidates(points, eyes, radius)
     there = settle(points, centres, radius)
     near_radius = np.abs(there.radius - radius) <= tolerance + 3.0 * there.radius_sigma
     other_ball = (there.radius_sigma <= tolerance / 4.0) & (there.seen >= 2.0 * LEAST_COVERAGE)  # for the report
@@ -113,7 +118,7 @@ def find_spheres(xyz: Float, eyes: Float, radius: float, tolerance: float) -> tu
         (there.on >= LEAST_POINTS)
         & (there.share >= ROUGH * SHARE)
         & (there.seen >= ROUGH * LEAST_COVERAGE)
-        & (there.radius_sigma <= tolerance / ROUGH)
+        & (there.radius_sigma <= tolerance / 2.0 / ROUGH)
         & (near_radius | other_ball)
     )
     spheres: list[Sphere] = []
@@ -123,7 +128,7 @@ def find_spheres(xyz: Float, eyes: Float, radius: float, tolerance: float) -> tu
         if _taken(there.centres[k], radius, spheres) or _taken(there.centres[k], radius, refusals):
             continue
         near = points.around(there.centres[k], 2.0 * radius)
-        found = _judge(xyz[near], eyes[near], there.centres[k], radius, tolerance)
+        found = _judge(xyz[near], eyes[near], there.centres[k], radius, tolerance, noise)
         if isinstance(found, Sphere):
             if not _taken(found.centre, radius, spheres):
                 spheres.append(found)
@@ -136,25 +141,25 @@ def _taken(centre: Float, radius: float, found: Sequence[Sphere] | Sequence[Refu
     return any(float(np.linalg.norm(centre - other.centre)) < radius for other in found)
 
 
-def _judge(points: Float, eyes: Float, start: Float, radius: float, tolerance: float) -> Sphere | Refusal | None:
+def _judge(points: Float, eyes: Float, start: Float, radius: float, tolerance: float, noise: float) -> Sphere | Refusal | None:
     """Fit a sphere to the points around a candidate; None for what isn't even round."""
     fit = fit_sphere(points, eyes, start, radius, 3.0 * tolerance)
-    if fit is None or fit.rms > tolerance or fit.on.sum() < LEAST_POINTS:
-        return None
-    if fit.radius_sigma > tolerance:  # a plane or a small cap: it cannot be told whether it is a sphere
-        return None
+    if fit is None or fit.on.sum() < LEAST_POINTS or fit.radius_sigma > tolerance / 2.0:
+        return None  # of a plane or a small cap, it cannot be told within the tolerance whether it is a sphere
+    # Chance makes as few points scatter by so much at the most, and the noise is known to a tenth.
+    count = int(fit.used.sum())
+    most = min(tolerance, 1.1 * (1.0 + 3.0 / math.sqrt(2.0 * count)) * noise * fit.expected)
     towards = _towards(points[fit.on], eyes[fit.on], fit.centre)
     seen = coverage(points[fit.on], fit.centre, towards)
-    if seen < LEAST_COVERAGE or _share_on(points, fit, towards, radius) < SHARE:
+    if fit.radius_rms > most or seen < LEAST_COVERAGE or _share_on(points, fit, towards, radius) < SHARE:
         return None
     if _is_cylinder(points, fit, radius, tolerance):
-        return Refusal(fit.centre, int(fit.on.sum()), "it is a cylinder, or the end of one")
-    if _bulge(points[fit.used], fit, radius) > tolerance / 2.0:
-        return Refusal(fit.centre, int(fit.on.sum()), "it is round, but no sphere")
+        return Refusal(fit.centre, count, "it is a cylinder, or the end of one")
     if abs(fit.radius - radius) > math.hypot(tolerance, 2.0 * fit.radius_sigma):
-        reason = f"its radius is {1e3 * fit.radius:.1f} ± {1e3 * fit.radius_sigma:.1f} mm"
-        return Refusal(fit.centre, int(fit.on.sum()), reason)
-    return Sphere(fit.centre, fit.radius, fit.radius_sigma, fit.rms, fit.sigma, seen, int(fit.used.sum()))
+        return Refusal(fit.centre, count, f"its radius is {1e3 * fit.radius:.1f} ± {1e3 * fit.radius_sigma:.1f} mm")
+    if fit.rms > most or _astray(points[fit.used], fit, radius) > tolerance / 3.0:
+        return Refusal(fit.centre, count, "it is round, but no sphere")
+    return Sphere(fit.centre, fit.radius, fit.radius_sigma, fit.rms, fit.sigma, seen, count)
 
 
 def _towards(points: Float, eyes: Float, centre: Float) -> Float:
@@ -196,30 +201,18 @@ def _is_cylinder(points: Float, fit: Fit, radius: float, tolerance: float) -> bo
     return False
 
 
-def _bulge(points: Float, fit: Fit, radius: float) -> float:
-    """By how much the points' surface is an ellipsoid instead, rms, m; 0 where that can't be told from noise.
+def _astray(points: Float, fit: Fit, radius: float) -> float:
+    """By how much the surface under the noise differs from the sphere, rms, m; 0 where that can't be told from chance.
 
-    Five surface harmonics of second degree beside radius and centre; that they are there is asked for at the odds of one in
-    a thousand (F test).
+    Noise differs from point to point, and a shape hardly does: the correlation of the residuals of neighbours (Moran's I, 1950,
+    Biometrika 37) is the shape's share of their variance. By chance it scatters by about √(2 / (points × neighbours)).
     """
-    out = points - fit.centre
-    far = np.linalg.norm(out, axis=1)
-    x, y, z = (out / far[:, None]).T
-    plain = np.column_stack([np.ones(len(x)), x, y, z])
-    full = np.column_stack([plain, x * y, y * z, x * z, x * x - y * y, 3.0 * z * z - 1.0])
-    if len(x) <= 2 * full.shape[1]:
+    residual = np.linalg.norm(points - fit.centre, axis=1) - radius
+    _, near = cKDTree(points).query(points, NEIGHBOURS + 1)
+    alike = float((residual * residual[near[:, 1:]].mean(axis=1)).sum() / (residual @ residual))
+    if alike <= 3.0 * math.sqrt(2.0 / (NEIGHBOURS * len(points))):
         return 0.0
-    residual = far - radius
-    simple = plain @ np.linalg.lstsq(plain, residual, rcond=None)[0]
-    bent = full @ np.linalg.lstsq(full, residual, rcond=None)[0]
-    gain = float(((bent - simple) ** 2).sum())
-    noise = float(((residual - bent) ** 2).sum()) / (len(x) - full.shape[1])
-    if gain / 5.0 <= F_LIMIT * noise:
-        return 0.0
-    return math.sqrt(gain / len(x))
-
-
-F_LIMIT = 4.1  # 0.1 % of F(5, ∞)
+    return math.sqrt(alike) * fit.rms
 
 
 def _axes(count: int) -> Float:

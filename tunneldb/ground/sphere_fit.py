@@ -22,6 +22,9 @@ GRAZING = 0.25
 """Cosine of incidence (75.5°) below which a point isn't used where the scanner's place is known: at the limb of a sphere
 a beam measures a range between that of the sphere and that of what is behind it."""
 
+BEHIND = -0.1
+"""Cosine of incidence below which a point can't lie on the sphere: the sphere itself would hide it."""
+
 SLANT = 0.6
 """The distance of a point from the sphere scatters by the noise of the range × the cosine of incidence, so points seen
 slantingly weigh more; no more than at this cosine, since beyond the sphere's curvature over the noise makes it untrue."""
@@ -43,10 +46,12 @@ class Fit:
         m.
     covariance : (3, 3) float64 array
         Of the centre, m².
-    radius, radius_sigma : float
-        Of the best sphere of any radius, and its standard deviation, m.
+    radius, radius_sigma, radius_rms : float
+        Of the best sphere of any radius: its radius, the standard deviation of it, and the rms of the points, m.
     rms : float
         Root mean square of the distances of the points from the sphere of the nominal radius, m.
+    expected : float
+        What `rms` would be if ranges had a standard deviation of 1, by the incidence; 1 where that is not known.
     on : (n,) bool array
         Points that lie on the sphere, grazing ones included.
     used : (n,) bool array
@@ -57,7 +62,9 @@ class Fit:
     covariance: Float
     radius: float
     radius_sigma: float
+    radius_rms: float
     rms: float
+    expected: float
     on: Bool
     used: Bool
 
@@ -113,13 +120,19 @@ def fit_sphere(points: Float, eyes: Float, start: Float, radius: float, widest: 
             break
         band = narrower
     distance, cosine = _seen(points, eyes, centre, radius)
-    on = np.abs(distance) <= band
-    residual = distance[used]
+    on = (np.abs(distance) <= band) & ~(cosine < BEHIND)
     _, covariance = _solve(points[used], scale, centre, radius, free=False)
     solution, wider = _solve(points[used], scale, np.append(centre, radius), radius, free=True)
     radius_sigma = math.sqrt(wider[3, 3]) if wider[3, 3] > 0.0 else math.inf  # a plane has no radius
-    rms = math.sqrt(float(residual @ residual) / len(residual))
-    return Fit(centre, covariance, float(solution[3]), radius_sigma, rms, on, used)
+    radius_rms = _rms(np.linalg.norm(points[used] - solution[:3], axis=1) - solution[3])
+    expected = _rms(np.nan_to_num(cosine[used], nan=1.0))
+    return Fit(
+        centre, covariance, float(solution[3]), radius_sigma, radius_rms, _rms(distance[used]), expected, on, used
+    )  # fmt: skip
+
+
+def _rms(values: Float) -> float:
+    return math.sqrt(float(values @ values) / len(values))
 
 
 def _seen(points: Float, eyes: Float, centre: Float, radius: float) -> tuple[Float, Float]:

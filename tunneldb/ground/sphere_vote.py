@@ -27,6 +27,7 @@ NEAR = 1.35  # around a centre, what can lie on the sphere or tell that it is no
 VOTERS = 8  # points that vote, of each cell of REACH: as many as a sphere of 60 points needs; more say the same again
 NEIGHBOURS = 128  # points looked at around one, about
 LEAST_NEIGHBOURS = 6
+GRAZING = 0.25  # cosine of incidence below which a neighbourhood says nothing of the noise
 VOTES = 12  # that make a candidate; a fifth of a sphere of 60 points has as many
 SHARE = 0.25  # of the voters near a candidate that have voted for it; of a plane 0.14 do
 
@@ -66,7 +67,7 @@ class Scattered:
         return self.order[around(self.xyz, self.key, self.span, self.edge, place - self.low, reach)]
 
 
-def candidates(points: Scattered, eyes: Float, radius: float) -> tuple[Float, Int64]:
+def candidates(points: Scattered, eyes: Float, radius: float) -> tuple[Float, float]:
     """Places where the centre of a sphere may be.
 
     Parameters
@@ -82,18 +83,22 @@ def candidates(points: Scattered, eyes: Float, radius: float) -> tuple[Float, In
     -------
     centres : (k, 3) float64 array
         By falling number of votes, m.
-    votes : (k,) int array
+    noise : float
+        Standard deviation of a range, m, where surfaces are smooth: that which a quarter of the neighbourhoods stay below,
+        by their distances from their planes and the incidence. Infinite where nothing tells.
     """
     if len(points.key) == 0:
-        return np.zeros((0, 3)), np.zeros(0, np.int64)
+        return np.zeros((0, 3)), math.inf
     stop = np.append(points.start[1:], len(points.key))
-    votes, voters = _vote(
+    votes, voters, scatter = _vote(
         points.xyz, np.ascontiguousarray(eyes[points.order] - points.low), points.key, points.start, stop, points.span,
         REACH * radius, radius,
     )  # fmt: skip
+    scatter = scatter[np.isfinite(scatter)]
+    noise = float(np.quantile(scatter, 0.25)) if len(scatter) else math.inf
     votes, voters = votes[np.isfinite(votes[:, 0])], points.xyz[voters]
     if len(votes) < VOTES:
-        return np.zeros((0, 3)), np.zeros(0, np.int64)
+        return np.zeros((0, 3)), math.inf
     cast = Scattered(votes, VOTE * radius)
     centres, counts = _peaks(cast.xyz, cast.key, cast.start, np.append(cast.start[1:], len(votes)), cast.span)
     centres += cast.low
@@ -102,7 +107,7 @@ def candidates(points: Scattered, eyes: Float, radius: float) -> tuple[Float, In
     good = counts >= SHARE * near
     centres, counts = centres[good], counts[good]
     order = np.lexsort((*centres.T, -counts))
-    return centres[order] + points.low, counts[order]
+    return centres[order] + points.low, noise
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -145,14 +150,15 @@ def _count(xyz: Float, key: Int64, span: Int64, edge: float, places: Float, reac
 @njit(cache=True, nogil=True, parallel=True)
 def _vote(
     xyz: Float, eyes: Float, key: Int64, start: Int64, stop: Int64, span: Int64, reach: float, radius: float
-) -> tuple[Float, Int64]:  # pragma: no cover - compiled
-    """Votes (2m, 3), NaN where there is none, and who cast them (m,)."""
+) -> tuple[Float, Int64, Float]:  # pragma: no cover - compiled
+    """Votes (2m, 3), NaN where there is none, who cast them (m,), and the noise of the ranges there (m,), NaN for unknown."""
     cells = len(start)
     first = np.zeros(cells + 1, np.int64)
     for c in range(cells):
         first[c + 1] = first[c] + min(stop[c] - start[c], VOTERS)
     votes = np.full((2 * first[cells], 3), np.nan)
     voters = np.empty(first[cells], np.int64)
+    scatter = np.full(first[cells], np.nan)
     for c in prange(cells):
         begins, ends = np.empty(9, np.int64), np.empty(9, np.int64)
         there = 0
@@ -190,13 +196,17 @@ def _vote(
             # The middle of a cap lies below its top, by half of what its points lie from the axis, squared, over the radius.
             deep = radius - (middle + greatest) / (2.0 * radius)
             side = nx * (eyes[i, 0] - x) + ny * (eyes[i, 1] - y) + nz * (eyes[i, 2] - z)
+            sight = math.sqrt((eyes[i, 0] - x) ** 2 + (eyes[i, 1] - y) ** 2 + (eyes[i, 2] - z) ** 2)
+            cosine = 1.0 if math.isnan(side) else abs(side) / sight
+            if n > 3 and cosine > GRAZING:
+                scatter[first[c] + v] = math.sqrt(max(least, 0.0) * n / (n - 3)) / cosine
             at = 2 * (first[c] + v)
             if side <= 0.0 or math.isnan(side):
                 votes[at, 0], votes[at, 1], votes[at, 2] = x + sx + deep * nx, y + sy + deep * ny, z + sz + deep * nz
             if side > 0.0 or math.isnan(side):
                 at += 1
                 votes[at, 0], votes[at, 1], votes[at, 2] = x + sx - deep * nx, y + sy - deep * ny, z + sz - deep * nz
-    return votes, voters
+    return votes, voters, scatter
 
 
 @njit(cache=True, nogil=True)
