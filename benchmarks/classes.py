@@ -2,9 +2,10 @@
 
     python -m benchmarks.classes [--seeds 3] [--length 40]
 
-Scenes hold people, trolleys, cases, tripods, bollards, lamps, free cables, a contact line, target spheres, ballast and sleepers.
-Ground and clusters are found from points of survey density; classes are counted over all points. Points that the truth calls
-outliers (mixed pixels, too) are left out. The centres of the spheres are given: finding them is measured by benchmarks.spheres.
+Scenes hold people, trolleys, cases, tripods, bollards, lamps, free cables, a contact line, target spheres, ballast and
+sleepers. Ground and clusters are found from points of survey density; classes are counted over all points. Points that the
+truth calls outliers (mixed pixels, too) are left out. The centres of the spheres are given: benchmarks.spheres measures how
+they are found.
 """
 
 from __future__ import annotations
@@ -122,8 +123,8 @@ def report(way: str, rows: list[dict[str, Any]]) -> None:
         table.append([klass.name.lower(), *np.median(values, axis=0).tolist(), *values.min(axis=0).tolist()])
     agreement = 100.0 * np.array([row["agreement"] for row in rows])
     speed = np.median([row["points_per_s"] for row in rows]) / 1e6
-    title = f"{way}: {len(rows)} scenes, agreement {np.median(agreement):.2f} % (worst {agreement.min():.2f} %), {speed:.1f} M points/s"
-    print_table(title, ["class", "found, %", "own, %", "found, worst", "own, worst"], table)
+    typical = f"agreement {np.median(agreement):.2f} % (worst {agreement.min():.2f} %), {speed:.1f} million points/s"
+    print_table(f"{way}: {len(rows)} scenes, {typical}", ["class", "found, %", "own, %", "found, worst", "own, worst"], table)
 
 
 if __name__ == "__main__":

@@ -243,15 +243,16 @@ def _whole(found: Float, spread: Float, expected: Float, inside: NDArray[np.bool
 
 @njit(cache=True, nogil=True, parallel=True)
 def _median(grid: Float, along: int, across: int) -> Float:  # pragma: no cover - compiled
-    """Median of the cells about each, NaN left out; every second one of them, which is enough."""
+    """Median of the cells about each, NaN left out; of some of them, evenly chosen, which is enough."""
     rows, columns = grid.shape
     out = np.full(grid.shape, np.nan)
+    step = max(2, along // 3)
     for j in prange(columns):
-        values = np.empty((along + 1) * (across + 1) + 2)
+        values = np.empty((2 * along // step + 1) * (across + 1))
         for i in range(rows):
             count = 0
             for m in range(i - across, i + across + 1, 2):
-                for n in range(j - along, j + along + 1, 2):
+                for n in range(j - along, j + along + 1, step):
                     if 0 <= m < rows and 0 <= n < columns and not np.isnan(grid[m, n]):
                         values[count] = grid[m, n]
                         count += 1
