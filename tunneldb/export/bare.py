@@ -109,7 +109,8 @@ def find_scene_of(
         except ValueError as error:
             raise UserError(f"{source}: {error}") from error
         progress(len(xyz))
-    thinned = voxels.centroids()
+    thinned, spread = voxels.centroids(), voxels.spread()
+    del voxels  # room for the models
     line = Line.through(thinned)
-    ground = find_ground(thinned, line, settings, spread=voxels.spread())
+    ground = find_ground(thinned, line, settings, spread=spread)
     return find_bare_scene(thinned, line, ground, ClusterSettings.from_parameters(values)), origin
