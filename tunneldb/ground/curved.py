@@ -69,8 +69,9 @@ class Curved:
         self._kept[order] = kept
 
     def holds(self, xyz: Float) -> Bool:
-        """Whether points (n, 3) that were added lie in cells that are kept, (n,)."""
-        return self._kept[self.cells.find(np.ascontiguousarray(xyz))]
+        """Whether points (n, 3) lie in cells that are kept, (n,)."""
+        number = self.cells.find(np.ascontiguousarray(xyz))
+        return np.asarray((number >= 0) & self._kept[number])
 
 
 def _keys(place: Int64) -> Int64:

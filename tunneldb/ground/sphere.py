@@ -113,7 +113,7 @@ def find_spheres(
     centres, noise = candidates(points, eyes, radius)
     there = settle(points, centres, radius)
     near_radius = np.abs(there.radius - radius) <= tolerance + 3.0 * there.radius_sigma
-    other_ball = (there.radius_sigma <= tolerance / 4.0) & (there.seen >= 2.0 * LEAST_COVERAGE)  # for the report
+    other_ball = (there.radius_sigma <= tolerance / 4.0) & (there.seen >= 1.5 * LEAST_COVERAGE)  # for the report
     likely = np.flatnonzero(
         (there.on >= LEAST_POINTS)
         & (there.share >= ROUGH * SHARE)
@@ -146,20 +146,39 @@ def _judge(points: Float, eyes: Float, start: Float, radius: float, tolerance: f
     fit = fit_sphere(points, eyes, start, radius, 3.0 * tolerance)
     if fit is None or fit.on.sum() < LEAST_POINTS or fit.radius_sigma > tolerance / 2.0:
         return None  # of a plane or a small cap, it cannot be told within the tolerance whether it is a sphere
-    # Chance makes as few points scatter by so much at the most, and the noise is known to a tenth.
-    count = int(fit.used.sum())
-    most = min(tolerance, 1.1 * (1.0 + 3.0 / math.sqrt(2.0 * count)) * noise * fit.expected)
+    count, most = int(fit.used.sum()), _greatest_rms(fit, tolerance, noise)
     towards = _towards(points[fit.on], eyes[fit.on], fit.centre)
     seen = coverage(points[fit.on], fit.centre, towards)
-    if fit.radius_rms > most or seen < LEAST_COVERAGE or _share_on(points, fit, towards, radius) < SHARE:
+    if seen < LEAST_COVERAGE or _share_on(points, fit, towards, radius) < SHARE:
         return None
+    if abs(fit.radius - radius) > math.hypot(tolerance, 2.0 * fit.radius_sigma):
+        return _other_ball(points, eyes, fit, radius, tolerance, noise)
     if _is_cylinder(points, fit, radius, tolerance):
         return Refusal(fit.centre, count, "it is a cylinder, or the end of one")
-    if abs(fit.radius - radius) > math.hypot(tolerance, 2.0 * fit.radius_sigma):
-        return Refusal(fit.centre, count, f"its radius is {1e3 * fit.radius:.1f} ± {1e3 * fit.radius_sigma:.1f} mm")
-    if fit.rms > most or _astray(points[fit.used], fit, radius) > tolerance / 3.0:
+    if fit.rms > most:
+        return None
+    if _astray(points[fit.used], fit, radius) > tolerance / 3.0:
         return Refusal(fit.centre, count, "it is round, but no sphere")
     return Sphere(fit.centre, fit.radius, fit.radius_sigma, fit.rms, fit.sigma, seen, count)
+
+
+def _greatest_rms(fit: Fit, tolerance: float, noise: float) -> float:
+    """By how much points of a sphere may scatter, m: chance hardly makes so few do so by more; noise is known to a tenth."""
+    by_chance = 1.0 + 3.0 / math.sqrt(2.0 * float(fit.used.sum()))
+    return min(tolerance, 1.1 * by_chance * noise * fit.expected)
+
+
+def _other_ball(points: Float, eyes: Float, fit: Fit, radius: float, tolerance: float, noise: float) -> Refusal | None:
+    """What is a sphere, but of another radius: a lamp, a helmet."""
+    if not radius / 2.0 < fit.radius < 2.0 * radius:
+        return None
+    other = fit_sphere(points, eyes, fit.free_centre, fit.radius, 3.0 * tolerance)
+    if other is None or other.on.sum() < LEAST_POINTS or other.rms > _greatest_rms(other, tolerance, noise):
+        return None
+    if abs(other.radius - radius) <= math.hypot(tolerance, 2.0 * other.radius_sigma):
+        return None
+    reason = f"its radius is {1e3 * other.radius:.1f} ± {1e3 * other.radius_sigma:.1f} mm"
+    return Refusal(other.centre, int(other.used.sum()), reason)
 
 
 def _towards(points: Float, eyes: Float, centre: Float) -> Float:

@@ -46,8 +46,10 @@ class Fit:
         m.
     covariance : (3, 3) float64 array
         Of the centre, m².
-    radius, radius_sigma, radius_rms : float
-        Of the best sphere of any radius: its radius, the standard deviation of it, and the rms of the points, m.
+    free_centre : (3,) float64 array
+        Of the best sphere of any radius, m.
+    radius, radius_sigma : float
+        Of that sphere, and its standard deviation, m.
     rms : float
         Root mean square of the distances of the points from the sphere of the nominal radius, m.
     expected : float
@@ -60,9 +62,9 @@ class Fit:
 
     centre: Float
     covariance: Float
+    free_centre: Float
     radius: float
     radius_sigma: float
-    radius_rms: float
     rms: float
     expected: float
     on: Bool
@@ -124,10 +126,9 @@ def fit_sphere(points: Float, eyes: Float, start: Float, radius: float, widest: 
     _, covariance = _solve(points[used], scale, centre, radius, free=False)
     solution, wider = _solve(points[used], scale, np.append(centre, radius), radius, free=True)
     radius_sigma = math.sqrt(wider[3, 3]) if wider[3, 3] > 0.0 else math.inf  # a plane has no radius
-    radius_rms = _rms(np.linalg.norm(points[used] - solution[:3], axis=1) - solution[3])
     expected = _rms(np.nan_to_num(cosine[used], nan=1.0))
     return Fit(
-        centre, covariance, float(solution[3]), radius_sigma, radius_rms, _rms(distance[used]), expected, on, used
+        centre, covariance, solution[:3], float(solution[3]), radius_sigma, _rms(distance[used]), expected, on, used
     )  # fmt: skip
 
 
