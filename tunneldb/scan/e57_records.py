@@ -120,9 +120,9 @@ class E57Records:
         if scan.has_time:
             point["gps_time"] = values["timeStamp"] + scan.start - _ADJUSTED
         for place, (name, _, kind) in enumerate(self.extras):
-            column = np.ndarray((len(out),), f"<{kind}", out.data, before + 4 * place, (out.shape[1],))
-            column[:] = values.get(name, np.nan if kind == "f4" else -1)
-        self._count(stored, point["bit_fields"] & 0b1111)
+            extra: NDArray[Any] = np.ndarray((len(out),), f"<{kind}", out.data, before + 4 * place, (out.shape[1],))
+            extra[:] = values.get(name, np.nan if kind == "f4" else -1)
+        self._count(stored, np.broadcast_to(number, len(out)))
         return out
 
     def _count(self, stored: NDArray[np.float64], number: NDArray[np.uint8]) -> None:
