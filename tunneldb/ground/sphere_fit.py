@@ -32,6 +32,9 @@ slantingly weigh more; no more than at this cosine, since beyond the sphere's cu
 BAND = 3.0  # standard deviations from the sphere within which points are on it
 LEAST_SPREAD = 0.0005  # m; files round to as much
 
+SOFT = 1.5  # standard deviations beyond which a residual draws less than in proportion
+STEPS = 25
+
 BANDS, SECTORS = 8, 6
 """Coverage is counted on cells of equal area: bands across the direction to the scanner, and sectors around it."""
 
@@ -103,7 +106,7 @@ def fit_sphere(points: Float, eyes: Float, start: Float, radius: float, widest: 
     scipy's least squares with its soft L1 loss; residuals are distances from the sphere in units of their standard deviation.
     """
     centre, band = start, widest
-    for _ in range(8):
+    for _ in range(STEPS):
         before = centre
         distance, cosine = _seen(points, eyes, centre, radius)
         near = (np.abs(distance) <= widest) & ~(cosine < GRAZING)
@@ -114,16 +117,16 @@ def fit_sphere(points: Float, eyes: Float, start: Float, radius: float, widest: 
             return None
         scale = spread * np.clip(cosine[used], SLANT, 1.0)
         scale[np.isnan(scale)] = spread
-        centre, _ = _solve(points[used], scale, centre, radius, free=False)
+        centre = _step(points[used], scale, centre, radius)
         if not np.linalg.norm(centre - start) < radius:
             return None
         narrower = min(widest, BAND * spread)
-        if np.linalg.norm(centre - before) < 1e-5 and abs(narrower - band) < 1e-5:
+        if np.linalg.norm(centre - before) < 1e-6 and abs(narrower - band) < 1e-6:
             break
         band = narrower
+    centre, covariance = _solve(points[used], scale, centre, radius, free=False)
     distance, cosine = _seen(points, eyes, centre, radius)
     on = (np.abs(distance) <= band) & ~(cosine < BEHIND)
-    _, covariance = _solve(points[used], scale, centre, radius, free=False)
     solution, wider = _solve(points[used], scale, np.append(centre, radius), radius, free=True)
     radius_sigma = math.sqrt(wider[3, 3]) if wider[3, 3] > 0.0 else math.inf  # a plane has no radius
     expected = _rms(np.nan_to_num(cosine[used], nan=1.0))
@@ -147,6 +150,17 @@ def _seen(points: Float, eyes: Float, centre: Float, radius: float) -> tuple[Flo
     return far - radius, cosine
 
 
+def _step(points: Float, scale: Float, centre: Float, radius: float) -> Float:
+    """One Gauss-Newton step with the weights of the soft L1 loss."""
+    out = points - centre
+    far = np.linalg.norm(out, axis=1)
+    residual = (far - radius) / scale
+    weight = 1.0 / np.sqrt(1.0 + (residual / SOFT) ** 2)
+    slope = out / (far * scale)[:, None]
+    stepped: Float = centre + np.linalg.lstsq((slope.T * weight) @ slope, (slope.T * weight) @ residual, rcond=1e-9)[0]
+    return stepped
+
+
 def _solve(points: Float, scale: Float, start: Float, radius: float, free: bool) -> tuple[Float, Float]:
     """Best centre (and radius) and its covariance; ``scale`` is the standard deviation of each point's distance."""
     middle = points.mean(axis=0)
@@ -166,11 +180,11 @@ def _solve(points: Float, scale: Float, start: Float, radius: float, free: bool)
         slope = -out / (far * scale)[:, None]
         return np.column_stack([slope, -1.0 / scale]) if free else slope
 
-    result = least_squares(residuals, begin, slopes, method="trf", loss="soft_l1", f_scale=1.5, xtol=1e-10)
+    result = least_squares(residuals, begin, slopes, method="trf", loss="soft_l1", f_scale=SOFT, xtol=1e-10)
     # Variance of robust estimates (Huber, 1981, section 7.6): the influence of each residual, and how fast it changes.
     r = residuals(result.x)
     jacobian = slopes(result.x)
-    bend = 1.0 + (r / 1.5) ** 2
+    bend = 1.0 + (r / SOFT) ** 2
     influence, rate = r / np.sqrt(bend), bend**-1.5
     inverse = np.linalg.pinv(jacobian.T @ (jacobian * rate[:, None]))
     freedom = max(len(r) - len(begin), 1)

@@ -209,7 +209,7 @@ def _vote(
     return votes, voters, scatter
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, parallel=True)
 def _peaks(
     xyz: Float, key: Int64, start: Int64, stop: Int64, span: Int64
 ) -> tuple[Float, Int64]:  # pragma: no cover - compiled
@@ -217,35 +217,32 @@ def _peaks(
     cells = len(start)
     keys = key[start]
     total = np.zeros(cells, np.int64)
-    for c in range(cells):
+    for c in prange(cells):
         for column in range(9):
             middle = keys[c] + ((column // 3 - 1) * span[1] + column % 3 - 1) * span[2]
             begin, end = _run(keys, middle - 1, middle + 1)
             for j in range(begin, end):
                 total[c] += stop[j] - start[j]
-    centres = np.empty((cells, 3))
-    counts = np.empty(cells, np.int64)
-    found = 0
-    for c in range(cells):
-        if total[c] < VOTES:
-            continue
-        best = True
-        for column in range(9):
-            middle = keys[c] + ((column // 3 - 1) * span[1] + column % 3 - 1) * span[2]
-            begin, end = _run(keys, middle - 1, middle + 1)
-            for j in range(begin, end):
-                if total[j] > total[c] or (total[j] == total[c] and j < c):
-                    best = False
-        if not best:
-            continue
-        mean = np.zeros(3)
+    best = total >= VOTES
+    for c in prange(cells):
+        if total[c] >= VOTES:
+            for column in range(9):
+                middle = keys[c] + ((column // 3 - 1) * span[1] + column % 3 - 1) * span[2]
+                begin, end = _run(keys, middle - 1, middle + 1)
+                for j in range(begin, end):
+                    if total[j] > total[c] or (total[j] == total[c] and j < c):
+                        best[c] = False
+    chosen = np.flatnonzero(best)
+    centres = np.zeros((len(chosen), 3))
+    for k in prange(len(chosen)):
+        c = chosen[k]
         for column in range(9):
             middle = keys[c] + ((column // 3 - 1) * span[1] + column % 3 - 1) * span[2]
             begin, end = _run(keys, middle - 1, middle + 1)
             for j in range(begin, end):
                 for i in range(start[j], stop[j]):
-                    mean += xyz[i]
-        centres[found] = mean / total[c]
-        counts[found] = total[c]
-        found += 1
-    return centres[:found], counts[:found]
+                    for a in range(3):
+                        centres[k, a] += xyz[i, a]
+        for a in range(3):
+            centres[k, a] /= total[c]
+    return centres, total[chosen]

@@ -30,7 +30,7 @@ Bool = NDArray[np.bool_]
 Progress = Callable[[int], None]
 
 MEMORY = 256 << 20  # of points that wait to be looked at; beyond, they wait on disk
-WINDOW = 1_500_000  # points looked at at a time
+WINDOW = 1_000_000  # points looked at at a time
 BESIDE = 1.0  # m; a window reaches so far into its neighbours, for spheres on its ends
 
 _KEPT = np.dtype([("xyz", "f8", (3,)), ("eye", "f8", (3,)), ("chainage", "f8"), ("scan", "i4")])
