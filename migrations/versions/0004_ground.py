@@ -138,13 +138,14 @@ def upgrade() -> None:
             "chainage", sa.Double(), nullable=True, comment="Chainage of its centre, m; none where the tunnel has no segment"
         ),
         sa.Column(
-            "geom", Geometry("POINTZ", dimension=3, spatial_index=False), nullable=False, comment="Centre, tunnel's SRID, m"
+            "geom",
+            Geometry("POINTZ", dimension=3, spatial_index=False),
+            nullable=False,
+            comment="Centre, by the nominal radius, tunnel's SRID, m",
         ),
-        sa.Column("radius", sa.Double(), nullable=False, comment="Radius of the fitted sphere, m"),
+        sa.Column("radius", sa.Double(), nullable=False, comment="Radius of the best sphere of any radius, a check, m"),
         sa.Column("nominal", sa.Double(), nullable=False, comment="Radius that was asked for, m"),
-        sa.Column(
-            "rms", sa.Double(), nullable=False, comment="Root mean square of its points' distances from the fitted sphere, m"
-        ),
+        sa.Column("rms", sa.Double(), nullable=False, comment="Root mean square of its points' distances from the sphere, m"),
         sa.Column("sigma", sa.Double(), nullable=False, comment="Standard deviation of the centre, from the fit, m"),
         sa.Column("coverage", sa.Double(), nullable=False, comment="Share of the sphere's surface that is seen, 0 to 1"),
         sa.Column("points", sa.Integer(), nullable=False, comment="Points that it was fitted to"),

@@ -14,7 +14,7 @@ from tunneldb.cli.main import main
 from tunneldb.simulate import Parameters, Simulation, write
 
 NAME = "t"
-START = 988.0
+START = 990.0
 """The end of a kilometre lies in the middle of it."""
 
 
@@ -29,8 +29,8 @@ def survey(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Simulation]:
     folder = tmp_path_factory.mktemp("spheres")
     simulation = Simulation(
         Parameters(
-            name=NAME, length=24.0, section="horseshoe", seed=3, slope=2.0, start_chainage=START, station_spacing=8.0,
-            angular_step=0.2, leaks=1, people=1, bollards=1, globes=2, spheres=6,
+            name=NAME, length=20.0, section="horseshoe", seed=3, slope=2.0, start_chainage=START, station_spacing=7.0,
+            angular_step=0.22, leaks=1, people=1, bollards=1, globes=1, spheres=6,
         )
     )  # fmt: skip
     write(simulation, folder)

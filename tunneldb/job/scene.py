@@ -210,9 +210,9 @@ def load_scene(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_t
 
 
 def load_spheres(conn: psycopg.Connection[Any], survey: Survey, first: float, stop: float) -> Float:
-    """Target spheres between two chainages, m: x, y, z and radius of each (k, 4), of all scans that saw it."""
+    """Target spheres between two chainages, m: x, y, z and nominal radius of each (k, 4), of all scans that saw it."""
     rows = conn.execute(
-        "SELECT public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom), radius FROM tunnel.target_sphere"
+        "SELECT public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom), nominal FROM tunnel.target_sphere"
         " WHERE survey_id = %s AND chainage BETWEEN %s AND %s ORDER BY number, scan_id",
         [survey.id, first, stop],
     ).fetchall()
