@@ -19,7 +19,9 @@ from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
 
+import CSF
 import numpy as np
+import open3d as o3d  # needs the system's libusb-1.0-0
 from numpy.typing import NDArray
 
 from tunneldb.ground.agreement import Agreement
@@ -139,8 +141,6 @@ def silence() -> Iterator[None]:
 
 
 def csf(xyz: Float, resolution: float, rigidness: int, threshold: float) -> Bool:
-    import CSF
-
     cloth = CSF.CSF()
     cloth.params.bSloopSmooth = False
     cloth.params.cloth_resolution = resolution
@@ -157,8 +157,6 @@ def csf(xyz: Float, resolution: float, rigidness: int, threshold: float) -> Bool
 
 
 def open3d(xyz: Float) -> Bool:
-    import open3d as o3d
-
     o3d.utility.random.seed(0)
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(xyz - xyz[0]))
     _, inliers = cloud.segment_plane(SETTINGS.distance, 3, 1000)
