@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from tunneldb.database.survey import Survey
-from tunneldb.export.preview import label
 from tunneldb.ground.control import Motion
 from tunneldb.job.control import Comparison, mean_centres
 from tunneldb.job.spheres import Found, Search
@@ -34,7 +33,7 @@ def sphere_rows(rows: Iterable[Found]) -> list[tuple[str, ...]]:
         (
             str(row.number),
             str(row.scan),
-            "" if row.chainage is None else label(row.chainage),
+            "" if row.chainage is None else _label(row.chainage),
             *(f"{value:.4f}" for value in row.sphere.centre),
             f"{1e3 * row.sphere.radius:.1f}",
             f"{1e3 * row.sphere.rms:.1f}",
@@ -161,6 +160,14 @@ def _between_scans(rows: list[Found]) -> list[str]:
     head = ("sphere", "scan", "dx mm", "dy mm", "dz mm", "length mm")
     text = f"Spheres that several scans saw, against the mean of the scans; rms {1e3 * rms:.1f} mm."
     return ["## Between scans", text, _table(head, cells)]
+
+
+def _label(chainage: float) -> str:
+    """Chainage as 12+345.678, like tunnel_api.chainage_label."""
+    millimetres = round(1000.0 * chainage)
+    sign = "-" if millimetres < 0 else ""
+    kilometres, rest = divmod(abs(millimetres), 1_000_000)
+    return f"{sign}{kilometres}+{rest / 1000.0:07.3f}"
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
