@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve
@@ -16,8 +18,10 @@ _REACH = 3.0  # cells closer than this are neighbours, m: profiles may lie apart
 _SHORT = 40.0  # m; below, a tunnel may be wider than long, and the way it looks from its end tells its direction
 _STEP = 5.0  # m between vertices
 _SAMPLE = 10_000  # points that are looked at from all sides
-_CENTRED = 200_000  # and that tell the middle
 _PICTURE = 0.2  # edge of a cell of the picture, m
+_SLICE = 1.0  # m, across the line
+_HELD = 10  # cells that make a slice
+_ASTRAY = 0.02  # of a slice's cells may lie beyond each wall
 _FAR = 1 << 24  # cells; more than any tunnel is long
 
 
@@ -48,7 +52,8 @@ def course(points: Float) -> Float:
     vertices = _strung(cells, way) if way.max() > _SHORT else _seen(local)
     if vertices[-1, 0] < vertices[0, 0]:
         vertices = vertices[::-1]
-    spaced = local[:: max(1, len(local) // _CENTRED), :2]
+    # Spread evenly: a scanner's own surroundings would outweigh the walls.
+    spaced = _filled_cells(local[:, :2], _PICTURE)
     for _ in range(3):
         vertices = _centred(vertices, spaced)
     return np.asarray(vertices + origin[:2])
@@ -56,13 +61,17 @@ def course(points: Float) -> Float:
 
 def _cells(plan: Float) -> Float:
     """Middles (m, 2) of the plan's cells that hold points and hang together; single stray points don't count."""
-    key = np.floor(plan / _CELL).astype(np.int64)
-    key, count = np.unique(key[:, 0] * _FAR + key[:, 1] + _FAR // 2, return_counts=True)
-    cells = np.column_stack([key // _FAR, key % _FAR - _FAR // 2])
-    cells = cells[count >= 0.1 * np.median(count)]
-    middle = np.asarray((cells + 0.5) * _CELL, dtype=np.float64)
+    middle = _filled_cells(plan, _CELL)
     _, label = connected_components(_graph(middle), directed=False)
     return np.asarray(middle[label == np.argmax(np.bincount(label))], dtype=np.float64)
+
+
+def _filled_cells(plan: Float, edge: float) -> Float:
+    """Middles (m, 2) of the cells of the plan that hold points, but for those that hold far fewer than most."""
+    key = np.floor(plan / edge).astype(np.int64)
+    key, count = np.unique(key[:, 0] * _FAR + key[:, 1] + _FAR // 2, return_counts=True)
+    cells = np.column_stack([key // _FAR, key % _FAR - _FAR // 2])[count >= 0.1 * np.median(count)]
+    return np.asarray((cells + 0.5) * edge, dtype=np.float64)
 
 
 def _graph(middle: Float) -> coo_array:
@@ -139,30 +148,44 @@ def _centred(vertices: Float, plan: Float) -> Float:
         return vertices
     count = round(length / _STEP)
     at = np.linspace(0.0, length, count + 1)
-    along, across = line.place(plan)
-    order = np.argsort(along, kind="stable")
-    along, across = along[order], across[order]
-    middle = np.full(len(at), np.nan)
-    low, high = (np.searchsorted(along, at + side * _STEP) for side in (-1.0, 1.0))
-    for k, (i, j) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
-        if j - i >= 10:
-            middle[k] = np.mean(np.quantile(across[i:j], (0.02, 0.98)))
-    return line.point(at, _smooth(middle))
+    walls = _walls(*line.place(plan), math.ceil(length / _SLICE))
+    slices = (np.arange(len(walls)) + 0.5) * _SLICE
+    # The median of the slices about a vertex: a niche widens some of them only.
+    near = [walls[np.abs(slices - place) <= _STEP] for place in at]
+    middle = np.array([np.nanmedian(w, axis=0).mean() if np.isfinite(w).any() else np.nan for w in near])
+    seen = np.isfinite(middle)
+    return _smooth(line.point(at, np.where(seen, middle, 0.0)), seen)
 
 
-def _smooth(offset: Float) -> Float:
-    """Smooth offsets at even distances, those of niches and gaps after their neighbours (Whittaker, 1923)."""
-    weight = np.isfinite(offset).astype(np.float64)
-    value = np.where(weight > 0, offset, 0.0)
-    count = len(offset)
-    if count < 4 or weight.sum() < 4:
-        return np.zeros(count)
-    second = np.diff(np.eye(count), n=2, axis=0)
-    bend = 10.0 * second.T @ second
-    out = value
+def _walls(along: Float, across: Float, count: int) -> Float:
+    """Where the walls stand (count, 2), m to the right of the line, in slices across it; NaN where there are no points."""
+    number = np.floor(along / _SLICE).astype(np.int64)
+    order = np.lexsort((across, number))
+    number, across = number[order], across[order]
+    first, stop = (np.searchsorted(number, np.arange(count), side=side) for side in ("left", "right"))
+    walls = np.full((count, 2), np.nan)
+    held = stop - first >= _HELD
+    spare = np.floor(_ASTRAY * (stop - first - 1)).astype(np.int64)
+    walls[held, 0] = across[(first + spare)[held]]
+    walls[held, 1] = across[(stop - 1 - spare)[held]]
+    return walls
+
+
+def _smooth(places: Float, seen: NDArray[np.bool_]) -> Float:
+    """Smooth places (k, 2) at even distances, those of niches and gaps after their neighbours (Whittaker, 1923).
+
+    Third differences are kept small: neither a straight line nor a circle is bent.
+    """
+    count = len(places)
+    if count < 6 or np.count_nonzero(seen) < 4:
+        return places
+    third = np.diff(np.eye(count), n=3, axis=0)
+    bend = 10.0 * third.T @ third
+    weight = seen.astype(np.float64)
+    out = places
     for _ in range(5):
-        out = solve(np.diag(weight) + bend + 1e-9 * np.eye(count), weight * value, assume_a="pos")
-        away = np.abs(value - out)
-        usual = max(3.0 * 1.4826 * float(np.median(away[np.isfinite(offset)])), 0.02)
-        weight = np.where(np.isfinite(offset), 1.0 / (1.0 + (away / usual) ** 2), 0.0)
+        out = solve(np.diag(weight) + bend + 1e-9 * np.eye(count), (weight + 1e-9)[:, None] * places, assume_a="pos")
+        away = np.hypot(*(places - out).T)
+        usual = max(3.0 * 1.4826 * float(np.median(away[seen])), 0.02)
+        weight = np.where(seen, 1.0 / (1.0 + (away / usual) ** 2), 0.0)
     return np.asarray(out)
