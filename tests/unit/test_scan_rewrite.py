@@ -13,7 +13,7 @@ from pyproj import CRS
 from tunneldb.errors import UserError
 from tunneldb.scan import laz
 from tunneldb.scan.reader import read_header
-from tunneldb.scan.rewrite import rewrite
+from tunneldb.scan.rewrite import read_coordinates, rewrite
 
 NAMES = {2: "ground", 64: "lining"}
 DATA = Path(__file__).parents[3] / "shared" / "data"
@@ -178,6 +178,15 @@ def test_e57(tmp_path: Path) -> None:
     assert las.header.parse_crs().to_epsg() == 25830
 
 
+def test_e57_of_invalid_points_alone_is_refused(tmp_path: Path) -> None:
+    fields = {name: np.ones(10) for name in ("cartesianX", "cartesianY", "cartesianZ", "cartesianInvalidState")}
+    source = e57files.write(tmp_path / "a.e57", [e57files.Scan(fields)])
+    with pytest.raises(UserError, match=r"a\.e57: all 10 points are marked as invalid"):
+        list(read_coordinates(source))
+    with pytest.raises(UserError, match=r"a\.e57: all 10 points are marked as invalid"):
+        rewrite(source, tmp_path / "b.laz", parity, NAMES)
+
+
 class Full:
     """A disk on which little fits."""
 
@@ -219,3 +228,8 @@ def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
     waves.write_bytes(data)
     with pytest.raises(UserError, match="waveforms"):
         rewrite(waves, tmp_path / "e.laz", parity, NAMES)
+    data = bytearray(whole.read_bytes())
+    data[96:100] = (300).to_bytes(4, "little")
+    (tmp_path / "early.laz").write_bytes(data)
+    with pytest.raises(UserError, match=r"early\.laz: truncated, corrupt"):
+        rewrite(tmp_path / "early.laz", tmp_path / "f.laz", parity, NAMES)

@@ -123,7 +123,7 @@ def read_e57_header(path: Path) -> ScanHeader:
     """
     with open_e57(path) as image, decoding(path, KIND):
         scans = scans_of(path, image)
-        boxes = [_box(path, image, scan) for scan in scans]
+        boxes = [_box(image, scan) for scan in scans]
         crs = _crs(image)
     dimensions = [name for name, has in _DIMENSIONS if all(map(has, scans))]
     return ScanHeader(
@@ -181,8 +181,7 @@ class _Cursor:
             check_finite(self.path, raw, self.dimension, good)
             good += len(raw)
             yield raw
-        if not good:
-            raise UserError(f"{self.path}: all {sum(scan.records for scan in self.scans)} points are marked as invalid")
+        require_good(self.path, self.scans, good)
 
     def read(self, begin: int, end: int) -> Iterator[Raw]:
         """Points begin to end, half-open."""
@@ -232,6 +231,12 @@ def _count_good(path: Path, version: tuple[int, int], scan: int, flags: tuple[st
 def good_of(fields: dict[str, NDArray[Any]], flags: Sequence[str]) -> NDArray[np.bool_]:
     """Tell which points are good: those that no flag speaks against."""
     return np.logical_and.reduce([fields[flag] == 0 for flag in flags])
+
+
+def require_good(path: Path, scans: Sequence[Scan], good: int) -> None:
+    """Refuse a file of whose points, read to the end, none was good."""
+    if not good:
+        raise UserError(f"{path}: all {sum(scan.records for scan in scans)} points are marked as invalid")
 
 
 def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int) -> Iterator[Raw]:
@@ -377,7 +382,7 @@ def value_of(node: Any, name: str, missing: float | None = None) -> float | None
     return float(node.scaledValue() if hasattr(node, "scaledValue") else node.value())
 
 
-def _box(path: Path, image: Any, scan: Scan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _box(image: Any, scan: Scan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Box of a scan in the file's frame."""
     node = image.root()["data3D"][scan.index]
     limits = [[value_of(node, f"cartesianBounds/{axis}{end}", np.nan) for axis in "xyz"] for end in ("Minimum", "Maximum")]

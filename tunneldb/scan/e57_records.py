@@ -15,7 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunneldb.errors import UserError
-from tunneldb.scan.e57 import KIND, Scan, good_of, open_e57, own_coordinates, read_e57_header, read_fields, scans_of, value_of
+from tunneldb.scan.e57 import (
+    KIND,
+    Scan,
+    good_of,
+    open_e57,
+    own_coordinates,
+    read_e57_header,
+    read_fields,
+    require_good,
+    scans_of,
+    value_of,
+)
 from tunneldb.scan.faults import decoding
 from tunneldb.scan.head import HEADER_SIZE, Head, Record
 from tunneldb.scan.records import Bytes, fields, record_size
@@ -71,13 +82,20 @@ class E57Records:
         self.returns = np.zeros(15, np.uint64)
 
     def read(self, size: int) -> Iterator[Bytes]:
-        """Read the points, no more than `size` at a time."""
+        """Read the points, no more than `size` at a time; once.
+
+        Raises
+        ------
+        UserError
+            If they cannot be read, one has no place, or all are marked as invalid.
+        """
         with open_e57(self.path) as image:
             with decoding(self.path, KIND):
                 scans = scans_of(self.path, image)
             for scan in scans:
                 with decoding(self.path, KIND):
                     yield from self._read_scan(image, scan, size)
+        require_good(self.path, scans, self.count)
 
     def patches(self) -> tuple[int, bytes]:
         """Where in the header, and what stands there, that is known once all points were read: box and counts."""

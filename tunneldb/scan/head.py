@@ -155,6 +155,8 @@ def read_head(path: Path) -> Head:
         file.seek(0)
         header = file.read(size)
         records = _read_records(file, count)
+        if points_at < file.tell() and header[25] > 0:
+            raise ValueError(f"its points begin at byte {points_at}, its records end at {file.tell()}")
         padding = file.read(points_at - file.tell()) if header[25] > 0 else b""
         extended: tuple[Record, ...] = ()
         if header[25] >= 4:
