@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from benchmarks.common import print_table, progress, save
 from tunneldb.ground.classes import Klass
-from tunneldb.ground.classify import Scene, find_bare_scene, find_scene
+from tunneldb.ground.classify import find_bare_scene, find_scene
 from tunneldb.ground.filter import GroundSettings, find_ground
 from tunneldb.ground.line import Line
+from tunneldb.ground.scene import Scene
 from tunneldb.ground.voxels import Voxels
 from tunneldb.scan.thin import thin, voxel_edge
 from tunneldb.simulate.parameters import Parameters

@@ -5,10 +5,11 @@ import pytest
 from scenes import exact, scan, share
 
 from tunneldb.ground.classes import Klass
-from tunneldb.ground.classify import Scene, find_bare_scene, find_scene
-from tunneldb.ground.cluster import CELL, NEAR, Cluster, Lookup, pieces
+from tunneldb.ground.classify import find_bare_scene, find_scene
+from tunneldb.ground.cluster import CELL, NEAR, Cluster, Lookup, look_up, pieces
 from tunneldb.ground.filter import GroundSettings, find_ground
 from tunneldb.ground.line import Line
+from tunneldb.ground.scene import Scene
 from tunneldb.ground.spacing import Spacing
 from tunneldb.ground.things import bars
 from tunneldb.ground.voxels import Voxels
@@ -111,12 +112,12 @@ def test_a_point_finds_the_nearest_cluster() -> None:
     for order in ([near, far], [far, near]):
         lookup = Lookup.of(order)
         x = (np.arange(-6, 10) + 0.5) * CELL
-        found = lookup.klasses(np.column_stack([x, np.full(len(x), 0.05), np.full(len(x), 0.05)]))
+        found = [look_up(at, 0.05, 0.05, lookup.first, lookup.last, lookup.keys, lookup.klass) for at in x]
         cells = np.floor(x / CELL).astype(int)
         expected = [
             Klass.OBJECT if abs(c) <= min(NEAR, abs(c - 3)) else Klass.APPENDAGE if abs(c - 3) <= NEAR else 0 for c in cells
         ]
-        assert found.tolist() == expected
+        assert found == expected
 
 
 def test_long_clusters_are_cut_at_whole_tens_of_metres() -> None:

@@ -19,8 +19,6 @@ from tunneldb.ground.scene import Scene
 from tunneldb.ground.spacing import Spacing
 from tunneldb.ground.things import ClusterSettings, Rest, find_clusters, sort_clusters
 
-__all__ = ["Scene", "find_bare_scene", "find_scene"]
-
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 

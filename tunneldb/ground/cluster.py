@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
@@ -21,7 +21,6 @@ PIECE = 10.0
 
 NEAR = 2
 """A point belongs to the cell within so many cells: points of survey density leave cells of a surface empty."""
-
 
 _SQUARE = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
 
@@ -136,10 +135,6 @@ class Lookup:
         keys, found = _filled(cells, klass, _steps(), first, last - first + 1)
         return cls(first, last, keys, found)
 
-    def klasses(self, xyz: Float) -> NDArray[np.uint8]:
-        """Class of the cluster that each point (n, 3) lies in; 0 for none."""
-        return np.asarray(_looked_up(np.ascontiguousarray(xyz), self.first, self.last, self.keys, self.klass))
-
 
 def _steps() -> Int:
     """Steps to the cells within ``NEAR``, the shortest first."""
@@ -200,13 +195,3 @@ def look_up(
     key = ((np.int64(cx) - first[0]) * wide + np.int64(cy) - first[1]) * tall + np.int64(cz) - first[2]
     slot = _slot(keys, key)
     return int(klass[slot]) if keys[slot] >= 0 else 0
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _looked_up(
-    xyz: Float, first: Int, last: Int, keys: Int, klass: NDArray[np.uint8]
-) -> NDArray[np.uint8]:  # pragma: no cover - compiled
-    found = np.zeros(xyz.shape[0], np.uint8)
-    for i in prange(xyz.shape[0]):
-        found[i] = look_up(xyz[i, 0], xyz[i, 1], xyz[i, 2], first, last, keys, klass)
-    return found

@@ -120,14 +120,6 @@ class Relief:
         level = _levels(chainage, arc, self.cell, self.column, self.row, self.offset, self.spread)
         return level[0], level[1]
 
-    def off_lining(self, chainage: Float, arc: Float, offset: Float) -> Float:
-        """Distance of points (n,) from the lining's local plane, positive into the tunnel, in tolerances.
-
-        Up to 1 to both sides a point lies on the lining; NaN where there is none.
-        """
-        plane, tolerance = self.level(chainage, arc)
-        return (offset - plane) / tolerance
-
 
 @dataclass(frozen=True)
 class Wall:

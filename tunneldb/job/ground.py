@@ -18,20 +18,16 @@ from tunneldb.geometry.store import load_surface
 from tunneldb.geometry.surface import Surface
 from tunneldb.ground.arcs import foot_arcs
 from tunneldb.ground.classes import Klass
-from tunneldb.ground.classify import Scene, find_scene
-from tunneldb.ground.filter import GroundSettings, find_ground
+from tunneldb.ground.classify import find_scene
+from tunneldb.ground.filter import MARGIN, GroundSettings, find_ground
 from tunneldb.ground.line import Line
+from tunneldb.ground.scene import Scene
 from tunneldb.ground.things import ClusterSettings
 from tunneldb.job.partition import partition, partition_exists
-from tunneldb.job.scene import line_of, load_ground, load_scene, save_clusters, save_ground, save_relief
-
-__all__ = ["find", "ground", "load_ground", "load_scene", "read_points"]
+from tunneldb.job.scene import line_of, save_clusters, save_ground, save_relief
 
 Counts = dict[str, Any]
 Float = NDArray[np.float64]
-
-MARGIN = 32.0
-"""Points so far beyond the ends of a kilometre are looked at too, so that its neighbours find the same there, m."""
 
 _XYZ: tuple[tuple[str, str, sql.Composable], ...] = tuple(
     (axis, "f8", sql.SQL("public.{}(geom)").format(sql.Identifier(f"st_{axis}"))) for axis in "xyz"
@@ -47,7 +43,8 @@ def ground(
 ) -> Counts:
     """Find the ground, the lining and what else there is in a kilometre (Li et al., 2023), and class its points.
 
-    A tunnel without ground has none in the database, and all else.
+    Points and sections so far beyond its ends as the ground depends on (``MARGIN``) are looked at too, so that its neighbours
+    find the same there. A tunnel without ground has none in the database, and all else.
 
     Raises
     ------

@@ -16,11 +16,11 @@ from tunneldb.database.survey import Survey
 from tunneldb.geometry.alignment import KILOMETRE
 from tunneldb.geometry.store import load_surface
 from tunneldb.geometry.surface import Surface
-from tunneldb.ground.classify import Scene
 from tunneldb.ground.cluster import CELL, Cluster
 from tunneldb.ground.line import Line
 from tunneldb.ground.lining import Relief
 from tunneldb.ground.model import COLUMN, Ground
+from tunneldb.ground.scene import Scene
 
 Float = NDArray[np.float64]
 
