@@ -99,7 +99,9 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("free_cables", "N", "Cables on hangers off the wall, from end to end.", int),
         _Option("ballast", "M", "Standard deviation of the floor's height: stones of 3 to 6 cm."),
         _Option("camber", "%", "Fall of the floor from its middle to both walls."),
-        _Option("walkway", "M", "Height of a walkway 0.9 m wide along the left wall and of a kerb 0.4 m wide along the right one."),
+        _Option(
+            "walkway", "M", "Height of a walkway 0.9 m wide along the left wall, and of a kerb 0.4 m wide along the right."
+        ),
         _Option("carriageway", "M", "Height of a second carriageway on the right."),
     ],
     "Other": [

@@ -89,8 +89,8 @@ def detect(
     grid = _grid(surface, km, values["image.pixel"])
     files = sources(conn, survey, km)
     radiometer = _radiometer(conn, survey, values["intensity.max_incidence"])
-    halo = grid.halo * grid.pixel
-    eye = Eye.of(surface, km, values["lining.tolerance"], radiometer, load_floor(conn, survey, km, halo), halo)
+    beyond = grid.halo * grid.pixel
+    eye = Eye.of(surface, km, values["lining.tolerance"], radiometer, load_floor(conn, survey, km, beyond), beyond)
     with Accumulator(grid) as image:
         if radiometer is None:
             return _offset_only(conn, survey, eye, files, image, progress)
