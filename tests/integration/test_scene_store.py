@@ -74,6 +74,26 @@ def test_ground_of_kilometres_is_put_together(conn: psycopg.Connection, survey: 
     assert load_ground(conn, survey, 12_000, 12_999) is None
 
 
+def test_ground_goes_on_to_the_end_of_the_last_kilometre(conn: psycopg.Connection, survey: Survey) -> None:
+    surface, whole = example_surface()[0], ground(12_800, 13_010)
+    whole.height[12_998 - 12_800] = whole.height[12_997 - 12_800] + 1.0  # a hole
+    arcs = np.tile([-6.0, 6.0], (len(whole.height), 1))
+    conn.execute("DELETE FROM tunnel.ground WHERE survey_id = %s", [survey.id])
+    save_ground(conn, survey, 12, line_of(surface), whole, arcs)
+    along, across = np.array([12_998.5, 12_999.4, 12_999.999]), np.full(3, 0.5)
+    height = whole.height_at(along, across)
+    for stop in (13_000.0, 13_020.0):
+        found = load_ground(conn, survey, 12_990.0, stop)
+        np.testing.assert_allclose(found.height_at(along, across), height)
+        assert found.is_ground(along, across, height).all()
+        assert np.isnan(found.height_at(np.array([13_000.5]), across[:1])).all()
+    assert len(load_ground(conn, survey, 12_990.0, 12_999.0).height) == 10
+    left, right = load_arcs(conn, survey, 12_990, 13_005)
+    assert (left[:11] == -6.0).all()
+    assert (right[:11] == 6.0).all()
+    assert np.isnan([left[11:], right[11:]]).all()
+
+
 def test_the_lining_of_kilometres_is_put_together(conn: psycopg.Connection, survey: Survey) -> None:
     rng = np.random.default_rng(1)
     whole = Relief(0.25, 4 * FIRST, -40, *rng.standard_normal((2, 80, 4 * (STOP - FIRST))).astype(np.float32))

@@ -76,7 +76,8 @@ def save_ground(conn: psycopg.Connection[Any], survey: Survey, km: int, line: Li
 def load_ground(conn: psycopg.Connection[Any], survey: Survey, first: float, stop: float) -> Ground | None:
     """Ground of a survey between two chainages, m; None if there is none.
 
-    What lies between metres that have one is as wide as all of them together, NaN where nothing is known.
+    What lies between metres that have one is as wide as all of them together, NaN where nothing is known. Where a kilometre
+    has ground to its last metre and the next one has none, or has not been worked on, it goes on straight to the end.
     """
     rows = conn.execute(
         "SELECT n, across, array_send(height), gamma, array_send(foot), array_send(lean) FROM tunnel.ground"
@@ -89,7 +90,8 @@ def load_ground(conn: psycopg.Connection[Any], survey: Survey, first: float, sto
     heights = [unpack_array(row[2], np.float64) for row in rows]
     begins = [round(row[1] / COLUMN) for row in rows]
     start, left = rows[0][0], min(begins)
-    count, width = rows[-1][0] - start + 1, max(b + len(h) for b, h in zip(begins, heights, strict=True)) - left
+    last = rows[-1][0] + 1 if _is_end(rows[-1][0] + 1) and rows[-1][0] < stop else rows[-1][0]
+    count, width = last - start + 1, max(b + len(h) for b, h in zip(begins, heights, strict=True)) - left
     height = np.full((count, width), np.nan)
     gamma = np.full(count, np.nan)
     foot, lean = np.full((count, 2), np.nan), np.full((count, 2), np.nan)
@@ -98,11 +100,31 @@ def load_ground(conn: psycopg.Connection[Any], survey: Survey, first: float, sto
         height[k, begin - left : begin - left + len(values)] = values
         gamma[k] = row[3]
         foot[k], lean[k] = unpack_array(row[4], np.float64), unpack_array(row[5], np.float64)
-    return Ground(start, left, height, gamma, foot, lean)
+    ground = Ground(start, left, height, gamma, foot, lean)
+    _carry_to_ends(ground)
+    return ground
+
+
+def _carry_to_ends(ground: Ground) -> None:
+    """Give the ends of kilometres whose next one has no ground what goes on straight from the metres before them."""
+    height, others = ground.height, (ground.gamma, ground.foot, ground.lean)
+    for k in range(1, len(height)):
+        if _is_end(ground.start + k) and np.isnan(height[k]).all():
+            height[k] = height[k - 1] + np.nan_to_num(height[k - 1] - height[max(k - 2, 0)])
+            for values in others:
+                values[k] = values[k - 1]
+
+
+def _is_end(metre: int) -> bool:
+    """Whether a kilometre ends at a metre, of which the ground is kept with the next one."""
+    return metre % KILOMETRE == 0
 
 
 def load_arcs(conn: psycopg.Connection[Any], survey: Survey, first: int, stop: int) -> tuple[Float, Float]:
-    """Arcs at which the ground begins on the left and on the right, at each metre from ``first`` to ``stop``; NaN for none."""
+    """Arcs at which the ground begins on the left and on the right, at each metre from ``first`` to ``stop``; NaN for none.
+
+    The end of a kilometre has those of its last metre, if the next one has none.
+    """
     arcs = np.full((2, stop - first + 1), np.nan)
     rows = conn.execute(
         "SELECT n, arc_left, arc_right FROM tunnel.ground WHERE survey_id = %s AND n BETWEEN %s AND %s",
@@ -110,6 +132,9 @@ def load_arcs(conn: psycopg.Connection[Any], survey: Survey, first: int, stop: i
     ).fetchall()
     for n, left, right in rows:
         arcs[:, n - first] = [np.nan if arc is None else arc for arc in (left, right)]
+    for k in range(1, stop - first + 1):
+        if _is_end(first + k) and np.isnan(arcs[:, k]).all():
+            arcs[:, k] = arcs[:, k - 1]
     return arcs[0], arcs[1]
 
 
