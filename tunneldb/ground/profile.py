@@ -50,18 +50,25 @@ def profiles(
     reach = round(distance / _BIN)
     most = round(2 * half / _PIECE)
     rows = (cells.shape[0] - 1) // columns
+    # A piece at the tunnel's end, or beside a gap, is too short to tell ground from what stands on it.
+    window = np.empty((centres.shape[0], 4), np.int64)
+    shown_length = np.zeros(centres.shape[0])
     for g in prange(centres.shape[0]):
-        if np.isnan(planes[g, 0]):
-            continue
-        low = int(np.floor(centres[g] - half)) - start
-        high = int(np.ceil(centres[g] + half)) - start
-        low, high = max(low, 0), min(high, rows)
+        low = max(int(np.floor(centres[g] - half)) - start, 0)
+        high = min(int(np.ceil(centres[g] + half)) - start, rows)
         pieces = _cut(cells, columns, low, high, most)
+        length = _pieces(along, cells, columns, low, high, centres[g] - half, pieces, 2 * half / pieces)
+        window[g, 0], window[g, 1], window[g, 2], window[g, 3] = low, high, pieces, length
+        shown_length[g] = length * 2 * half / pieces
+    enough = min(half, shown_length.max())
+    for g in prange(centres.shape[0]):
+        if np.isnan(planes[g, 0]) or shown_length[g] < enough:
+            continue
+        low, high, pieces, length = window[g, 0], window[g, 1], window[g, 2], window[g, 3]
         piece_length = 2 * half / pieces
         count = np.empty(bins + 1, np.int64)
         seen = np.empty((bins, pieces), np.bool_)
         here = np.empty(pieces, np.bool_)
-        length = _pieces(along, cells, columns, low, high, centres[g] - half, pieces, piece_length)
         for c in range(columns):
             count[:] = 0
             seen[:] = False
