@@ -37,6 +37,7 @@ def image(settings: Settings, survey: str, output: Path, km: str | None) -> None
         if not there:
             raise UserError(f"survey {survey} has no images yet: tunneldb run {survey}")
         wanted = parse_km(km, there)
+        conn.rollback()
         try:
             output.mkdir(parents=True, exist_ok=True)
         except OSError as error:

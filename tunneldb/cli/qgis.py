@@ -43,6 +43,7 @@ def qgis(settings: Settings, survey: str, output: Path, service: str | None) -> 
 def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> list[Path]:
     """Write the images of all kilometres and return the GeoTIFFs."""
     kilometres = image_kilometres(conn, survey)
+    conn.rollback()
     if kilometres:
         try:
             folder.mkdir(exist_ok=True)

@@ -1,6 +1,6 @@
 """Which server, the connection to it, its schema, and COPY."""
 
-from tunneldb.database.connection import connect, open_connection, resolve_dsn, sqlalchemy_engine
+from tunneldb.database.connection import connect, open_connection, resolve_dsn, snapshot, sqlalchemy_engine
 from tunneldb.database.copy import PointZ, copy_binary, pack
 from tunneldb.database.resources import resource_dir
 from tunneldb.database.schema import install
@@ -17,5 +17,6 @@ __all__ = [
     "pack",
     "resolve_dsn",
     "resource_dir",
+    "snapshot",
     "sqlalchemy_engine",
 ]

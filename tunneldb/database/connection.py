@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import psycopg
@@ -72,6 +74,17 @@ def connect(dsn: str | None) -> psycopg.Connection[Any]:
         connection.close()
         raise
     return connection
+
+
+@contextmanager
+def snapshot(connection: psycopg.Connection[Any]) -> Iterator[None]:
+    """Read what the database holds at one moment, for the length of a with block: what others commit meanwhile is not seen.
+
+    The connection must be idle.
+    """
+    with connection.transaction():
+        connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY")
+        yield
 
 
 def sqlalchemy_engine(dsn: str | None) -> sqlalchemy.Engine:

@@ -13,7 +13,7 @@ import numpy as np
 import psycopg
 from numpy.typing import NDArray
 
-from tunneldb.database.survey import Survey
+from tunneldb.database import Survey, snapshot
 from tunneldb.errors import UserError
 from tunneldb.export.atomic import replacing
 from tunneldb.ground.classes import Klass
@@ -93,9 +93,7 @@ def export_classified(
     for number, (file, target) in enumerate(zip(wanted, targets, strict=True), start=1):
         started = perf_counter()
         source = unchanged_file(file.path, file.bytes, file.checksum)
-        with conn.transaction():
-            # What a run commits meanwhile is seen in whole or not at all.
-            conn.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY")
+        with snapshot(conn):
             _require_ground(conn, survey, file.kilometres)
             scene = load_scene(conn, survey, min(file.kilometres), max(file.kilometres))
         progress = begin(f"[{number}|{len(wanted)}] {file.name}", file.points)

@@ -12,7 +12,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from tunneldb.database import Survey
+from tunneldb.database import Survey, snapshot
 from tunneldb.export import preview
 from tunneldb.export.atomic import replacing
 from tunneldb.export.classes import ClassPainter
@@ -29,6 +29,8 @@ def image_kilometres(conn: psycopg.Connection, survey: Survey) -> list[int]:
 def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> list[Path]:
     """Write the images of a kilometre: ``SURVEY-kmNNN-KIND.tif`` and ``.png`` for each kind that it has.
 
+    All are of one moment; the connection must be idle.
+
     The GeoTIFFs hold dB or m as single-precision numbers, NaN where no point fell, or the code of a class, 0 where no point
     fell; x is the chainage and y the arc, m. Each file appears whole. Classes are there when stage ground has run: they are
     computed from the offset image and what that stage has stored.
@@ -38,30 +40,30 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
     list of Path
         Files written.
     """
-    written = []
-    leaks = _leaks(conn, survey, km)
-    for kind in (*KINDS, "class"):
-        stored = "offset" if kind == "class" else kind
-        blocks = _blocks(conn, survey, km, stored)
-        if not blocks:
-            continue
-        painter = ClassPainter.load(conn, survey, km) if kind == "class" else None
-        if kind == "class" and painter is None:
-            continue
-        first = _read(conn, survey, km, stored, blocks[0])
-        rows, width = first.values.shape
-        extent = Extent(first.transform, rows, width * (blocks[-1] - blocks[0] + 1))
-        stem = f"{survey.name}-km{km:03d}-{kind}"
-        tiff, png = folder / f"{stem}.tif", folder / f"{stem}.png"
-        sheet = _Sheet(extent.transform.a)
-        with replacing(tiff) as temporary:
-            write_cog(temporary, kind, extent, _pixels(conn, survey, km, stored, blocks, painter, sheet))
+    with snapshot(conn):
+        return [path for kind in (*KINDS, "class") for path in _export_kind(conn, survey, km, kind, folder)]
+
+
+def _export_kind(conn: psycopg.Connection, survey: Survey, km: int, kind: str, folder: Path) -> list[Path]:
+    """Write the image of one kind and its preview, if there are any; returns their paths."""
+    stored = "offset" if kind == "class" else kind
+    blocks = _blocks(conn, survey, km, stored)
+    painter = ClassPainter.load(conn, survey, km) if kind == "class" and blocks else None
+    if not blocks or (kind == "class" and painter is None):
+        return []
+    first = _read(conn, survey, km, stored, blocks[0])
+    rows, width = first.values.shape
+    extent = Extent(first.transform, rows, width * (blocks[-1] - blocks[0] + 1))
+    stem = f"{survey.name}-km{km:03d}-{kind}"
+    tiff, png = folder / f"{stem}.tif", folder / f"{stem}.png"
+    sheet = _Sheet(extent.transform.a)
+    with replacing(tiff) as temporary:
+        write_cog(temporary, kind, extent, _pixels(conn, survey, km, stored, blocks, painter, sheet))
+    leaks = _leaks(conn, survey, km) if kind == "corrected" else []
+    with replacing(png) as temporary:
         title = f"{survey.name}  km {km}  {_TITLES[kind]}"
-        with replacing(png) as temporary:
-            outlines = leaks if kind == "corrected" else []
-            preview.draw(temporary, title, kind, list(sheet.strips()), extent.transform.f, sheet.pixel, outlines)
-        written += [tiff, png]
-    return written
+        preview.draw(temporary, title, kind, list(sheet.strips()), extent.transform.f, sheet.pixel, leaks)
+    return [tiff, png]
 
 
 _TITLES = {
