@@ -11,8 +11,9 @@ from tunneldb.ground.filter import GroundSettings, find_ground
 from tunneldb.ground.line import Line
 from tunneldb.ground.scene import Scene
 from tunneldb.ground.spacing import Spacing
-from tunneldb.ground.things import bars
+from tunneldb.ground.things import ClusterSettings, bars
 from tunneldb.ground.voxels import Voxels
+from tunneldb.job.parameters import settings
 from tunneldb.scan.thin import thin, voxel_edge
 from tunneldb.simulate.parameters import Parameters
 
@@ -104,6 +105,11 @@ def test_classes_do_not_depend_on_how_points_are_cut(survey) -> None:
     whole = scene.classes(points)
     parts = np.concatenate([scene.classes(part) for part in np.array_split(points, 7)])
     assert (whole == parts).all()
+
+
+def test_defaults_are_those_of_the_parameters() -> None:
+    assert ClusterSettings() == ClusterSettings.of(settings([]))
+    assert GroundSettings() == GroundSettings.of(settings([]))
 
 
 def test_a_point_finds_the_nearest_cluster() -> None:

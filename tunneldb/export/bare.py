@@ -113,4 +113,4 @@ def find_scene_of(
     del voxels  # room for the models
     line = Line.through(thinned)
     ground = find_ground(thinned, line, settings, spread=spread)
-    return find_bare_scene(thinned, line, ground, ClusterSettings.from_parameters(values)), origin
+    return find_bare_scene(thinned, line, ground, ClusterSettings.of(values)), origin

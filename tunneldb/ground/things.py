@@ -58,8 +58,8 @@ class ClusterSettings:
     region: float = 0.4
 
     @classmethod
-    def from_parameters(cls, values: Mapping[str, float]) -> ClusterSettings:
-        """Settings from the parameters ``cluster.*``."""
+    def of(cls, values: Mapping[str, float]) -> ClusterSettings:
+        """Settings of the parameters ``cluster.*``."""
         return cls(values["cluster.radius"], int(values["cluster.min_points"]), values["cluster.region"])
 
 

@@ -71,7 +71,7 @@ def ground(
 def find(points: Float, line: Line, surface: Surface, values: Mapping[str, float]) -> Scene:
     """Find ground, lining and clusters from points (n, 3) of survey density, m."""
     found = find_ground(points, line, GroundSettings.of(values))
-    return find_scene(points, line, surface, found, ClusterSettings.from_parameters(values))
+    return find_scene(points, line, surface, found, ClusterSettings.of(values))
 
 
 def read_points(conn: psycopg.Connection[Any], survey: Survey, km: int, begin: float, end: float) -> tuple[Float, int]:

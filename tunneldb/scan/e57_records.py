@@ -73,7 +73,7 @@ class E57Records:
         self.offsets = np.floor(header.low)
         self.extras = [extra for extra in _EXTRAS if any(extra[0] in scan.fields for scan in scans)]
         size = record_size(FORMAT) + 4 * len(self.extras)
-        date = dt.datetime.now() if not created else _GPS_EPOCH + dt.timedelta(seconds=created)
+        date = _GPS_EPOCH + dt.timedelta(seconds=created) if created else None
         timed = any(scan.has_time for scan in scans)
         records = (_extra_bytes(self.extras),) if self.extras else ()
         self.head = Head(_header(self.scale, self.offsets, date, size, timed), records).with_crs(header.crs)
@@ -169,11 +169,12 @@ def _spread(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.
     return np.rint(np.clip(share, 0.0, 1.0) * (2**16 - 1)).astype(np.uint16)
 
 
-def _header(scale: float, offsets: NDArray[np.float64], date: dt.datetime, size: int, timed: bool) -> bytes:
+def _header(scale: float, offsets: NDArray[np.float64], date: dt.datetime | None, size: int, timed: bool) -> bytes:
     header = bytearray(HEADER_SIZE)
     flags = _STANDARD_TIME_FLAG if timed else 0
     struct.pack_into("<4sHH16sBB32s32s", header, 0, b"LASF", 0, flags, bytes(16), 1, 4, b"OTHER", b"tunneldb")
-    struct.pack_into("<HHH", header, 90, date.timetuple().tm_yday, date.year, HEADER_SIZE)
+    day, year = (0, 0) if date is None else (date.timetuple().tm_yday, date.year)
+    struct.pack_into("<HHH", header, 90, day, year, HEADER_SIZE)
     struct.pack_into("<BH", header, 104, FORMAT, size)
     struct.pack_into("<6d", header, 131, *[scale] * 3, *offsets)
     return bytes(header)
