@@ -18,6 +18,7 @@ from tunneldb.geometry.store import load_surface
 from tunneldb.ground.classes import Klass
 from tunneldb.job import ground as stage
 from tunneldb.job.parameters import settings
+from tunneldb.job.scene import line_of, load_ground, load_scene
 from tunneldb.simulate import Simulation, write
 
 PLANE = 13_000.0
@@ -150,23 +151,44 @@ def stale(conn: psycopg.Connection) -> Mapping[str, int]:
     return dict(rows)
 
 
+def test_points_on_target_spheres_are_theirs_once_it_runs_again(sections: psycopg.Connection) -> None:
+    conn = sections
+    command("run", NAME, "--from", "ground", "--to", "ground")
+    xyz, before = points(conn)
+    centre = xyz[np.flatnonzero(before == Klass.OBJECT)[0]]
+    survey = get_survey(conn, NAME)
+    conn.execute(  # as found before there were segments
+        "INSERT INTO tunnel.target_sphere (survey_id, km, number, scan_id, geom, radius, nominal, rms, sigma, coverage, points)"
+        " VALUES (%s, 12, 1, 1, ST_SetSRID(ST_MakePoint(%s, %s, %s), %s), 0.2, 0.2, 0.001, 0.0001, 0.4, 100)",
+        [survey.id, *centre.tolist(), survey.srid],
+    )
+    conn.commit()
+    command("run", NAME, "--from", "ground", "--to", "ground")
+    again, after = points(conn)
+    np.testing.assert_array_equal(again, xyz)
+    on_it = np.linalg.norm(xyz - centre, axis=1) <= 0.2
+    assert on_it.sum() > 1
+    assert (after[on_it] == Klass.SPHERE).all()
+    np.testing.assert_array_equal(load_scene(conn, survey, 12, 13).classes(xyz)[on_it], after[on_it])
+
+
 def test_at_the_end_of_a_kilometre_neighbours_find_what_one_whole_shows(sections: psycopg.Connection) -> None:
     conn = sections
     command("run", NAME, "--from", "ground", "--to", "ground")
     survey = get_survey(conn, NAME)
     surface = load_surface(conn, survey)
-    line = stage.line_of(surface)
+    line = line_of(surface)
     xyz, found = points(conn)
     whole = stage.find(xyz, line, surface, settings())
     assert (whole.classes(xyz) == found).mean() > 0.999
-    stored = stage.load_ground(conn, survey, START, START + 40)
+    stored = load_ground(conn, survey, START, START + 40)
     assert whole.ground is not None
     assert stored is not None
     expected = whole.ground
     along, across = (grid.ravel() for grid in np.meshgrid(np.arange(START, START + 39.5, 0.25), np.arange(-4.0, 4.0, 0.1)))
     np.testing.assert_allclose(stored.height_at(along, across), expected.height_at(along, across), atol=0.002)
     # read back for points of any density, the models say the same
-    assert (stage.load_scene(conn, survey, 12, 13).classes(xyz) == found).mean() > 0.999
+    assert (load_scene(conn, survey, 12, 13).classes(xyz) == found).mean() > 0.999
 
 
 def test_a_tunnel_without_ground_has_none_and_all_of_it_is_lining(conn: psycopg.Connection, tmp_path: Path) -> None:

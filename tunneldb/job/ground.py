@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from tunneldb.ground.line import Line
 from tunneldb.ground.scene import Scene
 from tunneldb.ground.things import ClusterSettings
 from tunneldb.job.partition import partition, partition_exists
-from tunneldb.job.scene import line_of, save_clusters, save_ground, save_relief
+from tunneldb.job.scene import line_of, load_spheres, save_clusters, save_ground, save_relief
 
 Counts = dict[str, Any]
 Float = NDArray[np.float64]
@@ -56,7 +57,7 @@ def ground(
     points, own = read_points(conn, survey, km, begin, end)
     progress(0.2)
     line = line_of(surface)
-    scene = find(points, line, surface, values)
+    scene = replace(find(points, line, surface, values), spheres=load_spheres(conn, survey, km, km))
     progress(0.6)
     classes = scene.classes(points[:own])
     metres = save_ground(conn, survey, km, line, scene.ground, foot_arcs(scene.ground, line, surface))

@@ -230,16 +230,24 @@ def load_scene(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_t
         load_clusters(conn, survey, first, stop),
         surface,
         load_relief(conn, survey, km_from - 1, km_to + 1),
-        load_spheres(conn, survey, first, stop),
+        load_spheres(conn, survey, km_from, km_to),
     )
 
 
-def load_spheres(conn: psycopg.Connection[Any], survey: Survey, first: float, stop: float) -> Float:
-    """Target spheres between two chainages, m: x, y, z and nominal radius of each (k, 4), of all scans that saw it."""
+def load_spheres(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_to: int) -> Float:
+    """Target spheres of kilometres ``km_from`` to ``km_to`` and of those beside them, of all scans that saw each.
+
+    They have a kilometre also where they were found before there were segments, and so have no chainage.
+
+    Returns
+    -------
+    (k, 4) float array
+        x, y, z and nominal radius of each, m.
+    """
     rows = conn.execute(
         "SELECT public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom), nominal FROM tunnel.target_sphere"
-        " WHERE survey_id = %s AND chainage BETWEEN %s AND %s ORDER BY number, scan_id",
-        [survey.id, first, stop],
+        " WHERE survey_id = %s AND km BETWEEN %s AND %s ORDER BY number, scan_id",
+        [survey.id, km_from - 1, km_to + 1],
     ).fetchall()
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
