@@ -89,16 +89,17 @@ def test_a_wall_that_is_missing_is_thought_on():
     np.testing.assert_allclose(foot_arcs(flat(3.0, 99.0, foot=foot), LINE, BOX)[:, 0], -6.5, atol=0.11)
 
 
-def test_without_ground_nothing_is_floor():
+@pytest.mark.parametrize(("rows", "floor_there"), [(10, True), (30, False)])
+def test_without_ground_nothing_is_floor_unless_it_is_hidden_for_a_few_metres_only(rows, floor_there):
     assert foot_arcs(None, LINE, BOX).shape == (0, 2)
     height = np.full((51, 61), 97.5)
-    height[10:20] = np.nan
+    height[10 : 10 + rows] = np.nan
     arcs = foot_arcs(flat(3.0, 97.5, height=height), LINE, BOX)
-    assert np.isnan(arcs[10:20]).all()
+    assert np.isnan(arcs[10 : 10 + rows]).all()
     floor = Floor.of(5, *arcs.T)
     arc = np.array([-9.0, 0.0, 9.0])
-    assert floor.covers(np.full(3, 30.0), arc).tolist() == [True, False, True]
-    assert floor.covers(np.full(3, 20.0), arc).tolist() == [False, False, False]
+    assert floor.covers(np.full(3, 50.0), arc).tolist() == [True, False, True]
+    assert floor.covers(np.full(3, 20.0), arc).tolist() == [floor_there, False, floor_there]
     assert floor.covers(np.full(3, np.nan), np.full(3, np.nan)).tolist() == [False, False, False]
 
 

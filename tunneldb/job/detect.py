@@ -26,7 +26,7 @@ from tunneldb.leak.detection import detect as find_leaks
 from tunneldb.leak.gather import Counts, gather
 from tunneldb.leak.image import KILOMETRE, Accumulator, Grid
 from tunneldb.leak.leaks import save_leaks
-from tunneldb.leak.lining import Astray, Floor
+from tunneldb.leak.lining import HIDDEN, Astray, Floor
 from tunneldb.leak.picture import Picture, develop, halo
 from tunneldb.leak.raster import KINDS
 from tunneldb.leak.seen import Eye, Radiometer, Seen, Span
@@ -127,8 +127,10 @@ def load_floor(conn: psycopg.Connection[Any], survey: Survey, km: int, halo: flo
     ).fetchone()
     if done is None:
         raise UserError(f"the ground of kilometre {km} is not known yet: tunneldb run {survey.name} --km {km} --from ground")
-    first = int(km * KILOMETRE - np.ceil(halo))
-    return Floor.of(first, *load_arcs(conn, survey, first, int((km + 1) * KILOMETRE + np.ceil(halo))))
+    # Far enough for both kilometres to see the ground on both sides of a gap at their border.
+    beyond = int(np.ceil(halo)) + HIDDEN
+    first = int(km * KILOMETRE) - beyond
+    return Floor.of(first, *load_arcs(conn, survey, first, int((km + 1) * KILOMETRE) + beyond))
 
 
 def _offset_only(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import pairwise
 
 import numpy as np
 from numba import njit
@@ -15,6 +16,9 @@ from tunneldb.leak.appendage import appendages
 from tunneldb.leak.image import Grid, Window
 
 Float = NDArray[np.float64]
+
+HIDDEN = 25
+"""So many metres of ground may be hidden by what stands on it, and the floor goes on beneath."""
 
 FLOOR_EDGE = 0.02
 """So much of the wall above the floor goes with it, m: its foot, found from points of survey density, is known no better."""
@@ -62,6 +66,7 @@ class Floor:
     @classmethod
     def of(cls, start: int, left: Float, right: Float) -> Floor:
         """Make a floor of the arcs of the walls' feet (k,), m, NaN for none, at each metre from ``start`` on."""
+        left, right = _bridged(left), _bridged(right)
         none = np.isnan(left), np.isnan(right)
         return cls(start, np.where(none[0], -np.inf, left + FLOOR_EDGE), np.where(none[1], np.inf, right - FLOOR_EDGE))
 
@@ -76,6 +81,16 @@ class Floor:
         left, right = self.bounds(chainage)
         with np.errstate(invalid="ignore"):
             return np.asarray((arc <= left + above) | (arc >= right - above), dtype=np.bool_)
+
+
+def _bridged(arcs: Float) -> Float:
+    """Fill gaps of up to HIDDEN metres between places."""
+    out = arcs.copy()
+    known = np.flatnonzero(np.isfinite(arcs))
+    for before, after in pairwise(known.tolist()):
+        if after - before <= HIDDEN:
+            out[before : after + 1] = np.linspace(arcs[before], arcs[after], after - before + 1)
+    return out
 
 
 @dataclass(frozen=True)
