@@ -25,7 +25,7 @@ from scipy.spatial.distance import pdist
 from benchmarks.common import print_table, progress, save
 from tunneldb.ground.curved import Curved
 from tunneldb.ground.dbscan import dbscan
-from tunneldb.ground.sphere import LEAST_POINTS, Sphere, find_spheres
+from tunneldb.ground.sphere import LEAST_POINTS, Sphere, confirmed, find_spheres, join
 from tunneldb.ground.sphere_fit import coverage, distance_error, fit_ratio
 from tunneldb.simulate import Parameters, Simulation
 
@@ -175,18 +175,34 @@ def run(number: int, ours: Tally, free: Tally, paper: Tally) -> int:
     curved.close()
     kept = curved.holds(xyz)
     ours.seconds += time.perf_counter() - begun
+    seen = []
     for one in np.unique(scan):
         chosen = np.flatnonzero(kept & (scan == one))
         begun = time.perf_counter()
         found, _ = find_spheres(xyz[chosen], eyes[chosen], RADIUS, TOLERANCE)
         ours.seconds += time.perf_counter() - begun
+        seen += [(int(one), sphere) for sphere in found]
+    group = join(np.array([sphere.centre for _, sphere in seen]), np.array([one for one, _ in seen]), RADIUS)
+    good = confirmed(group, np.array([sphere.firm for _, sphere in seen]))
+    for one in np.unique(scan):
+        spheres = [sphere for (of, sphere), sure in zip(seen, good, strict=True) if of == one and sure]
         counted = np.zeros(len(truth), bool)
-        for k, sphere in enumerate(simulation.spheres):
-            on = np.flatnonzero((scan == one) & (klass == SPHERE) & (thing == sphere.id))
+        for k, target in enumerate(simulation.spheres):
+            on = np.flatnonzero((scan == one) & (klass == SPHERE) & (thing == target.id))
             towards = (eyes[on] - truth[k]).mean(axis=0) if len(on) else np.ones(3)
             counted[k] = len(on) >= POINTS and coverage(xyz[on], truth[k], towards) >= COVERAGE
-        ours.add(truth, counted, [(sphere.centre, RADIUS, sphere.sigma) for sphere in found])
-        near = [xyz[chosen][on_sphere(xyz[chosen], sphere)] for sphere in found]
+        here = np.flatnonzero(kept & (scan == one))
+        for sphere in spheres:
+            gaps = [distance_error(sphere.centre, true) for true in truth]
+            if min(gaps) > NEAR:
+                there = here[np.linalg.norm(xyz[here] - sphere.centre, axis=1) < 1.3 * RADIUS]
+                kinds = {item.kind for item in simulation.things if item.number in set(thing[there].tolist())}
+                progress(f"  invented: {sphere}, on classes {np.unique(klass[there])} {kinds}")
+        for k in np.flatnonzero(counted).tolist():
+            if not spheres or min(distance_error(sphere.centre, truth[k]) for sphere in spheres) > NEAR:
+                progress(f"  missed: sphere {k + 1} ({simulation.spheres[k].kind}) by scan {one}")
+        near = [xyz[here][on_sphere(xyz[here], sphere)] for sphere in spheres]
+        ours.add(truth, counted, [(sphere.centre, RADIUS, sphere.sigma) for sphere in spheres])
         free.add(truth, counted, [(*any_radius(points), 0.0) for points in near])
         begun = time.perf_counter()
         off = (scan == one) & ~np.isin(klass, (LINING, FLOOR, NICHE))

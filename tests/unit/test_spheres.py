@@ -11,7 +11,7 @@ import pytest
 from tests.targets import Ball, Rod, Thing, Wall, scan
 from tunneldb.ground.curved import Curved
 from tunneldb.ground.moments import eigenvalues, normal
-from tunneldb.ground.sphere import Refusal, Sphere, find_spheres, join
+from tunneldb.ground.sphere import Refusal, Sphere, confirmed, find_spheres, join
 from tunneldb.ground.sphere_fit import coverage, distance_error, fit_ratio, fit_sphere
 
 R = 0.0725
@@ -38,7 +38,7 @@ FOUND = {
     "touching the wall": [Ball(AT, R), Wall((X + R, Y, Z), (-1.0, 0.0, 0.0))],
     "on a post": [Ball(AT, R), Rod((X, Y, Z - 1.5), (X, Y, Z - 0.06), 0.02), WALL],
     "on a thick post": [Ball(AT, R), Rod((X, Y, Z - 1.5), (X, Y, Z - 0.06), 0.04), WALL],
-    "behind a cable": [Ball(AT, R), Rod((X - 0.2, Y - 0.04, Z - 1), (X - 0.2, Y - 0.04, Z + 1), 0.03), WALL],
+    "behind a cable": [Ball(AT, R), Rod((X - 0.2, Y - 0.14, Z - 1), (X - 0.2, Y + 0.06, Z + 1), 0.03), WALL],
     "on the floor": [Ball(AT, R), Wall((X, Y, Z - R), (0.0, 0.0, 1.0)), WALL],
 }
 
@@ -214,3 +214,13 @@ def test_rows_of_several_scans_are_joined() -> None:
     group = join(np.array([[0, 0, 0], [0.06, 0, 0], [0.01, 0, 0]], float), np.array([1, 1, 2]), R)
     assert group.tolist() == [0, 1, 0]
     assert join(np.zeros((0, 3)), np.zeros(0, int), R).tolist() == []
+
+
+def test_few_points_need_another_scan() -> None:
+    assert confirmed(np.array([0, 1, 0, 2]), np.array([False, False, True, True])).tolist() == [True, False, True, True]
+    station = np.add(AT, (-5.0, 0.0, 0.0))
+    for step, firm in ((0.0042, False), (0.0018, True)):
+        points, number = scan([Ball(AT, R), WALL], station, step, 1, towards=AT, opening=0.1)
+        assert ((number == 0).sum() >= 50) == firm
+        found, _ = find_spheres(points, np.broadcast_to(station, points.shape), R, TOLERANCE)
+        assert [sphere.firm for sphere in found] == [firm]

@@ -25,12 +25,16 @@ Int64 = NDArray[np.int64]
 LEAST_POINTS = 30
 """Points on a sphere; with fewer, its centre is known to 1 or 2 mm at best and its radius not at all."""
 
+FIRM_POINTS = 50
+"""Points with which a sphere stands by itself; one with fewer must be seen better by another scan: by so few points, now and
+then the top of a bollard, a shoulder or a heap of ballast is as round as a sphere."""
+
 LEAST_COVERAGE = 0.15
 """Share of a sphere's surface that must be seen."""
 
 # Of the points near the sphere, in the directions in which it is seen, this share lies on it: there is nothing in a sphere,
 # and mostly nothing on it.
-SHARE = 0.6
+SHARE = 0.8
 
 ROUGH = 0.8  # the quick fit's figures may fall short by so much of what the final ones must reach
 
@@ -59,6 +63,8 @@ class Sphere:
         Share of its surface that is seen (`tunneldb.ground.sphere_fit.coverage`).
     points : int
         Points that it was fitted to.
+    firm : bool
+        Whether it stands by itself (`FIRM_POINTS`).
     """
 
     centre: Float
@@ -68,6 +74,7 @@ class Sphere:
     sigma: float
     coverage: float
     points: int
+    firm: bool
 
 
 @dataclass(frozen=True)
@@ -149,7 +156,7 @@ def _judge(points: Float, eyes: Float, start: Float, radius: float, tolerance: f
     count, most = int(fit.used.sum()), _greatest_rms(fit, tolerance, noise)
     towards = _towards(points[fit.on], eyes[fit.on], fit.centre)
     seen = coverage(points[fit.on], fit.centre, towards)
-    if seen < LEAST_COVERAGE or _share_on(points, fit, towards, radius) < SHARE:
+    if seen < LEAST_COVERAGE or _share_on(points, fit, towards, radius, tolerance) < SHARE:
         return None
     if abs(fit.radius - radius) > math.hypot(tolerance, 2.0 * fit.radius_sigma):
         return _other_ball(points, eyes, fit, radius, tolerance, noise)
@@ -159,7 +166,8 @@ def _judge(points: Float, eyes: Float, start: Float, radius: float, tolerance: f
         return None
     if _astray(points[fit.used], fit, radius) > tolerance / 3.0:
         return Refusal(fit.centre, count, "it is round, but no sphere")
-    return Sphere(fit.centre, fit.radius, fit.radius_sigma, fit.rms, fit.sigma, seen, count)
+    firm = int(fit.on.sum()) >= FIRM_POINTS
+    return Sphere(fit.centre, fit.radius, fit.radius_sigma, fit.rms, fit.sigma, seen, count, firm)
 
 
 def _greatest_rms(fit: Fit, tolerance: float, noise: float) -> float:
@@ -190,13 +198,16 @@ def _towards(points: Float, eyes: Float, centre: Float) -> Float:
     return mean if np.linalg.norm(mean) > 1e-6 else np.array([0.0, 0.0, 1.0])
 
 
-def _share_on(points: Float, fit: Fit, towards: Float, radius: float) -> float:
+def _share_on(points: Float, fit: Fit, towards: Float, radius: float, tolerance: float) -> float:
     """Share of the points in and near the sphere, in the directions in which it is seen, that lie on it."""
-    _, held = cells_of(points[fit.on], fit.centre, towards)
     far = np.linalg.norm(points - fit.centre, axis=1)
+    on = np.abs(far - radius) <= 1.5 * tolerance
     near = far <= NEAR * radius
+    if not on.any():
+        return 0.0
+    _, held = cells_of(points[on], fit.centre, towards)
     cell, _ = cells_of(points[near], fit.centre, towards)
-    return float(fit.on.sum()) / float(held[cell].sum())
+    return float(on.sum()) / float(held[cell].sum())
 
 
 def _is_cylinder(points: Float, fit: Fit, radius: float, tolerance: float) -> bool:
@@ -277,3 +288,8 @@ def join(centres: Float, scans: NDArray[np.int64], radius: float) -> Int64:
         if one != other and not np.intersect1d(scans[group == one], scans[group == other]).size:
             group[group == max(one, other)] = min(one, other)
     return np.unique(group, return_inverse=True)[1].astype(np.int64)
+
+
+def confirmed(group: Int64, firm: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether each row (n,) is of a sphere that stands by itself in some row of its group, as `join` has them."""
+    return np.isin(group, group[firm])

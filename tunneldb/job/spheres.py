@@ -16,7 +16,7 @@ from tunneldb.geometry.alignment import KILOMETRE, Alignment
 from tunneldb.geometry.store import load_alignment, load_surface
 from tunneldb.geometry.surface import Surface
 from tunneldb.ground.curved import Curved
-from tunneldb.ground.sphere import LEAST_POINTS, Refusal, Sphere, find_spheres, join
+from tunneldb.ground.sphere import LEAST_POINTS, Refusal, Sphere, confirmed, find_spheres, join
 from tunneldb.job.ledger import stage_run
 from tunneldb.job.run import loaded_kilometres
 from tunneldb.job.scene import line_of, load_ground
@@ -122,7 +122,8 @@ def search(
             found, refused = look.search(begin)
             rows += found
             refusals += refused
-        rows = _numbered(rows, radius, place)
+        rows, weak = _numbered(rows, radius, place)
+        refusals += weak
         _save(conn, survey, rows, radius)
         run.counts.update(
             kilometres=len(kilometres),
@@ -259,18 +260,27 @@ class _Kilometre:
         return low <= int(bin_of(np.array([chainage]))[0]) < high
 
 
-def _numbered(rows: list[Found], radius: float, place: _Place) -> list[Found]:
-    """Rows with the numbers of their spheres, along the tunnel, in the order of numbers and scans."""
+def _numbered(rows: list[Found], radius: float, place: _Place) -> tuple[list[Found], list[tuple[int, Refusal]]]:
+    """Rows with the numbers of their spheres, along the tunnel, by number and scan; and what no scan saw well."""
     if not rows:
-        return rows
+        return rows, []
     centres = np.array([row.sphere.centre for row in rows])
     group = join(centres, np.array([row.scan for row in rows]), radius)
-    along = place.alignment.chainage(centres)
-    middle = np.bincount(group, along) / np.bincount(group)
+    good = confirmed(group, np.array([row.sphere.firm for row in rows]))
+    weak = [
+        (row.scan, Refusal(row.sphere.centre, row.sphere.points, "too few points, and no other scan saw it better"))
+        for row, sure in zip(rows, good, strict=True)
+        if not sure
+    ]
+    rows, group, centres = [row for row, sure in zip(rows, good, strict=True) if sure], group[good], centres[good]
+    if not rows:
+        return rows, weak
+    group = np.unique(group, return_inverse=True)[1]
+    middle = np.bincount(group, place.alignment.chainage(centres)) / np.bincount(group)
     rank = np.empty(len(middle), np.int64)
     rank[np.lexsort((np.arange(len(middle)), middle))] = np.arange(1, len(middle) + 1)
     numbered = [replace(row, number=int(rank[group[k]])) for k, row in enumerate(rows)]
-    return sorted(numbered, key=lambda row: (row.number, row.scan))
+    return sorted(numbered, key=lambda row: (row.number, row.scan)), weak
 
 
 def _save(conn: psycopg.Connection[Any], survey: Survey, rows: list[Found], radius: float) -> None:
