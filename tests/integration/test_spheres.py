@@ -160,7 +160,6 @@ def test_what_is_wrong_is_said_and_changes_nothing(
     finally:
         aside.rename(scan)
     assert stored(conn) == before
-    assert conn.execute("SELECT outcome FROM tunnel.run WHERE stage = 'spheres' ORDER BY id DESC").fetchone() == ("failed",)
 
 
 def test_spheres_of_a_radius_that_there_is_none_of(loaded: tuple[Path, Simulation], conn: psycopg.Connection) -> None:

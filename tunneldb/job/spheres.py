@@ -10,7 +10,7 @@ import numpy as np
 import psycopg
 from numpy.typing import NDArray
 
-from tunneldb.database.survey import Survey
+from tunneldb.database import Survey, snapshot
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import KILOMETRE, Alignment
 from tunneldb.geometry.store import load_alignment, load_surface
@@ -89,7 +89,7 @@ def search(
     """Find the target spheres of a survey in its scan files, and put them in the place of those found before.
 
     The files are read twice, kilometre by kilometre: once for where they aren't flat, once for the points there, of which
-    those on the ground are left out if stage ``ground`` has been run. One transaction.
+    those on the ground are left out if stage ``ground`` has been run. What is found is written in one short transaction.
 
     Parameters
     ----------
@@ -106,24 +106,26 @@ def search(
     UserError
         If nothing is loaded, a file is gone or was changed, or cannot be read.
     """
-    kilometres = loaded_kilometres(conn, survey)
-    conn.rollback()
-    if not kilometres:
+    with snapshot(conn):
+        kilometres = loaded_kilometres(conn, survey)
+        place = _Place.of(conn, survey) if kilometres else None
+    if place is None:
         raise UserError(f"survey {survey.name} holds no points yet: tunneldb load {survey.name} FILE...")
-    with stage_run(conn, survey.id, None, "spheres", {"radius": radius, "tolerance": tolerance}) as run:
-        place = _Place.of(conn, survey)
-        rows: list[Found] = []
-        refusals: list[tuple[int, Refusal]] = []
-        points = 0
-        for km in kilometres:
+    rows: list[Found] = []
+    refusals: list[tuple[int, Refusal]] = []
+    points = 0
+    for km in kilometres:
+        with snapshot(conn):
             files = sources(conn, survey, km)
-            points += sum(file.points for file in files)
             look = _Kilometre(place, km, files, radius, tolerance, _ground_of(conn, survey, km))
-            found, refused = look.search(begin)
-            rows += found
-            refusals += refused
-        rows, weak = _numbered(rows, radius, place)
-        refusals += weak
+        points += sum(file.points for file in files)
+        found, refused = look.search(begin)
+        rows += found
+        refusals += refused
+    rows, weak = _numbered(rows, radius, place)
+    refusals += weak
+    # Begun only now: while files are read, batches of the survey go on.
+    with stage_run(conn, survey.id, None, "spheres", {"radius": radius, "tolerance": tolerance}) as run:
         _save(conn, survey, rows, radius)
         run.counts.update(
             kilometres=len(kilometres),
