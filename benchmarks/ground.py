@@ -185,8 +185,9 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--length", type=float, default=30.0)
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--ours", action="store_true", help="without the peers and the single steps")
     options = parser.parse_args()
-    cloth = tuned_csf(options.length)
+    cloth = (1.0, 3, 0.1) if options.ours else tuned_csf(options.length)
     methods: dict[str, Callable[[Float], Bool]] = {
         "RANSAC": lambda p: by_segments(p, thin=False, normals=False, through=False),
         "RANSAC, normals": lambda p: by_segments(p, thin=False, normals=True, through=False),
@@ -196,10 +197,12 @@ def main() -> None:
         f"CSF ({cloth[0]:g} m, {cloth[1]}, {cloth[2]:g} m)": lambda p: csf(p, *cloth),
         "Open3D segment_plane": open3d,
     }
+    if options.ours:
+        methods = {"ours: and levels, walls": ours}
     tallies = {name: Tally() for name in methods}
     warm = simulate(Parameters(length=10, scanner="profiler", profile_spacing=0.1, profile_points=500))
-    for name in tuple(methods)[:5]:
-        methods[name](warm.xyz)
+    for method in tuple(methods.values())[:5]:
+        method(warm.xyz)
     print("type I, II, total and kappa in %, means over scenes")
     for scene, parameters in scenes(options.seeds, options.quick, options.length):
         cloud = simulate(parameters)
