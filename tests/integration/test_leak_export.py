@@ -156,7 +156,8 @@ def test_a_leak_confirmed_but_not_found_again_is_listed(conn, example):
 def test_images_are_cloud_optimized_and_lie_in_the_unrolled_plane(conn, example, tmp_path):
     run("image", example, "-o", tmp_path / "images")
     names = sorted(p.name for p in (tmp_path / "images").iterdir())
-    assert names == sorted(f"{example}-km012-{kind}.{end}" for kind in ("raw", "corrected", "offset") for end in ("tif", "png"))
+    kinds = ("raw", "corrected", "offset", "class")
+    assert names == sorted(f"{example}-km012-{kind}.{end}" for kind in kinds for end in ("tif", "png"))
     with rasterio.open(tmp_path / "images" / f"{example}-km012-corrected.tif") as image:
         assert image.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG"
         assert image.overviews(1)

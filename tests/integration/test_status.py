@@ -192,7 +192,7 @@ def test_watch_in_a_pipe_says_what_changes_and_ends_when_nothing_is_left(conn: p
     conn.execute("DELETE FROM tunnel.incoming WHERE name = 'km-5.laz'")
     conn.execute("DELETE FROM tunnel.goal WHERE km > 3")
     conn.commit()
-    lines = watcher.communicate(timeout=30)[0].splitlines()
+    lines = watcher.communicate(timeout=120)[0].splitlines()
     assert watcher.returncode == 0
     assert lines[0].startswith("[10/18] segments km 3: ")
     assert lines[-1].endswith("steps done")
