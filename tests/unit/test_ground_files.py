@@ -148,14 +148,12 @@ def test_full_disk(tunnel: tuple[Path, np.ndarray], tmp_path: Path, monkeypatch:
 
 
 SLOW = """
-import signal
 import time
 from types import SimpleNamespace
 import numpy as np
 from tunneldb.cli.main import main
 from tunneldb.export import bare
 
-signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background has it ignored
 scene = SimpleNamespace(ground=0, clusters=[], relief=None, classes=lambda xyz: np.full(len(xyz), 2, np.uint8))
 bare.find_scene_of = lambda *_: (scene, 0.0)
 whole = bare.rewrite
