@@ -214,18 +214,19 @@ def run(number: int, ours: Tally, free: Tally, paper: Tally) -> int:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0, help="number of the first scene, which its seed follows from")
     arguments = parser.parse_args()
     tallies = {"fixed radius": Tally(), "free radius": Tally(), "paper's way": Tally()}
     points = 0
-    for number in range(arguments.scenes):
-        progress(f"scene {number + 1} of {arguments.scenes}")
+    for number in range(arguments.first, arguments.first + arguments.scenes):
+        progress(f"scene {number}")
         points += run(number, *tallies.values())
     figures = {name: tally.figures() for name, tally in tallies.items()}
     names = list(figures["fixed radius"])
     print_table("Target spheres", ["", *names], [[name, *(str(values[n]) for n in names)] for name, values in figures.items()])
     print(f"{points:,} points, {points / tallies['fixed radius'].seconds:,.0f} points/s (decoding not counted)")
     print(f"The paper, three spheres: R_fit {PAPER} %, E_distance 1.36, 0.29, 3.87 mm")
-    print(save("spheres", {"scenes": arguments.scenes, "points": points, **figures}))
+    print(save("spheres", {"first": arguments.first, "scenes": arguments.scenes, "points": points, **figures}))
 
 
 if __name__ == "__main__":
