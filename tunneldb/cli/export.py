@@ -12,6 +12,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.progress import points_bar, step
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
+from tunneldb.export.atomic import make_folder
 from tunneldb.job.run import loaded_kilometres, parse_km
 
 
@@ -47,10 +48,7 @@ def export(settings: Settings, survey: str, classified: bool, output: Path, km: 
             raise UserError(f"survey {survey} holds no points yet: tunneldb load {survey} FILE...")
         wanted = parse_km(km, there)
         conn.rollback()
-        try:
-            output.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise UserError(f"{output}: the folder cannot be made: {error.strerror}") from error
+        make_folder(output)
         with told_to_end(), points_bar() as progress:
             for file in export_classified(conn, found, output, wanted, step(progress)):
                 points = int(file.counts.sum())

@@ -9,6 +9,7 @@ import click
 from tunneldb.cli.main import Settings
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
+from tunneldb.export.atomic import make_folder
 from tunneldb.export.image import export_kilometre, image_kilometres
 from tunneldb.job.run import parse_km
 
@@ -38,10 +39,7 @@ def image(settings: Settings, survey: str, output: Path, km: str | None) -> None
             raise UserError(f"survey {survey} has no images yet: tunneldb run {survey}")
         wanted = parse_km(km, there)
         conn.rollback()
-        try:
-            output.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise UserError(f"{output}: the folder cannot be made: {error.strerror}") from error
+        make_folder(output)
         for number, kilometre in enumerate(wanted, start=1):
             for path in export_kilometre(conn, found, kilometre, output):
                 click.echo(f"[{number}|{len(wanted)}] {path}", err=True)

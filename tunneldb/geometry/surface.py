@@ -10,6 +10,12 @@ from numpy.typing import NDArray
 from tunneldb.geometry.frame import Float, frame_at
 from tunneldb.geometry.unrolling import NODES, bracket, roll_all, unroll_all
 
+APART = 0.06
+"""A section that stands apart from those beside it by more was not measured on the wall, m."""
+
+MIN_SECTIONS = 4
+"""With fewer sections there is nothing to compare with."""
+
 
 @dataclass(frozen=True)
 class Unrolled:
@@ -100,3 +106,19 @@ class Surface:
             return float("nan"), float("nan")
         ends = (1.0 - g) * self.arcs[a, [0, -1]] + g * self.arcs[b, [0, -1]]
         return float(ends[0]), float(ends[1])
+
+    def astray(self) -> Float:
+        """How far each section stands apart from those beside it, (k, 361), m; 0 where it is on the lining.
+
+        A section that was measured in a niche or on something hung on the wall does. Each is compared with the median of the
+        three before and the three after it; it must differ by more than the lining does there from section to section
+        anyway, as rock does.
+        """
+        count = len(self.chainages)
+        if count < MIN_SECTIONS:
+            return np.zeros_like(self.radius)
+        first = np.clip(np.arange(count) - 3, 0, max(count - 7, 0))
+        beside = np.array([[n for n in range(f, f + min(7, count)) if n != k] for k, f in enumerate(first.tolist())])
+        apart = self.radius - np.median(self.radius[beside], axis=1)
+        usual = 3.0 * 1.4826 * np.median(np.abs(apart), axis=1)
+        return np.where(np.abs(apart) > np.maximum(usual, APART)[:, None], apart, 0.0)

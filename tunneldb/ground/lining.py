@@ -171,18 +171,8 @@ class Prior:
 
     @classmethod
     def of(cls, surface: Surface) -> Prior:
-        """Compare each section with the median of the three before and the three after it.
-
-        It must differ by more than the lining does there from section to section anyway, as rock does.
-        """
-        count = len(surface.chainages)
-        if count < 4:
-            return cls(surface, np.zeros_like(surface.radius))
-        first = np.clip(np.arange(count) - 3, 0, max(count - 7, 0))
-        beside = np.array([[n for n in range(f, f + min(7, count)) if n != k] for k, f in enumerate(first.tolist())])
-        apart = surface.radius - np.median(surface.radius[beside], axis=1)
-        usual = SIGMAS * 1.4826 * np.median(np.abs(apart), axis=1)
-        return cls(surface, np.where(np.abs(apart) > np.maximum(usual, APART)[:, None], apart, 0.0))
+        """Take the sections that stand apart from those beside them (:meth:`Surface.astray`)."""
+        return cls(surface, surface.astray())
 
     def at(self, chainage: Float, arc: Float) -> Float:
         """Offset of the lining where the surface left it; (rows,) arcs by (columns,) chainages, m."""

@@ -23,17 +23,11 @@ HIDDEN = 25
 FLOOR_EDGE = 0.02
 """So much of the wall above the floor goes with it, m: its foot, found from points of survey density, is known no better."""
 
-APART = 0.06
-"""A section that stands apart from those beside it by more was not measured on the wall, m."""
-
 MOST = 0.4
 """Where a larger part of a section does, it is the tunnel that has another shape."""
 
 OFF_WALL = 0.03
 """Surface that is farther off the wall is not lining, m."""
-
-MIN_SECTIONS = 4
-"""With fewer sections there is nothing to compare with."""
 
 
 class State(IntEnum):
@@ -114,21 +108,11 @@ class Astray:
 
     @classmethod
     def of(cls, surface: Surface) -> Astray:
-        """Compare each section with the median of the three before and the three after it.
-
-        It must differ by more than the lining does there from section to section anyway, as rock does.
-        """
-        count = len(surface.chainages)
-        if count < MIN_SECTIONS:
-            return cls(surface, np.zeros_like(surface.radius))
-        first = np.clip(np.arange(count) - 3, 0, max(count - 7, 0))
-        beside = np.array([[n for n in range(f, f + min(7, count)) if n != k] for k, f in enumerate(first.tolist())])
-        apart = np.abs(surface.radius - np.median(surface.radius[beside], axis=1))
-        usual = 3.0 * 1.4826 * np.median(apart, axis=1)
-        astray = apart > np.maximum(usual, APART)[:, None]
+        """Take the sections that stand apart from those beside them (:meth:`Surface.astray`)."""
+        apart = np.abs(surface.astray())
         # A tunnel that is wider or narrower all round has no niche.
-        astray[astray.mean(axis=1) > MOST] = False
-        return cls(surface, np.where(astray, apart, 0.0))
+        apart[(apart > 0.0).mean(axis=1) > MOST] = 0.0
+        return cls(surface, apart)
 
     def covers(self, chainage: Float, arc: Float) -> NDArray[np.bool_]:
         """Tell which pixels, (rows,) arcs by (columns,) chainages, lie on surface that left the wall."""
