@@ -81,7 +81,7 @@ def measure(dsn: str | None, section: str, seed: int, scanner: str, length: floa
 
 def found_leaks(connection: psycopg.Connection, survey: str) -> list[BaseGeometry]:
     rows = connection.execute(
-        "SELECT public.ST_AsBinary(l.unrolled) FROM tunnel.leak AS l"
+        "SELECT public.ST_AsBinary(l.unrolled) FROM tunnel.anomaly AS l"
         " JOIN tunnel.survey AS s ON s.id = l.survey_id WHERE s.name = %s ORDER BY l.id",
         (survey,),
     ).fetchall()

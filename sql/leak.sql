@@ -47,7 +47,7 @@ LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER
 SET search_path = pg_catalog, public, pg_temp
 AS $$
     SELECT coalesce(sum(l.area * ST_Area(ST_Intersection(l.unrolled, w.stretch)) / ST_Area(l.unrolled)), 0)
-    FROM tunnel.leak l
+    FROM tunnel.anomaly l
     JOIN tunnel.survey s ON s.id = l.survey_id
     CROSS JOIN LATERAL (
         SELECT ST_MakeEnvelope($2, ST_YMin(l.unrolled) - 1, $3, ST_YMax(l.unrolled) + 1) AS stretch) w

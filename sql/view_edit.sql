@@ -69,7 +69,7 @@ BEGIN
     END IF;
     NEW.reviewed_by := session_user;
     NEW.reviewed_at := clock_timestamp();
-    UPDATE tunnel.leak
+    UPDATE tunnel.anomaly
        SET review = NEW.review, remark = NEW.remark, reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at
      WHERE id = OLD.id;
     RETURN NEW;

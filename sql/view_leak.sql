@@ -14,7 +14,7 @@ SELECT l.id, l.survey_id, s.name AS survey, l.km,
        l.unrolled::public.geometry(Polygon, 0) AS unrolled,
        l.map::public.geometry AS map,
        l.surface::public.geometry AS surface
-  FROM tunnel.leak l
+  FROM tunnel.anomaly l
   JOIN tunnel.survey s ON s.id = l.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
  CROSS JOIN LATERAL (SELECT (l.chainage_from + l.chainage_to) / 2 AS chainage,
@@ -106,7 +106,7 @@ SELECT s.id::bigint * 1000000 + 500000 + g.km AS id, s.id AS survey_id, s.name A
                coalesce(sum(k.area) FILTER (WHERE k.detected AND k.review <> 'rejected'), 0) AS wet_area,
                max(k.area) FILTER (WHERE k.detected AND k.review <> 'rejected') AS largest_area,
                max(k.drop_max) FILTER (WHERE k.detected AND k.review <> 'rejected') AS greatest_drop
-          FROM tunnel.leak k
+          FROM tunnel.anomaly k
          WHERE k.survey_id = g.survey_id AND k.km = g.km) l;
 COMMENT ON VIEW tunnel_api.km_statistics IS 'Leaks of each kilometre, summed; without those rejected or no longer found';
 COMMENT ON COLUMN tunnel_api.km_statistics.lining_area IS 'Lining that the last detection saw, m²; NULL before it';

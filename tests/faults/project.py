@@ -147,8 +147,8 @@ _TABLES = {
     "image": "SELECT km, kind, block, tiff FROM tunnel.image ORDER BY 1, 2, 3",
     "leak": "SELECT km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max, image_share, "
     f"{_COORDINATES.format('unrolled')}, {_COORDINATES.format('map')}, {_COORDINATES.format('surface')}, review, detected "
-    "FROM tunnel.leak ORDER BY 2, 4",
-    "leak_part": "SELECT km, pixel, box, mask, filled, drop_sum, drop_max FROM tunnel.leak_part ORDER BY km, box",
+    "FROM tunnel.anomaly ORDER BY 2, 4",
+    "leak_part": "SELECT km, pixel, box, mask, filled, drop_sum, drop_max FROM tunnel.anomaly_part ORDER BY km, box",
     "tables": "SELECT relname FROM pg_class WHERE relnamespace = 'tunnel'::regnamespace AND relkind IN ('r', 'p') ORDER BY 1",
     "goal": "SELECT km, stage, parameters::text FROM tunnel.goal ORDER BY km",
     "incoming": "SELECT name, message FROM tunnel.incoming ORDER BY name",

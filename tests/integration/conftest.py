@@ -185,7 +185,7 @@ def _leaks(conn: psycopg.Connection, survey_id: int, surface: Surface) -> list[P
         shaped = shapes(outline, surface)
         west, south, east, north = outline.bounds
         conn.execute(
-            "INSERT INTO tunnel.leak (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, "
+            "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, "
             "drop_mean, drop_max, image_share, unrolled, map, surface, review) VALUES (%s, %s, %s, %s, %s, %s, %s, %s, "
             "%s, %s, 0.97, ST_GeomFromWKB(%s, 0), ST_GeomFromWKB(%s, %s), ST_GeomFromWKB(%s, %s), %s)",
             (

@@ -65,7 +65,7 @@ def prepare(folder: Path, scanner: str, kind: str = "amplitude", start: float = 
 
 
 def outlines(conn: psycopg.Connection) -> dict[int, shapely.Polygon]:
-    rows = conn.execute("SELECT id, ST_AsBinary(unrolled) FROM tunnel.leak WHERE detected ORDER BY id").fetchall()
+    rows = conn.execute("SELECT id, ST_AsBinary(unrolled) FROM tunnel.anomaly WHERE detected ORDER BY id").fetchall()
     conn.rollback()
     return {key: shapely.from_wkb(bytes(wkb)) for key, wkb in rows}
 
@@ -158,7 +158,7 @@ def _check_radiometry(conn: psycopg.Connection, simulation: Simulation, scanner:
 
 def _check_statistics(conn: psycopg.Connection, simulation: Simulation) -> None:
     rows = conn.execute(
-        "SELECT ST_AsBinary(unrolled), ST_AsBinary(surface), clock, area, drop_mean, drop_max, image_share FROM tunnel.leak"
+        "SELECT ST_AsBinary(unrolled), ST_AsBinary(surface), clock, area, drop_mean, drop_max, image_share FROM tunnel.anomaly"
     ).fetchall()
     conn.rollback()
     for unrolled, surface, clock, area, mean, greatest, share in rows:
@@ -205,17 +205,18 @@ def test_a_rerun_gives_the_same_and_reviews_survive(detected: psycopg.Connection
     before = outlines(conn)
     assert len(before) >= 3
     confirmed, rejected, *_ = before
-    conn.execute("UPDATE tunnel.leak SET review = 'confirmed', reviewed_by = 'ines' WHERE id = %s", [confirmed])
-    conn.execute("UPDATE tunnel.leak SET review = 'rejected', remark = 'stain' WHERE id = %s", [rejected])
+    conn.execute("UPDATE tunnel.anomaly SET review = 'confirmed', reviewed_by = 'ines' WHERE id = %s", [confirmed])
+    conn.execute("UPDATE tunnel.anomaly SET review = 'rejected', remark = 'stain' WHERE id = %s", [rejected])
     # A reviewed leak and an unreviewed one where there is none any more.
     ghosts = []
     for chainage, review in ((START + 3, "confirmed"), (START + 5, "open")):
         ghosts.append(
             conn.execute(
-                "INSERT INTO tunnel.leak (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean,"
-                " drop_max, image_share, unrolled, map, surface, review) SELECT survey_id, km, %(c)s, %(c)s + 0.1, 0, 0.1, 12,"
+                "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area,"
+                " drop_mean, drop_max, image_share, unrolled, map, surface, review)"
+                " SELECT survey_id, km, %(c)s, %(c)s + 0.1, 0, 0.1, 12,"
                 " 0.01, 1, 1, 1, ST_MakeEnvelope(%(c)s, 0, %(c)s + 0.1, 0.1, 0), map, surface, %(review)s"
-                " FROM tunnel.leak LIMIT 1 RETURNING id",
+                " FROM tunnel.anomaly LIMIT 1 RETURNING id",
                 {"c": chainage, "review": review},
             ).fetchone()[0]
         )
@@ -226,10 +227,10 @@ def test_a_rerun_gives_the_same_and_reviews_survive(detected: psycopg.Connection
     after = outlines(conn)
     assert after.keys() == before.keys()
     assert all(after[key].equals(before[key]) for key in before)
-    reviews = dict(conn.execute("SELECT id, review FROM tunnel.leak WHERE review <> 'open'").fetchall())
+    reviews = dict(conn.execute("SELECT id, review FROM tunnel.anomaly WHERE review <> 'open'").fetchall())
     assert reviews == {confirmed: "confirmed", rejected: "rejected", ghosts[0]: "confirmed"}
     state = conn.execute(
-        "SELECT detected, reviewed_by, remark FROM tunnel.leak WHERE id = ANY (%s) ORDER BY id", [list(reviews)]
+        "SELECT detected, reviewed_by, remark FROM tunnel.anomaly WHERE id = ANY (%s) ORDER BY id", [list(reviews)]
     )
     assert state.fetchall() == [(True, "ines", None), (True, None, "stain"), (False, None, None)]
     assert conn.execute("SELECT kind, block, md5(tiff) FROM tunnel.image ORDER BY 1, 2").fetchall() == images

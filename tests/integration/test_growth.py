@@ -64,7 +64,7 @@ SELECT g.survey_id, g.km, g.n, half, g.chainage_from + half / 10.0, 0.15, 5, '{1
   FROM tunnel.segment g, (VALUES (25), (75)) AS h (half)
 """
 LEAKS = """
-INSERT INTO tunnel.leak (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max,
+INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max,
     image_share, unrolled, map, surface)
 SELECT g.survey_id, g.km, g.chainage_from, g.chainage_from + 1, 0, 1, 12, 1, 3, 3, 1,
     ST_MakeEnvelope(g.chainage_from, 0, g.chainage_from + 1, 1, 0),
@@ -99,7 +99,7 @@ def many(server_dsn: str, template: str) -> Iterator[str]:
             conn.execute(statement)
         conn.commit()
         conn.autocommit = True
-        conn.execute("ANALYZE tunnel.survey, tunnel.tunnel, tunnel.segment, tunnel.section, tunnel.leak")
+        conn.execute("ANALYZE tunnel.survey, tunnel.tunnel, tunnel.segment, tunnel.section, tunnel.anomaly")
     yield dsn
     with psycopg.connect(server_dsn, autocommit=True) as conn:
         conn.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(sql.Identifier(DATABASE)))
@@ -255,16 +255,18 @@ def test_points_of_a_survey_by_name_are_read_from_their_kilometre(conn: psycopg.
 
 
 @pytest.mark.parametrize(
-    ("view", "condition"),
+    ("view", "table", "condition"),
     [
-        ("segment", "chainage_to >= 5000 AND chainage_from < 5100"),
-        ("section", "chainage BETWEEN 5000 AND 5100"),
-        ("leak", "chainage_to >= 5000 AND chainage_from < 5100"),
+        ("segment", "segment", "chainage_to >= 5000 AND chainage_from < 5100"),
+        ("section", "section", "chainage BETWEEN 5000 AND 5100"),
+        ("leak", "anomaly", "chainage_to >= 5000 AND chainage_from < 5100"),
     ],
 )
-def test_rows_of_a_stretch_are_found_by_an_index_on_the_survey(conn: psycopg.Connection, view: str, condition: str) -> None:
+def test_rows_of_a_stretch_are_found_by_an_index_on_the_survey(
+    conn: psycopg.Connection, view: str, table: str, condition: str
+) -> None:
     plan = explain(conn, f"SELECT * FROM tunnel_api.{view} WHERE survey = 'short' AND {condition}")
-    scans = [node for node in nodes(plan) if node.get("Relation Name") == view or view in node.get("Index Name", "")]
+    scans = [node for node in nodes(plan) if node.get("Relation Name") == table or table in node.get("Index Name", "")]
     assert scans
     assert not any(node["Node Type"] == "Seq Scan" for node in scans)
     assert any("survey_id =" in node.get("Index Cond", "") for node in scans)

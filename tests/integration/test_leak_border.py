@@ -121,7 +121,7 @@ def test_leaks_over_the_end_are_what_they_are_elsewhere(sections: psycopg.Connec
         assert share_of(scan, same, APPENDAGE) < 0.05
         assert share_of(scan, same, FLOOR) < 0.05
     for km, west, east, share, area in conn.execute(
-        "SELECT km, chainage_from, chainage_to, image_share, area / ST_Area(unrolled) FROM tunnel.leak"
+        "SELECT km, chainage_from, chainage_to, image_share, area / ST_Area(unrolled) FROM tunnel.anomaly"
     ):
         assert km == (west + east) / 2 // 1000
         assert 0.3 < share <= 1
@@ -129,7 +129,7 @@ def test_leaks_over_the_end_are_what_they_are_elsewhere(sections: psycopg.Connec
     conn.rollback()
     # Doing both again, or only one, changes nothing; a review stays.
     (larger, _) = sorted(over_end(conn), key=lambda key: -found[key].area)
-    conn.execute("UPDATE tunnel.leak SET review = 'confirmed' WHERE id = %s", [larger])
+    conn.execute("UPDATE tunnel.anomaly SET review = 'confirmed' WHERE id = %s", [larger])
     conn.commit()
     for options in ([], ["--km", 12], ["--km", 13]):
         command("run", NAME, "--from", "detect", *options)
@@ -137,10 +137,10 @@ def test_leaks_over_the_end_are_what_they_are_elsewhere(sections: psycopg.Connec
         assert again.keys() == found.keys()
         assert all(again[key].equals(found[key]) for key in found)
         assert (counts(conn)["leaks_new"], counts(conn)["leaks_gone"]) == (0, 0)
-    assert conn.execute("SELECT review FROM tunnel.leak WHERE id = %s", [larger]).fetchone() == ("confirmed",)
+    assert conn.execute("SELECT review FROM tunnel.anomaly WHERE id = %s", [larger]).fetchone() == ("confirmed",)
     conn.rollback()
     command("survey", "remove", NAME, "--yes")
-    assert conn.execute("SELECT count(*) FROM tunnel.leak_part").fetchone() == (0,)
+    assert conn.execute("SELECT count(*) FROM tunnel.anomaly_part").fetchone() == (0,)
 
 
 @pytest.mark.parametrize(("first", "second"), [(12, 13), (13, 12)])
@@ -155,13 +155,13 @@ def test_a_half_that_was_found_first_becomes_the_whole(
     # What the smaller leak has in kilometre 12 is too small for a leak of its own.
     assert len(halves) == {12: 1, 13: 2}[first]
     assert not over_end(conn)
-    conn.execute("UPDATE tunnel.leak SET review = 'rejected', remark = 'old stain' WHERE id = ANY (%s)", [list(halves)])
+    conn.execute("UPDATE tunnel.anomaly SET review = 'rejected', remark = 'old stain' WHERE id = ANY (%s)", [list(halves)])
     conn.commit()
     command("run", NAME, "--from", "detect", "--km", second)
     assert_same(outlines(conn), uncut)
     assert len(over_end(conn)) == 2
     assert halves.keys() <= over_end(conn).keys()
-    kept = conn.execute("SELECT review, remark, detected FROM tunnel.leak WHERE id = ANY (%s)", [list(halves)]).fetchall()
+    kept = conn.execute("SELECT review, remark, detected FROM tunnel.anomaly WHERE id = ANY (%s)", [list(halves)]).fetchall()
     assert kept == [("rejected", "old stain", True)] * len(halves)
 
 

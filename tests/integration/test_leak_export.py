@@ -58,7 +58,9 @@ def test_chainage_is_parsed_or_refused(conn):
 
 
 def test_wet_area_is_cut_at_the_ends_and_leaves_out_the_rejected(conn, example):
-    leaks = conn.execute("SELECT chainage_from, chainage_to, area, review FROM tunnel.leak ORDER BY chainage_from").fetchall()
+    leaks = conn.execute(
+        "SELECT chainage_from, chainage_to, area, review FROM tunnel.anomaly ORDER BY chainage_from"
+    ).fetchall()
 
     def wet(start, end):
         return conn.execute("SELECT tunnel_api.wet_area(%s, %s, %s)", [example, start, end]).fetchone()[0]
@@ -147,7 +149,7 @@ def test_a_folder_that_is_not_there_is_named_and_nothing_is_left(example, tmp_pa
 
 
 def test_a_leak_confirmed_but_not_found_again_is_listed(conn, example):
-    conn.execute("UPDATE tunnel.leak SET detected = false")
+    conn.execute("UPDATE tunnel.anomaly SET detected = false")
     conn.commit()
     rows = list(csv.DictReader(run("leaks", example, "--format", "csv").stdout.splitlines()))
     assert [row["review"] for row in rows] == ["confirmed", "confirmed"]
@@ -168,7 +170,7 @@ def test_images_are_cloud_optimized_and_lie_in_the_unrolled_plane(conn, example,
         pixel = image.transform.a
         values = image.read(1)
         # The leaks that were painted are darker than what lies about them.
-        (wkb,) = conn.execute("SELECT ST_AsBinary(unrolled) FROM tunnel.leak ORDER BY id LIMIT 1").fetchone()
+        (wkb,) = conn.execute("SELECT ST_AsBinary(unrolled) FROM tunnel.anomaly ORDER BY id LIMIT 1").fetchone()
         centre = shapely.from_wkb(bytes(wkb)).representative_point()
         row, column = image.index(centre.x, centre.y)
         assert np.nanmean(values[row - 2 : row + 3, column - 2 : column + 3]) < np.nanmedian(values) - 2

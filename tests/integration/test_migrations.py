@@ -96,12 +96,12 @@ def test_the_functions_are_made_anew_and_data_stay(example: str, dsn: str, conn:
     conn.execute("DROP FUNCTION tunnel_api.chainage_label CASCADE")
     conn.execute("CREATE FUNCTION tunnel_api.left_over() RETURNS int LANGUAGE sql AS 'SELECT 1'")
     conn.commit()
-    leaks = conn.execute("SELECT count(*) FROM tunnel.leak").fetchone()
+    leaks = conn.execute("SELECT count(*) FROM tunnel.anomaly").fetchone()
     conn.commit()
     install(conn)
     assert conn.execute("SELECT tunnel_api.chainage_label(12345.678)").fetchone() == ("12+345.678",)
     assert conn.execute("SELECT to_regproc('tunnel_api.left_over')").fetchone() == (None,)
-    assert conn.execute("SELECT count(*) FROM tunnel.leak").fetchone() == leaks
+    assert conn.execute("SELECT count(*) FROM tunnel.anomaly").fetchone() == leaks
 
 
 def test_a_view_of_the_users_own_is_not_dropped_unasked(conn: psycopg.Connection) -> None:

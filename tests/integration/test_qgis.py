@@ -230,7 +230,7 @@ def test_vertex_moved_in_qgis_is_saved_with_its_stamp(conn: psycopg.Connection, 
 def test_review_in_qgis_is_saved_with_its_stamp(conn: psycopg.Connection, project: Path, layer: str) -> None:
     assert act(project, "review", "3", "rejected", "a stain, dry to the touch", layer)["saved"]
     review, remark, by, at = conn.execute(
-        "SELECT review, remark, reviewed_by, reviewed_at FROM tunnel.leak WHERE id = 3"
+        "SELECT review, remark, reviewed_by, reviewed_at FROM tunnel.anomaly WHERE id = 3"
     ).fetchone()  # type: ignore[misc]
     assert (review, remark) == ("rejected", "a stain, dry to the touch")
     assert (by,) == conn.execute("SELECT session_user::text").fetchone()
@@ -327,7 +327,7 @@ def test_service_stands_for_the_connection(conn: psycopg.Connection, example: st
 
 
 def test_project_without_leaks_sections_and_images(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
-    for table in ("leak", "image", "section"):
+    for table in ("anomaly", "image", "section"):
         conn.execute(f"DELETE FROM tunnel.{table}")  # type: ignore[arg-type]
     conn.commit()
     assert write(tmp_path / "demo.qgz").exit_code == 0
@@ -361,7 +361,7 @@ def test_errors_are_one_line(conn: psycopg.Connection, example: str, tmp_path: P
     result = write(tmp_path / "nowhere" / "demo.qgz")
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
     conn.execute("DELETE FROM tunnel.axis_vertex")
-    conn.execute("DELETE FROM tunnel.leak")
+    conn.execute("DELETE FROM tunnel.anomaly")
     conn.execute("DELETE FROM tunnel.image")
     conn.commit()
     result = write(tmp_path / "demo.qgz")

@@ -23,7 +23,7 @@ REVIEW = "UPDATE tunnel_api.leak_unrolled SET review = 'confirmed'"
 MOVE = "UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0, 0, 0.1) WHERE n = 1240"
 DRAW = "INSERT INTO tunnel_api.region (survey, kind, geom) VALUES ('demo-2024', 'dry', ST_MakeEnvelope(12400, 0, 12410, 2, 0))"
 READ = "SELECT count(*) FROM tunnel_api.leak"
-TABLE = "SELECT count(*) FROM tunnel.leak"
+TABLE = "SELECT count(*) FROM tunnel.anomaly"
 
 
 @pytest.fixture(scope="session")
@@ -74,9 +74,9 @@ def test_readers_unroll_and_sum_without_rights_on_tables(person: psycopg.Connect
 @pytest.mark.parametrize("person", ["vera", "ines"], indirect=True)
 def test_readers_see_no_table_and_run_no_stage(person: psycopg.Connection) -> None:
     refused(person, TABLE)
-    refused(person, "UPDATE tunnel.leak SET review = 'confirmed'")
+    refused(person, "UPDATE tunnel.anomaly SET review = 'confirmed'")
     refused(person, "DELETE FROM tunnel.point")
-    refused(person, "DROP TABLE tunnel.leak")
+    refused(person, "DROP TABLE tunnel.anomaly")
     refused(person, "CREATE TABLE tunnel.mine (x int)")
     refused(person, "CREATE VIEW tunnel_api.mine AS SELECT 1")
     refused(person, "SELECT tunnel_api.axis_refine(1, 12)")

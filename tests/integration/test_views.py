@@ -203,16 +203,16 @@ def test_bad_edit_of_a_vertex_is_refused(conn: psycopg.Connection, example: str,
 
 @pytest.mark.parametrize("view", ["leak", "leak_unrolled", "leak_map", "leak_3d"])
 def test_review_is_stamped(conn: psycopg.Connection, example: str, view: str) -> None:
-    key = one(conn, "SELECT min(id) FROM tunnel.leak")
+    key = one(conn, "SELECT min(id) FROM tunnel.anomaly")
     target = sql.Identifier(view)
     conn.execute(sql.SQL("UPDATE tunnel_api.{} SET review = 'confirmed', remark = 'drips' WHERE id = {}").format(target, key))
     review, remark, by, recent = one(
         conn,
-        "SELECT review, remark, reviewed_by, reviewed_at > now() - interval '1 minute' FROM tunnel.leak WHERE id = %s",
+        "SELECT review, remark, reviewed_by, reviewed_at > now() - interval '1 minute' FROM tunnel.anomaly WHERE id = %s",
         key,
     )
     assert (review, remark, by, recent) == ("confirmed", "drips", one(conn, "SELECT session_user::text"), True)
-    assert one(conn, "SELECT count(*) FROM tunnel.leak WHERE reviewed_by IS NOT NULL") == 1
+    assert one(conn, "SELECT count(*) FROM tunnel.anomaly WHERE reviewed_by IS NOT NULL") == 1
     for change in ("review = 'maybe'", "review = NULL", "area = 0", "reviewed_by = 'another'"):
         with pytest.raises(psycopg.Error, match=r"open, confirmed or rejected|only the review"), conn.transaction():
             conn.execute(sql.SQL("UPDATE tunnel_api.{} SET " + change).format(target))  # type: ignore[arg-type]
@@ -443,8 +443,8 @@ def test_statistics_leave_out_rejected_and_vanished_leaks(conn: psycopg.Connecti
         """UPDATE tunnel.run SET counts = '{"lining_pixels": 100000}', parameters = '{"image.pixel": 0.1}'
             WHERE stage = 'detect'"""
     )
-    gone = one(conn, "UPDATE tunnel.leak SET detected = false WHERE id = (SELECT min(id) FROM tunnel.leak) RETURNING id")
-    areas = conn.execute("SELECT area FROM tunnel.leak WHERE review <> 'rejected' AND id <> %s", (gone,)).fetchall()
+    gone = one(conn, "UPDATE tunnel.anomaly SET detected = false WHERE id = (SELECT min(id) FROM tunnel.anomaly) RETURNING id")
+    areas = conn.execute("SELECT area FROM tunnel.anomaly WHERE review <> 'rejected' AND id <> %s", (gone,)).fetchall()
     lining, wet, share, leaks, rejected = one(
         conn, "SELECT lining_area, wet_area, wet_share, leaks, leaks_rejected FROM tunnel_api.km_statistics WHERE km = 12"
     )

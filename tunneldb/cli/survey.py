@@ -113,8 +113,8 @@ def remove(settings: Settings, name: str, yes: bool) -> None:
         row = connection.execute(
             """
             SELECT (SELECT coalesce(sum(kept), 0) FROM tunnel.scan_file WHERE survey_id = %(id)s),
-                   (SELECT count(*) FROM tunnel.leak WHERE survey_id = %(id)s),
-                   (SELECT count(*) FROM tunnel.leak WHERE survey_id = %(id)s AND review <> 'open')
+                   (SELECT count(*) FROM tunnel.anomaly WHERE survey_id = %(id)s),
+                   (SELECT count(*) FROM tunnel.anomaly WHERE survey_id = %(id)s AND review <> 'open')
             """,
             {"id": found.id},
         ).fetchone()

@@ -43,6 +43,7 @@ _NAMES = {
 }
 
 Floats = Annotated[list[float], mapped_column(ARRAY(Double))]
+Reals = Annotated[list[float], mapped_column(ARRAY(REAL))]
 
 
 class Base(DeclarativeBase):
@@ -111,6 +112,7 @@ class Survey(Base):
     __table_args__ = (
         _one_of("intensity_kind", "amplitude", "reflectance", "linear", "none"),
         _one_of("platform", "static", "mobile"),
+        _one_of("reference", "none", "measured", "auto"),
         CheckConstraint("(intensity_dimension IS NULL) = (intensity_kind = 'none')", name="intensity_dimension"),
         Index(None, "tunnel_id"),
         {"comment": "A scanning campaign (an epoch) of a tunnel"},
@@ -127,6 +129,10 @@ class Survey(Base):
         comment="amplitude (dB, falls with range), reflectance (dB, range removed), linear (counts) or none"
     )
     platform: Mapped[str] = mapped_column(comment="static (rows in station) or mobile (rows in pose)")
+    reference: Mapped[str] = mapped_column(
+        server_default=text("'none'"),
+        comment="Range curve: none, measured on a target (rows in reference) or auto, from the lining of each kilometre",
+    )
     created_at: Mapped[dt.datetime] = mapped_column(server_default=_NOW, comment="When it was added")
 
 
@@ -526,6 +532,33 @@ class Radiometry(Base):
     wet_pixels: Mapped[int] = mapped_column(BigInteger, comment="Lining pixels found wet, after the median filter")
 
 
+class RangeCurve(Base):
+    """The range curve of a kilometre, found on its lining."""
+
+    __tablename__ = "range_curve"
+    __table_args__ = {"comment": "Range curve found on the lining of a kilometre, of surveys whose reference is auto"}  # noqa: RUF012
+
+    survey_id: Mapped[int] = mapped_column(_parent("survey"), primary_key=True, comment=_SURVEY)
+    km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=_KM)
+    range_m: Mapped[Floats] = mapped_column(comment="Ranges, growing, m")
+    intensity_db: Mapped[Floats] = mapped_column(comment="Intensity of dry lining at right angles there, dB")
+    sigma_db: Mapped[Floats] = mapped_column(comment="Standard deviation of the curve's shape there, dB")
+
+
+class Coverage(Base):
+    """What detection saw of the lining of a kilometre."""
+
+    __tablename__ = "coverage"
+    __table_args__ = {"comment": "Lining of a kilometre, what was seen of it and what is dark, by steps of chainage"}  # noqa: RUF012
+
+    survey_id: Mapped[int] = mapped_column(_parent("survey"), primary_key=True, comment=_SURVEY)
+    km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=_KM)
+    step: Mapped[float] = mapped_column(comment="Length of a step, m; the first begins with the kilometre")
+    lining: Mapped[Reals] = mapped_column(comment="Lining in each step, seen or not, in the unrolled plane, m²")
+    seen: Mapped[Reals] = mapped_column(comment="What of it was seen within the limits of range and incidence, m²")
+    wet: Mapped[Reals] = mapped_column(comment="What of that is wet: pixels below the threshold, after the median filter, m²")
+
+
 class Region(Base):
     """A region drawn by the user."""
 
@@ -550,7 +583,7 @@ class Image(Base):
 
     __tablename__ = "image"
     __table_args__ = (
-        _one_of("kind", "raw", "corrected", "offset"),
+        _one_of("kind", "raw", "corrected", "offset", "state"),
         {
             "comment": "Unrolled images in blocks of 50 m: partition image_s<survey>",
             "postgresql_partition_by": "LIST (survey_id)",
@@ -559,23 +592,27 @@ class Image(Base):
 
     survey_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=_SURVEY)
     km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=_KM)
-    kind: Mapped[str] = mapped_column(primary_key=True, comment="raw or corrected intensity, dB, or offset from the surface, m")
+    kind: Mapped[str] = mapped_column(
+        primary_key=True, comment="raw or corrected intensity, dB, offset from the surface, m, or state of the pixel"
+    )
     block: Mapped[int] = mapped_column(
         primary_key=True, autoincrement=False, comment="Block along the tunnel: floor(chainage / 50)"
     )
     tiff: Mapped[bytes] = mapped_column(comment="GeoTIFF in the unrolled plane (chainage, arc), m")
 
 
-class Leak(Base):
-    """A leak."""
+class Anomaly(Base):
+    """A leak, or what is dark but dry."""
 
-    __tablename__ = "leak"
+    __tablename__ = "anomaly"
     __table_args__ = (
+        _one_of("kind", "leak", "joint", "dark"),
+        _one_of("judged", "leak", "joint", "dark"),
         _one_of("review", "open", "confirmed", "rejected"),
         Index(None, "survey_id", "km"),
         Index(None, "unrolled", postgresql_using="gist"),
         Index(None, "map", postgresql_using="gist"),
-        {"comment": "Leaks: polygons of wet lining, in three geometries"},
+        {"comment": "What is darker than dry lining: leaks, joints and other dark spots, in three geometries"},
     )
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
@@ -588,6 +625,17 @@ class Leak(Base):
     clock: Mapped[float] = mapped_column(
         comment="Clock position of its middle, hours: 12 is the crown, 3 is right looking up-chainage"
     )
+    kind: Mapped[str] = mapped_column(
+        server_default=text("'leak'"), comment="What detection takes it for: leak, joint or dark (dark but dry)"
+    )
+    reasons: Mapped[list[str]] = mapped_column(
+        ARRAY(Text), server_default=text("'{}'"), comment="Why, such as thin, straight, gradual, rectangular, recess"
+    )
+    confidence: Mapped[float | None] = mapped_column(comment="Confidence that it is of its kind, 0 to 1; none from before")
+    contrast: Mapped[float | None] = mapped_column(
+        comment="Mean drop in standard deviations of the dry lining about it; none from before"
+    )
+    judged: Mapped[str | None] = mapped_column(comment="What an inspector takes it for, where he says so")
     area: Mapped[float] = mapped_column(comment="Area on the surface, m²")
     drop_mean: Mapped[float] = mapped_column(comment="Mean drop below dry lining, dB")
     drop_max: Mapped[float] = mapped_column(comment="Greatest drop below dry lining, dB")
@@ -604,14 +652,14 @@ class Leak(Base):
     detected_at: Mapped[dt.datetime] = mapped_column(server_default=_NOW, comment="When it was last found")
 
 
-class LeakPart(Base):
-    """A wet region that an end of its kilometre cuts."""
+class AnomalyPart(Base):
+    """A dark region that an end of its kilometre cuts."""
 
-    __tablename__ = "leak_part"
+    __tablename__ = "anomaly_part"
     __table_args__ = (
         Index(None, "survey_id", "km"),
-        Index(None, "leak_id"),
-        {"comment": "Wet regions cut by an end of their kilometre, from which leaks over several kilometres are put together"},
+        Index(None, "anomaly_id"),
+        {"comment": "Dark regions cut by an end of their kilometre, from which anomalies over several are put together"},
     )
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
@@ -621,12 +669,15 @@ class LeakPart(Base):
     box: Mapped[list[int]] = mapped_column(
         ARRAY(Integer), comment="First column (chainage / pixel), first row (arc / pixel), columns and rows of the mask"
     )
-    mask: Mapped[bytes] = mapped_column(comment="Its wet pixels, a bit each, row by row from the lowest arc")
+    mask: Mapped[bytes] = mapped_column(comment="Its dark pixels, a bit each, row by row from the lowest arc")
     filled: Mapped[int] = mapped_column(BigInteger, comment="Its pixels that hold measured data")
     drop_sum: Mapped[float] = mapped_column(comment="Sum over them of the drop below dry lining, dB")
     drop_max: Mapped[float] = mapped_column(comment="Greatest drop below dry lining, dB")
-    leak_id: Mapped[int | None] = mapped_column(
-        ForeignKey(Leak.id, ondelete="SET NULL"), comment="Leak that it is a part of, if it is large enough"
+    traits: Mapped[Floats] = mapped_column(
+        server_default=text("'{}'"), comment="Sums over its pixels by which it is told what it is, see Region in leak/region.py"
+    )
+    anomaly_id: Mapped[int | None] = mapped_column(
+        ForeignKey(Anomaly.id, ondelete="SET NULL"), comment="Anomaly that it is a part of, if it is large enough"
     )
 
 

@@ -154,7 +154,7 @@ def _read(conn: psycopg.Connection, survey: Survey, km: int, kind: str, block: i
 
 def _leaks(conn: psycopg.Connection, survey: Survey, km: int) -> list[Polygon]:
     rows = conn.execute(
-        "SELECT public.ST_AsBinary(unrolled) FROM tunnel.leak"
+        "SELECT public.ST_AsBinary(unrolled) FROM tunnel.anomaly"
         " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected' ORDER BY id",
         (survey.id, km * 1000.0, (km + 1) * 1000.0),
     )

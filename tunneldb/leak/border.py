@@ -82,11 +82,11 @@ def replace_parts(conn: psycopg.Connection[Any], survey: Survey, km: int, cut: S
     """
     conn.execute("SELECT pg_advisory_xact_lock(%s, %s)", (LOCK, survey.id))
     before = conn.execute(
-        "DELETE FROM tunnel.leak_part WHERE survey_id = %s AND km = %s RETURNING leak_id", (survey.id, km)
+        "DELETE FROM tunnel.anomaly_part WHERE survey_id = %s AND km = %s RETURNING anomaly_id", (survey.id, km)
     ).fetchall()
     with conn.cursor() as cursor:
         cursor.executemany(
-            "INSERT INTO tunnel.leak_part (survey_id, km, pixel, box, mask, filled, drop_sum, drop_max)"
+            "INSERT INTO tunnel.anomaly_part (survey_id, km, pixel, box, mask, filled, drop_sum, drop_max)"
             " VALUES (%s, %s, %s, %s, %b, %s, %s, %s)",
             [_row(survey, km, region) for region in cut],
         )
@@ -116,7 +116,7 @@ def replace_parts(conn: psycopg.Connection[Any], survey: Survey, km: int, cut: S
 def link(conn: psycopg.Connection[Any], cluster: Cluster, leak: int | None) -> None:
     """Note which leak the parts of a cluster were written as."""
     keys = [part.id for part in cluster.parts]
-    conn.execute("UPDATE tunnel.leak_part SET leak_id = %s WHERE id = ANY (%s)", (leak, keys))
+    conn.execute("UPDATE tunnel.anomaly_part SET anomaly_id = %s WHERE id = ANY (%s)", (leak, keys))
 
 
 def _at(part: Part, km: int) -> bool:
@@ -138,7 +138,7 @@ def _row(survey: Survey, km: int, region: Region) -> tuple[Any, ...]:
 
 def _load(conn: psycopg.Connection[Any], survey: Survey, kilometres: Iterable[int]) -> list[Part]:
     rows = conn.execute(
-        "SELECT id, km, leak_id, pixel, box, mask, filled, drop_sum, drop_max FROM tunnel.leak_part"
+        "SELECT id, km, anomaly_id, pixel, box, mask, filled, drop_sum, drop_max FROM tunnel.anomaly_part"
         " WHERE survey_id = %s AND km = ANY (%s) ORDER BY id",
         (survey.id, list(kilometres)),
         binary=True,

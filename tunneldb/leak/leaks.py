@@ -109,8 +109,8 @@ def save_leaks(
     # One of a neighbour that was given up before stays as it is.
     lost = [leak for k, leak in enumerate(left) if k not in again.values() and (leak.km == km or leak.id in border.leaks)]
     kept, gone = [leak.id for leak in lost if leak.reviewed], [leak.id for leak in lost if not leak.reviewed]
-    conn.execute("UPDATE tunnel.leak SET detected = false WHERE id = ANY (%s)", (kept,))
-    conn.execute("DELETE FROM tunnel.leak WHERE id = ANY (%s)", (gone,))
+    conn.execute("UPDATE tunnel.anomaly SET detected = false WHERE id = ANY (%s)", (kept,))
+    conn.execute("DELETE FROM tunnel.anomaly WHERE id = ANY (%s)", (gone,))
     once = len(taken) + len(again)
     across = sum(len({part.km for part in cluster.parts}) > 1 for cluster, _ in over)
     return Matched(len(over) + len(found) - once, once, len(kept), len(gone), across, border.other_pixels)
@@ -124,11 +124,11 @@ def _earlier(conn: psycopg.Connection[Any], survey: Survey, km: int, border: Bor
     rows = conn.execute(
         """
         SELECT l.id, l.km, l.review <> 'open', public.ST_AsBinary(l.unrolled), l.id = ANY (%(over)s)
-          FROM tunnel.leak l
+          FROM tunnel.anomaly l
          WHERE l.survey_id = %(survey)s
            AND (l.id = ANY (%(over)s)
                 OR (l.km BETWEEN %(first)s AND %(last)s AND (l.km = %(km)s OR NOT l.detected)
-                    AND NOT EXISTS (SELECT FROM tunnel.leak_part p WHERE p.survey_id = l.survey_id AND p.leak_id = l.id)))
+                    AND NOT EXISTS (SELECT FROM tunnel.anomaly_part p WHERE p.survey_id = l.survey_id AND p.anomaly_id = l.id)))
          ORDER BY l.id
            FOR UPDATE OF l
         """,
@@ -157,7 +157,7 @@ def _surface_of(conn: psycopg.Connection[Any], survey: Survey, km: int, surface:
 
 
 _INSERT = """
-    INSERT INTO tunnel.leak (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max,
+    INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max,
                              image_share, unrolled, map, surface)
     VALUES (%(survey)s, %(km)s, %(chainage_from)s, %(chainage_to)s, %(arc_from)s, %(arc_to)s, %(clock)s, %(area)s,
             %(drop_mean)s, %(drop_max)s, %(image_share)s, public.ST_GeomFromWKB(%(unrolled)s, 0),
@@ -165,7 +165,7 @@ _INSERT = """
     RETURNING id
 """
 _UPDATE = """
-    UPDATE tunnel.leak
+    UPDATE tunnel.anomaly
        SET km = %(km)s, chainage_from = %(chainage_from)s, chainage_to = %(chainage_to)s, arc_from = %(arc_from)s,
            arc_to = %(arc_to)s, clock = %(clock)s, area = %(area)s, drop_mean = %(drop_mean)s, drop_max = %(drop_max)s,
            image_share = %(image_share)s, unrolled = public.ST_GeomFromWKB(%(unrolled)s, 0),
