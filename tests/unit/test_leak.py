@@ -209,7 +209,7 @@ def test_the_median_filter_is_a_vote_of_the_lining_about_a_pixel():
         about = np.s_[max(i - 3, 0) : i + 4, max(j - 3, 0) : j + 4]
         lining = state[about] == State.LINING
         wet = lining & (level[about] < -90)
-        assert found[i, j] == (2 * wet.sum() > lining.sum() > 0.2 * 12 and state[i, j] <= State.LINING)
+        assert found[i, j] == (2 * wet.sum() > lining.sum() > 0.2 * 12 and state[i, j] <= State.RECESS)
 
 
 def test_an_appendage_is_never_wet():

@@ -150,7 +150,9 @@ def _inside(picture: Picture, polygons: list[Polygon]) -> list[tuple[slice, NDAr
         near = [polygon for polygon in polygons if polygon.bounds[0] < east and polygon.bounds[2] > west]
         if near:
             inside = rasterio.features.geometry_mask(near, shape, transform, invert=True)
-            found.append((columns, inside & (picture.state[:, columns] == State.LINING)))
+            found.append(
+                (columns, inside & (picture.state[:, columns] >= State.LINING) & (picture.state[:, columns] <= State.RECESS))
+            )
     return found
 
 
@@ -162,8 +164,8 @@ def _columns(
     lining, could = np.zeros(stop - first, np.int64), np.zeros(stop - first, np.int64)
     for i in range(state.shape[0]):
         for j in range(first, stop):
-            lining[j - first] += state[i, j] == 1
-            could[j - first] += state[i, j] <= 1
+            lining[j - first] += 1 <= state[i, j] <= 2
+            could[j - first] += state[i, j] <= 2
     return lining, could
 
 
@@ -175,7 +177,7 @@ def _sample(
     seen, kept = 0, np.empty(2 * SAMPLE, np.int16)
     for i in range(state.shape[0]):
         for j in range(first, stop):
-            if state[i, j] == 1:
+            if 1 <= state[i, j] <= 2:
                 if seen % every == 0:
                     kept[seen // every] = level[i, j]
                 seen += 1
@@ -187,7 +189,7 @@ def _wet_lining(state: NDArray[np.uint8], wet: NDArray[np.bool_], first: int, st
     count = 0
     for i in range(state.shape[0]):
         for j in range(first, stop):
-            count += wet[i, j] and state[i, j] == 1
+            count += wet[i, j] and 1 <= state[i, j] <= 2
     return count
 
 
@@ -203,7 +205,7 @@ def _dry(
     dry = np.zeros(len(row), np.bool_)
     for k in range(len(row)):
         i, j = row[k], column[k]
-        if first <= j < stop and state[i, j] == 1:
+        if first <= j < stop and 1 <= state[i, j] <= 2:
             dry[k] = True
             for m in range(max(i - WET_EDGE, 0), min(i + WET_EDGE + 1, state.shape[0])):
                 for n in range(max(j - WET_EDGE, 0), min(j + WET_EDGE + 1, state.shape[1])):

@@ -35,8 +35,9 @@ class State(IntEnum):
 
     EMPTY = 0
     LINING = 1
-    OFF = 2  # an appendage or a niche
-    FLOOR = 3
+    RECESS = 2  # lining set back behind the wall: the back of a niche, a bolt pocket
+    OFF = 3  # an appendage, or the mixed pixels of an edge
+    FLOOR = 4
 
 
 @dataclass(frozen=True)
@@ -173,9 +174,9 @@ def _states(
     for i in range(count.shape[0]):
         for j in range(count.shape[1]):
             if arc[i] <= left[j] or arc[i] >= right[j]:
-                state[i, j] = 3
+                state[i, j] = 4
             elif off[i, j] or astray[i, j]:
-                state[i, j] = 2
+                state[i, j] = 3
             else:
                 state[i, j] = 1 if count[i, j] > 0 else 0
     return state

@@ -74,7 +74,7 @@ def _wet(
         for j in range(columns):
             votes += lining[j + 2 * half]
             wet_votes += wet[j + 2 * half]
-            out[i, j] = 2 * wet_votes > votes and votes > enough and state[i, j] <= 1
+            out[i, j] = 2 * wet_votes > votes and votes > enough and state[i, j] <= 2
             votes -= lining[j]
             wet_votes -= wet[j]
     return out
@@ -94,6 +94,6 @@ def _count(
     limit = np.int32(np.ceil(min(max(threshold, -40000.0), 40000.0)))
     step = np.int32(sign)
     for j in range(state.shape[0]):
-        here = step if state[j] == 1 else np.int32(0)
+        here = step if 1 <= state[j] <= 2 else np.int32(0)
         lining[j + half] += here
         wet[j + half] += here if np.int32(level[j]) < limit else np.int32(0)
