@@ -10,7 +10,7 @@ from tunneldb.database.survey import Survey
 from tunneldb.job.rows import by_chainage, pack_rows
 from tunneldb.scan.spool import ROW
 
-SURVEY = Survey(7, "s", 1, "t", 25830, 0.0, 10.0, dt.date(2024, 5, 4), None, "none", "static")
+SURVEY = Survey(7, "s", 1, "t", 25830, 0.0, 10.0, dt.date(2024, 5, 4), None, "none", "static", "none")
 
 
 def test_rows_are_packed_as_columns_are() -> None:

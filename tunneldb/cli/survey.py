@@ -33,7 +33,12 @@ def survey() -> None:
     "or a folder of E57 files. May be given several times.",
 )
 @click.option("--backwards", is_flag=True, help="The trajectory was driven towards falling chainage.")
-@click.option("--reference", type=FILE, help="CSV with range_m,intensity_db: the scanner's intensity over range.")
+@click.option(
+    "--reference",
+    metavar="FILE|auto",
+    help="The scanner's intensity over range: CSV with range_m,intensity_db, measured on a target; or auto, to have it found "
+    "on the lining (a file of that name is ./auto).",
+)
 @click.option(
     "--intensity",
     metavar="DIMENSION",
@@ -54,7 +59,7 @@ def add(
     trajectory: Path | None,
     stations: tuple[Path, ...],
     backwards: bool,
-    reference: Path | None,
+    reference: str | None,
     intensity: str | None,
     intensity_kind: str,
 ) -> None:
@@ -78,7 +83,7 @@ def add(
             stations if trajectory is None else (trajectory,),
             mobile=trajectory is not None,
             backwards=backwards,
-            reference=reference,
+            reference="auto" if reference == "auto" else None if reference is None else Path(reference),
             intensity=Intensity(intensity_kind, intensity),
         )
     click.echo(f"{name}: {count} {'poses' if trajectory else 'stations'} of {tunnel}, {date:%Y-%m-%d}", err=True)

@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import psycopg
@@ -119,7 +119,7 @@ def add_survey(
     *,
     mobile: bool,
     backwards: bool,
-    reference: Path | None,
+    reference: Path | Literal["auto"] | None,
     intensity: Intensity,
 ) -> int:
     """Add a survey with its scanner positions and reference curve; return how many positions it has.
@@ -132,12 +132,12 @@ def add_survey(
     backwards
         Whether the trajectory was driven towards falling chainage.
     reference
-        CSV with range_m,intensity_db.
+        CSV with range_m,intensity_db; or auto, to find the curve on the lining of each kilometre.
 
     Raises
     ------
     UserError
-        For a name that is taken, an unknown tunnel, or files that do not fit it.
+        For a name that is taken, an unknown tunnel, files that do not fit it, or an intensity without a range curve to find.
     """
     _require_name(name)
     tunnel_id, srid, alignment = _alignment(connection, tunnel)
@@ -151,14 +151,24 @@ def add_survey(
     _require_near(poses, xyz, alignment, tunnel)
     if mobile:
         _require_direction(table, alignment, backwards=backwards)
-    curve = None if reference is None else _read_reference(reference)
+    if reference == "auto":
+        _require_range(intensity.kind)
+    curve = _read_reference(reference) if isinstance(reference, Path) else None
     try:
         row = connection.execute(
             """
-            INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_dimension, intensity_kind, platform)
-            VALUES (%s, %s, %s, %s, %s, %s) RETURNING id
+            INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_dimension, intensity_kind, platform, reference)
+            VALUES (%s, %s, %s, %s, %s, %s, %s) RETURNING id
             """,
-            [tunnel_id, name, date, intensity.dimension, intensity.kind, "mobile" if mobile else "static"],
+            [
+                tunnel_id,
+                name,
+                date,
+                intensity.dimension,
+                intensity.kind,
+                "mobile" if mobile else "static",
+                "measured" if curve is not None else reference or "none",
+            ],
         ).fetchone()
     except psycopg.errors.UniqueViolation:
         raise UserError(f"there is a survey {name!r} already: tunneldb survey list") from None
@@ -205,6 +215,14 @@ def _read_reference(path: Path) -> CsvTable:
         raise table.error(0, f"range_m {table['range_m'][0]:g} is not positive")
     table.require_growing("range_m")
     return table
+
+
+def _require_range(kind: str) -> None:
+    """A range curve can be found only in intensity that falls with range."""
+    if kind == "none":
+        raise UserError("--reference auto finds the range curve in the intensity, and intensity of kind none is not read")
+    if kind == "reflectance":
+        raise UserError("--reference auto has nothing to find: from intensity of kind reflectance the maker removed the range")
 
 
 def _require_near(paths: Sequence[Path], xyz: NDArray[np.float64], alignment: Alignment, tunnel: str) -> None:

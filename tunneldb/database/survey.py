@@ -36,6 +36,8 @@ class Survey:
         ``amplitude``, ``reflectance``, ``linear`` or ``none``.
     platform
         ``static`` (stations) or ``mobile`` (trajectory).
+    reference
+        Range curve: ``none``, ``measured`` on a target, or ``auto``, found on the lining of each kilometre.
     """
 
     id: int
@@ -49,6 +51,7 @@ class Survey:
     intensity_dimension: str | None
     intensity_kind: str
     platform: str
+    reference: str
 
 
 def get_survey(conn: psycopg.Connection[Any], name: str) -> Survey:
@@ -63,7 +66,7 @@ def get_survey(conn: psycopg.Connection[Any], name: str) -> Survey:
         survey = cursor.execute(
             """
             SELECT s.id, s.name, s.tunnel_id, t.name AS tunnel, t.srid, t.start_chainage, t.spacing,
-                   s.date, s.intensity_dimension, s.intensity_kind, s.platform
+                   s.date, s.intensity_dimension, s.intensity_kind, s.platform, s.reference
               FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
              WHERE s.name = %s
             """,

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 SHORTH = 0.4
 """Share of all values in the shortest interval that marks where dry lining lies."""
 
-CLIP = 2.0
+CLIP = 1.5
 """Values within so many standard deviations of the mean are taken for dry."""
 
-CLIPPED_SIGMA = 0.8796
+CLIPPED_SIGMA = 0.7426
 """Standard deviation of a standard normal distribution clipped at ±CLIP."""
 
 
@@ -45,7 +45,7 @@ def robust_statistics(values: NDArray[np.floating]) -> Dry:
 
     Wet lining is darker, so that it pulls mean, median and standard deviation. The shortest interval that
     holds 40 % of the values lies within the dry part; above its middle there is hardly anything wet, so that
-    the median deviation there gives a first σ. Values within 2σ of the mean are then averaged until mean and
+    the median deviation there gives a first σ. Values within 1.5σ of the mean are then averaged until mean and
     σ stand still, the clipping being allowed for as in a normal distribution.
 
     Parameters

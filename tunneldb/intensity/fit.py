@@ -269,9 +269,9 @@ def _shared(left: Float, there: Float, cluster: Index, part: Index) -> float:
 def _sums(number: Index, values: Float, weight: Float | None = None, count: int = 0) -> Float:
     """Sums (count, …) of values (n, …), times their weights (n,), of each number."""
     if values.ndim == 1:
-        return np.bincount(number, values if weight is None else values * weight, minlength=count)
-    parts = [np.bincount(number, v if weight is None else v * weight, minlength=count) for v in values.T]
-    return np.column_stack(parts)
+        sums: Float = np.bincount(number, values if weight is None else values * weight, minlength=count)
+        return sums
+    return np.column_stack([_sums(number, column, weight, count) for column in values.T])
 
 
 def _per(values: Float, like: Float) -> Float:

@@ -71,7 +71,7 @@ def one_maximum(matrix: Float, right: Float) -> Float:
     matrix, right : (p, p) and (p,) float arrays
         Of the loss ½ bᵀ·matrix·b − right·b.
     """
-    free: Float = np.linalg.solve(matrix, right)
+    free: Float = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
     if _has_one_maximum(free):
         return free
     root = np.linalg.cholesky(matrix)

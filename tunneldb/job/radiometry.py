@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -15,10 +15,20 @@ from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.intensity.correct import Kind, Views, needs_reference, range_span
 from tunneldb.intensity.dry import Dry, plain_statistics
-from tunneldb.intensity.roughness import Regions, Roughness, automatic_regions, drawn_regions, find_roughness
+from tunneldb.intensity.range_curve import RangeCurve, estimate_range_curve
+from tunneldb.intensity.reference import ReferenceCurve
+from tunneldb.intensity.roughness import (
+    STEEPEST,
+    TELLING,
+    Regions,
+    Roughness,
+    automatic_regions,
+    drawn_regions,
+    find_roughness,
+)
 from tunneldb.job.sources import sample
 from tunneldb.leak.detection import Detection, dry_places
-from tunneldb.leak.picture import Picture
+from tunneldb.leak.relative import Relative
 from tunneldb.leak.seen import Eye, Radiometer, Seen, Span
 from tunneldb.leak.store import load_reference
 from tunneldb.scan.pose import load_poses
@@ -29,6 +39,9 @@ angles wrong."""
 
 NEAR_SURFACE = 0.05
 """Points that serve for the roughness lie no farther from the surface, m."""
+
+UNKNOWN = ReferenceCurve(np.array([1e-3, 1e4]), np.zeros(2))
+"""Stands for a range curve that is yet to be found: changes nothing."""
 
 
 @dataclass(frozen=True)
@@ -55,19 +68,58 @@ class Sample:
         assert self.seen.views is not None
         return self.seen.views
 
+    @property
+    def telling(self) -> NDArray[np.bool_]:
+        """Points that say something of range and incidence: clear of the lining's foot and near the surface."""
+        return self.clear & (np.abs(self.seen.offset) <= NEAR_SURFACE)
 
-def find_radiometer(conn: psycopg.Connection[Any], survey: Survey, max_incidence: float) -> Radiometer | None:
-    """Gather what a survey's intensity is corrected with; None when it has none."""
+    def along(self, curve: ReferenceCurve) -> Sample:
+        """Correct for distance by a curve what was seen with an UNKNOWN one."""
+        views = self.views
+        level = (views.raw_db - curve(views.range_m.astype(np.float64))).astype(np.float32)
+        return replace(self, seen=replace(self.seen, views=replace(views, distance_db=level)))
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What a kilometre's intensity is corrected with.
+
+    Attributes
+    ----------
+    eye : Eye
+        Sees points with the range curve that holds here.
+    view : Sample
+        What it sees at survey density.
+    roughness : Roughness
+        Of the lining.
+    found : RangeCurve or None
+        Range curve found on this kilometre's lining; None where it was measured, or isn't needed.
+    """
+
+    eye: Eye
+    view: Sample
+    roughness: Roughness
+    found: RangeCurve | None
+
+
+def find_radiometer(conn: psycopg.Connection[Any], survey: Survey, max_incidence: float, max_range: float) -> Radiometer | None:
+    """Gather what a survey's intensity is corrected with; None when it has none.
+
+    A range curve that is to be found on the lining is UNKNOWN at first: see :func:`calibrate`.
+    """
     if survey.intensity_kind == "none":
         return None
     kind = cast(Kind, survey.intensity_kind)
-    reference = load_reference(conn, survey) if needs_reference(kind) else None
+    reference = None
+    if needs_reference(kind):
+        reference = UNKNOWN if survey.reference == "auto" else load_reference(conn, survey)
     if needs_reference(kind) and reference is None:
         raise UserError(
             f"survey {survey.name} has no reference curve, without which intensity of kind {kind} can't be corrected for"
-            " distance: add the survey with --reference CSV (range_m,intensity_db), or take a reflectance dimension"
+            " distance: add the survey with --reference CSV (range_m,intensity_db), or with --reference auto to have it"
+            " found on the lining, or take a reflectance dimension"
         )
-    return Radiometer(kind, load_poses(conn, survey), reference, max_incidence)
+    return Radiometer(kind, load_poses(conn, survey), reference, max_incidence, max_range)
 
 
 def take_sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye) -> Sample:
@@ -77,7 +129,7 @@ def take_sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye) -> Samp
     if not seen.lining.any():
         raise UserError(
             f"no point of kilometre {eye.km} lies on the lining: within {eye.tolerance:g} m of the sections and seen at"
-            f" less than the incidence intensity.max_incidence"
+            f" less than intensity.max_incidence from nearer than intensity.max_range"
         )
     assert eye.radiometer is not None
     if eye.radiometer.reference:
@@ -88,6 +140,61 @@ def take_sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye) -> Samp
     return Sample(seen, points.scan_id, seen.lining & ~eye.floor.covers(seen.chainage, seen.arc, CORNER))
 
 
+def calibrate(conn: psycopg.Connection[Any], survey: Survey, eye: Eye, drawn: list[Polygon]) -> Calibration:
+    """Find range curve and roughness of a kilometre on points of survey density.
+
+    Parameters
+    ----------
+    conn, survey
+        Where.
+    eye : Eye
+        Of :func:`find_radiometer`'s radiometer.
+    drawn : list of Polygon
+        Homogeneous regions that the user drew, if any: they decide about the roughness.
+
+    Raises
+    ------
+    UserError
+        If nothing is seen of the lining, it lies outside the reference curve, or its own curve can't be found on it.
+    """
+    view = take_sample(conn, survey, eye)
+    if survey.reference != "auto":
+        return Calibration(eye, view, roughness_of(view, drawn), None)
+    assert eye.radiometer is not None
+    try:
+        found = find_range_curve(view)
+        found.require()
+    except UserError as error:
+        raise UserError(f"survey {survey.name}, kilometre {eye.km}: {error}") from None
+    eye = replace(eye, radiometer=replace(eye.radiometer, reference=found.curve))
+    view = view.along(found.curve)
+    return Calibration(eye, view, roughness_of(view, drawn) if drawn else _roughness_found(view, found), found)
+
+
+def find_range_curve(view: Sample) -> RangeCurve:
+    """Range curve and roughness from the lining itself; see :func:`estimate_range_curve`."""
+    seen, views, near = view.seen, view.views, view.telling
+    return estimate_range_curve(
+        np.column_stack([seen.chainage[near], seen.arc[near]]),
+        views.range_m[near].astype(np.float64),
+        views.cosine[near].astype(np.float64),
+        views.raw_db[near].astype(np.float64),
+    )
+
+
+def _roughness_found(view: Sample, found: RangeCurve) -> Roughness:
+    """The roughness that was found with the range curve, as founded as its deviation says."""
+    angle = np.degrees(np.arccos(view.views.cosine[view.telling]))
+    return Roughness(
+        found.roughness,
+        found.roughness_sigma < TELLING,
+        float("nan"),
+        float("nan"),
+        found.cells,
+        *(float(a) for a in np.quantile(angle[angle <= STEEPEST], (0.001, 0.999))),
+    )
+
+
 def roughness_of(view: Sample, drawn: list[Polygon]) -> Roughness:
     """Roughness from the regions that the user drew, or from automatic ones."""
     seen, views = view.seen, view.views
@@ -96,7 +203,7 @@ def roughness_of(view: Sample, drawn: list[Polygon]) -> Roughness:
         if len(regions) < 2:
             raise UserError(f"the {len(drawn)} homogeneous regions drawn hold too few points: draw larger ones, or none")
         return find_roughness(regions)
-    near = view.clear & (np.abs(seen.offset) <= NEAR_SURFACE)
+    near = view.telling
     regions = automatic_regions(
         seen.chainage[near], seen.arc[near], view.scan_id[near], views.cosine[near], views.distance_db[near]
     )
@@ -119,7 +226,7 @@ def _polygon_of(seen: Seen, polygons: list[Polygon]) -> NDArray[np.int64]:
 
 def dry_sigma(
     view: Sample,
-    picture: Picture,
+    darker: Relative,
     found: Detection,
     roughness: Roughness,
     dry_regions: list[Polygon],
@@ -129,7 +236,7 @@ def dry_sigma(
     if dry_regions:
         dry = seen.lining & (_polygon_of(seen, dry_regions) >= 0)
     else:
-        dry = view.clear & dry_places(picture, found, seen.chainage, seen.arc)
+        dry = view.clear & dry_places(darker, found, seen.chainage, seen.arc)
     return (
         plain_statistics(views.raw_db[dry]),
         plain_statistics(views.corrected(0.0)[dry]),
