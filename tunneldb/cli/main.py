@@ -35,6 +35,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "worker": ("tunneldb.cli.worker:worker", "Do what batches ask for, also of other machines."),
     "stop": ("tunneldb.cli.worker:stop", "Ask all workers to end what they are at and leave."),
     "leaks": ("tunneldb.cli.leaks:leaks", "List or export the leaks that were found."),
+    "evaluate": ("tunneldb.cli.evaluate:evaluate", "Hold the leaks that were found against true ones."),
     "spheres": ("tunneldb.cli.spheres:spheres", "Find target spheres, and compare them with control points."),
     "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),
     "export": ("tunneldb.cli.export:export", "Write the scan files again with the class of each point."),

@@ -1,0 +1,175 @@
+"""True leaks from a file, in the unrolled plane."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+import pyogrio
+import pyogrio.raw
+import pyproj
+import shapely
+from numpy.typing import NDArray
+from pyogrio.errors import DataLayerError, DataSourceError
+from pyproj.exceptions import CRSError
+from shapely.geometry import MultiPolygon, Polygon
+
+from tunneldb.database.survey import Survey
+from tunneldb.errors import UserError
+
+LAYER = "leak"
+"""Layer that is read where a file has several."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """True leaks.
+
+    Attributes
+    ----------
+    ids : list of str
+        What the file calls them: its column ``id``, else the number of the row, from 1.
+    shapes : list of Polygon or MultiPolygon
+        Valid, in the unrolled plane, m.
+    """
+
+    ids: list[str]
+    shapes: list[Polygon | MultiPolygon]
+
+
+def read_truth(conn: psycopg.Connection[Any], survey: Survey, path: Path, layer: str | None = None) -> Truth:
+    """Read true leaks from a GeoPackage or GeoJSON file.
+
+    Polygons without a coordinate system are taken for (chainage, arc); 3D polygons in the tunnel's system are carried over
+    to the unrolled plane.
+
+    Parameters
+    ----------
+    conn, survey
+        On whose surface they lie.
+    path : Path
+        The file.
+    layer : str, optional
+        Layer to read; by default the only one, or ``leak``.
+
+    Raises
+    ------
+    UserError
+        The file can't be read, has no such layer or no polygon, another coordinate system, or a geometry that is no valid
+        polygon or lies off the tunnel.
+    """
+    chosen = _layer(path, layer)
+    where = f"{path}, layer {chosen}"
+    try:
+        meta, _, wkb, columns = pyogrio.raw.read(str(path), layer=chosen)
+    except (DataSourceError, DataLayerError, RuntimeError) as error:
+        raise UserError(f"{where}: cannot be read: {_line(error)}") from None
+    if wkb is None or not len(wkb):
+        raise UserError(f"{where} is empty: there must be at least one polygon; what has no leak has nothing to compare with")
+    ids = _ids(meta, columns, len(wkb))
+    shapes = _polygons(wkb, ids, where)
+    if _in_space(path, meta["crs"], survey, where):
+        shapes = [_unrolled(conn, survey, shape, f"{where}, leak {key}") for key, shape in zip(ids, shapes, strict=True)]
+    for key, shape in zip(ids, shapes, strict=True):
+        if not shape.is_valid:
+            raise UserError(
+                f"{where}, leak {key} is no valid polygon ({shapely.is_valid_reason(shape)}): mend it, and try again"
+            )
+    return Truth(ids, shapes)
+
+
+def _layer(path: Path, wanted: str | None) -> str:
+    """Layer of a file that is to be read."""
+    if not path.is_file():
+        raise UserError(f"{path}: there is no such file")
+    try:
+        there = [str(name) for name in pyogrio.list_layers(str(path))[:, 0]]
+    except DataSourceError:
+        raise UserError(f"{path} is neither GeoPackage nor GeoJSON: write the truth as one of these") from None
+    listed = ", ".join(there) or "none"
+    if wanted is not None:
+        if wanted not in there:
+            raise UserError(f"{path} has no layer {wanted}; it has {listed}")
+        return wanted
+    if len(there) != 1 and LAYER not in there:
+        raise UserError(f"{path} has the layers {listed}: say by --layer which holds the true leaks")
+    return LAYER if LAYER in there else there[0]
+
+
+def _ids(meta: dict[str, Any], columns: list[NDArray[Any]], count: int) -> list[str]:
+    names = list(meta["fields"])
+    return [str(v) for v in columns[names.index("id")]] if "id" in names else [str(k + 1) for k in range(count)]
+
+
+def _polygons(wkb: NDArray[np.object_], ids: list[str], where: str) -> list[Polygon | MultiPolygon]:
+    """Geometries, each of which must be a polygon, or several."""
+    shapes = []
+    for key, data in zip(ids, wkb, strict=True):
+        try:
+            shape = None if data is None else shapely.from_wkb(data)
+        except shapely.errors.GEOSException as error:
+            raise UserError(f"{where}, leak {key} is no valid polygon ({_line(error)}): mend it, and try again") from None
+        if not isinstance(shape, Polygon | MultiPolygon) or shape.is_empty:
+            kind = "nothing" if shape is None or shape.is_empty else shape.geom_type
+            raise UserError(f"{where}, leak {key} is {kind}: each leak must be a polygon")
+        if not np.isfinite(shapely.get_coordinates(shape)).all():
+            raise UserError(f"{where}, leak {key} has a coordinate that is no number: mend it, and try again")
+        shapes.append(shape)
+    return shapes
+
+
+def _in_space(path: Path, given: str | None, survey: Survey, where: str) -> bool:
+    """Whether the polygons are in the tunnel's system, and not in the unrolled plane, which has none."""
+    if given is None or _bare_geojson(path):
+        return False
+    try:
+        crs = pyproj.CRS(given)
+    except CRSError:
+        crs = None
+    if crs is not None and crs.is_engineering:
+        return False
+    flat = crs.sub_crs_list[0] if crs is not None and crs.is_compound else crs
+    if flat is not None and flat.equals(pyproj.CRS.from_epsg(survey.srid), ignore_axis_order=True):
+        return True
+    name = crs.name if crs is not None else given
+    raise UserError(
+        f"{where} is in {name}: polygons must be in the unrolled plane, without a coordinate system,"
+        f" or 3D in the tunnel's, EPSG:{survey.srid}"
+    )
+
+
+def _bare_geojson(path: Path) -> bool:
+    """Whether a file is GeoJSON without a ``crs`` member; GDAL takes such a one for longitude and latitude."""
+    if path.suffix.lower() not in (".geojson", ".json"):
+        return False
+    try:
+        content = json.loads(path.read_text("utf-8"))
+    except ValueError:
+        return False
+    return isinstance(content, dict) and content.get("crs") is None
+
+
+def _unrolled(
+    conn: psycopg.Connection[Any], survey: Survey, shape: Polygon | MultiPolygon, where: str
+) -> Polygon | MultiPolygon:
+    """A leak in space, in the unrolled plane."""
+    if not shape.has_z:
+        raise UserError(f"{where} has no heights: polygons in EPSG:{survey.srid} must be 3D, on the lining")
+    parts = []
+    for part in shapely.get_parts(shape):
+        row = conn.execute(
+            "SELECT public.ST_AsBinary(tunnel_api.unroll_shape(%s, public.ST_GeomFromWKB(%s, %s)))",
+            (survey.id, shapely.to_wkb(part), survey.srid),
+        ).fetchone()
+        if row is None or row[0] is None:
+            raise UserError(f"{where} lies off the tunnel of survey {survey.name}, or where it has no sections")
+        parts.append(shapely.from_wkb(bytes(row[0])))
+    return parts[0] if len(parts) == 1 else MultiPolygon(parts)
+
+
+def _line(error: Exception) -> str:
+    return str(error).strip().split("\n", 1)[0]
