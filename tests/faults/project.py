@@ -145,10 +145,13 @@ _TABLES = {
     "radiometry": "SELECT km, roughness, dry_mean, dry_sigma, threshold, sigma_raw, sigma_lambert, sigma_oren_nayar, regions, "
     "pixels, wet_pixels FROM tunnel.radiometry ORDER BY km",
     "image": "SELECT km, kind, block, tiff FROM tunnel.image ORDER BY 1, 2, 3",
-    "leak": "SELECT km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max, image_share, "
+    "coverage": "SELECT km, step, lining, seen, wet FROM tunnel.coverage ORDER BY km",
+    "range_curve": "SELECT km, range_m, intensity_db, sigma_db FROM tunnel.range_curve ORDER BY km",
+    "anomaly": "SELECT km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max, image_share, "
+    "kind, reasons, confidence, contrast, judged, "
     f"{_COORDINATES.format('unrolled')}, {_COORDINATES.format('map')}, {_COORDINATES.format('surface')}, review, detected "
     "FROM tunnel.anomaly ORDER BY 2, 4",
-    "leak_part": "SELECT km, pixel, box, mask, filled, drop_sum, drop_max FROM tunnel.anomaly_part ORDER BY km, box",
+    "anomaly_part": "SELECT km, pixel, box, mask, filled, drop_sum, drop_max, traits FROM tunnel.anomaly_part ORDER BY km, box",
     "tables": "SELECT relname FROM pg_class WHERE relnamespace = 'tunnel'::regnamespace AND relkind IN ('r', 'p') ORDER BY 1",
     "goal": "SELECT km, stage, parameters::text FROM tunnel.goal ORDER BY km",
     "incoming": "SELECT name, message FROM tunnel.incoming ORDER BY name",

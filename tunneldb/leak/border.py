@@ -1,4 +1,4 @@
-"""Wet regions cut by the ends of kilometres: kept in the database, and put together whichever kilometre is done first."""
+"""Dark regions cut by the ends of kilometres: kept in the database, and put together whichever kilometre is done first."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import psycopg
 
 from tunneldb.database.survey import Survey
 from tunneldb.leak.image import KILOMETRE
-from tunneldb.leak.region import Region, together, unite
+from tunneldb.leak.region import Region, Traits, together, unite
 
 LOCK = -3
-"""First key of the advisory lock, the survey being the second: leaks over ends of kilometres are written one by one."""
+"""First key of the advisory lock, the survey being the second: anomalies over ends of kilometres are written one by one."""
 
 
 @dataclass(frozen=True)
@@ -27,15 +27,15 @@ class Part:
         Key of its row.
     km : int
         Kilometre.
-    leak : int or None
-        Key of the leak that it is a part of.
+    anomaly : int or None
+        Key of the anomaly that it is a part of.
     region : Region
         Its pixels.
     """
 
     id: int
     km: int
-    leak: int | None
+    anomaly: int | None
     region: Region
 
     def reaches(self, plane: int) -> bool:
@@ -60,8 +60,8 @@ class Border:
     ----------
     clusters : sequence of Cluster
         Those with a part in the kilometre or at its ends, in order of chainage.
-    leaks : set of int
-        Leaks that they, and the parts that the kilometre had before, were written as.
+    anomalies : set of int
+        Anomalies that they, and the parts that the kilometre had before, were written as.
     first, last : int
         Kilometres over which they lie.
     other_pixels : list of int
@@ -69,7 +69,7 @@ class Border:
     """
 
     clusters: Sequence[Cluster]
-    leaks: set[int]
+    anomalies: set[int]
     first: int
     last: int
     other_pixels: list[int]
@@ -86,8 +86,8 @@ def replace_parts(conn: psycopg.Connection[Any], survey: Survey, km: int, cut: S
     ).fetchall()
     with conn.cursor() as cursor:
         cursor.executemany(
-            "INSERT INTO tunnel.anomaly_part (survey_id, km, pixel, box, mask, filled, drop_sum, drop_max)"
-            " VALUES (%s, %s, %s, %s, %b, %s, %s, %s)",
+            "INSERT INTO tunnel.anomaly_part (survey_id, km, pixel, box, mask, filled, drop_sum, drop_max, traits)"
+            " VALUES (%s, %s, %s, %s, %b, %s, %s, %s, %s)",
             [_row(survey, km, region) for region in cut],
         )
     parts = _load(conn, survey, range(km - 1, km + 2))
@@ -102,21 +102,21 @@ def replace_parts(conn: psycopg.Connection[Any], survey: Survey, km: int, cut: S
             break
         parts += _load(conn, survey, more)
         first, last = min(first, *more), max(last, *more)
-    leaks = {part.leak for group in touched for part in group} | {row[0] for row in before}
+    anomalies = {part.anomaly for group in touched for part in group} | {row[0] for row in before}
     pixel = {part.region.pixel for part in parts if part.km == km}
     return Border(
         [Cluster(group, unite([part.region for part in group])) for group in touched],
-        {leak for leak in leaks if leak is not None},
+        {key for key in anomalies if key is not None},
         first,
         last,
         sorted({p.km for p in parts if p.km != km and _at(p, km) and pixel and p.region.pixel not in pixel}),
     )
 
 
-def link(conn: psycopg.Connection[Any], cluster: Cluster, leak: int | None) -> None:
-    """Note which leak the parts of a cluster were written as."""
+def link(conn: psycopg.Connection[Any], cluster: Cluster, anomaly: int | None) -> None:
+    """Note which anomaly the parts of a cluster were written as."""
     keys = [part.id for part in cluster.parts]
-    conn.execute("UPDATE tunnel.anomaly_part SET anomaly_id = %s WHERE id = ANY (%s)", (leak, keys))
+    conn.execute("UPDATE tunnel.anomaly_part SET anomaly_id = %s WHERE id = ANY (%s)", (anomaly, keys))
 
 
 def _at(part: Part, km: int) -> bool:
@@ -133,18 +133,20 @@ def _row(survey: Survey, km: int, region: Region) -> tuple[Any, ...]:
     box = [region.column, region.row, columns, rows]
     return (
         survey.id, km, region.pixel, box, np.packbits(region.mask).tobytes(), region.filled, region.drop_sum, region.drop_max,
+        list(region.traits),
     )  # fmt: skip
 
 
 def _load(conn: psycopg.Connection[Any], survey: Survey, kilometres: Iterable[int]) -> list[Part]:
     rows = conn.execute(
-        "SELECT id, km, anomaly_id, pixel, box, mask, filled, drop_sum, drop_max FROM tunnel.anomaly_part"
+        "SELECT id, km, anomaly_id, pixel, box, mask, filled, drop_sum, drop_max, traits FROM tunnel.anomaly_part"
         " WHERE survey_id = %s AND km = ANY (%s) ORDER BY id",
         (survey.id, list(kilometres)),
         binary=True,
     )
     parts = []
-    for key, km, leak, pixel, (column, row, columns, height), bits, *sums in rows:
+    for key, km, anomaly, pixel, (column, row, columns, height), bits, filled, total, most, traits in rows:
         mask = np.unpackbits(np.frombuffer(bits, np.uint8), count=height * columns).astype(np.bool_).reshape(height, columns)
-        parts.append(Part(key, km, leak, Region(pixel, column, row, mask, *sums)))
+        region = Region(pixel, column, row, mask, filled, total, most, Traits(*traits))
+        parts.append(Part(key, km, anomaly, region))
     return parts

@@ -1,121 +1,154 @@
-"""From the picture of a kilometre to leaks: threshold, regions, statistics."""
+"""From the picture of a kilometre relative to dry lining to what is dark in it: leaks, joints and other dark spots."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import rasterio.features
 from numba import njit
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from tunneldb.intensity.dry import Dry, plain_statistics, robust_statistics
-from tunneldb.leak.lining import State
-from tunneldb.leak.picture import WET_EDGE, Picture
-from tunneldb.leak.raster import STEP
+from tunneldb.leak.dry_map import DryMap
+from tunneldb.leak.image import Grid
+from tunneldb.leak.judge import Verdict, judge
+from tunneldb.leak.picture import WET_EDGE
 from tunneldb.leak.region import Region, regions
-from tunneldb.leak.threshold import filter_size, wet_pixels
+from tunneldb.leak.relative import Relative
+from tunneldb.leak.threshold import dark_pixels, filter_size
 
 Float = NDArray[np.float64]
-
-SAMPLE = 2_000_000
-"""Pixels, about, that the statistics of dry lining are drawn from."""
+Mask = NDArray[np.bool_]
 
 GAP = 5.0
 """Lining that is seen nowhere along more of the tunnel was not scanned there, m; profiles lie closer."""
 
+MIN_JOINT = 0.5
+"""Joints that are seen over less are left out, m."""
+
 
 @dataclass(frozen=True)
 class Found:
-    """A leak in the unrolled plane.
+    """An anomaly in the unrolled plane.
 
     Attributes
     ----------
     outline : Polygon
         (chainage, arc), m.
     drop_mean, drop_max : float
-        Mean and greatest drop below the mean of dry lining, dB.
+        Mean and greatest drop below dry lining, dB.
+    contrast : float
+        Mean drop in standard deviations of the dry lining about it.
     image_share : float
         Share of its pixels into which points fell, 0 to 1.
+    verdict : Verdict
+        What it is.
     """
 
     outline: Polygon
     drop_mean: float
     drop_max: float
+    contrast: float
     image_share: float
+    verdict: Verdict
 
     @classmethod
     def of(cls, region: Region, min_area: float) -> Found | None:
-        """Make a leak of a region; None if it is smaller than ``min_area``, m², or holds no point."""
-        if region.area < min_area * (1 - 1e-12) or not region.filled:
+        """Make an anomaly of a region; None if it holds no point or is too small.
+
+        Leaks and dark spots must not be smaller than ``min_area``, m², joints no shorter than MIN_JOINT.
+        """
+        if not region.filled:
+            return None
+        verdict = judge(region)
+        if verdict.kind == "joint":
+            if max(region.mask.shape) * region.pixel < MIN_JOINT:
+                return None
+        elif region.area < min_area * (1 - 1e-12):
             return None
         share = region.filled / np.count_nonzero(region.mask)
-        return cls(region.outline, region.drop_sum / region.filled, region.drop_max, float(share))
+        return cls(region.outline, region.drop_mean, region.drop_max, region.contrast, float(share), verdict)
 
 
 @dataclass(frozen=True)
 class Detection:
-    """Leaks of a kilometre and what they were told by.
+    """What is dark in a kilometre.
 
     Attributes
     ----------
-    dry : Dry
-        Mean and standard deviation of dry lining pixels, dB.
-    leaks : list of Found
-        Those within the kilometre, in order of chainage.
+    found : list of Found
+        Anomalies within the kilometre, in order of chainage.
     cut : list of Region
-        Wet regions that reach an end of the kilometre, whatever their size.
+        Dark regions that reach an end of the kilometre, whatever their size.
+    dark : (rows, columns) bool array
+        Dark pixels, before small regions were left out.
     wet : (rows, columns) bool array
-        Pixels found wet, before small regions were left out.
+        Those of leaks.
+    size : int
+        Side of the median filter, pixels.
     pixels, wet_pixels : int
-        Lining pixels of the kilometre, and how many of them are wet.
+        Lining pixels of the kilometre, and how many of them are in leaks.
     """
 
-    dry: Dry
-    leaks: list[Found]
+    found: list[Found]
     cut: list[Region]
-    wet: NDArray[np.bool_]
+    dark: Mask
+    wet: Mask
+    size: int
     pixels: int
     wet_pixels: int
 
 
-def detect(picture: Picture, min_area: float, dry_regions: list[Polygon] | None = None) -> Detection:
-    """Find the leaks of a kilometre.
+def detect(relative: Relative, dry: DryMap, min_area: float) -> Detection:
+    """Find what is dark in a kilometre.
 
     Parameters
     ----------
-    picture : Picture
-        State and intensity of its pixels.
+    relative : Relative
+        State and drop of its pixels.
+    dry : DryMap
+        What they are relative to.
     min_area : float
         Smaller leaks are left out, m² in the unrolled plane.
-    dry_regions : list of Polygon, optional
-        Dry lining drawn by the user, in the unrolled plane; without it the dry pixels are told from the wet
-        ones robustly.
     """
-    grid, state, level = picture.grid, picture.state, picture.level
+    grid, state = relative.grid, relative.state
     lining, could = _columns(state, grid.inner.start, grid.inner.stop)
-    dry = _dry_statistics(picture, int(lining.sum()), dry_regions or [])
-    if not dry.count:
-        return Detection(dry, [], [], np.zeros(state.shape, np.bool_), int(lining.sum()), 0)
     size = filter_size(_filled(lining, could, round(GAP / grid.pixel)))
-    wet = wet_pixels(state, level, dry.threshold / STEP["corrected"], size)
-    leaks, cut = [], []
+    pixels = int(lining.sum())
+    wet = np.zeros(state.shape, np.bool_)
+    if not dry.count:
+        return Detection([], [], wet.copy(), wet, size, pixels, 0)
+    dark = dark_pixels(relative, size)
+    found, cut, leaks = [], [], []
     ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
-    for region in regions(wet, level, grid, dry.mean, min_area):
+    for region in regions(dark, relative, min_area):
+        anomaly = Found.of(region, min_area)
         if region.column == ends[0] or region.stop == ends[1]:
             cut.append(region)
-        elif (leak := Found.of(region, min_area)) is not None:
-            leaks.append(leak)
-    return Detection(dry, leaks, cut, wet, int(lining.sum()), _wet_lining(state, wet, grid.inner.start, grid.inner.stop))
+        elif anomaly is not None:
+            found.append(anomaly)
+        if anomaly is not None and anomaly.verdict.kind == "leak":
+            leaks.append(region)
+    _draw(wet, leaks, grid)
+    wet &= dark
+    return Detection(found, cut, dark, wet, size, pixels, sum(region.filled for region in leaks))
 
 
-def dry_places(picture: Picture, found: Detection, chainage: Float, arc: Float) -> NDArray[np.bool_]:
-    """Tell which places (n,) in the unrolled plane, m, lie on lining of the kilometre that is neither wet nor next to it."""
-    row, column = picture.grid.place(chainage, arc)
-    inner = picture.grid.inner
-    dry: NDArray[np.bool_] = _dry(picture.state, found.wet, row, column, inner.start, inner.stop)
+def dry_places(relative: Relative, found: Detection, chainage: Float, arc: Float) -> Mask:
+    """Tell which places (n,) in the unrolled plane, m, lie on lining of the kilometre that is neither dark nor next to it."""
+    row, column = relative.grid.place(chainage, arc)
+    inner = relative.grid.inner
+    dry: Mask = _dry(relative.state, found.dark, row, column, inner.start, inner.stop)
     return dry
+
+
+def _draw(image: Mask, drawn: Iterable[Region], grid: Grid) -> None:
+    """Draw the masks of regions."""
+    for region in drawn:
+        rows, columns = region.mask.shape
+        top, left = grid.bottom + grid.rows - region.row - rows, region.column - grid.first_column
+        image[top : top + rows, left : left + columns] |= region.mask[::-1]
 
 
 def _filled(lining: NDArray[np.int64], could: NDArray[np.int64], gap: int) -> float:
@@ -128,32 +161,6 @@ def _filled(lining: NDArray[np.int64], could: NDArray[np.int64], gap: int) -> fl
     scanned = np.where(step > gap, 1, step)
     # Floor and niches are marked whether or not they hold points.
     return float(lining.sum() / (until[columns + scanned] - until[columns]).sum())
-
-
-def _dry_statistics(picture: Picture, lining: int, dry_regions: list[Polygon]) -> Dry:
-    """Statistics of dry lining pixels (eq. 19): of those in the drawn regions, or of all, robustly."""
-    inner, step = picture.grid.inner, STEP["corrected"]
-    if dry_regions:
-        parts = [picture.level[:, columns][chosen] for columns, chosen in _inside(picture, dry_regions)]
-        return plain_statistics(np.concatenate(parts) * step if parts else np.zeros(0))
-    sample = _sample(picture.state, picture.level, inner.start, inner.stop, max(1, lining // SAMPLE))
-    return robust_statistics(sample * step)
-
-
-def _inside(picture: Picture, polygons: list[Polygon]) -> list[tuple[slice, NDArray[np.bool_]]]:
-    """Lining pixels of the kilometre whose centres lie in one of the polygons, block by block."""
-    grid, found = picture.grid, []
-    for start in range(grid.inner.start, grid.inner.stop, grid.block_columns):
-        columns = slice(start, start + grid.block_columns)
-        transform, shape = grid.transform(start), (grid.rows, grid.block_columns)
-        west, east = transform.c, transform.c + shape[1] * transform.a
-        near = [polygon for polygon in polygons if polygon.bounds[0] < east and polygon.bounds[2] > west]
-        if near:
-            inside = rasterio.features.geometry_mask(near, shape, transform, invert=True)
-            found.append(
-                (columns, inside & (picture.state[:, columns] >= State.LINING) & (picture.state[:, columns] <= State.RECESS))
-            )
-    return found
 
 
 @njit(cache=True, nogil=True)
@@ -170,33 +177,9 @@ def _columns(
 
 
 @njit(cache=True, nogil=True)
-def _sample(
-    state: NDArray[np.uint8], level: NDArray[np.int16], first: int, stop: int, every: int
-) -> NDArray[np.int16]:  # pragma: no cover - compiled
-    """Level of every n-th lining pixel."""
-    seen, kept = 0, np.empty(2 * SAMPLE, np.int16)
-    for i in range(state.shape[0]):
-        for j in range(first, stop):
-            if 1 <= state[i, j] <= 2:
-                if seen % every == 0:
-                    kept[seen // every] = level[i, j]
-                seen += 1
-    return kept[: (seen + every - 1) // every]
-
-
-@njit(cache=True, nogil=True)
-def _wet_lining(state: NDArray[np.uint8], wet: NDArray[np.bool_], first: int, stop: int) -> int:  # pragma: no cover - compiled
-    count = 0
-    for i in range(state.shape[0]):
-        for j in range(first, stop):
-            count += wet[i, j] and 1 <= state[i, j] <= 2
-    return count
-
-
-@njit(cache=True, nogil=True)
 def _dry(
     state: NDArray[np.uint8],
-    wet: NDArray[np.bool_],
+    dark: Mask,
     row: NDArray[np.int32],
     column: NDArray[np.int32],
     first: int,
@@ -209,6 +192,6 @@ def _dry(
             dry[k] = True
             for m in range(max(i - WET_EDGE, 0), min(i + WET_EDGE + 1, state.shape[0])):
                 for n in range(max(j - WET_EDGE, 0), min(j + WET_EDGE + 1, state.shape[1])):
-                    if wet[m, n]:
+                    if dark[m, n]:
                         dry[k] = False
     return dry

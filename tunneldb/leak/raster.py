@@ -18,10 +18,10 @@ Single = NDArray[np.float32]
 KINDS = ("raw", "corrected", "offset")
 """What the images of a kilometre show: raw and corrected intensity (dB), offset from the surface (m)."""
 
-STEP = {"raw": 0.01, "corrected": 0.01, "offset": 0.001}
-"""Value of one step of the stored whole numbers: dB, dB, m."""
+STEP = {"raw": 0.01, "corrected": 0.01, "offset": 0.001, "state": 1.0}
+"""Value of one step of the stored whole numbers: dB, dB, m, and of the state of pixels itself."""
 
-UNIT = {"raw": "dB", "corrected": "dB", "offset": "m"}
+UNIT = {"raw": "dB", "corrected": "dB", "offset": "m", "state": ""}
 
 NODATA = -32768
 

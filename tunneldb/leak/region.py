@@ -1,9 +1,10 @@
-"""Connected wet regions: cut out of the image of a kilometre, and put together across its ends."""
+"""Connected dark regions: cut out of the image of a kilometre, with their drips, and put together across its ends."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from affine import Affine
@@ -12,17 +13,54 @@ from numpy.typing import NDArray
 from scipy import sparse
 from shapely.geometry import Polygon
 
-from tunneldb.leak.image import Grid
+from tunneldb.leak.drips import Dark, hang
 from tunneldb.leak.polygon import outline
 from tunneldb.leak.raster import NODATA, STEP
+from tunneldb.leak.relative import Relative
 
 Mask = NDArray[np.bool_]
 Int = NDArray[np.int64]
 
+ACROSS = 0.06
+"""The step over a rim is measured so far inside and outside, m: a wet patch ends within it, soot doesn't."""
+
+LONG = 0.5
+"""Regions that are longer are kept even if they are small, m: joints."""
+
+
+class Traits(NamedTuple):
+    """Sums over the pixels of a region, and over the sides by which they face what is not dark.
+
+    Attributes
+    ----------
+    sigma : float
+        Local standard deviation of dry lining, dB, over the pixels with points.
+    square : float
+        Square of the drop, dB², over the same.
+    recess : float
+        Pixels on lining set back behind the wall.
+    rim, rim_off, rim_recess : float
+        Sides, of them those towards an appendage or the floor, and those towards dry lining set back behind the wall.
+    steps : float
+        Sides at which the drop was measured on both, ACROSS from them.
+    inside, outside : float
+        Sum of the drop there, dB.
+    """
+
+    sigma: float = 0.0
+    square: float = 0.0
+    recess: float = 0.0
+    rim: float = 0.0
+    rim_off: float = 0.0
+    rim_recess: float = 0.0
+    steps: float = 0.0
+    inside: float = 0.0
+    outside: float = 0.0
+
 
 @dataclass(frozen=True)
 class Region:
-    """Wet pixels that hang together by their sides, and what they show.
+    """Dark pixels that hang together by their sides, and what they show.
 
     Attributes
     ----------
@@ -35,7 +73,9 @@ class Region:
     filled : int
         How many of them hold points.
     drop_sum, drop_max : float
-        Sum over those and greatest of the drop below the mean of dry lining, dB.
+        Sum over those and greatest of the drop below dry lining, dB.
+    traits : Traits
+        Further sums.
     """
 
     pixel: float
@@ -45,6 +85,7 @@ class Region:
     filled: int
     drop_sum: float
     drop_max: float
+    traits: Traits
 
     @property
     def stop(self) -> int:
@@ -57,57 +98,72 @@ class Region:
         return float(np.count_nonzero(self.mask)) * self.pixel**2
 
     @property
+    def drop_mean(self) -> float:
+        """Mean drop over the pixels with points, dB."""
+        return self.drop_sum / self.filled
+
+    @property
+    def contrast(self) -> float:
+        """Mean drop in standard deviations of the dry lining about it."""
+        return self.drop_sum / self.traits.sigma if self.traits.sigma > 0 else 0.0
+
+    @property
     def outline(self) -> Polygon:
         """Polygon of (chainage, arc), m."""
         west, north = self.column * self.pixel, (self.row + self.mask.shape[0]) * self.pixel
         return outline(self.mask[::-1], Affine(self.pixel, 0.0, west, 0.0, -self.pixel, north))
 
 
-def regions(wet: Mask, level: NDArray[np.int16], grid: Grid, dry_mean: float, min_area: float) -> list[Region]:
-    """Connected wet regions of a kilometre that are large enough, or are cut by its ends and may be a part of one that is.
+def regions(dark: Mask, relative: Relative, min_area: float) -> list[Region]:
+    """Connected dark regions of a kilometre that are large or long enough, or are cut by its ends and may be a part of one.
+
+    Drips that hang below a region are a part of it.
 
     Parameters
     ----------
-    wet : (rows, columns) bool array
-        Wet pixels; those beyond the ends of the kilometre don't count.
-    level : (rows, columns) int16 array
-        Corrected intensity, in steps of the stored image.
-    grid : Grid
-        The pixels.
-    dry_mean : float
-        Mean of dry lining, dB.
+    dark : (rows, columns) bool array
+        Dark pixels; those beyond the ends of the kilometre don't count.
+    relative : Relative
+        Their drop.
     min_area : float
         Smaller regions within the kilometre are left out, m².
     """
+    grid = relative.grid
     inner = grid.inner
-    runs = _runs(wet, inner.start, inner.stop)
+    runs = _runs(dark, inner.start, inner.stop)
     if not len(runs):
         return []
     count, label = sparse.csgraph.connected_components(_beside(runs), directed=False)
-    pixels = np.bincount(label, runs[:, 2] - runs[:, 1], count)
-    cut = np.zeros(count, np.bool_)
-    cut[label[(runs[:, 1] == inner.start) | (runs[:, 2] == inner.stop)]] = True
+    pieces = Dark.of(runs, label.astype(np.int64), count)
+    ends = pieces.touches(inner.start, inner.stop)
+    wanted = ends | (pieces.pixels * grid.pixel**2 >= min_area * (1 - 1e-12)) | (pieces.extent * grid.pixel >= LONG)
+    whole, bridges = hang(pieces, wanted, grid)
+    chosen = np.flatnonzero(wanted[whole])
+    runs, label = np.concatenate([runs, bridges[:, :3]]), np.concatenate([whole[label], bridges[:, 3]])
     order = np.argsort(label, kind="stable")
-    ends = np.cumsum(np.bincount(label, minlength=count))
-    wanted = np.flatnonzero(cut | (pixels * grid.pixel**2 >= min_area * (1 - 1e-12)))
-    found = [_cut_out(runs[order[(ends[k - 1] if k else 0) : ends[k]]], level, grid, dry_mean) for k in wanted.tolist()]
+    stops = np.cumsum(np.bincount(label, minlength=count))
+    found = [_cut_out(runs[order[(stops[k - 1] if k else 0) : stops[k]]], dark, relative) for k in np.unique(whole[chosen])]
     return sorted(found, key=lambda region: (region.column, region.row))
 
 
-def _cut_out(runs: Int, level: NDArray[np.int16], grid: Grid, dry_mean: float) -> Region:
-    top, bottom = int(runs[0, 0]), int(runs[-1, 0])
+def _cut_out(runs: Int, dark: Mask, relative: Relative) -> Region:
+    grid = relative.grid
+    top, bottom = int(runs[:, 0].min()), int(runs[:, 0].max())
     first = int(runs[:, 1].min())
     mask = np.zeros((bottom - top + 1, int(runs[:, 2].max()) - first), np.bool_)
-    filled, total, lowest = _read(runs, level, mask, top, first)
-    step = STEP["corrected"]
+    across = max(1, round(ACROSS / grid.pixel))
+    sums = _read(
+        runs, dark, relative.drop, relative.state, relative.sigma, relative.tile, mask, top, first, across, STEP["corrected"]
+    )
     return Region(
         grid.pixel,
         grid.first_column + first,
         grid.bottom + grid.rows - 1 - bottom,
         mask[::-1],
-        filled,
-        filled * dry_mean - total * step,
-        dry_mean - lowest * step,
+        int(sums[0]),
+        float(sums[1]),
+        float(sums[2]),
+        Traits(*sums[3:].tolist()),
     )
 
 
@@ -127,6 +183,7 @@ def unite(parts: Sequence[Region]) -> Region:
         sum(part.filled for part in parts),
         float(sum(part.drop_sum for part in parts)),
         max(part.drop_max for part in parts),
+        Traits(*(float(sum(sums)) for sums in zip(*(part.traits for part in parts), strict=True))),
     )
 
 
@@ -208,16 +265,50 @@ def _pairs(runs: Int) -> tuple[Int, Int]:  # pragma: no cover - compiled
 
 @njit(cache=True, nogil=True)
 def _read(
-    runs: Int, level: NDArray[np.int16], mask: Mask, top: int, left: int
-) -> tuple[int, float, float]:  # pragma: no cover - compiled
-    """Draw a region's runs into its mask; how many pixels hold points, the sum of their levels and the lowest."""
-    filled, total, lowest = 0, 0.0, np.inf
+    runs: Int,
+    dark: Mask,
+    drop: NDArray[np.int16],
+    state: NDArray[np.uint8],
+    sigma: NDArray[np.float32],
+    tile: int,
+    mask: Mask,
+    top: int,
+    left: int,
+    across: int,
+    step: float,
+) -> NDArray[np.float64]:  # pragma: no cover - compiled
+    """Draw a region's runs into its mask and sum up what they show: filled, drop's sum and maximum, and the traits."""
+    sums = np.zeros(12)
+    sums[2] = -np.inf
+    rows, columns = dark.shape
     for k in range(runs.shape[0]):
+        i = runs[k, 0]
         for j in range(runs[k, 1], runs[k, 2]):
-            mask[runs[k, 0] - top, j - left] = True
-            value = level[runs[k, 0], j]
-            if value != NODATA:
-                filled += 1
-                total += value
-                lowest = min(lowest, float(value))
-    return filled, total, lowest
+            mask[i - top, j - left] = True
+            if not dark[i, j]:
+                continue  # between a drip and what it hangs below
+            sums[5] += state[i, j] == 2
+            if drop[i, j] != NODATA:
+                value = drop[i, j] * step
+                sums[0] += 1
+                sums[1] += value
+                sums[2] = max(sums[2], value)
+                sums[3] += sigma[i // tile, j // tile]
+                sums[4] += value * value
+            for di, dj in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+                m, n = i + di, j + dj
+                if m < 0 or m >= rows or n < 0 or n >= columns or dark[m, n]:
+                    continue
+                sums[6] += 1
+                sums[7] += state[m, n] >= 3
+                sums[8] += state[m, n] == 2
+                # The step: what is dark there behind the rim, and what is not before it.
+                m, n = i + across * di, j + across * dj
+                p, q = i - (across - 1) * di, j - (across - 1) * dj
+                if m < 0 or m >= rows or n < 0 or n >= columns or p < 0 or p >= rows or q < 0 or q >= columns:
+                    continue
+                if dark[p, q] and not dark[m, n] and drop[p, q] != NODATA and 1 <= state[m, n] <= 2:
+                    sums[9] += 1
+                    sums[10] += drop[p, q] * step
+                    sums[11] += drop[m, n] * step
+    return sums

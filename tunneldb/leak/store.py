@@ -1,4 +1,4 @@
-"""Images and radiometry of a kilometre, to and from the database."""
+"""Images, radiometry and coverage of a kilometre, to and from the database."""
 
 from __future__ import annotations
 
@@ -15,9 +15,14 @@ from tunneldb.database import Survey
 from tunneldb.intensity.dry import Dry
 from tunneldb.intensity.reference import ReferenceCurve
 from tunneldb.intensity.roughness import Roughness
+from tunneldb.leak.coverage import Coverage
 from tunneldb.leak.detection import Detection
+from tunneldb.leak.dry_map import DryMap
 from tunneldb.leak.image import Grid, Window
 from tunneldb.leak.raster import Raster, encode
+
+DARK = 5
+"""Value of dark pixels in the image of states, beside those of :class:`tunneldb.leak.lining.State`."""
 
 
 def load_reference(conn: psycopg.Connection[Any], survey: Survey) -> ReferenceCurve | None:
@@ -55,28 +60,39 @@ class ImageStore:
 
     Attributes
     ----------
-    pixels, points : int
-        How many pixels of what was saved hold points, and how many points.
+    pixels : int
+        How many pixels of what was saved hold points.
     """
 
     def __init__(self, conn: psycopg.Connection[Any], survey: Survey, grid: Grid, kinds: Sequence[str]) -> None:
         self.conn, self.survey, self.grid, self.kinds = conn, survey, grid, kinds
-        self.pixels, self.points = 0, 0
+        self.pixels = 0
+        self._blocks: list[int] = []
         conn.execute("DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s", (survey.id, grid.km))
 
     def save(self, window: Window) -> None:
-        """Save a whole block."""
+        """Save a whole block as points fell into it."""
         grid, columns = self.grid, window.columns
         block = grid.first_block + columns.start // grid.block_columns
-        self.pixels += int(np.count_nonzero(window.count))
-        self.points += int(window.count.sum())
-        with self.conn.cursor() as cursor:
-            for kind in self.kinds:
-                tiff = encode(Raster(_values(window, kind), grid.transform(columns.start)), kind)
-                cursor.execute(
-                    "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %b)",
-                    (self.survey.id, grid.km, kind, block, tiff),
-                )
+        self.pixels += int(np.count_nonzero(window.weight))
+        self._blocks.append(block)
+        for kind in self.kinds:
+            self._insert(kind, block, Raster(_values(window, kind), grid.transform(columns.start)))
+
+    def save_states(self, state: NDArray[np.uint8], dark: NDArray[np.bool_]) -> None:
+        """Save what the pixels (rows, columns) of the kilometre show, in the blocks that were saved before; DARK where dark."""
+        grid = self.grid
+        for block in self._blocks:
+            first = (block - grid.first_block) * grid.block_columns
+            columns = slice(first, first + grid.block_columns)
+            values = np.where(dark[:, columns], np.float32(DARK), state[:, columns].astype(np.float32))
+            self._insert("state", block, Raster(values, grid.transform(first)))
+
+    def _insert(self, kind: str, block: int, raster: Raster) -> None:
+        self.conn.execute(
+            "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %b)",
+            (self.survey.id, self.grid.km, kind, block, encode(raster, kind)),
+        )
 
 
 def _values(window: Window, kind: str) -> NDArray[np.float32]:
@@ -89,6 +105,7 @@ def save_radiometry(
     survey: Survey,
     km: int,
     roughness: Roughness,
+    dry: DryMap,
     found: Detection,
     sigma: tuple[Dry, Dry, Dry],
 ) -> None:
@@ -100,8 +117,10 @@ def save_radiometry(
         Where.
     roughness : Roughness
         Stored as NULL where the incidence angles don't determine it.
+    dry : DryMap
+        Dry lining: the medians of its level and standard deviation, with the threshold by them.
     found : Detection
-        Dry lining's statistics, threshold and pixel counts.
+        Pixel counts.
     sigma : three Dry
         Dry lining points raw, corrected by Lambert's law and by Oren–Nayar (Table 1 of Xu et al., 2018).
     """
@@ -114,13 +133,27 @@ def save_radiometry(
             survey.id,
             km,
             roughness.sigma if roughness.determined else None,
-            *(_null(v) for v in (found.dry.mean, found.dry.sigma, found.dry.threshold)),
+            *(_null(v) for v in (dry.mean, dry.spread, dry.mean - 3.0 * dry.spread)),
             *(_null(s.sigma) for s in sigma),
             roughness.regions,
             found.pixels,
             found.wet_pixels,
         ),
     )
+
+
+def save_coverage(conn: psycopg.Connection[Any], survey: Survey, km: int, coverage: Coverage) -> None:
+    """Replace the coverage of a kilometre."""
+    drop_coverage(conn, survey, km)
+    conn.execute(
+        "INSERT INTO tunnel.coverage (survey_id, km, step, lining, seen, wet) VALUES (%s, %s, %s, %s, %s, %s)",
+        (survey.id, km, coverage.step, *(areas.tolist() for areas in (coverage.lining, coverage.seen, coverage.wet))),
+    )
+
+
+def drop_coverage(conn: psycopg.Connection[Any], survey: Survey, km: int) -> None:
+    """Take away the coverage of a kilometre."""
+    conn.execute("DELETE FROM tunnel.coverage WHERE survey_id = %s AND km = %s", (survey.id, km))
 
 
 def drop_radiometry(conn: psycopg.Connection[Any], survey: Survey, km: int) -> None:

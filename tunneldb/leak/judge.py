@@ -1,0 +1,111 @@
+"""What a dark region is: a leak, a joint, or something else that is dark but dry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from tunneldb.leak.region import Region
+from tunneldb.leak.shape import Shape, measure
+
+Kind = Literal["leak", "joint", "dark"]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a region is taken for.
+
+    Attributes
+    ----------
+    kind : {'leak', 'joint', 'dark'}
+        A leak; a joint; or dark but dry.
+    reasons : tuple of str
+        What speaks against a leak, the strongest first; of a leak what makes it doubtful.
+    confidence : float
+        That it is of its kind, 0 to 1.
+    """
+
+    kind: Kind
+    reasons: tuple[str, ...]
+    confidence: float
+
+
+def judge(region: Region) -> Verdict:
+    """Tell what a region is, by its shape and its sums.
+
+    Each reason why it may be dry gets a degree between 0 and 1; the region is a leak unless one is above 1/2.
+    """
+    shape = measure(region.mask, region.pixel)
+    degrees = {
+        "thin": _thin(shape, region.pixel),
+        "recess": _recess(region),
+        "gradual": _gradual(region),
+        "rectangular": _rectangular(region, shape),
+        "shadow": _shadow(region, shape),
+    }
+    against = sorted((name for name in degrees if degrees[name] > 0.0), key=lambda name: -degrees[name])
+    worst = max(degrees.values())
+    if worst <= 0.5:
+        return Verdict("leak", tuple(against), evidence(region) * (1.0 - worst))
+    reasons = tuple(name for name in against if degrees[name] > 0.5)
+    return Verdict("joint" if reasons[0] == "thin" else "dark", reasons, worst)
+
+
+def evidence(region: Region) -> float:
+    """How sure it is that a region is darker than dry lining, 0 to 1: by contrast, size and support."""
+    area = region.area
+    share = region.filled * region.pixel**2 / area
+    contrast = 1.0 - np.exp(-((region.contrast / 4.0) ** 2))
+    return float(contrast * area / (area + 0.02) * (1.0 - np.exp(-share / 0.15)))
+
+
+def _thin(shape: Shape, pixel: float) -> float:
+    """Joints are at most 2 cm wide, which the median filter and the beam widen to a few pixels, and straight."""
+    wander = min(shape.wander_along if shape.along > shape.across else shape.wander_across, 1.0)
+    width = max(0.05, 2.5 * pixel)
+    return min(
+        _ramp(shape.width, 1.4 * width, width),
+        _ramp(shape.length / max(shape.width, pixel), 4.0, 8.0),
+        _ramp(wander, 1.5 * pixel, 0.75 * pixel),
+    )
+
+
+def _recess(region: Region) -> float:
+    """A bolt pocket is dark as a whole: it is set back, and what is about it is not."""
+    traits, pixels = region.traits, np.count_nonzero(region.mask)
+    about = traits.rim_recess / traits.rim if traits.rim else 0.0
+    return min(_ramp(traits.recess / pixels, 0.3, 0.7), _ramp(about, 0.4, 0.2), _ramp(region.area, 0.25, 0.15))
+
+
+def _gradual(region: Region) -> float:
+    """Soot and grime fade out; of the darkness of a wet patch most is reached within some centimetres of its edge."""
+    traits = region.traits
+    if traits.steps < 10 or not region.filled or region.drop_sum <= 0:
+        return 0.0
+    step = (traits.inside - traits.outside) / traits.steps
+    return _ramp(step / region.drop_mean, 0.6, 0.3)
+
+
+def _rectangular(region: Region, shape: Shape) -> float:
+    """A repaired patch, a painted stripe: straight sides along the tunnel and around it, all of them seen, and one shade."""
+    traits = region.traits
+    if not traits.rim or not region.filled or min(shape.along, shape.across) < 4 * region.pixel:
+        return 0.0
+    wander = max(shape.wander_along, shape.wander_across) / region.pixel
+    # Nothing man-made and dry is as dark as running water.
+    strong = _ramp(min(region.contrast / 8.0, region.drop_mean / 3.0), 1.2, 1.0)
+    return min(_ramp(wander, 1.2, 0.6), _ramp(shape.fill, 0.85, 0.93), _ramp(traits.rim_off / traits.rim, 0.2, 0.1), strong)
+
+
+def _shadow(region: Region, shape: Shape) -> float:
+    """A narrow band beside a cable or a pipe."""
+    traits = region.traits
+    beside = traits.rim_off / traits.rim if traits.rim else 0.0
+    return min(_ramp(beside, 0.25, 0.45), _ramp(shape.width, 0.14, 0.08))
+
+
+def _ramp(value: float, none: float, full: float) -> float:
+    """From 0 at ``none`` to 1 at ``full``, whichever is the greater."""
+    return float(np.clip((value - none) / (full - none), 0.0, 1.0))
