@@ -18,6 +18,7 @@ from tunneldb.job.threads import threads, use_threads
 from tunneldb.leak import gather as module
 from tunneldb.leak.gather import Lens, gather
 from tunneldb.leak.image import LEVEL, OFFSET, Accumulator, Grid
+from tunneldb.leak.kernel import WEIGHT
 from tunneldb.leak.lining import Floor
 from tunneldb.leak.seen import Eye, Radiometer
 from tunneldb.scan.pose import PoseModel
@@ -28,7 +29,8 @@ ORIGIN = np.array([512_000.0, 4_104_000.0, 414.0])
 CURVE = ReferenceCurve.from_rows(np.array([0.5, 2.0, 3.0, 4.5, 9.0]), np.array([31.0, 36.0, 34.0, 30.0, 22.0]))
 FAR = ReferenceCurve.from_rows(np.array([0.5, 2.0, 5.0, 60.0]), np.array([31.0, 36.0, 30.0, 5.0]))
 ROUGHNESS = 14.0
-MAX_INCIDENCE = 70.0
+MAX_INCIDENCE, MAX_RANGE = 70.0, 8.0
+DEPTH = 0.3, 0.4
 
 
 def tunnel() -> Surface:
@@ -98,10 +100,10 @@ def cloud(count: int, seed: int = 1) -> Points:
 
 def eye(kind: str, mobile: bool, curve: ReferenceCurve = FAR) -> Eye:
     if kind == "none":
-        return Eye.of(SURFACE, KM, 0.3, None, FLOOR)
+        return Eye.of(SURFACE, KM, DEPTH, None, FLOOR)
     reference = None if kind == "reflectance" else curve
     typed: Kind = kind  # type: ignore[assignment]
-    return Eye.of(SURFACE, KM, 0.3, Radiometer(typed, poses(mobile), reference, MAX_INCIDENCE), FLOOR)
+    return Eye.of(SURFACE, KM, DEPTH, Radiometer(typed, poses(mobile), reference, MAX_INCIDENCE, MAX_RANGE), FLOOR)
 
 
 def grid(pixel: float = 0.02) -> Grid:
@@ -121,15 +123,19 @@ def test_each_point_is_what_the_steps_in_numpy_make_of_it(kind: str, mobile: boo
     unrolled = SURFACE.unroll(points.xyz)
     row, column = grid().place(unrolled.chainage, unrolled.arc)
     with np.errstate(invalid="ignore"):
-        use = (np.abs(unrolled.offset) <= 0.3) & (column >= 0)
+        use = (unrolled.offset <= DEPTH[0]) & (unrolled.offset >= -DEPTH[1]) & (column >= 0)
     raw = corrected = np.zeros(len(points))
+    weight = np.ones(len(points))
     if kind != "none":
         scanner = poses(mobile).positions(points)
         ray = scanner - points.xyz
         distance = np.linalg.norm(ray, axis=1)
         cosine = (ray * look.edges.normals_of(points.xyz, unrolled)).sum(axis=1) / distance
         raw = to_decibel(points.intensity, kind)  # type: ignore[arg-type]
-        use &= np.isfinite(raw) & (cosine >= np.cos(np.radians(MAX_INCIDENCE)))
+        use &= np.isfinite(raw) & (cosine >= np.cos(np.radians(MAX_INCIDENCE))) & (distance <= MAX_RANGE)
+        least = np.cos(np.radians(MAX_INCIDENCE)) ** 2
+        slant, far = (cosine**2 - least) / (1 - least), 1 / (1 + (distance / (MAX_RANGE / 2)) ** 2)
+        weight = 1 + np.rint(63 * slant * (far - 0.2) / 0.8)
         corrected = raw - incidence_db(np.where(use, cosine, 1.0), ROUGHNESS)
         if kind != "reflectance":
             corrected -= CURVE(distance)
@@ -142,6 +148,9 @@ def test_each_point_is_what_the_steps_in_numpy_make_of_it(kind: str, mobile: boo
     assert tally.lost == 0
     np.testing.assert_array_equal(pixels.column[: len(points)], np.where(use, column, -1))
     np.testing.assert_array_equal(pixels.row[: len(points)][use], row[use])
+    differs = pixels.weight[: len(points)][use] != weight[use]
+    assert differs.mean() < 1e-3  # a half may be rounded either way
+    np.testing.assert_allclose(pixels.weight[: len(points)][use], weight[use], atol=1)
     np.testing.assert_allclose(pixels.offset[: len(points)][use], unrolled.offset[use], atol=1e-7)
     np.testing.assert_allclose(pixels.raw[: len(points)][use], raw[use], atol=1e-5)
     np.testing.assert_allclose(pixels.corrected[: len(points)][use], corrected[use], atol=1e-5)
@@ -191,23 +200,26 @@ def test_the_image_depends_neither_on_files_nor_on_threads(monkeypatch: pytest.M
                     images.append(image.window(0, image.grid.columns))
     finally:
         use_threads(before)
-    assert images[0].count.max() > 3
+    assert images[0].weight.max() > 3 * WEIGHT / 2
     for other in images[1:]:
-        for name in ("count", "offset", "raw", "corrected"):
+        for name in ("weight", "offset", "raw", "corrected"):
             np.testing.assert_array_equal(getattr(other, name), getattr(images[0], name))
 
 
-def test_a_pixel_is_the_mean_of_its_points(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_pixel_is_the_weighted_mean_of_its_points(monkeypatch: pytest.MonkeyPatch) -> None:
     points, look = cloud(50_000, 6), eye("reflectance", False)
     pixels, _ = Lens.of(look, grid(0.1), ROUGHNESS).look(points)
     with read(monkeypatch, look, [[points]]) as image:
         window = image.window(0, image.grid.columns)
-    row, column = np.argwhere(window.count >= 4)[0]
+    place, points_in = np.unique(np.stack([pixels.row, pixels.column])[:, pixels.column >= 0], axis=1, return_counts=True)
+    row, column = place[:, points_in.argmax()]
     inside = np.flatnonzero((pixels.row[: len(points)] == row) & (pixels.column[: len(points)] == column))
-    assert window.count[row, column] == len(inside)
-    assert window.offset[row, column] == pytest.approx(pixels.offset[inside].mean(), abs=OFFSET)
-    assert window.raw[row, column] == pytest.approx(pixels.raw[inside].mean(), abs=LEVEL)
-    assert window.corrected[row, column] == pytest.approx(pixels.corrected[inside].mean(), abs=LEVEL)
+    weight = pixels.weight[inside]
+    assert len(np.unique(weight)) > 1
+    assert window.weight[row, column] == weight.sum()
+    assert window.offset[row, column] == pytest.approx(np.average(pixels.offset[inside], weights=weight), abs=OFFSET)
+    assert window.raw[row, column] == pytest.approx(np.average(pixels.raw[inside], weights=weight), abs=LEVEL)
+    assert window.corrected[row, column] == pytest.approx(np.average(pixels.corrected[inside], weights=weight), abs=LEVEL)
 
 
 def test_points_of_unknown_scanner_position_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ from tunneldb.errors import UserError
 from tunneldb.leak.appendage import appendages, distance_from_plane, reach
 from tunneldb.leak.detection import _columns, _filled
 from tunneldb.leak.image import LEVEL, OFFSET, Accumulator, Grid
-from tunneldb.leak.kernel import Pixels
+from tunneldb.leak.kernel import WEIGHT, Pixels
 from tunneldb.leak.lining import State
 from tunneldb.leak.match import match, match_parts
 from tunneldb.leak.raster import NODATA, Raster, decode, encode
@@ -20,39 +20,65 @@ from tunneldb.leak.threshold import filter_size, wet_pixels
 PIXEL = 0.02
 
 
-def add(image, chainage, arc, offset, raw, use):
+def add(image, chainage, arc, offset, raw, use, weight=None):
     """Add points whose corrected intensity is 5 dB less than the raw."""
     row, column = image.grid.place(chainage, arc)
-    image.add(Pixels(row, np.where(use, column, -1), offset.astype(np.float32), raw, raw - 5), len(row))
+    weight = np.ones(len(row), np.int32) if weight is None else weight
+    image.add(Pixels(row, np.where(use, column, -1), weight, offset.astype(np.float32), raw, raw - 5), len(row))
 
 
-def test_image_means_do_not_depend_on_the_order_of_points():
+@pytest.mark.parametrize(("pixel", "itemsize"), [(0.5, 8), (0.02, 4)])
+def test_image_means_do_not_depend_on_the_order_of_points(pixel, itemsize):
     rng = np.random.default_rng(1)
-    grid = Grid.covering(12, 0.5, -3.2, 3.2)
+    half = 6.4 * pixel
+    grid = Grid.covering(12, pixel, -half, half)
+    # So many points to a pixel, and two blocks more than there is room for in memory, whatever the pixel.
     chainage = rng.uniform(11_990, 13_010, 40_000)
-    arc, offset = rng.uniform(-3.2, 3.2, 40_000), rng.normal(0, 0.01, 40_000)
+    if pixel < 0.5:
+        chainage = 12_000 + 50 * rng.integers(0, 20, 40_000) + rng.uniform(-2.0, 2.0, 40_000)
+    arc, offset = rng.uniform(-half, half, 40_000), rng.normal(0, 0.01, 40_000)
     raw = rng.normal(20, 1, 40_000).astype(np.float32)
     use = rng.random(40_000) < 0.9
+    weight = rng.integers(1, WEIGHT + 1, 40_000).astype(np.int32)
     windows = []
     # Room for two blocks of twenty: the others lie in the file.
-    for order, memory in ((np.arange(40_000), 10**9), (rng.permutation(40_000), 2 * 100 * grid.rows * 16)):
+    for order, memory in (
+        (np.arange(40_000), 10**9),
+        (rng.permutation(40_000), 2 * grid.block_columns * grid.rows * 4 * itemsize),
+    ):
         with Accumulator(grid, memory) as image:
             for part in np.array_split(order, 7):
-                add(image, chainage[part], arc[part], offset[part], raw[part], use[part])
+                add(image, chainage[part], arc[part], offset[part], raw[part], use[part], weight[part])
             assert image.blocks() == list(range(20))
             windows.append(image.window(0, grid.columns))
     one, other = windows
-    assert one.count.sum() == (use & (chainage >= 12_000) & (chainage < 13_000)).sum()
-    for name in ("count", "offset", "raw", "corrected"):
+    inside = use & (chainage >= 12_000) & (chainage < 13_000)
+    assert one.weight.dtype.itemsize == itemsize
+    assert one.weight.sum() == weight[inside].sum()
+    for name in ("weight", "offset", "raw", "corrected"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
     np.testing.assert_allclose(one.corrected, one.raw - 5, atol=0.001)
     # A pixel's mean is that of the points within its corners.
-    row, column = np.argwhere(one.count > 3)[500]
+    row, column = np.argwhere(one.weight > 3 * WEIGHT / 2)[500 if pixel == 0.5 else 5]
     west, north = grid.transform() @ (column, row)
-    inside = use & (chainage >= west) & (chainage < west + 0.5) & (arc < north) & (arc >= north - 0.5)
-    assert one.count[row, column] == inside.sum()
-    assert one.offset[row, column] == pytest.approx(offset[inside].mean(), abs=OFFSET)
-    assert one.raw[row, column] == pytest.approx(raw[inside].mean(), abs=LEVEL)
+    inside = use & (chainage >= west) & (chainage < west + pixel) & (arc < north) & (arc >= north - pixel)
+    assert inside.sum() > 1
+    assert one.weight[row, column] == weight[inside].sum()
+    assert one.offset[row, column] == pytest.approx(np.average(offset[inside], weights=weight[inside]), abs=OFFSET)
+    assert one.raw[row, column] == pytest.approx(np.average(raw[inside], weights=weight[inside]), abs=LEVEL)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_pixel_that_a_scanner_stood_before_does_not_run_over(sign):
+    grid = Grid.covering(0, 0.02, 0.0, 0.1)
+    count = 200_000
+    level = np.full(count, sign * 500.0, np.float32)  # held at 128 dB
+    with Accumulator(grid) as image:
+        add(image, np.full(count, 5.01), np.full(count, 0.05), np.full(count, sign * 3.0), level, True, np.full(count, 64))
+        window = image.window(0, 500)
+    assert window.raw[2, 250] == pytest.approx(sign * 128, abs=0.01)
+    assert window.offset[2, 250] == pytest.approx(sign * 3.0)
+    assert window.weight[2, 250] <= 2**17
 
 
 def test_windows_join_across_blocks_and_stop_at_the_kilometre():

@@ -48,9 +48,11 @@ PARAMETERS: dict[str, Parameter] = {
     "cluster.radius": Parameter(3.0, 1.0, 20.0, "", "points so near belong to a cluster, in spacings of the points"),
     "cluster.min_points": Parameter(4, 1, 1000, "", "points so near that make the core of a cluster", whole=True),
     "cluster.region": Parameter(0.4, 0.05, 1.0, "", "objects stand in this part of the tunnel's height, from the ground"),
-    "lining.tolerance": Parameter(0.5, 0.01, 5.0, "m", "points farther from the surface are not lining"),
+    "lining.tolerance": Parameter(0.5, 0.01, 5.0, "m", "points that stand in farther from the surface are not lining"),
+    "lining.recess": Parameter(1.2, 0.01, 3.0, "m", "points farther behind the surface are not lining, not even of a niche"),
     "image.pixel": Parameter(0.02, 0.005, 0.5, "m", "edge of a pixel of the unrolled images"),
-    "intensity.max_incidence": Parameter(80.0, 30.0, 89.0, "°", "points seen more slantingly are left out of the images"),
+    "intensity.max_incidence": Parameter(75.0, 30.0, 89.0, "°", "points seen more slantingly are left out of the images"),
+    "intensity.max_range": Parameter(40.0, 2.0, 1000.0, "m", "points seen from farther are left out of the images"),
     "appendage.distance": Parameter(0.03, 0.005, 0.5, "m", "what stands off the local plane by more hangs on the lining"),
     "leak.min_area": Parameter(0.05, 0.0, 100.0, "m²", "smaller leaks are left out"),
 }

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from tunneldb.errors import UserError
-from tunneldb.intensity.oren_nayar import coefficients
+from tunneldb.intensity.oren_nayar import incidence_db
 from tunneldb.intensity.reference import SPAN_TOLERANCE
 from tunneldb.job.sources import Source
 from tunneldb.job.threads import threads
 from tunneldb.leak.image import Accumulator, Grid
-from tunneldb.leak.kernel import Faces, Optics, Pixels, Scanner, Shape, Tally, Target, look
+from tunneldb.leak.kernel import COSINES, Faces, Optics, Pixels, Scanner, Shape, Tally, Target, look
 from tunneldb.leak.seen import Eye, Span
 from tunneldb.scan.reader import Points, read_chunks
 
@@ -99,12 +99,15 @@ class Lens:
                 eye.box[0],
                 eye.box[1],
                 eye.tolerance,
+                eye.recess,
                 grid.west,
                 1.0 / grid.pixel,
                 grid.bottom,
                 grid.rows,
                 grid.near.start,
                 grid.near.stop,
+                grid.inner.start,
+                grid.inner.stop,
                 float(floor.start),
                 floor.left,
                 floor.right,
@@ -141,7 +144,7 @@ def _scanner(eye: Eye) -> Scanner:
 def _optics(eye: Eye, roughness: float) -> Optics:
     nothing = np.zeros(0)
     if eye.radiometer is None:
-        return Optics(False, False, nothing, nothing, -np.inf, np.inf, 1.0, 0.0, 0.0)
+        return Optics(False, False, nothing, nothing, -np.inf, np.inf, nothing, 0.0, np.inf)
     radiometer, curve = eye.radiometer, eye.radiometer.reference
     return Optics(
         True,
@@ -150,6 +153,7 @@ def _optics(eye: Eye, roughness: float) -> Optics:
         curve.intensity_db if curve else nothing,
         float(curve.range_m[0]) - SPAN_TOLERANCE if curve else -np.inf,
         float(curve.range_m[-1]) + SPAN_TOLERANCE if curve else np.inf,
-        *coefficients(roughness),
+        incidence_db(np.arange(COSINES + 1) / COSINES, roughness),
         float(np.cos(np.radians(radiometer.max_incidence))),
+        radiometer.max_range,
     )

@@ -1,7 +1,8 @@
 """The unrolled image of a kilometre, gathered from points in any order in bounded memory.
 
-A pixel holds sums over the points that fall into it. Only the blocks used last lie in memory; the others in a file
-of the temporary folder.
+A pixel holds weighted sums over the points that fall into it: several stations are blended by the weights of their views
+(:func:`tunneldb.leak.kernel.weight_of`). Only the blocks used last lie in memory; the others in a file of the temporary
+folder.
 """
 
 from __future__ import annotations
@@ -21,10 +22,11 @@ from numpy.typing import NDArray
 
 from tunneldb.errors import UserError
 from tunneldb.job.threads import threads
-from tunneldb.leak.kernel import Pixels
+from tunneldb.leak.kernel import WEIGHT, Pixels
 
 Float = NDArray[np.float64]
 Single = NDArray[np.float32]
+Whole = NDArray[np.int32] | NDArray[np.int64]
 
 KILOMETRE = 1000.0
 BLOCK = 50.0
@@ -34,10 +36,18 @@ MEMORY = 400_000_000
 """Bytes of memory for sums."""
 
 CHANNELS = 4
-"""Sums a pixel holds: points, offset, raw, corrected."""
+"""Sums a pixel holds: weight and, weighted, offset, raw and corrected intensity."""
 
-OFFSET, LEVEL = 2.0**-16, 2.0**-10
-"""Offset (m) and intensity (dB) of a point are summed in whole multiples of these."""
+OFFSET, LEVEL = 2.0**-11, 2.0**-7
+"""Offset (m) and intensity (dB) of a point are summed in whole multiples of these, half a millimetre and less than a stored
+step."""
+
+GREATEST = 2**14 - 1
+"""Multiples at most that a point adds for each unit of its weight: 8 m, 128 dB."""
+
+FULL = 2**17 - WEIGHT
+"""A pixel whose weights add up to more takes no more points: then no sum passes 2³¹. These are 2,047 points seen straight on
+from near by, 0.4 mm apart in a pixel of 2 cm. Pixels larger than that have sums of 64 bits and are never full."""
 
 
 @dataclass(frozen=True)
@@ -156,14 +166,14 @@ class Grid:
 
 @dataclass(frozen=True)
 class Window:
-    """Means over a few columns of the image; (rows, columns) arrays, NaN where no point fell.
+    """Weighted means over a few columns of the image; (rows, columns) arrays, NaN where no point fell.
 
     Attributes
     ----------
     columns : slice
         Columns of the grid.
-    count : int32 array
-        Points in the pixel.
+    weight : int array
+        Weights of the points in the pixel, 0 where no point fell.
     offset : float32 array
         Mean offset from the section surface, m.
     raw, corrected : float32 arrays
@@ -171,7 +181,7 @@ class Window:
     """
 
     columns: slice
-    count: NDArray[np.int32]
+    weight: Whole
     offset: Single
     raw: Single
     corrected: Single
@@ -179,7 +189,7 @@ class Window:
     def cut(self, columns: slice) -> Window:
         """Those of the columns that lie in a slice of the grid's columns."""
         here = slice(columns.start - self.columns.start, columns.stop - self.columns.start)
-        return Window(columns, self.count[:, here], self.offset[:, here], self.raw[:, here], self.corrected[:, here])
+        return Window(columns, self.weight[:, here], self.offset[:, here], self.raw[:, here], self.corrected[:, here])
 
 
 class Accumulator:
@@ -198,9 +208,12 @@ class Accumulator:
     def __init__(self, grid: Grid, memory: int = MEMORY) -> None:
         self.grid = grid
         self._shape = (grid.rows, grid.block_columns, CHANNELS)
-        self._bytes = 4 * int(np.prod(self._shape))
+        small = grid.pixel < 0.0201
+        self._type = np.dtype(np.int32 if small else np.int64)
+        self._full = FULL if small else np.iinfo(np.int64).max
+        self._bytes = self._type.itemsize * int(np.prod(self._shape))
         self._room = max(1, memory // self._bytes)
-        self._blocks: OrderedDict[int, Single] = OrderedDict()
+        self._blocks: OrderedDict[int, Whole] = OrderedDict()
         """Blocks in memory, the one used last at the end."""
         self._changed: set[int] = set()
         self._spilled: set[int] = set()
@@ -219,8 +232,8 @@ class Accumulator:
     def add(self, pixels: Pixels, count: int) -> None:
         """Add points.
 
-        Sums are exact, and so the same in whatever order points come, as long as a pixel holds no more than some hundred
-        points: offset and intensity are rounded to OFFSET and LEVEL first.
+        Offset and intensity are rounded to OFFSET and LEVEL and summed as whole numbers, so sums are exact, and the same in
+        whatever order points come, as long as no pixel is FULL.
 
         Parameters
         ----------
@@ -234,12 +247,12 @@ class Accumulator:
         UserError
             If the temporary folder has no room for what memory doesn't hold.
         """
-        row, column, *values = (array[:count] for array in pixels)
+        row, column, weight, *values = (array[:count] for array in pixels)
         width = self.grid.block_columns
         touched = np.flatnonzero(_touched(column, width, self.grid.columns // width)).tolist()
         # Blocks in memory first, lest fetching another one puts them out.
         for block in sorted(touched, key=lambda b: b not in self._blocks):
-            _add(self._fetch(block), row, column, block * width, *values, threads())
+            _add(self._fetch(block), row, column, block * width, weight, *values, self._full, threads())
             self._changed.add(block)
 
     def blocks(self) -> list[int]:
@@ -256,24 +269,24 @@ class Accumulator:
         start, stop = max(start, 0), min(stop, self.grid.columns)
         width = self.grid.block_columns
         held = set(self.blocks())
-        count = np.zeros((self.grid.rows, stop - start), np.int32)
-        means = np.empty((CHANNELS - 1, *count.shape), np.float32)
+        weight = np.zeros((self.grid.rows, stop - start), self._type)
+        means = np.empty((CHANNELS - 1, *weight.shape), np.float32)
         for block in range(start // width, (stop - 1) // width + 1):
             first, last = max(block * width, start), min((block + 1) * width, stop)
             if block in held:
-                _means(self._fetch(block), first - block * width, count, means, first - start, last - start)
+                _means(self._fetch(block), first - block * width, weight, means, first - start, last - start)
             else:
                 means[:, :, first - start : last - start] = np.nan
-        return Window(slice(start, stop), count, *means)
+        return Window(slice(start, stop), weight, *means)
 
-    def _fetch(self, block: int) -> Single:
+    def _fetch(self, block: int) -> Whole:
         """Sums of a block, brought into memory, from the file or new."""
         if block in self._blocks:
             self._blocks.move_to_end(block)
             return self._blocks[block]
         while len(self._blocks) >= self._room:
             self._put_out(*self._blocks.popitem(last=False))
-        sums = np.zeros(self._shape, np.float32)
+        sums: Whole = np.zeros(self._shape, self._type)
         if block in self._spilled:
             assert self._file
             self._file.seek(block * self._bytes)
@@ -281,7 +294,7 @@ class Accumulator:
         self._blocks[block] = sums
         return sums
 
-    def _put_out(self, block: int, sums: Single) -> None:
+    def _put_out(self, block: int, sums: Whole) -> None:
         """Write a block that leaves memory to the file, unless it is there already."""
         if block not in self._changed:
             return
@@ -318,13 +331,15 @@ def _touched(column: NDArray[np.int32], width: int, blocks: int) -> NDArray[np.b
 
 @njit(cache=True, nogil=True, parallel=True)
 def _add(
-    sums: Single,
+    sums: Whole,
     row: NDArray[np.int32],
     column: NDArray[np.int32],
     first: int,
+    weight: NDArray[np.int32],
     offset: Single,
     raw: Single,
     corrected: Single,
+    full: int,
     parts: int,
 ) -> None:  # pragma: no cover - compiled
     """Add the points that fall into a block; each thread has rows of its own."""
@@ -332,22 +347,26 @@ def _add(
     for part in prange(parts):
         for i in range(row.shape[0]):
             r, c = row[i], column[i] - first
-            if 0 <= c < width and r % parts == part:
-                sums[r, c, 0] += np.float32(1.0)
-                sums[r, c, 1] += np.float32(np.rint(offset[i] * (1.0 / OFFSET)) * OFFSET)
-                sums[r, c, 2] += np.float32(np.rint(raw[i] * (1.0 / LEVEL)) * LEVEL)
-                sums[r, c, 3] += np.float32(np.rint(corrected[i] * (1.0 / LEVEL)) * LEVEL)
+            if 0 <= c < width and r % parts == part and sums[r, c, 0] <= full:
+                sums[r, c, 0] += weight[i]
+                sums[r, c, 1] += weight[i] * _multiple(offset[i] * np.float32(1.0 / OFFSET))
+                sums[r, c, 2] += weight[i] * _multiple(raw[i] * np.float32(1.0 / LEVEL))
+                sums[r, c, 3] += weight[i] * _multiple(corrected[i] * np.float32(1.0 / LEVEL))
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _multiple(value: np.float32) -> np.int32:
+    return np.int32(np.rint(min(max(value, np.float32(-GREATEST)), np.float32(GREATEST))))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _means(
-    sums: Single, skip: int, count: NDArray[np.int32], means: Single, first: int, stop: int
-) -> None:  # pragma: no cover - compiled
+def _means(sums: Whole, skip: int, weight: Whole, means: Single, first: int, stop: int) -> None:  # pragma: no cover - compiled
     """Divide the sums of a block, from column ``skip`` on, into columns ``first`` to ``stop`` of a window."""
-    for i in range(count.shape[0]):
+    for i in range(weight.shape[0]):
         for j in range(first, stop):
             pixel = sums[i, j - first + skip]
-            count[i, j] = np.int32(pixel[0])
-            per = np.float32(1.0) / pixel[0] if pixel[0] > 0.0 else np.float32(np.nan)
-            for k in range(3):
-                means[k, i, j] = pixel[k + 1] * per
+            weight[i, j] = pixel[0]
+            per = 1.0 / pixel[0] if pixel[0] > 0 else np.nan
+            means[0, i, j] = pixel[1] * (per * OFFSET)
+            means[1, i, j] = pixel[2] * (per * LEVEL)
+            means[2, i, j] = pixel[3] * (per * LEVEL)

@@ -15,7 +15,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from tunneldb.geometry.unrolling import NOWHERE, unroll_point
-from tunneldb.intensity.correct import incidence_loss, level_of, reference_at
+from tunneldb.intensity.correct import level_of, reference_at
 from tunneldb.intensity.edge import face_at, face_normal
 from tunneldb.scan.pose import TIME_TOLERANCE, interval, position_at
 
@@ -25,6 +25,12 @@ Int = NDArray[np.int64]
 
 BLOCK = 4096
 """Points that a thread takes at a time."""
+
+WEIGHT = 64
+"""Weight of a point seen straight on from near by; that of one at the limits of range or incidence is 1."""
+
+COSINES = 2048
+"""Steps of the cosine at which the loss by incidence is computed; between them it is interpolated, to less than 0.001 dB."""
 
 
 class Shape(NamedTuple):
@@ -63,8 +69,9 @@ class Optics(NamedTuple):
     """How intensity is corrected.
 
     ``wanted`` is False for a survey without it, then nothing below counts. ``knots`` (m) and ``values`` (dB) are the
-    reference curve, empty where none is needed; ``low`` and ``high`` (m) the ranges that it serves for; ``a`` and ``b``
-    Oren's and Nayar's coefficients; points seen at a lower cosine than ``cosine`` are left out.
+    reference curve, empty where none is needed; ``low`` and ``high`` (m) the ranges that it serves for; ``loss`` is the
+    loss by incidence at each of COSINES steps of the cosine from 0 to 1, dB; points seen at a lower cosine than ``cosine``
+    or from farther than ``far`` (m) are left out.
     """
 
     wanted: bool
@@ -73,29 +80,32 @@ class Optics(NamedTuple):
     values: Float
     low: float
     high: float
-    a: float
-    b: float
+    loss: Float
     cosine: float
+    far: float
 
 
 class Target(NamedTuple):
     """Where points go.
 
-    ``low`` and ``high`` (3) are the box of points to look at, m; ``tolerance`` the greatest distance from the surface,
-    m; ``west`` the chainage at column 0, m; ``bottom`` the arc of the lower edge of the last row, in pixels; ``first``
-    to ``stop`` are the columns that take points. The floor begins at the arcs ``left`` and ``right`` (m) at each metre
-    from ``floor`` on.
+    ``low`` and ``high`` (3) are the box of points to look at, m; ``tolerance`` and ``recess`` the greatest distances in
+    front of the surface and behind it, m; ``west`` the chainage at column 0, m; ``bottom`` the arc of the lower edge of the
+    last row, in pixels; ``first`` to ``stop`` are the columns that take points, ``start`` to ``end`` those of the kilometre
+    itself. The floor begins at the arcs ``left`` and ``right`` (m) at each metre from ``floor`` on.
     """
 
     low: Float
     high: Float
     tolerance: float
+    recess: float
     west: float
     per_metre: float
     bottom: int
     rows: int
     first: int
     stop: int
+    start: int
+    end: int
     floor: float
     left: Float
     right: Float
@@ -104,11 +114,12 @@ class Target(NamedTuple):
 class Pixels(NamedTuple):
     """Pixel of each point (n,) and what it adds there; column -1 for a point that goes nowhere.
 
-    ``row`` and ``column`` are int32, ``offset`` (m), ``raw`` and ``corrected`` (dB) float32 arrays.
+    ``row``, ``column`` and ``weight`` are int32, ``offset`` (m), ``raw`` and ``corrected`` (dB) float32 arrays.
     """
 
     row: NDArray[np.int32]
     column: NDArray[np.int32]
+    weight: NDArray[np.int32]
     offset: Single
     raw: Single
     corrected: Single
@@ -116,15 +127,16 @@ class Pixels(NamedTuple):
     @classmethod
     def empty(cls, count: int) -> Pixels:
         """Room for so many points."""
-        whole, single = np.empty((2, count), np.int32), np.empty((3, count), np.float32)
-        return cls(whole[0], whole[1], single[0], single[1], single[2])
+        whole, single = np.empty((3, count), np.int32), np.empty((3, count), np.float32)
+        return cls(whole[0], whole[1], whole[2], single[0], single[1], single[2])
 
 
 class Tally(NamedTuple):
     """What `look` counts.
 
-    Points used; those of them whose scanner position is unknown (they go nowhere); of those used that are not floor, how
-    many there are, how many lie outside the reference curve's ranges, and the nearest and farthest range, m.
+    Points used in the kilometre itself; those whose scanner position is unknown (they go nowhere); of those used, in the
+    halo too, that are not floor, how many there are, how many lie outside the reference curve's ranges, and the nearest and
+    farthest range, m.
     """
 
     used: int
@@ -163,6 +175,36 @@ def look(
     return Tally(used, lost, lining, outside, float(ranges[:, 0].min(initial=np.inf)), float(ranges[:, 1].max(initial=-np.inf)))
 
 
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def weight_of(cosine: float, distance: float, least: float, far: float) -> int:
+    """Weight of a point in its pixel, 1 to WEIGHT, by the variance of its corrected intensity.
+
+    An error of the normal goes into the level by the slope of the loss by incidence, for Lambert's law as tan² θ: if at 45°
+    that is as large as the noise, the inverse variance is cos² θ. The noise of the signal, which weakens with the square of
+    the range, adds to it as R²: here as much as the rest from half the greatest range on (Soudarissanane et al., 2011, find
+    both effects). Either factor is lowered by its value at the limit, so that the view of a station fades out where it ends.
+
+    Parameters
+    ----------
+    cosine, distance : float
+        Cosine of the incidence angle and range, m.
+    least, far : float
+        Least cosine and greatest range that are taken, m.
+    """
+    floor = least * least
+    slant = (cosine * cosine - floor) / (1.0 - floor)
+    share = 2.0 * distance / far
+    fade = (1.0 / (1.0 + share * share) - 0.2) * 1.25
+    return 1 + int((WEIGHT - 1) * slant * fade + 0.5)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _loss_at(loss: Float, cosine: float) -> float:
+    place = cosine * COSINES
+    k = min(int(place), COSINES - 1)
+    return float(loss[k] + (place - k) * (loss[k + 1] - loss[k]))
+
+
 @njit(cache=True, nogil=True, parallel=True, error_model="numpy")
 def _look(
     shape: Shape,
@@ -184,7 +226,8 @@ def _look(
     curve = optics.knots.shape[0] > 0
     low, high = target.low, target.high
     # By names of their own: Numba drops what is written to a field of a tuple inside a parallel loop.
-    row, column, offsets, raws, correcteds = pixels.row, pixels.column, pixels.offset, pixels.raw, pixels.corrected
+    row, column, weights = pixels.row, pixels.column, pixels.weight
+    offsets, raws, correcteds = pixels.offset, pixels.raw, pixels.corrected
     for part in prange(parts):
         near = NOWHERE
         moment, knot = 0, 0
@@ -207,13 +250,13 @@ def _look(
                 continue  # the same point again, from nowhere on
             k = i
             i += 1
-            if near[0] < 0 or abs(offset) > target.tolerance:
+            if near[0] < 0 or offset > target.tolerance or offset < -target.recess:
                 continue
             c = np.floor((chainage - target.west) * target.per_metre)
             r = target.rows - 1 - (np.floor(arc * target.per_metre) - target.bottom)
             if c < target.first or c >= target.stop or r < 0 or r >= target.rows:
                 continue
-            raw, corrected = 0.0, 0.0
+            raw, corrected, weight = 0.0, 0.0, 1
             if optics.wanted:
                 if mobile:
                     t = time[k]
@@ -236,6 +279,8 @@ def _look(
                 dy -= y
                 dz -= z
                 distance = np.sqrt(dx * dx + dy * dy + dz * dz)
+                if distance > optics.far:
+                    continue
                 if faces.any:
                     along, across = face_at(faces.start, faces.first, faces.sharp, chainage, arc)
                     if along >= 0:
@@ -244,7 +289,8 @@ def _look(
                 raw = level_of(intensity[k], optics.linear)
                 if not cosine >= optics.cosine or not np.isfinite(raw):
                     continue
-                corrected = raw - incidence_loss(cosine, optics.a, optics.b)
+                corrected = raw - _loss_at(optics.loss, cosine)
+                weight = weight_of(cosine, distance, optics.cosine, optics.far)
                 if curve:
                     level, knot = reference_at(optics.knots, optics.values, distance, knot)
                     corrected -= level
@@ -258,10 +304,11 @@ def _look(
                             outside += 1
             row[k] = int(r)
             column[k] = int(c)
+            weights[k] = weight
             offsets[k] = offset
             raws[k] = raw
             correcteds[k] = corrected
-            used += 1
+            used += target.start <= c < target.end
         counts[part, 0], counts[part, 1], counts[part, 2], counts[part, 3] = used, lost, lining, outside
         ranges[part, 0], ranges[part, 1] = nearest, farthest
     return counts, ranges

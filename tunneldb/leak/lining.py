@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from tunneldb.geometry.surface import Surface
 from tunneldb.leak.appendage import appendages
-from tunneldb.leak.image import Grid, Window
+from tunneldb.leak.image import Grid, Whole, Window
 
 Float = NDArray[np.float64]
 
@@ -162,21 +162,21 @@ def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Ast
     off = appendages(window.offset, grid.pixel, delta, corner)[:, inner]
     chainage, arc = grid.chainages(columns), grid.arcs()
     left, right = floor.bounds(chainage)
-    state: NDArray[np.uint8] = _states(window.count[:, inner], off, astray.covers(chainage, arc), arc, left, right)
+    state: NDArray[np.uint8] = _states(window.weight[:, inner], off, astray.covers(chainage, arc), arc, left, right)
     return state
 
 
 @njit(cache=True, nogil=True)
 def _states(
-    count: NDArray[np.int32], off: NDArray[np.bool_], astray: NDArray[np.bool_], arc: Float, left: Float, right: Float
+    weight: Whole, off: NDArray[np.bool_], astray: NDArray[np.bool_], arc: Float, left: Float, right: Float
 ) -> NDArray[np.uint8]:  # pragma: no cover - compiled
-    state = np.empty(count.shape, np.uint8)
-    for i in range(count.shape[0]):
-        for j in range(count.shape[1]):
+    state = np.empty(weight.shape, np.uint8)
+    for i in range(weight.shape[0]):
+        for j in range(weight.shape[1]):
             if arc[i] <= left[j] or arc[i] >= right[j]:
                 state[i, j] = 4
             elif off[i, j] or astray[i, j]:
                 state[i, j] = 3
             else:
-                state[i, j] = 1 if count[i, j] > 0 else 0
+                state[i, j] = 1 if weight[i, j] > 0 else 0
     return state

@@ -32,14 +32,15 @@ class Radiometer:
         Scanner positions.
     reference : ReferenceCurve or None
         Effect of distance; None for reflectance.
-    max_incidence : float
-        Points seen more slantingly are left out, degrees.
+    max_incidence, max_range : float
+        Points seen more slantingly (degrees) or from farther (m) are left out.
     """
 
     kind: Kind
     poses: PoseModel
     reference: ReferenceCurve | None
     max_incidence: float
+    max_range: float
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Seen:
     chainage, arc, offset : float arrays
         Unrolled, m.
     use : bool array
-        Points within the tolerance of the surface, in the kilometre, and whose intensity can be corrected.
+        Points near the surface, in the kilometre, and whose intensity can be corrected.
     lining : bool array
         Those of them that don't lie on the floor.
     views : Views or None
@@ -76,8 +77,8 @@ class Eye:
         The tunnel.
     km : int
         Kilometre.
-    tolerance : float
-        Points farther from the surface are not lining, m.
+    tolerance, recess : float
+        Points that stand in farther from the surface, or lie farther behind it, are not lining, m.
     radiometer : Radiometer or None
         None when the survey has no intensity.
     floor : Floor
@@ -91,6 +92,7 @@ class Eye:
     surface: Surface
     km: int
     tolerance: float
+    recess: float
     radiometer: Radiometer | None
     floor: Floor
     edges: Edges
@@ -98,9 +100,18 @@ class Eye:
 
     @classmethod
     def of(
-        cls, surface: Surface, km: int, tolerance: float, radiometer: Radiometer | None, floor: Floor, halo: float = 0.0
+        cls,
+        surface: Surface,
+        km: int,
+        depth: tuple[float, float],
+        radiometer: Radiometer | None,
+        floor: Floor,
+        halo: float = 0.0,
     ) -> Eye:
-        """Make the eye for a kilometre that the surface covers at least in part, and so many metres beyond its ends."""
+        """Make the eye for a kilometre that the surface covers at least in part, and so many metres beyond its ends.
+
+        ``depth`` is how far in front of the surface and behind it lining is looked for, m: tolerance and recess.
+        """
         start, stop = km * 1000.0, (km + 1) * 1000.0
         touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)
         if not touching.any():
@@ -109,11 +120,11 @@ class Eye:
         start, stop = start - math.ceil(halo), stop + math.ceil(halo)
         touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)
         vertices = surface.segments[touching, :6].reshape(-1, 3)
-        margin = float(surface.radius.max()) + tolerance
+        margin = float(surface.radius.max()) + max(depth)
         return cls(
             surface,
             km,
-            tolerance,
+            *depth,
             radiometer,
             floor,
             Edges.of(surface, start, stop),
@@ -151,7 +162,7 @@ class Eye:
         unrolled = self.surface.unroll(points.xyz)
         start = self.km * 1000.0
         with np.errstate(invalid="ignore"):
-            use = np.abs(unrolled.offset) <= self.tolerance
+            use = (unrolled.offset <= self.tolerance) & (unrolled.offset >= -self.recess)
             use &= (unrolled.chainage >= start) & (unrolled.chainage < start + 1000.0)
         views = None
         if self.radiometer:
@@ -161,6 +172,7 @@ class Eye:
             views = observe(points.xyz, scanner, normals, points.intensity, radiometer.kind, radiometer.reference)
             with np.errstate(invalid="ignore"):
                 use &= views.cosine >= np.cos(np.radians(radiometer.max_incidence))
+                use &= views.range_m <= radiometer.max_range
             use &= np.isfinite(views.raw_db)
         lining = use & ~self.floor.covers(unrolled.chainage, unrolled.arc)
         return Seen(unrolled.chainage, unrolled.arc, unrolled.offset, use, lining, views)
