@@ -39,8 +39,8 @@ COMMENT ON FUNCTION tunnel_api.chainage_parse(text) IS
 'Chainage in m of its text: 12+345.678 -> 12345.678; plain metres are taken as they are.';
 
 
--- Wet area of a stretch of a survey, m² on the lining: the leaks that were found last and are not rejected, cut at both
--- ends. Runs with the owner's rights, for it reads the tables themselves.
+-- Wet area of a stretch of a survey, m² on the lining: the leaks (of kind leak, after judging) that were found last and are
+-- not rejected, cut at both ends. Runs with the owner's rights, for it reads the tables themselves.
 CREATE OR REPLACE FUNCTION tunnel_api.wet_area(survey text, chainage_from float8, chainage_to float8)
 RETURNS float8
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER
@@ -51,7 +51,7 @@ AS $$
     JOIN tunnel.survey s ON s.id = l.survey_id
     CROSS JOIN LATERAL (
         SELECT ST_MakeEnvelope($2, ST_YMin(l.unrolled) - 1, $3, ST_YMax(l.unrolled) + 1) AS stretch) w
-    WHERE s.name = $1 AND l.detected AND l.review <> 'rejected'
+    WHERE s.name = $1 AND l.detected AND l.review <> 'rejected' AND coalesce(l.judged, l.kind) = 'leak'
         AND l.chainage_to > $2 AND l.chainage_from < $3 AND $2 < $3
 $$;
 COMMENT ON FUNCTION tunnel_api.wet_area(text, float8, float8) IS

@@ -78,7 +78,9 @@ BEGIN
         RETURN;
     END IF;
     GRANT UPDATE (geom) ON tunnel_api.axis_vertex TO tunnel_inspector;
-    GRANT UPDATE (review, remark) ON tunnel_api.leak, tunnel_api.leak_unrolled, tunnel_api.leak_map, tunnel_api.leak_3d
+    GRANT UPDATE (review, remark, kind) ON
+        tunnel_api.anomaly, tunnel_api.anomaly_unrolled, tunnel_api.anomaly_map, tunnel_api.anomaly_3d,
+        tunnel_api.leak, tunnel_api.leak_unrolled, tunnel_api.leak_map, tunnel_api.leak_3d
         TO tunnel_inspector;
     GRANT INSERT, DELETE, UPDATE (kind, geom) ON tunnel_api.region TO tunnel_inspector;
 END

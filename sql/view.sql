@@ -17,8 +17,8 @@ COMMENT ON COLUMN tunnel_api.tunnel.spacing IS 'Distance between the vertices of
 COMMENT ON COLUMN tunnel_api.tunnel.geom IS 'Axis as given, in the tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.survey AS
-SELECT s.id, s.tunnel_id, t.name AS tunnel, s.name, s.date, s.platform, s.intensity_dimension, s.intensity_kind, t.srid,
-       s.created_at, f.files, f.points, f.chainage_from, f.chainage_to
+SELECT s.id, s.tunnel_id, t.name AS tunnel, s.name, s.date, s.platform, s.intensity_dimension, s.intensity_kind,
+       s.reference, t.srid, s.created_at, f.files, f.points, f.chainage_from, f.chainage_to
   FROM tunnel.survey s
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
   LEFT JOIN LATERAL (SELECT count(*) AS files, coalesce(sum(kept), 0)::bigint AS points,
@@ -27,6 +27,8 @@ SELECT s.id, s.tunnel_id, t.name AS tunnel, s.name, s.date, s.platform, s.intens
 COMMENT ON VIEW tunnel_api.survey IS 'Scanning campaigns of tunnels, with what is loaded of each';
 COMMENT ON COLUMN tunnel_api.survey.points IS 'Points kept in the database at survey density';
 COMMENT ON COLUMN tunnel_api.survey.intensity_kind IS 'amplitude (dB), reflectance (dB, range removed), linear (counts) or none';
+COMMENT ON COLUMN tunnel_api.survey.reference IS
+    'Range curve of the intensity: none, measured on a target, or auto, from the lining of each kilometre (tunnel_api.range_curve)';
 
 CREATE OR REPLACE VIEW tunnel_api.file AS
 SELECT f.id, f.survey_id, s.name AS survey, f.name, f.path, f.checksum, f.bytes, f.points, f.noise, f.outside, f.thinned,

@@ -1,5 +1,5 @@
--- What may be written through the views, by INSTEAD OF triggers: the position of axis vertices, the review and remark
--- of leaks (view_leak.sql), and regions drawn by hand. The functions run with the owner's rights, so that who edits
+-- What may be written through the views, by INSTEAD OF triggers: the position of axis vertices, review, remark and kind of
+-- leaks and other anomalies (view_anomaly.sql), and regions drawn by hand. The functions run with the owner's rights, so that who edits
 -- needs no right on schema tunnel, and stamp each row with session_user, which stays the person's own name in them.
 
 -- Moves an axis vertex. Frame and unit: the tunnel's SRID, m.
@@ -45,46 +45,57 @@ COMMENT ON FUNCTION tunnel_api.edit_axis_vertex() IS 'Trigger of view axis_verte
 CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.axis_vertex
     FOR EACH ROW EXECUTE FUNCTION tunnel_api.edit_axis_vertex();
 
--- Sets the review status and the remark of a leak; for the views leak, leak_unrolled, leak_map and leak_3d alike.
+-- Sets the review, the remark and the kind of an anomaly; for the views anomaly, leak and those of one geometry alike.
+-- A kind other than the one that was found is noted as judged; the one that was found takes that back.
 -- Geometries, whose columns differ between the views, are never written back.
-CREATE OR REPLACE FUNCTION tunnel_api.review_leak() RETURNS trigger
+CREATE OR REPLACE FUNCTION tunnel_api.review_anomaly() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
 BEGIN
     IF (NEW.id, NEW.survey_id, NEW.survey, NEW.km, NEW.segment, NEW.chainage_from, NEW.chainage_to, NEW.label,
-        NEW.arc_from, NEW.arc_to, NEW.clock, NEW.area, NEW.drop_mean, NEW.drop_max, NEW.image_share, NEW.reviewed_by,
-        NEW.reviewed_at, NEW.detected, NEW.created_at, NEW.detected_at) IS DISTINCT FROM
+        NEW.arc_from, NEW.arc_to, NEW.clock, NEW.found, NEW.reasons, NEW.confidence, NEW.contrast, NEW.area, NEW.drop_mean,
+        NEW.drop_max, NEW.image_share, NEW.reviewed_by, NEW.reviewed_at, NEW.detected, NEW.created_at, NEW.detected_at)
+       IS DISTINCT FROM
        (OLD.id, OLD.survey_id, OLD.survey, OLD.km, OLD.segment, OLD.chainage_from, OLD.chainage_to, OLD.label,
-        OLD.arc_from, OLD.arc_to, OLD.clock, OLD.area, OLD.drop_mean, OLD.drop_max, OLD.image_share, OLD.reviewed_by,
-        OLD.reviewed_at, OLD.detected, OLD.created_at, OLD.detected_at) THEN
-        RAISE EXCEPTION 'of a leak only the review and the remark can be edited'
+        OLD.arc_from, OLD.arc_to, OLD.clock, OLD.found, OLD.reasons, OLD.confidence, OLD.contrast, OLD.area, OLD.drop_mean,
+        OLD.drop_max, OLD.image_share, OLD.reviewed_by, OLD.reviewed_at, OLD.detected, OLD.created_at, OLD.detected_at) THEN
+        RAISE EXCEPTION 'of a leak or another anomaly only the review, the remark and the kind can be edited'
             USING ERRCODE = 'feature_not_supported';
     END IF;
     IF NEW.review IS NULL OR NEW.review NOT IN ('open', 'confirmed', 'rejected') THEN
-        RAISE EXCEPTION 'the review of leak % can be open, confirmed or rejected, not %',
-            OLD.id, coalesce(NEW.review, 'empty')
+        RAISE EXCEPTION 'the review of % % can be open, confirmed or rejected, not %',
+            OLD.kind, OLD.id, coalesce(NEW.review, 'empty')
             USING ERRCODE = 'check_violation';
     END IF;
-    IF (NEW.review, NEW.remark) IS NOT DISTINCT FROM (OLD.review, OLD.remark) THEN
+    IF NEW.kind IS NULL OR NEW.kind NOT IN ('leak', 'joint', 'dark') THEN
+        RAISE EXCEPTION 'the kind of % % can be leak, joint or dark, not %', OLD.kind, OLD.id, coalesce(NEW.kind, 'empty')
+            USING ERRCODE = 'check_violation';
+    END IF;
+    IF (NEW.review, NEW.remark, NEW.kind) IS NOT DISTINCT FROM (OLD.review, OLD.remark, OLD.kind) THEN
         RETURN NEW;
     END IF;
     NEW.reviewed_by := session_user;
     NEW.reviewed_at := clock_timestamp();
-    UPDATE tunnel.anomaly
-       SET review = NEW.review, remark = NEW.remark, reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at
-     WHERE id = OLD.id;
+    UPDATE tunnel.anomaly a
+       SET review = NEW.review, remark = NEW.remark, reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at,
+           judged = CASE WHEN NEW.kind = OLD.kind THEN a.judged ELSE nullif(NEW.kind, a.kind) END
+     WHERE a.id = OLD.id;
     RETURN NEW;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.review_leak() IS 'Trigger of the leak views: sets review and remark and notes who and when';
+COMMENT ON FUNCTION tunnel_api.review_anomaly() IS
+    'Trigger of the views of anomalies and leaks: sets review, remark and kind and notes who and when';
 
-CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.leak
-    FOR EACH ROW EXECUTE FUNCTION tunnel_api.review_leak();
-CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.leak_unrolled
-    FOR EACH ROW EXECUTE FUNCTION tunnel_api.review_leak();
-CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.leak_map
-    FOR EACH ROW EXECUTE FUNCTION tunnel_api.review_leak();
-CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.leak_3d
-    FOR EACH ROW EXECUTE FUNCTION tunnel_api.review_leak();
+DO $$
+DECLARE
+    name text;
+BEGIN
+    FOREACH name IN ARRAY ARRAY['anomaly', 'anomaly_unrolled', 'anomaly_map', 'anomaly_3d',
+                                'leak', 'leak_unrolled', 'leak_map', 'leak_3d'] LOOP
+        EXECUTE format('CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.%I
+                            FOR EACH ROW EXECUTE FUNCTION tunnel_api.review_anomaly()', name);
+    END LOOP;
+END
+$$;
 
 -- Adds, changes or deletes a region drawn by hand in the unrolled plane (m). A new one names its survey by survey_id or,
 -- without that, by name.

@@ -1,0 +1,102 @@
+-- Views of what the leaks of each kilometre sum up to, and of the radiometry they rest on. Needs stretch_statistics
+-- (statistics.sql).
+
+CREATE OR REPLACE VIEW tunnel_api.range_curve AS
+SELECT (r.survey_id::bigint * 1000000 + 500000 + r.km) * 10000 + c.n AS id, r.survey_id, s.name AS survey, r.km,
+       c.range_m, c.intensity_db, c.sigma_db
+  FROM tunnel.range_curve r
+  JOIN tunnel.survey s ON s.id = r.survey_id
+ CROSS JOIN LATERAL unnest(r.range_m, r.intensity_db, r.sigma_db) WITH ORDINALITY AS c (range_m, intensity_db, sigma_db, n);
+COMMENT ON VIEW tunnel_api.range_curve IS
+    'Range curve that was found on the lining of each kilometre, of surveys whose reference is auto: a row a range';
+COMMENT ON COLUMN tunnel_api.range_curve.range_m IS 'Range, m';
+COMMENT ON COLUMN tunnel_api.range_curve.intensity_db IS 'Intensity of dry lining at right angles at this range, dB';
+COMMENT ON COLUMN tunnel_api.range_curve.sigma_db IS 'Standard deviation of the curve''s shape there, dB';
+
+CREATE OR REPLACE VIEW tunnel_api.radiometry AS
+SELECT r.survey_id::bigint * 1000000 + 500000 + r.km AS id, r.survey_id, s.name AS survey, r.km, s.reference,
+       c.range_from, c.range_to, c.range_sigma, r.roughness, r.dry_mean, r.dry_sigma, r.threshold, r.sigma_raw,
+       r.sigma_lambert, r.sigma_oren_nayar, r.regions, r.pixels, r.wet_pixels
+  FROM tunnel.radiometry r
+  JOIN tunnel.survey s ON s.id = r.survey_id
+  LEFT JOIN LATERAL (SELECT min(v.range_m) AS range_from, max(v.range_m) AS range_to, max(v.sigma_db) AS range_sigma
+                       FROM tunnel.range_curve q CROSS JOIN LATERAL unnest(q.range_m, q.sigma_db) AS v (range_m, sigma_db)
+                      WHERE q.survey_id = r.survey_id AND q.km = r.km) c ON true;
+COMMENT ON VIEW tunnel_api.radiometry IS 'Intensity correction of each kilometre (Xu et al., 2018)';
+COMMENT ON COLUMN tunnel_api.radiometry.reference IS 'Range curve of the survey: none, measured or auto';
+COMMENT ON COLUMN tunnel_api.radiometry.range_from IS 'Least range of the curve found on the lining (tunnel_api.range_curve), m; NULL unless the reference is auto';
+COMMENT ON COLUMN tunnel_api.radiometry.range_to IS 'Greatest range of it, m';
+COMMENT ON COLUMN tunnel_api.radiometry.range_sigma IS 'Greatest standard deviation of its shape, dB';
+COMMENT ON COLUMN tunnel_api.radiometry.roughness IS 'Roughness angle of Oren-Nayar, degrees (eq. 13-18)';
+COMMENT ON COLUMN tunnel_api.radiometry.threshold IS 'Corrected intensity below which lining is wet, dB (eq. 19-20)';
+COMMENT ON COLUMN tunnel_api.radiometry.sigma_raw IS 'Standard deviation of dry lining before correction, dB';
+COMMENT ON COLUMN tunnel_api.radiometry.sigma_lambert IS 'The same after correction by Lambert''s law, dB';
+COMMENT ON COLUMN tunnel_api.radiometry.sigma_oren_nayar IS 'The same after correction by Oren-Nayar, dB';
+
+-- Of a kilometre that was detected before there was a coverage the lining seen is what that detection counted: pixels of
+-- lining that hold measurements × the area of a pixel.
+CREATE OR REPLACE VIEW tunnel_api.km_statistics AS
+SELECT s.id::bigint * 1000000 + 500000 + g.km AS id, s.id AS survey_id, s.name AS survey, g.km, g.chainage_from,
+       g.chainage_to, c.lining AS lining_area, d.seen AS seen_area, d.seen / nullif(c.lining, 0) AS seen_share,
+       l.wet_area, l.wet_area / nullif(d.seen, 0) AS wet_share, c.wet / nullif(c.seen, 0) AS wet_pixel_share, l.leaks,
+       l.leaks_open, l.leaks_confirmed, l.leaks_rejected, l.largest_area, l.greatest_drop
+  FROM tunnel.survey s
+  JOIN (SELECT survey_id, km, min(chainage_from) AS chainage_from, max(chainage_to) AS chainage_to
+          FROM tunnel.segment GROUP BY survey_id, km) g ON g.survey_id = s.id
+  LEFT JOIN LATERAL (
+        SELECT sum(v.lining * i.share) AS lining, sum(v.seen * i.share) AS seen, sum(v.wet * i.share) AS wet
+          FROM tunnel.coverage q
+         CROSS JOIN LATERAL unnest(q.lining, q.seen, q.wet) WITH ORDINALITY AS v (lining, seen, wet, n)
+         -- the tunnel may end within the kilometre, even within a step of it
+         CROSS JOIN LATERAL (SELECT greatest(0, least(g.chainage_to - q.km * 1000 - v.n * q.step, 0)
+                                 - greatest(g.chainage_from - q.km * 1000 - v.n * q.step, -q.step)) / q.step AS share) i
+         WHERE q.survey_id = g.survey_id AND q.km = g.km) c ON true
+ CROSS JOIN LATERAL (SELECT coalesce(c.seen, (
+        SELECT (r.counts ->> 'lining_pixels')::float8 * (r.parameters ->> 'image.pixel')::float8 ^ 2
+          FROM tunnel.run r
+         WHERE r.survey_id = g.survey_id AND r.km = g.km AND r.stage = 'detect' AND r.outcome = 'done'
+         ORDER BY r.finished_at DESC, r.id DESC LIMIT 1)) AS seen) d
+ CROSS JOIN LATERAL (
+        SELECT count(*) FILTER (WHERE k.review <> 'rejected') AS leaks,
+               count(*) FILTER (WHERE k.review = 'open') AS leaks_open,
+               count(*) FILTER (WHERE k.review = 'confirmed') AS leaks_confirmed,
+               count(*) FILTER (WHERE k.review = 'rejected') AS leaks_rejected,
+               coalesce(sum(k.area) FILTER (WHERE k.review <> 'rejected'), 0) AS wet_area,
+               max(k.area) FILTER (WHERE k.review <> 'rejected') AS largest_area,
+               max(k.drop_max) FILTER (WHERE k.review <> 'rejected') AS greatest_drop
+          FROM tunnel.anomaly k
+         WHERE k.survey_id = g.survey_id AND k.km = g.km AND k.detected AND coalesce(k.judged, k.kind) = 'leak') l;
+COMMENT ON VIEW tunnel_api.km_statistics IS 'Leaks of each kilometre, summed; without those rejected or no longer found';
+COMMENT ON COLUMN tunnel_api.km_statistics.lining_area IS 'Lining, seen or not, m²; NULL before detection, and after one by an earlier version';
+COMMENT ON COLUMN tunnel_api.km_statistics.seen_area IS 'Lining that the last detection saw, m²; NULL before it';
+COMMENT ON COLUMN tunnel_api.km_statistics.seen_share IS 'seen_area / lining_area';
+COMMENT ON COLUMN tunnel_api.km_statistics.wet_area IS 'Area of the leaks on the lining, m²';
+COMMENT ON COLUMN tunnel_api.km_statistics.wet_share IS 'wet_area / seen_area';
+COMMENT ON COLUMN tunnel_api.km_statistics.wet_pixel_share IS 'Share of wet pixels, after the median filter, in the lining seen (Xu et al., 2018)';
+COMMENT ON COLUMN tunnel_api.km_statistics.leaks IS 'Leaks open or confirmed';
+
+CREATE OR REPLACE VIEW tunnel_api.km_waterproof AS
+SELECT s.id::bigint * 1000000 + 500000 + k.km[t.n] AS id, s.id AS survey_id, s.name AS survey, k.km[t.n] AS km,
+       t.chainage_from, t.chainage_to, t.lining_area, t.seen_share, t.wet_area, t.wet_ratio, t.patches, t.largest_area,
+       t.largest_leak, t.window_patches, t.window_from, t.window_to, t.window_wet_area, t.class
+  FROM tunnel.survey s
+ CROSS JOIN LATERAL (
+        SELECT array_agg(g.km ORDER BY g.km) AS km, array_agg(g.chainage_from ORDER BY g.km) AS starts,
+               array_agg(g.chainage_to ORDER BY g.km) AS ends
+          FROM (SELECT km, min(chainage_from) AS chainage_from, max(chainage_to) AS chainage_to
+                  FROM tunnel.segment WHERE survey_id = s.id GROUP BY km) g) k
+ CROSS JOIN LATERAL tunnel_api.stretch_statistics(s.id, k.starts, k.ends) t;
+COMMENT ON VIEW tunnel_api.km_waterproof IS
+    'Waterproofing of each kilometre by GB 50108-2008, as far as a scan can tell: see leak_statistics and waterproof_class';
+COMMENT ON COLUMN tunnel_api.km_waterproof.lining_area IS 'Lining, seen or not, m²';
+COMMENT ON COLUMN tunnel_api.km_waterproof.seen_share IS 'Share of it that was seen: the rest cannot be certified';
+COMMENT ON COLUMN tunnel_api.km_waterproof.wet_area IS 'Area of the leaks within the kilometre, m²; a leak over its end by its part';
+COMMENT ON COLUMN tunnel_api.km_waterproof.wet_ratio IS 'wet_area, of the lining seen';
+COMMENT ON COLUMN tunnel_api.km_waterproof.patches IS 'Leaks in the kilometre or over its ends';
+COMMENT ON COLUMN tunnel_api.km_waterproof.largest_area IS 'Area of the largest of them, whole, m²';
+COMMENT ON COLUMN tunnel_api.km_waterproof.largest_leak IS 'Its id';
+COMMENT ON COLUMN tunnel_api.km_waterproof.window_patches IS 'Most leaks in any 100 m² of lining';
+COMMENT ON COLUMN tunnel_api.km_waterproof.window_from IS 'Where those 100 m² begin, m';
+COMMENT ON COLUMN tunnel_api.km_waterproof.window_to IS 'Where they end, m';
+COMMENT ON COLUMN tunnel_api.km_waterproof.window_wet_area IS 'Greatest wet area in any 100 m² of lining, m²';
+COMMENT ON COLUMN tunnel_api.km_waterproof.class IS 'Best class that the lining seen keeps; NULL if none was seen';
