@@ -166,9 +166,11 @@ class _Problem:
             tried.append(b)
             losses.append(float(mixed @ along - 2.0 * b @ along[:p] + b @ matrix @ b))
         roughness = _lowest(ROUGHNESS, np.array(losses))
-        share = np.clip((roughness - ROUGHNESS) / (ROUGHNESS[1] - ROUGHNESS[0]) + 1.0, 0.0, 2.0)
-        near = np.where(share <= 1.0, share, 2.0 - share)
-        return _Solution(near @ np.array(tried), roughness, np.array(tried), np.array(losses))
+        # Between two roughnesses coefficients are no straight line, so those at the best are solved for.
+        level = self.cells.level - incidence_db(self.cells.cosine, roughness)
+        rest = level - self.cell_means(level, weights.view)[self.cells.cell]
+        right = within[:, :p].T @ (rest * one) + means[:, :p].T @ (self.cell_means(level, weights.view) * other)
+        return _Solution(one_maximum(matrix, right), roughness, np.array(tried), np.array(losses))
 
     def residuals(self, solution: _Solution) -> Float:
         """Intensity less range and incidence, (n,), dB."""
@@ -269,8 +271,7 @@ def _shared(left: Float, there: Float, cluster: Index, part: Index) -> float:
 def _sums(number: Index, values: Float, weight: Float | None = None, count: int = 0) -> Float:
     """Sums (count, …) of values (n, …), times their weights (n,), of each number."""
     if values.ndim == 1:
-        sums: Float = np.bincount(number, values if weight is None else values * weight, minlength=count)
-        return sums
+        return np.asarray(np.bincount(number, values if weight is None else values * weight, minlength=count), np.float64)
     return np.column_stack([_sums(number, column, weight, count) for column in values.T])
 
 
