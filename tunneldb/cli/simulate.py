@@ -75,6 +75,12 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("range_noise", "M", "Standard deviation along the ray."),
         _Option("outliers", "SHARE", "Share of isolated points, in the air or behind the wall."),
         _Option("relief", "M", "Height of small-scale relief of the lining."),
+        _Option(
+            "range_curve",
+            "NAME",
+            "How intensity falls with range: near_loss (with the loss of near ranges) or inverse_square.",
+            click.Choice(["near_loss", "inverse_square"]),
+        ),
     ],
     "Intensity and contents": [
         _Option("roughness", "DEG", "Oren–Nayar roughness of all surfaces (9 to 20 for concrete)."),
@@ -82,6 +88,20 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("leaks", "N", "Number of leaks [one every 12 m].", int),
         _Option("leak_area", "MIN MAX", "Area of leaks, m².", float, 2),
         _Option("leak_drop", "MIN MAX", "How much darker than dry lining leaks are, dB.", float, 2),
+        _Option("leak_edge", "M", "Width over which a leak goes from dry to wet; its outline lies in the middle."),
+    ],
+    "Make and looks of the lining": [
+        _Option(
+            "lining",
+            "NAME",
+            "plain, cast (blocks), segments (rings of segments with bolt pockets), shotcrete or tiles.",
+            click.Choice(["plain", "cast", "segments", "shotcrete", "tiles"]),
+        ),
+        _Option("ring", "M", "Length of the blocks of cast and of the rings of segments [10, 1.5]."),
+        _Option("soot", "DB", "Darkening of the crown."),
+        _Option("grime", "DB", "Darkening beneath cables and trays."),
+        _Option("patches", "N", "Repaired rectangles, 2 dB darker to 2 dB brighter.", int),
+        _Option("paint", "N", "Painted numbers and stripes in turn, 4 dB darker to 4 dB brighter.", int),
     ],
     "Floor and what stands free": [
         _Option("people", "N", "People standing about.", int),

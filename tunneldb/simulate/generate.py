@@ -12,14 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunneldb.simulate import ground
+from tunneldb.simulate.coat import coat
 from tunneldb.simulate.furniture import FLOOR, RAIL, Appendage, Niche, furnish, refuges
 from tunneldb.simulate.intensity import counts, reference_curve
 from tunneldb.simulate.leaks import Leak, place
+from tunneldb.simulate.marks import Mark, place_marks
 from tunneldb.simulate.overhead import overhead, sleepers
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.placing import stand
 from tunneldb.simulate.profile import slabs
 from tunneldb.simulate.ray import scene, trace
+from tunneldb.simulate.rings import build
 from tunneldb.simulate.scanner import BlockPlan, Scanner
 from tunneldb.simulate.things import TargetSphere, Thing, parts_table
 from tunneldb.simulate.tunnel import Tunnel
@@ -82,8 +85,10 @@ class Simulation:
     parameters : Parameters
     tunnel : Tunnel
         Exact geometry.
-    appendages, niches, leaks : list
+    appendages, niches, leaks, marks : list
         What is in it.
+    rings : Rings
+        How the lining is put together.
     things : list of Thing
         What stands or hangs free, thing i with number i + 1.
     spheres : list of TargetSphere
@@ -95,7 +100,9 @@ class Simulation:
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
         self.tunnel: Tunnel = parameters.tunnel()
-        furniture, wet, reference, self._seed, free, loose = np.random.SeedSequence(parameters.seed).spawn(6)
+        # Later streams come behind, so that a seed keeps its points.
+        streams = np.random.SeedSequence(parameters.seed).spawn(9)
+        furniture, wet, reference, self._seed, free, loose, built, marked, coated = streams
         self.appendages: list[Appendage] = (
             furnish(self.tunnel, np.random.default_rng(furniture)) if parameters.appendages else []
         )
@@ -110,7 +117,12 @@ class Simulation:
             parameters.leak_drop,
             np.random.default_rng(wet),
         )
-        self.reference = reference_curve(parameters.max_range, np.random.default_rng(reference))
+        self.rings = build(parameters, self.tunnel, built)
+        openings = [n.footprint(self.tunnel) for n in self.niches]
+        self.marks: list[Mark] = place_marks(parameters, self.tunnel, [k.polygon for k in self.leaks] + openings, marked)
+        self._coat = coat(parameters, self.tunnel, self.rings, self.appendages, self.marks, coated)
+        self._radiometry = parameters.radiometry()
+        self.reference = reference_curve(parameters.max_range, np.random.default_rng(reference), self._radiometry.near_loss)
         self.scanner = Scanner(parameters, self.tunnel)
         standing, spheres = stand(parameters, self.tunnel, self.scanner, self.appendages, self.niches, free)
         self.spheres: list[TargetSphere] = spheres
@@ -120,6 +132,7 @@ class Simulation:
             self.appendages,
             self.niches,
             self.leaks,
+            parameters.leak_edge,
         )
         solid = self.things + sleepers(parameters, self.tunnel)
         self._parts = parts_table(self.tunnel, solid) if solid else None
@@ -137,6 +150,7 @@ class Simulation:
             self._scene,
             self._parts,
             self._ground,
+            self._coat,
             rays.origin,
             rays.direction,
             rays.hint,
@@ -149,7 +163,7 @@ class Simulation:
         )
         keep = np.flatnonzero(~np.isnan(out[:, 0]))
         out = out[keep]
-        radiometry = p.radiometry()
+        radiometry = self._radiometry
         klass = out[:, 7].astype(np.uint8)
         noise = rng.standard_normal(len(out)) * p.intensity_noise
         reflectance = radiometry.reflectance(out[:, 10], (klass == FLOOR) | (klass == RAIL), out[:, 9]) + noise
@@ -161,7 +175,7 @@ class Simulation:
             scan_id=rays.scan_id[keep],
             amplitude=amplitude.astype(np.float32),
             reflectance=reflectance.astype(np.float32),
-            intensity=counts(amplitude),
+            intensity=counts(amplitude, radiometry.near_loss),
             chainage=out[:, 4].copy(),
             arc=out[:, 5].astype(np.float32),
             offset=out[:, 6].astype(np.float32),

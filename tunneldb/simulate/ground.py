@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.section import Section
+from tunneldb.simulate.texture import mix
 
 Array = NDArray[np.float64]
 
@@ -42,15 +43,6 @@ class Ground(NamedTuple):
     high: float
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _mix(i: int, j: int, salt: int) -> np.uint64:
-    """Scramble a cell's numbers (splitmix64)."""
-    h = np.uint64(i) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(j) * np.uint64(0xC2B2AE3D27D4EB4F) + np.uint64(salt)
-    h = (h ^ (h >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    h = (h ^ (h >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return h ^ (h >> np.uint64(31))
-
-
 @njit(cache=True, nogil=True)
 def stones(x: float, y: float, salt: int) -> float:
     """Height of the stones at a place, in heights of a dome: -1 to 1.5."""
@@ -60,7 +52,7 @@ def stones(x: float, y: float, salt: int) -> float:
     mask = np.uint64(0xFFFF)
     for i in range(-1, 2):
         for j in range(-1, 2):
-            h = _mix(int(fx) + i, int(fy) + j, salt)
+            h = mix(int(fx) + i, int(fy) + j, salt)
             cx = (fx + i + 0.1 + 0.8 * part * float(h & mask)) * CELL
             cy = (fy + j + 0.1 + 0.8 * part * float((h >> np.uint64(16)) & mask)) * CELL
             radius = STONE[0] + (STONE[1] - STONE[0]) * part * float((h >> np.uint64(32)) & mask)

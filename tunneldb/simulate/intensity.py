@@ -25,9 +25,11 @@ SYSTEM_CONSTANT = 54.5
 FULL_SCALE = 50_000.0
 
 
-def range_term(distance: Array) -> Array:
-    """F1: change of amplitude with range (m) of a fixed target, dB."""
+def range_term(distance: Array, near_loss: bool = True) -> Array:
+    """F1: change of amplitude with range (m) of a fixed target, dB: the inverse square, with the loss of near ranges."""
     r = np.asarray(distance, dtype=float)
+    if not near_loss:
+        return np.asarray(-20.0 * np.log10(r))
     near = -np.expm1(-((r / NEAR_RANGE) ** NEAR_POWER))
     return -20.0 * np.log10(r) + 10.0 * np.log10(near)
 
@@ -48,9 +50,10 @@ def oren_nayar(cosine: Array, roughness: float) -> Array:
     return 10.0 * np.log10(a * c + b * (1.0 - c * c))
 
 
-def counts(amplitude: Array) -> NDArray[np.uint16]:
+def counts(amplitude: Array, near_loss: bool = True) -> NDArray[np.uint16]:
     """Linear intensity: power in counts, scaled so that a white target at the best range is at full scale."""
-    peak = SYSTEM_CONSTANT + float(range_term(np.linspace(5.0, 15.0, 101)).max())
+    best = np.linspace(5.0, 15.0, 101) if near_loss else np.array([1.0])
+    peak = SYSTEM_CONSTANT + float(range_term(best, near_loss).max())
     linear = FULL_SCALE * 10.0 ** ((np.asarray(amplitude, dtype=float) - peak) / 10.0)
     return np.clip(np.rint(linear), 1, 65535).astype(np.uint16)
 
@@ -65,11 +68,14 @@ class Radiometry:
         Oren-Nayar standard deviation of facet slope, degrees.
     lining, floor : float
         Reflectance (0 to 1) of concrete walls and of the floor.
+    near_loss : bool
+        Whether the scanner loses near ranges; else its range term is the inverse square.
     """
 
     roughness: float = 12.0
     lining: float = 0.30
     floor: float = 0.15
+    near_loss: bool = True
 
     def reflectance(self, cosine: Array, floor: NDArray[np.bool_], drop: Array) -> Array:
         """Range-free part, dB: incidence, material and drop (dB, positive is darker)."""
@@ -78,18 +84,18 @@ class Radiometry:
 
     def amplitude(self, distance: Array, reflectance: Array) -> Array:
         """Amplitude, dB, from range (m) and the range-free part (dB)."""
-        return SYSTEM_CONSTANT + range_term(distance) + reflectance
+        return SYSTEM_CONSTANT + range_term(distance, self.near_loss) + reflectance
 
 
 # The reference target of Xu et al. (2018): 30 % at normal incidence.
 TARGET_REFLECTANCE = 0.30
 
 
-def reference_curve(furthest: float, rng: np.random.Generator) -> Array:
+def reference_curve(furthest: float, rng: np.random.Generator, near_loss: bool = True) -> Array:
     """Amplitudes of the reference target every metre from 1 m beyond ``furthest`` m; (n, 2): range m, dB.
 
     Averages over a target, so their noise is small (0.02 dB).
     """
     r = np.arange(1.0, math.ceil(furthest) + 2.0)
     level = SYSTEM_CONSTANT + 10.0 * math.log10(TARGET_REFLECTANCE)
-    return np.column_stack([r, level + range_term(r) + rng.normal(0.0, 0.02, r.size)])
+    return np.column_stack([r, level + range_term(r, near_loss) + rng.normal(0.0, 0.02, r.size)])

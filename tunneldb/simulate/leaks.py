@@ -19,8 +19,8 @@ from tunneldb.simulate.tunnel import Tunnel
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-# Half width of the edge over which a patch goes from dry to wet, m.
-EDGE = 0.004
+# Width of the edge over which a patch goes from dry to wet, m.
+EDGE = 0.008
 
 
 @dataclass(frozen=True)

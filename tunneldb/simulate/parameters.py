@@ -35,9 +35,15 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "range_noise": (0.0, 0.05, "m"),
     "outliers": (0.0, 0.2, "(share)"),
     "relief": (0.0, 0.02, "m"),
+    "ring": (0.5, 50.0, "m"),
+    "soot": (0.0, 10.0, "dB"),
+    "grime": (0.0, 10.0, "dB"),
+    "patches": (0, 100_000, "patches"),
+    "paint": (0, 100_000, "paintings"),
     "roughness": (0.0, 60.0, "degrees"),
     "intensity_noise": (0.0, 5.0, "dB"),
     "leaks": (0, 100_000, "leaks"),
+    "leak_edge": (0.002, 0.5, "m"),
     "people": (0, 5000, "people"),
     "equipment": (0, 5000, "things"),
     "bollards": (0, 5000, "bollards"),
@@ -50,6 +56,16 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "walkway": (0.0, 0.6, "m"),
     "carriageway": (0.0, 0.6, "m"),
 }
+
+
+CHOICES: dict[str, tuple[str, ...]] = {
+    "section": ("circular", "horseshoe", "box"),
+    "scanner": ("static", "profiler"),
+    "range_curve": ("near_loss", "inverse_square"),
+    "lining": ("plain", "cast", "segments", "shotcrete", "tiles"),
+}
+# Usual lengths of the blocks of cast lining and of rings of segments, m.
+RINGS = {"cast": 10.0, "segments": 1.5}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,14 +114,23 @@ class Parameters:
     range_noise: float = 0.003
     outliers: float = 0.0005
     relief: float = 0.0
+    range_curve: Literal["near_loss", "inverse_square"] = "near_loss"
 
     roughness: float = 12.0
     intensity_noise: float = 0.35
     leaks: int | None = None
     leak_area: tuple[float, float] = (0.05, 3.0)
     leak_drop: tuple[float, float] = (4.0, 8.0)
+    leak_edge: float = 0.008
     appendages: bool = True
     niches: bool = True
+
+    lining: Literal["plain", "cast", "segments", "shotcrete", "tiles"] = "plain"
+    ring: float | None = None
+    soot: float = 0.0
+    grime: float = 0.0
+    patches: int = 0
+    paint: int = 0
 
     people: int = 0
     equipment: int = 0
@@ -128,10 +153,12 @@ class Parameters:
                 raise UserError(f"{name.replace('_', ' ')} is {value:g}: give {low:g} to {high:g} {unit}")
         if not self.name or any(c in self.name for c in "/\\\0") or self.name.startswith("."):
             raise UserError(f"name {self.name!r} does not make a file name: use letters, digits, - and _")
-        if self.section not in ("circular", "horseshoe", "box"):
-            raise UserError(f"section {self.section!r} is unknown: use circular, horseshoe or box")
-        if self.scanner not in ("static", "profiler"):
-            raise UserError(f"scanner {self.scanner!r} is unknown: use static or profiler")
+        for name, names in CHOICES.items():
+            if getattr(self, name) not in names:
+                *others, last = names
+                raise UserError(
+                    f"{name.replace('_', ' ')} {getattr(self, name)!r} is unknown: use {', '.join(others)} or {last}"
+                )
         if self.radius and not abs(self.radius) >= 50.0:
             raise UserError(f"radius of the curve is {self.radius:g} m: give 50 m or more, or 0 for a straight tunnel")
         if self.straight is not None and not 0.0 <= self.straight <= self.length:
@@ -188,7 +215,12 @@ class Parameters:
 
     def radiometry(self) -> Radiometry:
         """Material of the surfaces."""
-        return Radiometry(roughness=self.roughness)
+        return Radiometry(roughness=self.roughness, near_loss=self.range_curve == "near_loss")
+
+    def ring_length(self) -> float:
+        """Distance between the joints of the lining, m; 0: it has none."""
+        usual = RINGS.get(self.lining, 0.0)
+        return self.ring if usual and self.ring is not None else usual
 
     def leak_count(self) -> int:
         """Number of leaks: as asked, else one every 12 m."""

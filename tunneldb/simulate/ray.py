@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tunneldb.simulate.coat import Coat, level
 from tunneldb.simulate.furniture import (
     APPENDAGE,
     FLOOR,
@@ -55,7 +56,7 @@ class Scene(NamedTuple):
     plan: Array
     profile: Array
     parts: Array
-    ends: Array  # chainage of both ends, arc of the floor's corner, reach of the appendages off the lining
+    ends: Array  # chainage of both ends, arc of the floor's corner, reach of the appendages off the lining, half a leak's edge
     items: Array
     item_bins: Index
     item_list: Index
@@ -69,8 +70,8 @@ class Scene(NamedTuple):
     leak_list: Index
 
 
-def scene(tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: list[Leak]) -> Scene:
-    """Lay a tunnel and its contents out for the kernels."""
+def scene(tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: list[Leak], edge: float = EDGE) -> Scene:
+    """Lay a tunnel and its contents out for the kernels; leaks go from dry to wet over ``edge`` m."""
     line = tunnel.line
     item_rows, niche_rows = appendage_table(tunnel, items), niche_table(tunnel, niches)
     edges, first, leak_rows = edge_table(leaks)
@@ -79,7 +80,7 @@ def scene(tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: li
         line.plan,
         line.profile,
         tunnel.section.parts,
-        np.array([line.start, line.end, tunnel.section.floor_arc, 1.1 * reach + 0.02]),
+        np.array([line.start, line.end, tunnel.section.floor_arc, 1.1 * reach + 0.02, 0.5 * edge]),
         item_rows,
         *bins(item_rows[:, 1], item_rows[:, 2], line.start, line.end),
         niche_rows,
@@ -251,15 +252,16 @@ def _uneven(sc: Scene, ground: Ground, o: Array, d: Array, s: float, r: float, o
 @njit(cache=True, nogil=True)
 def _wetness(sc: Scene, s: float, arc: float) -> tuple[int, float]:
     """Number of the leak that holds a point of the lining (-1: none) and drop there, dB."""
+    edge = sc.ends[4]
     b = bin_of(s, sc.ends[0], sc.leak_bins)
     for j in range(sc.leak_bins[b], sc.leak_bins[b + 1]):
         i = sc.leak_list[j]
         row = sc.leaks[i]
-        if s < row[0] - EDGE or s > row[2] + EDGE or arc < row[1] - EDGE or arc > row[3] + EDGE:
+        if s < row[0] - edge or s > row[2] + edge or arc < row[1] - edge or arc > row[3] + edge:
             continue
         depth = depth_inside(sc.edges, sc.edge_first[i], sc.edge_first[i + 1], s, arc)
-        if depth > -EDGE:
-            share = min(0.5 * (depth + EDGE) / EDGE, 1.0)
+        if depth > -edge:
+            share = min(0.5 * (depth + edge) / edge, 1.0)
             return (i if depth > 0.0 else -1), row[4] * share * share * (3.0 - 2.0 * share)
     return -1, 0.0
 
@@ -269,6 +271,7 @@ def trace(
     sc: Scene,
     parts: Parts | None,
     ground: Ground | None,
+    coat: Coat | None,
     origin: Array,
     direction: Array,
     hint: Array,
@@ -283,8 +286,9 @@ def trace(
 
     Parameters
     ----------
-    parts, ground
-        What stands free and the uneven floor. Without them (None) the kernel is compiled without what they need.
+    parts, ground, coat
+        What stands free, the uneven floor, and how bright the lining is from place to place. Without them (None) the
+        kernel is compiled without what they need.
     origin, direction : (n, 3)
         From the line's origin, m; unit vectors.
     hint : (n,)
@@ -340,6 +344,8 @@ def trace(
                 r, cosine, klass = hit, c, NICHE
             else:
                 leak, drop = _wetness(sc, s, arc)
+                if coat is not None:
+                    drop -= level(coat, s, arc)
                 if relief > 0.0:
                     height = relief * bump(s, arc, 0.12)
         behind = wall
