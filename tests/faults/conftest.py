@@ -46,7 +46,7 @@ def _survey(folder: Path, last: int) -> Iterator[Survey]:
         assert [row for row in runs(project) if row[3] != 1] == []
         assert {row[2:4] for row in survey.undisturbed["status"]} == {("done", False)}
         assert survey.undisturbed["jobs"] == survey.undisturbed["incoming"] == survey.undisturbed["scratch"] == []
-        assert len(survey.undisturbed["leak"]) >= 2 * last - 1
+        assert len(survey.undisturbed["anomaly"]) >= 2 * last - 1
         yield survey
     finally:
         project.close()

@@ -40,12 +40,12 @@ def test_bad_file_fails_its_kilometres_alone(short: Survey, tmp_path: Path) -> N
 def test_comparison_sees_what_is_lost_or_doubled(short: Survey) -> None:
     """Otherwise nothing here could fail."""
     good = short.undisturbed
-    leak = (*good["leak"][0][:6], good["leak"][0][6] * 1.0001, *good["leak"][0][7:])
+    leak = (*good["anomaly"][0][:6], good["anomaly"][0][6] * 1.0001, *good["anomaly"][0][7:])
     moved = good["point"].copy()
     moved["segment"][7] += 1
     for name, rows in {
         "point": good["point"][1:],
-        "leak": [leak, *good["leak"][1:]],
+        "anomaly": [leak, *good["anomaly"][1:]],
         "image": [(*good["image"][0][:3], good["image"][0][3] + b"\0"), *good["image"][1:]],
         "tables": [*good["tables"], ("fragment_s1_f1_km1",)],
     }.items():

@@ -16,6 +16,7 @@ from tunneldb.leak.judge import Verdict, judge
 from tunneldb.leak.picture import WET_EDGE
 from tunneldb.leak.region import Region, regions
 from tunneldb.leak.relative import Relative
+from tunneldb.leak.rim import settle
 from tunneldb.leak.threshold import dark_pixels, filter_size
 
 Float = NDArray[np.float64]
@@ -119,7 +120,7 @@ def detect(relative: Relative, dry: DryMap, min_area: float) -> Detection:
     wet = np.zeros(state.shape, np.bool_)
     if not dry.count:
         return Detection([], [], wet.copy(), wet, size, pixels, 0)
-    dark = dark_pixels(relative, size)
+    dark = settle(dark_pixels(relative, size), relative, size)
     found, cut, leaks = [], [], []
     ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
     for region in regions(dark, relative, min_area):

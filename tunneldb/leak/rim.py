@@ -1,0 +1,113 @@
+"""The rim of dark regions, where half of their own contrast is reached."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tunneldb.leak.inside import inside
+from tunneldb.leak.raster import NODATA
+from tunneldb.leak.relative import Relative
+from tunneldb.leak.threshold import MEDIAN
+
+Mask = NDArray[np.bool_]
+
+BAND = 2
+"""Pixels to both sides of the rim that may change sides, each time."""
+
+TIMES = 2
+"""How many times they may."""
+
+CONTRAST = 6
+"""Half the side of the window in which the contrast of a region is taken, pixels."""
+
+FEW = 5
+"""Fewer pixels tell no mean."""
+
+
+def settle(dark: Mask, relative: Relative, size: int) -> Mask:
+    """Move the rim of dark regions to where half of their contrast is reached.
+
+    The threshold of three sigma lies at the outermost edge of a strongly wet patch and at the innermost of a weak one; a mean
+    passes half of the contrast just where the edge is, whatever the contrast, the beam's footprint and the noise.
+
+    Parameters
+    ----------
+    dark : (rows, columns) bool array
+        Dark pixels by the threshold; changed in place.
+    relative : Relative
+        Their drop.
+    size : int
+        Side of the median filter that they went through, pixels.
+
+    Returns
+    -------
+    (rows, columns) bool array
+        The same array.
+    """
+    half = max(1, size // 2 - MEDIAN // 2 + 1)
+    for _ in range(TIMES):
+        row, column, becomes = _settled(dark, relative.drop, relative.state, half)
+        dark[row, column] = becomes
+    for columns, mask in inside(relative.grid, relative.drawn):
+        dark[:, columns][mask] = False
+    return dark
+
+
+@njit(cache=True, nogil=True)
+def _settled(
+    dark: Mask, drop: NDArray[np.int16], state: NDArray[np.uint8], half: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32], Mask]:  # pragma: no cover - compiled
+    """Pixels near the rim that change sides, and to which."""
+    rows, columns = dark.shape
+    near = np.zeros((rows, columns), np.bool_)
+    count = 0
+    for i in range(rows):
+        for j in range(columns):
+            if (j + 1 < columns and dark[i, j] != dark[i, j + 1]) or (i + 1 < rows and dark[i, j] != dark[i + 1, j]):
+                for m in range(max(i - BAND + 1, 0), min(i + BAND + 1, rows)):
+                    for n in range(max(j - BAND + 1, 0), min(j + BAND + 1, columns)):
+                        count += not near[m, n]
+                        near[m, n] = True
+    row, column, becomes = np.empty(count, np.int32), np.empty(count, np.int32), np.empty(count, np.bool_)
+    count = 0
+    for i in range(rows):
+        for j in range(columns):
+            if not near[i, j] or state[i, j] > 2:
+                continue
+            contrast, held = _core(dark, drop, i, j)
+            if held < FEW:
+                continue
+            level, seen = _level(drop, state, i, j, half)
+            if seen >= FEW and (2.0 * level > contrast) != dark[i, j]:
+                row[count], column[count], becomes[count] = i, j, not dark[i, j]
+                count += 1
+    return row[:count], column[:count], becomes[:count]
+
+
+@njit(cache=True, nogil=True)
+def _core(dark: Mask, drop: NDArray[np.int16], i: int, j: int) -> tuple[float, int]:  # pragma: no cover - compiled
+    """Mean drop of the dark pixels about one that lie within dark ones, and how many there are."""
+    rows, columns = dark.shape
+    total, held = 0.0, 0
+    for m in range(max(i - CONTRAST, 1), min(i + CONTRAST + 1, rows - 1)):
+        for n in range(max(j - CONTRAST, 1), min(j + CONTRAST + 1, columns - 1)):
+            if dark[m, n] and drop[m, n] != NODATA and dark[m - 1, n] and dark[m + 1, n] and dark[m, n - 1] and dark[m, n + 1]:
+                total += drop[m, n]
+                held += 1
+    return total / max(held, 1), held
+
+
+@njit(cache=True, nogil=True)
+def _level(
+    drop: NDArray[np.int16], state: NDArray[np.uint8], i: int, j: int, half: int
+) -> tuple[float, int]:  # pragma: no cover - compiled
+    """Mean drop of the lining about a pixel, and of how many pixels it is."""
+    total, seen = 0.0, 0
+    for m in range(max(i - half, 0), min(i + half + 1, drop.shape[0])):
+        for n in range(max(j - half, 0), min(j + half + 1, drop.shape[1])):
+            if 1 <= state[m, n] <= 2 and drop[m, n] != NODATA:
+                total += drop[m, n]
+                seen += 1
+    return total / max(seen, 1), seen
