@@ -129,7 +129,7 @@ def test_smaller_picture_shows_the_commonest_class() -> None:
     values[:2, :2] = [[2, 64], [64, 0]]
     values[2:, :2] = [[0, 0], [0, 66]]
     values[:2, 2:4] = [[2, 2], [67, 67]]
-    small = preview.shrink_classes(values, 2)
+    small = preview.shrink_codes(values, 2)
     assert small[:, :2].tolist() == [[64, 67], [66, pytest.approx(np.nan, nan_ok=True)]]
     assert np.isnan(small[:, 2]).all()
 

@@ -6,21 +6,40 @@ from pathlib import Path
 from typing import cast
 
 import click
+import psycopg
 from rich.console import Console
 
 from tunneldb.cli.main import Settings
-from tunneldb.database import connect, get_survey
+from tunneldb.cli.tables import print_table
+from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
 from tunneldb.export.atomic import replacing
-from tunneldb.export.leaks import Geometry, Leak, as_csv, as_geojson, as_table, read_leaks, write_gpkg
+from tunneldb.export.leaks import (
+    Anomaly,
+    Geometry,
+    Kind,
+    as_csv,
+    as_geojson,
+    as_table,
+    read_leaks,
+    total,
+    write_gpkg,
+)
 from tunneldb.job.run import loaded_kilometres, parse_km
 
 _BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
-_WIDTH = 160
+_WIDTH = 180
 
 
 @click.command()
 @click.argument("survey")
+@click.option(
+    "--kind",
+    type=click.Choice(["leak", "joint", "dark", "all"]),
+    default="leak",
+    show_default=True,
+    help="What to list: leaks, joints, what else is dark but dry, or all of it.",
+)
 @click.option(
     "--geometry",
     type=click.Choice(["unrolled", "map", "3d"]),
@@ -36,46 +55,81 @@ _WIDTH = 160
 )
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write.")
 @click.option("--km", metavar="A-B", help="Only these kilometres: 12 or 12-14.")
-@click.option("--min-area", type=click.FloatRange(min=0), default=0.0, metavar="M2", help="Only leaks of at least so many m².")
+@click.option("--min-area", type=click.FloatRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
+@click.option("--by-km", is_flag=True, help="Leaks of each kilometre summed up instead, with its class of waterproofing.")
 @click.pass_obj
 def leaks(
-    settings: Settings, survey: str, geometry: str, form: str | None, output: Path | None, km: str | None, min_area: float
+    settings: Settings,
+    survey: str,
+    kind: str,
+    geometry: str,
+    form: str | None,
+    output: Path | None,
+    km: str | None,
+    min_area: float,
+    by_km: bool,
 ) -> None:
-    """List the leaks of SURVEY, or export them."""
-    chosen = cast(Geometry, geometry)
+    """List the leaks of SURVEY, or what else is dark on its lining, or export them.
+
+    With --by-km a line for each kilometre: wet area and number of leaks, the most in any 100 m² of lining, and the best
+    class of GB 50108-2008 that the lining seen keeps, as far as a scan can tell. Any other stretch, and what breaks a
+    class: SELECT * FROM tunnel_api.waterproof_class(survey, from, to).
+    """
+    chosen, what = cast(Geometry, geometry), cast(Kind, kind)
     form = form or (_BY_SUFFIX.get(output.suffix.lower(), "table") if output else "table")
     if form == "gpkg" and output is None:
         raise UserError("a GeoPackage needs a file to be written to: add -o leaks.gpkg")
+    if by_km and (output is not None or form != "table" or kind != "leak" or min_area > 0):
+        raise UserError("--by-km prints a table of all leaks; elsewhere read the view tunnel_api.km_waterproof")
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
         kilometres = parse_km(km, loaded_kilometres(conn, found)) if km else None
-        rows = read_leaks(conn, found, chosen, kilometres, min_area)
+        if by_km:
+            _print_classes(conn, found, kilometres)
+            return
+        rows = read_leaks(conn, found, chosen, kilometres, min_area, what)
     if output is None:
-        _print(rows, form, chosen, found.srid, found.name)
+        _print(rows, form, chosen, what, found)
         return
     with replacing(output) as temporary:
         if form == "gpkg":
-            write_gpkg(temporary, rows, chosen, found.srid)
+            write_gpkg(temporary, rows, chosen, found.srid, what)
         else:
-            temporary.write_text(_text(rows, form, chosen, found.srid, found.name), encoding="utf-8")
-    click.echo(f"{len(rows)} leaks to {output}", err=True)
+            temporary.write_text(_text(rows, form, chosen, what, found), encoding="utf-8")
+    click.echo(f"{total(rows, what)} to {output}", err=True)
 
 
-def _print(rows: list[Leak], form: str, geometry: Geometry, srid: int, name: str) -> None:
+def _print_classes(conn: psycopg.Connection, survey: Survey, kilometres: list[int] | None) -> None:
+    rows = conn.execute(
+        "SELECT km, lining_area, seen_share, wet_area, 1000 * wet_ratio, patches, largest_area, window_patches, class"
+        " FROM tunnel_api.km_waterproof WHERE survey_id = %(survey)s AND (%(km)s::int[] IS NULL OR km = ANY (%(km)s))"
+        " ORDER BY km",
+        {"survey": survey.id, "km": kilometres},
+    ).fetchall()
+    header = ("km", "lining m²", "seen %", "wet m²", "wet ‰", "leaks", "largest m²", "in 100 m²", "class")
+    formats = ("d", ".0f", ".1%", ".2f", ".2f", "d", ".2f", "d", "d")
+    lines = [
+        ["-" if value is None else format(value, form).removesuffix("%") for value, form in zip(row, formats, strict=True)]
+        for row in rows
+    ]
+    print_table(header, lines, right=range(len(header)))
+
+
+def _print(rows: list[Anomaly], form: str, geometry: Geometry, kind: Kind, survey: Survey) -> None:
     if form == "table":
         console = Console()
         if not console.is_terminal:
             console = Console(width=_WIDTH)
-        console.print(as_table(rows, name))
+        console.print(as_table(rows, survey.name, kind))
     else:
-        click.echo(_text(rows, form, geometry, srid, name), nl=False)
+        click.echo(_text(rows, form, geometry, kind, survey), nl=False)
 
 
-def _text(rows: list[Leak], form: str, geometry: Geometry, srid: int, name: str) -> str:
+def _text(rows: list[Anomaly], form: str, geometry: Geometry, kind: Kind, survey: Survey) -> str:
     if form == "csv":
         return as_csv(rows)
     if form == "geojson":
-        return as_geojson(rows, geometry, srid)
+        return as_geojson(rows, geometry, survey.srid, kind)
     console = Console(width=_WIDTH, record=True, quiet=True)
-    console.print(as_table(rows, name))
+    console.print(as_table(rows, survey.name, kind))
     return console.export_text()

@@ -10,13 +10,16 @@ import psycopg
 from numpy.typing import NDArray
 
 from tunneldb.database import Survey
-from tunneldb.export.cog import NO_CLASS
+from tunneldb.export.palette import PALETTES
 from tunneldb.geometry.surface import Surface
 from tunneldb.ground.classes import Klass
 from tunneldb.job.scene import load_scene
 from tunneldb.leak.raster import Raster
 
 Float = NDArray[np.float64]
+
+NO_CLASS = PALETTES["class"].nodata
+"""Value of a pixel without a class."""
 
 SEAM = 1e-3
 """Points are kept so far from the ends of a section, m."""

@@ -14,11 +14,8 @@ from affine import Affine
 from numpy.typing import NDArray
 from rasterio.windows import Window
 
-from tunneldb.export.palette import COLOURS
+from tunneldb.export.palette import PALETTES
 from tunneldb.leak.raster import UNIT
-
-NO_CLASS = 0
-"""Value of a pixel without a class."""
 
 
 @dataclass(frozen=True)
@@ -46,30 +43,30 @@ def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int,
     path : Path
         File to write.
     kind : str
-        Intensities and offset are written in single precision, NaN for nothing; ``class`` in 8 bits with a colour
-        table, 0 for nothing.
+        Intensities and offset are written in single precision, NaN for nothing; classes and states in 8 bits with a
+        colour table.
     extent : Extent
         Place and size of the image.
     blocks : iterable of (int, (rows, columns) array)
         First column and pixels of each block.
     """
     plain = path.with_name(f"plain-{path.name}")
-    classes = kind == "class"
+    palette = PALETTES.get(kind)
     with rasterio.open(
         plain, "w", driver="GTiff", height=extent.rows, width=extent.columns, count=1, transform=extent.transform,
-        dtype="uint8" if classes else "float32", nodata=NO_CLASS if classes else np.nan,
+        dtype="uint8" if palette else "float32", nodata=palette.nodata if palette else np.nan,
         tiled=True, blockxsize=256, blockysize=256, bigtiff="if_safer",
     ) as image:  # fmt: skip
         image.set_band_description(1, kind)
-        if classes:
-            image.write_colormap(1, {int(klass): (*colour, 255) for klass, colour in COLOURS.items()})
-            image.update_tags(1, **{f"CLASS_{int(klass)}": klass.name.lower() for klass in COLOURS})
+        if palette:
+            image.write_colormap(1, {code: (*colour, 255) for code, (_, colour) in palette.entries.items()})
+            image.update_tags(1, **{f"{kind.upper()}_{code}": name for code, (name, _) in palette.entries.items()})
         else:
             image.units = (UNIT[kind],)
         for column, pixels in blocks:
             image.write(pixels, 1, window=Window(column, 0, pixels.shape[1], extent.rows))
     rasterio.shutil.copy(
-        str(plain), str(path), driver="COG", compress="DEFLATE", predictor="NO" if classes else "YES",
-        overview_resampling="MODE" if classes else "AVERAGE", bigtiff="IF_SAFER",
+        str(plain), str(path), driver="COG", compress="DEFLATE", predictor="NO" if palette else "YES",
+        overview_resampling="MODE" if palette else "AVERAGE", bigtiff="IF_SAFER",
     )  # fmt: skip
     plain.unlink()

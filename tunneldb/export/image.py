@@ -17,6 +17,7 @@ from tunneldb.export import preview
 from tunneldb.export.atomic import replacing
 from tunneldb.export.classes import ClassPainter
 from tunneldb.export.cog import Extent, write_cog
+from tunneldb.export.palette import PALETTES
 from tunneldb.leak.raster import KINDS, Raster, decode
 
 
@@ -31,9 +32,9 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
 
     All are of one moment; the connection must be idle.
 
-    The GeoTIFFs hold dB or m as single-precision numbers, NaN where no point fell, or the code of a class, 0 where no point
-    fell; x is the chainage and y the arc, m. Each file appears whole. Classes are there when stage ground has run: they are
-    computed from the offset image and what that stage has stored.
+    The GeoTIFFs hold dB or m as single-precision numbers, NaN where no point fell, the state of a pixel, or the code of a
+    class, 0 where no point fell; x is the chainage and y the arc, m. Each file appears whole. Classes are there when stage
+    ground has run: they are computed from the offset image and what that stage has stored.
 
     Returns
     -------
@@ -41,7 +42,7 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
         Files written.
     """
     with snapshot(conn):
-        return [path for kind in (*KINDS, "class") for path in _export_kind(conn, survey, km, kind, folder)]
+        return [path for kind in (*KINDS, *PALETTES) for path in _export_kind(conn, survey, km, kind, folder)]
 
 
 def _export_kind(conn: psycopg.Connection, survey: Survey, km: int, kind: str, folder: Path) -> list[Path]:
@@ -70,6 +71,7 @@ _TITLES = {
     "raw": "raw intensity",
     "corrected": "corrected intensity",
     "offset": "offset from the section surface",
+    "state": "states",
     "class": "classes",
 }
 
@@ -91,7 +93,7 @@ class _Sheet:
     def note(self, west: float, pixels: NDArray[Any]) -> None:
         """Take a block that begins at a chainage, m."""
         shrink: Callable[[NDArray[Any], int], preview.Single] = (
-            preview.shrink_classes if pixels.dtype == np.uint8 else preview.shrink
+            preview.shrink_codes if pixels.dtype == np.uint8 else preview.shrink
         )
         self._blocks.append((west, shrink(pixels, self._factor)))
 
@@ -117,10 +119,12 @@ def _pixels(
     painter: ClassPainter | None,
     sheet: _Sheet,
 ) -> Iterator[tuple[int, NDArray[Any]]]:
-    """First column and pixels of each stored block, or their classes; the sheet takes note of them."""
+    """First column and pixels of each stored block, codes in 8 bits, or their classes; the sheet takes note of them."""
     for block in blocks:
         raster = _read(conn, survey, km, kind, block)
         pixels: NDArray[Any] = raster.values if painter is None else painter.paint(raster)
+        if kind in PALETTES:
+            pixels = pixels.astype(np.uint8, copy=False)
         sheet.note(raster.transform.c, pixels)
         yield (block - blocks[0]) * pixels.shape[1], pixels
 
@@ -155,7 +159,8 @@ def _read(conn: psycopg.Connection, survey: Survey, km: int, kind: str, block: i
 def _leaks(conn: psycopg.Connection, survey: Survey, km: int) -> list[Polygon]:
     rows = conn.execute(
         "SELECT public.ST_AsBinary(unrolled) FROM tunnel.anomaly"
-        " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected' ORDER BY id",
+        " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected'"
+        " AND coalesce(judged, kind) = 'leak' ORDER BY id",
         (survey.id, km * 1000.0, (km + 1) * 1000.0),
     )
     return [shapely.from_wkb(bytes(wkb)) for (wkb,) in rows]

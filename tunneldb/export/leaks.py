@@ -1,4 +1,4 @@
-"""Leaks as a table, CSV, GeoJSON or GeoPackage."""
+"""Leaks, joints and other dark spots as a table, CSV, GeoJSON or GeoPackage."""
 
 from __future__ import annotations
 
@@ -26,15 +26,19 @@ from tunneldb.database import Survey
 Geometry = Literal["unrolled", "map", "3d"]
 """Unrolled plane (chainage, arc); map strip beside the axis; on the surface in space."""
 
+Kind = Literal["leak", "joint", "dark", "all"]
+"""What is listed: leaks, joints, what else is dark but dry, or all of it."""
+
 DECIMALS = 4
 """Decimals of coordinates in text, m."""
 
+_PLURAL = {"leak": "leaks", "joint": "joints", "dark": "dark spots", "all": "anomalies"}
 _COLUMN = {"unrolled": "unrolled", "map": "map", "3d": "surface"}
 
 
 @dataclass(frozen=True)
-class Leak:
-    """A leak as it is listed.
+class Anomaly:
+    """A leak, a joint or another dark spot as it is listed.
 
     Attributes
     ----------
@@ -48,6 +52,14 @@ class Leak:
         m from the crown, positive to the right looking up-chainage.
     clock : float
         Hours.
+    kind : str
+        leak, joint or dark: as an inspector judged it, else as found.
+    confidence : float or None
+        That it is what detection takes it for, 0 to 1.
+    reasons : list of str
+        Why detection takes it for that.
+    contrast : float or None
+        Mean drop in standard deviations of the dry lining about it.
     area : float
         On the surface, m².
     drop_mean, drop_max : float
@@ -72,6 +84,10 @@ class Leak:
     arc_from: float
     arc_to: float
     clock: float
+    kind: str
+    confidence: float | None
+    reasons: list[str]
+    contrast: float | None
     area: float
     drop_mean: float
     drop_max: float
@@ -83,7 +99,7 @@ class Leak:
     geometry: Polygon
 
 
-COLUMNS = tuple(f.name for f in fields(Leak) if f.name != "geometry")
+COLUMNS = tuple(f.name for f in fields(Anomaly) if f.name != "geometry")
 
 
 def read_leaks(
@@ -92,8 +108,9 @@ def read_leaks(
     geometry: Geometry = "unrolled",
     kilometres: Sequence[int] | None = None,
     min_area: float = 0.0,
-) -> list[Leak]:
-    """Read the leaks of a survey in order of chainage.
+    kind: Kind = "leak",
+) -> list[Anomaly]:
+    """Read the leaks of a survey, or what else is dark on its lining, in order of chainage.
 
     Those that the last detection found, and those that an inspector confirmed although it did not.
 
@@ -107,24 +124,31 @@ def read_leaks(
         Only these.
     min_area : float
         Smaller ones are left out, m².
+    kind : {'leak', 'joint', 'dark', 'all'}
+        What to read.
     """
     query = sql.SQL(
-        "SELECT {columns}, public.ST_AsBinary({geometry}) FROM tunnel_api.leak"
+        "SELECT {columns}, public.ST_AsBinary({geometry}) FROM tunnel_api.anomaly"
         " WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed')"
         " AND (%(km)s::int[] IS NULL OR km = ANY (%(km)s)) AND area >= %(min_area)s"
+        " AND %(kind)s IN (kind, 'all')"
         " ORDER BY chainage_from, arc_from, id"
     ).format(columns=sql.SQL(", ").join(map(sql.Identifier, COLUMNS)), geometry=sql.Identifier(_COLUMN[geometry]))
     wanted = None if kilometres is None else list(kilometres)
-    rows = conn.execute(query, {"survey": survey.id, "km": wanted, "min_area": min_area}).fetchall()
+    rows = conn.execute(query, {"survey": survey.id, "km": wanted, "min_area": min_area, "kind": kind}).fetchall()
     names = [*COLUMNS, "geometry"]
-    return [Leak(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True))) for row in rows]
+    return [Anomaly(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True))) for row in rows]
 
 
-def as_table(leaks: Sequence[Leak], title: str) -> Table:
-    """Lay leaks out for a terminal."""
-    table = Table(title=title, caption=_total(leaks))
-    for heading in ("id", "chainage", "length m", "arc m", "clock", "area m²", "drop dB", "max dB", "image", "review", "by"):
-        table.add_column(heading, justify="left" if heading in ("review", "by") else "right", no_wrap=True)
+def as_table(leaks: Sequence[Anomaly], title: str, kind: Kind) -> Table:
+    """Lay leaks or what else was read out for a terminal."""
+    table = Table(title=title, caption=total(leaks, kind))
+    left = ("kind", "review", "by")
+    for heading in (
+        *("id", "chainage", "length m", "arc m", "clock", "kind", "conf.", "contrast", "area m²", "drop dB", "max dB", "image"),
+        *("review", "by"),
+    ):
+        table.add_column(heading, justify="left" if heading in left else "right", no_wrap=True)
     for leak in leaks:
         table.add_row(
             str(leak.id),
@@ -132,6 +156,9 @@ def as_table(leaks: Sequence[Leak], title: str) -> Table:
             f"{leak.chainage_to - leak.chainage_from:.2f}",
             f"{leak.arc_from:+.2f} to {leak.arc_to:+.2f}",
             clock_label(leak.clock),
+            leak.kind,
+            "" if leak.confidence is None else f"{leak.confidence:.2f}",
+            "" if leak.contrast is None else f"{leak.contrast:.1f}",
             f"{leak.area:.2f}",
             f"{leak.drop_mean:.1f}",
             f"{leak.drop_max:.1f}",
@@ -148,11 +175,12 @@ def clock_label(hours: float) -> str:
     return f"{minutes // 60 or 12}:{minutes % 60:02d}"
 
 
-def _total(leaks: Sequence[Leak]) -> str:
-    return f"{len(leaks)} leaks, {sum(leak.area for leak in leaks):.2f} m²"
+def total(leaks: Sequence[Anomaly], kind: Kind) -> str:
+    """Say how many there are and how large they are together."""
+    return f"{len(leaks)} {_PLURAL[kind]}, {sum(leak.area for leak in leaks):.2f} m²"
 
 
-def as_csv(leaks: Sequence[Leak]) -> str:
+def as_csv(leaks: Sequence[Anomaly]) -> str:
     """Write leaks as CSV with a header; the last column, ``geometry``, is WKT."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -163,13 +191,13 @@ def as_csv(leaks: Sequence[Leak]) -> str:
     return out.getvalue()
 
 
-def as_geojson(leaks: Sequence[Leak], geometry: Geometry, srid: int) -> str:
+def as_geojson(leaks: Sequence[Anomaly], geometry: Geometry, srid: int, kind: Kind) -> str:
     """Write leaks as a GeoJSON FeatureCollection in the coordinates of the chosen geometry.
 
     Map and space carry the tunnel's coordinate system in a ``crs`` member, as GDAL and QGIS read it; the
     unrolled plane has none.
     """
-    collection: dict[str, Any] = {"type": "FeatureCollection", "name": layer_name(geometry)}
+    collection: dict[str, Any] = {"type": "FeatureCollection", "name": layer_name(geometry, kind)}
     if geometry != "unrolled":
         collection["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{srid}"}}
     collection["features"] = [
@@ -184,19 +212,22 @@ def as_geojson(leaks: Sequence[Leak], geometry: Geometry, srid: int) -> str:
     return json.dumps(collection, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def write_gpkg(path: Path, leaks: Sequence[Leak], geometry: Geometry, srid: int) -> None:
+def write_gpkg(path: Path, leaks: Sequence[Anomaly], geometry: Geometry, srid: int, kind: Kind) -> None:
     """Write leaks as a GeoPackage with one layer; the unrolled plane is an undefined Cartesian system there."""
     data = [np.array([getattr(leak, name) for leak in leaks], dtype=_GPKG_TYPE.get(name, object)) for name in COLUMNS]
+    data[COLUMNS.index("reasons")] = np.array([_plain(leak.reasons) for leak in leaks], dtype=object)
     moments = [leak.reviewed_at for leak in leaks]
     data[COLUMNS.index("reviewed_at")] = np.array(
         [np.datetime64("NaT") if m is None else _utc(m) for m in moments], dtype="datetime64[ms]"
     )
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "'crs' was not provided")  # the unrolled plane has none
-        _write_layer(path, leaks, data, geometry, srid)
+        _write_layer(path, leaks, data, geometry, srid, layer_name(geometry, kind))
 
 
-def _write_layer(path: Path, leaks: Sequence[Leak], data: list[NDArray[Any]], geometry: Geometry, srid: int) -> None:
+def _write_layer(
+    path: Path, leaks: Sequence[Anomaly], data: list[NDArray[Any]], geometry: Geometry, srid: int, layer: str
+) -> None:
     pyogrio.raw.write(
         str(path),
         shapely.to_wkb(np.array([leak.geometry for leak in leaks], dtype=object)),
@@ -205,7 +236,7 @@ def _write_layer(path: Path, leaks: Sequence[Leak], data: list[NDArray[Any]], ge
         geometry_type="Polygon Z" if geometry == "3d" else "Polygon",
         crs=None if geometry == "unrolled" else f"EPSG:{srid}",
         driver="GPKG",
-        layer=layer_name(geometry),
+        layer=layer,
     )
 
 
@@ -220,6 +251,8 @@ _GPKG_TYPE: dict[str, Any] = {
             "arc_from",
             "arc_to",
             "clock",
+            "confidence",
+            "contrast",
             "area",
             "drop_mean",
             "drop_max",
@@ -230,9 +263,9 @@ _GPKG_TYPE: dict[str, Any] = {
 }
 
 
-def layer_name(geometry: Geometry) -> str:
+def layer_name(geometry: Geometry, kind: Kind) -> str:
     """Name of the layer in files."""
-    return f"leak_{geometry}"
+    return f"{'anomaly' if kind == 'all' else kind}_{geometry}"
 
 
 def _utc(moment: dt.datetime) -> dt.datetime:
@@ -243,6 +276,8 @@ def _utc(moment: dt.datetime) -> dt.datetime:
 def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return round(value, DECIMALS)
+    if isinstance(value, list):
+        return ", ".join(value)
     return value.isoformat() if isinstance(value, dt.datetime) else value
 
 

@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw, ImageFont
 from scipy import ndimage
 from shapely.geometry import Polygon
 
-from tunneldb.export.palette import COLOURS
+from tunneldb.export.palette import PALETTES
 from tunneldb.ground.classes import Klass
 
 Single = NDArray[np.float32]
@@ -66,8 +66,8 @@ def shrink(values: Single, factor: int) -> Single:
     return np.where(count > 0, total / np.maximum(count, 1), np.nan).astype(np.float32)
 
 
-def shrink_classes(values: NDArray[np.uint8], factor: int) -> Single:
-    """Take the commonest class of ``factor`` × ``factor`` pixels, the greater of two; without 0, which becomes NaN."""
+def shrink_codes(values: NDArray[np.uint8], factor: int) -> Single:
+    """Take the commonest code of ``factor`` × ``factor`` pixels, the greater of two; without 0, which becomes NaN."""
     rows, columns = (-(-n // factor) * factor for n in values.shape)
     padded = np.zeros((rows, columns), np.uint8)
     padded[: values.shape[0], : values.shape[1]] = values
@@ -93,7 +93,9 @@ def fill_gaps(values: Single, reach: float) -> Single:
 
 
 def _filled(kind: str, values: Single, reach: float) -> Single:
-    """Fill the gaps of an image; what floats in them is no colour for its surroundings."""
+    """Fill the gaps of an image; what floats in them is no colour for its surroundings. Gaps between states are shown."""
+    if kind == "state":
+        return values
     if kind != "class":
         return fill_gaps(values, reach)
     floating = values == Klass.NOISE
@@ -111,9 +113,9 @@ def draw(
         File to write.
     title : str
         Heading.
-    kind : {'raw', 'corrected', 'offset', 'class'}
+    kind : {'raw', 'corrected', 'offset', 'state', 'class'}
         Intensities are drawn in grey between their 2nd and 98th percentile, offsets in blue (outside the
-        surface) to red (inside), classes in their colours.
+        surface) to red (inside), states and classes in their colours.
     strips : sequence of Strip
         In order of chainage.
     top : float
@@ -128,9 +130,9 @@ def draw(
     pen = ImageDraw.Draw(sheet)
     low, high = _span(kind, strips)
     large, small = ImageFont.load_default(18), ImageFont.load_default(13)
-    if kind == "class":
+    if kind in PALETTES:
         pen.text((_MARGIN, 8), f"{title}:", _INK, large)
-        _legend(pen, _MARGIN + int(pen.textlength(f"{title}:  ", large)), strips, large)
+        _legend(pen, _MARGIN + int(pen.textlength(f"{title}:  ", large)), kind, strips, large)
     else:
         scale = (
             f"blue {low:+.2f} m (outside) to red {high:+.2f} m (inside)"
@@ -162,20 +164,24 @@ def _clip(line: list[tuple[float, float]], left: float, right: float) -> list[tu
 
 
 def _legend(
-    pen: ImageDraw.ImageDraw, x: int, strips: Sequence[Strip], font: ImageFont.ImageFont | ImageFont.FreeTypeFont
+    pen: ImageDraw.ImageDraw,
+    x: int,
+    kind: str,
+    strips: Sequence[Strip],
+    font: ImageFont.ImageFont | ImageFont.FreeTypeFont,
 ) -> None:
-    """Colour and name of each class that is there."""
-    there = np.unique(np.concatenate([s.values[np.isfinite(s.values)] for s in strips]))
-    for klass, colour in COLOURS.items():
-        if klass in there:
+    """Colour and name of each code that is there."""
+    there = np.unique(np.concatenate([np.nan_to_num(s.values) for s in strips]))
+    for code, (name, colour) in PALETTES[kind].entries.items():
+        if code in there:
             pen.rectangle([(x, 11), (x + 14, 25)], colour, _INK)
-            pen.text((x + 20, 8), klass.name.lower(), _INK, font)
-            x += 40 + int(pen.textlength(klass.name.lower(), font))
+            pen.text((x + 20, 8), name, _INK, font)
+            x += 40 + int(pen.textlength(name, font))
 
 
 def _span(kind: str, strips: Sequence[Strip]) -> tuple[float, float]:
     held = np.concatenate([s.values[np.isfinite(s.values)] for s in strips])
-    if len(held) == 0 or kind == "class":
+    if len(held) == 0 or kind in PALETTES:
         return 0.0, 1.0
     if kind == "offset":
         usual = float(np.percentile(np.abs(held), 90))
@@ -187,9 +193,10 @@ def _span(kind: str, strips: Sequence[Strip]) -> tuple[float, float]:
 
 def _colours(kind: str, values: Single, low: float, high: float) -> NDArray[np.uint8]:
     """Colours (rows, columns, 3) of values; places without one in a pale grey."""
-    if kind == "class":
+    if kind in PALETTES:
         table = np.full((256, 3), _EMPTY, np.uint8)
-        table[list(COLOURS)] = list(COLOURS.values())
+        for code, (_, colour_of_code) in PALETTES[kind].entries.items():
+            table[code] = colour_of_code
         return np.asarray(table[np.nan_to_num(values).astype(np.uint8)])
     with np.errstate(invalid="ignore"):
         share = np.clip((values - low) / (high - low), 0.0, 1.0)[..., None]

@@ -9,9 +9,15 @@ from pathlib import Path
 import numpy as np
 import rasterio
 
-from tunneldb.export.palette import COLOURS, hexadecimal
+from tunneldb.export.palette import PALETTES, hexadecimal
 
-KINDS = {"corrected": "Intensity, corrected", "raw": "Intensity, raw", "offset": "Offset", "class": "Classes"}
+KINDS = {
+    "corrected": "Intensity, corrected",
+    "raw": "Intensity, raw",
+    "offset": "Offset",
+    "state": "States: seen, unseen, dark",
+    "class": "Classes",
+}
 """Kinds of image, the one shown at first in front, with the names of their groups."""
 
 OFFSET_RANGE = 0.1
@@ -50,17 +56,14 @@ def grey_range(paths: Sequence[Path]) -> tuple[float, float]:
 def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
     """Return the element that says how an image is drawn, and all of its kind alike.
 
-    Intensity is drawn in grey, offset in diverging colours, each class in its own.
+    Intensity is drawn in grey, offset in diverging colours, each state or class in its own.
     """
     element = ET.Element("pipe")
-    if kind == "class":
+    if kind in PALETTES:
         renderer = ET.SubElement(element, "rasterrenderer", type="paletted", band="1")
         entries = ET.SubElement(renderer, "colorPalette")
-        for klass in COLOURS:
-            ET.SubElement(
-                entries, "paletteEntry", value=str(int(klass)), color=hexadecimal(COLOURS[klass]), label=klass.name.lower(),
-                alpha="255",
-            )  # fmt: skip
+        for code, (name, rgb) in PALETTES[kind].entries.items():
+            ET.SubElement(entries, "paletteEntry", value=str(code), color=hexadecimal(rgb), label=name, alpha="255")
     elif kind == "offset":
         renderer = ET.SubElement(
             element, "rasterrenderer", type="singlebandpseudocolor", band="1",
@@ -87,7 +90,7 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
     ET.SubElement(element, "brightnesscontrast", brightness="0", contrast="0", gamma="1")
     ET.SubElement(element, "huesaturation", saturation="0", colorizeOn="0", grayscaleMode="0")
     resampler = ET.SubElement(element, "rasterresampler", maxOversampling="2")
-    if kind != "class":
+    if kind not in PALETTES:
         resampler.set("zoomedOutResampler", "bilinear")
     return element
 
