@@ -40,6 +40,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),
     "export": ("tunneldb.cli.export:export", "Write the scan files again with the class of each point."),
     "ground": ("tunneldb.cli.ground:ground", "Class the points of a scan file by itself, without a database."),
+    "intensity": ("tunneldb.cli.intensity:intensity", "Show whether intensity depends on range or incidence, and plot it."),
     "image": ("tunneldb.cli.image:image", "Write the unrolled images as GeoTIFF."),
     "qgis": ("tunneldb.cli.qgis:qgis", "Write a QGIS project with styled layers."),
     "status": ("tunneldb.cli.status:status", "Show what is loaded and how far each kilometre has come."),

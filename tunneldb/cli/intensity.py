@@ -1,0 +1,90 @@
+"""The verb ``intensity``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast, get_args
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect, get_survey
+from tunneldb.errors import UserError
+from tunneldb.export.dependence import check_format, write_figure
+from tunneldb.intensity.correct import Kind
+from tunneldb.intensity.look import Look
+
+_FILES = (".las", ".laz", ".e57")
+
+
+@click.command()
+@click.argument("survey", metavar="SURVEY|FILE")
+@click.option("--km", metavar="A-B", help="Only these kilometres of the survey: 12 or 12-14.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="Figure to write: .png, .pdf or .svg.")
+@click.option("--intensity", metavar="DIMENSION", help="Of a file: dimension that holds the intensity.")
+@click.option("--intensity-kind", type=click.Choice(get_args(Kind)), help="Of a file: what it is; as for tunneldb survey add.")
+@click.option(
+    "--scanner",
+    type=(float, float, float),
+    metavar="X Y Z",
+    help="Of a file: where the scanner stood, in the file's coordinates; an E57 file says it by its poses.",
+)
+@click.pass_obj
+def intensity(
+    settings: Settings,
+    survey: str,
+    km: str | None,
+    output: Path | None,
+    intensity: str | None,
+    intensity_kind: str | None,
+    scanner: tuple[float, float, float] | None,
+) -> None:
+    """Show whether intensity depends on range or incidence, before and after correction.
+
+    Of a SURVEY the points of survey density on the lining are looked at, after the stages sections and ground; nothing is
+    changed. Of a FILE (LAS, LAZ or E57) by itself all flat surfaces are, and no database is needed. The table gives the
+    slope of intensity, and how much the medians of classes of range and incidence differ (standard deviation).
+    """
+    if output is not None:
+        check_format(output)
+    if survey.lower().endswith(_FILES):
+        if km is not None:
+            raise UserError("--km is of a survey, not of a file")
+        look = _look_at_file(Path(survey), intensity, intensity_kind, scanner)
+    else:
+        if intensity is not None or intensity_kind is not None or scanner is not None:
+            raise UserError(f"--intensity, --intensity-kind and --scanner are for a file; the survey {survey} has its own")
+        look = _look_at_survey(settings, survey, km)
+    _print(look)
+    if output is not None:
+        write_figure(look, output)
+        click.echo(f"figure to {output}", err=True)
+
+
+def _look_at_file(path: Path, dimension: str | None, kind: str | None, scanner: tuple[float, float, float] | None) -> Look:
+    from tunneldb.job.intensity import look_at_file
+
+    if dimension is None:
+        raise UserError(f"{path}: say which dimension holds the intensity: --intensity DIMENSION")
+    if kind is None:
+        raise UserError(f"{path}: say what {dimension} is: --intensity-kind {'|'.join(get_args(Kind))}")
+    return look_at_file(path, dimension, cast(Kind, kind), scanner)
+
+
+def _look_at_survey(settings: Settings, name: str, km: str | None) -> Look:
+    from tunneldb.job.intensity import look_at_survey
+    from tunneldb.job.parameters import settings as defaults
+    from tunneldb.job.run import loaded_kilometres, parse_km
+
+    with connect(settings.dsn) as conn:
+        survey = get_survey(conn, name)
+        return look_at_survey(conn, survey, parse_km(km, loaded_kilometres(conn, survey)), defaults())
+
+
+def _print(look: Look) -> None:
+    header = ["over", "slope before", "slope after", "medians before", "medians after"]
+    print_table(header, look.dependence.rows(), right=(1, 2, 3, 4))
+    for note in look.notes:
+        click.echo(note)
+    click.echo(look.dependence.verdict())

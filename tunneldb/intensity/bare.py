@@ -1,0 +1,42 @@
+"""Range and incidence in a scan by itself, without a tunnel: normals from neighbouring points."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+Float = NDArray[np.float64]
+
+NEIGHBOURS = 20
+"""Points to which a plane is fitted, itself included."""
+
+FLAT = 0.01
+"""Largest surface variation (Pauly et al., 2002: least eigenvalue by the sum of all) of a surface whose normal is used."""
+
+BLOCK = 100_000
+"""Points at a time."""
+
+
+def incidence_cosine(xyz: Float, scanner: Float) -> Float:
+    """Cosine of the incidence angle at points (n, 3), seen from positions (n, 3); NaN where the surface isn't flat.
+
+    The normal is that of the plane through the nearest neighbours; its side is the one that was seen.
+    """
+    cosine = np.full(len(xyz), np.nan)
+    if len(xyz) < NEIGHBOURS:
+        return cosine
+    tree = cKDTree(xyz)
+    for first in range(0, len(xyz), BLOCK):
+        part = slice(first, first + BLOCK)
+        at = xyz[part]
+        near = xyz[tree.query(at, NEIGHBOURS, workers=-1)[1]]
+        near = near - near.mean(axis=1, keepdims=True)
+        values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))
+        towards = scanner[part] - at
+        towards = towards / np.linalg.norm(towards, axis=1, keepdims=True)
+        seen = np.abs(np.einsum("ni,ni->n", vectors[:, :, 0], towards))
+        # Points on a line, as of a single profile, have no normal.
+        flat = (values[:, 0] <= FLAT * values.sum(axis=1)) & (values[:, 1] > 10.0 * values[:, 0])
+        cosine[part] = np.where(flat, seen, np.nan)
+    return cosine
