@@ -171,6 +171,7 @@ def test_without_truth_and_nothing_left_over(tmp_path: Path) -> None:
         "small.reference.csv",
         "small.trajectory.csv",
         "small.truth.geojson",
+        "small.truth.gpkg",
     ]
 
 

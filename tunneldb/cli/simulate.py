@@ -89,6 +89,8 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("leak_area", "MIN MAX", "Area of leaks, m².", float, 2),
         _Option("leak_drop", "MIN MAX", "How much darker than dry lining leaks are, dB.", float, 2),
         _Option("leak_edge", "M", "Width over which a leak goes from dry to wet; its outline lies in the middle."),
+        _Option("joint_leaks", "N", "Leaks along joints, bands 0.1 to 0.4 m wide; with --lining cast or segments.", int),
+        _Option("niche_leaks", "N", "Leaks on the back walls of niches.", int),
     ],
     "Make and looks of the lining": [
         _Option(
@@ -133,6 +135,7 @@ _FLAGS = {
     "s_curve": ("--s-curve", True, "Bend back in the second half.", "Tunnel"),
     "appendages": ("--no-appendages", False, "No cables, trays, boxes, lamps and rails.", "Intensity and contents"),
     "niches": ("--no-niches", False, "No refuge niches.", "Intensity and contents"),
+    "drips": ("--drips", True, "Drips below leaks, apart from them, that belong to their truth.", "Intensity and contents"),
     "catenary": ("--catenary", True, "A contact line over the track.", "Floor and what stands free"),
     "sleepers": ("--sleepers", True, "Sleepers under the rails.", "Floor and what stands free"),
 }
@@ -203,7 +206,9 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
     OUT/NAME.truth.npz       chainage, arc, offset, class and leak of each point, in file order;
                              class 0 lining, 1 floor, 2 appendage, 3 niche, 4 outlier, 5 rail, 6 object, 7 target
                              sphere; leak -1 for none; thing, where something stands free: its number, 0 for none
-    OUT/NAME.truth.geojson   leaks as polygons in the plane (chainage, arc)
+    OUT/NAME.truth.geojson   leaks as polygons in the plane (chainage, arc), with drips as multipolygons
+    OUT/NAME.truth.gpkg      the same as layer leak; layer dry: what is dark but dry (joint, pocket, patch, paint,
+                             stripe, soot, grime)
     OUT/NAME.spheres.csv     id,x,y,z,radius,kind of the target spheres, if any; id is their number among the things
     OUT/NAME.json            all parameters, appendages, niches, things that stand free
 

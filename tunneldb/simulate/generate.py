@@ -6,7 +6,7 @@ import os
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from tunneldb.simulate import ground
 from tunneldb.simulate.coat import coat
 from tunneldb.simulate.furniture import FLOOR, RAIL, Appendage, Niche, furnish, refuges
 from tunneldb.simulate.intensity import counts, reference_curve
-from tunneldb.simulate.leaks import Leak, place
+from tunneldb.simulate.leaks import Leak, Room, place
 from tunneldb.simulate.marks import Mark, place_marks
 from tunneldb.simulate.overhead import overhead, sleepers
 from tunneldb.simulate.parameters import Parameters
@@ -26,6 +26,7 @@ from tunneldb.simulate.rings import build
 from tunneldb.simulate.scanner import BlockPlan, Scanner
 from tunneldb.simulate.things import TargetSphere, Thing, parts_table
 from tunneldb.simulate.tunnel import Tunnel
+from tunneldb.simulate.wet import joint_leaks, niche_leaks, with_drips
 
 Array = NDArray[np.float64]
 
@@ -89,6 +90,8 @@ class Simulation:
         What is in it.
     rings : Rings
         How the lining is put together.
+    coat : Coat or None
+        How bright it is from place to place; None: plain.
     things : list of Thing
         What stands or hangs free, thing i with number i + 1.
     spheres : list of TargetSphere
@@ -101,26 +104,19 @@ class Simulation:
         self.parameters = parameters
         self.tunnel: Tunnel = parameters.tunnel()
         # Later streams come behind, so that a seed keeps its points.
-        streams = np.random.SeedSequence(parameters.seed).spawn(9)
-        furniture, wet, reference, self._seed, free, loose, built, marked, coated = streams
+        streams = np.random.SeedSequence(parameters.seed).spawn(12)
+        furniture, wet, reference, self._seed, free, loose, built, marked, coated, joints, refuge, drips = streams
         self.appendages: list[Appendage] = (
             furnish(self.tunnel, np.random.default_rng(furniture)) if parameters.appendages else []
         )
         self.niches: list[Niche] = refuges(self.tunnel) if parameters.niches else []
         self.appendages += slabs(parameters, self.tunnel)
         obstacles = [a.footprint() for a in self.appendages] + [n.footprint(self.tunnel) for n in self.niches]
-        self.leaks: list[Leak] = place(
-            self.tunnel,
-            obstacles,
-            parameters.leak_count(),
-            parameters.leak_area,
-            parameters.leak_drop,
-            np.random.default_rng(wet),
-        )
         self.rings = build(parameters, self.tunnel, built)
+        self.leaks: list[Leak] = self._leaks(Room(self.tunnel, obstacles), wet, joints, refuge, drips)
         openings = [n.footprint(self.tunnel) for n in self.niches]
         self.marks: list[Mark] = place_marks(parameters, self.tunnel, [k.polygon for k in self.leaks] + openings, marked)
-        self._coat = coat(parameters, self.tunnel, self.rings, self.appendages, self.marks, coated)
+        self.coat = coat(parameters, self.tunnel, self.rings, self.appendages, self.marks, coated)
         self._radiometry = parameters.radiometry()
         self.reference = reference_curve(parameters.max_range, np.random.default_rng(reference), self._radiometry.near_loss)
         self.scanner = Scanner(parameters, self.tunnel)
@@ -138,6 +134,22 @@ class Simulation:
         self._parts = parts_table(self.tunnel, solid) if solid else None
         self._ground = ground.lay(parameters, self.tunnel.section, int(free.generate_state(1)[0]))
 
+    def _leaks(
+        self,
+        room: Room,
+        wall: np.random.SeedSequence,
+        joints: np.random.SeedSequence,
+        refuge: np.random.SeedSequence,
+        drips: np.random.SeedSequence,
+    ) -> list[Leak]:
+        """Leaks on the wall, along joints, in niches, numbered in this order."""
+        p, tunnel = self.parameters, self.tunnel
+        leaks = place(tunnel, room, p.leak_count(), p.leak_area, p.leak_drop, np.random.default_rng(wall))
+        leaks += joint_leaks(p, tunnel, self.rings, room, joints)
+        leaks += niche_leaks(p, tunnel, self.niches, refuge)
+        leaks = [replace(leak, id=i + 1) for i, leak in enumerate(leaks)]
+        return with_drips(leaks, tunnel, room, drips) if p.drips else leaks
+
     def make(self, plan: BlockPlan) -> Cloud:
         """Points of one block; the same for the same seed and index, whenever it is made."""
         p = self.parameters
@@ -150,7 +162,7 @@ class Simulation:
             self._scene,
             self._parts,
             self._ground,
-            self._coat,
+            self.coat,
             rays.origin,
             rays.direction,
             rays.hint,

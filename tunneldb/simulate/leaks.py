@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from shapely import affinity
-from shapely.geometry import Polygon
+from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.prepared import prep
 
@@ -21,16 +21,22 @@ Index = NDArray[np.int64]
 
 # Width of the edge over which a patch goes from dry to wet, m.
 EDGE = 0.008
+# Least distance of a leak to the tunnel's ends, to the floor, to obstacles, to other leaks, m.
+END, FLOOR_MARGIN, OBSTACLE_MARGIN, LEAK_MARGIN = 1.0, 0.3, 0.25, 0.3
 
 
 @dataclass(frozen=True)
 class Leak:
-    """A wet patch: id, polygon in the unrolled plane (m), area on the surface (m²), drop (dB)."""
+    """A wet patch: id, outline in the unrolled plane (m), area on the surface (m²), drop (dB).
+
+    ``kind`` is wall, joint (along one) or niche (on its back wall). With drips the outline has several parts.
+    """
 
     id: int
-    polygon: Polygon
+    polygon: Polygon | MultiPolygon
     area_surface: float
     drop: float
+    kind: str = "wall"
 
     @property
     def area(self) -> float:
@@ -38,7 +44,7 @@ class Leak:
         return float(self.polygon.area)
 
 
-def _star(rng: np.random.Generator, elongation: float) -> Polygon:
+def star(rng: np.random.Generator, elongation: float) -> Polygon:
     """A closed curve around the origin, its radius perturbed by a few harmonics; longer along arc."""
     angle = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     radius = np.ones_like(angle)
@@ -50,7 +56,7 @@ def _star(rng: np.random.Generator, elongation: float) -> Polygon:
 
 def _shape(rng: np.random.Generator, area: float, down: int, holed: bool) -> Polygon:
     """A patch of the given area around the origin; drips run ``down`` (+1 or -1 in arc) from large ones."""
-    patch: BaseGeometry = _star(rng, float(rng.uniform(0.8, 1.8)))
+    patch: BaseGeometry = star(rng, float(rng.uniform(0.8, 1.8)))
     if area > 0.3:
         for _ in range(int(rng.integers(1, 4))):
             width, length = rng.uniform(0.12, 0.22), rng.uniform(1.0, 2.2)
@@ -62,49 +68,73 @@ def _shape(rng: np.random.Generator, area: float, down: int, holed: bool) -> Pol
             right = np.column_stack([sway + width * taper, y])[::-1]
             patch = patch.union(Polygon(np.vstack([left, right])).buffer(0.03))
     if holed:
-        patch = patch.difference(affinity.scale(_star(rng, 1.0), 0.35, 0.35))
+        patch = patch.difference(affinity.scale(star(rng, 1.0), 0.35, 0.35))
     if not isinstance(patch, Polygon):
         patch = max(patch.geoms, key=lambda g: g.area)
     scale = math.sqrt(area / patch.area)
     return affinity.scale(patch.simplify(0.004), scale, scale, origin=(0.0, 0.0))
 
 
+class Room:
+    """Where leaks may lie on the lining: clear of obstacles, floor, tunnel ends and each other."""
+
+    def __init__(self, tunnel: Tunnel, obstacles: list[Polygon]) -> None:
+        line = tunnel.line
+        self.start, self.end = line.start + END, line.end - END
+        self.lowest = tunnel.section.floor_arc - FLOOR_MARGIN
+        self._taken = [prep(o.buffer(OBSTACLE_MARGIN)) for o in obstacles]
+        self._leaks: list[BaseGeometry] = []
+
+    def holds(self, outline: BaseGeometry) -> bool:
+        """Whether a leak can lie there."""
+        left, low, right, high = outline.bounds
+        inside = low > -self.lowest and high < self.lowest and left > self.start and right < self.end
+        return inside and outline.is_valid and not any(t.intersects(outline) for t in self._taken)
+
+    def take(self, outline: BaseGeometry) -> None:
+        """Keep others away."""
+        self._leaks.append(outline)
+        self._taken.append(prep(outline.buffer(LEAK_MARGIN)))
+
+    def bears(self, drip: BaseGeometry, leak: BaseGeometry) -> bool:
+        """Whether a drip can lie there: on the lining, apart from its own leak and from all others."""
+        others = [k for k in self._leaks if k is not leak]
+        low, high = drip.bounds[1::2]
+        inside = low > -self.lowest and high < self.lowest
+        return inside and drip.distance(leak) > EDGE and all(drip.distance(k) > 0.5 * LEAK_MARGIN for k in others)
+
+
 def place(
     tunnel: Tunnel,
-    obstacles: list[Polygon],
+    room: Room,
     count: int,
     area: tuple[float, float],
     drop: tuple[float, float],
     rng: np.random.Generator,
 ) -> list[Leak]:
-    """Put ``count`` patches on the lining, clear of obstacles, floor, tunnel ends and each other.
+    """Put ``count`` patches on the lining where there is room.
 
     Areas are log-uniform between the limits (m²), drops uniform (dB); every third patch of 0.5 m² or more has
     a hole. The largest are placed first, so that a crowded tunnel takes them.
     """
-    line, section = tunnel.line, tunnel.section
+    line = tunnel.line
     sizes = np.sort(np.exp(rng.uniform(math.log(area[0]), math.log(area[1]), count)))[::-1]
     end_margin = min(3.0, 0.1 * (line.end - line.start))
-    lowest = section.floor_arc - 0.3
-    taken = [o.buffer(0.25) for o in obstacles]
-    ready = [prep(t) for t in taken]
     leaks = []
     for number, size in enumerate(sizes):
         for _ in range(600):
             s = float(rng.uniform(line.start + end_margin, line.end - end_margin))
-            arc = float(rng.uniform(-lowest, lowest))
+            arc = float(rng.uniform(-room.lowest, room.lowest))
             polygon = _shape(rng, float(size), 1 if arc >= 0 else -1, number % 3 == 0 and size >= 0.5)
             for _ in range(2):  # simplifying moved the area a little
                 factor = math.sqrt(size / polygon.area)
                 polygon = affinity.scale(polygon, factor, factor, origin=(0.0, 0.0))
             polygon = affinity.translate(polygon, s, arc)
-            left, bottom, right, top = polygon.bounds
-            inside = bottom > -lowest and top < lowest and left > line.start + 1.0 and right < line.end - 1.0
-            if inside and polygon.is_valid and not any(r.intersects(polygon) for r in ready):
+            if room.holds(polygon):
                 break
         else:
             raise UserError(f"no room on the lining for leak {number + 1} of {count} ({size:.2f} m²): ask for fewer or smaller")
-        ready.append(prep(polygon.buffer(0.3)))
+        room.take(polygon)
         centre = polygon.representative_point()
         factor = float(tunnel.area_factor(np.array([centre.x]), np.array([centre.y]))[0])
         leaks.append((polygon, polygon.area * factor, float(rng.uniform(*drop))))
@@ -116,10 +146,13 @@ def edge_table(leaks: list[Leak]) -> tuple[Array, Index, Array]:
     """Rows of edges (x1, y1, x2, y2), first edge of each leak (n+1,), and per leak: bounds (4) and drop."""
     edges, first, rows = [np.empty((0, 4))], [0], np.zeros((len(leaks), 5))
     for row, leak in zip(rows, leaks, strict=True):
-        for ring in (leak.polygon.exterior, *leak.polygon.interiors):
-            xy = np.asarray(ring.coords)
-            edges.append(np.hstack([xy[:-1], xy[1:]]))
-        first.append(first[-1] + sum(len(e) for e in edges) - first[-1])
+        own = []
+        for part in getattr(leak.polygon, "geoms", [leak.polygon]):
+            for ring in (part.exterior, *part.interiors):
+                xy = np.asarray(ring.coords)
+                own.append(np.hstack([xy[:-1], xy[1:]]))
+        edges += own
+        first.append(first[-1] + sum(len(e) for e in own))
         row[:4], row[4] = leak.polygon.bounds, leak.drop
     return np.ascontiguousarray(np.vstack(edges)), np.array(first, dtype=np.int64), rows
 

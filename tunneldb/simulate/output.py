@@ -21,6 +21,7 @@ from shapely.geometry import mapping
 import tunneldb
 from tunneldb.errors import UserError
 from tunneldb.simulate.generate import Cloud, Simulation
+from tunneldb.simulate.truth import write_truth
 
 # Resolution of the stored coordinates, m; as scanner makers export.
 SCALE = 0.00025
@@ -50,6 +51,7 @@ class Files:
     poses: Path = Path()
     reference: Path = Path()
     leaks: Path = Path()
+    lining: Path = Path()
     parameters: Path = Path()
     spheres: Path | None = None
     points: int = 0
@@ -67,6 +69,7 @@ class Files:
             poses=to(self.poses),
             reference=to(self.reference),
             leaks=to(self.leaks),
+            lining=to(self.lining),
             parameters=to(self.parameters),
             spheres=None if self.spheres is None else to(self.spheres),
             points=self.points,
@@ -171,6 +174,7 @@ def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
             "id": leak.id,
             "properties": {
                 "id": leak.id,
+                "kind": leak.kind,
                 "area": round(leak.area, 5),
                 "area_surface": round(leak.area_surface, 5),
                 "drop_db": round(leak.drop, 3),
@@ -180,6 +184,8 @@ def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
         for leak in simulation.leaks
     ]
     files.leaks.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    files.lining = Path(f"{base}.truth.gpkg")
+    write_truth(simulation, files.lining)
     files.spheres = _spheres(simulation, Path(f"{base}.spheres.csv"))
     section = simulation.tunnel.section
     record = {

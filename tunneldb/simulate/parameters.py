@@ -44,6 +44,8 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "intensity_noise": (0.0, 5.0, "dB"),
     "leaks": (0, 100_000, "leaks"),
     "leak_edge": (0.002, 0.5, "m"),
+    "joint_leaks": (0, 100_000, "leaks"),
+    "niche_leaks": (0, 100_000, "leaks"),
     "people": (0, 5000, "people"),
     "equipment": (0, 5000, "things"),
     "bollards": (0, 5000, "bollards"),
@@ -122,6 +124,9 @@ class Parameters:
     leak_area: tuple[float, float] = (0.05, 3.0)
     leak_drop: tuple[float, float] = (4.0, 8.0)
     leak_edge: float = 0.008
+    joint_leaks: int = 0
+    niche_leaks: int = 0
+    drips: bool = False
     appendages: bool = True
     niches: bool = True
 
@@ -171,6 +176,10 @@ class Parameters:
             low, high = getattr(self, name)
             if not floor <= low <= high:
                 raise UserError(f"{name.replace('_', ' ')} is {low:g} to {high:g}: give two growing numbers from {floor:g}")
+        if self.joint_leaks and not self.ring_length():
+            raise UserError(f"joint leaks need joints, and lining {self.lining} has none: use lining cast or segments")
+        if self.niche_leaks and not self.niches:
+            raise UserError("niche leaks need niches: leave out --no-niches")
         self.crs()
         tunnel = self.tunnel()
         height = tunnel.section.floor + self.scanner_height

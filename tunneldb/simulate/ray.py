@@ -56,7 +56,9 @@ class Scene(NamedTuple):
     plan: Array
     profile: Array
     parts: Array
-    ends: Array  # chainage of both ends, arc of the floor's corner, reach of the appendages off the lining, half a leak's edge
+    # chainage of both ends, arc of the floor's corner, reach of the appendages off the lining, half a leak's edge,
+    # number of leaks in niches
+    ends: Array
     items: Array
     item_bins: Index
     item_list: Index
@@ -75,12 +77,13 @@ def scene(tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: li
     line = tunnel.line
     item_rows, niche_rows = appendage_table(tunnel, items), niche_table(tunnel, niches)
     edges, first, leak_rows = edge_table(leaks)
+    wet_niches = float(sum(leak.kind == "niche" for leak in leaks))
     reach = max((i.standoff + 0.5 * i.depth for i in items), default=0.0)
     return Scene(
         line.plan,
         line.profile,
         tunnel.section.parts,
-        np.array([line.start, line.end, tunnel.section.floor_arc, 1.1 * reach + 0.02, 0.5 * edge]),
+        np.array([line.start, line.end, tunnel.section.floor_arc, 1.1 * reach + 0.02, 0.5 * edge, wet_niches]),
         item_rows,
         *bins(item_rows[:, 1], item_rows[:, 2], line.start, line.end),
         niche_rows,
@@ -210,13 +213,14 @@ def _item(sc: Scene, o: Array, d: Array, s: float, r: float, wall: float) -> tup
 
 
 @njit(cache=True, nogil=True)
-def _niche(sc: Scene, o: Array, d: Array, s: float, r: float) -> tuple[float, float]:
-    """Range to the inside of a niche whose opening the ray passes at range r, and cosine there (NaN: none)."""
+def _niche(sc: Scene, o: Array, d: Array, s: float, r: float) -> tuple[float, float, bool]:
+    """Range to the inside of a niche whose opening the ray passes at range r (NaN: none), cosine, whether its back wall."""
     b = bin_of(s, sc.ends[0], sc.niche_bins)
     for j in range(sc.niche_bins[b], sc.niche_bins[b + 1]):
         row = sc.niches[sc.niche_list[j]]
         leave = 1e300
         cosine = 0.0
+        is_back = False
         inside = True
         for axis in range(3):
             a = row[5 + 3 * axis : 8 + 3 * axis]
@@ -235,9 +239,22 @@ def _niche(sc: Scene, o: Array, d: Array, s: float, r: float) -> tuple[float, fl
                 if to < leave:
                     leave = to
                     cosine = abs(rate)
+                    is_back = axis == 1
         if inside:
-            return r + leave, cosine
-    return np.nan, 0.0
+            return r + leave, cosine, is_back
+    return np.nan, 0.0, False
+
+
+@njit(cache=True, nogil=True)
+def _unrolled(sc: Scene, o: Array, d: Array, r: float, s: float) -> tuple[float, float]:
+    """Chainage and arc of the place at range r, ``s`` a chainage near it."""
+    x, y, z = o[0] + r * d[0], o[1] + r * d[1], o[2] + r * d[2]
+    for _ in range(10):
+        found = newton_step(sc.plan, sc.profile, x, y, z, s)
+        s += found[0]
+        if abs(found[0]) < 1e-6:
+            break
+    return s, nearest(sc.parts, found[1], found[2])[0]
 
 
 @njit(cache=True, nogil=True)
@@ -253,6 +270,7 @@ def _uneven(sc: Scene, ground: Ground, o: Array, d: Array, s: float, r: float, o
 def _wetness(sc: Scene, s: float, arc: float) -> tuple[int, float]:
     """Number of the leak that holds a point of the lining (-1: none) and drop there, dB."""
     edge = sc.ends[4]
+    leak, drop = -1, 0.0
     b = bin_of(s, sc.ends[0], sc.leak_bins)
     for j in range(sc.leak_bins[b], sc.leak_bins[b + 1]):
         i = sc.leak_list[j]
@@ -262,8 +280,10 @@ def _wetness(sc: Scene, s: float, arc: float) -> tuple[int, float]:
         depth = depth_inside(sc.edges, sc.edge_first[i], sc.edge_first[i + 1], s, arc)
         if depth > -edge:
             share = min(0.5 * (depth + edge) / edge, 1.0)
-            return (i if depth > 0.0 else -1), row[4] * share * share * (3.0 - 2.0 * share)
-    return -1, 0.0
+            if depth > 0.0:
+                leak = i
+            drop = max(drop, row[4] * share * share * (3.0 - 2.0 * share))
+    return leak, drop
 
 
 @njit(cache=True, nogil=True)
@@ -339,9 +359,11 @@ def trace(
                 klass = int(sc.items[which, 9])
                 drop = sc.items[which, 10]
         if r == wall and klass == LINING and not is_open:
-            hit, c = _niche(sc, o, d, s, wall)
+            hit, c, is_back = _niche(sc, o, d, s, wall)
             if not math.isnan(hit):
                 r, cosine, klass = hit, c, NICHE
+                if is_back and sc.ends[5] > 0.0:
+                    leak, drop = _wetness(sc, *_unrolled(sc, o, d, r, s))
             else:
                 leak, drop = _wetness(sc, s, arc)
                 if coat is not None:

@@ -1,0 +1,124 @@
+"""Truth of the lining as polygons: what is wet, and what is dark but dry."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pyogrio.raw
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon, box
+from shapely.geometry.base import BaseGeometry
+
+from tunneldb.simulate.coat import GRIME_RISE, Coat, soot_amount
+from tunneldb.simulate.rings import POCKET, POCKET_FROM_JOINT, POCKETS, Rings
+
+if TYPE_CHECKING:
+    from tunneldb.simulate.generate import Simulation
+
+Array = NDArray[np.float64]
+
+STEP = 1.0  # m between the vertices of soot
+
+
+class Dry(NamedTuple):
+    """Something dark on the lining that is no leak: outline in the unrolled plane (m), kind, drop (dB)."""
+
+    outline: Polygon
+    kind: str
+    drop: float
+
+
+def joints(rings: Rings, start: float, end: float, lowest: float) -> list[Dry]:
+    """Joints of the lining and bolt pockets from chainage ``start`` to ``end``, up to ``lowest`` m from the crown."""
+    dry = []
+    n, m = rings.seam_width.shape
+    half = 0.5 * m * rings.period
+    for j in range(n + 1 if rings.length else 0):
+        s, width = rings.first + j * rings.length, 0.5 * rings.joint_width[j]
+        dry.append(Dry(box(s - width, -lowest, s + width, lowest), "joint", float(rings.joint_drop[j])))
+    for i in range(n):
+        begin = rings.first + i * rings.length
+        middle = begin + POCKET_FROM_JOINT
+        for k in range(m):
+            seam = rings.shift[i] + k * rings.period
+            arc = (seam + half) % (2.0 * half) - half
+            width = 0.5 * rings.seam_width[i, k]
+            outline = box(begin, arc - width, begin + rings.length, arc + width)
+            dry.append(Dry(outline, "joint", float(rings.seam_drop[i, k])))
+            for share, drop in zip(POCKETS, rings.pocket_drop[i, k].tolist(), strict=True):
+                arc = (seam + share * rings.period + half) % (2.0 * half) - half
+                outline = box(middle - 0.5 * POCKET[0], arc - 0.5 * POCKET[1], middle + 0.5 * POCKET[0], arc + 0.5 * POCKET[1])
+                dry.append(Dry(outline, "pocket", drop))
+    lining = box(start, -lowest, end, lowest)
+    cut = [d._replace(outline=d.outline.intersection(lining)) for d in dry]
+    return [d for d in cut if d.outline.area > 0.0]
+
+
+def soot(coat: Coat, start: float, end: float) -> list[Dry]:
+    """Where soot darkens by half of what was asked or more; its drop is the mean over that."""
+    asked, middle, width = coat.soot.tolist()
+    if asked == 0.0:
+        return []
+    s = np.linspace(start, end, max(2, math.ceil((end - start) / STEP) + 1))
+    amount = np.array([soot_amount(coat, float(x)) for x in s])
+    half = width * np.sqrt(np.log(np.maximum(2.0 * amount, 1.0 + 1e-9)))
+    outline = Polygon(np.vstack([np.column_stack([s, middle - half]), np.column_stack([s, middle + half])[::-1]]))
+    across = np.linspace(0.0, 1.0, 51) * half[:, None]
+    level = asked * amount[:, None] * np.exp(-((across / width) ** 2))
+    return [Dry(outline, "soot", float(np.average(level.mean(axis=1), weights=half)))]
+
+
+def grime(coat: Coat, start: float, end: float) -> list[Dry]:
+    """Where grime darkens by half of its most or more, on average along the tunnel; the drop is the mean over that."""
+    dry = []
+    for side, edge, fade, drop in coat.grime.tolist():
+        low, high = sorted((side * (edge - 0.5 * GRIME_RISE), side * (edge + fade * math.log(2.0))))
+        dry.append(Dry(box(start, low, end, high), "grime", 0.75 * drop))
+    return dry
+
+
+def dry_features(simulation: Simulation) -> list[Dry]:
+    """Everything on the lining that is dark but dry."""
+    line, lowest = simulation.tunnel.line, simulation.tunnel.section.floor_arc
+    dry = joints(simulation.rings, line.start, line.end, lowest)
+    dry += [Dry(m.polygon(), m.kind, -m.level) for m in simulation.marks if m.level < 0.0]
+    if simulation.coat is not None:
+        dry += soot(simulation.coat, line.start, line.end) + grime(simulation.coat, line.start, line.end)
+    return dry
+
+
+def write_truth(simulation: Simulation, path: Path) -> None:
+    """Write leaks and what is dark but dry as layers ``leak`` and ``dry`` of a GeoPackage, in the unrolled plane."""
+    leaks, dry = simulation.leaks, dry_features(simulation)
+    wet = {
+        "id": np.array([k.id for k in leaks], dtype=np.int32),
+        "kind": np.array([k.kind for k in leaks], dtype=object),
+        "area": np.array([k.area for k in leaks], dtype=np.float64),
+        "drop_db": np.array([k.drop for k in leaks], dtype=np.float64),
+    }
+    dark = {
+        "kind": np.array([d.kind for d in dry], dtype=object),
+        "drop_db": np.array([d.drop for d in dry], dtype=np.float64),
+    }
+    _write_layer(path, "leak", [k.polygon for k in leaks], wet, append=False)
+    _write_layer(path, "dry", [d.outline for d in dry], dark, append=True)
+
+
+def _write_layer(path: Path, layer: str, outlines: list[BaseGeometry], columns: dict[str, NDArray], append: bool) -> None:  # type: ignore[type-arg]
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "'crs' was not provided")  # the unrolled plane has none
+        pyogrio.raw.write(
+            str(path),
+            shapely.to_wkb(np.array([shapely.geometry.MultiPolygon(getattr(o, "geoms", [o])) for o in outlines], dtype=object)),
+            list(columns.values()),
+            np.array(list(columns), dtype=object),
+            layer=layer,
+            driver="GPKG",
+            geometry_type="MultiPolygon",
+            append=append,
+        )
