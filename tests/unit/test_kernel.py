@@ -208,8 +208,8 @@ def test_the_image_depends_neither_on_files_nor_on_threads(monkeypatch: pytest.M
 
 def test_a_pixel_is_the_weighted_mean_of_its_points(monkeypatch: pytest.MonkeyPatch) -> None:
     points, look = cloud(50_000, 6), eye("reflectance", False)
-    pixels, _ = Lens.of(look, grid(0.1), ROUGHNESS).look(points)
-    with read(monkeypatch, look, [[points]]) as image:
+    pixels, _ = Lens.of(look, grid(0.5), ROUGHNESS).look(points)
+    with read(monkeypatch, look, [[points]], 0.5) as image:
         window = image.window(0, image.grid.columns)
     place, points_in = np.unique(np.stack([pixels.row, pixels.column])[:, pixels.column >= 0], axis=1, return_counts=True)
     row, column = place[:, points_in.argmax()]

@@ -7,7 +7,7 @@ import shapely.affinity
 from shapely.geometry import Polygon, box
 
 from tunneldb.errors import UserError
-from tunneldb.leak.appendage import appendages, distance_from_plane, reach
+from tunneldb.leak.appendage import distance_from_plane, off_plane, reach, recessed
 from tunneldb.leak.detection import _columns, _filled
 from tunneldb.leak.image import LEVEL, OFFSET, Accumulator, Grid
 from tunneldb.leak.kernel import WEIGHT, Pixels
@@ -143,14 +143,32 @@ def _wall(rows=300, columns=600, seed=1):
     return offset, wall, shapes
 
 
-def test_appendages_and_niches_stand_off_from_the_wall():
+def split(offset, pixel=PIXEL, corner=(0, 0)):
+    """What stands off, and recesses."""
+    distance = distance_from_plane(offset, pixel, corner)
+    recess = recessed(offset, distance, pixel)
+    return off_plane(distance, recess, pixel), recess
+
+
+def test_appendages_stand_off_from_the_wall_and_niches_lie_behind_it():
     offset, wall, shapes = _wall()
-    found = appendages(offset, PIXEL)
+    found, recess = split(offset)
     held = ~np.isnan(offset)
     true = np.zeros(offset.shape, bool)
-    for where in shapes.values():
-        assert found[where][held[where]].all()
+    for name, where in shapes.items():
+        if name == "niche":
+            inner = np.s_[where[0].start + 2 : where[0].stop - 2, where[1].start + 2 : where[1].stop - 2]
+            assert recess[inner][held[inner]].all()
+            edge = np.zeros(offset.shape, bool)
+            edge[where] = True
+            edge[inner] = False
+            assert found[edge & held].mean() > 0.97
+            assert recess[edge & held].mean() < 0.03  # where a pixel of the wall is alone at a corner
+            recess[where] = False
+        else:
+            assert found[where][held[where]].all()
         true[where] = True
+    assert not recess.any()
     near = np.pad(true, 3)
     near = np.any([np.roll(near, (i, j), (0, 1)) for i in range(-3, 4) for j in range(-3, 4)], axis=0)[3:-3, 3:-3]
     assert not found[~near].any()
@@ -162,7 +180,7 @@ def test_appendages_and_niches_stand_off_from_the_wall():
 def test_a_wide_tray_does_not_pass_for_the_wall():
     offset = np.random.default_rng(2).normal(0, 0.004, (200, 400)).astype(np.float32)
     offset[80:105] += 0.1  # half a metre
-    found = appendages(offset, PIXEL)
+    found, _ = split(offset)
     assert found[80:105].all()
     assert not found[:77].any()
     assert not found[108:].any()
@@ -171,17 +189,48 @@ def test_a_wide_tray_does_not_pass_for_the_wall():
 @pytest.mark.parametrize("pixel", [0.02, 0.05])
 def test_a_pixel_is_judged_alike_in_whichever_part_of_the_image(pixel):
     offset, _, _ = _wall()
-    whole, far = appendages(offset, pixel, corner=(-37, 1234)), reach(pixel)
+    whole, far = split(offset, pixel, (-37, 1234)), reach(pixel)
     for first, stop, low, high in ((0, 200, 0, 150), (133, 333, 41, 300), (399, 600, 7, 222)):
-        part = appendages(offset[low:high, first:stop], pixel, corner=(-37 + low, 1234 + first))
+        part = split(offset[low:high, first:stop], pixel, (-37 + low, 1234 + first))
         within = np.s_[far if low else 0 : None if high == 300 else -far, far if first else 0 : None if stop == 600 else -far]
-        np.testing.assert_array_equal(part[within], whole[low:high, first:stop][within])
+        for one, other in zip(part, whole, strict=True):
+            np.testing.assert_array_equal(one[within], other[low:high, first:stop][within])
 
 
 def test_a_single_outlier_is_not_grown():
     offset = np.zeros((60, 60), np.float32)
     offset[30, 30] = 0.2
-    assert appendages(offset, PIXEL).sum() == 1
+    assert split(offset)[0].sum() == 1
+
+
+def test_a_niche_is_recess_though_profiles_are_apart_and_an_outlier_lies_in_it():
+    rng = np.random.default_rng(3)
+    offset = rng.normal(0, 0.003, (200, 300)).astype(np.float32)
+    offset[60:140, 100:200] -= 0.7
+    offset[100, 148] = -0.2
+    offset[:, np.arange(300) % 4 > 0] = np.nan
+    off, recess = split(offset)
+    held = ~np.isnan(offset)
+    back = np.zeros(offset.shape, bool)
+    back[62:138, 104:197] = True
+    assert off[100, 148]
+    held[100, 148] = False
+    assert recess[back & held].all()
+    # Between its profiles nothing is barred.
+    assert off[70:95, 110:190].sum() == 0
+
+
+def test_points_scattered_behind_the_wall_are_no_recess():
+    rng = np.random.default_rng(4)
+    offset = rng.normal(0, 0.003, (300, 300)).astype(np.float32)
+    ghost = rng.random(offset.shape) < 0.01
+    offset[ghost] -= rng.uniform(0.05, 1.0, ghost.sum()).astype(np.float32)
+    ghost[100:200, 100:200] = False
+    # A doorway, in which they are alone.
+    offset[100:200, 100:200] = np.where(rng.random((100, 100)) < 0.05, -rng.uniform(0.1, 1.1, (100, 100)), np.nan)
+    off, recess = split(offset)
+    assert not recess.any()
+    assert off[ghost].all()
 
 
 def _rings():

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 from shapely.geometry import box as rectangle
 
 from tunneldb.geometry.frame import segment_rows, tangents
@@ -12,8 +13,11 @@ from tunneldb.ground.arcs import foot_arcs
 from tunneldb.ground.line import Line
 from tunneldb.ground.model import COLUMN, Ground
 from tunneldb.intensity.edge import Edges
+from tunneldb.leak import appendage, step
 from tunneldb.leak.geometries import shapes
-from tunneldb.leak.lining import FLOOR_EDGE, Astray, Floor
+from tunneldb.leak.image import Accumulator, Grid
+from tunneldb.leak.kernel import Pixels
+from tunneldb.leak.lining import FLOOR_EDGE, Astray, Floor, State, reach, states
 
 LENGTH = 60.0
 
@@ -127,21 +131,125 @@ def test_a_round_tunnel_has_no_edges():
 
 
 @pytest.mark.parametrize("apart", [0.8, -0.15])
-def test_a_section_measured_in_a_niche_or_on_a_box_is_no_lining(apart):
+def test_a_section_measured_in_a_niche_or_on_a_box_leaves_the_wall(apart):
     radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
     radius[5, 250:300] += apart
     surface = straight(radius)
     astray = Astray.of(surface)
     at = np.array([20.0, float(surface.chainages[5]), 40.0])
     middle = np.interp(275, np.arange(361), surface.arcs[5])
-    covered = astray.covers(at, np.array([middle, -middle, 0.0]))
-    assert covered.tolist() == [[False, True, False], [False, False, False], [False, False, False]]
+    edge = np.interp(250, np.arange(361), surface.arcs[5])
+    level, bent = astray.level(at, np.array([middle, -middle, 0.0, edge]))
+    np.testing.assert_allclose(level[:3], [[0, apart, 0], [0, 0, 0], [0, 0, 0]], atol=1e-6)
+    assert bent.tolist() == [[False] * 3, [False] * 3, [False] * 3, [False, True, False]]
+    assert astray.level(at[[0, 2]], np.array([middle])) is None
+
+
+def wall(rng, surface, depth):
+    """Points on the right wall of a box with a niche from 26 to 29 m, unrolled."""
+    x, z = rng.uniform(15.0, 45.0, 500_000), rng.uniform(-2.0, 2.0, 500_000)
+    niche = (x > 26.0) & (x < 29.0) & (z > -1.65) & (z < 1.0)
+    y = 3.0 + np.where(niche, depth, 0.0) + rng.normal(0.0, 0.002, len(x))
+    return x, z, niche, surface.unroll(np.column_stack([x, -y, 100.0 + z]))
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_the_back_of_a_niche_is_lining_though_a_section_was_measured_in_it(measured):
+    radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
+    if measured:
+        radius[5, 250:300] += 0.5
+    surface = straight(radius)
+    x, z, niche, unrolled = wall(np.random.default_rng(1), surface, 0.5)
+    grid = Grid.covering(0, 0.05, float(surface.arcs.min()), float(surface.arcs.max()))
+    floor = Floor.of(0, np.full(61, -9.0), np.full(61, 9.0))
+    with Accumulator(grid) as image:
+        row, column = grid.place(unrolled.chainage, unrolled.arc)
+        offset, nothing = unrolled.offset.astype(np.float32), np.zeros(len(x), np.float32)
+        image.add(Pixels(row, column, np.ones(len(x), np.int32), offset, nothing, nothing), len(x))
+        columns = slice(400, 800)
+        window = image.window(columns.start - reach(0.05), columns.stop + reach(0.05))
+        state = states(window, columns, grid, floor, Astray.of(surface), 0.03)
+    inside = (column >= 400) & (column < 800)
+    seen = np.zeros(len(x), np.uint8)
+    seen[inside] = state[row[inside], column[inside] - 400]
+    within = (np.minimum(x - 26.0, 29.0 - x) > 0.3) & (z > -1.3) & (z < 0.7)
+    around = (np.maximum(26.0 - x, x - 29.0) > 0.3) | (z < -1.8) | (z > 1.3)
+    edge = niche & (np.minimum(x - 26.0, 29.0 - x) < 0.02)
+    assert (seen[within] == State.RECESS).all()
+    # Where the surface bends from the wall into the niche and back, over some degrees, there is none.
+    share = 0.8 if measured else 1.0
+    assert (seen[around & inside] == State.LINING).mean() >= share
+    assert (seen[around & inside & (np.abs(z) < 0.5)] == State.LINING).all()
+    assert (seen[edge] == State.OFF).mean() > 0.98
+
+
+def test_beyond_the_ends_of_the_section_nothing_is_left_to_be_seen():
+    grid = Grid.covering(0, 0.05, -15.0, 15.0)
+    floor = Floor.of(0, np.full(61, np.nan), np.full(61, np.nan))
+    with Accumulator(grid) as image:
+        state = states(image.window(0, 1400), slice(200, 1400), grid, floor, Astray.of(ROUND), 0.03)
+    arc, chainage = grid.arcs(), grid.chainages(slice(200, 1400))
+    beyond = np.abs(arc) > 4.0 * np.pi + 0.05
+    assert (state[beyond] == State.OFF).all()
+    assert (state[np.abs(arc) < 4.0 * np.pi - 0.05][:, chainage < LENGTH] == State.EMPTY).all()
+    assert (state[:, chainage > LENGTH + 5.0] == State.OFF).all()
+
+
+def ring(rng, pixel, filled=0.9):
+    """Offset image of a lining 0.1 m wider from column 400 on, its sections 2.5 m before and behind; a tray and a box."""
+    rows, columns = round(20.0 / pixel), 800
+    place = (np.arange(columns) + 0.5 - 400) * pixel
+    # From one section to the other the surface passes over evenly.
+    course = np.interp(place, [-2.5, 2.5], [0.0, -0.1]) + np.where(place > 0, 0.1, 0.0)
+    offset = -course + rng.normal(0.0, 0.004, (rows, columns)) + 0.01 * np.sin(np.arange(rows) * pixel)[:, None]
+    things = np.zeros((rows, columns), bool)
+    things[100:115] = things[300:340, 380:410] = things[500:502] = True
+    offset[things] += 0.08
+    offset[rng.random(offset.shape) > filled] = np.nan
+    return offset.astype(np.float32), things
+
+
+@pytest.mark.parametrize("filled", [0.95, 0.3])
+def test_a_step_all_round_the_section_is_lining_and_what_hangs_there_is_not(filled):
+    offset, things = ring(np.random.default_rng(2), 0.02, filled)
+    arc, bounds = np.linspace(10.0, -10.0, len(offset)), np.full(800, 20.0)
+    jumps = step.steps(offset, 0.02, 0, arc, -bounds, bounds)
+    assert jumps[400] - jumps[399] == pytest.approx(-0.1, abs=0.005)
+    flat = offset - jumps
+    distance = appendage.distance_from_plane(flat, 0.02)
+    off = appendage.off_plane(distance, appendage.recessed(flat, distance, 0.02), 0.02)
+    held = ~np.isnan(offset)
+    assert off[things & held].all()
+    near = ndimage.binary_dilation(things, iterations=4)
+    assert off[held & ~near].mean() < 1e-4
+    # Without it there is no lining beside the joint.
+    distance = appendage.distance_from_plane(offset, 0.02)
+    assert appendage.off_plane(distance, np.zeros_like(things), 0.02)[held & ~near].mean() > 0.01
+
+
+def test_steps_are_the_same_whichever_part_they_are_seen_in():
+    offset, _ = ring(np.random.default_rng(3), 0.02)
+    arc, bounds, far = np.linspace(10.0, -10.0, len(offset)), np.full(800, 20.0), step.reach(0.02)
+    whole = step.steps(offset, 0.02, -7, arc, -bounds, bounds)
+    for first, stop in ((0, 500), (317, 700), (360, 600)):
+        part = step.steps(offset[:, first:stop], 0.02, -7, arc, -bounds[first:stop], bounds[first:stop])
+        np.testing.assert_array_equal(part[far:-far], whole[first:stop][far:-far])
+
+
+def test_what_does_not_go_all_round_is_no_step():
+    rng = np.random.default_rng(4)
+    offset = rng.normal(0.0, 0.004, (1000, 400)).astype(np.float32)
+    offset[:450, 200:] += 0.08  # panels on a bit less than half of the wall
+    arc, bounds = np.linspace(10.0, -10.0, 1000), np.full(400, 20.0)
+    assert not step.steps(offset, 0.02, 0, arc, -bounds, bounds).any()
+    # The same on all of the wall above the floor.
+    assert step.steps(offset, 0.02, 0, arc, np.full(400, 1.0), bounds).any()
 
 
 def test_rock_that_differs_from_section_to_section_is_lining():
     rng = np.random.default_rng(1)
     radius = 4.0 + np.repeat(rng.normal(0, 0.1, (12, 73)), 5, axis=1)[:, :361]
-    assert (Astray.of(straight(radius)).apart > 0).mean() < 0.03
+    assert (Astray.of(straight(radius)).apart != 0).mean() < 0.03
 
 
 def test_a_wider_stretch_is_no_niche():

@@ -1,4 +1,4 @@
-"""Appendages: what stands off from the plane of the lining about it (Xu et al., 2018, eq. 21–23).
+"""Appendages: what stands off from the plane of the lining about it (Xu et al., 2018, eq. 21–23); and recesses of the lining.
 
 The planes are fitted to the offset image, where a curved lining is flat.
 """
@@ -30,6 +30,7 @@ SCALES = np.array([0.06, 0.05, 0.04, 0.03, 0.03])
 _BIN, _BINS, _REACH = 0.01, 8, 2
 _EVERY = 4  # of the pixels of a part every fourth is taken, in slanting lines: enough for three numbers
 _NONE = np.float32(1e9)  # an offset that no plane comes near
+_SUPPORT = 0.15  # share of the pixels about one in a recess that must lie at its depth: one profile's, less an outlier
 
 
 def distance_from_plane(offset: Single, pixel: float, corner: tuple[int, int] = (0, 0)) -> Single:
@@ -59,25 +60,40 @@ def distance_from_plane(offset: Single, pixel: float, corner: tuple[int, int] = 
     return distance
 
 
-def appendages(offset: Single, pixel: float, delta: float = DELTA, corner: tuple[int, int] = (0, 0)) -> Mask:
-    """Mark pixels that don't lie on the lining (eq. 23), grown to swallow the mixed pixels of their edges.
+def recessed(offset: Single, distance: Single, pixel: float, delta: float = DELTA) -> Mask:
+    """Mark pixels behind their plane that lie on a surface there: the back of a niche or of a bolt pocket.
+
+    About such a pixel, over 0.1 m, those with points lie at about its own depth, within δ; one may be an outlier. So
+    neither its edges are recesses, with the mixed pixels there, nor what lies scattered behind the wall.
 
     Parameters
     ----------
-    offset : (rows, columns) float32 array
-        Offset image, m, NaN where there is no point.
+    offset, distance : (rows, columns) float32 arrays
+        Offset image, m, and what :func:`distance_from_plane` returned for it.
     pixel : float
         Side of a pixel, m.
     delta : float
         δ, m.
-    corner : (int, int)
-        As for :func:`distance_from_plane`.
-
-    Returns
-    -------
-    (rows, columns) bool array
     """
-    marked: Mask = _grown(distance_from_plane(offset, pixel, corner), delta, _growth(pixel))
+    marked: Mask = _recessed(offset, distance, delta, _growth(pixel))
+    return marked
+
+
+def off_plane(distance: Single, recess: Mask, pixel: float, delta: float = DELTA) -> Mask:
+    """Mark pixels that lie neither on their plane (eq. 23) nor in a recess, grown to swallow the mixed pixels of their edges.
+
+    Parameters
+    ----------
+    distance : (rows, columns) float32 array
+        What :func:`distance_from_plane` returned.
+    recess : (rows, columns) bool array
+        What :func:`recessed` returned.
+    pixel : float
+        Side of a pixel, m.
+    delta : float
+        δ, m.
+    """
+    marked: Mask = _grown(distance, recess, delta, _growth(pixel))
     return marked
 
 
@@ -260,13 +276,33 @@ def _weighted(
 
 
 @njit(cache=True, nogil=True)
-def _grown(distance: Single, delta: float, growth: int) -> Mask:  # pragma: no cover - compiled
+def _recessed(offset: Single, distance: Single, delta: float, half: int) -> Mask:  # pragma: no cover - compiled
+    rows, columns = offset.shape
+    out = np.zeros((rows, columns), np.bool_)
+    enough = _SUPPORT * (2 * half + 1) ** 2
+    for i in range(rows):
+        for j in range(columns):
+            if not distance[i, j] <= -delta:
+                continue
+            alike, other = 0, 0
+            for m in range(max(i - half, 0), min(i + half + 1, rows)):
+                for n in range(max(j - half, 0), min(j + half + 1, columns)):
+                    alike += abs(offset[m, n] - offset[i, j]) < delta
+                    other += abs(offset[m, n] - offset[i, j]) >= delta
+                if other > 1:
+                    break
+            out[i, j] = other <= 1 and alike >= enough
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _grown(distance: Single, recess: Mask, delta: float, growth: int) -> Mask:  # pragma: no cover - compiled
     """Pixels off the plane, and those about them; a pixel alone is an outlier, which has no edge."""
     rows, columns = distance.shape
     out = np.zeros((rows, columns), np.bool_)
     for i in range(rows):
         for j in range(columns):
-            if abs(distance[i, j]) >= delta:
+            if abs(distance[i, j]) >= delta and not recess[i, j]:
                 beside = 0
                 for m in range(max(i - 1, 0), min(i + 2, rows)):
                     for n in range(max(j - 1, 0), min(j + 2, columns)):

@@ -1,4 +1,4 @@
-"""Which pixels of the unrolled image show lining: not the floor, not an appendage, not a niche."""
+"""What each pixel of the unrolled image shows: lining, lining set back in a recess, what hangs on it, floor."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from tunneldb.geometry.surface import Surface
-from tunneldb.leak.appendage import appendages
+from tunneldb.geometry.unrolling import bracket
+from tunneldb.leak import appendage, step
 from tunneldb.leak.image import Grid, Whole, Window
 
 Float = NDArray[np.float64]
+Single = NDArray[np.float32]
 
 HIDDEN = 25
 """So many metres of ground may be hidden by what stands on it, and the floor goes on beneath."""
@@ -27,7 +29,7 @@ MOST = 0.4
 """Where a larger part of a section does, it is the tunnel that has another shape."""
 
 OFF_WALL = 0.03
-"""Surface that is farther off the wall is not lining, m."""
+"""Where the surface leaves the wall by more than this within a few degrees, it bends, m."""
 
 
 class State(IntEnum):
@@ -92,16 +94,16 @@ def _bridged(arcs: Float) -> Float:
 class Astray:
     """Where the surface leaves the wall, because a section was measured in a niche or on something hung on the wall.
 
-    Such a section stands apart from those beside it. From one of them to the other the surface is then no
-    wall there, and what lies on it no lining.
+    Such a section stands apart from those beside it, and between them the surface departs from the wall as it does from
+    their course.
 
     Attributes
     ----------
     surface : Surface
         The tunnel.
     apart : (k, 361) float array
-        How far each section stands apart from those beside it, m, at each whole degree; 0 where it is on the
-        wall.
+        How far each section stands apart from those beside it, m, outwards positive, at each whole degree; 0 where it is
+        on the wall.
     """
 
     surface: Surface
@@ -110,28 +112,38 @@ class Astray:
     @classmethod
     def of(cls, surface: Surface) -> Astray:
         """Take the sections that stand apart from those beside them (:meth:`Surface.astray`)."""
-        apart = np.abs(surface.astray())
+        apart = surface.astray()
         # A tunnel that is wider or narrower all round has no niche.
-        apart[(apart > 0.0).mean(axis=1) > MOST] = 0.0
+        apart[(apart != 0.0).mean(axis=1) > MOST] = 0.0
         return cls(surface, apart)
 
-    def covers(self, chainage: Float, arc: Float) -> NDArray[np.bool_]:
-        """Tell which pixels, (rows,) arcs by (columns,) chainages, lie on surface that left the wall."""
-        out = np.zeros((len(arc), len(chainage)), np.bool_)
+    def level(self, chainage: Float, arc: Float) -> tuple[Single, NDArray[np.bool_]] | None:
+        """Offset of the wall from the surface, m, and where it bends; (rows,) arcs by (columns,) chainages; None: nowhere.
+
+        Where it bends, at the edges of the niche, the surface's normals are not those of the wall.
+        """
         at = self.surface.chainages
-        after = np.clip(np.searchsorted(at, chainage, side="right"), 1, len(at) - 1) if len(at) > 1 else None
-        if after is None or not self.apart.any():
-            return out
+        if len(at) < 2 or not self.apart.any():
+            return None
+        after = np.clip(np.searchsorted(at, chainage, side="right"), 1, len(at) - 1)
+        columns = np.flatnonzero(self.apart[after].any(axis=1) | self.apart[after - 1].any(axis=1))
+        if not len(columns):
+            return None
         share = np.clip((chainage - at[after - 1]) / (at[after] - at[after - 1]), 0.0, 1.0)
-        for pair in np.unique(after):
-            if not self.apart[pair - 1 : pair + 1].any():
-                continue
-            for column in np.flatnonzero(after == pair):
-                g = share[column]
-                nodes = (1 - g) * self.surface.arcs[pair - 1] + g * self.surface.arcs[pair]
-                apart = (1 - g) * self.apart[pair - 1] + g * self.apart[pair]
-                out[:, column] = np.interp(arc, nodes, ndimage.maximum_filter1d(apart, 7)) > OFF_WALL
-        return out
+        level, bent = np.zeros((len(arc), len(chainage)), np.float32), np.zeros((len(arc), len(chainage)), np.bool_)
+        for column in columns.tolist():
+            a, b, g = after[column] - 1, after[column], share[column]
+            nodes = (1 - g) * self.surface.arcs[a] + g * self.surface.arcs[b]
+            apart = (1 - g) * self.apart[a] + g * self.apart[b]
+            bend = ndimage.maximum_filter1d(apart, 7) - ndimage.minimum_filter1d(apart, 7)
+            level[:, column] = np.interp(arc, nodes, apart)
+            bent[:, column] = np.interp(arc, nodes, bend) > OFF_WALL
+        return level, bent
+
+
+def reach(pixel: float) -> int:
+    """How far, in pixels, what a pixel's state depends on lies from it at most."""
+    return appendage.reach(pixel) + step.reach(pixel)
 
 
 def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Astray, delta: float) -> NDArray[np.uint8]:
@@ -140,7 +152,7 @@ def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Ast
     Parameters
     ----------
     window : Window
-        Those columns and, to both sides, :func:`tunneldb.leak.appendage.reach` more.
+        Those columns and, to both sides, :func:`reach` more.
     columns : slice
         Columns of the grid.
     grid : Grid
@@ -157,26 +169,63 @@ def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Ast
     (rows, columns) uint8 array
         Values of :class:`State`.
     """
-    inner = slice(columns.start - window.columns.start, columns.stop - window.columns.start)
-    corner = (-grid.bottom - grid.rows, grid.first_column + window.columns.start)
-    off = appendages(window.offset, grid.pixel, delta, corner)[:, inner]
-    chainage, arc = grid.chainages(columns), grid.arcs()
+    chainage, arc = grid.chainages(window.columns), grid.arcs()
     left, right = floor.bounds(chainage)
-    state: NDArray[np.uint8] = _states(window.weight[:, inner], off, astray.covers(chainage, arc), arc, left, right)
+    offset, bent = window.offset, None
+    if (strayed := astray.level(chainage, arc)) is not None:
+        offset, bent = offset - strayed[0], strayed[1]
+    row = -grid.bottom - grid.rows
+    jumps = step.steps(offset, grid.pixel, row, arc, left, right)
+    if jumps.any():
+        offset = offset - jumps
+    distance = appendage.distance_from_plane(offset, grid.pixel, (row, grid.first_column + window.columns.start))
+    recess = appendage.recessed(offset, distance, grid.pixel, delta)
+    off = appendage.off_plane(distance, recess, grid.pixel, delta)
+    if bent is not None:
+        off |= bent
+        recess &= ~bent
+    inner = slice(columns.start - window.columns.start, columns.stop - window.columns.start)
+    surface = astray.surface
+    state: NDArray[np.uint8] = _states(
+        window.weight[:, inner], off[:, inner], recess[:, inner], arc,
+        left[inner], right[inner], *_ends(surface.chainages, surface.arcs, surface.reach, chainage[inner]),
+    )  # fmt: skip
     return state
 
 
 @njit(cache=True, nogil=True)
+def _ends(at: Float, arcs: Float, reach: float, chainage: Float) -> tuple[Float, Float]:  # pragma: no cover - compiled
+    """Arcs at which the section at each chainage begins and ends, m; infinite, so that nothing lies between, where none is."""
+    low, high = np.full(chainage.shape[0], np.inf), np.full(chainage.shape[0], -np.inf)
+    for j in range(chainage.shape[0]):
+        a, b, g = bracket(at, chainage[j], reach)
+        if a >= 0:
+            low[j] = (1.0 - g) * arcs[a, 0] + g * arcs[b, 0]
+            high[j] = (1.0 - g) * arcs[a, -1] + g * arcs[b, -1]
+    return low, high
+
+
+@njit(cache=True, nogil=True)
 def _states(
-    weight: Whole, off: NDArray[np.bool_], astray: NDArray[np.bool_], arc: Float, left: Float, right: Float
+    weight: Whole,
+    off: NDArray[np.bool_],
+    recess: NDArray[np.bool_],
+    arc: Float,
+    left: Float,
+    right: Float,
+    low: Float,
+    high: Float,
 ) -> NDArray[np.uint8]:  # pragma: no cover - compiled
     state = np.empty(weight.shape, np.uint8)
     for i in range(weight.shape[0]):
         for j in range(weight.shape[1]):
             if arc[i] <= left[j] or arc[i] >= right[j]:
                 state[i, j] = 4
-            elif off[i, j] or astray[i, j]:
-                state[i, j] = 3
+            elif weight[i, j] == 0:
+                # Beyond the ends of the section there is no lining to be seen.
+                state[i, j] = 0 if low[j] <= arc[i] <= high[j] and not off[i, j] else 3
+            elif recess[i, j]:
+                state[i, j] = 2
             else:
-                state[i, j] = 1 if weight[i, j] > 0 else 0
+                state[i, j] = 3 if off[i, j] else 1
     return state

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tunneldb.leak.appendage import reach
 from tunneldb.leak.image import Accumulator, Grid, Window
-from tunneldb.leak.lining import Astray, Floor, states
+from tunneldb.leak.lining import Astray, Floor, reach, states
 from tunneldb.leak.raster import NODATA, whole
 from tunneldb.leak.threshold import MAX_MEDIAN
 
