@@ -13,6 +13,7 @@ from shapely.geometry import Polygon
 from tunneldb.leak.dry_map import DryMap
 from tunneldb.leak.image import Grid
 from tunneldb.leak.judge import Verdict, judge
+from tunneldb.leak.lines import lines
 from tunneldb.leak.picture import WET_EDGE
 from tunneldb.leak.region import Region, regions
 from tunneldb.leak.relative import Relative
@@ -123,7 +124,7 @@ def detect(relative: Relative, dry: DryMap, min_area: float) -> Detection:
     dark = settle(dark_pixels(relative, size), relative, size)
     found, cut, leaks = [], [], []
     ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
-    for region in regions(dark, relative, min_area):
+    for region in _regions(dark, relative, min_area):
         anomaly = Found.of(region, min_area)
         if region.column == ends[0] or region.stop == ends[1]:
             cut.append(region)
@@ -134,6 +135,16 @@ def detect(relative: Relative, dry: DryMap, min_area: float) -> Detection:
     _draw(wet, leaks, grid)
     wet &= dark
     return Detection(found, cut, dark, wet, size, pixels, sum(region.filled for region in leaks))
+
+
+def _regions(dark: Mask, relative: Relative, min_area: float) -> list[Region]:
+    """Regions of the dark pixels, joints cut off from what they run through."""
+    inner = relative.grid.inner
+    joints = lines(dark, inner.start, inner.stop, relative.grid.pixel)
+    if not joints.any():
+        return regions(dark, relative, min_area)
+    found = regions(dark & ~joints, relative, min_area) + regions(joints, relative, min_area)
+    return sorted(found, key=lambda region: (region.column, region.row))
 
 
 def dry_places(relative: Relative, found: Detection, chainage: Float, arc: Float) -> Mask:

@@ -41,7 +41,7 @@ def judge(region: Region) -> Verdict:
     degrees = {
         "thin": _thin(shape, region.pixel),
         "recess": _recess(region),
-        "gradual": _gradual(region),
+        "gradual": _gradual(region, shape),
         "rectangular": _rectangular(region, shape),
         "shadow": _shadow(region, shape),
     }
@@ -62,13 +62,12 @@ def evidence(region: Region) -> float:
 
 
 def _thin(shape: Shape, pixel: float) -> float:
-    """Joints are at most 2 cm wide, which the median filter and the beam widen to a few pixels, and straight."""
-    wander = min(shape.wander_along if shape.along > shape.across else shape.wander_across, 1.0)
-    width = max(0.05, 2.5 * pixel)
+    """Joints are at most 2 cm wide, which the beam, the pixels and the median filter widen, and straight."""
+    wander = shape.wander_along if shape.along > shape.across else shape.wander_across
     return min(
-        _ramp(shape.width, 1.4 * width, width),
-        _ramp(shape.length / max(shape.width, pixel), 4.0, 8.0),
-        _ramp(wander, 1.5 * pixel, 0.75 * pixel),
+        _ramp(shape.mean_width, 0.09, 0.06),
+        _ramp(shape.length / max(shape.mean_width, pixel), 4.0, 8.0),
+        _ramp(wander, 2.0 * pixel, pixel),
     )
 
 
@@ -79,24 +78,30 @@ def _recess(region: Region) -> float:
     return min(_ramp(traits.recess / pixels, 0.3, 0.7), _ramp(about, 0.4, 0.2), _ramp(region.area, 0.25, 0.15))
 
 
-def _gradual(region: Region) -> float:
-    """Soot and grime fade out; of the darkness of a wet patch most is reached within some centimetres of its edge."""
+def _gradual(region: Region, shape: Shape) -> float:
+    """Soot and grime fade out; of the darkness of a wet patch most is reached within some centimetres of its edge.
+
+    Grime beneath a cable lies in a band along the tunnel, which water does not: there less softness is enough.
+    """
     traits = region.traits
-    if traits.steps < 10 or not region.filled or region.drop_sum <= 0:
+    if traits.steps < 10 or region.drop_sum <= 0:
         return 0.0
-    step = (traits.inside - traits.outside) / traits.steps
-    return _ramp(step / region.drop_mean, 0.6, 0.3)
+    step = (traits.inside - traits.outside) / traits.steps / region.drop_mean
+    band = _ramp(shape.along / shape.across, 4.0, 8.0)
+    return _ramp(step, 0.6 + 0.25 * band, 0.3 + 0.25 * band)
 
 
 def _rectangular(region: Region, shape: Shape) -> float:
     """A repaired patch, a painted stripe: straight sides along the tunnel and around it, all of them seen, and one shade."""
     traits = region.traits
-    if not traits.rim or not region.filled or min(shape.along, shape.across) < 4 * region.pixel:
+    if not traits.rim or min(shape.along, shape.across) < 4 * region.pixel:
         return 0.0
     wander = max(shape.wander_along, shape.wander_across) / region.pixel
-    # Nothing man-made and dry is as dark as running water.
-    strong = _ramp(min(region.contrast / 8.0, region.drop_mean / 3.0), 1.2, 1.0)
-    return min(_ramp(wander, 1.2, 0.6), _ramp(shape.fill, 0.85, 0.93), _ramp(traits.rim_off / traits.rim, 0.2, 0.1), strong)
+    # Water that fills a panel between joints is rectangular too, and darker than repairs are; but no stripe.
+    strong = min(region.contrast / 8.0, region.drop_mean / 3.0)
+    panel = _ramp(strong, 1.0, 1.2) * (1.0 - _ramp(shape.length / shape.mean_width, 6.0, 10.0))
+    seen = _ramp(traits.rim_off / traits.rim, 0.2, 0.1)
+    return min(_ramp(wander, 1.2, 0.6), _ramp(shape.fill, 0.85, 0.93), _ramp(shape.corners, 0.3, 0.6), seen, 1.0 - panel)
 
 
 def _shadow(region: Region, shape: Shape) -> float:

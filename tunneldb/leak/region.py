@@ -14,6 +14,7 @@ from scipy import sparse
 from shapely.geometry import Polygon
 
 from tunneldb.leak.drips import Dark, hang
+from tunneldb.leak.lines import beside
 from tunneldb.leak.polygon import outline
 from tunneldb.leak.raster import NODATA, STEP
 from tunneldb.leak.relative import Relative
@@ -218,7 +219,7 @@ def _touch(before: Region, after: Region) -> bool:
 
 def _beside(runs: Int) -> sparse.coo_array:
     """Pairs of runs of neighbouring rows that share sides."""
-    first, second = _pairs(runs)
+    first, second = beside(runs)
     return sparse.coo_array((np.ones(len(first), np.int8), (first, second)), shape=(len(runs), len(runs)))
 
 
@@ -243,24 +244,6 @@ def _runs(wet: Mask, first: int, stop: int) -> Int:  # pragma: no cover - compil
                 runs[count - 1, 2] = j + 1
             before = wet[i, j]
     return runs
-
-
-@njit(cache=True, nogil=True)
-def _pairs(runs: Int) -> tuple[Int, Int]:  # pragma: no cover - compiled
-    """Runs of neighbouring rows that share sides; of n runs in a row with m in the next, at most n + m - 1 do."""
-    first, second = np.empty(2 * len(runs), np.int64), np.empty(2 * len(runs), np.int64)
-    count, above = 0, 0
-    for k in range(runs.shape[0]):
-        while above < k and (
-            runs[above, 0] < runs[k, 0] - 1 or (runs[above, 0] == runs[k, 0] - 1 and runs[above, 2] <= runs[k, 1])
-        ):
-            above += 1
-        m = above
-        while m < k and runs[m, 0] == runs[k, 0] - 1 and runs[m, 1] < runs[k, 2]:
-            first[count], second[count] = m, k
-            count += 1
-            m += 1
-    return first[:count], second[:count]
 
 
 @njit(cache=True, nogil=True)

@@ -14,8 +14,8 @@ Float = NDArray[np.float64]
 PIECE = 2.0
 """Sides are compared with straight lines piece by piece, so long at most, m: a tunnel's alignment is no straighter."""
 
-CORNER = 0.1
-"""Share of a side left out at either end of it: corners are rounded by the median filter."""
+CORNER = 0.12
+"""Share of a side that belongs to the corners, at either end of it."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,14 @@ class Shape:
     ----------
     along, across : float
         Extent in chainage and in arc.
+    area : float
+        m².
     width : float
         Diameter of the largest circle that fits in, about.
     fill : float
-        Share of its box that it fills, 0 to 1.
+        Share that it fills, 0 to 1, of the box of those rows and columns of pixels of which it fills half.
+    corners : float
+        Share that it fills of the emptiest corner of that box, 0 to 1.
     wander_along, wander_across : float
         Standard deviation about straight lines of the sides that face arcs, as one goes along the tunnel, and of those that
         face chainages, as one goes around it.
@@ -37,8 +41,10 @@ class Shape:
 
     along: float
     across: float
+    area: float
     width: float
     fill: float
+    corners: float
     wander_along: float
     wander_across: float
 
@@ -46,6 +52,11 @@ class Shape:
     def length(self) -> float:
         """The greater extent, m."""
         return max(self.along, self.across)
+
+    @property
+    def mean_width(self) -> float:
+        """Area over length, m."""
+        return self.area / self.length
 
 
 def measure(mask: Mask, pixel: float) -> Shape:
@@ -55,11 +66,21 @@ def measure(mask: Mask, pixel: float) -> Shape:
     return Shape(
         columns * pixel,
         rows * pixel,
+        float(np.count_nonzero(mask)) * pixel**2,
         float(_widest(mask)) * pixel,
-        float(np.count_nonzero(mask)) / mask.size,
+        *_box(mask),
         float(_wander(mask, piece)) * pixel,
         float(_wander(np.ascontiguousarray(mask.T), piece)) * pixel,
     )
+
+
+def _box(mask: Mask) -> tuple[float, float]:
+    """Share of the box that is filled, and of its emptiest corner."""
+    across, along = np.count_nonzero(mask, axis=1), np.count_nonzero(mask, axis=0)
+    full = mask[np.ix_(across >= 0.5 * np.median(across), along >= 0.5 * np.median(along))]
+    high, wide = (max(2, round(CORNER * side)) for side in full.shape)
+    corners = (full[i, j] for i in (slice(high), slice(-high, None)) for j in (slice(wide), slice(-wide, None)))
+    return float(full.mean()), min(float(corner.mean()) for corner in corners)
 
 
 @njit(cache=True, nogil=True)

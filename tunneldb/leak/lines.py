@@ -1,0 +1,131 @@
+"""Joints: narrow straight dark lines, around the tunnel or along it, that must not tie leaks together."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy import sparse
+
+Mask = NDArray[np.bool_]
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+NARROW = 0.08
+"""Joints are at most 2 cm wide; the beam, the pixels and the median filter widen them, but not to more, m."""
+
+LONG = 1.0
+"""Water that runs down a wall keeps no straight line for longer, m."""
+
+STRAIGHT = 0.015
+"""Standard deviation of the middle of a joint about a straight line, m: it is built to millimetres, pixels are larger."""
+
+
+def lines(dark: Mask, first: int, stop: int, pixel: float) -> Mask:
+    """Find the pixels of narrow straight lines at least LONG around the tunnel or along it.
+
+    Parameters
+    ----------
+    dark : (rows, columns) bool array
+        Dark pixels.
+    first, stop : int
+        Columns that count.
+    pixel : float
+        Side of a pixel, m.
+    """
+    found = np.zeros(dark.shape, np.bool_)
+    wide, long = max(2, round(NARROW / pixel)), round(LONG / pixel)
+    across, along = short_runs(dark, first, stop, wide)
+    for runs, upright in ((across, True), (along, False)):
+        if len(runs) < long:
+            continue
+        chosen = runs[_straight(runs, long, max(STRAIGHT / pixel, 0.75))]
+        _draw(found, chosen, upright)
+    return found
+
+
+def _straight(runs: Int, long: int, wander: float) -> Mask:
+    """Which runs, of a line and from a place up to another one each, are parts of a long straight line across these lines."""
+    first, second = beside(runs)
+    graph = sparse.coo_array((np.ones(len(first), np.int8), (first, second)), shape=(len(runs), len(runs)))
+    count, label = sparse.csgraph.connected_components(graph, directed=False)
+    at, middle = runs[:, 0].astype(np.float64), 0.5 * (runs[:, 1] + runs[:, 2])
+
+    def mean(values: NDArray[np.floating]) -> Float:
+        return np.asarray(np.bincount(label, values, count)) / number
+
+    number = np.bincount(label, minlength=count)
+    at, middle = at - mean(at)[label], middle - mean(middle)[label]
+    spread, tilt = mean(at * at), mean(at * middle)
+    slope = tilt / np.maximum(spread, 1e-9)
+    left = np.sqrt(np.maximum(mean(middle * middle) - slope * tilt, 0.0))
+    low, high = np.full(count, np.iinfo(np.int64).max), np.full(count, -1)
+    np.minimum.at(low, label, runs[:, 0])
+    np.maximum.at(high, label, runs[:, 0])
+    # One run a line: no net, no branches.
+    straight = (high - low + 1 >= long) & (left <= wander) & (np.abs(slope) < 0.1) & (number <= 1.2 * (high - low + 1))
+    return np.asarray(straight[label], dtype=np.bool_)
+
+
+@njit(cache=True, nogil=True)
+def beside(runs: Int) -> tuple[Int, Int]:  # pragma: no cover - compiled
+    """Runs of neighbouring lines that share sides; of n runs in a line with m in the next, at most n + m - 1 do."""
+    first, second = np.empty(2 * len(runs), np.int64), np.empty(2 * len(runs), np.int64)
+    count, above = 0, 0
+    for k in range(runs.shape[0]):
+        while above < k and (
+            runs[above, 0] < runs[k, 0] - 1 or (runs[above, 0] == runs[k, 0] - 1 and runs[above, 2] <= runs[k, 1])
+        ):
+            above += 1
+        m = above
+        while m < k and runs[m, 0] == runs[k, 0] - 1 and runs[m, 1] < runs[k, 2]:
+            first[count], second[count] = m, k
+            count += 1
+            m += 1
+    return first[:count], second[:count]
+
+
+@njit(cache=True, nogil=True)
+def short_runs(dark: Mask, first: int, stop: int, wide: int) -> tuple[Int, Int]:  # pragma: no cover - compiled
+    """Unbroken runs of dark pixels that are not wider: (row, column, column behind) and (column, row, row behind), in order."""
+    rows = dark.shape[0]
+    across, along = 0, 0
+    begin = np.full(stop, -1, np.int64)
+    for count_only in (True, False):
+        if not count_only:
+            horizontal, vertical = np.empty((across, 3), np.int64), np.empty((along, 3), np.int64)
+            across, along = 0, 0
+            begin[:] = -1
+        for i in range(rows + 1):
+            start = -1
+            for j in range(first, stop + 1):
+                here = i < rows and j < stop and dark[i, j]
+                if here and start < 0:
+                    start = j
+                elif not here and start >= 0:
+                    if j - start <= wide:
+                        if not count_only:
+                            horizontal[across] = i, start, j
+                        across += 1
+                    start = -1
+                if j < stop:
+                    if here and begin[j] < 0:
+                        begin[j] = i
+                    elif not here and begin[j] >= 0:
+                        if i - begin[j] <= wide:
+                            if not count_only:
+                                vertical[along] = j, begin[j], i
+                            along += 1
+                        begin[j] = -1
+    order = np.argsort(vertical[:, 0] * (rows + 1) + vertical[:, 1])
+    return horizontal, vertical[order]
+
+
+@njit(cache=True, nogil=True)
+def _draw(image: Mask, runs: Int, upright: bool) -> None:  # pragma: no cover - compiled
+    for k in range(runs.shape[0]):
+        for m in range(runs[k, 1], runs[k, 2]):
+            if upright:
+                image[runs[k, 0], m] = True
+            else:
+                image[m, runs[k, 0]] = True
