@@ -39,6 +39,12 @@ NARROW = 0.6
 ENOUGH = 100
 """Values that tell the level of dry lining to a tenth of their standard deviation, about."""
 
+FEW = 10
+"""From fewer values no level is told."""
+
+PART = 0.15
+"""Part of what a row or a column holds on average from which its level is told."""
+
 AROUND = 2.0
 """Half the side of the windows for the standard deviation, m: they hold a few segments of a ring."""
 
@@ -90,7 +96,9 @@ class Fit:
 
     def add_bands(self) -> None:
         """Add what each row shows: about each block, or where too little is seen of it, in the whole kilometre."""
-        found, whole = row_modes(self.picture.state, self.picture.level, *self.parts, self.every, BESIDE, ENOUGH)
+        along = min(np.count_nonzero(self.lining.any(axis=0)), (2 * BESIDE + 1) * self.smooth.shape[1] // self.bands.shape[1])
+        enough = max(FEW, round(PART * along * self.per_tile / self.tile / self.every))
+        found, whole = row_modes(*self._plain, *self.parts, self.every, BESIDE, enough)
         found = np.where(np.isfinite(found), found, whole[:, None])
         rows = np.flatnonzero(np.isfinite(whole))
         if not len(rows):
@@ -104,20 +112,21 @@ class Fit:
         """Add what each column shows, without joints."""
         pixel = self.grid.pixel
         per_column = self.per_tile * self.lining.shape[0] / self.tile
-        found = column_modes(self.picture.state, self.picture.level, *self.parts, self.every, max(1, round(0.1 * per_column)))
+        found = column_modes(*self._plain, *self.parts, self.every, max(FEW, round(PART * per_column / self.every)))
         # Where columns hold little, more of them are taken together.
         size = _odd(max(RING / pixel, 10.0 * ENOUGH / max(per_column, 1.0)))
+        found = _running_median(found, size // 2)
         columns = np.flatnonzero(np.isfinite(found))
         if not len(columns):
             return
-        rings = self.rings + _running_median(found, size // 2)
-        rings = np.interp(np.arange(len(rings)), np.flatnonzero(np.isfinite(rings)), rings[np.isfinite(rings)])
+        rings = self.rings + np.interp(np.arange(len(found)), columns, found[columns])
         closed = ndimage.grey_closing(rings, _odd(NARROW / pixel), mode="nearest")
         self.rings = np.where(closed - rings > 0.5 * self.spread, closed, rings).astype(np.float32)
 
     def add_smooth(self) -> None:
         """Add what changes slowly."""
-        half = int(np.ceil((np.sqrt(ENOUGH / max(self.per_tile, 1e-3)) - 1) / 2)) if self.per_tile < ENOUGH else 0
+        held = max(self.per_tile / self.every, 1e-3)
+        half = int(np.ceil((np.sqrt(ENOUGH / held) - 1) / 2)) if held < ENOUGH else 0
         histograms = self._histograms()
         used = np.ones(self.smooth.shape, np.bool_)
         mean, sigma, count = settle_windows(histograms, used, half)
@@ -127,8 +136,7 @@ class Fit:
             mean[self.pinned] = (total / np.maximum(number, 1))[self.pinned]
         if np.isfinite(sigma).any():
             self.spread = max(float(np.nanmedian(sigma)), STEP["corrected"])
-        added, self.odd = slow(mean, self.spread, self.pinned)
-        self.smooth = self.smooth + added
+        self.smooth, self.odd = slow(self.smooth + mean, self.smooth, self.spread, self.pinned)
 
     def sigma(self) -> Single:
         """Standard deviation about the model, by tiles, dB."""
@@ -150,7 +158,12 @@ class Fit:
         return sigma
 
     def _histograms(self) -> NDArray[np.uint16]:
-        return tile_histograms(self.picture.state, self.picture.level, *self.parts, self.every)
+        return tile_histograms(self.picture.state, self.picture.level, self.lining > 0, *self.parts, self.every)
+
+    @property
+    def _plain(self) -> tuple[NDArray[np.uint8], NDArray[np.int16], Mask]:
+        """State, level and the tiles that nothing sets off."""
+        return self.picture.state, self.picture.level, (self.lining > 0) & ~self.odd
 
     def _drawn_moments(self) -> tuple[Float, Float, Float]:
         """Of the lining pixels in drawn regions, by tiles: number, sum and squares of what they show beyond the model."""

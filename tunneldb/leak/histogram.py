@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tunneldb.intensity.dry import CLIP, CLIPPED_SIGMA, SHORTH
+from tunneldb.intensity.dry import CLIP, CLIPPED_SIGMA
 from tunneldb.leak.raster import STEP
 
 Float = NDArray[np.float64]
@@ -18,6 +18,7 @@ Single = NDArray[np.float32]
 Counts = NDArray[np.int32]
 State = NDArray[np.uint8]
 Level = NDArray[np.int16]
+Used = NDArray[np.bool_]
 
 BIN = 0.05
 """Width of a bin, dB: half the standard deviation of pixels that average many points; means come out far finer."""
@@ -28,7 +29,11 @@ BINS = 384
 TILE_BINS = 160
 """Bins of the histograms of tiles."""
 
-LONGER = 1.2
+SHORTH = 0.25
+"""Share of all values in the shortest run of bins that marks where dry lining lies: it may be less than half of them, and is
+still denser than what is wet to several degrees."""
+
+LONGER = 1.5
 """Of runs of bins up to so much longer than the shortest the brightest is taken: where half is wet, it is the dry one."""
 
 PER_LEVEL = STEP["corrected"] / BIN
@@ -170,6 +175,7 @@ def fill_levels(
 def row_modes(
     state: State,
     level: Level,
+    used: Used,
     base: float,
     rings: Single,
     bands: Single,
@@ -181,7 +187,7 @@ def row_modes(
 ) -> tuple[Single, Single]:  # pragma: no cover - compiled
     """What dry lining shows beyond the model in each row: about each block, from so many blocks beside it, and everywhere.
 
-    (rows, blocks) and (rows,), dB; NaN where there are not enough values. Every n-th tile is looked at.
+    (rows, blocks) and (rows,), dB; NaN where there are not enough values. Every n-th of the tiles used is looked at.
     """
     rows, blocks = bands.shape
     tiles = smooth.shape[1]
@@ -194,6 +200,8 @@ def row_modes(
         histogram[:] = 0
         row_line(i, base, bands, smooth, tile, 0, tiles, line)
         for t in range((every - i % every) % every, tiles, every):
+            if not used[i // tile, t]:
+                continue
             for j in range(t * tile, (t + 1) * tile):
                 if state[i, j] == 1:
                     beyond = np.float32(level[i, j] * PER_LEVEL) - per_bin * dry_level(j, line, rings, per_pixel)
@@ -218,6 +226,7 @@ def row_modes(
 def column_modes(
     state: State,
     level: Level,
+    used: Used,
     base: float,
     rings: Single,
     bands: Single,
@@ -228,7 +237,7 @@ def column_modes(
 ) -> Single:  # pragma: no cover - compiled
     """What dry lining shows beyond the model in each column (columns,), dB; NaN where there are not enough values.
 
-    Every n-th row is looked at.
+    Every n-th row of the tiles used is looked at.
     """
     rows, columns = state.shape
     tiles = smooth.shape[1]
@@ -241,12 +250,15 @@ def column_modes(
         histogram[:] = 0
         for i in range(every // 2, rows, every):
             row_line(i, base, bands, smooth, tile, max(start - 1, 0), min(stop + 1, tiles), line)
-            for j in range(start * tile, stop * tile):
-                if state[i, j] == 1:
-                    beyond = np.float32(level[i, j] * PER_LEVEL) - per_bin * dry_level(j, line, rings, per_pixel)
-                    k = int(np.floor(beyond)) + BINS // 2
-                    if 0 <= k < BINS:
-                        histogram[j - start * tile, k] += 1
+            for t in range(start, stop):
+                if not used[i // tile, t]:
+                    continue
+                for j in range(t * tile, (t + 1) * tile):
+                    if state[i, j] == 1:
+                        beyond = np.float32(level[i, j] * PER_LEVEL) - per_bin * dry_level(j, line, rings, per_pixel)
+                        k = int(np.floor(beyond)) + BINS // 2
+                        if 0 <= k < BINS:
+                            histogram[j - start * tile, k] += 1
         for j in range(start * tile, stop * tile):
             mean, _, count = settle(histogram[j - start * tile])
             out[j] = (mean - BINS // 2) * BIN if count >= enough else np.nan
@@ -257,6 +269,7 @@ def column_modes(
 def tile_histograms(
     state: State,
     level: Level,
+    used: Used,
     base: float,
     rings: Single,
     bands: Single,
@@ -264,7 +277,7 @@ def tile_histograms(
     tile: int,
     every: int,
 ) -> NDArray[np.uint16]:  # pragma: no cover - compiled
-    """Histograms (tiles down, tiles along, bins) of what lining shows beyond the model; every n-th row is looked at."""
+    """Histograms (tiles down, tiles along, bins) of what lining shows beyond the model, from every n-th row of the tiles used."""
     rows = state.shape[0]
     down, along = smooth.shape
     out = np.zeros((down, along, TILE_BINS), np.uint16)
@@ -273,6 +286,8 @@ def tile_histograms(
     for i in range(every // 2, rows, every):
         row_line(i, base, bands, smooth, tile, 0, along, line)
         for t in range(along):
+            if not used[i // tile, t]:
+                continue
             histogram = out[i // tile, t]
             for j in range(t * tile, (t + 1) * tile):
                 if state[i, j] == 1:
@@ -285,7 +300,7 @@ def tile_histograms(
 
 @njit(cache=True, nogil=True)
 def settle_windows(
-    histograms: NDArray[np.uint16], used: NDArray[np.bool_], half: int
+    histograms: NDArray[np.uint16], used: Used, half: int
 ) -> tuple[Single, Single, Counts]:  # pragma: no cover - compiled
     """Mean and standard deviation of dry lining in windows of 2 ``half`` + 1 tiles to a side about each tile.
 

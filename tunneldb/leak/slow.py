@@ -16,11 +16,11 @@ ASIDE = 3.0
 BAND = 4
 """So many tiles to either side in arc, of the whole kilometre, say how much tiles differ."""
 
-REACH = 2
-"""An edge is sharp when most of the step lies within so many tiles."""
+EDGE, ABOUT = 3, 7
+"""Tiles to a side of the windows that show an edge itself and what it is part of: 1 m and 3 m from middle to middle."""
 
 SHARP = 0.6
-"""Part of the step within REACH from which an edge is sharp: a smooth passage over twice that length has less."""
+"""Part of the step about it from which an edge is sharp: one that fades over more than 1.7 m is not."""
 
 SMOOTH = (5, 9)
 """Tiles down and along of the median filter."""
@@ -29,7 +29,7 @@ FEW = 20
 """So many tiles tell by how much they differ."""
 
 
-def slow(beyond: Single, spread: float, pinned: Mask) -> tuple[Single, Mask]:
+def slow(level: Single, before: Single, spread: float, pinned: Mask) -> tuple[Single, Mask]:
     """Follow what changes slowly, and nothing that is set off by a sharp edge.
 
     Dry lining differs from place to place as much towards dark as towards bright, and wet lining is only ever darker. So
@@ -39,8 +39,10 @@ def slow(beyond: Single, spread: float, pinned: Mask) -> tuple[Single, Mask]:
 
     Parameters
     ----------
-    beyond : (tiles down, tiles along) float32 array
-        Level of dry lining in each tile beyond the model so far, dB; NaN where it is unknown.
+    level : (tiles down, tiles along) float32 array
+        Level of dry lining in each tile beyond base, rings and bands, dB; NaN where it is unknown.
+    before : (tiles down, tiles along) float32 array
+        What is known already to change slowly, dB; what is found is added to it.
     spread : float
         Standard deviation of the pixels of dry lining, dB.
     pinned : (tiles down, tiles along) bool array
@@ -53,18 +55,18 @@ def slow(beyond: Single, spread: float, pinned: Mask) -> tuple[Single, Mask]:
     odd : (tiles down, tiles along) bool array
         Tiles set off by a sharp edge.
     """
-    known = np.isfinite(beyond)
-    limit = _limits(beyond, known & ~pinned, spread)
-    odd = np.zeros(beyond.shape, np.bool_)
+    known = np.isfinite(level)
+    limit = _limits(level, known & ~pinned, spread)
+    odd = np.zeros(level.shape, np.bool_)
     for sign in (1.0, -1.0):
         with np.errstate(invalid="ignore"):
-            out = known & ~pinned & (sign * beyond > limit[:, None])
-        odd |= _sharp(np.where(known, sign * beyond, np.nan), out)
+            out = known & ~pinned & (sign * level > limit[:, None])
+        odd |= _sharp(sign * level, out)
     # The tiles about them lie partly in them.
     odd = ndimage.binary_dilation(odd, np.ones((3, 3), np.bool_)) & ~pinned
-    filled = fill(np.where(odd, np.nan, beyond))
-    smooth = ndimage.uniform_filter(ndimage.median_filter(filled, SMOOTH, mode="nearest"), 3, mode="nearest")
-    smooth[pinned] = beyond[pinned]
+    rest = fill(np.where(odd, np.nan, level - before))
+    smooth = before + ndimage.uniform_filter(ndimage.median_filter(rest, SMOOTH, mode="nearest"), 3, mode="nearest")
+    smooth[pinned] = level[pinned]
     return smooth.astype(np.float32), odd
 
 
@@ -86,12 +88,12 @@ def fill(values: Single) -> Single:
     return out
 
 
-def _limits(beyond: Single, used: Mask, spread: float) -> Float:
+def _limits(level: Single, used: Mask, spread: float) -> Float:
     """By how much a tile may differ, for each row of tiles, dB."""
-    limit = np.full(len(beyond), np.nan)
-    for row in range(len(beyond)):
+    limit = np.full(len(level), np.nan)
+    for row in range(len(level)):
         about = slice(max(row - BAND, 0), row + BAND + 1)
-        bright = beyond[about][used[about]]
+        bright = level[about][used[about]]
         bright = bright[bright > 0.0]
         if len(bright) >= FEW:
             limit[row] = ASIDE * 1.4826 * float(np.median(bright))
@@ -104,14 +106,17 @@ def _sharp(step: Single, out: Mask) -> Mask:
     pieces, count = ndimage.label(out)
     if not count:
         return out
-    rest = np.isfinite(step) & ~out
-    about = ndimage.minimum_filter(np.where(rest, step, np.inf), 2 * REACH + 1, mode="nearest")
-    with np.errstate(invalid="ignore"):
-        rise = step - about
-    rim = out & ndimage.binary_dilation(rest)
-    number = np.arange(1, count + 1)
-    height = ndimage.labeled_comprehension(step, pieces, number, lambda v: np.percentile(v, 90), float, np.nan)
-    edge = ndimage.labeled_comprehension(rise[rim], pieces[rim], number, np.median, float, np.inf)
-    chosen = np.concatenate([[False], edge > SHARP * height])
-    sharp: Mask = chosen[pieces]
+    rim = out & ndimage.binary_dilation(np.isfinite(step) & ~out)
+    steep = (_span(step, EDGE)[rim] / np.maximum(_span(step, ABOUT)[rim], 1e-6)).astype(np.float64)
+    part = ndimage.labeled_comprehension(steep, pieces[rim], np.arange(1, count + 1), np.median, float, 1.0)
+    sharp: Mask = np.concatenate([[False], part > SHARP])[pieces]
     return sharp
+
+
+def _span(step: Single, size: int) -> Single:
+    """By how much known tiles differ in windows of so many tiles to a side."""
+    known = np.isfinite(step)
+    highest = ndimage.maximum_filter(np.where(known, step, -np.inf), size, mode="nearest")
+    lowest = ndimage.minimum_filter(np.where(known, step, np.inf), size, mode="nearest")
+    span: Single = highest - lowest
+    return span
