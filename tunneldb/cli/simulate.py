@@ -100,6 +100,8 @@ _GROUPS: dict[str, list[_Option]] = {
             click.Choice(["plain", "cast", "segments", "shotcrete", "tiles"]),
         ),
         _Option("ring", "M", "Length of the blocks of cast and of the rings of segments [10, 1.5]."),
+        _Option("ring_step", "M", "Standard deviation of the radius from ring to ring or block to block."),
+        _Option("radius_step", "M", "How much wider the section is over the second half."),
         _Option("soot", "DB", "Darkening of the crown."),
         _Option("grime", "DB", "Darkening beneath cables and trays."),
         _Option("patches", "N", "Repaired rectangles, 2 dB darker to 2 dB brighter.", int),

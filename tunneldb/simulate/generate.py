@@ -24,6 +24,7 @@ from tunneldb.simulate.profile import slabs
 from tunneldb.simulate.ray import scene, trace
 from tunneldb.simulate.rings import build
 from tunneldb.simulate.scanner import BlockPlan, Scanner
+from tunneldb.simulate.skin import skin
 from tunneldb.simulate.things import TargetSphere, Thing, parts_table
 from tunneldb.simulate.tunnel import Tunnel
 from tunneldb.simulate.wet import joint_leaks, niche_leaks, with_drips
@@ -104,8 +105,8 @@ class Simulation:
         self.parameters = parameters
         self.tunnel: Tunnel = parameters.tunnel()
         # Later streams come behind, so that a seed keeps its points.
-        streams = np.random.SeedSequence(parameters.seed).spawn(12)
-        furniture, wet, reference, self._seed, free, loose, built, marked, coated, joints, refuge, drips = streams
+        streams = np.random.SeedSequence(parameters.seed).spawn(13)
+        furniture, wet, reference, self._seed, free, loose, built, marked, coated, joints, refuge, drips, moved = streams
         self.appendages: list[Appendage] = (
             furnish(self.tunnel, np.random.default_rng(furniture)) if parameters.appendages else []
         )
@@ -117,6 +118,7 @@ class Simulation:
         openings = [n.footprint(self.tunnel) for n in self.niches]
         self.marks: list[Mark] = place_marks(parameters, self.tunnel, [k.polygon for k in self.leaks] + openings, marked)
         self.coat = coat(parameters, self.tunnel, self.rings, self.appendages, self.marks, coated)
+        self._skin = skin(parameters, self.tunnel, self.rings, moved)
         self._radiometry = parameters.radiometry()
         self.reference = reference_curve(parameters.max_range, np.random.default_rng(reference), self._radiometry.near_loss)
         self.scanner = Scanner(parameters, self.tunnel)
@@ -163,6 +165,7 @@ class Simulation:
             self._parts,
             self._ground,
             self.coat,
+            self._skin,
             rays.origin,
             rays.direction,
             rays.hint,

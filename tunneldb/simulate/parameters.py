@@ -36,6 +36,8 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "outliers": (0.0, 0.2, "(share)"),
     "relief": (0.0, 0.02, "m"),
     "ring": (0.5, 50.0, "m"),
+    "ring_step": (0.0, 0.02, "m"),
+    "radius_step": (0.0, 0.2, "m"),
     "soot": (0.0, 10.0, "dB"),
     "grime": (0.0, 10.0, "dB"),
     "patches": (0, 100_000, "patches"),
@@ -132,6 +134,8 @@ class Parameters:
 
     lining: Literal["plain", "cast", "segments", "shotcrete", "tiles"] = "plain"
     ring: float | None = None
+    ring_step: float = 0.0
+    radius_step: float = 0.0
     soot: float = 0.0
     grime: float = 0.0
     patches: int = 0
@@ -178,6 +182,8 @@ class Parameters:
                 raise UserError(f"{name.replace('_', ' ')} is {low:g} to {high:g}: give two growing numbers from {floor:g}")
         if self.joint_leaks and not self.ring_length():
             raise UserError(f"joint leaks need joints, and lining {self.lining} has none: use lining cast or segments")
+        if self.ring_step and not self.ring_length():
+            raise UserError(f"ring step needs rings, and lining {self.lining} has none: use lining cast or segments")
         if self.niche_leaks and not self.niches:
             raise UserError("niche leaks need niches: leave out --no-niches")
         self.crs()

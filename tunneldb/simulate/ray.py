@@ -32,6 +32,7 @@ from tunneldb.simulate.furniture import (
 from tunneldb.simulate.ground import Ground, bump, meet_ground
 from tunneldb.simulate.leaks import EDGE, Leak, depth_inside, edge_table
 from tunneldb.simulate.section import LINE, nearest
+from tunneldb.simulate.skin import Skin, meet_skin
 from tunneldb.simulate.things import BEAM, Parts, meet_parts
 from tunneldb.simulate.tunnel import Tunnel, gradient, newton_step
 
@@ -292,6 +293,7 @@ def trace(
     parts: Parts | None,
     ground: Ground | None,
     coat: Coat | None,
+    skin: Skin | None,
     origin: Array,
     direction: Array,
     hint: Array,
@@ -306,9 +308,9 @@ def trace(
 
     Parameters
     ----------
-    parts, ground, coat
-        What stands free, the uneven floor, and how bright the lining is from place to place. Without them (None) the
-        kernel is compiled without what they need.
+    parts, ground, coat, skin
+        What stands free, the uneven floor, how bright the lining is from place to place, and where it departs from
+        the section. Without them (None) the kernel is compiled without what they need.
     origin, direction : (n, 3)
         From the line's origin, m; unit vectors.
     hint : (n,)
@@ -365,9 +367,14 @@ def trace(
                 if is_back and sc.ends[5] > 0.0:
                     leak, drop = _wetness(sc, *_unrolled(sc, o, d, r, s))
             else:
-                leak, drop = _wetness(sc, s, arc)
-                if coat is not None:
-                    drop -= level(coat, s, arc)
+                if skin is not None:
+                    r, s, arc, cosine, is_floor = meet_skin(skin, sc.plan, sc.profile, sc.parts, o, d, wall, s, cosine)
+                    wall = r
+                    klass = FLOOR if is_floor else LINING
+                if klass == LINING:
+                    leak, drop = _wetness(sc, s, arc)
+                    if coat is not None:
+                        drop -= level(coat, s, arc)
                 if relief > 0.0:
                     height = relief * bump(s, arc, 0.12)
         behind = wall
