@@ -106,6 +106,13 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("grime", "DB", "Darkening beneath cables and trays."),
         _Option("patches", "N", "Repaired rectangles, 2 dB darker to 2 dB brighter.", int),
         _Option("paint", "N", "Painted numbers and stripes in turn, 4 dB darker to 4 dB brighter.", int),
+        _Option(
+            "clutter",
+            "N",
+            "Cables, bundles of cables and pipes in turn, seen 3 to 30 cm off the wall from end to end; with them a sign "
+            "and a junction box every 10 m.",
+            int,
+        ),
     ],
     "Floor and what stands free": [
         _Option("people", "N", "People standing about.", int),

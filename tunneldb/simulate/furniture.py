@@ -34,7 +34,7 @@ class Appendage:
     Attributes
     ----------
     kind : str
-        cable, tray, box, lamp or rail; walkway, kerb or carriageway.
+        cable, pipe, tray, box, sign, lamp or rail; walkway, kerb or carriageway.
     start, end : float
         Chainage, m.
     arc : float
@@ -59,7 +59,7 @@ class Appendage:
     @property
     def is_tube(self) -> bool:
         """Whether it is round."""
-        return self.kind == "cable"
+        return self.kind in ("cable", "pipe")
 
     @property
     def klass(self) -> int:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunneldb.simulate import ground
+from tunneldb.simulate.clutter import clutter
 from tunneldb.simulate.coat import coat
 from tunneldb.simulate.furniture import FLOOR, RAIL, Appendage, Niche, furnish, refuges
 from tunneldb.simulate.intensity import counts, reference_curve
@@ -105,12 +106,13 @@ class Simulation:
         self.parameters = parameters
         self.tunnel: Tunnel = parameters.tunnel()
         # Later streams come behind, so that a seed keeps its points.
-        streams = np.random.SeedSequence(parameters.seed).spawn(13)
-        furniture, wet, reference, self._seed, free, loose, built, marked, coated, joints, refuge, drips, moved = streams
+        streams = np.random.SeedSequence(parameters.seed).spawn(14)
+        furniture, wet, reference, self._seed, free, loose, built, marked, coated, joints, refuge, drips, moved, hung = streams
         self.appendages: list[Appendage] = (
             furnish(self.tunnel, np.random.default_rng(furniture)) if parameters.appendages else []
         )
         self.niches: list[Niche] = refuges(self.tunnel) if parameters.niches else []
+        self.appendages += clutter(parameters, self.tunnel, self.appendages, hung)
         self.appendages += slabs(parameters, self.tunnel)
         obstacles = [a.footprint() for a in self.appendages] + [n.footprint(self.tunnel) for n in self.niches]
         self.rings = build(parameters, self.tunnel, built)

@@ -46,6 +46,7 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "intensity_noise": (0.0, 5.0, "dB"),
     "leaks": (0, 100_000, "leaks"),
     "leak_edge": (0.002, 0.5, "m"),
+    "clutter": (0, 30, "runs"),
     "joint_leaks": (0, 100_000, "leaks"),
     "niche_leaks": (0, 100_000, "leaks"),
     "people": (0, 5000, "people"),
@@ -140,6 +141,7 @@ class Parameters:
     grime: float = 0.0
     patches: int = 0
     paint: int = 0
+    clutter: int = 0
 
     people: int = 0
     equipment: int = 0
