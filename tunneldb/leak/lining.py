@@ -178,16 +178,20 @@ def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Ast
     jumps = step.steps(offset, grid.pixel, row, arc, left, right)
     if jumps.any():
         offset = offset - jumps
-    distance = appendage.distance_from_plane(offset, grid.pixel, (row, grid.first_column + window.columns.start))
+    # What counts for the planes of the columns, of what counts for the steps.
+    near = appendage.reach(grid.pixel)
+    first = max(columns.start - near, window.columns.start)
+    offset = offset[:, first - window.columns.start : columns.stop + near - window.columns.start]
+    distance = appendage.distance_from_plane(offset, grid.pixel, (row, grid.first_column + first))
     recess = appendage.recessed(offset, distance, grid.pixel, delta)
     off = appendage.off_plane(distance, recess, grid.pixel, delta)
-    if bent is not None:
-        off |= bent
-        recess &= ~bent
     inner = slice(columns.start - window.columns.start, columns.stop - window.columns.start)
+    off, recess = (mask[:, columns.start - first : columns.stop - first] for mask in (off, recess))
+    if bent is not None:
+        off, recess = off | bent[:, inner], recess & ~bent[:, inner]
     surface = astray.surface
     state: NDArray[np.uint8] = _states(
-        window.weight[:, inner], off[:, inner], recess[:, inner], arc,
+        window.weight[:, inner], off, recess, arc,
         left[inner], right[inner], *_ends(surface.chainages, surface.arcs, surface.reach, chainage[inner]),
     )  # fmt: skip
     return state
