@@ -27,7 +27,7 @@ COMMENT ON COLUMN tunnel_api.waterproof_limit.description IS 'What the class all
 -- up to a place takes the part of chainage, so that a leak is an interval [a, b] and every window has a length of 100. One
 -- that begins at s holds a leak for s from a - 100 to b: their number changes there only. The area of a leak is spread
 -- evenly over its interval; that within a window then changes along straight lines between those places, a and b - 100,
--- and is greatest at one of them.
+-- and is greatest at one of them. A leak where no lining is known is in no window.
 CREATE OR REPLACE FUNCTION tunnel_api.stretch_statistics(survey_id int, starts float8[], ends float8[])
 RETURNS TABLE (
     n int, chainage_from float8, chainage_to float8, lining_area float8, seen_area float8, seen_share float8,
@@ -84,9 +84,9 @@ AS $$
         FROM patch p
         GROUP BY p.n
     ), change AS (  -- of the number of patches in a window, by where it begins
-        SELECT p.n, greatest(p.a - 100, s.a) AS at, 1 AS step FROM patch p JOIN roomy s ON s.n = p.n
+        SELECT p.n, greatest(p.a - 100, s.a) AS at, 1 AS step FROM patch p JOIN roomy s ON s.n = p.n WHERE p.a < p.b
         UNION ALL
-        SELECT p.n, p.b, -1 FROM patch p JOIN roomy s ON s.n = p.n WHERE p.b < s.last
+        SELECT p.n, p.b, -1 FROM patch p JOIN roomy s ON s.n = p.n WHERE p.a < p.b AND p.b < s.last
     ), counted AS (
         SELECT c.n, c.at, sum(c.step) OVER (along ROWS UNBOUNDED PRECEDING)::int AS patches, lead(c.at) OVER along AS until
         FROM change c
@@ -98,14 +98,13 @@ AS $$
     ), named AS (
         SELECT w.n, array_agg(p.id ORDER BY p.id) AS leaks
         FROM crowded w JOIN patch p ON p.n = w.n
-        WHERE p.a <= w.a + 100 AND p.b >= w.a
+        WHERE p.a < p.b AND p.a <= w.a + 100 AND p.b >= w.a
         GROUP BY w.n
     ), slope AS (  -- of the wet area in a window, by where it begins
-        SELECT p.n, e.at, p.area / (g.b - p.a) * e.way AS change
+        SELECT p.n, e.at, p.area / (p.b - p.a) * e.way AS change
         FROM patch p JOIN roomy s ON s.n = p.n
-        -- a leak where no lining is known is an interval without length
-        CROSS JOIN LATERAL (SELECT greatest(p.b, p.a + 0.01) AS b) g
-        CROSS JOIN LATERAL (VALUES (p.a - 100, 1), (g.b - 100, -1), (p.a, -1), (g.b, 1)) AS e (at, way)
+        CROSS JOIN LATERAL (VALUES (p.a - 100, 1), (p.b - 100, -1), (p.a, -1), (p.b, 1)) AS e (at, way)
+        WHERE p.a < p.b
         UNION ALL
         SELECT s.n, e.at, 0 FROM roomy s CROSS JOIN LATERAL (VALUES (s.a), (s.last)) AS e (at)
     ), bend AS (
@@ -141,11 +140,12 @@ AS $$
         LEFT JOIN placed p ON p.n = s.n
         LEFT JOIN named m ON m.n = s.n
         LEFT JOIN wettest v ON v.n = s.n
-        CROSS JOIN LATERAL (
+        LEFT JOIN LATERAL (
             SELECT coalesce(w.patches, 0) AS crowd, p.low AS crowd_low, p.high AS crowd_high, m.leaks, v.area AS window_wet
             WHERE o.n IS NOT NULL
             UNION ALL
-            SELECT coalesce(t.patches, 0), s.low, s.high, t.leaks, coalesce(t.area, 0) WHERE o.n IS NULL) f
+            SELECT coalesce(t.patches, 0), s.low, s.high, t.leaks, coalesce(t.area, 0)
+            WHERE o.n IS NULL AND s.b > s.a) f ON true
     )
     SELECT r.n, r.low, r.high, r.lining, r.seen, r.seen_share, r.wet, r.ratio, r.patches, r.largest, r.id,
         r.crowd, r.crowd_low, r.crowd_high, r.leaks, r.window_wet,
@@ -210,7 +210,8 @@ AS $$
                                  tunnel_api.chainage_label(t.window_from), tunnel_api.chainage_label(t.window_to),
                                  c.patches_per_100) END,
             CASE c.patches_per_100 WHEN 0 THEN (SELECT array_agg(l.id) FROM leak l) ELSE t.window_leaks END
-        FROM found t JOIN tunnel_api.waterproof_limit c ON t.window_patches > c.patches_per_100
+        FROM found t 
+        JOIN tunnel_api.waterproof_limit c ON t.window_patches > c.patches_per_100 OR (c.patches_per_100 = 0 AND t.patches > 0)
     )
     SELECT c.id, CASE WHEN b.texts IS NOT NULL THEN false WHEN t.seen_area > 0 THEN true END, coalesce(b.texts, '{}'),
         ARRAY(SELECT DISTINCT unnest(i.leaks) FROM breach i WHERE i.class = c.id ORDER BY 1), t.seen_share
@@ -237,7 +238,7 @@ DECLARE
     starts float8[];
     ends float8[];
 BEGIN
-    IF NOT ring_length >= 0.1 OR ring_length = 'Infinity' THEN
+    IF NOT (ring_length >= 0.1 AND ring_length < 'Infinity') THEN
         RAISE EXCEPTION 'a ring must be at least 0.1 m long, not % m', ring_length USING ERRCODE = 'invalid_parameter_value';
     END IF;
     SELECT e.* INTO extent FROM tunnel_api.survey_ends(survey_key) e;

@@ -8,7 +8,7 @@ import pytest
 import shapely
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
-from shapely.geometry import Polygon
+from shapely.geometry import Polygon, box
 from things import CORNER, HALF_FLOOR, SPHERES, THINGS, beside, boxed, relief
 
 from tunneldb.database import install, open_connection
@@ -16,13 +16,37 @@ from tunneldb.geometry.frame import frame_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
 from tunneldb.leak.geometries import shapes
 from tunneldb.leak.image import BLOCK, Grid
+from tunneldb.leak.lining import State
 from tunneldb.leak.raster import KINDS, Raster, encode
+from tunneldb.leak.store import DARK
 
 DATABASE = "tunneldb_example"
 NAME, SRID, SPACING = "demo-2024", 25830, 10.0
 FIRST, LAST = 1230, 1250  # axis vertices: chainage 12+300 to 12+500
 KM = 12
 PIXEL = 0.1
+LEAKS = [
+    (12318.0, 1.0, 0.5, "open"),
+    (12344.0, -5.2, 0.9, "open"),
+    (12402.5, 4.4, 1.1, "confirmed"),
+    (12421.0, -1.5, 0.4, "rejected"),
+    (12428.0, 6.0, 0.7, "open"),
+    (12436.0, -6.1, 0.8, "confirmed"),
+    (12471.0, 0.3, 0.5, "open"),
+]
+"""Leaks: chainage and arc of the middle, radius across, m, and review."""
+
+DRY = {
+    "joint": (box(12415.0, -6.0, 12415.1, 6.0), ["thin"]),
+    "dark": (box(12440.0, 2.0, 12441.0, 2.8), ["rectangular"]),
+}
+"""What is dark but dry: outline in the unrolled plane and reasons, by kind."""
+
+SEEN_FROM, WET = 12310.0, (12400.0, 12405.0)
+"""Before that chainage no lining was seen; the stretch in which a tenth of what was seen is wet, m."""
+
+GIRTH = 2 * CORNER
+"""Lining round the section, from foot to foot of the walls, m."""
 
 
 @pytest.fixture(scope="session")
@@ -53,15 +77,16 @@ def _fill(conn: psycopg.Connection) -> None:
         (SRID, FIRST * SPACING, SPACING, shapely.to_wkb(shapely.LineString(vertices)), SRID),
     ).fetchone()[0]
     survey_id = conn.execute(
-        "INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_dimension, intensity_kind, platform) "
-        "VALUES (%s, %s, '2024-05-04', 'Amplitude', 'amplitude', 'static') RETURNING id",
+        "INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_dimension, intensity_kind, platform, reference) "
+        "VALUES (%s, %s, '2024-05-04', 'Amplitude', 'amplitude', 'static', 'auto') RETURNING id",
         (tunnel_id, NAME),
     ).fetchone()[0]
     _files_and_runs(conn, survey_id)
     _axis(conn, survey_id, vertices)
     _segments(conn, survey_id, surface)
     _sections(conn, survey_id, surface)
-    outlines = _leaks(conn, survey_id, surface)
+    outlines = _anomalies(conn, survey_id, surface)
+    _coverage(conn, survey_id)
     _images(conn, survey_id, surface, outlines)
     _ground(conn, survey_id, surface)
     _things(conn, survey_id, surface)
@@ -72,6 +97,11 @@ def _fill(conn: psycopg.Connection) -> None:
     conn.execute(
         "INSERT INTO tunnel.radiometry (survey_id, km, roughness, dry_mean, dry_sigma, threshold, regions, pixels, wet_pixels) "
         "VALUES (%s, %s, 24, -12, 0.6, -13.8, 9, 1000000, 7000)",
+        (survey_id, KM),
+    )
+    conn.execute(
+        "INSERT INTO tunnel.range_curve (survey_id, km, range_m, intensity_db, sigma_db) "
+        "VALUES (%s, %s, '{2,4,8,16}', '{-1,-3,-8,-14}', '{0.2,0.1,0.1,0.3}')",
         (survey_id, KM),
     )
 
@@ -164,36 +194,52 @@ def _sections(conn: psycopg.Connection, survey_id: int, surface: Surface) -> Non
         )  # fmt: skip
 
 
-def _leaks(conn: psycopg.Connection, survey_id: int, surface: Surface) -> list[Polygon]:
+def _anomalies(conn: psycopg.Connection, survey_id: int, surface: Surface) -> list[Polygon]:
+    """Store the leaks, and what is dark but dry; returns all their outlines."""
     rng = np.random.default_rng(1)
     outlines = []
-    for number, (chainage, arc, size, review) in enumerate(
-        [
-            (12318.0, 1.0, 0.5, "open"),
-            (12344.0, -5.2, 0.9, "open"),
-            (12402.5, 4.4, 1.1, "confirmed"),
-            (12421.0, -1.5, 0.4, "rejected"),
-            (12428.0, 6.0, 0.7, "open"),
-            (12436.0, -6.1, 0.8, "confirmed"),
-            (12471.0, 0.3, 0.5, "open"),
-        ]
-    ):
+    for number, (chainage, arc, size, review) in enumerate(LEAKS):
         angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
         reach = size * (1 + 0.35 * rng.standard_normal(24).cumsum() / 5)
-        outline = Polygon(np.column_stack([chainage + 1.4 * reach * np.cos(angle), arc + reach * np.sin(angle)])).buffer(0)
+        outlines.append(
+            Polygon(np.column_stack([chainage + 1.4 * reach * np.cos(angle), arc + reach * np.sin(angle)])).buffer(0)
+        )
+        drop = 3.1 + number / 10
+        _anomaly(conn, survey_id, surface, outlines[-1], "leak", [], 0.9 - number / 10, drop, review)
+    for kind, (outline, reasons) in DRY.items():
         outlines.append(outline)
-        shaped = shapes(outline, surface)
-        west, south, east, north = outline.bounds
-        conn.execute(
-            "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, "
-            "drop_mean, drop_max, image_share, unrolled, map, surface, review) VALUES (%s, %s, %s, %s, %s, %s, %s, %s, "
-            "%s, %s, 0.97, ST_GeomFromWKB(%s, 0), ST_GeomFromWKB(%s, %s), ST_GeomFromWKB(%s, %s), %s)",
-            (
-                survey_id, KM, west, east, south, north, shaped.clock, shaped.area, 3.1 + number / 10, 5.0,
-                shapely.to_wkb(outline), shapely.to_wkb(shaped.strip), SRID, shapely.to_wkb(shaped.surface), SRID, review,
-            ),
-        )  # fmt: skip
+        _anomaly(conn, survey_id, surface, outline, kind, reasons, 0.8, 2.5, "open")
     return outlines
+
+
+def _anomaly(
+    conn: psycopg.Connection, survey_id: int, surface: Surface, outline: Polygon, kind: str, reasons: list[str],
+    confidence: float, drop: float, review: str,
+) -> None:  # fmt: skip
+    shaped = shapes(outline, surface)
+    west, south, east, north = outline.bounds
+    conn.execute(
+        "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, "
+        "confidence, contrast, area, drop_mean, drop_max, image_share, unrolled, map, surface, review) VALUES (%s, %s, %s, %s, "
+        "%s, %s, %s, %s, %s, %s, %s, %s, %s, 5, 0.97, "
+        "ST_GeomFromWKB(%s, 0), ST_GeomFromWKB(%s, %s), ST_GeomFromWKB(%s, %s), %s)",
+        (
+            survey_id, KM, west, east, south, north, shaped.clock, kind, reasons, confidence, drop / 0.6, shaped.area, drop,
+            shapely.to_wkb(outline), shapely.to_wkb(shaped.strip), SRID, shapely.to_wkb(shaped.surface), SRID, review,
+        ),
+    )  # fmt: skip
+
+
+def _coverage(conn: psycopg.Connection, survey_id: int) -> None:
+    """The lining of steps of 0.1 m, as a kilometre has them that the tunnel fills only in part."""
+    start = KM * 1000 + 0.1 * np.arange(10_000) + 0.05
+    lining = np.where((start > FIRST * SPACING) & (start < LAST * SPACING), 0.1 * GIRTH, 0.0)
+    seen = np.where(start > SEEN_FROM, lining, 0.0)
+    wet = np.where((start > WET[0]) & (start < WET[1]), 0.1 * seen, 0.0)
+    conn.execute(
+        "INSERT INTO tunnel.coverage (survey_id, km, step, lining, seen, wet) VALUES (%s, %s, 0.1, %s, %s, %s)",
+        (survey_id, KM, lining.tolist(), seen.tolist(), wet.tolist()),
+    )
 
 
 def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines: list[Polygon]) -> None:
@@ -210,13 +256,26 @@ def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines
         offset = 0.004 * rng.standard_normal(x.shape) + np.where(np.abs(y) < CORNER, relief(x, y), 0.0)
         for thing in THINGS:
             _lay(offset, grid, columns, surface, thing)
-        values = {"corrected": shade, "raw": shade - 0.08 * (x % 20 - 10) ** 2 / 2, "offset": offset}
-        for kind in KINDS:
-            held = np.where((np.abs(y) < 9.0) | (kind == "offset"), values[kind], np.nan).astype(np.float32)
+        values = {
+            "corrected": shade, "raw": shade - 0.08 * (x % 20 - 10) ** 2 / 2, "offset": offset,
+            "state": np.where(wet & (np.abs(y) < CORNER), DARK, _states(x, y)),
+        }  # fmt: skip
+        for kind in (*KINDS, "state"):
+            held = np.where((np.abs(y) < 9.0) | (kind in ("offset", "state")), values[kind], np.nan).astype(np.float32)
             conn.execute(
                 "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %s)",
                 (survey_id, KM, kind, block, encode(Raster(held, grid.transform(columns.start)), kind)),
             )
+
+
+def _states(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """State of pixels, without the dark ones: a niche on the right, a cable on the left, the floor at both edges."""
+    state = np.full(x.shape, State.LINING, float)
+    state[x < SEEN_FROM] = State.EMPTY
+    state[(x > 12360) & (x < 12362) & (y > 5) & (y < 7)] = State.RECESS
+    state[np.abs(y + 6.5) < 0.2] = State.OFF
+    state[np.abs(y) > CORNER] = State.FLOOR
+    return state
 
 
 def _ground(conn: psycopg.Connection, survey_id: int, surface: Surface) -> None:

@@ -1,6 +1,6 @@
 """Open a project with real QGIS and say what it sees, as JSON; runs under the Python that has PyQGIS.
 
-Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK [LAYER]
+Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK [LAYER [KIND]]
        | draw KIND | add VIEW | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG
 """
 
@@ -53,6 +53,7 @@ def describe(project: QgsProject, canvas: QgsMapCanvas) -> dict[str, Any]:
                 "features": len(features),
                 "z": [max((v.z() for v in f.geometry().vertices()), default=None) for f in features],
                 "widget": {f.name(): layer.editorWidgetSetup(layer.fields().indexOf(f.name())).type() for f in layer.fields()},
+                "aliases": [f.name() for f in layer.fields() if layer.attributeAlias(layer.fields().indexOf(f.name()))],
                 "read_only": layer.readOnly(),
                 "editable": editable,
                 "renderer": layer.renderer().type(),
@@ -123,22 +124,25 @@ def move_vertex(project: QgsProject, n: str, dx: str, dz: str) -> dict[str, Any]
     return _commit(layer)
 
 
-def review(project: QgsProject, number: str, status: str, remark: str, layer_id: str = "leak_unrolled") -> dict[str, Any]:
-    """Set a leak's review and remark as the form does."""
+def review(
+    project: QgsProject, number: str, status: str, remark: str, layer_id: str = "leak_unrolled", kind: str = ""
+) -> dict[str, Any]:
+    """Set a leak's review and remark, and its kind if one is given, as the form does."""
     layer = project.mapLayer(PREFIX + layer_id)
     feature = next(f for f in layer.getFeatures() if f["id"] == int(number))
     assert layer.startEditing(), "cannot be edited"
-    for name, value in (("review", status), ("remark", remark)):
+    values = [("review", status), ("remark", remark), *([("kind", kind)] if kind else [])]
+    for name, value in values:
         assert layer.changeAttributeValue(feature.id(), layer.fields().indexOf(name), value)
     return _commit(layer)
 
 
 def draw(project: QgsProject, kind: str) -> dict[str, Any]:
-    """Draw a region in the unrolled plane, with the values that the form would fill in."""
+    """Draw a region in the unrolled plane, with the values that the form would fill in; kind "default" is left to it."""
     layer = project.mapLayer(PREFIX + "region")
     square = [QgsPointXY(12440, 1), QgsPointXY(12444, 1), QgsPointXY(12444, 3), QgsPointXY(12440, 3)]
     assert layer.startEditing(), "cannot be edited"
-    attributes = {layer.fields().indexOf("kind"): kind}
+    attributes = {layer.fields().indexOf("kind"): kind} if kind != "default" else {}
     feature = QgsVectorLayerUtils.createFeature(layer, QgsGeometry.fromPolygonXY([square]), attributes)
     assert layer.addFeature(QgsFeature(feature))
     return _commit(layer)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import psycopg
 import pyogrio
+import pyogrio.raw
 import pytest
 import rasterio
 import shapely
@@ -16,7 +17,8 @@ from PIL import Image
 from tunneldb.cli.main import main
 
 COLUMNS = [
-    *("id", "km", "chainage_from", "chainage_to", "label", "arc_from", "arc_to", "clock", "area"),
+    *("id", "km", "chainage_from", "chainage_to", "label", "arc_from", "arc_to", "clock"),
+    *("kind", "confidence", "reasons", "contrast", "area"),
     *("drop_mean", "drop_max", "image_share", "review", "reviewed_by", "reviewed_at"),
 ]
 
@@ -59,7 +61,7 @@ def test_chainage_is_parsed_or_refused(conn):
 
 def test_wet_area_is_cut_at_the_ends_and_leaves_out_the_rejected(conn, example):
     leaks = conn.execute(
-        "SELECT chainage_from, chainage_to, area, review FROM tunnel.anomaly ORDER BY chainage_from"
+        "SELECT chainage_from, chainage_to, area, review FROM tunnel.anomaly WHERE kind = 'leak' ORDER BY chainage_from"
     ).fetchall()
 
     def wet(start, end):
@@ -79,6 +81,46 @@ def test_table_lists_every_leak(example):
     rows = list(csv.DictReader(run("leaks", example, "--format", "csv").stdout.splitlines()))
     assert all(row["label"] in text for row in rows)
     assert "confirmed" in text
+
+
+@pytest.mark.parametrize(("kind", "number"), [("leak", 6), ("joint", 1), ("dark", 2), ("all", 9)])
+def test_kinds_are_listed_and_exported(conn, example, tmp_path, kind, number):
+    conn.execute("UPDATE tunnel_api.anomaly SET kind = 'dark' WHERE id = 1")
+    conn.execute("UPDATE tunnel_api.anomaly SET kind = 'leak' WHERE kind = 'joint'")
+    conn.execute("UPDATE tunnel_api.anomaly SET kind = 'joint' WHERE id = 2")
+    conn.execute("UPDATE tunnel.anomaly SET confidence = NULL, contrast = NULL WHERE id = 3")
+    conn.commit()
+    expected = conn.execute(
+        "SELECT id, kind, confidence, array_to_string(reasons, ', ') FROM tunnel_api.anomaly"
+        " WHERE kind = %s OR %s = 'all' ORDER BY id", (kind, kind),
+    ).fetchall()  # fmt: skip
+    assert len(expected) == number
+    features = json.loads(run("leaks", example, "--kind", kind, "--format", "geojson").stdout)
+    assert features["name"] == ("anomaly" if kind == "all" else kind) + "_unrolled"
+    listed = sorted(
+        (f["id"], *(f["properties"][name] for name in ("kind", "confidence", "reasons"))) for f in features["features"]
+    )
+    assert [(k, c, None if conf is None else pytest.approx(conf, abs=1e-4), r) for k, c, conf, r in expected] == listed
+    path = tmp_path / "dark.gpkg"
+    run("leaks", example, "--kind", kind, "-o", path)
+    meta, _, _, values = pyogrio.raw.read(path, columns=["kind", "confidence", "reasons"])
+    columns = dict(zip(meta["fields"], values, strict=True))
+    assert sorted(zip(columns["kind"], columns["reasons"], strict=True)) == sorted((row[1], row[3]) for row in expected)
+    assert np.isnan(columns["confidence"]).sum() == sum(row[2] is None for row in expected)
+
+
+def test_kilometres_are_summed_up(conn, example):
+    lines = run("leaks", example, "--by-km").stdout.splitlines()
+    header = ("km", "lining m²", "seen %", "wet m²", "wet ‰", "leaks", "largest m²", "in 100 m²", "class")
+    assert lines[0].split() == " ".join(header).split()
+    (areas,) = conn.execute("SELECT array_agg(area) FROM tunnel_api.leak WHERE review <> 'rejected'").fetchone()
+    # 200 m of tunnel with 18.0 m of wall around, of which the first 10 m were not seen
+    lining = 200 * 2 * 4 * np.arccos(-2.5 / 4)
+    wet = sum(areas)
+    assert lines[1].split() == [
+        "12", f"{lining:.0f}", "95.0", f"{wet:.2f}", f"{1000 * wet / (0.95 * lining):.2f}", "6", f"{max(areas):.2f}", "1", "4",
+    ]  # fmt: skip
+    assert run("leaks", example, "--by-km", "--kind", "all", code=2).stderr.count("\n") == 1
 
 
 def test_leaks_are_chosen_by_area_and_kilometre(example, dsn):
@@ -158,7 +200,7 @@ def test_a_leak_confirmed_but_not_found_again_is_listed(conn, example):
 def test_images_are_cloud_optimized_and_lie_in_the_unrolled_plane(conn, example, tmp_path):
     run("image", example, "-o", tmp_path / "images")
     names = sorted(p.name for p in (tmp_path / "images").iterdir())
-    kinds = ("raw", "corrected", "offset", "class")
+    kinds = ("raw", "corrected", "offset", "state", "class")
     assert names == sorted(f"{example}-km012-{kind}.{end}" for kind in kinds for end in ("tif", "png"))
     with rasterio.open(tmp_path / "images" / f"{example}-km012-corrected.tif") as image:
         assert image.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG"

@@ -22,7 +22,7 @@ from psycopg.conninfo import make_conninfo
 from rasterio.errors import NotGeoreferencedWarning
 
 from tunneldb.cli.main import main
-from tunneldb.export.palette import COLOURS, hexadecimal
+from tunneldb.export.palette import COLOURS, PALETTES, hexadecimal
 from tunneldb.ground.classes import Klass
 
 SCRIPT = Path(__file__).with_name("open_in_qgis.py")
@@ -35,13 +35,14 @@ ON_MAP = {
     "segment": "LineStringZ",
     "section": "LineStringZ",
     "leak_map": "Polygon",
+    "anomaly_map": "Polygon",
     "target_sphere": "PointZ",
     "cluster": "Polygon",
     "ground": "LineStringZ",
     "leak_3d": "PolygonZ",
 }
-IMAGES = ("raw", "corrected", "offset", "class")
-UNROLLED = {"leak_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon"}
+IMAGES = ("raw", "corrected", "offset", "state", "class")
+UNROLLED = {"leak_unrolled": "Polygon", "anomaly_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon"}
 
 
 @cache
@@ -128,7 +129,8 @@ def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str
     assert seen["crs"] == "EPSG:25830"
     for name, kind in (ON_MAP | UNROLLED).items():
         layer = layers[name]
-        (count,) = rows.execute(f"SELECT count(*) FROM tunnel_api.{name} WHERE survey = 'demo-2024'").fetchone()  # type: ignore[arg-type,misc]
+        dry = "AND kind <> 'leak'" if name.startswith("anomaly") else ""
+        (count,) = rows.execute(f"SELECT count(*) FROM tunnel_api.{name} WHERE survey = 'demo-2024' {dry}").fetchone()  # type: ignore[arg-type,misc]
         assert (layer["wkb"], layer["features"]) == (kind, count), name
         assert layer["crs"] == ("EPSG:25830" if name in ON_MAP else ""), name
         assert layer["error"] == "", name
@@ -148,9 +150,10 @@ def test_height_reaches_qgis(rows: psycopg.Connection, seen: dict[str, Any]) -> 
 
 def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
     layers = seen["layers"]
-    for name in ("leak_map", "leak_unrolled", "leak_3d"):
-        assert (layers[name]["read_only"], layers[name]["editable"]) == (False, ["review", "remark"])
-        assert layers[name]["widget"]["review"] == "ValueMap"
+    for name in ("leak_map", "leak_unrolled", "leak_3d", "anomaly_map", "anomaly_unrolled"):
+        assert (layers[name]["read_only"], layers[name]["editable"]) == (False, ["kind", "review", "remark"])
+        assert layers[name]["widget"]["review"] == layers[name]["widget"]["kind"] == "ValueMap"
+        assert set(layers[name]["aliases"]) == set(layers[name]["widget"]) - {"geom"}
     assert (layers["axis_vertex"]["read_only"], layers["axis_vertex"]["editable"]) == (False, [])
     assert all(
         layers[name]["read_only"]
@@ -164,7 +167,7 @@ def test_themes_and_views(seen: dict[str, Any]) -> None:
         "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster",
     }  # fmt: skip
     assert set(seen["themes"]["3D"]) == {"axis", "section", "leak_3d", "target_sphere", "ground"}
-    assert set(seen["themes"]["Unrolled"]) == {*UNROLLED, "demo-2024-km012-corrected"}
+    assert set(seen["themes"]["Unrolled"]) == {*UNROLLED, "demo-2024-km012-corrected"} - {"anomaly_unrolled"}
     assert seen["bookmarks"] == ["Map", "Unrolled", "Unrolled, km 12"]
     # the second canvas follows the theme, and starts where there is lining
     assert seen["canvas_theme"] == "Unrolled"
@@ -192,6 +195,29 @@ def test_themes_are_drawn(shared: Path, tmp_path: Path, theme: str) -> None:
     if theme == "Unrolled":
         rows = np.flatnonzero(inked.mean(axis=1) > 0.9)
         assert rows[-1] - rows[0] > 0.4 * inked.shape[0], "the lining"
+
+
+def test_states_are_named_and_drawn_in_their_colours(shared: Path, seen: dict[str, Any], tmp_path: Path) -> None:
+    entries = PALETTES["state"].entries
+    legend = [[code, name, hexadecimal(colour)] for code, (name, colour) in entries.items()]
+    assert seen["layers"]["demo-2024-km012-state"]["legend"] == legend
+    assert [name for _, name, _ in legend] == ["unseen", "lining", "recess", "appendage", "floor", "dark"]
+    picture = tmp_path / "state.png"
+    # 160 m along the tunnel by 64 m across in 1600 × 640 pixels: one of the image is one of the picture
+    assert act(shared, "draw_layer", "demo-2024-km012-state", "12300,-32,12460,32", str(picture))["saved"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        image = rasterio.open(picture)
+    with image:
+        pixels = image.read([1, 2, 3])
+    area = {
+        name: (pixels == np.array(colour)[:, None, None]).all(axis=0).sum() * 0.01 for name, colour in entries.values()
+    }  # fmt: skip
+    # the wall is 18.0 m round, of which 0.4 m are hidden by a cable
+    assert area["unseen"] == pytest.approx(10 * (17.96 - 0.4), rel=0.02)
+    assert area["recess"] == pytest.approx(4, abs=0.5)
+    assert area["appendage"] == pytest.approx(160 * 0.4, rel=0.1)
+    assert area["dark"] > 5
 
 
 def test_classes_are_named_and_drawn_in_their_colours(shared: Path, seen: dict[str, Any], tmp_path: Path) -> None:
@@ -226,21 +252,32 @@ def test_vertex_moved_in_qgis_is_saved_with_its_stamp(conn: psycopg.Connection, 
     assert at is not None
 
 
-@pytest.mark.parametrize("layer", ["leak_unrolled", "leak_map", "leak_3d"])
-def test_review_in_qgis_is_saved_with_its_stamp(conn: psycopg.Connection, project: Path, layer: str) -> None:
-    assert act(project, "review", "3", "rejected", "a stain, dry to the touch", layer)["saved"]
-    review, remark, by, at = conn.execute(
-        "SELECT review, remark, reviewed_by, reviewed_at FROM tunnel.anomaly WHERE id = 3"
+@pytest.mark.parametrize(
+    ("layer", "key", "kind"),
+    [
+        ("leak_unrolled", "3", "dark"), ("leak_map", "3", "joint"), ("leak_3d", "3", ""), ("anomaly_unrolled", "8", "leak"),
+        ("anomaly_map", "9", "joint"),
+    ],
+)  # fmt: skip
+def test_review_in_qgis_is_saved_with_its_stamp(
+    conn: psycopg.Connection, project: Path, layer: str, key: str, kind: str
+) -> None:
+    assert act(project, "review", key, "rejected", "a stain, dry to the touch", layer, kind)["saved"]
+    review, remark, judged, by, at = conn.execute(
+        "SELECT review, remark, judged, reviewed_by, reviewed_at FROM tunnel.anomaly WHERE id = %s", (key,)
     ).fetchone()  # type: ignore[misc]
-    assert (review, remark) == ("rejected", "a stain, dry to the touch")
+    assert (review, remark, judged) == ("rejected", "a stain, dry to the touch", kind or None)
     assert (by,) == conn.execute("SELECT session_user::text").fetchone()
     assert at is not None
 
 
-def test_region_drawn_in_qgis_belongs_to_the_survey(conn: psycopg.Connection, project: Path) -> None:
-    assert act(project, "draw", "homogeneous")["saved"]
-    rows = conn.execute("SELECT survey, ST_Area(geom) FROM tunnel_api.region WHERE kind = 'homogeneous'").fetchall()
-    assert rows == [("demo-2024", 8)]
+@pytest.mark.parametrize(("chosen", "kind"), [("homogeneous", "homogeneous"), ("dry", "dry"), ("default", "dry")])
+def test_region_drawn_in_qgis_belongs_to_the_survey(conn: psycopg.Connection, project: Path, chosen: str, kind: str) -> None:
+    conn.execute("DELETE FROM tunnel.region")
+    conn.commit()
+    assert act(project, "draw", chosen)["saved"]
+    rows = conn.execute("SELECT survey, kind, ST_Area(geom) FROM tunnel_api.region").fetchall()
+    assert rows == [("demo-2024", kind, 8)]
 
 
 def test_viewer_opens_the_project_but_cannot_edit(server_dsn: str, project: Path) -> None:
@@ -261,7 +298,8 @@ def test_viewer_opens_the_project_but_cannot_edit(server_dsn: str, project: Path
 @pytest.mark.parametrize(
     "view",
     [
-        "leak_map", "leak_3d", "leak_unrolled", "axis_vertex", "segment", "section", "target_sphere", "cluster", "ground",
+        "leak_map", "leak_3d", "leak_unrolled", "anomaly_map", "anomaly_unrolled", "axis_vertex", "segment", "section",
+        "target_sphere", "cluster", "ground",
     ],
 )  # fmt: skip
 def test_layer_added_by_hand_finds_its_style_srid_and_height(shared: Path, view: str) -> None:
@@ -287,6 +325,7 @@ def test_styles_have_one_default_a_layer_and_are_replaced(conn: psycopg.Connecti
     first = styles()
     assert {(row[0], row[1]) for row in first} == {
         *((name, "geom") for name in ON_MAP | UNROLLED), ("leak", "unrolled"), ("leak", "map"), ("leak", "surface"),
+        ("anomaly", "unrolled"), ("anomaly", "map"),
     }  # fmt: skip
     assert all(row[2:] == (1, 1, True) for row in first)
     conn.execute(
@@ -341,7 +380,9 @@ def test_offset_is_shown_where_there_is_no_intensity(conn: psycopg.Connection, e
     conn.execute("DELETE FROM tunnel.image WHERE kind <> 'offset'")
     conn.commit()
     assert write(tmp_path / "demo.qgz").exit_code == 0
-    assert set(act(tmp_path / "demo.qgz", "describe")["themes"]["Unrolled"]) == {*UNROLLED, "demo-2024-km012-offset"}
+    assert set(act(tmp_path / "demo.qgz", "describe")["themes"]["Unrolled"]) == {
+        *UNROLLED, "demo-2024-km012-offset",
+    } - {"anomaly_unrolled"}  # fmt: skip
 
 
 def test_socket_that_qgis_cannot_reach_is_refused(conn: psycopg.Connection, dsn: str, example: str, tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ PEOPLE = {
 }
 
 REVIEW = "UPDATE tunnel_api.leak_unrolled SET review = 'confirmed'"
+JUDGE = "UPDATE tunnel_api.anomaly_map SET kind = 'leak' WHERE kind = 'joint'"
 MOVE = "UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0, 0, 0.1) WHERE n = 1240"
 DRAW = "INSERT INTO tunnel_api.region (survey, kind, geom) VALUES ('demo-2024', 'dry', ST_MakeEnvelope(12400, 0, 12410, 2, 0))"
 READ = "SELECT count(*) FROM tunnel_api.leak"
@@ -69,6 +70,10 @@ def test_readers_unroll_and_sum_without_rights_on_tables(person: psycopg.Connect
     ).fetchone()
     assert (chainage, arc, offset) == pytest.approx((12345, 2, 0.1), abs=1e-3)
     assert person.execute("SELECT tunnel_api.wet_area('demo-2024', 12300, 12500)").fetchone()[0] > 10
+    for function in ("leak_statistics", "waterproof_class", "coverage"):
+        query = sql.SQL("SELECT * FROM tunnel_api.{}('demo-2024', 12300, 12500)").format(sql.Identifier(function))
+        assert person.execute(query).fetchone()[0] is not None
+    assert len(person.execute("SELECT * FROM tunnel_api.ring_statistics('demo-2024', 10, 12300)").fetchall()) == 20
 
 
 @pytest.mark.parametrize("person", ["vera", "ines"], indirect=True)
@@ -86,17 +91,18 @@ def test_readers_see_no_table_and_run_no_stage(person: psycopg.Connection) -> No
 
 @pytest.mark.parametrize("person", ["vera"], indirect=True)
 def test_viewer_changes_nothing(person: psycopg.Connection) -> None:
-    for statement in (REVIEW, MOVE, DRAW, "DELETE FROM tunnel_api.region", "DELETE FROM tunnel_api.leak"):
+    for statement in (REVIEW, JUDGE, MOVE, DRAW, "DELETE FROM tunnel_api.region", "DELETE FROM tunnel_api.leak"):
         refused(person, statement)
 
 
 @pytest.mark.parametrize("person", ["ines"], indirect=True)
 def test_inspector_reviews_moves_and_draws_under_her_own_name(person: psycopg.Connection) -> None:
-    for statement in (REVIEW, MOVE, DRAW):
+    for statement in (REVIEW, JUDGE, MOVE, DRAW):
         person.execute(statement)  # type: ignore[arg-type]
     assert person.execute("SELECT DISTINCT reviewed_by FROM tunnel_api.leak WHERE reviewed_by IS NOT NULL").fetchall() == [
         ("ines",)
     ]
+    assert person.execute("SELECT reviewed_by FROM tunnel_api.anomaly WHERE kind <> found").fetchall() == [("ines",)]
     assert person.execute("SELECT edited_by FROM tunnel_api.axis_vertex WHERE source = 'edited'").fetchall() == [("ines",)]
     assert person.execute("SELECT count(*) FROM tunnel_api.region WHERE drawn_by = 'ines'").fetchone() == (1,)
 
@@ -108,6 +114,8 @@ def test_inspector_reviews_moves_and_draws_under_her_own_name(person: psycopg.Co
         "UPDATE tunnel_api.leak_map SET geom = NULL",
         "UPDATE tunnel_api.leak SET reviewed_by = 'vera'",
         "UPDATE tunnel_api.leak SET area = 0",
+        "UPDATE tunnel_api.anomaly SET found = 'leak'",
+        "UPDATE tunnel_api.anomaly_3d SET reasons = '{}'",
         "DELETE FROM tunnel_api.leak",
         "UPDATE tunnel_api.axis_vertex SET source = 'measured'",
         "UPDATE tunnel_api.axis_vertex SET edited_by = 'vera'",

@@ -201,7 +201,11 @@ def test_bad_edit_of_a_vertex_is_refused(conn: psycopg.Connection, example: str,
         conn.execute(f"UPDATE tunnel_api.axis_vertex SET {change} WHERE n = 1241")  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("view", ["leak", "leak_unrolled", "leak_map", "leak_3d"])
+LEAK_VIEWS = ["leak", "leak_unrolled", "leak_map", "leak_3d"]
+ANOMALY_VIEWS = ["anomaly", "anomaly_unrolled", "anomaly_map", "anomaly_3d"]
+
+
+@pytest.mark.parametrize("view", LEAK_VIEWS + ANOMALY_VIEWS)
 def test_review_is_stamped(conn: psycopg.Connection, example: str, view: str) -> None:
     key = one(conn, "SELECT min(id) FROM tunnel.anomaly")
     target = sql.Identifier(view)
@@ -213,9 +217,56 @@ def test_review_is_stamped(conn: psycopg.Connection, example: str, view: str) ->
     )
     assert (review, remark, by, recent) == ("confirmed", "drips", one(conn, "SELECT session_user::text"), True)
     assert one(conn, "SELECT count(*) FROM tunnel.anomaly WHERE reviewed_by IS NOT NULL") == 1
-    for change in ("review = 'maybe'", "review = NULL", "area = 0", "reviewed_by = 'another'"):
-        with pytest.raises(psycopg.Error, match=r"open, confirmed or rejected|only the review"), conn.transaction():
+    for change in (
+        "review = 'maybe'", "review = NULL", "area = 0", "reviewed_by = 'another'", "kind = 'crack'", "kind = NULL",
+        "found = 'dark'", "confidence = 1", "reasons = NULL",
+    ):  # fmt: skip
+        complaint = r"open, confirmed or rejected|leak, joint or dark|only the review"
+        with pytest.raises(psycopg.Error, match=complaint), conn.transaction():
             conn.execute(sql.SQL("UPDATE tunnel_api.{} SET " + change).format(target))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("view", ANOMALY_VIEWS)
+def test_kind_is_judged_stamped_and_taken_back(conn: psycopg.Connection, example: str, view: str) -> None:
+    key = one(conn, "SELECT id FROM tunnel.anomaly WHERE kind = 'joint'")
+    change = sql.SQL("UPDATE tunnel_api.{} SET kind = %s WHERE id = %s").format(sql.Identifier(view))
+    counts = "SELECT count(*) FROM tunnel_api.leak"
+    before = one(conn, counts)
+    conn.execute(change, ("leak", key))
+    assert one(conn, "SELECT kind, judged, reviewed_by = session_user, review FROM tunnel.anomaly WHERE id = %s", key) == (
+        "joint", "leak", True, "open",
+    )  # fmt: skip
+    assert one(conn, counts) == before + 1
+    assert one(conn, "SELECT kind, found FROM tunnel_api.anomaly WHERE id = %s", key) == ("leak", "joint")
+    conn.execute("UPDATE tunnel_api.leak SET remark = 'drips' WHERE id = %s", (key,))
+    assert one(conn, "SELECT judged, remark FROM tunnel.anomaly WHERE id = %s", key) == ("leak", "drips")
+    conn.execute(change, ("joint", key))
+    assert one(conn, "SELECT judged FROM tunnel.anomaly WHERE id = %s", key) is None
+    assert one(conn, counts) == before
+    assert one(conn, "SELECT count(*) FROM tunnel.anomaly WHERE reviewed_by IS NOT NULL") == 1
+
+
+def test_views_of_leaks_hold_leaks_and_those_of_anomalies_all(conn: psycopg.Connection, example: str) -> None:
+    for views_of, kinds in ((LEAK_VIEWS, {"leak": 7}), (ANOMALY_VIEWS, {"leak": 7, "joint": 1, "dark": 1})):
+        for view in views_of:
+            rows = conn.execute(
+                sql.SQL("SELECT kind, count(*)::int FROM tunnel_api.{} GROUP BY 1").format(sql.Identifier(view))
+            ).fetchall()
+            assert dict(rows) == kinds, view
+    assert one(conn, "SELECT found, reasons, label FROM tunnel_api.anomaly WHERE kind = 'joint'") == (
+        "joint", ["thin"], "12+415.050",
+    )  # fmt: skip
+
+
+def test_curve_found_on_the_lining_is_told_of(conn: psycopg.Connection, example: str) -> None:
+    assert one(conn, "SELECT reference FROM tunnel_api.survey") == "auto"
+    assert conn.execute("SELECT range_m, intensity_db, sigma_db FROM tunnel_api.range_curve ORDER BY id").fetchall() == [
+        (2, -1, 0.2), (4, -3, 0.1), (8, -8, 0.1), (16, -14, 0.3),
+    ]  # fmt: skip
+    told = "SELECT reference, range_from, range_to, range_sigma FROM tunnel_api.radiometry"
+    assert one(conn, told) == ("auto", 2, 16, 0.3)
+    conn.execute("DELETE FROM tunnel.range_curve")
+    assert one(conn, told) == ("auto", None, None, None)
 
 
 def test_region_is_drawn_changed_and_deleted(conn: psycopg.Connection, example: str) -> None:
@@ -438,27 +489,13 @@ def test_ground_lies_where_its_metre_is(conn: psycopg.Connection, example: str) 
     ) == (181, True)
 
 
-def test_statistics_leave_out_rejected_and_vanished_leaks(conn: psycopg.Connection, example: str) -> None:
-    conn.execute(
-        """UPDATE tunnel.run SET counts = '{"lining_pixels": 100000}', parameters = '{"image.pixel": 0.1}'
-            WHERE stage = 'detect'"""
-    )
-    gone = one(conn, "UPDATE tunnel.anomaly SET detected = false WHERE id = (SELECT min(id) FROM tunnel.anomaly) RETURNING id")
-    areas = conn.execute("SELECT area FROM tunnel.anomaly WHERE review <> 'rejected' AND id <> %s", (gone,)).fetchall()
-    lining, wet, share, leaks, rejected = one(
-        conn, "SELECT lining_area, wet_area, wet_share, leaks, leaks_rejected FROM tunnel_api.km_statistics WHERE km = 12"
-    )
-    assert lining == pytest.approx(1000)
-    assert wet == pytest.approx(sum(area for (area,) in areas))
-    assert (share, leaks, rejected) == (pytest.approx(wet / 1000), 5, 1)
-
-
-def test_trigger_functions_pass_plpgsql_check(conn: psycopg.Connection) -> None:
+def test_functions_pass_plpgsql_check(conn: psycopg.Connection) -> None:
     if not one(conn, "SELECT count(*) FROM pg_available_extensions WHERE name = 'plpgsql_check'"):
         pytest.skip("plpgsql_check is not installed")
     conn.execute("CREATE EXTENSION plpgsql_check")
     complaints = conn.execute(
         "SELECT c.* FROM pg_trigger t JOIN pg_class r ON r.oid = t.tgrelid AND r.relnamespace = 'tunnel_api'::regnamespace "
-        "CROSS JOIN LATERAL plpgsql_check_function(t.tgfoid, t.tgrelid) c"
+        "CROSS JOIN LATERAL plpgsql_check_function(t.tgfoid, t.tgrelid) c "
+        "UNION ALL SELECT c.* FROM plpgsql_check_function('tunnel_api.ring_statistics(text, float8, float8)'::regprocedure) c"
     ).fetchall()
     assert complaints == []

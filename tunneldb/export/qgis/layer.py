@@ -32,6 +32,8 @@ class VectorLayer:
         Map themes that show it.
     edited : bool
         Whether it is for editing; the others are read-only in QGIS.
+    where : str
+        Condition on the rows that it shows, beside that on the survey.
     """
 
     id: str
@@ -43,6 +45,7 @@ class VectorLayer:
     themes: tuple[str, ...]
     edited: bool = False
     column: str = "geom"
+    where: str = ""
 
     @property
     def on_map(self) -> bool:
@@ -55,16 +58,26 @@ class VectorLayer:
         return {"Point": "Point", "LineString": "Line", "Polygon": "Polygon"}[self.wkb.removesuffix("Z")]
 
 
+_DRY = "\"kind\" <> 'leak'"
+
 # In drawing order within a group, from the top.
 LAYERS = (
     VectorLayer("axis_vertex", "Axis vertices (editable)", "axis_vertex", "PointZ", "axis_vertex", MAP, (MAP,), True),
     VectorLayer("leak_map", "Leaks beside the axis (review)", "leak_map", "Polygon", "leak", MAP, (MAP,), True),
+    VectorLayer(
+        "anomaly_map", "Joints and dark spots beside the axis (review)", "anomaly_map", "Polygon", "anomaly", MAP, (), True,
+        where=_DRY,
+    ),
     VectorLayer("target_sphere", "Target spheres", "target_sphere", "PointZ", "target_sphere", MAP, (MAP, SPACE)),
     VectorLayer("axis", "Axis", "axis", "LineStringZ", "axis", MAP, (MAP, SPACE)),
     VectorLayer("segment", "Segments", "segment", "LineStringZ", "segment", MAP, (MAP,)),
     VectorLayer("section", "Sections", "section", "LineStringZ", "section", MAP, (MAP, SPACE)),
     VectorLayer("cluster", "Objects, rails and appendages", "cluster", "Polygon", "cluster", MAP, (MAP,)),
     VectorLayer("leak_unrolled", "Leaks (review)", "leak_unrolled", "Polygon", "leak", UNROLLED, (UNROLLED,), True),
+    VectorLayer(
+        "anomaly_unrolled", "Joints and dark spots (review)", "anomaly_unrolled", "Polygon", "anomaly", UNROLLED, (), True,
+        where=_DRY,
+    ),
     VectorLayer("region", "Regions drawn by hand", "region", "Polygon", "region", UNROLLED, (UNROLLED,), True),
     VectorLayer(
         "section_unrolled", "Sections, unrolled", "section_unrolled", "LineString", "section_unrolled", UNROLLED,

@@ -119,8 +119,10 @@ def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element)
     element.extend(style_elements(layer.style))
     if layer.view == "region":
         # What is drawn belongs to this survey.
-        name = survey.name.replace("'", "''")
-        ET.SubElement(ET.SubElement(element, "defaults"), "default", field="survey", expression=f"'{name}'", applyOnUpdate="0")
+        defaults = ET.SubElement(element, "defaults")
+        for column, value in (("survey", survey.name), ("kind", "dry")):
+            quoted = value.replace("'", "''")
+            ET.SubElement(defaults, "default", field=column, expression=f"'{quoted}'", applyOnUpdate="0")
     return _Entry(layer_id(layer.id), layer.title, (layer.group,), layer.themes, element)
 
 

@@ -65,5 +65,5 @@ class Source:
         return (
             f"{self.connection} key='id' estimatedmetadata=true srid={srid if layer.on_map else 0} type={layer.wkb} "
             f'checkPrimaryKeyUnicity=\'0\' table="tunnel_api"."{layer.view}" ({layer.column}) '
-            f'sql="survey" = {name}'
+            f'sql="survey" = {name}{" AND " + layer.where if layer.where else ""}'
         )

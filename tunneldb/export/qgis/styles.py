@@ -68,8 +68,10 @@ def store_styles(conn: psycopg.Connection) -> int:
 
 
 def styled_columns() -> list[tuple[str, str, str, str]]:
-    """Return view, geometry column, style and title of whatever has a style; view ``leak`` has three geometries."""
+    """Return view, geometry column, style and title of whatever has a style; some views have several geometries."""
     return [(layer.view, layer.column, layer.style, layer.title) for layer in LAYERS] + [
+        ("anomaly", "unrolled", "anomaly", "Leaks, joints and dark spots, unrolled"),
+        ("anomaly", "map", "anomaly", "Leaks, joints and dark spots beside the axis"),
         ("leak", "unrolled", "leak", "Leaks, unrolled"),
         ("leak", "map", "leak", "Leaks beside the axis"),
         ("leak", "surface", "leak_3d", "Leaks in space"),

@@ -156,6 +156,53 @@
         </config>
       </editWidget>
     </field>
+    <field name="kind" configurationFlags="None">
+      <editWidget type="ValueMap">
+        <config>
+          <Option type="Map">
+            <Option type="List" name="map">
+              <Option type="Map">
+                <Option type="QString" name="Leak" value="leak"/>
+              </Option>
+              <Option type="Map">
+                <Option type="QString" name="Joint" value="joint"/>
+              </Option>
+              <Option type="Map">
+                <Option type="QString" name="Dark but dry" value="dark"/>
+              </Option>
+            </Option>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="found" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="reasons" configurationFlags="None">
+      <editWidget type="List">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="confidence" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="contrast" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
     <field name="area" configurationFlags="None">
       <editWidget type="TextEdit">
         <config>
@@ -276,17 +323,22 @@
     <alias index="8" field="arc_from" name="Arc from (m)"/>
     <alias index="9" field="arc_to" name="Arc to (m)"/>
     <alias index="10" field="clock" name="Clock position (h)"/>
-    <alias index="11" field="area" name="Area (m²)"/>
-    <alias index="12" field="drop_mean" name="Mean drop (dB)"/>
-    <alias index="13" field="drop_max" name="Greatest drop (dB)"/>
-    <alias index="14" field="image_share" name="Share measured"/>
-    <alias index="15" field="review" name="Review"/>
-    <alias index="16" field="reviewed_by" name="Reviewed by"/>
-    <alias index="17" field="reviewed_at" name="Reviewed at"/>
-    <alias index="18" field="remark" name="Remark"/>
-    <alias index="19" field="detected" name="Found by the last detection"/>
-    <alias index="20" field="created_at" name="First detected"/>
-    <alias index="21" field="detected_at" name="Last detected"/>
+    <alias index="11" field="kind" name="Kind"/>
+    <alias index="12" field="found" name="Found as"/>
+    <alias index="13" field="reasons" name="Reasons"/>
+    <alias index="14" field="confidence" name="Confidence (0-1)"/>
+    <alias index="15" field="contrast" name="Contrast (sigma)"/>
+    <alias index="16" field="area" name="Area (m²)"/>
+    <alias index="17" field="drop_mean" name="Mean drop (dB)"/>
+    <alias index="18" field="drop_max" name="Greatest drop (dB)"/>
+    <alias index="19" field="image_share" name="Share measured"/>
+    <alias index="20" field="review" name="Review"/>
+    <alias index="21" field="reviewed_by" name="Reviewed by"/>
+    <alias index="22" field="reviewed_at" name="Reviewed at"/>
+    <alias index="23" field="remark" name="Remark"/>
+    <alias index="24" field="detected" name="Found by the last detection"/>
+    <alias index="25" field="created_at" name="First detected"/>
+    <alias index="26" field="detected_at" name="Last detected"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -300,6 +352,11 @@
     <field name="arc_from" editable="0"/>
     <field name="arc_to" editable="0"/>
     <field name="clock" editable="0"/>
+    <field name="kind" editable="1"/>
+    <field name="found" editable="0"/>
+    <field name="reasons" editable="0"/>
+    <field name="confidence" editable="0"/>
+    <field name="contrast" editable="0"/>
     <field name="area" editable="0"/>
     <field name="drop_mean" editable="0"/>
     <field name="drop_max" editable="0"/>
@@ -315,32 +372,37 @@
   <editorlayout>tablayout</editorlayout>
   <attributeEditorForm>
     <attributeEditorContainer name="Review" columnCount="1" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
-      <attributeEditorField name="review" index="15" showLabel="1"/>
-      <attributeEditorField name="remark" index="18" showLabel="1"/>
-      <attributeEditorField name="reviewed_by" index="16" showLabel="1"/>
-      <attributeEditorField name="reviewed_at" index="17" showLabel="1"/>
+      <attributeEditorField name="review" index="20" showLabel="1"/>
+      <attributeEditorField name="kind" index="11" showLabel="1"/>
+      <attributeEditorField name="remark" index="23" showLabel="1"/>
+      <attributeEditorField name="reviewed_by" index="21" showLabel="1"/>
+      <attributeEditorField name="reviewed_at" index="22" showLabel="1"/>
     </attributeEditorContainer>
     <attributeEditorContainer name="Leak" columnCount="2" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
       <attributeEditorField name="id" index="0" showLabel="1"/>
       <attributeEditorField name="label" index="7" showLabel="1"/>
       <attributeEditorField name="segment" index="4" showLabel="1"/>
       <attributeEditorField name="clock" index="10" showLabel="1"/>
-      <attributeEditorField name="area" index="11" showLabel="1"/>
-      <attributeEditorField name="image_share" index="14" showLabel="1"/>
-      <attributeEditorField name="drop_mean" index="12" showLabel="1"/>
-      <attributeEditorField name="drop_max" index="13" showLabel="1"/>
+      <attributeEditorField name="area" index="16" showLabel="1"/>
+      <attributeEditorField name="image_share" index="19" showLabel="1"/>
+      <attributeEditorField name="found" index="12" showLabel="1"/>
+      <attributeEditorField name="confidence" index="14" showLabel="1"/>
+      <attributeEditorField name="reasons" index="13" showLabel="1"/>
+      <attributeEditorField name="contrast" index="15" showLabel="1"/>
+      <attributeEditorField name="drop_mean" index="17" showLabel="1"/>
+      <attributeEditorField name="drop_max" index="18" showLabel="1"/>
       <attributeEditorField name="chainage_from" index="5" showLabel="1"/>
       <attributeEditorField name="chainage_to" index="6" showLabel="1"/>
       <attributeEditorField name="arc_from" index="8" showLabel="1"/>
       <attributeEditorField name="arc_to" index="9" showLabel="1"/>
-      <attributeEditorField name="detected" index="19" showLabel="1"/>
-      <attributeEditorField name="created_at" index="20" showLabel="1"/>
-      <attributeEditorField name="detected_at" index="21" showLabel="1"/>
+      <attributeEditorField name="detected" index="24" showLabel="1"/>
+      <attributeEditorField name="created_at" index="25" showLabel="1"/>
+      <attributeEditorField name="detected_at" index="26" showLabel="1"/>
       <attributeEditorField name="survey" index="2" showLabel="1"/>
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% format_number("clock", 1) %] h&lt;br&gt;drop [% format_number("drop_mean", 1) %] dB, [% "review" %]</mapTip>
+  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% format_number("clock", 1) %] h&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "found" %]&lt;br&gt;drop [% format_number("drop_mean", 1) %] dB, [% "review" %]</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <symbol type="polygon">

@@ -1,0 +1,402 @@
+<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
+<qgis version="3.22.0" styleCategories="AllStyleCategories" hasScaleBasedVisibilityFlag="0" minScale="0" maxScale="0" readOnly="0">
+  <renderer-v2 type="categorizedSymbol" attr="kind" forceraster="0" enableorderby="0" symbollevels="0">
+    <categories>
+      <category symbol="0" value="joint" label="Joint" render="true"/>
+      <category symbol="1" value="dark" label="Dark but dry" render="true"/>
+      <category symbol="2" value="leak" label="Leak" render="true"/>
+    </categories>
+    <symbols>
+      <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="0,150,136,40"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="0,150,136,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.4"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+      </symbol>
+      <symbol name="1" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="156,39,176,40"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="156,39,176,255"/>
+            <Option type="QString" name="outline_style" value="dash"/>
+            <Option type="QString" name="outline_width" value="0.4"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+      </symbol>
+      <symbol name="2" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="230,126,0,45"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="230,126,0,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.4"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+      </symbol>
+    </symbols>
+  </renderer-v2>
+  <labeling type="simple">
+    <settings calloutType="simple">
+      <text-style fieldName="&quot;kind&quot; || coalesce(': ' || array_to_string(&quot;reasons&quot;, ', '), '') || '\n' || format_number(&quot;area&quot;, 2) || ' m²' || if(&quot;kind&quot; = &quot;found&quot;, coalesce(', ' || round(100 * &quot;confidence&quot;) || ' %', ''), '')" isExpression="1" fontFamily="Sans Serif" namedStyle="Regular" fontWeight="50" fontSize="8" fontSizeUnit="Point" textColor="30,30,30,255" textOpacity="1" multilineHeight="1" allowHtml="0">
+        <text-buffer bufferDraw="0" bufferSize="0.7" bufferSizeUnits="MM" bufferColor="255,255,255,215" bufferOpacity="1" bufferJoinStyle="128" bufferNoFill="1"/>
+        <background shapeDraw="1" shapeType="0" shapeSizeType="0" shapeSizeX="0.8" shapeSizeY="0.5" shapeSizeUnit="MM" shapeRadiiX="0.8" shapeRadiiY="0.8" shapeRadiiUnit="MM" shapeFillColor="255,255,255,225" shapeBorderColor="150,150,150,255" shapeBorderWidth="0.1" shapeBorderWidthUnit="MM" shapeOpacity="1" shapeJoinStyle="128"/>
+        <shadow shadowDraw="0"/>
+      </text-style>
+      <text-format multilineAlign="1"/>
+      <placement placement="8" dist="1.5" distUnits="MM" polygonPlacementFlags="3" priority="8"/>
+      <rendering scaleVisibility="1" scaleMin="0" scaleMax="4000" obstacle="1" obstacleFactor="1" displayAll="0" drawLabels="1" upsidedownLabels="0" fontLimitPixelSize="0" mergeLines="0" limitNumLabels="0" minFeatureSize="0"/>
+      <dd_properties>
+        <Option type="Map">
+          <Option type="QString" name="name" value=""/>
+          <Option type="Map" name="properties">
+            <Option type="Map" name="Color">
+              <Option type="bool" name="active" value="true"/>
+              <Option type="QString" name="expression" value="CASE WHEN &quot;kind&quot; = 'leak' THEN '#a34d00' WHEN &quot;kind&quot; = 'joint' THEN '#00695f' ELSE '#6d1b7b' END"/>
+              <Option type="int" name="type" value="3"/>
+            </Option>
+          </Option>
+          <Option type="QString" name="type" value="collection"/>
+        </Option>
+      </dd_properties>
+    </settings>
+  </labeling>
+  <fieldConfiguration>
+    <field name="id" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="survey_id" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="survey" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="km" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="segment" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="chainage_from" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="chainage_to" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="label" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="arc_from" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="arc_to" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="clock" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="kind" configurationFlags="None">
+      <editWidget type="ValueMap">
+        <config>
+          <Option type="Map">
+            <Option type="List" name="map">
+              <Option type="Map">
+                <Option type="QString" name="Leak" value="leak"/>
+              </Option>
+              <Option type="Map">
+                <Option type="QString" name="Joint" value="joint"/>
+              </Option>
+              <Option type="Map">
+                <Option type="QString" name="Dark but dry" value="dark"/>
+              </Option>
+            </Option>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="found" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="reasons" configurationFlags="None">
+      <editWidget type="List">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="confidence" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="contrast" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="area" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="drop_mean" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="drop_max" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="image_share" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="review" configurationFlags="None">
+      <editWidget type="ValueMap">
+        <config>
+          <Option type="Map">
+            <Option type="List" name="map">
+              <Option type="Map">
+                <Option type="QString" name="Open" value="open"/>
+              </Option>
+              <Option type="Map">
+                <Option type="QString" name="Confirmed" value="confirmed"/>
+              </Option>
+              <Option type="Map">
+                <Option type="QString" name="Rejected" value="rejected"/>
+              </Option>
+            </Option>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="reviewed_by" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="reviewed_at" configurationFlags="None">
+      <editWidget type="DateTime">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="allow_null" value="true"/>
+            <Option type="bool" name="calendar_popup" value="true"/>
+            <Option type="QString" name="display_format" value="yyyy-MM-dd HH:mm"/>
+            <Option type="bool" name="field_iso_format" value="false"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="remark" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="IsMultiline" value="true"/>
+            <Option type="bool" name="UseHtml" value="false"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="detected" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="created_at" configurationFlags="None">
+      <editWidget type="DateTime">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="allow_null" value="true"/>
+            <Option type="bool" name="calendar_popup" value="true"/>
+            <Option type="QString" name="display_format" value="yyyy-MM-dd HH:mm"/>
+            <Option type="bool" name="field_iso_format" value="false"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="detected_at" configurationFlags="None">
+      <editWidget type="DateTime">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="allow_null" value="true"/>
+            <Option type="bool" name="calendar_popup" value="true"/>
+            <Option type="QString" name="display_format" value="yyyy-MM-dd HH:mm"/>
+            <Option type="bool" name="field_iso_format" value="false"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+  </fieldConfiguration>
+  <aliases>
+    <alias index="0" field="id" name="Anomaly"/>
+    <alias index="1" field="survey_id" name="Survey key"/>
+    <alias index="2" field="survey" name="Survey"/>
+    <alias index="3" field="km" name="Kilometre"/>
+    <alias index="4" field="segment" name="Segment"/>
+    <alias index="5" field="chainage_from" name="Chainage from (m)"/>
+    <alias index="6" field="chainage_to" name="Chainage to (m)"/>
+    <alias index="7" field="label" name="Chainage"/>
+    <alias index="8" field="arc_from" name="Arc from (m)"/>
+    <alias index="9" field="arc_to" name="Arc to (m)"/>
+    <alias index="10" field="clock" name="Clock position (h)"/>
+    <alias index="11" field="kind" name="Kind"/>
+    <alias index="12" field="found" name="Found as"/>
+    <alias index="13" field="reasons" name="Reasons"/>
+    <alias index="14" field="confidence" name="Confidence (0-1)"/>
+    <alias index="15" field="contrast" name="Contrast (sigma)"/>
+    <alias index="16" field="area" name="Area (m²)"/>
+    <alias index="17" field="drop_mean" name="Mean drop (dB)"/>
+    <alias index="18" field="drop_max" name="Greatest drop (dB)"/>
+    <alias index="19" field="image_share" name="Share measured"/>
+    <alias index="20" field="review" name="Review"/>
+    <alias index="21" field="reviewed_by" name="Reviewed by"/>
+    <alias index="22" field="reviewed_at" name="Reviewed at"/>
+    <alias index="23" field="remark" name="Remark"/>
+    <alias index="24" field="detected" name="Found by the last detection"/>
+    <alias index="25" field="created_at" name="First detected"/>
+    <alias index="26" field="detected_at" name="Last detected"/>
+  </aliases>
+  <editable>
+    <field name="id" editable="0"/>
+    <field name="survey_id" editable="0"/>
+    <field name="survey" editable="0"/>
+    <field name="km" editable="0"/>
+    <field name="segment" editable="0"/>
+    <field name="chainage_from" editable="0"/>
+    <field name="chainage_to" editable="0"/>
+    <field name="label" editable="0"/>
+    <field name="arc_from" editable="0"/>
+    <field name="arc_to" editable="0"/>
+    <field name="clock" editable="0"/>
+    <field name="kind" editable="1"/>
+    <field name="found" editable="0"/>
+    <field name="reasons" editable="0"/>
+    <field name="confidence" editable="0"/>
+    <field name="contrast" editable="0"/>
+    <field name="area" editable="0"/>
+    <field name="drop_mean" editable="0"/>
+    <field name="drop_max" editable="0"/>
+    <field name="image_share" editable="0"/>
+    <field name="review" editable="1"/>
+    <field name="reviewed_by" editable="0"/>
+    <field name="reviewed_at" editable="0"/>
+    <field name="remark" editable="1"/>
+    <field name="detected" editable="0"/>
+    <field name="created_at" editable="0"/>
+    <field name="detected_at" editable="0"/>
+  </editable>
+  <editorlayout>tablayout</editorlayout>
+  <attributeEditorForm>
+    <attributeEditorContainer name="Review" columnCount="1" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
+      <attributeEditorField name="review" index="20" showLabel="1"/>
+      <attributeEditorField name="kind" index="11" showLabel="1"/>
+      <attributeEditorField name="remark" index="23" showLabel="1"/>
+      <attributeEditorField name="reviewed_by" index="21" showLabel="1"/>
+      <attributeEditorField name="reviewed_at" index="22" showLabel="1"/>
+    </attributeEditorContainer>
+    <attributeEditorContainer name="Anomaly" columnCount="2" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
+      <attributeEditorField name="id" index="0" showLabel="1"/>
+      <attributeEditorField name="label" index="7" showLabel="1"/>
+      <attributeEditorField name="segment" index="4" showLabel="1"/>
+      <attributeEditorField name="clock" index="10" showLabel="1"/>
+      <attributeEditorField name="area" index="16" showLabel="1"/>
+      <attributeEditorField name="image_share" index="19" showLabel="1"/>
+      <attributeEditorField name="found" index="12" showLabel="1"/>
+      <attributeEditorField name="confidence" index="14" showLabel="1"/>
+      <attributeEditorField name="reasons" index="13" showLabel="1"/>
+      <attributeEditorField name="contrast" index="15" showLabel="1"/>
+      <attributeEditorField name="drop_mean" index="17" showLabel="1"/>
+      <attributeEditorField name="drop_max" index="18" showLabel="1"/>
+      <attributeEditorField name="chainage_from" index="5" showLabel="1"/>
+      <attributeEditorField name="chainage_to" index="6" showLabel="1"/>
+      <attributeEditorField name="arc_from" index="8" showLabel="1"/>
+      <attributeEditorField name="arc_to" index="9" showLabel="1"/>
+      <attributeEditorField name="detected" index="24" showLabel="1"/>
+      <attributeEditorField name="created_at" index="25" showLabel="1"/>
+      <attributeEditorField name="detected_at" index="26" showLabel="1"/>
+      <attributeEditorField name="survey" index="2" showLabel="1"/>
+    </attributeEditorContainer>
+  </attributeEditorForm>
+  <previewExpression>"label"</previewExpression>
+  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% format_number("clock", 1) %] h&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "found" %]&lt;br&gt;drop [% format_number("drop_mean", 1) %] dB, [% "review" %]</mapTip>
+  <layerGeometryType>2</layerGeometryType>
+</qgis>
