@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunneldb.simulate import ground
+from tunneldb.simulate.beam import blur
 from tunneldb.simulate.clutter import clutter
 from tunneldb.simulate.coat import coat
 from tunneldb.simulate.furniture import FLOOR, RAIL, Appendage, Niche, furnish, refuges
@@ -24,7 +25,7 @@ from tunneldb.simulate.placing import stand
 from tunneldb.simulate.profile import slabs
 from tunneldb.simulate.ray import scene, trace
 from tunneldb.simulate.rings import build
-from tunneldb.simulate.scanner import BlockPlan, Scanner
+from tunneldb.simulate.scanner import BlockPlan, Rays, Scanner
 from tunneldb.simulate.skin import skin
 from tunneldb.simulate.things import TargetSphere, Thing, parts_table
 from tunneldb.simulate.tunnel import Tunnel
@@ -154,6 +155,29 @@ class Simulation:
         leaks = [replace(leak, id=i + 1) for i, leak in enumerate(leaks)]
         return with_drips(leaks, tunnel, room, drips) if p.drips else leaks
 
+    def _trace(self, rays: Rays, index: NDArray[np.int64] | slice, direction: Array, noise: Array, chance: Array) -> Array:
+        """Shoot some of the rays in given directions; rows of :func:`trace`."""
+        p = self.parameters
+        out = np.empty((len(direction), 12 if self._parts is None else 13))
+        trace(
+            self._scene,
+            self._parts,
+            self._ground,
+            self.coat,
+            self._skin,
+            rays.origin[index],
+            direction,
+            rays.hint[index],
+            noise,
+            chance,
+            p.outliers,
+            1.0 if p.beam == 0.0 else 0.0,
+            p.relief,
+            p.max_range,
+            out,
+        )
+        return out
+
     def make(self, plan: BlockPlan) -> Cloud:
         """Points of one block; the same for the same seed and index, whenever it is made."""
         p = self.parameters
@@ -161,28 +185,19 @@ class Simulation:
         rng = np.random.default_rng(sequence)
         rays = self.scanner.rays(plan, rng)
         n = len(rays.time)
-        out = np.empty((n, 12 if self._parts is None else 13))
-        trace(
-            self._scene,
-            self._parts,
-            self._ground,
-            self.coat,
-            self._skin,
-            rays.origin,
-            rays.direction,
-            rays.hint,
-            rng.standard_normal(n) * p.range_noise,
-            rng.random((n, 2)),
-            p.outliers,
-            p.relief,
-            p.max_range,
-            out,
-        )
+        out = self._trace(rays, slice(None), rays.direction, rng.standard_normal(n) * p.range_noise, rng.random((n, 2)))
         keep = np.flatnonzero(~np.isnan(out[:, 0]))
         out = out[keep]
         radiometry = self._radiometry
-        klass = out[:, 7].astype(np.uint8)
         noise = rng.standard_normal(len(out)) * p.intensity_noise
+        if p.beam > 0.0:
+
+            def again(index: NDArray[np.int64], direction: Array) -> Array:
+                """Without noise, and with numbers that make no stray points."""
+                return self._trace(rays, index, direction, np.zeros(len(index)), np.ones((len(index), 2)))
+
+            blur(out, rays, keep, p.beam, again, self.tunnel, radiometry, rng)
+        klass = out[:, 7].astype(np.uint8)
         reflectance = radiometry.reflectance(out[:, 10], (klass == FLOOR) | (klass == RAIL), out[:, 9]) + noise
         amplitude = radiometry.amplitude(out[:, 11], reflectance)
         index = out[:, 8].astype(np.int32)

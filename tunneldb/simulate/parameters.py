@@ -35,6 +35,7 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "range_noise": (0.0, 0.05, "m"),
     "outliers": (0.0, 0.2, "(share)"),
     "relief": (0.0, 0.02, "m"),
+    "beam": (0.0, 10.0, "mrad"),
     "ring": (0.5, 50.0, "m"),
     "ring_step": (0.0, 0.02, "m"),
     "radius_step": (0.0, 0.2, "m"),
@@ -119,6 +120,7 @@ class Parameters:
     range_noise: float = 0.003
     outliers: float = 0.0005
     relief: float = 0.0
+    beam: float = 0.0
     range_curve: Literal["near_loss", "inverse_square"] = "near_loss"
 
     roughness: float = 12.0

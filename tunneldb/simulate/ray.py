@@ -300,6 +300,7 @@ def trace(
     noise: Array,
     chance: Array,
     outliers: float,
+    stray: float,
     relief: float,
     furthest: float,
     out: Array,
@@ -321,6 +322,8 @@ def trace(
         Uniform numbers that decide on outliers and where they fall.
     outliers : float
         Share of rays that become isolated points.
+    stray : float
+        1: a fixed share of the rays at appendages and edges give mixed pixels; 0: none, the beam's footprint does.
     relief : float
         Height of small-scale relief of the lining, m.
     furthest : float
@@ -398,8 +401,8 @@ def trace(
             # Most isolated points hang in the air, some lie behind the wall (multipath).
             r = NEAREST + v / 0.7 * (0.95 * r - NEAREST) if v < 0.7 else r * (1.0 + 0.5 * (v - 0.7))
             klass = OUTLIER
-        elif (klass == APPENDAGE and thing == 0 and chance[i, 0] < outliers + 0.01) or (
-            thing > 0 and edge < BEAM and chance[i, 0] < outliers + MIXED
+        elif (klass == APPENDAGE and thing == 0 and chance[i, 0] < outliers + 0.01 * stray) or (
+            thing > 0 and edge < BEAM and chance[i, 0] < outliers + MIXED * stray
         ):
             r += v * (behind - r)  # a mixed pixel: the beam meets an edge and what lies behind it
             klass = OUTLIER
