@@ -34,8 +34,8 @@ class Scene:
         tunneldb("simulate", folder, "--name", name, "--start-chainage", start_chainage, *options)
         return cls(folder, name, start_chainage)
 
-    def register(self, dsn: str, intensity: str = "Amplitude", kind: str = "amplitude") -> None:
-        """Add tunnel and survey to the database."""
+    def register(self, dsn: str, intensity: str = "Amplitude", kind: str = "amplitude", reference: str = "measured") -> None:
+        """Add tunnel and survey to the database; the range curve is measured, or found on the lining (``auto``)."""
         tunneldb(
             "tunnel", "add", self.name, "--srid", 25830, "--axis", self.file("axis.csv"),
             "--start-chainage", self.start_chainage, dsn=dsn,
@@ -44,8 +44,8 @@ class Scene:
         poses = ("--stations", stations) if stations.exists() else ("--trajectory", trajectory)
         tunneldb(
             "survey", "add", self.name, "--tunnel", self.name, "--date", "2024-05-04", *poses,
-            "--reference", self.file("reference.csv"), "--intensity", intensity, "--intensity-kind", kind,
-            dsn=dsn,
+            "--reference", "auto" if reference == "auto" else self.file("reference.csv"),
+            "--intensity", intensity, "--intensity-kind", kind, dsn=dsn,
         )  # fmt: skip
 
     def load(self, dsn: str) -> float:
