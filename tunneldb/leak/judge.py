@@ -10,6 +10,10 @@ import numpy as np
 from tunneldb.leak.region import Region
 from tunneldb.leak.shape import Shape, measure
 
+STRONG_CONTRAST, STRONG_DROP = 8.0, 3.0
+"""Standard deviations and dB from which a patch with straight sides may be water after all, that fills a panel between joints:
+of shades of concrete and mortar neither is expected, water takes away half of the light and more."""
+
 Kind = Literal["leak", "joint", "dark"]
 
 
@@ -92,16 +96,20 @@ def _gradual(region: Region, shape: Shape) -> float:
 
 
 def _rectangular(region: Region, shape: Shape) -> float:
-    """A repaired patch, a painted stripe: straight sides along the tunnel and around it, all of them seen, and one shade."""
-    traits = region.traits
-    if not traits.rim or min(shape.along, shape.across) < 4 * region.pixel:
+    """A repaired patch, a painted stripe: straight sides along the tunnel and around it, three of them seen at least.
+
+    A small blob may have straight sides by chance, but no corners.
+    """
+    traits, pixel = region.traits, region.pixel
+    if not traits.rim or min(shape.along, shape.across) < 4 * pixel:
         return 0.0
-    wander = max(shape.wander_along, shape.wander_across) / region.pixel
+    wander = max(shape.wander_along, shape.wander_across)
+    corners = max(_ramp(shape.corners, 0.35, 0.65), _ramp(wander / np.sqrt(shape.area), 0.02, 0.01))
     # Water that fills a panel between joints is rectangular too, and darker than repairs are; but no stripe.
-    strong = min(region.contrast / 8.0, region.drop_mean / 3.0)
-    panel = _ramp(strong, 1.0, 1.2) * (1.0 - _ramp(shape.length / shape.mean_width, 6.0, 10.0))
-    seen = _ramp(traits.rim_off / traits.rim, 0.2, 0.1)
-    return min(_ramp(wander, 1.2, 0.6), _ramp(shape.fill, 0.85, 0.93), _ramp(shape.corners, 0.3, 0.6), seen, 1.0 - panel)
+    strong = min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP)
+    panel = _ramp(strong, 0.8, 1.0) * (1.0 - _ramp(shape.length / shape.mean_width, 6.0, 10.0))
+    hidden = _ramp(traits.rim_off / traits.rim, 0.4, 0.55)
+    return min(_ramp(wander, 1.2 * pixel, 0.6 * pixel), _ramp(shape.fill, 0.85, 0.93), corners, 1.0 - max(panel, hidden))
 
 
 def _shadow(region: Region, shape: Shape) -> float:
@@ -113,4 +121,4 @@ def _shadow(region: Region, shape: Shape) -> float:
 
 def _ramp(value: float, none: float, full: float) -> float:
     """From 0 at ``none`` to 1 at ``full``, whichever is the greater."""
-    return float(np.clip((value - none) / (full - none), 0.0, 1.0))
+    return min(max((float(value) - none) / (full - none), 0.0), 1.0)

@@ -89,36 +89,39 @@ def beside(runs: Int) -> tuple[Int, Int]:  # pragma: no cover - compiled
 def short_runs(dark: Mask, first: int, stop: int, wide: int) -> tuple[Int, Int]:  # pragma: no cover - compiled
     """Unbroken runs of dark pixels that are not wider: (row, column, column behind) and (column, row, row behind), in order."""
     rows = dark.shape[0]
-    across, along = 0, 0
-    begin = np.full(stop, -1, np.int64)
-    for count_only in (True, False):
-        if not count_only:
-            horizontal, vertical = np.empty((across, 3), np.int64), np.empty((along, 3), np.int64)
-            across, along = 0, 0
-            begin[:] = -1
-        for i in range(rows + 1):
-            start = -1
-            for j in range(first, stop + 1):
-                here = i < rows and j < stop and dark[i, j]
-                if here and start < 0:
-                    start = j
-                elif not here and start >= 0:
-                    if j - start <= wide:
-                        if not count_only:
-                            horizontal[across] = i, start, j
-                        across += 1
-                    start = -1
-                if j < stop:
-                    if here and begin[j] < 0:
-                        begin[j] = i
-                    elif not here and begin[j] >= 0:
-                        if i - begin[j] <= wide:
-                            if not count_only:
-                                vertical[along] = j, begin[j], i
-                            along += 1
-                        begin[j] = -1
-    order = np.argsort(vertical[:, 0] * (rows + 1) + vertical[:, 1])
-    return horizontal, vertical[order]
+    across, along = np.empty((1024, 3), np.int64), np.empty((1024, 3), np.int64)
+    flat, upright = 0, 0
+    for i in range(rows):
+        for j in range(first, stop):
+            if not dark[i, j]:
+                continue
+            if j == first or not dark[i, j - 1]:
+                behind = j + 1
+                while behind < stop and behind - j <= wide and dark[i, behind]:
+                    behind += 1
+                if behind - j <= wide:
+                    if flat == len(across):
+                        across = _longer(across)
+                    across[flat] = i, j, behind
+                    flat += 1
+            if i == 0 or not dark[i - 1, j]:
+                behind = i + 1
+                while behind < rows and behind - i <= wide and dark[behind, j]:
+                    behind += 1
+                if behind - i <= wide:
+                    if upright == len(along):
+                        along = _longer(along)
+                    along[upright] = j, i, behind
+                    upright += 1
+    along = along[:upright]
+    return across[:flat], along[np.argsort(along[:, 0] * rows + along[:, 1])]
+
+
+@njit(cache=True, nogil=True)
+def _longer(runs: Int) -> Int:  # pragma: no cover - compiled
+    longer = np.empty((2 * len(runs), 3), np.int64)
+    longer[: len(runs)] = runs
+    return longer
 
 
 @njit(cache=True, nogil=True)

@@ -25,6 +25,8 @@ CONTRAST = 6
 FEW = 5
 """Fewer pixels tell no mean."""
 
+RIM, LISTED = 1, 2
+
 
 def settle(dark: Mask, relative: Relative, size: int) -> Mask:
     """Move the rim of dark regions to where half of their contrast is reached.
@@ -60,40 +62,67 @@ def _settled(
     dark: Mask, drop: NDArray[np.int16], state: NDArray[np.uint8], half: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], Mask]:  # pragma: no cover - compiled
     """Pixels near the rim that change sides, and to which."""
-    rows, columns = dark.shape
-    near = np.zeros((rows, columns), np.bool_)
+    near, row, column = _near(dark)
+    becomes = np.empty(len(row), np.bool_)
     count = 0
-    for i in range(rows):
-        for j in range(columns):
-            if (j + 1 < columns and dark[i, j] != dark[i, j + 1]) or (i + 1 < rows and dark[i, j] != dark[i + 1, j]):
-                for m in range(max(i - BAND + 1, 0), min(i + BAND + 1, rows)):
-                    for n in range(max(j - BAND + 1, 0), min(j + BAND + 1, columns)):
-                        count += not near[m, n]
-                        near[m, n] = True
-    row, column, becomes = np.empty(count, np.int32), np.empty(count, np.int32), np.empty(count, np.bool_)
-    count = 0
-    for i in range(rows):
-        for j in range(columns):
-            if not near[i, j] or state[i, j] > 2:
-                continue
-            contrast, held = _core(dark, drop, i, j)
-            if held < FEW:
-                continue
-            level, seen = _level(drop, state, i, j, half)
-            if seen >= FEW and (2.0 * level > contrast) != dark[i, j]:
-                row[count], column[count], becomes[count] = i, j, not dark[i, j]
-                count += 1
+    for k in range(len(row)):
+        i, j = row[k], column[k]
+        if state[i, j] > 2:
+            continue
+        contrast, held = _core(dark, near, drop, i, j)
+        if held < FEW:
+            continue
+        level, seen = _level(drop, state, i, j, half)
+        if seen >= FEW and (2.0 * level > contrast) != dark[i, j]:
+            row[count], column[count], becomes[count] = i, j, not dark[i, j]
+            count += 1
     return row[:count], column[:count], becomes[:count]
 
 
 @njit(cache=True, nogil=True)
-def _core(dark: Mask, drop: NDArray[np.int16], i: int, j: int) -> tuple[float, int]:  # pragma: no cover - compiled
-    """Mean drop of the dark pixels about one that lie within dark ones, and how many there are."""
+def _near(dark: Mask) -> tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]]:  # pragma: no cover - compiled
+    """Which pixels lie within BAND of the rim (LISTED), which dark ones at it (RIM), and a list of the former."""
+    rows, columns = dark.shape
+    near = np.zeros((rows, columns), np.uint8)
+    row, column = np.empty(1024, np.int32), np.empty(1024, np.int32)
+    count = 0
+    for i in range(rows):
+        for j in range(columns):
+            if not dark[i, j]:
+                continue
+            for di, dj in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+                p, q = i + di, j + dj
+                if p < 0 or p >= rows or q < 0 or q >= columns or dark[p, q]:
+                    continue
+                near[i, j] |= RIM
+                for m in range(max(min(i, p) - BAND + 1, 0), min(max(i, p) + BAND, rows)):
+                    for n in range(max(min(j, q) - BAND + 1, 0), min(max(j, q) + BAND, columns)):
+                        if not near[m, n] & LISTED:
+                            near[m, n] |= LISTED
+                            if count == len(row):
+                                row, column = _longer(row), _longer(column)
+                            row[count], column[count] = m, n
+                            count += 1
+    return near, row[:count], column[:count]
+
+
+@njit(cache=True, nogil=True)
+def _longer(numbers: NDArray[np.int32]) -> NDArray[np.int32]:  # pragma: no cover - compiled
+    longer = np.empty(2 * len(numbers), np.int32)
+    longer[: len(numbers)] = numbers
+    return longer
+
+
+@njit(cache=True, nogil=True)
+def _core(
+    dark: Mask, near: NDArray[np.uint8], drop: NDArray[np.int16], i: int, j: int
+) -> tuple[float, int]:  # pragma: no cover - compiled
+    """Mean drop of dark pixels about one, every other one, but for those at the rim, and of how many it is."""
     rows, columns = dark.shape
     total, held = 0.0, 0
-    for m in range(max(i - CONTRAST, 1), min(i + CONTRAST + 1, rows - 1)):
-        for n in range(max(j - CONTRAST, 1), min(j + CONTRAST + 1, columns - 1)):
-            if dark[m, n] and drop[m, n] != NODATA and dark[m - 1, n] and dark[m + 1, n] and dark[m, n - 1] and dark[m, n + 1]:
+    for m in range(i - CONTRAST, i + CONTRAST + 1, 2):
+        for n in range(j - CONTRAST, j + CONTRAST + 1, 2):
+            if 0 <= m < rows and 0 <= n < columns and dark[m, n] and not near[m, n] & RIM and drop[m, n] != NODATA:
                 total += drop[m, n]
                 held += 1
     return total / max(held, 1), held
