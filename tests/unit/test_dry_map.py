@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import shapely
 from shapely.geometry import box
 
 from tunneldb.leak.dry_map import map_dry
@@ -53,7 +52,8 @@ class Lining:
 
 def test_uniform_lining():
     error, sigma, dry = Lining().map()
-    assert np.abs(error).max() < 0.05
+    assert np.abs(error).max() < 0.1
+    assert np.abs(error).mean() < 0.02
     assert np.abs(sigma / NOISE - 1).max() < 0.05
     assert dry.mean == pytest.approx(2.0, abs=0.01)
     assert dry.spread == pytest.approx(NOISE, rel=0.02)
@@ -62,16 +62,19 @@ def test_uniform_lining():
 
 def test_rings_are_followed_to_the_pixel_and_joints_are_not():
     lining = Lining()
-    ring = np.random.default_rng(3).normal(0, 0.8, 41)[((lining.chainage - 400) / 1.5).astype(int)]
-    lining.dry += ring
-    joint = np.abs((lining.chainage - 400 + 0.75) % 1.5 - 0.75) < 0.02
+    number = ((lining.chainage - 400) / 1.5).astype(int)
+    ring = np.random.default_rng(3).normal(0, 0.8, 40)
+    lining.dry += ring[number]
+    joint = np.flatnonzero(np.diff(number))  # the last column of each ring
     lining.wet[:, joint] = 3.0
     error, _, _ = lining.map()
-    # A pixel to either side of the joint may lie in the ring beyond it.
-    edge = np.convolve(joint, np.ones(3), "same") > 0
-    assert np.abs(error[:, ~edge]).max() < 0.1
-    assert np.abs(np.median(error, axis=0))[~edge].max() < 0.06
-    assert np.abs(error[:, joint]).max() < 3.0
+    clear = np.ones(len(number), bool)
+    clear[joint] = False
+    assert np.abs(np.median(error, axis=0))[clear].max() < 0.1
+    # In a joint the level is that of the one ring or the other, or between them.
+    level = np.median(error + lining.dry, axis=0)[joint] - 2.0
+    assert (level > np.minimum(ring[:-1], ring[1:]) - 0.15).all()
+    assert (level < np.maximum(ring[:-1], ring[1:]) + 0.15).all()
 
 
 def test_soot_that_changes_along_the_tunnel_is_followed():
@@ -79,8 +82,8 @@ def test_soot_that_changes_along_the_tunnel_is_followed():
     strength = 3.0 * (0.5 + 0.5 * np.cos(2 * np.pi * lining.chainage / 80.0))
     lining.dry -= strength * np.exp(-0.5 * (lining.arc / 1.2) ** 2)
     error, sigma, _ = lining.map()
-    assert np.abs(error).mean() < 0.06
-    assert np.abs(error).max() < NOISE
+    assert np.abs(error).mean() < 0.05
+    assert (np.abs(error) > NOISE).mean() < 0.001
     assert np.median(sigma) == pytest.approx(NOISE, rel=0.05)
 
 
@@ -93,7 +96,7 @@ def test_a_stripe_along_the_tunnel_is_followed():
 
 @pytest.mark.parametrize("size", [(1.0, 1.0), (4.0, 5.0), (9.0, 4.0)])
 def test_a_large_leak_is_not_swallowed(size):
-    lining = Lining()
+    lining = Lining(arc=16.0)
     lining.leak(420.0, 420.0 + size[0], -3.9, -3.9 + size[1])
     error, sigma, _ = lining.map()
     assert np.abs(error).max() < 0.15
@@ -122,7 +125,7 @@ def test_a_quarter_wet_does_not_raise_the_threshold():
         lining.dry -= 1.0 * np.exp(-0.5 * (lining.arc / 1.2) ** 2)
     (_, _, before), (error, sigma, after) = dry.map(), wet.map()
     assert after.mean - 3 * after.spread == pytest.approx(before.mean - 3 * before.spread, abs=0.1)
-    assert np.abs((error - 3 * (sigma - NOISE))).mean() < 0.1
+    assert np.abs(error - 3 * (sigma - NOISE)).mean() < 0.1
 
 
 def test_half_of_the_perimeter_wet_along_30_m():
@@ -131,3 +134,137 @@ def test_half_of_the_perimeter_wet_along_30_m():
     error, sigma, _ = lining.map()
     assert np.abs(error).max() < 0.2
     assert np.abs(sigma / NOISE - 1).max() < 0.15
+
+
+def test_a_leak_within_soot_is_not_swallowed():
+    lining = Lining(150.0, arc=16.0)
+    lining.dry -= 3.0 * np.exp(-0.5 * (lining.arc / 1.5) ** 2)
+    lining.leak(470.0, 473.0, -1.0, 1.0)
+    error, _, _ = lining.map()
+    assert np.abs(error).max() < 0.2
+
+
+def test_sigma_follows_the_texture():
+    lining = Lining(90.0)
+    rough = lining.chainage > 430
+    noise = np.where(rough, 0.8, 0.25)[None, :]
+    _, sigma, dry = lining.map(noise=noise)
+    clear = np.abs(lining.chainage - 430) > 3.0  # half a window, and a tile
+    assert np.abs(sigma / noise - 1)[:, clear].max() < 0.1
+    assert dry.spread == pytest.approx(0.8, rel=0.1)
+
+
+def test_half_empty_pixels_and_a_gap():
+    lining = Lining(100.0)
+    rng = np.random.default_rng(8)
+    lining.dry += rng.normal(0, 0.5, 67)[((lining.chainage - 400) / 1.5).astype(int)]
+    lining.held = rng.random(lining.held.shape) < 0.3
+    lining.held[:, 2000:3000] = False
+    error, sigma, dry = lining.map()
+    seen = np.zeros(error.shape, bool)
+    seen[:, :1990] = seen[:, 3010:] = True
+    assert dry.count == lining.held.sum()
+    assert np.abs(error[lining.held]).mean() < 0.05
+    assert np.abs(sigma / NOISE - 1)[seen].max() < 0.1
+    assert np.isfinite(error).all()
+    assert (dry.sigma > 0).all()
+
+
+def test_profiles_farther_apart_than_pixels():
+    lining = Lining(100.0)
+    lining.leak(450.0, 452.0, 0.0, 2.0)
+    lining.held[:] = False
+    lining.held[np.random.default_rng(8).random(lining.held.shape[0]) < 0.5, ::5] = True
+    error, sigma, _ = lining.map()
+    assert np.abs(error).max() < 0.3
+    assert np.abs(sigma / NOISE - 1).max() < 0.2
+
+
+def test_a_short_tunnel_and_hardly_any_lining():
+    short = Lining(20.0)
+    short.leak(408.0, 411.0, -2.0, 0.0)
+    error, _, _ = short.map()
+    assert np.abs(error).max() < 0.15
+    scrap = Lining(1.0)
+    scrap.held[:] = False
+    scrap.held[100:103, 10:20] = True
+    error, sigma, dry = scrap.map()
+    assert np.abs(error[scrap.held]).max() < 1.0
+    assert np.isfinite(sigma).all()
+    assert dry.count == 30
+
+
+def test_no_lining():
+    lining = Lining(1.0)
+    lining.held[:] = False
+    picture = lining.picture()
+    dry = map_dry(picture)
+    assert dry.count == 0
+    assert np.isnan(dry.mean)
+    assert (dry.sigma > 0).all()
+    assert (relative(picture, dry).drop == NODATA).all()
+
+
+def test_recesses_do_not_count():
+    lining = Lining()
+    picture = lining.picture()
+    recess = lining.within(420.0, 423.0, -2.0, 2.0)
+    picture.level[:, lining.columns][recess] -= 400
+    picture.state[:, lining.columns][recess] = State.RECESS
+    dry = map_dry(picture)
+    level = dry.levels(slice(0, lining.grid.rows), lining.columns)
+    assert np.abs(level - 2.0).max() < 0.1
+    assert dry.count == recess.size - recess.sum()
+
+
+def test_the_map_is_the_same_on_both_sides_of_the_end_of_a_kilometre():
+    """A tunnel over the end of kilometre 0, of which each kilometre sees the first 0.5 m beyond it."""
+    both = Lining(100.0, start=950.0, km=0)  # beyond the end lies one more block
+    both.dry += np.random.default_rng(3).normal(0, 0.5, 80)[((both.chainage - 950) / 1.5).astype(int)]
+    both.dry = both.dry - 2.0 * np.exp(-0.5 * (both.arc / 1.2) ** 2)
+    whole = both.picture()
+    before, after = Grid(0, PIXEL, -200, 400, 25), Grid(1, PIXEL, -200, 400, 25)
+    levels = []
+    for grid in (before, after):
+        state, level = np.zeros((grid.rows, grid.columns), np.uint8), np.full((grid.rows, grid.columns), NODATA, np.int16)
+        # Columns, counted from the end at 1000 m.
+        end, here = whole.grid.inner.stop, grid.inner.stop if grid is before else grid.inner.start
+        far = (2500, 25) if grid is before else (25, 2500)
+        state[:, here - far[0] : here + far[1]] = whole.state[:, end - far[0] : end + far[1]]
+        level[:, here - far[0] : here + far[1]] = whole.level[:, end - far[0] : end + far[1]]
+        dry = map_dry(Picture(grid, state, level))
+        levels.append(dry.levels(slice(0, grid.rows), slice(here - 25, here + 25)))
+    np.testing.assert_allclose(levels[0], levels[1], atol=0.15)
+
+
+def test_drawn_dry_regions_rule_what_lies_in_them_and_nothing_else():
+    plain, drawn = Lining(), Lining()
+    for lining in (plain, drawn):
+        lining.leak(420.0, 424.0, -2.0, 2.0)
+    region = box(420.0, -2.0, 424.0, 0.0)
+    picture = drawn.picture()
+    dry = map_dry(picture, [region])
+    level = dry.levels(slice(0, drawn.grid.rows), drawn.columns)
+    core = drawn.within(421.0, 423.0, -1.5, -0.5)
+    assert np.abs(level[core] - (2.0 - 3.0)).max() < 0.1
+    other = ~drawn.within(419.0, 425.0, -3.0, 1.0)
+    before, _, _ = plain.map()
+    assert np.abs(level - drawn.dry - before)[other].max() < 0.05
+    dark = dark_pixels(relative(picture, dry), 5)[:, drawn.columns]
+    assert not dark[drawn.within(420.0, 424.0, -2.0, 0.0)].any()
+    assert dark[drawn.within(420.0, 424.0, 0.6, 2.0)].mean() > 0.97
+
+
+def test_drop_is_dry_level_less_level_in_the_memory_of_the_picture():
+    lining = Lining(10.0)
+    lining.held[np.random.default_rng(2).random(lining.held.shape) < 0.2] = False
+    picture = lining.picture()
+    level = picture.level.copy()
+    dry = map_dry(picture)
+    found = relative(picture, dry)
+    assert found.drop is picture.level
+    assert found.state is picture.state
+    held = level != NODATA
+    expected = dry.levels(slice(0, lining.grid.rows), slice(0, lining.grid.columns)) * 100 - level
+    np.testing.assert_allclose(found.drop[held], expected[held], atol=0.51)
+    assert (found.drop[~held] == NODATA).all()

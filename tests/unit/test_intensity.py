@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from tunneldb.errors import UserError
 from tunneldb.intensity.correct import observe, range_span, to_decibel
-from tunneldb.intensity.dry import plain_statistics, robust_statistics
 from tunneldb.intensity.oren_nayar import coefficients, incidence_db
 from tunneldb.intensity.reference import ReferenceCurve
 from tunneldb.intensity.roughness import Regions, automatic_regions, drawn_regions, find_roughness, objective
@@ -101,23 +100,6 @@ def test_a_curve_that_does_not_span_the_lining_is_refused_with_both_spans():
     with pytest.raises(UserError, match=r"spans 1 to 30 m.*2\.00 to 40\.00 m.*26 %"):
         CURVE.require_span(*span)
     CURVE.require_span(*range_span(views, points[:, 2] < 30.04, CURVE))
-
-
-@pytest.mark.parametrize("wet", [0.0, 0.1, 0.2, 0.3])
-def test_wet_lining_does_not_shift_the_dry_statistics(wet):
-    rng = np.random.default_rng(3)
-    values = rng.normal(2.0, 0.4, 100_000)
-    values[: int(wet * len(values))] -= rng.uniform(1.0, 5.0, int(wet * len(values)))
-    dry = robust_statistics(np.append(values, [np.nan, np.inf, -np.inf]))
-    assert dry.mean == pytest.approx(2.0, abs=0.02)
-    assert dry.sigma == pytest.approx(0.4, rel=0.05)
-    assert dry.threshold == pytest.approx(0.8, abs=0.08)
-
-
-def test_statistics_of_nothing():
-    assert plain_statistics(np.array([np.nan])).count == 0
-    assert np.isnan(robust_statistics(np.zeros(0)).mean)
-    assert robust_statistics(np.full(10, 3.0)).threshold == pytest.approx(3.0)
 
 
 def test_objective_is_equation_17():

@@ -277,9 +277,12 @@ def cut_out(mask, level, min_area, dry_mean=0.0):
     """Outlines of the regions of a mask at the corner of a kilometre, with the regions."""
     grid = Grid(0, PIXEL, 0, mask.shape[0])
     whole = np.zeros((mask.shape[0], grid.columns), bool)
-    levels = np.full(whole.shape, NODATA, np.int16)
-    whole[:, 50 : 50 + mask.shape[1]], levels[:, 50 : 50 + mask.shape[1]] = mask, level
-    found = regions(whole, levels, grid, dry_mean, min_area)
+    drop = np.full(whole.shape, NODATA, np.int16)
+    drop[:, 50 : 50 + mask.shape[1]] = np.where(level == NODATA, NODATA, 100 * dry_mean - level)
+    whole[:, 50 : 50 + mask.shape[1]] = mask
+    state = (drop != NODATA).astype(np.uint8)
+    sigma = np.full((-(-len(mask) // 25), grid.columns // 25), 0.3, np.float32)
+    found = regions(whole, Relative(grid, state, drop, 25, sigma), min_area)
     return [shapely.affinity.translate(region.outline, -50 * PIXEL) for region in found], found
 
 

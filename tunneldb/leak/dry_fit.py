@@ -86,7 +86,7 @@ class Fit:
         self.per_tile = float(scanned.mean())
         self.pinned = np.zeros(shape, np.bool_)
         if drawn:
-            number = self._drawn_moments()[0]
+            number = self._drawn_moments(self.smooth)[0]
             self.pinned = (number >= DRAWN * self.lining) & (number > 0)
 
     @property
@@ -96,7 +96,8 @@ class Fit:
 
     def add_bands(self) -> None:
         """Add what each row shows: about each block, or where too little is seen of it, in the whole kilometre."""
-        along = min(np.count_nonzero(self.lining.any(axis=0)), (2 * BESIDE + 1) * self.smooth.shape[1] // self.bands.shape[1])
+        scanned, per_block = int(self.lining.any(axis=0).sum()), self.smooth.shape[1] // self.bands.shape[1]
+        along = min(scanned, (2 * BESIDE + 1) * per_block)
         enough = max(FEW, round(PART * along * self.per_tile / self.tile / self.every))
         found, whole = row_modes(*self._plain, *self.parts, self.every, BESIDE, enough)
         found = np.where(np.isfinite(found), found, whole[:, None])
@@ -131,12 +132,13 @@ class Fit:
         used = np.ones(self.smooth.shape, np.bool_)
         mean, sigma, count = settle_windows(histograms, used, half)
         mean[(count == 0) | (self.lining == 0)] = np.nan
+        level = self.smooth + mean
         if self.pinned.any():
-            number, total, _ = self._drawn_moments()
-            mean[self.pinned] = (total / np.maximum(number, 1))[self.pinned]
+            number, total, _ = self._drawn_moments(np.zeros_like(self.smooth))
+            level[self.pinned] = (total / np.maximum(number, 1))[self.pinned]
         if np.isfinite(sigma).any():
             self.spread = max(float(np.nanmedian(sigma)), STEP["corrected"])
-        self.smooth, self.odd = slow(self.smooth + mean, self.smooth, self.spread, self.pinned)
+        self.smooth, self.odd = slow(level, self.smooth, self.spread, self.pinned)
 
     def sigma(self) -> Single:
         """Standard deviation about the model, by tiles, dB."""
@@ -151,7 +153,9 @@ class Fit:
             return np.full_like(sigma, self.spread)
         sigma = fill(np.where(known, np.maximum(sigma, np.percentile(sigma[seen], LEAST)), np.nan).astype(np.float32))
         if self.pinned.any():
-            number, total, squares = (ndimage.uniform_filter(m * self.pinned, 2 * half + 1) for m in self._drawn_moments())
+            number, total, squares = (
+                ndimage.uniform_filter(m * self.pinned, 2 * half + 1) for m in self._drawn_moments(self.smooth)
+            )
             number = np.maximum(number, 1e-9)
             plain = np.sqrt(np.maximum(squares / number - (total / number) ** 2, STEP["corrected"] ** 2))
             sigma[self.pinned] = plain[self.pinned]
@@ -165,14 +169,17 @@ class Fit:
         """State, level and the tiles that nothing sets off."""
         return self.picture.state, self.picture.level, (self.lining > 0) & ~self.odd
 
-    def _drawn_moments(self) -> tuple[Float, Float, Float]:
-        """Of the lining pixels in drawn regions, by tiles: number, sum and squares of what they show beyond the model."""
+    def _drawn_moments(self, smooth: Single) -> tuple[Float, Float, Float]:
+        """Of the lining pixels in drawn regions, by tiles: number, sum and squares of what they show beyond the model.
+
+        With ``smooth`` in the place of the model's.
+        """
         tile, shape = self.tile, self.smooth.shape
         moments = np.zeros((3, *shape))
         for columns, mask in inside(self.grid, self.drawn):
             row, column = np.nonzero(mask & (self.picture.state[:, columns] == 1))
             level = np.empty(mask.shape, np.float32)
-            fill_levels(*self.parts, 0, columns.start, level)
+            fill_levels(self.base, self.rings, self.bands, smooth, self.tile, 0, columns.start, level)
             beyond = self.picture.level[:, columns][row, column] * STEP["corrected"] - level[row, column]
             where = row // tile * shape[1] + (column + columns.start) // tile
             for k in range(3):

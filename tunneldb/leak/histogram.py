@@ -277,7 +277,7 @@ def tile_histograms(
     tile: int,
     every: int,
 ) -> NDArray[np.uint16]:  # pragma: no cover - compiled
-    """Histograms (tiles down, tiles along, bins) of what lining shows beyond the model, from every n-th row of the tiles used."""
+    """Histograms (tiles down, tiles along, bins) of what lining shows beyond the model; every n-th row of the tiles used."""
     rows = state.shape[0]
     down, along = smooth.shape
     out = np.zeros((down, along, TILE_BINS), np.uint16)

@@ -22,6 +22,9 @@ EDGE, ABOUT = 3, 7
 SHARP = 0.6
 """Part of the step about it from which an edge is sharp: one that fades over more than 1.7 m is not."""
 
+WIDE = (7, 13)
+"""Tiles down and along of the windows that show the level about a tile."""
+
 SMOOTH = (5, 9)
 """Tiles down and along of the median filter."""
 
@@ -53,18 +56,14 @@ def slow(level: Single, before: Single, spread: float, pinned: Mask) -> tuple[Si
     smooth : (tiles down, tiles along) float32 array
         dB; 0 everywhere if nothing is known.
     odd : (tiles down, tiles along) bool array
-        Tiles set off by a sharp edge.
+        Tiles set off by a sharp edge; pinned ones too.
     """
     known = np.isfinite(level)
-    limit = _limits(level, known & ~pinned, spread)
-    odd = np.zeros(level.shape, np.bool_)
-    for sign in (1.0, -1.0):
-        with np.errstate(invalid="ignore"):
-            out = known & ~pinned & (sign * level > limit[:, None])
-        odd |= _sharp(sign * level, out)
-    # The tiles about them lie partly in them.
-    odd = ndimage.binary_dilation(odd, np.ones((3, 3), np.bool_)) & ~pinned
-    rest = fill(np.where(odd, np.nan, level - before))
+    odd = _odd(level, known, spread)
+    # Soot that comes and goes hides leaks until it is taken off.
+    about = ndimage.uniform_filter(fill(np.where(odd | pinned, np.nan, level)), WIDE, mode="nearest")
+    odd |= _odd(level - about, known & ~odd, spread)
+    rest = fill(np.where(odd | pinned, np.nan, level - before))
     smooth = before + ndimage.uniform_filter(ndimage.median_filter(rest, SMOOTH, mode="nearest"), 3, mode="nearest")
     smooth[pinned] = level[pinned]
     return smooth.astype(np.float32), odd
@@ -88,6 +87,18 @@ def fill(values: Single) -> Single:
     return out
 
 
+def _odd(level: Single, free: Mask, spread: float) -> Mask:
+    """Tiles that stand out in pieces with a sharp rim, and those that lie partly in them."""
+    limit = _limits(level, free, spread)
+    odd = np.zeros(level.shape, np.bool_)
+    for sign in (1.0, -1.0):
+        with np.errstate(invalid="ignore"):
+            out = free & (sign * level > limit[:, None])
+        odd |= _sharp(level, out)
+    grown: Mask = ndimage.binary_dilation(odd, np.ones((3, 3), np.bool_))
+    return grown
+
+
 def _limits(level: Single, used: Mask, spread: float) -> Float:
     """By how much a tile may differ, for each row of tiles, dB."""
     limit = np.full(len(level), np.nan)
@@ -101,22 +112,22 @@ def _limits(level: Single, used: Mask, spread: float) -> Float:
     return np.maximum(np.where(np.isfinite(limit), limit, rest), spread)
 
 
-def _sharp(step: Single, out: Mask) -> Mask:
-    """Of tiles that stand out by ``step``, those in pieces whose rim is sharp; pieces without a rim are."""
+def _sharp(level: Single, out: Mask) -> Mask:
+    """Of tiles that stand out from the level, those in pieces whose rim is sharp; pieces without a rim are."""
     pieces, count = ndimage.label(out)
     if not count:
         return out
-    rim = out & ndimage.binary_dilation(np.isfinite(step) & ~out)
-    steep = (_span(step, EDGE)[rim] / np.maximum(_span(step, ABOUT)[rim], 1e-6)).astype(np.float64)
+    rim = out & ndimage.binary_dilation(np.isfinite(level) & ~out)
+    steep = (_span(level, EDGE)[rim] / np.maximum(_span(level, ABOUT)[rim], 1e-6)).astype(np.float64)
     part = ndimage.labeled_comprehension(steep, pieces[rim], np.arange(1, count + 1), np.median, float, 1.0)
     sharp: Mask = np.concatenate([[False], part > SHARP])[pieces]
     return sharp
 
 
-def _span(step: Single, size: int) -> Single:
+def _span(level: Single, size: int) -> Single:
     """By how much known tiles differ in windows of so many tiles to a side."""
-    known = np.isfinite(step)
-    highest = ndimage.maximum_filter(np.where(known, step, -np.inf), size, mode="nearest")
-    lowest = ndimage.minimum_filter(np.where(known, step, np.inf), size, mode="nearest")
+    known = np.isfinite(level)
+    highest = ndimage.maximum_filter(np.where(known, level, -np.inf), size, mode="nearest")
+    lowest = ndimage.minimum_filter(np.where(known, level, np.inf), size, mode="nearest")
     span: Single = highest - lowest
     return span

@@ -64,28 +64,6 @@ def dark_pixels(relative: Relative, size: int) -> Mask:
     return dark
 
 
-def wet_pixels(state: NDArray[np.uint8], level: NDArray[np.int16], threshold: float, size: int) -> Mask:
-    """Mark wet pixels.
-
-    A lining pixel below the threshold is wet (eq. 20). The median of the wet and dry ones about each pixel
-    then decides: single ones go, and pixels without a point take the state of those about them. Appendages and
-    floor are never wet.
-
-    Parameters
-    ----------
-    state : (rows, columns) uint8 array
-        Values of :class:`tunneldb.leak.lining.State`.
-    level : (rows, columns) int16 array
-        Corrected intensity where there is lining.
-    threshold : float
-        In the unit of ``level``.
-    size : int
-        Side of the median filter, pixels.
-    """
-    wet: Mask = _wet(state, level, threshold, size // 2, 0.2 * min(size * size, MEDIAN_PIXELS))
-    return wet
-
-
 @njit(cache=True, nogil=True)
 def _dark(
     state: NDArray[np.uint8], drop: NDArray[np.int16], limit: NDArray[np.int16], tile: int, half: int, enough: float
@@ -132,50 +110,3 @@ def _vote(
             here = step if 1 <= state[j] <= 2 else np.int32(0)
             lining[j + half] += here
             dark[j + half] += here if drop[j] > limit[t] else np.int32(0)
-
-
-@njit(cache=True, nogil=True)
-def _wet(
-    state: NDArray[np.uint8], level: NDArray[np.int16], threshold: float, half: int, enough: float
-) -> Mask:  # pragma: no cover - compiled
-    rows, columns = state.shape
-    out = np.zeros((rows, columns), np.bool_)
-    # Lining and wet pixels of each column in the rows of the filter, with zeros beyond both ends.
-    lining, wet = np.zeros(columns + 2 * half + 1, np.int32), np.zeros(columns + 2 * half + 1, np.int32)
-    for i in range(-half, rows):
-        if i + half < rows:
-            _count(state[i + half], level[i + half], threshold, 1, lining, wet, half)
-        if i - half - 1 >= 0:
-            _count(state[i - half - 1], level[i - half - 1], threshold, -1, lining, wet, half)
-        if i < 0:
-            continue
-        votes, wet_votes = 0, 0
-        for j in range(2 * half):
-            votes += lining[j]
-            wet_votes += wet[j]
-        for j in range(columns):
-            votes += lining[j + 2 * half]
-            wet_votes += wet[j + 2 * half]
-            out[i, j] = 2 * wet_votes > votes and votes > enough and state[i, j] <= 2
-            votes -= lining[j]
-            wet_votes -= wet[j]
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _count(
-    state: NDArray[np.uint8],
-    level: NDArray[np.int16],
-    threshold: float,
-    sign: int,
-    lining: NDArray[np.int32],
-    wet: NDArray[np.int32],
-    half: int,
-) -> None:  # pragma: no cover - compiled
-    """Add a row to the sums of columns, or take it away."""
-    limit = np.int32(np.ceil(min(max(threshold, -40000.0), 40000.0)))
-    step = np.int32(sign)
-    for j in range(state.shape[0]):
-        here = step if 1 <= state[j] <= 2 else np.int32(0)
-        lining[j + half] += here
-        wet[j + half] += here if np.int32(level[j]) < limit else np.int32(0)

@@ -1,0 +1,98 @@
+"""Dark pixels by the local threshold and the median filter, and statistics of dry lining."""
+
+import numpy as np
+import pytest
+from shapely.geometry import box
+
+from tunneldb.intensity.dry import plain_statistics, robust_statistics
+from tunneldb.leak.image import Grid
+from tunneldb.leak.lining import State
+from tunneldb.leak.raster import NODATA
+from tunneldb.leak.relative import Relative
+from tunneldb.leak.threshold import dark_pixels, filter_size
+
+TILE = 25
+
+
+def spotted(seed=5):
+    """60 % of 200 by 300 pixels hold lining, within ±0.3 dB, but for a disc 3 dB darker; by tiles sigma is 0.3 to 1.2 dB."""
+    rng = np.random.default_rng(seed)
+    row, column = np.mgrid[:200, :300]
+    disc = np.hypot(row - 99.5, column - 149.5) < 60
+    state = np.where(rng.random(disc.shape) < 0.6, rng.choice([State.LINING, State.RECESS], disc.shape), State.EMPTY)
+    drop = np.where(state > 0, np.rint(100 * (rng.normal(0, 0.3, disc.shape) + 3.0 * disc)), NODATA).astype(np.int16)
+    sigma = rng.uniform(0.3, 1.2, (8, 12)).astype(np.float32)
+    return Relative(Grid(0, 0.02, 0, 200), state.astype(np.uint8), drop, TILE, sigma), disc
+
+
+@pytest.mark.parametrize("size", [5, 7, 11])
+def test_a_pixel_is_dark_by_the_vote_of_the_lining_about_it(size):
+    relative, _ = spotted()
+    state, drop = relative.state, relative.drop
+    state[50:60, 20:90] = State.OFF
+    state[:30] = State.FLOOR
+    found = dark_pixels(relative, size)
+    rng, half = np.random.default_rng(1), size // 2
+    limit = 3.0 * np.kron(relative.sigma, np.ones((TILE, TILE)))
+    for i, j in zip(rng.integers(0, 200, 500), rng.integers(0, 300, 500), strict=True):
+        about = np.s_[max(i - half, 0) : i + half + 1, max(j - half, 0) : j + half + 1]
+        lining = (state[about] == State.LINING) | (state[about] == State.RECESS)
+        dark = lining & (drop[about] / 100.0 > limit[about])
+        assert found[i, j] == (2 * dark.sum() > lining.sum() > 0.2 * 12 and state[i, j] <= State.RECESS)
+
+
+def test_what_is_dark_here_is_not_where_the_lining_varies_more():
+    relative, disc = spotted()
+    for sigma, dark in ((0.4, True), (0.8, True), (1.2, False)):
+        relative.sigma[:] = sigma
+        assert (dark_pixels(relative, 5)[disc].mean() > 0.95) == dark
+        assert not dark_pixels(relative, 5)[~disc].any() or dark
+
+
+def test_an_appendage_is_never_dark():
+    relative, disc = spotted()
+    relative.sigma[:] = 0.4
+    relative.state[:, 140:145] = State.OFF
+    found = dark_pixels(relative, 5)
+    closed = relative.state == State.OFF
+    assert not found[closed].any()
+    assert found[disc & ~closed].mean() > 0.95
+
+
+def test_nothing_in_a_drawn_dry_region_is_dark():
+    small, _ = spotted()
+    grid, shape = small.grid, (small.grid.rows, small.grid.columns)
+    state, drop = np.zeros(shape, np.uint8), np.full(shape, NODATA, np.int16)
+    state[:, :300], drop[:, :300] = small.state, small.drop
+    sigma = np.full((8, grid.columns // TILE), 0.4, np.float32)
+    before = dark_pixels(Relative(grid, state, drop, TILE, sigma), 5)
+    found = dark_pixels(Relative(grid, state, drop, TILE, sigma, (box(2.0, 1.0, 3.0, 3.0),)), 5)
+    inside = np.zeros(shape, bool)
+    inside[50:150, 100:150] = True
+    assert before[inside].any()
+    assert not found[inside].any()
+    np.testing.assert_array_equal(found[~inside], before[~inside])
+
+
+def test_filter_widens_where_pixels_are_sparse():
+    assert filter_size(1.0) == 5
+    assert filter_size(0.5) == 5
+    assert filter_size(0.1) == 11
+    assert filter_size(0.0) % 2 == 1
+
+
+@pytest.mark.parametrize("wet", [0.0, 0.1, 0.2, 0.3])
+def test_wet_lining_does_not_shift_the_dry_statistics(wet):
+    rng = np.random.default_rng(3)
+    values = rng.normal(2.0, 0.4, 100_000)
+    values[: int(wet * len(values))] -= rng.uniform(1.0, 5.0, int(wet * len(values)))
+    dry = robust_statistics(np.append(values, [np.nan, np.inf, -np.inf]))
+    assert dry.mean == pytest.approx(2.0, abs=0.02)
+    assert dry.sigma == pytest.approx(0.4, rel=0.05)
+    assert dry.threshold == pytest.approx(0.8, abs=0.08)
+
+
+def test_statistics_of_nothing():
+    assert plain_statistics(np.array([np.nan])).count == 0
+    assert np.isnan(robust_statistics(np.zeros(0)).mean)
+    assert robust_statistics(np.full(10, 3.0)).threshold == pytest.approx(3.0)
