@@ -1,5 +1,7 @@
 """Wet regions that the end of a kilometre cuts: put together, they are what they were."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,8 @@ from hypothesis.extra.numpy import arrays
 from tunneldb.leak.detection import Found
 from tunneldb.leak.image import Grid
 from tunneldb.leak.raster import NODATA
-from tunneldb.leak.region import Region, regions, together, unite
+from tunneldb.leak.region import Region, Traits, regions, together, unite
+from tunneldb.leak.relative import Relative
 
 PIXEL = 0.5  # 2000 columns a kilometre
 DRY = 1.25
@@ -29,7 +32,10 @@ def cut_by_kilometre(mask: np.ndarray, level: np.ndarray, first: int, bottom: in
             np.s_[:, begin - first : stop - first],
         )
         wet[here], levels[here] = mask[there], level[there]
-        found += [(km, region) for region in regions(wet, levels, grid, DRY, 0.0)]
+        drop = np.where(levels == NODATA, NODATA, 100 * DRY - levels).astype(np.int16)
+        sigma = np.full((len(wet), grid.columns), 0.25, np.float32)
+        relative = Relative(grid, (drop != NODATA).astype(np.uint8), drop, 1, sigma)
+        found += [(km, region) for region in regions(wet, relative, 0.0)]
     return found
 
 
@@ -43,6 +49,8 @@ def assert_same(one: list[Found], other: list[Found]) -> None:
     for a, b in zip(one, other, strict=True):
         assert a.outline.equals_exact(b.outline, 1e-9)
         assert (a.drop_mean, a.drop_max, a.image_share) == pytest.approx((b.drop_mean, b.drop_max, b.image_share))
+        assert (a.contrast, a.verdict.confidence) == pytest.approx((b.contrast, b.verdict.confidence))
+        assert (a.verdict.kind, a.verdict.reasons) == (b.verdict.kind, b.verdict.reasons)
 
 
 @settings(max_examples=60, deadline=None)
@@ -59,8 +67,8 @@ def test_leaks_are_the_same_wherever_the_kilometre_ends(mask: np.ndarray, before
     uncut = [region for _, region in cut_by_kilometre(mask, level, 7 * 2000 + 700, -5)]
     cut = [region for _, region in cut_by_kilometre(mask, level, 8 * 2000 - before, -5)]
     moved = [
-        Region(r.pixel, r.column - 8 * 2000 + before + 7 * 2000 + 700, r.row, r.mask, r.filled, r.drop_sum, r.drop_max)
-        for r in rng.permutation(np.array(cut, dtype=object))
+        replace(region, column=region.column - 8 * 2000 + before + 7 * 2000 + 700)
+        for region in rng.permutation(np.array(cut, dtype=object))
     ]
     assert_same(leaks(moved, min_area), leaks(uncut, min_area))
     assert sum(np.count_nonzero(region.mask) for region in cut) == mask.sum()
@@ -83,7 +91,7 @@ def test_a_leak_across_three_kilometres_is_one() -> None:
 
 def test_regions_that_touch_by_a_corner_or_have_other_pixels_stay_apart() -> None:
     def part(column: int, row: int, pixel: float = PIXEL) -> Region:
-        return Region(pixel, column, row, np.ones((2, 3), bool), 6, 1.0, 1.0)
+        return Region(pixel, column, row, np.ones((2, 3), bool), 6, 1.0, 1.0, Traits())
 
     assert together([part(0, 0), part(3, 1)]) == [[0, 1]]
     assert together([part(3, 1), part(0, 0)]) == [[1, 0]]

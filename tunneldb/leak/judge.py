@@ -104,7 +104,7 @@ def _rectangular(region: Region, shape: Shape) -> float:
     if not traits.rim or min(shape.along, shape.across) < 4 * pixel:
         return 0.0
     wander = max(shape.wander_along, shape.wander_across)
-    corners = max(_ramp(shape.corners, 0.35, 0.65), _ramp(wander / np.sqrt(shape.area), 0.02, 0.01))
+    corners = max(_ramp(shape.corners, 0.35, 0.65), _ramp(wander / np.sqrt(shape.area), 0.025, 0.01))
     # Water that fills a panel between joints is rectangular too, and darker than repairs are; but no stripe.
     strong = min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP)
     panel = _ramp(strong, 0.8, 1.0) * (1.0 - _ramp(shape.length / shape.mean_width, 6.0, 10.0))
