@@ -64,14 +64,16 @@ COMMON = {
     "drawn_at": "When it was drawn last, set by the database",
 }
 # Tables whose columns have the same names and meaning as those of a view.
-TABLES = {"file": "scan_file", "leak_unrolled": "leak", "leak_map": "leak", "leak_3d": "leak", "stage_status": "run"}
+TABLES = {"file": "scan_file", "stage_status": "run"} | dict.fromkeys(
+    [base + part for base in ("anomaly", "leak") for part in ("", "_unrolled", "_map", "_3d")], "anomaly"
+)
 # Columns geom that no table has.
 GEOMETRY = {
     "axis": "The axis, tunnel's SRID",
     "section_unrolled": "From its left to its right end, in the unrolled plane",
-    "leak_unrolled": "In the unrolled plane",
-    "leak_map": "On the map strip beside the axis, tunnel's SRID",
-    "leak_3d": "On the lining in space, tunnel's SRID",
+    **dict.fromkeys(["leak_unrolled", "anomaly_unrolled"], "In the unrolled plane"),
+    **dict.fromkeys(["leak_map", "anomaly_map"], "On the map strip beside the axis, tunnel's SRID"),
+    **dict.fromkeys(["leak_3d", "anomaly_3d"], "On the lining in space, tunnel's SRID"),
 }
 
 
@@ -187,8 +189,8 @@ def database(conn: psycopg.Connection[Any]) -> str:
         "the right looking up-chainage, offset is positive into the tunnel. Angles of sections are degrees from the upward "
         "direction, positive to the right. Geometry is in the tunnel's SRID, or in the unrolled plane (chainage, arc), SRID 0.",
         "## Views",
-        "Members of `tunnel_viewer` may read all of them. `axis_vertex` (its geometry), the leak views (`review` and `remark`) "
-        "and `region` may be changed by members of `tunnel_inspector`.",
+        "Members of `tunnel_viewer` may read all of them. `axis_vertex` (its geometry), the views of leaks and anomalies "
+        "(`review`, `remark` and `kind`) and `region` may be changed by members of `tunnel_inspector`.",
     ]
     parts += _views(conn)
     parts += [
