@@ -26,7 +26,7 @@ from benchmarks.scene import Scene
 STATIC: dict[str, Any] = {"scanner": "static", "station_spacing": 12.0, "angular_step": 0.18}
 PROFILER: dict[str, Any] = {"scanner": "profiler", "profile_spacing": 0.016, "profile_points": 1250}
 COMMON: dict[str, Any] = {
-    "leak_drop": (1.5, 8.0), "leak_area": (0.1, 2.5), "niche_leaks": 1, "drips": True, "clutter": True,
+    "leak_drop": (1.5, 8.0), "leak_area": (0.1, 2.5), "niche_leaks": 1, "drips": True, "clutter": 3,
     "beam": 0.3, "leak_edge": 0.03, "relief": 0.002, "slope": 2.0, "start_chainage": 12_310.0,
 }  # fmt: skip
 MARKED: dict[str, Any] = {"soot": 2.0, "grime": 2.0, "patches": 5, "paint": 5}

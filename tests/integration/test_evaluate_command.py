@@ -39,6 +39,7 @@ def survey(conn, example):
         "INSERT INTO tunnel.station (survey_id, scan_id, geom) SELECT s.id, v.n, v.geom FROM tunnel.survey s,"
         " tunnel.axis_vertex v WHERE v.n % 2 = 0"
     )
+    conn.execute("DELETE FROM tunnel.coverage")
     conn.execute(
         "INSERT INTO tunnel.coverage (survey_id, km, step, lining, seen, wet)"
         " SELECT id, 12, 500, '{700,900}', '{400,600}', '{0,7}' FROM tunnel.survey"
@@ -48,7 +49,9 @@ def survey(conn, example):
 
 
 def leaks(conn, where="review <> 'rejected'"):
-    rows = conn.execute(f"SELECT ST_AsBinary(unrolled) FROM tunnel.anomaly WHERE {where} ORDER BY id").fetchall()
+    rows = conn.execute(
+        f"SELECT ST_AsBinary(unrolled) FROM tunnel.anomaly WHERE kind = 'leak' AND {where} ORDER BY id"
+    ).fetchall()
     conn.commit()
     return [shapely.from_wkb(bytes(row[0])) for row in rows]
 
@@ -140,6 +143,20 @@ def test_leaks_of_several_parts_and_of_other_kilometres(conn, survey, tmp_path):
     everything = figures(survey, path, tmp_path)["groups"][0]
     assert (everything["true"], everything["found"], everything["right"]) == (1, 1, 2)
     assert "1 true leaks lie where leaks were not sought" in run("evaluate", survey, path).stdout
+
+
+def test_kinds_are_those_after_judging(conn, survey, tmp_path):
+    truth = gpkg(tmp_path / "truth.gpkg", leaks(conn))
+    before = figures(survey, truth, tmp_path)["groups"][0]
+    conn.execute(
+        "UPDATE tunnel.anomaly SET judged = 'dark' WHERE id = (SELECT min(id) FROM tunnel.anomaly WHERE kind = 'leak')"
+    )
+    conn.execute("UPDATE tunnel.anomaly SET judged = 'leak' WHERE kind = 'dark'")
+    conn.commit()
+    after = figures(survey, truth, tmp_path)["groups"][0]
+    assert after["found"] == before["found"] - 1
+    assert after["called"] == before["called"]  # one less, and the dark one more
+    assert after["false"] == before["false"] + 1
 
 
 def test_csv_has_a_row_for_each_group(conn, survey, tmp_path):
