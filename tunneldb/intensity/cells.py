@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tunneldb.intensity.oren_nayar import incidence_db
+from tunneldb.intensity.spline import RangeSpline
+
 Float = NDArray[np.float64]
 Index = NDArray[np.int64]
 
@@ -16,84 +19,129 @@ CELL = 0.5
 PATCH = 2.0
 """Side of the patches within which residuals may hang together in any way, m."""
 
-STRETCH = 10.0
-"""Length of the stretches that may differ in reflectance as a whole, m: a block of in-situ lining, several rings."""
+STRETCH = 5.0
+"""Length of the stretches that may differ in reflectance in any way, m: at most half a block of in-situ lining."""
 
 SECTOR = 1.0
 """Width of the strips along the tunnel that may differ in reflectance as a whole, m."""
-
-RANGE_CLASS = 0.1
-"""Views of a cell whose ranges differ less, as a part of the range, may count as one."""
-
-INCIDENCE_CLASS = 5.0
-"""Views of a cell whose incidence angles differ less, degrees, may count as one."""
 
 ENOUGH = 4
 """Points of a view beyond so many don't make it surer: what is left is the surface's texture."""
 
 
+ROUGHNESS = np.arange(0.0, 60.1, 2.5)
+"""Roughnesses that are tried, degrees; between two of them the effect of incidence follows from the nearest three."""
+
+
 @dataclass(frozen=True)
 class Cells:
-    """Cells of the lining, each seen in one way or several; arrays (n,) have an element for each view.
+    """Cells of the lining, each seen by one scan or several; arrays (n, …) have an element for each view.
 
     Attributes
     ----------
     cell : (n,) int array
         Number of its cell, 0 to count - 1.
-    range_m, cosine, level : (n,) float arrays
-        Mean range, m, cosine of the incidence angle and intensity, dB.
+    basis : (n, p) float array
+        Means of the functions of range.
+    incidence : (n, s) float array
+        Means of the effect of incidence, dB, for each of ROUGHNESS.
+    level : (n,) float array
+        Mean intensity, dB.
     weight : (n,) float array
         Points, at most ENOUGH.
-    patch, stretch, sector : (count,) int arrays
-        Numbers from 0 of the patch, the stretch and the strip that hold each cell; without a plane there are no strips,
-        and all have the number -1.
+    patch, stretch : (count,) int arrays
+        Numbers from 0 of the patch and the stretch that hold each cell.
+    ring, sector : (count,) int arrays
+        Numbers from 0 of the ring, as long as a patch, and of the strip; -1 where there is no unrolled plane.
+    row, column : (count,) int arrays
+        Place of each cell in the unrolled plane, in cells from the first along and across; -1 without one.
     """
 
     cell: Index
-    range_m: Float
-    cosine: Float
+    basis: Float
+    incidence: Float
     level: Float
     weight: Float
     patch: Index
     stretch: Index
+    ring: Index
     sector: Index
+    row: Index
+    column: Index
 
     @property
     def count(self) -> int:
         """Number of cells."""
         return len(self.patch)
 
+    @property
+    def overlapping(self) -> int:
+        """Number of cells that several scans saw."""
+        return int(np.count_nonzero(np.bincount(self.cell) > 1))
 
-def group(place: Float, range_m: Float, cosine: Float, level: Float, *, unrolled: bool) -> Cells:
-    """Gather points (n,) into cells; places as in :func:`tunneldb.intensity.range_curve.estimate_range_curve`."""
-    at = np.floor(place / CELL).astype(np.int64)
-    angle = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
-    views = np.column_stack(
-        [at, np.floor(np.log(range_m) / RANGE_CLASS).astype(np.int64), np.floor(angle / INCIDENCE_CLASS).astype(np.int64)]
-    )
-    number, first = _number(views)
+    def incidence_at(self, roughness: float) -> Float:
+        """Means (n,) of the effect of incidence, dB, for a roughness, degrees."""
+        k = int(np.clip(np.rint((roughness - ROUGHNESS[0]) / (ROUGHNESS[1] - ROUGHNESS[0])), 1, len(ROUGHNESS) - 2))
+        x = (roughness - ROUGHNESS[k]) / (ROUGHNESS[1] - ROUGHNESS[0])
+        return np.asarray(self.incidence[:, k - 1 : k + 2] @ np.array([0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)]))
+
+
+@dataclass(frozen=True)
+class Sight:
+    """Points as seen.
+
+    Attributes
+    ----------
+    place : (n, 2) or (n, 3) float array
+        Chainage and arc, or coordinates in space, m.
+    scan : (n,) int array
+        Number of the scan that each is of.
+    range_m, cosine : (n,) float arrays
+        Range, m, and cosine of the incidence angle.
+    level : (n,) float array
+        Intensity, dB.
+    """
+
+    place: Float
+    scan: NDArray[np.integer]
+    range_m: Float
+    cosine: Float
+    level: Float
+
+    def some(self, chosen: NDArray[np.bool_]) -> Sight:
+        """The chosen points."""
+        return Sight(self.place[chosen], self.scan[chosen], self.range_m[chosen], self.cosine[chosen], self.level[chosen])
+
+
+def group(sight: Sight, spline: RangeSpline, *, unrolled: bool) -> Cells:
+    """Gather points into cells; ``unrolled`` says that places are in the unrolled plane of a tunnel."""
+    at = np.floor(sight.place / CELL).astype(np.int64)
+    number, first = _number(np.column_stack([at, sight.scan.astype(np.int64)]))
     points = np.bincount(number)
     cell, some = _number(at[first])
 
     def mean(values: Float) -> Float:
         return np.asarray(np.bincount(number, values) / points)
 
-    where = place[first[some]]
+    where = sight.place[first[some]]
     return Cells(
         cell,
-        mean(range_m),
-        mean(cosine),
-        mean(level),
+        np.column_stack([mean(column) for column in spline(sight.range_m).T]),
+        np.column_stack([mean(incidence_db(sight.cosine, roughness)) for roughness in ROUGHNESS]),
+        mean(sight.level),
         np.minimum(points, ENOUGH).astype(np.float64),
         _number(np.floor(where / PATCH).astype(np.int64))[0],
         _number(np.floor(where[:, :1] / STRETCH if unrolled else where / STRETCH).astype(np.int64))[0],
-        _sectors(where[:, 1]) if unrolled else np.full(len(where), -1),
+        *(
+            _strips(where[:, axis], width) if unrolled else np.full(len(where), -1)
+            for axis, width in ((0, PATCH), (1, SECTOR), (0, CELL), (1, CELL))
+        ),
     )
 
 
-def _sectors(arc: Float) -> Index:
-    sector: Index = np.floor(arc / SECTOR).astype(np.int64)
-    return sector - sector.min() if len(sector) else sector
+def _strips(along: Float, width: float) -> Index:
+    strip: Index = np.floor(along / width).astype(np.int64)
+    return strip - strip.min() if len(strip) else strip
 
 
 def _number(keys: Index) -> tuple[Index, Index]:

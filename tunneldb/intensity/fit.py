@@ -1,9 +1,9 @@
 """Regression of intensity on range and incidence, over cells whose own reflectance is unknown.
 
-Views of one cell are compared with each other (fixed effects), cells with each other as far as their reflectance is alike
-(random effects: Swamy and Arora, 1972). Outliers – leaks, joints, what hangs on the lining – lose their weight (Tukey's
-biweight). The covariance is a sandwich, clustered by patches of the lining (Liang and Zeger, 1986), with what stretches
-and strips of it have in common added as its own component of variance.
+Views of one cell are compared with each other (fixed effects), cells of one stretch of the tunnel with each other as far
+as their reflectance is alike (random effects: Swamy and Arora, 1972). Outliers – leaks, joints, what hangs on the lining –
+lose their weight (Tukey's biweight). The covariance is a sandwich (Liang and Zeger, 1986): of views clustered by patches of
+the lining, of cells by the covariance of neighbours, with what rings and strips have in common as components of variance.
 """
 
 from __future__ import annotations
@@ -12,15 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import signal
+from scipy.interpolate import CubicSpline
 
-from tunneldb.intensity.cells import SECTOR, Cells, Index
-from tunneldb.intensity.oren_nayar import incidence_db
+from tunneldb.intensity.cells import CELL, ROUGHNESS, SECTOR, Cells, Index
 from tunneldb.intensity.spline import RangeSpline, one_maximum
 
 Float = NDArray[np.float64]
-
-ROUGHNESS = np.arange(0.0, 60.1, 2.5)
-"""Roughnesses that are tried, degrees; the best is refined by a parabola."""
 
 TUKEY = 4.685
 """Residuals of so many standard deviations have no weight: 95 % efficient on normal ones (Holland and Welsch, 1977)."""
@@ -28,8 +26,15 @@ TUKEY = 4.685
 ROUNDS = 8
 """Rounds of weighting."""
 
+NEAR = 6.0
+"""Distance beyond which cells are no longer taken for neighbours, m."""
+
 ALIKE = 2.0
 """Distance over which neighbouring strips along the tunnel are alike, m: soot and grime change over metres."""
+
+
+NOTHING = 1e6
+"""Design effect of a comparison that is to decide about nothing."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +88,7 @@ class _Weights:
     design: float
 
 
-def fit(cells: Cells, spline: RangeSpline) -> Fit:
+def fit(cells: Cells, spline: RangeSpline, *, among: bool) -> Fit:
     """Fit range spline and roughness.
 
     Parameters
@@ -92,13 +97,15 @@ def fit(cells: Cells, spline: RangeSpline) -> Fit:
         Views of cells.
     spline : RangeSpline
         Functions of range.
+    among : bool
+        Whether cells are compared with each other too, not only the views of each.
     """
     problem = _Problem(cells, spline)
-    weights = _Weights(cells.weight, np.ones(cells.count), 1.0, 1.0, 1.0)
+    weights = _Weights(cells.weight, np.ones(cells.count), 1.0, 1.0, 1.0 if among else NOTHING)
     solution = problem.solve(weights)
     for k in range(ROUNDS):
         weights = problem.reweighted(solution, weights)
-        if k >= ROUNDS // 2:
+        if among and k >= ROUNDS // 2:
             weights = replace(weights, design=problem.design_effect(solution, weights))
         solution = problem.solve(weights)
     covariance, roughness_sigma = problem.covariance(solution, weights)
@@ -130,10 +137,9 @@ class _Problem:
 
     def __init__(self, cells: Cells, spline: RangeSpline) -> None:
         self.cells = cells
-        self.basis = spline(cells.range_m)
+        self.basis = cells.basis
         self.bending = spline.bending()
-        self.incidence = np.column_stack([incidence_db(cells.cosine, s) for s in ROUGHNESS])
-        self.columns = np.column_stack([self.basis, self.incidence, cells.level])
+        self.columns = np.column_stack([cells.basis, cells.incidence, cells.level])
         self.terms = len(spline)
         self.views = np.bincount(cells.cell, minlength=cells.count)
 
@@ -149,14 +155,17 @@ class _Problem:
         means = self.cell_means(columns, weights.view)
         between = weights.cell / (weights.lining + weights.noise / np.maximum(total, 1e-9)) / weights.design
         between = np.where(total > 0, between, 0.0)
-        return columns - means[self.cells.cell], means, weights.view / weights.noise, between
+        # Stretches may differ as they like: only what differs within one counts.
+        stretch = self.cells.stretch
+        middles = _sums(stretch, means, between) / np.maximum(_sums(stretch, np.ones(len(between)), between), 1e-9)[:, None]
+        return columns - means[self.cells.cell], means - middles[stretch], weights.view / weights.noise, between
 
     def solve(self, weights: _Weights) -> _Solution:
         """Find the roughness and the coefficients of the least loss."""
         within, means, one, other = self._parts(weights, self.columns)
         products = within.T @ (within * one[:, None]) + means.T @ (means * other[:, None])
         p = self.terms
-        matrix = products[:p, :p] + self.bending + 1e-9 * np.eye(p)
+        matrix = products[:p, :p] + self.bending + self._tie(products[:p, :p])
         losses, tried = [], []
         for k in range(len(ROUGHNESS)):
             mixed = np.zeros(len(products))
@@ -167,14 +176,18 @@ class _Problem:
             losses.append(float(mixed @ along - 2.0 * b @ along[:p] + b @ matrix @ b))
         roughness = _lowest(ROUGHNESS, np.array(losses))
         # Between two roughnesses coefficients are no straight line, so those at the best are solved for.
-        level = self.cells.level - incidence_db(self.cells.cosine, roughness)
-        rest = level - self.cell_means(level, weights.view)[self.cells.cell]
-        right = within[:, :p].T @ (rest * one) + means[:, :p].T @ (self.cell_means(level, weights.view) * other)
+        level = (self.cells.level - self.cells.incidence_at(roughness))[:, None]
+        rest, among, _, _ = self._parts(weights, level)
+        right = within[:, :p].T @ (rest[:, 0] * one) + means[:, :p].T @ (among[:, 0] * other)
         return _Solution(one_maximum(matrix, right), roughness, np.array(tried), np.array(losses))
+
+    def _tie(self, products: Float) -> Float:
+        """Information that holds the curve's constant, which nothing tells, near 0."""
+        return 1e-7 * float(np.trace(products)) * np.full(products.shape, 1.0 / self.terms)
 
     def residuals(self, solution: _Solution) -> Float:
         """Intensity less range and incidence, (n,), dB."""
-        incidence = incidence_db(self.cells.cosine, solution.roughness)
+        incidence = self.cells.incidence_at(solution.roughness)
         return np.asarray(self.cells.level - self.basis @ solution.coefficients - incidence)
 
     def reweighted(self, solution: _Solution, weights: _Weights) -> _Weights:
@@ -185,7 +198,7 @@ class _Problem:
         scaled = (residual - means[cells.cell]) * np.sqrt(cells.weight)
         # n views of a cell leave n - 1 differences.
         lost = self.views[cells.cell] / np.maximum(self.views[cells.cell] - 1, 1)
-        away = means - np.median(means)
+        away = means - _medians(self.cells.stretch, means)
         among = _deviation(away)
         noise = _deviation(scaled[several] * np.sqrt(lost[several])) ** 2 if several.sum() >= 100 else among**2
         noise = max(noise, 1e-6)
@@ -195,13 +208,10 @@ class _Problem:
 
     def design_effect(self, solution: _Solution, weights: _Weights) -> float:
         """By how much the score of cells among each other varies more than if each stood for itself, on average."""
-        plain = replace(weights, design=1.0)
-        _, means, _, between = self._parts(plain, self.basis)
-        means = means - between @ means / between.sum()
+        _, means, _, between = self._parts(replace(weights, design=1.0), self.basis)
         information = means.T @ (means * between[:, None])
         left = self._left(solution, weights)
-        own = _outer(_sums(self.cells.patch, means * left[:, None], between))
-        spread = own + self._common(left, weights, means, between)
+        spread = self._nearby(left, weights, means, between) + self._common(left, weights, means, between)
         return max(1.0, float(np.trace(np.linalg.pinv(information, rcond=1e-6) @ spread)) / (self.terms - 1))
 
     def covariance(self, solution: _Solution, weights: _Weights) -> tuple[Float, float]:
@@ -209,7 +219,7 @@ class _Problem:
         p = self.terms
         step = ROUGHNESS[1] - ROUGHNESS[0]
         sides = np.clip([solution.roughness - step, solution.roughness + step], ROUGHNESS[0], ROUGHNESS[-1])
-        slope = incidence_db(self.cells.cosine, sides[1]) - incidence_db(self.cells.cosine, sides[0])
+        slope = self.cells.incidence_at(sides[1]) - self.cells.incidence_at(sides[0])
         columns = np.column_stack([self.basis, slope])
         within, means, one, between = self._parts(weights, columns)
         residual = self.residuals(solution)
@@ -220,45 +230,99 @@ class _Problem:
             one,
             self.cells.count,
         )
-        scores += means * (between * left)[:, None]
         patches = self.cells.patch.max() + 1
         spread = _outer(_sums(self.cells.patch, scores)) * patches / max(patches - p - 1, 1)
+        spread += self._nearby(left, weights, means, between)
         spread += self._common(left, weights, means, between)
         information = within.T @ (within * one[:, None]) + means.T @ (means * between[:, None])
         information[:p, :p] += self.bending
         spread[:p, :p] += self.bending
-        ridge = 1e-9 * np.eye(p)
-        inverse = np.linalg.inv(information[:p, :p] + ridge)
+        inverse = np.linalg.inv(information[:p, :p] + self._tie(information[:p, :p]))
         whole = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
         excess = (whole @ spread @ whole)[p, p] / max(whole[p, p], 1e-300)
-        chance = np.exp(-0.5 * (solution.loss - solution.loss.min()) / max(excess, 1.0))
+        # Loss and coefficients between the roughnesses tried: what is known may be finer than their steps.
+        fine = np.linspace(ROUGHNESS[0], ROUGHNESS[-1], 50 * (len(ROUGHNESS) - 1) + 1)
+        loss = CubicSpline(ROUGHNESS, solution.loss)(fine)
+        chance = np.exp(-0.5 * (loss - loss.min()) / max(excess, 1.0))
         chance /= chance.sum()
-        off = solution.tried - solution.coefficients
+        off = CubicSpline(ROUGHNESS, solution.tried)(fine) - solution.coefficients
         covariance = inverse @ spread[:p, :p] @ inverse + off.T @ (off * chance[:, None])
-        return covariance, float(np.sqrt(chance @ (ROUGHNESS - solution.roughness) ** 2))
+        return covariance, float(np.sqrt(chance @ (fine - solution.roughness) ** 2))
 
     def _left(self, solution: _Solution, weights: _Weights) -> Float:
-        """What is left of each cell, dB, less its mean; 0 of outliers."""
+        """What is left of each cell within its stretch, dB; 0 of outliers."""
         means = self.cell_means(self.residuals(solution), weights.view)
-        return np.asarray((means - np.average(means, weights=weights.cell)) * weights.cell)
+        stretch = self.cells.stretch
+        middles = _sums(stretch, means, weights.cell) / np.maximum(_sums(stretch, weights.cell), 1e-9)
+        return np.asarray((means - middles[stretch]) * weights.cell)
+
+    def _nearby(self, left: Float, weights: _Weights, means: Float, between: Float) -> Float:
+        """Variance of the scores by what neighbouring cells have in common (Conley, 1999), as far as their covariance goes."""
+        cells = self.cells
+        scores = means * between[:, None]
+        if cells.sector.min() < 0:
+            return _outer(_sums(cells.stretch, scores * left[:, None]))
+        shape = int(cells.row.max()) + 1, int(cells.column.max()) + 1
+
+        def plane(values: Float) -> Float:
+            out = np.zeros(shape)
+            out[cells.row, cells.column] = values
+            return out
+
+        covariance = _covariance(plane(left), plane(weights.cell))
+        fields = [plane(column) for column in scores.T]
+        spread_out = [signal.oaconvolve(one, covariance, mode="same") for one in fields]
+        products = np.array([[np.sum(one * other) for other in spread_out] for one in fields])
+        return np.asarray(0.5 * (products + products.T))
 
     def _common(self, left: Float, weights: _Weights, means: Float, between: Float) -> Float:
-        """Variance of the scores by what stretches, and strips along the tunnel, have in common."""
+        """Variance of the scores by what rings, and strips along the tunnel, have in common."""
         cells, there = self.cells, weights.cell
-        stretches = cells.stretch.max() + 1
         if cells.sector.min() < 0:
-            stretch = _shared(left, there, cells.stretch, cells.patch)
-            return stretch * _outer(_sums(cells.stretch, means, between))
-        block = cells.sector * stretches + cells.stretch
-        patch = _shared(left, there, cells.patch, np.arange(cells.count))
-        stretch = _shared(left, there, cells.stretch, block)
-        # Around the section reflectance may change as it does along the tunnel: where range and incidence are functions
-        # of the place in the section, what is left doesn't show it.
-        sector = max(_shared(left, there, cells.sector, block), patch - stretch, 0.0)
+            return np.zeros((means.shape[1], means.shape[1]))
+        ring = _shared(left, there, cells.ring, cells.patch)
+        spread = ring * _outer(_sums(cells.ring, means, between))
+        # Where range and incidence are functions of the place in the section, the curve takes up what strips have in
+        # common along the whole tunnel. So it is taken to be as much as what they have in common along a stretch.
+        block = cells.sector * (int(cells.stretch.max()) + 1) + cells.stretch
+        _, part = np.unique(block * (int(cells.patch.max()) + 1) + cells.patch, return_inverse=True)
+        sector = max(_shared(left, there, cells.sector, block), _shared(left, there, block, part.reshape(-1)))
         by_sector = _sums(cells.sector, means, between)
         number = np.arange(len(by_sector))
         alike = np.exp(-np.abs(number[:, None] - number) * SECTOR / ALIKE)
-        return stretch * _outer(_sums(cells.stretch, means, between)) + sector * (by_sector.T @ alike @ by_sector)
+        return spread + sector * (by_sector.T @ alike @ by_sector)
+
+
+def _covariance(left: Float, there: Float) -> Float:
+    """Covariance, dB², of cells of a plane by their distance, up to NEAR and no farther than it is positive.
+
+    Parameters
+    ----------
+    left, there : (rows, columns) float arrays
+        What is left, times the weights, and the weights; 0 where there is no cell.
+
+    Returns
+    -------
+    (2k + 1, 2k + 1) float array
+        For each shift of up to k cells along and across.
+    """
+    k = int(NEAR / CELL)
+
+    def shifted(values: Float) -> Float:
+        padded = np.pad(values, k)
+        return np.asarray(signal.oaconvolve(padded, padded[::-1, ::-1], mode="same"))
+
+    def middle(values: Float) -> Float:
+        row, column = (values.shape[0] - 1) // 2, (values.shape[1] - 1) // 2
+        return values[row - k : row + k + 1, column - k : column + k + 1]
+
+    products, pairs = middle(shifted(left)), middle(shifted(there))
+    shift = np.arange(-k, k + 1)
+    distance = np.rint(np.hypot(shift[:, None], shift)).astype(np.int64)
+    of = np.bincount(distance.ravel(), products.ravel()) / np.maximum(np.bincount(distance.ravel(), pairs.ravel()), 1e-9)
+    end = np.flatnonzero(of[: k + 1] <= 0.0)
+    of[end[0] if len(end) else k + 1 :] = 0.0
+    return np.asarray(of[distance])
 
 
 def _shared(left: Float, there: Float, cluster: Index, part: Index) -> float:
@@ -277,6 +341,15 @@ def _sums(number: Index, values: Float, weight: Float | None = None, count: int 
 
 def _per(values: Float, like: Float) -> Float:
     return values if like.ndim == 1 else values[:, None]
+
+
+def _medians(number: Index, values: Float) -> Float:
+    """Median (n,) of the values of each one's number."""
+    order = np.argsort(number, kind="stable")
+    there, first = np.unique(number[order], return_index=True)
+    medians = np.zeros(int(there.max()) + 1)
+    medians[there] = [np.median(part) for part in np.split(values[order], first[1:])]
+    return np.asarray(medians[number])
 
 
 def _outer(rows: Float) -> Float:

@@ -4,11 +4,12 @@ Of each small cell of the lining the scanner sees an intensity
 
 .. math:: I_{dB} = F_1(R) + F_2(\theta; \sigma) + \rho(cell) + noise
 
-with F₁ and F₂ as in Xu et al. (2018), eq. 5. Of cells seen from several places the differences don't hold ρ, the cell's
-own reflectance (the within-transformation of regressions with fixed effects). What cells differ by among each other says
-something only as far as their reflectance is alike; how far, the residuals tell, and that part counts by so much less
-(random effects). F₁ is a spline over ln R, in which the radar equation is a straight line; it rises to one maximum, or
-from the first, and falls (Fig. 3 of Xu et al.: defocus at near range). F₂ is Oren–Nayar's with the σ of least loss.
+with F₁ and F₂ as in Xu et al. (2018), eq. 5. Of cells that several scans saw the differences don't hold ρ, the cell's own
+reflectance (the within-transformation of regressions with fixed effects). Only where they don't suffice are cells compared
+with each other, which says something as far as their reflectance is alike; how far, the residuals tell, and that part
+counts by so much less (random effects). F₁ is a spline over ln R, in which the radar equation is a straight line; it rises
+to one maximum, or from the first, and falls (Fig. 3 of Xu et al.: defocus at near range). F₂ is Oren–Nayar's with the σ of
+least loss.
 
 The uncertainty is that of clustered residuals (sandwich), of σ, and of what a reflectance could do that changes around the
 section, or from one stretch to the next, as much as the residuals show that it changes anywhere.
@@ -22,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunneldb.errors import UserError
-from tunneldb.intensity.cells import Cells, group
+from tunneldb.intensity.cells import CELL, Cells, Sight, group
 from tunneldb.intensity.fit import Fit, fit
 from tunneldb.intensity.reference import ReferenceCurve
 from tunneldb.intensity.roughness import STEEPEST
@@ -68,7 +69,7 @@ class RangeCurve:
     nearest, farthest : float
         Ranges between which nearly all points lie, m.
     cells, overlapping : int
-        Cells used, and those of them seen in several ways.
+        Cells used, and those of them that several scans saw.
     noise, lining : float
         Standard deviation of a cell seen again, and of cells among each other, dB.
     """
@@ -104,19 +105,17 @@ class RangeCurve:
             )
 
 
-def estimate_range_curve(place: Float, range_m: Float, cosine: Float, raw_db: Float, *, unrolled: bool = True) -> RangeCurve:
+def estimate_range_curve(sight: Sight, *, unrolled: bool = True, reach: tuple[float, float] = (np.inf, 0.0)) -> RangeCurve:
     """Estimate range curve and roughness from points on the lining.
 
     Parameters
     ----------
-    place : (n, 2) or (n, 3) float array
-        Where the points lie, m: chainage and arc when ``unrolled``, else coordinates in space.
-    range_m, cosine : (n,) float arrays
-        Distance from the scanner, m, and cosine of the incidence angle.
-    raw_db : (n,) float array
-        Intensity, dB.
+    sight : Sight
+        Points.
     unrolled : bool
-        Whether places are in the unrolled plane of a tunnel.
+        Whether their places are in the unrolled plane of a tunnel, else in space.
+    reach : (float, float)
+        Ranges that the curve is to span too, m; beyond those of the points by its slope over ln R.
 
     Raises
     ------
@@ -124,42 +123,45 @@ def estimate_range_curve(place: Float, range_m: Float, cosine: Float, raw_db: Fl
         If there are too few points, or all are seen from the same distance. How sure the curve is, is not judged:
         see :meth:`RangeCurve.require`.
     """
-    angle = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
-    usable = np.isfinite(raw_db) & (angle <= STEEPEST) & (cosine > 0) & (range_m > 0) & np.isfinite(place).all(axis=1)
-    cells = group(place[usable], range_m[usable], cosine[usable], raw_db[usable], unrolled=unrolled)
-    if cells.count < FEWEST_CELLS:
+    angle = np.degrees(np.arccos(np.clip(sight.cosine, 0.0, 1.0)))
+    usable = np.isfinite(sight.level) & (angle <= STEEPEST) & (sight.cosine > 0) & (sight.range_m > 0)
+    sight = sight.some(usable & np.isfinite(sight.place).all(axis=1))
+    count = len(np.unique(np.floor(sight.place / CELL), axis=0))
+    if count < FEWEST_CELLS:
         raise UserError(
-            f"a range curve can't be found on {cells.count} cells of lining of 0.5 m: it takes {FEWEST_CELLS}; {ADVICE}"
+            f"a range curve can't be found on {count} cells of lining of {CELL:g} m: it takes {FEWEST_CELLS}; {ADVICE}"
         )
-    nearest, farthest = (float(r) for r in np.quantile(range_m[usable], PRESENT))
-    low, high = np.quantile(range_m[usable], (0.01, 0.99))
+    nearest, low, high, farthest = (float(r) for r in np.quantile(sight.range_m, (PRESENT[0], 0.01, 0.99, PRESENT[1])))
     if high < LEAST_SPREAD * low:
         raise UserError(
             f"range and incidence can't be told apart on this lining: nearly all of it lies {low:.2f} to {high:.2f} m from"
             f" the scanner, so that no course over range shows; {ADVICE}"
         )
     spline = RangeSpline.over(nearest, farthest)
-    found = fit(cells, spline)
-    return _curve(cells, spline, found, nearest, farthest, (range_m[usable].min(), range_m[usable].max()))
+    cells = group(sight, spline, unrolled=unrolled)
+    rows = np.geomspace(min(reach[0], sight.range_m.min()) / BEYOND, max(reach[1], sight.range_m.max()) * BEYOND, NODES)
+    curves = []
+    if cells.overlapping >= FEWEST_CELLS:
+        curves.append(_curve(cells, spline, fit(cells, spline, among=False), rows, (nearest, farthest)))
+    # What views of one cell say doesn't depend on what the lining is like: where it suffices, nothing else is asked.
+    if not curves or not curves[0].worst[0] <= MOST_UNCERTAIN:
+        curves.append(_curve(cells, spline, fit(cells, spline, among=True), rows, (nearest, farthest)))
+    return min(curves, key=lambda curve: curve.worst[0])
 
 
-def _curve(
-    cells: Cells, spline: RangeSpline, found: Fit, nearest: float, farthest: float, seen: tuple[float, float]
-) -> RangeCurve:
+def _curve(cells: Cells, spline: RangeSpline, found: Fit, rows: Float, present: tuple[float, float]) -> RangeCurve:
     """Table of the curve, with the uncertainty of its shape."""
-    rows = np.geomspace(seen[0] / BEYOND, seen[1] * BEYOND, NODES)
     basis = spline(rows)
-    centred = basis - found.weight @ spline(cells.range_m) / found.weight.sum()
+    centred = basis - found.weight @ cells.basis / found.weight.sum()
     variance = np.einsum("ij,jk,ik->i", centred, found.covariance, centred)
     return RangeCurve(
         ReferenceCurve(rows, basis @ found.coefficients + found.level),
         np.sqrt(np.maximum(variance, 0.0)),
         found.roughness,
         found.roughness_sigma,
-        nearest,
-        farthest,
+        *present,
         cells.count,
-        int(np.count_nonzero(np.bincount(cells.cell) > 1)),
+        cells.overlapping,
         found.noise,
         found.lining,
     )

@@ -15,6 +15,7 @@ from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.geometry.store import load_surface
 from tunneldb.intensity.bare import incidence_cosine
+from tunneldb.intensity.cells import Sight
 from tunneldb.intensity.correct import Kind, needs_reference, to_decibel
 from tunneldb.intensity.look import Look, pool
 from tunneldb.intensity.oren_nayar import incidence_db
@@ -135,8 +136,9 @@ def look_at_file(path: Path, dimension: str, kind: Kind, scanner: tuple[float, f
     flat = np.isfinite(cosine) & np.isfinite(level)
     if not flat.any():
         raise UserError(f"{path}: no surface is flat enough for its normal, and so for incidence angles, to be known")
-    xyz, range_m, cosine, level = xyz[flat], range_m[flat], cosine[flat], level[flat]
-    found, refused = _attempt(lambda: estimate_range_curve(xyz, range_m, cosine, level, unrolled=False))
+    sight = Sight(xyz, scan_id, range_m, cosine, level).some(flat)
+    range_m, cosine, level = sight.range_m, sight.cosine, sight.level
+    found, refused = _attempt(lambda: estimate_range_curve(sight, unrolled=False))
     distance = level
     if found and needs_reference(kind):
         distance = level - found.curve(range_m)
@@ -178,7 +180,7 @@ def _look(
     if found:
         sigma, where = found.worst
         notes.append(
-            f"{title}: found on {found.cells:,} cells, {found.overlapping:,} of them seen in several ways: range curve known to"
+            f"{title}: found on {found.cells:,} cells, {found.overlapping:,} of them seen by several scans: range curve known to"
             f" {sigma:.2f} dB between {found.nearest:.1f} and {found.farthest:.1f} m (worst at {where:.1f} m),"
             f" roughness {found.roughness:.1f}° ± {found.roughness_sigma:.1f}°"
         )

@@ -13,6 +13,7 @@ from shapely.geometry import Polygon
 
 from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
+from tunneldb.intensity.cells import Sight
 from tunneldb.intensity.correct import Kind, Views, needs_reference, range_span
 from tunneldb.intensity.dry import Dry, plain_statistics
 from tunneldb.intensity.range_curve import RangeCurve, estimate_range_curve
@@ -174,11 +175,16 @@ def calibrate(conn: psycopg.Connection[Any], survey: Survey, eye: Eye, drawn: li
 def find_range_curve(view: Sample) -> RangeCurve:
     """Range curve and roughness from the lining itself; see :func:`estimate_range_curve`."""
     seen, views, near = view.seen, view.views, view.telling
+    ranges = views.range_m[seen.lining].astype(np.float64)
     return estimate_range_curve(
-        np.column_stack([seen.chainage[near], seen.arc[near]]),
-        views.range_m[near].astype(np.float64),
-        views.cosine[near].astype(np.float64),
-        views.raw_db[near].astype(np.float64),
+        Sight(
+            np.column_stack([seen.chainage[near], seen.arc[near]]),
+            view.scan_id[near],
+            views.range_m[near].astype(np.float64),
+            views.cosine[near].astype(np.float64),
+            views.raw_db[near].astype(np.float64),
+        ),
+        reach=(float(ranges.min()), float(ranges.max())),
     )
 
 
