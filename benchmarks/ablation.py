@@ -26,7 +26,7 @@ from shapely.geometry import Polygon
 
 from benchmarks.common import print_table, progress, save, scratch_database
 from benchmarks.leak_set import Case, prepare
-from benchmarks.leaks import HEADER, Outcome, chosen, row, values
+from benchmarks.leaks import HEADER, Outcome, chosen, plain, row, values
 from benchmarks.scene import Scene
 from tunneldb.cli.main import main as command
 from tunneldb.database import connect
@@ -178,11 +178,15 @@ def main() -> None:
         mean = np.sqrt(np.mean(np.square([line[1:] for line in table_1]), axis=0)).tolist()
         header = ("standard deviation of dry lining, dB", "raw", "Lambert", "Oren-Nayar")
         print_table("Table 1 of Xu et al. (2018)", header, [*table_1, ["root mean square", *mean]])
-        rows = [[part.name, *missed(outcomes[part.name])] for part in laws]
+        rows = [[part.name, *missed(outcomes[part.name])] for part in laws if outcomes[part.name]]
         print_table("Fig. 8 of Xu et al. (2018)", ("intensity", "area missed", "area not wet", "leaks missed", "false"), rows)
-    rows = [row(part.name, outcomes[part.name]) for part in wanted]
+    all_of_them = len(outcomes[wanted[0].name])
+    rows = []
+    for part in wanted:
+        if of := outcomes[part.name]:
+            rows.append(row(part.name if len(of) == all_of_them else f"{part.name} ({len(of)} tunnels)", of))
     print_table("Parts switched off", ("switched off", *HEADER[1:]), rows)
-    found = {name: values(of) for name, of in outcomes.items() if of}
+    found = {name: plain(of) for name, of in outcomes.items() if of}
     print(f"\n{save('ablation', {'seed': arguments.seed, 'table_1': table_1, 'parts': found})}")
 
 
@@ -196,9 +200,9 @@ def measure(
             progress(f"  {part.name}")
             with part.off(database, scene) as options:
                 arguments = ["--dsn", database, "run", scene.name, "--from", "detect", *options]
-                done = CliRunner().invoke(command, arguments, catch_exceptions=False)
-            if done.exit_code:
-                progress(f"    {done.output.strip()}")
+                done = CliRunner().invoke(command, arguments)
+            if done.exit_code:  # without a part things may go wrong that can't go wrong with it
+                progress(f"    fails: {done.output.strip() or repr(done.exception)}")
                 continue
             with connect(database) as conn:
                 sigmas = conn.execute(

@@ -111,8 +111,8 @@ def main() -> None:
     )
     listed = [line for outcome in outcomes for line in lines(outcome)]
     print_table("Missed leaks and wrong ones", LIST_HEADER, listed)
-    table = {outcome.name: values([outcome]) for outcome in outcomes}
-    print(f"\n{save('leaks', {'seed': arguments.seed, 'tunnels': table, 'all': values(outcomes), 'wrong': listed})}")
+    table = {outcome.name: plain([outcome]) for outcome in outcomes}
+    print(f"\n{save('leaks', {'seed': arguments.seed, 'tunnels': table, 'all': plain(outcomes), 'wrong': listed})}")
 
 
 def chosen(only: str | None) -> list[Case]:
@@ -149,6 +149,11 @@ def values(outcomes: list[Outcome]) -> dict[str, Any]:
     }
 
 
+def plain(outcomes: list[Outcome]) -> dict[str, Any]:
+    """The same for JSON, in which what there is not is null."""
+    return {name: value if np.isfinite(value) else None for name, value in values(outcomes).items()}
+
+
 def row(name: str, outcomes: list[Outcome]) -> list[str]:
     """A line of the table."""
     v = values(outcomes)
@@ -156,7 +161,8 @@ def row(name: str, outcomes: list[Outcome]) -> list[str]:
     shares = [f"{v[key]:.3f}" for key in ("f1", "area_f1", "area_iou")]
     errors = [f"{100 * v[key]:.0f} %" for key in ("area_error", "area_error_p95")]
     edges = [f"{1000 * v[key]:.0f}" for key in ("edge", "edge_p95")]
-    return [name, *counts, f"{v['false_per_1000']:.2f}", *shares, *errors, *edges, str(v["joints"]), str(v["dark"])]
+    cells = [name, *counts, f"{v['false_per_1000']:.2f}", *shares, *errors, *edges, str(v["joints"]), str(v["dark"])]
+    return ["" if cell.startswith("nan") else cell for cell in cells]
 
 
 def lines(outcome: Outcome) -> list[list[str]]:
