@@ -54,7 +54,7 @@ def judge(region: Region) -> Verdict:
     if worst <= 0.5:
         return Verdict("leak", tuple(against), evidence(region) * (1.0 - worst))
     reasons = tuple(name for name in against if degrees[name] > 0.5)
-    return Verdict("joint" if reasons[0] == "thin" else "dark", reasons, worst)
+    return Verdict("joint" if "thin" in reasons else "dark", reasons, worst)
 
 
 def evidence(region: Region) -> float:
@@ -98,7 +98,7 @@ def _gradual(region: Region, shape: Shape) -> float:
 def _rectangular(region: Region, shape: Shape) -> float:
     """A repaired patch, a painted stripe: straight sides along the tunnel and around it, three of them seen at least.
 
-    A small blob may have straight sides by chance, but no corners.
+    A small blob may have straight sides by chance, but no corners; of a very small one pixels don't show the corners.
     """
     traits, pixel = region.traits, region.pixel
     if not traits.rim or min(shape.along, shape.across) < 4 * pixel:
@@ -107,9 +107,12 @@ def _rectangular(region: Region, shape: Shape) -> float:
     corners = max(_ramp(shape.corners, 0.35, 0.65), _ramp(wander / np.sqrt(shape.area), 0.025, 0.01))
     # Water that fills a panel between joints is rectangular too, and darker than repairs are; but no stripe.
     strong = min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP)
-    panel = _ramp(strong, 0.8, 1.0) * (1.0 - _ramp(shape.length / shape.mean_width, 6.0, 10.0))
+    stripe = _ramp(shape.length / shape.mean_width, 6.0, 10.0)
+    panel = _ramp(strong, 0.8, 1.0) * (1.0 - stripe)
     hidden = _ramp(traits.rim_off / traits.rim, 0.4, 0.55)
-    return min(_ramp(wander, 1.2 * pixel, 0.6 * pixel), _ramp(shape.fill, 0.85, 0.93), corners, 1.0 - max(panel, hidden))
+    large = max(stripe, _ramp(min(shape.along, shape.across), 12.0 * pixel, 18.0 * pixel))
+    sides = _ramp(wander, 1.2 * pixel, 0.6 * pixel)
+    return min(sides, _ramp(shape.fill, 0.85, 0.93), corners, large, 1.0 - max(panel, hidden))
 
 
 def _shadow(region: Region, shape: Shape) -> float:

@@ -14,15 +14,15 @@ Float = NDArray[np.float64]
 NARROW = 0.08
 """Joints are at most 2 cm wide; the beam, the pixels and the median filter widen them, but not to more, m."""
 
-LONG = 1.0
-"""Water that runs down a wall keeps no straight line for longer, m."""
+LONG_AROUND, LONG_ALONG = 1.0, 0.5
+"""Water that runs down a wall keeps no straight line for longer, and runs along the tunnel no farther, m."""
 
 STRAIGHT = 0.015
 """Standard deviation of the middle of a joint about a straight line, m: it is built to millimetres, pixels are larger."""
 
 
 def lines(dark: Mask, first: int, stop: int, pixel: float) -> Mask:
-    """Find the pixels of narrow straight lines at least LONG around the tunnel or along it.
+    """Find the pixels of narrow straight lines around the tunnel or along it that are long enough.
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ def lines(dark: Mask, first: int, stop: int, pixel: float) -> Mask:
         Side of a pixel, m.
     """
     found = np.zeros(dark.shape, np.bool_)
-    wide, long = max(2, round(NARROW / pixel)), round(LONG / pixel)
-    across, along = short_runs(dark, first, stop, wide)
+    across, along = short_runs(dark, first, stop, max(2, round(NARROW / pixel)))
     for runs, upright in ((across, True), (along, False)):
+        long = round((LONG_AROUND if upright else LONG_ALONG) / pixel)
         if len(runs) < long:
             continue
         chosen = runs[_straight(runs, long, max(STRAIGHT / pixel, 0.75))]

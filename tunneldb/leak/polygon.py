@@ -12,9 +12,12 @@ from shapely.geometry import Polygon
 SIMPLIFY = 0.75
 """Tolerance of the simplification, pixels: enough to straighten the stairs of a slanting edge."""
 
+LEAST_HOLE = 0.01
+"""Smaller holes are closed, m²: noise makes some in weak leaks, and a patch of 10 cm is no place that stayed dry."""
+
 
 def outline(mask: NDArray[np.bool_], transform: Affine) -> Polygon:
-    """Outline a connected region, with its holes.
+    """Outline a connected region, with its holes that are large enough.
 
     Parameters
     ----------
@@ -31,11 +34,15 @@ def outline(mask: NDArray[np.bool_], transform: Affine) -> Polygon:
     image = np.ascontiguousarray(mask, dtype=np.uint8)
     # In whole pixels first: the outline of a region must not depend on the kilometre that it lies in.
     ((shape, _),) = rasterio.features.shapes(image, mask=image.astype(bool), connectivity=4)
-    pixels = _straighten(shapely.geometry.shape(shape))
+    pixels = _straighten(_without_specks(shapely.geometry.shape(shape), LEAST_HOLE / abs(transform.determinant)))
     moved = shapely.transform(
         pixels, lambda at: np.column_stack([at, np.ones(len(at))]) @ np.array(transform).reshape(3, 3).T[:, :2]
     )
     return shapely.geometry.polygon.orient(shapely.normalize(moved))
+
+
+def _without_specks(stairs: Polygon, least: float) -> Polygon:
+    return Polygon(stairs.exterior, [hole for hole in stairs.interiors if Polygon(hole).area >= least])
 
 
 def _straighten(stairs: Polygon) -> Polygon:

@@ -1,0 +1,227 @@
+"""Leaks, joints and what is dark but dry, painted on lining with noise: what detection takes them for, and how exact it is."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import shapely
+from scipy import ndimage
+from shapely.geometry import Polygon, box
+
+from tunneldb.leak.detection import Detection, Found, detect
+from tunneldb.leak.image import Grid
+from tunneldb.leak.judge import evidence, judge
+from tunneldb.leak.lining import State
+from tunneldb.leak.raster import NODATA
+from tunneldb.leak.region import Region, Traits
+from tunneldb.leak.relative import Relative
+
+PIXEL, SIGMA = 0.02, 0.3
+WIDTH, HALF = 14.0, 4.0  # of the canvas: from chainage 0, and from arc -HALF to HALF, m
+
+
+class Canvas:
+    """Lining with noise on which to paint; each pixel is the mean of what it covers, as a pixel of points is."""
+
+    def __init__(self, seed: int = 0, filled: float = 0.8) -> None:
+        self.rng, self.filled = np.random.default_rng(seed), filled
+        self.grid = Grid.covering(0, PIXEL, -HALF, HALF)
+        self.drop = np.zeros((self.grid.rows, round(WIDTH / PIXEL)))
+        self.state = np.full(self.drop.shape, State.LINING, np.uint8)
+        self.chainage, self.arc = (np.arange(self.drop.shape[1]) + 0.5) * PIXEL, self.grid.arcs()[:, None]
+
+    def inside(self, shape: Polygon) -> np.ndarray:
+        """Share of each pixel that a shape covers."""
+        fine = 4
+        west, south, east, north = shape.bounds
+        first, last = int(west / PIXEL) - 1, int(east / PIXEL) + 2
+        top, bottom = int((HALF - north) / PIXEL) - 1, int((HALF - south) / PIXEL) + 2
+        first, top, last, bottom = max(first, 0), max(top, 0), min(last, self.drop.shape[1]), min(bottom, self.grid.rows)
+        x = (first + (np.arange((last - first) * fine) + 0.5) / fine) * PIXEL
+        y = HALF - (top + (np.arange((bottom - top) * fine) + 0.5) / fine) * PIXEL
+        held = shapely.contains_xy(shape, *np.meshgrid(x, y)).reshape(bottom - top, fine, last - first, fine)
+        out = np.zeros(self.drop.shape)
+        out[top:bottom, first:last] = held.mean(axis=(1, 3))
+        return out
+
+    def paint(self, shape: Polygon, drop: float) -> None:
+        self.drop = np.maximum(self.drop, drop * ndimage.gaussian_filter(self.inside(shape), 0.4))
+
+    def detect(self) -> Detection:
+        noisy = self.drop + self.rng.normal(0, SIGMA, self.drop.shape)
+        empty = self.rng.random(self.drop.shape) > self.filled
+        drop = np.full((self.grid.rows, self.grid.columns), NODATA, np.int16)
+        state = np.zeros(drop.shape, np.uint8)
+        drop[:, : self.drop.shape[1]] = np.where(empty, NODATA, np.rint(100 * noisy))
+        state[:, : self.drop.shape[1]] = np.where(empty & (self.state == State.LINING), State.EMPTY, self.state)
+        sigma = np.full((self.grid.rows // 25, self.grid.columns // 25), SIGMA, np.float32)
+        return detect(Relative(self.grid, state, drop, 25, sigma), SimpleNamespace(count=1), 0.05)
+
+
+def blob(chainage: float, arc: float, area: float, seed: int = 0) -> Polygon:
+    """An irregular patch."""
+    rng = np.random.default_rng(seed)
+    angle = np.linspace(0, 2 * np.pi, 90, endpoint=False)
+    radius = 1 + sum(rng.normal(0, 0.2 / k) * np.cos(k * angle + rng.uniform(0, 6)) for k in range(2, 8))
+    radius *= np.sqrt(area / np.pi)
+    shape = Polygon(np.column_stack([chainage + radius * np.cos(angle), arc + radius * np.sin(angle)]))
+    return shapely.affinity.scale(shape, np.sqrt(area / shape.area), np.sqrt(area / shape.area))
+
+
+def of_kind(found: Detection, kind: str) -> list[Found]:
+    return [anomaly for anomaly in found.found if anomaly.verdict.kind == kind]
+
+
+@pytest.mark.parametrize("filled", [0.9, 0.4])
+@pytest.mark.parametrize("contrast", [4.0, 6.0, 25.0])
+def test_edges_areas_and_holes_of_leaks_hold_whatever_their_contrast(contrast: float, filled: float) -> None:
+    canvas = Canvas(1, filled)
+    true = [blob(1.5 + 2.1 * k, arc, area, k) for k, area in enumerate((0.1, 0.2, 0.5, 1.0, 1.5, 0.3)) for arc in (-2.0, 2.0)]
+    true[6] = true[6].difference(shapely.Point(1.5 + 2.1 * 3, -2.0).buffer(0.25))
+    for leak in true:
+        canvas.paint(leak, contrast * SIGMA)
+    found = canvas.detect()
+    assert len(found.found) == len(of_kind(found, "leak")) == len(true)
+    errors = []
+    for leak in true:
+        (same,) = (anomaly for anomaly in found.found if anomaly.outline.intersects(leak))
+        assert same.outline.intersection(leak).area / same.outline.union(leak).area > 0.8
+        assert leak.boundary.hausdorff_distance(same.outline.boundary) < 0.08
+        assert len(same.outline.interiors) == len(leak.interiors)
+        places = shapely.line_interpolate_point(leak.exterior, np.arange(0, leak.exterior.length, 0.05))
+        assert np.median(shapely.distance(places, same.outline.exterior)) < 0.02
+        errors.append(same.outline.area / leak.area - 1)
+    assert np.median(np.abs(errors)) < 0.05
+    assert np.abs(errors).max() < 0.12
+
+
+def test_drips_are_a_part_of_the_patch_above_them() -> None:
+    """On both sides of the crown water runs down, away from it; a speck above or far below a patch is none of it."""
+    canvas = Canvas(2)
+    patches = [blob(3.0, 1.0, 0.5), blob(9.0, -1.0, 0.5)]
+    drips, strangers = [], []
+    for patch, down in zip(patches, (1, -1), strict=True):
+        middle = patch.centroid.x
+        low = patch.intersection(shapely.LineString([(middle, -HALF), (middle, HALF)])).bounds[3 if down > 0 else 1]
+        at = low
+        for gap, length in ((0.06, 0.14), (0.08, 0.1)):
+            at += down * gap
+            drips.append(box(middle - 0.04, min(at, at + down * length), middle + 0.04, max(at, at + down * length)))
+            at += down * length
+        strangers.append(shapely.Point(middle, at + down * 0.4).buffer(0.05))
+        strangers.append(shapely.Point(middle, patch.centroid.y - down * 0.65).buffer(0.05))
+    for shape in (*patches, *drips, *strangers):
+        canvas.paint(shape, 3.0)
+    found = canvas.detect().found
+    assert len(found) == 2
+    for patch, anomaly in zip(patches, found, strict=True):
+        assert anomaly.verdict.kind == "leak"
+        of_it = [drip for drip in drips if drip.distance(patch) < 0.5]
+        assert all(anomaly.outline.intersection(drip).area > 0.5 * drip.area for drip in of_it)
+        assert not any(anomaly.outline.intersects(stranger) for stranger in strangers)
+        whole = shapely.union_all([patch, *of_it])
+        assert anomaly.outline.area == pytest.approx(whole.area, rel=0.05)
+
+
+def test_joints_are_no_leaks_and_do_not_tie_leaks_together() -> None:
+    canvas = Canvas(3)
+    for chainage in np.arange(0.75, WIDTH, 1.5):
+        canvas.paint(box(chainage, -HALF, chainage + 0.06, HALF), 3.0)
+    canvas.paint(box(0.2, 1.0, WIDTH - 0.2, 1.06), 3.0)
+    true = [blob(3.0, 2.2, 0.6), blob(8.3, -1.5, 0.8, 1)]
+    for leak in true:
+        canvas.paint(leak, 3.0)
+    found = canvas.detect()
+    leaks = of_kind(found, "leak")
+    assert len(leaks) == 2
+    for leak, anomaly in zip(true, leaks, strict=True):
+        assert anomaly.outline.area == pytest.approx(leak.area, rel=0.15)
+    joints = of_kind(found, "joint")
+    assert len(joints) >= 9
+    assert all("thin" in joint.verdict.reasons for joint in joints)
+
+
+def test_a_leak_that_runs_along_a_joint_is_a_leak() -> None:
+    canvas = Canvas(4)
+    y = np.linspace(-1.5, 1.5, 40)
+    for k, width in enumerate((0.12, 0.2, 0.4)):
+        half = 0.5 * width * (1 + 0.25 * np.sin(5 * y + k))
+        middle = 2.0 + 4.0 * k
+        canvas.paint(box(middle - 0.01, -HALF, middle + 0.01, HALF), 3.0)
+        canvas.paint(Polygon([*zip(middle - half, y, strict=True), *zip((middle + half)[::-1], y[::-1], strict=True)]), 2.5)
+    found = canvas.detect()
+    assert [anomaly.verdict.kind for anomaly in found.found] == ["leak"] * 3
+
+
+@pytest.mark.parametrize("drop", [1.2, 2.0])
+def test_repairs_and_stripes_have_straight_sides(drop: float) -> None:
+    canvas = Canvas(5)
+    for k, (along, across) in enumerate([(1.2, 0.8), (0.5, 0.6), (0.4, 1.5), (1.0, 1.0)]):
+        canvas.paint(box(1 + 3 * k, 0.5, 1 + 3 * k + along, 0.5 + across), drop)
+    canvas.paint(box(1.0, -2.0, 9.0, -1.89), 3.5)
+    found = canvas.detect().found
+    assert len(found) == 5
+    assert all(anomaly.verdict.kind == "dark" and "rectangular" in anomaly.verdict.reasons for anomaly in found)
+
+
+def test_soot_fades_out() -> None:
+    canvas = Canvas(6)
+    canvas.drop += 2.2 * np.exp(-((canvas.arc / 1.2) ** 2) - ((canvas.chainage - 7) / 4) ** 2)
+    found = canvas.detect()
+    assert not of_kind(found, "leak")
+    assert {reason for anomaly in found.found for reason in anomaly.verdict.reasons} >= {"gradual"}
+
+
+def test_a_bolt_pocket_is_dark_and_a_leak_on_the_back_of_a_niche_is_a_leak() -> None:
+    canvas = Canvas(7)
+    pockets = [box(1 + 2 * k, 2.0, 1.25 + 2 * k, 2.25) for k in range(5)]
+    niche = box(3.0, -2.5, 5.0, -0.5)
+    for recess in (*pockets, niche):
+        canvas.state[canvas.inside(recess) > 0.5] = State.RECESS
+    for pocket in pockets:
+        canvas.paint(pocket, 3.0)
+    leak = blob(4.0, -1.5, 0.6)
+    canvas.paint(leak, 3.0)
+    found = canvas.detect()
+    (only,) = of_kind(found, "leak")
+    assert only.outline.intersection(leak).area > 0.9 * leak.area
+    dark = of_kind(found, "dark")
+    assert len(dark) == len(pockets)
+    assert all(anomaly.verdict.reasons[0] == "recess" for anomaly in dark)
+
+
+def test_a_dark_line_beside_a_cable_is_its_shadow() -> None:
+    canvas = Canvas(8)
+    canvas.state[np.abs(canvas.arc[:, 0] - 1.0) < 0.04] = State.OFF
+    canvas.paint(box(2.0, 1.04, 12.0, 1.13), 3.0)
+    found = canvas.detect()
+    assert found.found
+    assert not of_kind(found, "leak")
+
+
+def test_dry_lining_shows_nothing() -> None:
+    for filled in (1.0, 0.5, 0.2):
+        assert not Canvas(9, filled).detect().found
+
+
+def _region(side: int, drop: float, share: float = 1.0, pixel: float = PIXEL) -> Region:
+    """A round one."""
+    row, column = np.mgrid[:side, :side]
+    mask = np.hypot(row - side / 2 + 0.5, column - side / 2 + 0.5) < side / 2
+    filled = round(share * mask.sum())
+    traits = Traits(sigma=filled * SIGMA, square=filled * drop**2, rim=4.0 * side, steps=4.0 * side, inside=4.0 * side * drop)
+    return Region(pixel, 0, 0, mask, filled, filled * drop, drop, traits)
+
+
+def test_confidence_grows_with_contrast_size_and_support() -> None:
+    for grown in (
+        [_region(30, drop) for drop in (0.9, 1.2, 1.5, 2.0, 3.0)],
+        [_region(side, 1.5) for side in (13, 20, 30, 50, 90)],
+        [_region(30, 1.5, share) for share in (0.05, 0.1, 0.3, 0.6, 1.0)],
+    ):
+        told = [judge(region).confidence for region in grown]
+        assert all(judge(region).kind == "leak" for region in grown)
+        assert told == sorted(told)
+        assert len(set(told)) == len(told)
+        assert 0 < told[0] < told[-1] < 1
+    assert judge(_region(30, 3.0)).confidence == evidence(_region(30, 3.0))
