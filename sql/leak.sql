@@ -46,7 +46,8 @@ RETURNS float8
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER
 SET search_path = pg_catalog, public, pg_temp
 AS $$
-    SELECT coalesce(sum(l.area * ST_Area(ST_Intersection(l.unrolled, w.stretch)) / ST_Area(l.unrolled)), 0)
+    SELECT coalesce(sum(CASE WHEN l.chainage_from >= $2 AND l.chainage_to <= $3 THEN l.area
+        ELSE l.area * ST_Area(ST_Intersection(l.unrolled, w.stretch)) / ST_Area(l.unrolled) END), 0)
     FROM tunnel.anomaly l
     JOIN tunnel.survey s ON s.id = l.survey_id
     CROSS JOIN LATERAL (
