@@ -222,17 +222,17 @@ def test_a_niche_is_recess_though_profiles_are_apart_and_an_outlier_lies_in_it()
 
 
 @pytest.mark.parametrize("stand", [0.045, 0.1, 0.3])
-@pytest.mark.parametrize("profiles", [1, 3])
-def test_a_cable_goes_with_its_shadow_and_its_mixed_pixels(stand, profiles):
+@pytest.mark.parametrize(("profiles", "thick"), [(1, 2), (3, 2), (3, 1), (5, 1)])
+def test_a_cable_goes_with_its_shadow_and_its_mixed_pixels(stand, profiles, thick):
     rng = np.random.default_rng(6)
     offset = rng.normal(0, 0.004, (200, 600)).astype(np.float32)
-    # Two rows of cable that sags, a mixed row on both sides; above it wall that it hides.
+    # Some rows of cable that sags, a mixed row on both sides; above it wall that it hides.
     middle = np.rint(100 + 6 * np.sin(np.arange(600) / 90)).astype(int)
     cable, mixed = np.zeros((2, *offset.shape), bool)
     columns = np.arange(600)
-    for row in (0, 1):
+    for row in range(thick):
         cable[middle + row, columns] = True
-    for row in (-1, 2):
+    for row in (-1, thick):
         mixed[middle + row, columns] = True
     offset[cable] += stand
     offset[mixed] += stand * rng.uniform(0, 1, mixed.sum())

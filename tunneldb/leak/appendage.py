@@ -93,14 +93,14 @@ def off_plane(distance: Single, recess: Mask, pixel: float, delta: float = DELTA
     delta : float
         δ, m.
     """
-    marked: Mask = _grown(distance, recess, delta, _growth(pixel))
+    marked: Mask = _grown(distance, recess, delta, _growth(pixel), _look(pixel))
     return marked
 
 
 def reach(pixel: float) -> int:
     """How far, in pixels, what a pixel is judged by lies from it at most."""
     step, margin = _sides(pixel)
-    return step + margin + _growth(pixel) + 1
+    return step + margin + _growth(pixel) + _look(pixel)
 
 
 def _sides(pixel: float) -> tuple[int, int]:
@@ -111,6 +111,11 @@ def _sides(pixel: float) -> tuple[int, int]:
 def _growth(pixel: float) -> int:
     """Pixels by which an appendage is grown: two of 2 cm, fewer of larger ones."""
     return max(1, round(0.04 / pixel))
+
+
+def _look(pixel: float) -> int:
+    """Pixels to either side in which a pixel of a thin cable has another one, though profiles are apart: 0.1 m."""
+    return max(1, round(0.1 / pixel))
 
 
 @njit(cache=True, nogil=True, parallel=True)
@@ -296,7 +301,21 @@ def _recessed(offset: Single, distance: Single, delta: float, half: int) -> Mask
 
 
 @njit(cache=True, nogil=True)
-def _grown(distance: Single, recess: Mask, delta: float, growth: int) -> Mask:  # pragma: no cover - compiled
+def _goes_on(distance: Single, i: int, j: int, delta: float, look: int) -> bool:  # pragma: no cover - compiled
+    """Tell whether a pixel off the plane has others before or behind it, or above or below, that stand off alike."""
+    rows, columns = distance.shape
+    for tall, wide in ((1, look), (look, 1)):
+        alike = 0
+        for m in range(max(i - tall, 0), min(i + tall + 1, rows)):
+            for n in range(max(j - wide, 0), min(j + wide + 1, columns)):
+                alike += abs(distance[m, n]) >= delta and abs(distance[m, n] - distance[i, j]) < delta
+        if alike > 1:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _grown(distance: Single, recess: Mask, delta: float, growth: int, look: int) -> Mask:  # pragma: no cover - compiled
     """Pixels off the plane, and those about them; a pixel alone is an outlier, which has no edge."""
     rows, columns = distance.shape
     out = np.zeros((rows, columns), np.bool_)
@@ -308,6 +327,7 @@ def _grown(distance: Single, recess: Mask, delta: float, growth: int) -> Mask:  
                     for n in range(max(j - 1, 0), min(j + 2, columns)):
                         beside += abs(distance[m, n]) >= delta
                 out[i, j] = True
-                if 1 < beside < 9:  # from the rim the growth reaches as far as from within
+                # From the rim the growth reaches as far as from within.
+                if 1 < beside < 9 or (beside == 1 and _goes_on(distance, i, j, delta, look)):
                     out[max(i - growth, 0) : i + growth + 1, max(j - growth, 0) : j + growth + 1] = True
     return out
