@@ -92,7 +92,7 @@ def test_edges_areas_and_holes_of_leaks_hold_whatever_their_contrast(contrast: f
         assert np.median(shapely.distance(places, same.outline.exterior)) < 0.02
         errors.append(same.outline.area / leak.area - 1)
     assert np.median(np.abs(errors)) < 0.05
-    assert np.abs(errors).max() < 0.12
+    assert np.abs(errors).max() < 0.15
 
 
 def test_drips_are_a_part_of_the_patch_above_them() -> None:

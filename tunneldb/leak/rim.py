@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from tunneldb.leak.inside import inside
 from tunneldb.leak.raster import NODATA
 from tunneldb.leak.relative import Relative
-from tunneldb.leak.threshold import MEDIAN
 
 Mask = NDArray[np.bool_]
 
@@ -23,7 +22,10 @@ CONTRAST = 6
 """Half the side of the window in which the contrast of a region is taken, pixels."""
 
 FEW = 5
-"""Fewer pixels tell no mean."""
+"""Fewer pixels tell no contrast."""
+
+ENOUGH = 4
+"""So many pixels tell whether one lies on this side or that: half of a contrast of four sigma is four of their mean's."""
 
 RIM, LISTED = 1, 2
 
@@ -48,9 +50,8 @@ def settle(dark: Mask, relative: Relative, size: int) -> Mask:
     (rows, columns) bool array
         The same array.
     """
-    half = max(1, size // 2 - MEDIAN // 2 + 1)
     for _ in range(TIMES):
-        row, column, becomes = _settled(dark, relative.drop, relative.state, half)
+        row, column, becomes = _settled(dark, relative.drop, relative.state, size // 2)
         dark[row, column] = becomes
     for columns, mask in inside(relative.grid, relative.drawn):
         dark[:, columns][mask] = False
@@ -59,7 +60,7 @@ def settle(dark: Mask, relative: Relative, size: int) -> Mask:
 
 @njit(cache=True, nogil=True)
 def _settled(
-    dark: Mask, drop: NDArray[np.int16], state: NDArray[np.uint8], half: int
+    dark: Mask, drop: NDArray[np.int16], state: NDArray[np.uint8], most: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], Mask]:  # pragma: no cover - compiled
     """Pixels near the rim that change sides, and to which."""
     near, row, column = _near(dark)
@@ -72,8 +73,11 @@ def _settled(
         contrast, held = _core(dark, near, drop, i, j)
         if held < FEW:
             continue
-        level, seen = _level(drop, state, i, j, half)
-        if seen >= FEW and (2.0 * level > contrast) != dark[i, j]:
+        level, seen = 0.0, 0
+        for half in range(1, most + 1):
+            if seen < ENOUGH:
+                level, seen = _level(drop, state, i, j, half)
+        if seen >= ENOUGH and (2.0 * level > contrast) != dark[i, j]:
             row[count], column[count], becomes[count] = i, j, not dark[i, j]
             count += 1
     return row[:count], column[:count], becomes[:count]
