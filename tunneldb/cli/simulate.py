@@ -75,7 +75,7 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("range_noise", "M", "Standard deviation along the ray."),
         _Option("outliers", "SHARE", "Share of isolated points, in the air or behind the wall."),
         _Option("relief", "M", "Height of small-scale relief of the lining."),
-        _Option("beam", "MRAD", "Divergence of the beam: echoes at edges mix two surfaces [none]."),
+        _Option("beam", "MRAD", "Divergence of the beam: echoes at edges mix two surfaces; 0: none."),
         _Option(
             "range_curve",
             "NAME",
