@@ -85,7 +85,7 @@ def test_before_stage_ground_there_is_no_image_of_classes(
         conn.execute(sql.SQL("DELETE FROM tunnel.{}").format(sql.Identifier(table)))
     conn.commit()
     assert image(tmp_path) == [
-        f"demo-2024-km012-{kind}.{end}" for kind in ("corrected", "offset", "raw") for end in ("png", "tif")
+        f"demo-2024-km012-{kind}.{end}" for kind in ("corrected", "offset", "raw", "state") for end in ("png", "tif")
     ]
 
 
