@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 from shapely.geometry import Polygon
 
 from tunneldb.geometry.surface import Surface
@@ -55,13 +56,35 @@ def shapes(outline: Polygon, surface: Surface) -> Shapes:
     surface : Surface
         The tunnel.
     """
-    dense = shapely.segmentize(outline, DENSIFY)
+    dense = _within(shapely.segmentize(outline, DENSIFY), surface)
     return Shapes(
         strip=shapely.transform(dense, lambda unrolled: strip(surface, unrolled)),
         surface=_roll(dense, surface),
         clock=_clock(outline, surface),
         area=_area(outline, surface),
     )
+
+
+def _within(outline: Polygon, surface: Surface) -> Polygon:
+    """An outline whose vertices all lie on the surface: pixels at its end reach beyond it.
+
+    A vertex beyond the first or the last plane goes onto it, one that lies off for another reason to the nearest that doesn't.
+    """
+    at = shapely.get_coordinates(outline)
+    lost = _off(at, surface)
+    if not lost.any():
+        return outline
+    at[:, 0] = np.clip(at[:, 0], surface.ends[0, 0], surface.ends[-1, 1])
+    lost = _off(at, surface)
+    if not lost.all():
+        at[lost] = at[~lost][cKDTree(at[~lost]).query(at[lost])[1]]
+    return shapely.transform(outline, lambda _: at)
+
+
+def _off(unrolled: Float, surface: Surface) -> NDArray[np.bool_]:
+    """Which (chainage, arc) rows (n, 2) don't lie on the surface."""
+    off: NDArray[np.bool_] = np.isnan(surface.roll(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled)))).any(axis=1)
+    return off
 
 
 def strip(surface: Surface, unrolled: Float) -> Float:
