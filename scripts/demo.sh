@@ -20,7 +20,7 @@ remove_former() { # of an earlier demo
 }
 
 start=$SECONDS
-step simulate demo/scan --preset demo --name demo
+step simulate demo/scan --preset demo --name demo --lining segments --soot 2 --paint 4 --patches 4 --joint-leaks 2 --drips
 step init
 remove_former
 step tunnel add demo --srid 25830 --axis demo/scan/demo.axis.csv --start-chainage 12300
@@ -30,6 +30,9 @@ step load demo-2024 demo/scan/demo*.laz
 step run demo-2024
 step status
 step leaks demo-2024
+step leaks demo-2024 --by-km
+step evaluate demo-2024 demo/scan/demo.truth.gpkg
+step intensity demo-2024 -o demo/intensity.png
 step leaks demo-2024 --geometry map --format gpkg -o demo/leaks.gpkg
 step image demo-2024 -o demo/images
 step qgis demo-2024 -o demo/demo.qgz
@@ -37,8 +40,9 @@ step qgis demo-2024 -o demo/demo.qgz
 cat <<TEXT
 
 Done in $((SECONDS - start)) s. Look at
-  demo/images/     the unrolled lining
-  demo/leaks.gpkg  the leaks on the map
-  demo/demo.qgz    the project for QGIS
+  demo/images/         the unrolled lining
+  demo/intensity.png   whether intensity depends on range or incidence, before and after correction
+  demo/leaks.gpkg      the leaks on the map
+  demo/demo.qgz        the project for QGIS
 The demo's server runs on, for QGIS; to stop it: TUNNELDB_HOME=$TUNNELDB_HOME $tunneldb server stop
 TEXT
