@@ -83,8 +83,7 @@ def _within(outline: Polygon, surface: Surface) -> Polygon:
 
 def _off(unrolled: Float, surface: Surface) -> NDArray[np.bool_]:
     """Which (chainage, arc) rows (n, 2) don't lie on the surface."""
-    off: NDArray[np.bool_] = np.isnan(surface.roll(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled)))).any(axis=1)
-    return off
+    return np.isnan(surface.roll(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled)))[:, 0])
 
 
 def strip(surface: Surface, unrolled: Float) -> Float:
