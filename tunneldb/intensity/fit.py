@@ -2,7 +2,7 @@
 
 Views of one cell are compared with each other (fixed effects), cells of one stretch of the tunnel with each other as far
 as their reflectance is alike (random effects: Swamy and Arora, 1972). Outliers – leaks, joints, what hangs on the lining –
-lose their weight (Tukey's biweight). The covariance is a sandwich (Liang and Zeger, 1986): of views clustered by patches of
+lose their weight (Tukey's biweight). The covariance is a sandwich (Liang and Zeger, 1986): of views clustered by rings of
 the lining, of cells by the covariance of neighbours, with what rings and strips have in common as components of variance.
 """
 
@@ -230,8 +230,10 @@ class _Problem:
             one,
             self.cells.count,
         )
-        patches = self.cells.patch.max() + 1
-        spread = _outer(_sums(self.cells.patch, scores)) * patches / max(patches - p - 1, 1)
+        # Joints run around the section, and a scan's rows of points cross them alike all around.
+        cluster = self.cells.ring if self.cells.ring.min() >= 0 else self.cells.stretch
+        clusters = int(cluster.max()) + 1
+        spread = _outer(_sums(cluster, scores)) * clusters / max(clusters - p - 1, 1)
         spread += self._nearby(left, weights, means, between)
         spread += self._common(left, weights, means, between)
         information = within.T @ (within * one[:, None]) + means.T @ (means * between[:, None])

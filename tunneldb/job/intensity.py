@@ -19,7 +19,7 @@ from tunneldb.intensity.cells import Sight
 from tunneldb.intensity.correct import Kind, needs_reference, to_decibel
 from tunneldb.intensity.look import Look, pool
 from tunneldb.intensity.oren_nayar import incidence_db
-from tunneldb.intensity.range_curve import RangeCurve, estimate_range_curve
+from tunneldb.intensity.range_curve import FEWEST_CELLS, RangeCurve, estimate_range_curve
 from tunneldb.intensity.reference import ReferenceCurve
 from tunneldb.job.detect import ASIDE, load_floor
 from tunneldb.job.radiometry import UNKNOWN, find_radiometer, find_range_curve, roughness_of, take_sample
@@ -180,10 +180,12 @@ def _look(
     if found:
         sigma, where = found.worst
         notes.append(
-            f"{title}: found on {found.cells:,} cells, {found.overlapping:,} of them seen by several scans: range curve known to"
-            f" {sigma:.2f} dB between {found.nearest:.1f} and {found.farthest:.1f} m (worst at {where:.1f} m),"
+            f"{title}: found on {found.cells:,} cells, {found.overlapping:,} of them seen by several scans: range curve known"
+            f" to {sigma:.2f} dB between {found.nearest:.1f} and {found.farthest:.1f} m (worst at {where:.1f} m),"
             f" roughness {found.roughness:.1f}° ± {found.roughness_sigma:.1f}°"
         )
+        if found.overlapping < FEWEST_CELLS:
+            notes.append(f"{title}: hardly any of it was seen by two scans, so it is taken to be alike all around and along")
     if refused:
         notes.append(f"{title}: {refused}")
     return Look(

@@ -1,0 +1,153 @@
+"""Range curve and roughness found on the lining, against the simulator's curve and against made-up linings."""
+
+import numpy as np
+import pytest
+
+from tunneldb.errors import UserError
+from tunneldb.intensity.cells import Sight
+from tunneldb.intensity.dependence import Dependence, course
+from tunneldb.intensity.oren_nayar import incidence_db
+from tunneldb.intensity.range_curve import estimate_range_curve
+from tunneldb.intensity.spline import RangeSpline, one_maximum
+from tunneldb.simulate import Parameters, simulate
+from tunneldb.simulate.intensity import range_term
+
+
+def _inverse_square(range_m):
+    return -20.0 * np.log10(range_m)
+
+
+def _sight(true=range_term, **parameters):
+    """Lining of a simulated tunnel, its leaks and all, as many points as survey density has; by this range curve."""
+    cloud = simulate(Parameters(**{"length": 40.0, "angular_step": 0.5, "leaks": 5, **parameters}))
+    near = np.flatnonzero((np.abs(cloud.offset) < 0.05) & ((cloud.klass == 0) | (cloud.klass == 2)))
+    range_m = cloud.range[near].astype(float)
+    level = cloud.amplitude[near] - range_term(range_m) + true(range_m)
+    place = np.column_stack([cloud.chainage[near], cloud.arc[near]])
+    return Sight(place, cloud.scan_id[near], range_m, np.cos(cloud.incidence[near].astype(float)), level)
+
+
+def _errors(found, true):
+    """Difference of the curves' shapes over the ranges present, dB, and the deviation that is claimed there."""
+    at = np.linspace(found.nearest, found.farthest, 60)
+    off = found.curve(at) - true(at)
+    return off - off.mean(), np.interp(at, found.curve.range_m, found.sigma_db)
+
+
+@pytest.mark.parametrize(
+    ("seed", "section", "roughness", "true"),
+    [(1, "circular", 12.0, range_term), (2, "horseshoe", 28.0, _inverse_square), (3, "box", 6.0, range_term)],
+)
+def test_curve_of_static_stations_is_within_a_third_of_a_decibel(seed, section, roughness, true):
+    found = estimate_range_curve(_sight(true, seed=seed, section=section, roughness=roughness, station_spacing=10.0))
+    found.require()
+    off, sigma = _errors(found, true)
+    assert np.abs(off).max() < 0.3
+    assert np.mean(np.abs(off) < 3.0 * sigma) > 0.9
+    assert found.roughness == pytest.approx(roughness, abs=2.0)
+
+
+def test_curve_of_a_profiler_off_the_middle():
+    found = estimate_range_curve(_sight(scanner="profiler", profile_spacing=0.1, profile_points=500, seed=4))
+    found.require()
+    assert np.abs(_errors(found, range_term)[0]).max() < 0.1
+
+
+def test_a_centred_profiler_in_a_round_tunnel_is_refused():
+    with pytest.raises(UserError, match=r"can't be told apart.*4\.00 to 4\.00 m.*scan a target"):
+        estimate_range_curve(
+            _sight(scanner="profiler", profile_spacing=0.1, profile_points=500, scanner_offset=0.0, scanner_height=2.8)
+        )
+
+
+def test_cells_of_any_reflectance_seen_by_several_scans():
+    """Each cell has its own reflectance, up to 1 dB from the others'; four scans see them across each other."""
+    rng = np.random.default_rng(5)
+    place = np.column_stack([rng.uniform(0, 60, 60_000), rng.uniform(-6, 6, 60_000)])
+    scan = rng.integers(0, 4, len(place))
+    wall = 3.0 + 0.5 * np.abs(place[:, 1])
+    range_m = np.hypot(place[:, 0] - 20.0 * scan, wall)
+    cosine = wall / range_m
+    cell = np.floor(place / 0.5) @ [1, 1000]
+    level = np.sin(cell * 12.9898) + range_term(range_m) + incidence_db(cosine, 15.0) + rng.normal(0, 0.3, len(place))
+    found = estimate_range_curve(Sight(place, scan, range_m, cosine, level).some(cosine > np.cos(np.radians(75))))
+    found.require()
+    assert np.abs(_errors(found, range_term)[0]).max() < 0.3
+    assert found.roughness == pytest.approx(15.0, abs=2.0)
+
+
+def test_range_and_incidence_that_are_one_function_are_refused():
+    """A wall 4 m off, seen along a line: R cos θ is the same everywhere."""
+    rng = np.random.default_rng(6)
+    place = np.column_stack([rng.uniform(0, 60, 40_000), rng.uniform(-6, 6, 40_000)])
+    scan = rng.integers(0, 4, len(place))
+    range_m = np.hypot(place[:, 0] - 20.0 * scan, 4.0)
+    level = range_term(range_m) + incidence_db(4.0 / range_m, 15.0) + rng.normal(0, 0.3, len(place))
+    with pytest.raises(UserError, match=r"uncertain by .* dB at .*scan a target"):
+        estimate_range_curve(Sight(place, scan, range_m, 4.0 / range_m, level)).require()
+
+
+def test_soot_around_the_crown_makes_a_profilers_curve_uncertain():
+    """What changes around the section can't be told from range there; it shows by its changes along the tunnel."""
+    plain = _sight(scanner="profiler", profile_spacing=0.1, profile_points=500, seed=4)
+    soot = 3.0 * np.exp(-((plain.place[:, 1] / 4.0) ** 2)) * (1.0 + 0.5 * np.sin(plain.place[:, 0] / 5.0))
+    with pytest.raises(UserError, match="uncertain by"):
+        estimate_range_curve(Sight(plain.place, plain.scan, plain.range_m, plain.cosine, plain.level - soot)).require()
+
+
+def test_too_little_lining_is_refused():
+    sight = _sight()
+    with pytest.raises(UserError, match="it takes 200"):
+        estimate_range_curve(sight.some(sight.place[:, 0] < 2.0))
+
+
+def test_a_curve_goes_on_beyond_what_it_was_found_on():
+    sight = _sight(_inverse_square, seed=6)
+    found = estimate_range_curve(sight, reach=(1.0, 40.0))
+    assert found.curve.range_m[0] < 1.0
+    assert found.curve.range_m[-1] > 40.0
+    # The inverse square is a straight line over ln R.
+    drop = found.curve(np.array([found.farthest]))[0] - found.curve(np.array([2.0 * found.farthest]))[0]
+    assert drop == pytest.approx(20.0 * np.log10(2.0), abs=1.0)
+
+
+def test_splines_add_up_to_one_and_are_straight_outside():
+    spline = RangeSpline.over(2.0, 20.0)
+    np.testing.assert_allclose(spline(np.geomspace(0.5, 60.0, 50)).sum(axis=1), 1.0, atol=1e-9)
+    outside = spline(np.exp(np.array([3.5, 3.7, 3.9])))
+    np.testing.assert_allclose(outside[2] - outside[1], outside[1] - outside[0], atol=1e-9)
+
+
+def test_one_maximum_is_the_least_loss_of_that_shape():
+    rng = np.random.default_rng(7)
+    root = rng.normal(size=(20, 6))
+    target = rng.normal(size=20)
+    b = one_maximum(root.T @ root, root.T @ target)
+    steps = np.sign(np.round(np.diff(b), 9))
+    assert np.all(np.diff(steps[steps != 0]) <= 0)
+    loss = np.sum((root @ b - target) ** 2)
+    for _ in range(300):
+        other = np.sort(rng.normal(size=6))
+        top = rng.integers(0, 6)
+        other[top:] = other[top:][::-1]
+        if np.sum(np.diff(np.sign(np.diff(other))) > 0) == 0:
+            assert loss <= np.sum((root @ other - target) ** 2) + 1e-9
+
+
+def test_course_of_a_straight_line():
+    rng = np.random.default_rng(8)
+    at = rng.uniform(2.0, 12.0, 50_000)
+    seen = course(at, 3.0 - 0.5 * at + rng.normal(0, 0.1, len(at)))
+    assert seen.slope == pytest.approx(-0.5, abs=0.005)
+    assert seen.spread == pytest.approx(0.5 * 10.0 / np.sqrt(12.0), rel=0.02)
+    assert len(course(at[:5], at[:5]).at) == 0
+
+
+def test_verdict_says_what_is_left():
+    rng = np.random.default_rng(9)
+    range_m, angle = rng.uniform(2, 12, 20_000), rng.uniform(0, 70, 20_000)
+    noise = rng.normal(0, 0.2, 20_000)
+    assert "neither" in Dependence.of(range_m, angle, noise, noise).verdict()
+    left = Dependence.of(range_m, angle, noise, noise - 0.2 * range_m).verdict()
+    assert "still depends on range" in left
+    assert "incidence" not in left
