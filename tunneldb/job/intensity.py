@@ -77,8 +77,9 @@ def _look_at_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, v
         values["intensity.max_range"],
     )
     depth = values["lining.tolerance"], values["lining.recess"]
-    view = take_sample(conn, survey, Eye.of(surface, km, depth, radiometer, load_floor(conn, survey, km, 0.0)))
-    found, refused = _attempt(lambda: find_range_curve(view))
+    eye = Eye.of(surface, km, depth, radiometer, load_floor(conn, survey, km, 0.0))
+    view = take_sample(conn, survey, eye)
+    found, refused = _attempt(lambda: find_range_curve(view, eye))
     if needs_reference(kind) and measured is None:
         roughness = found.roughness if found else None
         view = view.along(found.curve if found else UNKNOWN)

@@ -163,7 +163,7 @@ def calibrate(conn: psycopg.Connection[Any], survey: Survey, eye: Eye, drawn: li
         return Calibration(eye, view, roughness_of(view, drawn), None)
     assert eye.radiometer is not None
     try:
-        found = find_range_curve(view)
+        found = find_range_curve(view, eye)
         found.require()
     except UserError as error:
         raise UserError(f"survey {survey.name}, kilometre {eye.km}: {error}") from None
@@ -172,8 +172,11 @@ def calibrate(conn: psycopg.Connection[Any], survey: Survey, eye: Eye, drawn: li
     return Calibration(eye, view, roughness_of(view, drawn) if drawn else _roughness_found(view, found), found)
 
 
-def find_range_curve(view: Sample) -> RangeCurve:
-    """Range curve and roughness from the lining itself; see :func:`estimate_range_curve`."""
+def find_range_curve(view: Sample, eye: Eye) -> RangeCurve:
+    """Range curve and roughness from the lining itself; see :func:`estimate_range_curve`.
+
+    It spans the ranges of all that full density may hold as lining: what stands out from it or back behind it too.
+    """
     seen, views, near = view.seen, view.views, view.telling
     ranges = views.range_m[seen.lining].astype(np.float64)
     return estimate_range_curve(
@@ -184,7 +187,7 @@ def find_range_curve(view: Sample) -> RangeCurve:
             views.cosine[near].astype(np.float64),
             views.raw_db[near].astype(np.float64),
         ),
-        reach=(float(ranges.min()), float(ranges.max())),
+        reach=(max(float(ranges.min()) - eye.tolerance, 0.1), float(ranges.max()) + max(eye.tolerance, eye.recess)),
     )
 
 
