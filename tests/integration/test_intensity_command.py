@@ -1,4 +1,4 @@
-"""The verb intensity on scan files by themselves; on a survey, in test_detect."""
+"""The verb intensity on scan files by themselves."""
 
 from pathlib import Path
 
