@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,18 +16,21 @@ from tests.integration.test_detect import APPENDAGE, FLOOR, NAME, command, count
 from tests.loading import SURVEY, add_survey
 from tunneldb.database import get_survey
 from tunneldb.geometry.store import load_surface
-from tunneldb.intensity.dry import Dry
 from tunneldb.intensity.roughness import Roughness
 from tunneldb.job import detect as job
+from tunneldb.job import radiometry
+from tunneldb.job.parameters import settings
 from tunneldb.job.scene import load_arcs
 from tunneldb.job.sources import sources
 from tunneldb.leak import detection
 from tunneldb.leak.border import replace_parts
+from tunneldb.leak.dry_map import map_dry
 from tunneldb.leak.gather import gather
-from tunneldb.leak.image import Accumulator
+from tunneldb.leak.image import Accumulator, Grid
 from tunneldb.leak.lining import Astray, Floor
 from tunneldb.leak.picture import develop
-from tunneldb.leak.region import Region
+from tunneldb.leak.region import Region, Traits
+from tunneldb.leak.relative import relative
 from tunneldb.leak.seen import Eye
 from tunneldb.simulate import Simulation, generate, write
 from tunneldb.simulate.leaks import Leak
@@ -72,6 +75,25 @@ def sections(conn: psycopg.Connection, scan: Path) -> psycopg.Connection:
     return conn
 
 
+@dataclass(frozen=True)
+class Flat:
+    """Dry lining that is everywhere alike."""
+
+    grid: Grid
+    mean: float
+    spread: float
+    count: int = 1
+    tile: int = 25
+    drawn: tuple[Polygon, ...] = ()
+
+    @property
+    def sigma(self) -> np.ndarray:
+        return np.full((-(-self.grid.rows // 25), -(-self.grid.columns // 25)), self.spread, np.float32)
+
+    def levels(self, rows: slice, columns: slice) -> np.ndarray:
+        return np.full((rows.stop - rows.start, columns.stop - columns.start), self.mean, np.float32)
+
+
 @pytest.fixture
 def uncut(sections: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> list[Polygon]:
     """The leaks with the same surface and points, but the end elsewhere; roughness and dry lining are one for all then."""
@@ -82,18 +104,23 @@ def uncut(sections: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> list
     grid = job._grid(surface, 12, PIXEL)
     first = int(START - SHIFT)
     floor = Floor.of(first, *load_arcs(conn, survey, int(START), int(START) + 24))
-    eye = Eye.of(surface, 12, 0.5, job._radiometer(conn, survey, 80.0), floor, grid.halo * PIXEL)
+    values = settings()
+    radiometer = radiometry.find_radiometer(conn, survey, values["intensity.max_incidence"], values["intensity.max_range"])
+    depth = values["lining.tolerance"], values["lining.recess"]
+    eye = Eye.of(surface, 12, depth, radiometer, floor, grid.halo * PIXEL)
     (points,) = conn.execute("SELECT points FROM tunnel.scan_file").fetchone()
     files = [replace(file, ranges=[(0, points)]) for file in sources(conn, survey, 12)]
     with Accumulator(grid) as image:
         gather(eye, files, image, ROUGHNESS.sigma, lambda share: None)
-        picture = develop(image, eye.floor, Astray.of(surface), 0.03, lambda window: None)
-    found = detection.detect(picture, 0.05)
+        picture = develop(image, eye.floor, Astray.of(surface), values["appendage.distance"], lambda window: None)
+    dry = map_dry(picture)
+    mean, spread = dry.mean, dry.spread
+    flat = Flat(grid, mean, spread)
+    found = detection.detect(relative(picture, flat), flat, 0.05)
     conn.rollback()
-    dry = Dry(found.dry.mean, found.dry.sigma, found.dry.count)
-    monkeypatch.setattr(detection, "_dry_statistics", lambda *_: dry)
-    monkeypatch.setattr(job, "_roughness", lambda *_: ROUGHNESS)
-    return [shapely.affinity.translate(leak.outline, SHIFT) for leak in found.leaks]
+    monkeypatch.setattr(job, "map_dry", lambda picture, _: Flat(picture.grid, mean, spread))
+    monkeypatch.setattr(radiometry, "roughness_of", lambda *_: ROUGHNESS)
+    return [shapely.affinity.translate(anomaly.outline, SHIFT) for anomaly in found.found]
 
 
 def assert_same(found: dict[int, Polygon], expected: list[Polygon]) -> None:
@@ -180,7 +207,7 @@ def test_pixels_of_two_sizes_are_not_put_together(sections: psycopg.Connection, 
 
 
 def region(first: int, last: int, row: int = 0) -> Region:
-    return Region(0.5, first, row, np.ones((2, last - first), bool), 2 * (last - first), 1.0, float(first))
+    return Region(0.5, first, row, np.ones((2, last - first), bool), 2 * (last - first), 1.0, float(first), Traits(rim=1.0))
 
 
 THROUGH = {
@@ -206,6 +233,7 @@ def test_any_order_of_kilometres_puts_the_same_together(conn: psycopg.Connection
             made = cluster.region
             box = (made.column, made.row, made.stop, made.row + len(made.mask))
             assert seen.setdefault(box, made).mask.tolist() == made.mask.tolist()
+            assert made.traits == Traits(rim=float(len(cluster.parts)))
             assert (made.filled, made.drop_max) == (made.mask.sum(), max(part.region.drop_max for part in cluster.parts))
     assert sorted(seen) == [
         (25_500, 9, 26_000, 11), (25_990, 0, 28_020, 2), (26_000, 20, 26_007, 22), (28_000, -9, 28_020, -7),
