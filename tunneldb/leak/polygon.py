@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import rasterio.features
 import shapely
-from affine import Affine
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
@@ -16,28 +15,29 @@ LEAST_HOLE = 0.01
 """Smaller holes are closed, m²: noise makes some in weak leaks, and a patch of 10 cm is no place that stayed dry."""
 
 
-def outline(mask: NDArray[np.bool_], transform: Affine) -> Polygon:
+def outline(mask: NDArray[np.bool_], column: int, row: int, pixel: float) -> Polygon:
     """Outline a connected region, with its holes that are large enough.
 
     Parameters
     ----------
     mask : (rows, columns) bool array
-        Its pixels; they hang together by their sides.
-    transform : Affine
-        From pixels (column, row) to (chainage, arc), m.
+        Its pixels, the first row at the lowest arc; they hang together by their sides.
+    column, row : int
+        Chainage and arc of the mask's lowest corner, pixels.
+    pixel : float
+        Side of a pixel, m.
 
     Returns
     -------
     Polygon
-        Valid, exterior counter-clockwise.
+        Of (chainage, arc), m; valid, exterior counter-clockwise.
     """
-    image = np.ascontiguousarray(mask, dtype=np.uint8)
-    # In whole pixels first: the outline of a region must not depend on the kilometre that it lies in.
+    image = np.ascontiguousarray(mask[::-1], dtype=np.uint8)
     ((shape, _),) = rasterio.features.shapes(image, mask=image.astype(bool), connectivity=4)
-    pixels = _straighten(_without_specks(shapely.geometry.shape(shape), LEAST_HOLE / abs(transform.determinant)))
-    moved = shapely.transform(
-        pixels, lambda at: np.column_stack([at, np.ones(len(at))]) @ np.array(transform).reshape(3, 3).T[:, :2]
-    )
+    pixels = _straighten(_without_specks(shapely.geometry.shape(shape), LEAST_HOLE / pixel**2))
+    # Whole pixels to the last: the outline of a region must not depend on the kilometre that it lies in.
+    corner = np.array([column, row + len(mask)])
+    moved = shapely.transform(pixels, lambda at: (corner + np.round(at) * [1, -1]) * pixel)
     return shapely.geometry.polygon.orient(shapely.normalize(moved))
 
 

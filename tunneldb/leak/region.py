@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from affine import Affine
 from numba import njit
 from numpy.typing import NDArray
 from scipy import sparse
@@ -111,8 +110,7 @@ class Region:
     @property
     def outline(self) -> Polygon:
         """Polygon of (chainage, arc), m."""
-        west, north = self.column * self.pixel, (self.row + self.mask.shape[0]) * self.pixel
-        return outline(self.mask[::-1], Affine(self.pixel, 0.0, west, 0.0, -self.pixel, north))
+        return outline(self.mask, self.column, self.row, self.pixel)
 
 
 def regions(dark: Mask, relative: Relative, min_area: float) -> list[Region]:
