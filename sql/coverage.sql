@@ -67,7 +67,7 @@ AS $$
     CROSS JOIN LATERAL (SELECT tunnel_api.interpolate(r.ends, c.chainage, c.lining) AS lining,
         tunnel_api.interpolate(r.ends, c.chainage, c.seen) AS seen, tunnel_api.interpolate(r.ends, c.chainage, c.wet) AS wet) a
     CROSS JOIN LATERAL (SELECT a.lining[2] - a.lining[1] AS lining, a.seen[2] - a.seen[1] AS seen, a.wet[2] - a.wet[1] AS wet) d
-    WHERE r.ends[1] < r.ends[2]
+    WHERE e.chainage_from IS NOT NULL AND r.ends[1] < r.ends[2]
 $$;
 COMMENT ON FUNCTION tunnel_api.coverage(text, float8, float8) IS
 'Lining of a survey between two chainages (m), what the last detection saw of it, and the pixels that it found wet, after the median filter (m²); seen_share of the lining, wet_pixel_share of what was seen, as Xu et al. (2018) state it. Steps of chainage that an end cuts count by their share; kilometres without detection are not counted.';

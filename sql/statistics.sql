@@ -44,7 +44,7 @@ AS $$
             $1, floor(($2)[1] / 1000)::int, floor(($3)[cardinality($3)] / 1000)::int) c
     ), stretch AS MATERIALIZED (
         SELECT q.n::int AS n, q.low, q.high, q.a, q.b, q.seen_b - q.seen_a AS seen,
-            least(q.length_b - q.length_a, q.high - q.low) / nullif(q.high - q.low, 0) AS looked_at
+            least(coalesce(q.length_b - q.length_a, 0), q.high - q.low) / nullif(q.high - q.low, 0) AS looked_at
         FROM sums c
         CROSS JOIN LATERAL unnest($2, $3,
             tunnel_api.interpolate($2, c.chainage, c.lining), tunnel_api.interpolate($3, c.chainage, c.lining),
@@ -151,7 +151,7 @@ AS $$
         r.crowd, r.crowd_low, r.crowd_high, r.leaks, r.window_wet,
         (SELECT min(c.id) FROM tunnel_api.waterproof_limit c
          WHERE r.seen > 0 AND (r.ratio > c.wet_ratio) IS NOT TRUE AND (r.largest > c.patch_area) IS NOT TRUE
-            AND (r.crowd > c.patches_per_100) IS NOT TRUE)
+            AND (r.crowd > c.patches_per_100 OR (c.patches_per_100 = 0 AND r.patches > 0)) IS NOT TRUE)
     FROM result r
     ORDER BY r.n
 $$;
@@ -210,7 +210,7 @@ AS $$
                                  tunnel_api.chainage_label(t.window_from), tunnel_api.chainage_label(t.window_to),
                                  c.patches_per_100) END,
             CASE c.patches_per_100 WHEN 0 THEN (SELECT array_agg(l.id) FROM leak l) ELSE t.window_leaks END
-        FROM found t 
+        FROM found t
         JOIN tunnel_api.waterproof_limit c ON t.window_patches > c.patches_per_100 OR (c.patches_per_100 = 0 AND t.patches > 0)
     )
     SELECT c.id, CASE WHEN b.texts IS NOT NULL THEN false WHEN t.seen_area > 0 THEN true END, coalesce(b.texts, '{}'),
@@ -240,6 +240,10 @@ DECLARE
 BEGIN
     IF NOT (ring_length >= 0.1 AND ring_length < 'Infinity') THEN
         RAISE EXCEPTION 'a ring must be at least 0.1 m long, not % m', ring_length USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    IF NOT (first_chainage > '-Infinity' AND first_chainage < 'Infinity') THEN
+        RAISE EXCEPTION 'the first ring must begin at a finite chainage, not %', first_chainage
+            USING ERRCODE = 'invalid_parameter_value';
     END IF;
     SELECT e.* INTO extent FROM tunnel_api.survey_ends(survey_key) e;
     SELECT array_agg(first_chainage + (i - 1) * ring_length ORDER BY i), array_agg(first_chainage + i * ring_length ORDER BY i)

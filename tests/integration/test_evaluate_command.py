@@ -105,6 +105,21 @@ def test_figures_follow_what_is_changed(conn, survey, tmp_path):
     assert "missed" in text
 
 
+def test_lining_seen_before_there_was_a_coverage_is_that_of_the_ledger(conn, survey, tmp_path):
+    conn.execute("DELETE FROM tunnel.coverage")
+    conn.execute(
+        """UPDATE tunnel.run SET counts = '{"lining_pixels": 200000}', parameters = '{"image.pixel": 0.1}'
+            WHERE stage = 'detect'"""
+    )
+    truth = gpkg(tmp_path / "truth.gpkg", leaks(conn)[1:])
+    found = figures(survey, truth, tmp_path)
+    assert found["seen_m2"] == pytest.approx(2000.0)
+    assert found["groups"][0]["false_per_1000"] == pytest.approx(0.5)
+    conn.execute("UPDATE tunnel.run SET counts = '{}'")
+    conn.commit()
+    assert figures(survey, truth, tmp_path)["seen_m2"] is None
+
+
 def test_an_inspector_s_word_counts(conn, survey, tmp_path):
     truth = gpkg(tmp_path / "truth.gpkg", leaks(conn))
     (key,) = conn.execute(

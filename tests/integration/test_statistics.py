@@ -328,6 +328,18 @@ def test_what_was_not_seen_holds_no_class(conn: psycopg.Connection, plain: int) 
     key = square(conn, plain, 100, 0.4)
     assert {number: holds for number, (holds, _, _) in classes(conn).items()} == {1: False, 2: False, 3: False, 4: None}
     assert classes(conn)[3][2] == [key]
+    assert ask(conn, "SELECT seen_share FROM tunnel_api.leak_statistics('s', 0, 500)") == [{"seen_share": 0}]
+
+
+def test_leak_where_no_lining_is_known_is_no_first_class(conn: psycopg.Connection) -> None:
+    """One kilometre was detected before there was a coverage; its leaks are in no window of 100 m²."""
+    survey = add_survey(conn, 0, 2000)
+    lining = np.full(10_000, 2.0)
+    add_coverage(conn, survey, 1, lining, lining, 0 * lining)
+    key = square(conn, survey, 500, 0.1)
+    found = classes(conn, 0, 2000)
+    assert found[1] == (False, ["wet patches: 1"], [key])
+    assert found[2][0] is True
 
 
 def test_leak_over_the_end_counts_by_its_part_as_one_patch_of_its_whole_size(conn: psycopg.Connection, plain: int) -> None:
@@ -350,6 +362,11 @@ def test_ranges_are_cut_to_the_survey(conn: psycopg.Connection, plain: int) -> N
     for bad in (0, -1, "NaN", "Infinity"):
         with pytest.raises(psycopg.errors.InvalidParameterValue, match="at least"), conn.transaction():
             conn.execute("SELECT tunnel_api.ring_statistics('s', %s, 0)", (bad,))
+    with pytest.raises(psycopg.errors.InvalidParameterValue, match="finite"), conn.transaction():
+        conn.execute("SELECT tunnel_api.ring_statistics('s', 1, '-Infinity')")
+    conn.execute("DELETE FROM tunnel.segment")
+    for function in ("coverage", "leak_statistics"):
+        assert ask(conn, f"SELECT * FROM tunnel_api.{function}('s', '-Infinity', 'Infinity') f WHERE f.lining_area > 0") == []
     with pytest.raises(psycopg.Error, match="there is no survey x"):
         conn.execute("SELECT tunnel_api.coverage('x', 0, 1)")
 

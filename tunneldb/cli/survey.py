@@ -119,13 +119,14 @@ def remove(settings: Settings, name: str, yes: bool) -> None:
             """
             SELECT (SELECT coalesce(sum(kept), 0) FROM tunnel.scan_file WHERE survey_id = %(id)s),
                    (SELECT count(*) FROM tunnel.anomaly WHERE survey_id = %(id)s),
-                   (SELECT count(*) FROM tunnel.anomaly WHERE survey_id = %(id)s AND review <> 'open')
+                   (SELECT count(*) FROM tunnel.anomaly WHERE survey_id = %(id)s
+                     AND (review <> 'open' OR judged IS NOT NULL))
             """,
             {"id": found.id},
         ).fetchone()
         assert row is not None
         connection.rollback()
-        question = f"Remove {name} with {row[0]} points and {row[1]} leaks, {row[2]} of them reviewed?"
+        question = f"Remove {name} with {row[0]} points and {row[1]} leaks and other dark spots, {row[2]} of them reviewed?"
         if not yes and not click.confirm(question):
             raise click.Abort
         remove_survey(connection, name)

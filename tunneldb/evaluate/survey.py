@@ -94,13 +94,14 @@ def read_findings(conn: psycopg.Connection[Any], survey: Survey, km: str | None 
 
 
 def _seen(conn: psycopg.Connection[Any], survey: Survey, kilometres: Sequence[int]) -> float:
-    """Lining that was seen in kilometres, m²: their coverage, or the lining that the ledger counts."""
+    """Lining that was seen in kilometres, m²: their coverage, or what the ledger counts; NaN where one has neither."""
     row = conn.execute(
         """
-        SELECT sum(coalesce((SELECT sum(s) FROM tunnel.coverage c, unnest(c.seen) AS s
-                              WHERE c.survey_id = %(survey)s AND c.km = k.km), m.lining_area))
-          FROM unnest(%(km)s::int[]) AS k (km)
-          LEFT JOIN tunnel_api.km_statistics m ON m.survey_id = %(survey)s AND m.km = k.km
+        SELECT CASE WHEN bool_and(t.seen IS NOT NULL) THEN sum(t.seen) END
+          FROM (SELECT coalesce((SELECT sum(s) FROM tunnel.coverage c, unnest(c.seen) AS s
+                                  WHERE c.survey_id = %(survey)s AND c.km = k.km), m.seen_area) AS seen
+                  FROM unnest(%(km)s::int[]) AS k (km)
+                  LEFT JOIN tunnel_api.km_statistics m ON m.survey_id = %(survey)s AND m.km = k.km) t
         """,
         {"survey": survey.id, "km": list(kilometres)},
     ).fetchone()
