@@ -246,6 +246,8 @@ def _thinned(path: Path, dimension: str) -> tuple[Float, NDArray[np.int32], NDAr
             kept = [_thin(_joined(kept), edge)]
             count = len(kept[0])
             edge *= 1.0 if count <= MOST_POINTS else 2.0**0.5
+    if not count:
+        raise UserError(f"{path}: the file holds no points")
     points = _thin(_joined(kept), edge)
     return points.xyz, points.scan_id, points.intensity
 
