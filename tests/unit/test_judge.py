@@ -126,8 +126,8 @@ def test_drips_are_a_part_of_the_patch_above_them() -> None:
 def test_joints_are_no_leaks_and_do_not_tie_leaks_together() -> None:
     canvas = Canvas(3)
     for chainage in np.arange(0.75, WIDTH, 1.5):
-        canvas.paint(box(chainage, -HALF, chainage + 0.06, HALF), 3.0)
-    canvas.paint(box(0.2, 1.0, WIDTH - 0.2, 1.06), 3.0)
+        canvas.paint(box(chainage, -HALF, chainage + 0.05, HALF), 3.0)
+    canvas.paint(box(0.2, 1.0, WIDTH - 0.2, 1.04), 3.0)
     true = [blob(3.0, 2.2, 0.6), blob(8.3, -1.5, 0.8, 1)]
     for leak in true:
         canvas.paint(leak, 3.0)
@@ -135,7 +135,7 @@ def test_joints_are_no_leaks_and_do_not_tie_leaks_together() -> None:
     leaks = of_kind(found, "leak")
     assert len(leaks) == 2
     for leak, anomaly in zip(true, leaks, strict=True):
-        assert anomaly.outline.area == pytest.approx(leak.area, rel=0.15)
+        assert anomaly.outline.area == pytest.approx(leak.area, rel=0.2)
     joints = of_kind(found, "joint")
     assert len(joints) >= 9
     assert all("thin" in joint.verdict.reasons for joint in joints)
@@ -161,7 +161,9 @@ def test_repairs_and_stripes_have_straight_sides(drop: float) -> None:
     canvas.paint(box(1.0, -2.0, 9.0, -1.89), 3.5)
     found = canvas.detect().found
     assert len(found) == 5
-    assert all(anomaly.verdict.kind == "dark" and "rectangular" in anomaly.verdict.reasons for anomaly in found)
+    assert all(anomaly.verdict.kind == "dark" for anomaly in found)
+    assert sum("rectangular" in anomaly.verdict.reasons for anomaly in found) == 4
+    assert sum("stripe" in anomaly.verdict.reasons for anomaly in found) == 1
 
 
 def test_soot_fades_out() -> None:

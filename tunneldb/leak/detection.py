@@ -142,9 +142,13 @@ def _regions(dark: Mask, relative: Relative, min_area: float) -> list[Region]:
     inner = relative.grid.inner
     joints = lines(dark, inner.start, inner.stop, relative.grid.pixel)
     if not joints.any():
-        return regions(dark, relative, min_area)
-    found = regions(dark & ~joints, relative, min_area) + regions(joints, relative, min_area)
+        return regions(dark, relative, min_area, _wet)
+    found = regions(dark & ~joints, relative, min_area, _wet) + regions(joints, relative, min_area, _wet)
     return sorted(found, key=lambda region: (region.column, region.row))
+
+
+def _wet(region: Region) -> bool:
+    return judge(region).kind == "leak"
 
 
 def dry_places(relative: Relative, found: Detection, chainage: Float, arc: Float) -> Mask:

@@ -47,6 +47,7 @@ def judge(region: Region) -> Verdict:
         "recess": _recess(region),
         "gradual": _gradual(region, shape),
         "rectangular": _rectangular(region, shape),
+        "stripe": _stripe(shape, region.pixel),
         "shadow": _shadow(region, shape),
     }
     against = sorted((name for name in degrees if degrees[name] > 0.0), key=lambda name: -degrees[name])
@@ -96,7 +97,7 @@ def _gradual(region: Region, shape: Shape) -> float:
 
 
 def _rectangular(region: Region, shape: Shape) -> float:
-    """A repaired patch, a painted stripe: straight sides along the tunnel and around it, three of them seen at least.
+    """A repaired patch: straight sides along the tunnel and around it, three of them seen at least.
 
     A small blob may have straight sides by chance, but no corners; of a very small one pixels don't show the corners.
     """
@@ -105,14 +106,22 @@ def _rectangular(region: Region, shape: Shape) -> float:
         return 0.0
     wander = max(shape.wander_along, shape.wander_across)
     corners = max(_ramp(shape.corners, 0.35, 0.65), _ramp(wander / np.sqrt(shape.area), 0.025, 0.01))
-    # Water that fills a panel between joints is rectangular too, and darker than repairs are; but no stripe.
-    strong = min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP)
-    stripe = _ramp(shape.length / shape.mean_width, 6.0, 10.0)
-    panel = _ramp(strong, 0.8, 1.0) * (1.0 - stripe)
+    # Water that fills a panel between joints is rectangular too, and darker than repairs are.
+    panel = _ramp(min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP), 0.8, 1.0)
     hidden = _ramp(traits.rim_off / traits.rim, 0.4, 0.55)
-    large = max(stripe, _ramp(min(shape.along, shape.across), 12.0 * pixel, 18.0 * pixel))
+    large = _ramp(min(shape.along, shape.across), 12.0 * pixel, 18.0 * pixel)
     sides = _ramp(wander, 1.2 * pixel, 0.6 * pixel)
     return min(sides, _ramp(shape.fill, 0.85, 0.93), corners, large, 1.0 - max(panel, hidden))
+
+
+def _stripe(shape: Shape, pixel: float) -> float:
+    """A painted stripe: a band along the tunnel, straight and as wide at its ends; water along a joint keeps to no edge."""
+    return min(
+        _ramp(shape.slender, 6.0, 10.0),
+        _ramp(shape.wander_box, pixel, 0.6 * pixel),
+        _ramp(shape.fill, 0.85, 0.93),
+        _ramp(shape.corners, 0.4, 0.7),
+    )
 
 
 def _shadow(region: Region, shape: Shape) -> float:

@@ -11,8 +11,9 @@ Mask = NDArray[np.bool_]
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
-NARROW = 0.08
-"""Joints are at most 2 cm wide; the beam, the pixels and the median filter widen them, but not to more, m."""
+NARROW_AROUND, NARROW_ALONG = 0.08, 0.06
+"""Joints are at most 2 cm wide; the beam, the pixels and grout widen them, but not to more, m. Along the tunnel there are
+painted stripes of 10 cm, which are to stay in one piece."""
 
 LONG_AROUND, LONG_ALONG = 1.0, 0.5
 """Water that runs down a wall keeps no straight line for longer, and runs along the tunnel no farther, m."""
@@ -34,7 +35,7 @@ def lines(dark: Mask, first: int, stop: int, pixel: float) -> Mask:
         Side of a pixel, m.
     """
     found = np.zeros(dark.shape, np.bool_)
-    across, along = short_runs(dark, first, stop, max(2, round(NARROW / pixel)))
+    across, along = short_runs(dark, first, stop, max(2, round(NARROW_AROUND / pixel)), max(2, round(NARROW_ALONG / pixel)))
     for runs, upright in ((across, True), (along, False)):
         long = round((LONG_AROUND if upright else LONG_ALONG) / pixel)
         if len(runs) < long:
@@ -86,8 +87,8 @@ def beside(runs: Int) -> tuple[Int, Int]:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True)
-def short_runs(dark: Mask, first: int, stop: int, wide: int) -> tuple[Int, Int]:  # pragma: no cover - compiled
-    """Unbroken runs of dark pixels that are not wider: (row, column, column behind) and (column, row, row behind), in order."""
+def short_runs(dark: Mask, first: int, stop: int, wide: int, high: int) -> tuple[Int, Int]:  # pragma: no cover - compiled
+    """Unbroken runs of dark pixels no wider or higher: (row, column, column behind) and (column, row, row behind), in order."""
     rows = dark.shape[0]
     across, along = np.empty((1024, 3), np.int64), np.empty((1024, 3), np.int64)
     flat, upright = 0, 0
@@ -106,9 +107,9 @@ def short_runs(dark: Mask, first: int, stop: int, wide: int) -> tuple[Int, Int]:
                     flat += 1
             if i == 0 or not dark[i - 1, j]:
                 behind = i + 1
-                while behind < rows and behind - i <= wide and dark[behind, j]:
+                while behind < rows and behind - i <= high and dark[behind, j]:
                     behind += 1
-                if behind - i <= wide:
+                if behind - i <= high:
                     if upright == len(along):
                         along = _longer(along)
                     along[upright] = j, i, behind

@@ -36,8 +36,8 @@ def outline(mask: NDArray[np.bool_], column: int, row: int, pixel: float) -> Pol
     ((shape, _),) = rasterio.features.shapes(image, mask=image.astype(bool), connectivity=4)
     pixels = _straighten(_without_specks(shapely.geometry.shape(shape), LEAST_HOLE / pixel**2))
     # Whole pixels to the last: the outline of a region must not depend on the kilometre that it lies in.
-    corner = np.array([column, row + len(mask)])
-    moved = shapely.transform(pixels, lambda at: (corner + np.round(at) * [1, -1]) * pixel)
+    corner, down = np.array([column, row + len(mask)]), np.array([1, -1])
+    moved = shapely.transform(pixels, lambda at: (corner + np.round(at) * down) * pixel)
     return shapely.geometry.polygon.orient(shapely.normalize(moved))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -113,7 +113,7 @@ class Region:
         return outline(self.mask, self.column, self.row, self.pixel)
 
 
-def regions(dark: Mask, relative: Relative, min_area: float) -> list[Region]:
+def regions(dark: Mask, relative: Relative, min_area: float, drips: Callable[[Region], bool] = lambda _: True) -> list[Region]:
     """Connected dark regions of a kilometre that are large or long enough, or are cut by its ends and may be a part of one.
 
     Drips that hang below a region are a part of it.
@@ -126,6 +126,8 @@ def regions(dark: Mask, relative: Relative, min_area: float) -> list[Region]:
         Their drop.
     min_area : float
         Smaller regions within the kilometre are left out, m².
+    drips : callable
+        Tells whether a region may have drips.
     """
     grid = relative.grid
     inner = grid.inner
@@ -137,12 +139,21 @@ def regions(dark: Mask, relative: Relative, min_area: float) -> list[Region]:
     ends = pieces.touches(inner.start, inner.stop)
     wanted = ends | (pieces.pixels * grid.pixel**2 >= min_area * (1 - 1e-12)) | (pieces.extent * grid.pixel >= LONG)
     whole, bridges = hang(pieces, wanted, grid)
-    chosen = np.flatnonzero(wanted[whole])
-    runs, label = np.concatenate([runs, bridges[:, :3]]), np.concatenate([whole[label], bridges[:, 3]])
-    order = np.argsort(label, kind="stable")
-    stops = np.cumsum(np.bincount(label, minlength=count))
-    found = [_cut_out(runs[order[(stops[k - 1] if k else 0) : stops[k]]], dark, relative) for k in np.unique(whole[chosen])]
+    alone = _by_label(runs, label, count)
+    for k in np.unique(whole[whole != np.arange(count)]).tolist():
+        if not drips(_cut_out(alone(k), dark, relative)):
+            whole[whole == k] = np.flatnonzero(whole == k)
+            bridges = bridges[bridges[:, 3] != k]
+    chosen = _by_label(np.concatenate([runs, bridges[:, :3]]), np.concatenate([whole[label], bridges[:, 3]]), count)
+    found = [_cut_out(chosen(k), dark, relative) for k in np.unique(whole[wanted]).tolist()]
     return sorted(found, key=lambda region: (region.column, region.row))
+
+
+def _by_label(runs: Int, label: Int, count: int) -> Callable[[int], Int]:
+    """What gives the runs of a label."""
+    order = np.argsort(label, kind="stable")
+    stops = np.concatenate([[0], np.cumsum(np.bincount(label, minlength=count))])
+    return lambda k: runs[order[stops[k] : stops[k + 1]]]
 
 
 def _cut_out(runs: Int, dark: Mask, relative: Relative) -> Region:

@@ -31,9 +31,14 @@ class Shape:
     width : float
         Diameter of the largest circle that fits in, about.
     fill : float
-        Share that it fills, 0 to 1, of the box of those rows and columns of pixels of which it fills half.
+        Share that it fills, 0 to 1, of the box of the rows and columns that hold at least half as many of its pixels as the
+        one of the median pixel: what sticks out of it is left out.
     corners : float
         Share that it fills of the emptiest corner of that box, 0 to 1.
+    wander_box : float
+        As ``wander_along``, of what lies in that box.
+    slender : float
+        Length of that box along the tunnel over its width.
     wander_along, wander_across : float
         Standard deviation about straight lines of the sides that face arcs, as one goes along the tunnel, and of those that
         face chainages, as one goes around it.
@@ -45,6 +50,8 @@ class Shape:
     width: float
     fill: float
     corners: float
+    wander_box: float
+    slender: float
     wander_along: float
     wander_across: float
 
@@ -68,19 +75,26 @@ def measure(mask: Mask, pixel: float) -> Shape:
         rows * pixel,
         float(np.count_nonzero(mask)) * pixel**2,
         float(_widest(mask)) * pixel,
-        *_box(mask),
+        *_box(mask, pixel, piece),
         float(_wander(mask, piece)) * pixel,
         float(_wander(np.ascontiguousarray(mask.T), piece)) * pixel,
     )
 
 
-def _box(mask: Mask) -> tuple[float, float]:
-    """Share of the box that is filled, and of its emptiest corner."""
-    across, along = np.count_nonzero(mask, axis=1), np.count_nonzero(mask, axis=0)
-    full = mask[np.ix_(across >= 0.5 * np.median(across), along >= 0.5 * np.median(along))]
+def _box(mask: Mask, pixel: float, piece: int) -> tuple[float, float, float, float]:
+    """Of the box without what sticks out: fill, corners, wander and slenderness."""
+    full = np.ascontiguousarray(mask[np.ix_(_usual(np.count_nonzero(mask, axis=1)), _usual(np.count_nonzero(mask, axis=0)))])
     high, wide = (max(2, round(CORNER * side)) for side in full.shape)
     corners = (full[i, j] for i in (slice(high), slice(-high, None)) for j in (slice(wide), slice(-wide, None)))
-    return float(full.mean()), min(float(corner.mean()) for corner in corners)
+    wander = float(_wander(full, piece)) * pixel
+    return float(full.mean()), min(float(corner.mean()) for corner in corners), wander, full.shape[1] / full.shape[0]
+
+
+def _usual(counts: NDArray[np.intp]) -> Mask:
+    """Which rows or columns hold at least half as many pixels as the one of the median pixel."""
+    ordered = np.sort(counts)
+    median = ordered[np.searchsorted(np.cumsum(ordered), 0.5 * ordered.sum())]
+    return np.asarray(counts >= 0.5 * median, dtype=np.bool_)
 
 
 @njit(cache=True, nogil=True)
