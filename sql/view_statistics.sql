@@ -11,7 +11,7 @@ COMMENT ON VIEW tunnel_api.range_curve IS
     'Range curve that was found on the lining of each kilometre, of surveys whose reference is auto: a row a range';
 COMMENT ON COLUMN tunnel_api.range_curve.range_m IS 'Range, m';
 COMMENT ON COLUMN tunnel_api.range_curve.intensity_db IS 'Intensity of dry lining at right angles at this range, dB';
-COMMENT ON COLUMN tunnel_api.range_curve.sigma_db IS 'Standard deviation of the curve''s shape there, dB';
+COMMENT ON COLUMN tunnel_api.range_curve.sigma_db IS 'Standard deviation of the curve''s shape there, dB; NULL beyond the ranges of nearly all points, where it goes on by its slope';
 
 CREATE OR REPLACE VIEW tunnel_api.radiometry AS
 SELECT r.survey_id::bigint * 1000000 + 500000 + r.km AS id, r.survey_id, s.name AS survey, r.km, s.reference,
@@ -21,12 +21,12 @@ SELECT r.survey_id::bigint * 1000000 + 500000 + r.km AS id, r.survey_id, s.name 
   JOIN tunnel.survey s ON s.id = r.survey_id
   LEFT JOIN LATERAL (SELECT min(v.range_m) AS range_from, max(v.range_m) AS range_to, max(v.sigma_db) AS range_sigma
                        FROM tunnel.range_curve q CROSS JOIN LATERAL unnest(q.range_m, q.sigma_db) AS v (range_m, sigma_db)
-                      WHERE q.survey_id = r.survey_id AND q.km = r.km) c ON true;
+                      WHERE q.survey_id = r.survey_id AND q.km = r.km AND v.sigma_db IS NOT NULL) c ON true;
 COMMENT ON VIEW tunnel_api.radiometry IS 'Intensity correction of each kilometre (Xu et al., 2018)';
 COMMENT ON COLUMN tunnel_api.radiometry.reference IS 'Range curve of the survey: none, measured or auto';
-COMMENT ON COLUMN tunnel_api.radiometry.range_from IS 'Least range of the curve found on the lining (tunnel_api.range_curve), m; NULL unless the reference is auto';
-COMMENT ON COLUMN tunnel_api.radiometry.range_to IS 'Greatest range of it, m';
-COMMENT ON COLUMN tunnel_api.radiometry.range_sigma IS 'Greatest standard deviation of its shape, dB';
+COMMENT ON COLUMN tunnel_api.radiometry.range_from IS 'Least of the ranges that the curve was found on (tunnel_api.range_curve), m; NULL unless the reference is auto';
+COMMENT ON COLUMN tunnel_api.radiometry.range_to IS 'Greatest of them, m';
+COMMENT ON COLUMN tunnel_api.radiometry.range_sigma IS 'Greatest standard deviation of its shape between them, dB: what is judged';
 COMMENT ON COLUMN tunnel_api.radiometry.roughness IS 'Roughness angle of Oren-Nayar, degrees (eq. 13-18)';
 COMMENT ON COLUMN tunnel_api.radiometry.threshold IS 'Corrected intensity below which lining is wet, dB (eq. 19-20)';
 COMMENT ON COLUMN tunnel_api.radiometry.sigma_raw IS 'Standard deviation of dry lining before correction, dB';

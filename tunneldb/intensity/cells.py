@@ -16,14 +16,11 @@ Index = NDArray[np.int64]
 CELL = 0.5
 """Side of a cell, m: the lining in it is of one reflectance."""
 
-PATCH = 2.0
-"""Side of the patches within which residuals may hang together in any way, m."""
+RING = 2.0
+"""Length of the rings within which what is left of views may hang together in any way, m."""
 
 STRETCH = 5.0
 """Length of the stretches that may differ in reflectance in any way, m: at most half a block of in-situ lining."""
-
-SECTOR = 1.0
-"""Width of the strips along the tunnel that may differ in reflectance as a whole, m."""
 
 ENOUGH = 4
 """Points of a view beyond so many don't make it surer: what is left is the surface's texture."""
@@ -47,12 +44,13 @@ class Cells:
         Means of the effect of incidence, dB, for each of ROUGHNESS.
     level : (n,) float array
         Mean intensity, dB.
+    aside : (n,) float array
+        How far from the middle of its cell a view's points lie around the section, on average, m; 0 without an unrolled plane.
     weight : (n,) float array
         Points, at most ENOUGH.
-    patch, stretch : (count,) int arrays
-        Numbers from 0 of the patch and the stretch that hold each cell.
-    ring, sector : (count,) int arrays
-        Numbers from 0 of the ring, as long as a patch, and of the strip; -1 where there is no unrolled plane.
+    stretch, ring, alike : (count,) int arrays
+        Numbers from 0 of the stretch that holds each cell, of the ring (a stretch where there is no unrolled plane), and of
+        the strip of its stretch, one cell wide, in which cells are compared with each other (likewise).
     row, column : (count,) int arrays
         Place of each cell in the unrolled plane, in cells from the first along and across; -1 without one.
     """
@@ -61,18 +59,18 @@ class Cells:
     basis: Float
     incidence: Float
     level: Float
+    aside: Float
     weight: Float
-    patch: Index
     stretch: Index
     ring: Index
-    sector: Index
+    alike: Index
     row: Index
     column: Index
 
     @property
     def count(self) -> int:
         """Number of cells."""
-        return len(self.patch)
+        return len(self.stretch)
 
     @property
     def overlapping(self) -> int:
@@ -124,24 +122,26 @@ def group(sight: Sight, spline: RangeSpline, *, unrolled: bool) -> Cells:
         return np.asarray(np.bincount(number, values) / points)
 
     where = sight.place[first[some]]
+    stretch = _number(np.floor(where[:, :1] / STRETCH if unrolled else where / STRETCH).astype(np.int64))[0]
+    row, column = (_places(where[:, axis]) if unrolled else np.full(len(where), -1) for axis in (0, 1))
     return Cells(
         cell,
         np.column_stack([mean(column) for column in spline(sight.range_m).T]),
         np.column_stack([mean(incidence_db(sight.cosine, roughness)) for roughness in ROUGHNESS]),
         mean(sight.level),
+        mean(sight.place[:, 1] - (at[:, 1] + 0.5) * CELL) if unrolled else np.zeros(len(points)),
         np.minimum(points, ENOUGH).astype(np.float64),
-        _number(np.floor(where / PATCH).astype(np.int64))[0],
-        _number(np.floor(where[:, :1] / STRETCH if unrolled else where / STRETCH).astype(np.int64))[0],
-        *(
-            _strips(where[:, axis], width) if unrolled else np.full(len(where), -1)
-            for axis, width in ((0, PATCH), (1, SECTOR), (0, CELL), (1, CELL))
-        ),
+        stretch,
+        _number(np.floor(where[:, :1] / RING).astype(np.int64))[0] if unrolled else stretch,
+        _number(np.column_stack([stretch, column]))[0] if unrolled else stretch,
+        row,
+        column,
     )
 
 
-def _strips(along: Float, width: float) -> Index:
-    strip: Index = np.floor(along / width).astype(np.int64)
-    return strip - strip.min() if len(strip) else strip
+def _places(along: Float) -> Index:
+    at: Index = np.floor(along / CELL).astype(np.int64)
+    return at - at.min() if len(at) else at
 
 
 def _number(keys: Index) -> tuple[Index, Index]:

@@ -1,9 +1,11 @@
 """Regression of intensity on range and incidence, over cells whose own reflectance is unknown.
 
-Views of one cell are compared with each other (fixed effects), cells of one stretch of the tunnel with each other as far
-as their reflectance is alike (random effects: Swamy and Arora, 1972). Outliers – leaks, joints, what hangs on the lining –
-lose their weight (Tukey's biweight). The covariance is a sandwich (Liang and Zeger, 1986): of views clustered by rings of
-the lining, of cells by the covariance of neighbours, with what rings and strips have in common as components of variance.
+Views of one cell are compared with each other (fixed effects), and so are the cells of one strip along the tunnel within a
+stretch, as far as their reflectance is alike (fixed effects of strips, random ones of cells: Swamy and Arora, 1972). Cells
+side by side around the section are never compared: there soot and grime go with range and incidence. Outliers – leaks,
+joints, what hangs on the lining – lose their weight (Tukey's biweight). The covariance is a sandwich (Liang and Zeger,
+1986): of views clustered by rings of the lining, of cells by the covariance of what all of the section has in common at
+some distance along the tunnel, as rings and blocks have, and of neighbours.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import signal
 from scipy.interpolate import CubicSpline
 
-from tunneldb.intensity.cells import CELL, ROUGHNESS, SECTOR, Cells, Index
+from tunneldb.intensity.cells import CELL, ROUGHNESS, STRETCH, Cells, Index
 from tunneldb.intensity.spline import RangeSpline, one_maximum
 
 Float = NDArray[np.float64]
@@ -29,8 +31,9 @@ ROUNDS = 8
 NEAR = 6.0
 """Distance beyond which cells are no longer taken for neighbours, m."""
 
-ALIKE = 2.0
-"""Distance over which neighbouring strips along the tunnel are alike, m: soot and grime change over metres."""
+APART = 2.0 * STRETCH
+"""Distance along the tunnel up to which what all of the section has in common may go on, m: as long as blocks of in-situ
+lining are."""
 
 
 NOTHING = 1e6
@@ -141,6 +144,7 @@ class _Problem:
         self.bending = spline.bending()
         self.columns = np.column_stack([cells.basis, cells.incidence, cells.level])
         self.terms = len(spline)
+        self.unrolled = bool(cells.column.min() >= 0)
         self.views = np.bincount(cells.cell, minlength=cells.count)
 
     def cell_means(self, values: Float, weight: Float) -> Float:
@@ -155,10 +159,13 @@ class _Problem:
         means = self.cell_means(columns, weights.view)
         between = weights.cell / (weights.lining + weights.noise / np.maximum(total, 1e-9)) / weights.design
         between = np.where(total > 0, between, 0.0)
-        # Stretches may differ as they like: only what differs within one counts.
-        stretch = self.cells.stretch
-        middles = _sums(stretch, means, between) / np.maximum(_sums(stretch, np.ones(len(between)), between), 1e-9)[:, None]
-        return columns - means[self.cells.cell], means - middles[stretch], weights.view / weights.noise, between
+        aside = self.cell_means(self.cells.aside, weights.view)
+        return (
+            columns - means[self.cells.cell],
+            _within(self.cells.alike, means, aside, between),
+            weights.view / weights.noise,
+            between,
+        )
 
     def solve(self, weights: _Weights) -> _Solution:
         """Find the roughness and the coefficients of the least loss."""
@@ -198,7 +205,7 @@ class _Problem:
         scaled = (residual - means[cells.cell]) * np.sqrt(cells.weight)
         # n views of a cell leave n - 1 differences.
         lost = self.views[cells.cell] / np.maximum(self.views[cells.cell] - 1, 1)
-        away = means - _medians(self.cells.stretch, means)
+        away = means - _medians(self.cells.alike, means)
         among = _deviation(away)
         noise = _deviation(scaled[several] * np.sqrt(lost[several])) ** 2 if several.sum() >= 100 else among**2
         noise = max(noise, 1e-6)
@@ -210,8 +217,7 @@ class _Problem:
         """By how much the score of cells among each other varies more than if each stood for itself, on average."""
         _, means, _, between = self._parts(replace(weights, design=1.0), self.basis)
         information = means.T @ (means * between[:, None])
-        left = self._left(solution, weights)
-        spread = self._nearby(left, weights, means, between) + self._common(left, weights, means, between)
+        spread = self._spread(self._left(solution, weights), weights, means, between)
         return max(1.0, float(np.trace(np.linalg.pinv(information, rcond=1e-6) @ spread)) / (self.terms - 1))
 
     def covariance(self, solution: _Solution, weights: _Weights) -> tuple[Float, float]:
@@ -223,7 +229,6 @@ class _Problem:
         columns = np.column_stack([self.basis, slope])
         within, means, one, between = self._parts(weights, columns)
         residual = self.residuals(solution)
-        left = self._left(solution, weights)
         scores = _sums(
             self.cells.cell,
             within * (residual - self.cell_means(residual, weights.view)[self.cells.cell])[:, None],
@@ -231,11 +236,9 @@ class _Problem:
             self.cells.count,
         )
         # Joints run around the section, and a scan's rows of points cross them alike all around.
-        cluster = self.cells.ring if self.cells.ring.min() >= 0 else self.cells.stretch
-        clusters = int(cluster.max()) + 1
-        spread = _outer(_sums(cluster, scores)) * clusters / max(clusters - p - 1, 1)
-        spread += self._nearby(left, weights, means, between)
-        spread += self._common(left, weights, means, between)
+        clusters = int(self.cells.ring.max()) + 1
+        spread = _outer(_sums(self.cells.ring, scores)) * clusters / max(clusters - p - 1, 1)
+        spread += self._spread(self._left(solution, weights), weights, means, between)
         information = within.T @ (within * one[:, None]) + means.T @ (means * between[:, None])
         information[:p, :p] += self.bending
         spread[:p, :p] += self.bending
@@ -252,17 +255,21 @@ class _Problem:
         return covariance, float(np.sqrt(chance @ (fine - solution.roughness) ** 2))
 
     def _left(self, solution: _Solution, weights: _Weights) -> Float:
-        """What is left of each cell within its stretch, dB; 0 of outliers."""
-        means = self.cell_means(self.residuals(solution), weights.view)
-        stretch = self.cells.stretch
-        middles = _sums(stretch, means, weights.cell) / np.maximum(_sums(stretch, weights.cell), 1e-9)
-        return np.asarray((means - middles[stretch]) * weights.cell)
+        """What is left of each cell within its strip, dB; 0 of outliers.
 
-    def _nearby(self, left: Float, weights: _Weights, means: Float, between: Float) -> Float:
-        """Variance of the scores by what neighbouring cells have in common (Conley, 1999), as far as their covariance goes."""
+        It is what differs from the strip as a whole, not from its stretch: few cells less their mean would seem more
+        alike than they are, and scores, which hold no more than differences within stretches, let the rest go.
+        """
+        means = self.cell_means(self.residuals(solution), weights.view)
+        strip = self.cells.column if self.unrolled else self.cells.stretch
+        middles = _sums(strip, means, weights.cell) / np.maximum(_sums(strip, weights.cell), 1e-9)
+        return np.asarray((means - middles[strip]) * weights.cell)
+
+    def _spread(self, left: Float, weights: _Weights, means: Float, between: Float) -> Float:
+        """Variance of the scores (Conley, 1999): what all of the section has in common, and neighbouring cells besides."""
         cells = self.cells
         scores = means * between[:, None]
-        if cells.sector.min() < 0:
+        if not self.unrolled:
             return _outer(_sums(cells.stretch, scores * left[:, None]))
         shape = int(cells.row.max()) + 1, int(cells.column.max()) + 1
 
@@ -271,32 +278,39 @@ class _Problem:
             out[cells.row, cells.column] = values
             return out
 
-        covariance = _covariance(plane(left), plane(weights.cell))
-        fields = [plane(column) for column in scores.T]
-        spread_out = [signal.oaconvolve(one, covariance, mode="same") for one in fields]
-        products = np.array([[np.sum(one * other) for other in spread_out] for one in fields])
-        return np.asarray(0.5 * (products + products.T))
-
-    def _common(self, left: Float, weights: _Weights, means: Float, between: Float) -> Float:
-        """Variance of the scores by what rings, and strips along the tunnel, have in common."""
-        cells, there = self.cells, weights.cell
-        if cells.sector.min() < 0:
-            return np.zeros((means.shape[1], means.shape[1]))
-        ring = _shared(left, there, cells.ring, cells.patch)
-        spread = ring * _outer(_sums(cells.ring, means, between))
-        # Where range and incidence are functions of the place in the section, the curve takes up what strips have in
-        # common along the whole tunnel. So it is taken to be as much as what they have in common along a stretch.
-        block = cells.sector * (int(cells.stretch.max()) + 1) + cells.stretch
-        _, part = np.unique(block * (int(cells.patch.max()) + 1) + cells.patch, return_inverse=True)
-        sector = max(_shared(left, there, cells.sector, block), _shared(left, there, block, part.reshape(-1)))
-        by_sector = _sums(cells.sector, means, between)
-        number = np.arange(len(by_sector))
-        alike = np.exp(-np.abs(number[:, None] - number) * SECTOR / ALIKE)
-        return spread + sector * (by_sector.T @ alike @ by_sector)
+        fields = np.array([plane(column) for column in scores.T])
+        ring, near = _covariances(plane(left), plane(weights.cell))
+        along = np.array([signal.fftconvolve(one, ring, mode="full") for one in fields.sum(axis=2)])
+        spread = along[:, len(ring) // 2 :][:, : shape[0]] @ fields.sum(axis=2).T
+        spread_out = [signal.oaconvolve(one, near, mode="same") for one in fields]
+        spread += np.array([[np.sum(one * other) for other in spread_out] for one in fields])
+        return _positive(spread)
 
 
-def _covariance(left: Float, there: Float) -> Float:
-    """Covariance, dB², of cells of a plane by their distance, up to NEAR and no farther than it is positive.
+def _within(number: Index, values: Float, aside: Float, weight: Float) -> Float:
+    """Values (n, m) less what a constant and a slope over ``aside`` (n,) say of those of the same number.
+
+    So nothing is left of a reflectance that depends on the place in the section, constant along a strip: not even by where
+    in its cells the points of a strip happen to lie.
+    """
+    total = np.maximum(_sums(number, weight), 1e-12)
+
+    def centred(of: Float) -> Float:
+        return np.asarray(of - (_sums(number, of, weight) / _per(total, of))[number])
+
+    values, aside = centred(values), centred(aside)
+    slope = _sums(number, values * aside[:, None], weight) / np.maximum(_sums(number, aside**2, weight), 1e-12)[:, None]
+    return np.asarray(values - slope[number] * aside[:, None])
+
+
+def _positive(matrix: Float) -> Float:
+    """The nearest covariance: symmetric, of no negative variance."""
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return np.asarray(vectors * np.maximum(values, 0.0) @ vectors.T)
+
+
+def _covariances(left: Float, there: Float) -> tuple[Float, Float]:
+    """Covariance, dB², of cells of a plane: by their distance along the tunnel alone, and what neighbours have besides.
 
     Parameters
     ----------
@@ -305,33 +319,40 @@ def _covariance(left: Float, there: Float) -> Float:
 
     Returns
     -------
-    (2k + 1, 2k + 1) float array
-        For each shift of up to k cells along and across.
+    along : (2m + 1,) float array
+        Of cells more than NEAR apart around the section, for each shift of up to m = APART / CELL rows. From what is left of
+        the farthest: the rest changes too slowly to say anything within a stretch.
+    near : (2k + 1, 2k + 1) float array
+        What neighbours have more, by their distance, up to k = NEAR / CELL and no farther than it is positive.
     """
-    k = int(NEAR / CELL)
+    k, m = int(NEAR / CELL), int(APART / CELL)
 
     def shifted(values: Float) -> Float:
-        padded = np.pad(values, k)
-        return np.asarray(signal.oaconvolve(padded, padded[::-1, ::-1], mode="same"))
+        padded = np.pad(values, ((m, m), (k, k)))
+        whole = signal.oaconvolve(padded, padded[::-1, ::-1], mode="full")
+        row, column = padded.shape[0] - 1, padded.shape[1] - 1
+        return np.asarray(whole[row - m : row + m + 1, column - k : column + k + 1])
 
-    def middle(values: Float) -> Float:
-        row, column = (values.shape[0] - 1) // 2, (values.shape[1] - 1) // 2
-        return values[row - k : row + k + 1, column - k : column + k + 1]
+    def rows(values: Float) -> Float:
+        series = np.pad(values.sum(axis=1), m)
+        return np.asarray(np.correlate(series, series, mode="full")[len(series) - 1 - m : len(series) + m])
 
-    products, pairs = middle(shifted(left)), middle(shifted(there))
+    products, pairs = shifted(left), shifted(there)
+    others = np.maximum(rows(there) - pairs.sum(axis=1), 0.0)
+    along = np.where(others > 0.5, (rows(left) - products.sum(axis=1)) / np.maximum(others, 0.5), 0.0)
+    # Shares of noise among many lags: what is common doesn't grow with the distance.
+    half = np.minimum.accumulate(along[m:])
+    half = np.maximum(half - half[-1], 0.0)
+    along = np.concatenate([half[:0:-1], half])
     shift = np.arange(-k, k + 1)
     distance = np.rint(np.hypot(shift[:, None], shift)).astype(np.int64)
-    of = np.bincount(distance.ravel(), products.ravel()) / np.maximum(np.bincount(distance.ravel(), pairs.ravel()), 1e-9)
+    rest = (products - pairs * along[:, None])[m - k : m + k + 1]
+    of = np.bincount(distance.ravel(), rest.ravel()) / np.maximum(
+        np.bincount(distance.ravel(), pairs[m - k : m + k + 1].ravel()), 1e-9
+    )
     end = np.flatnonzero(of[: k + 1] <= 0.0)
     of[end[0] if len(end) else k + 1 :] = 0.0
-    return np.asarray(of[distance])
-
-
-def _shared(left: Float, there: Float, cluster: Index, part: Index) -> float:
-    """Covariance of cells that share a cluster, but no part of it, dB²; 0 where there are no such."""
-    pairs = np.sum(_sums(cluster, there) ** 2) - np.sum(_sums(part, there) ** 2)
-    products = np.sum(_sums(cluster, left) ** 2) - np.sum(_sums(part, left) ** 2)
-    return max(float(products / pairs), 0.0) if pairs > 0 else 0.0
+    return along, np.asarray(of[distance])
 
 
 def _sums(number: Index, values: Float, weight: Float | None = None, count: int = 0) -> Float:

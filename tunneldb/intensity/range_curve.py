@@ -6,13 +6,15 @@ Of each small cell of the lining the scanner sees an intensity
 
 with F₁ and F₂ as in Xu et al. (2018), eq. 5. Of cells that several scans saw the differences don't hold ρ, the cell's own
 reflectance (the within-transformation of regressions with fixed effects). Only where they don't suffice are cells compared
-with each other, which says something as far as their reflectance is alike; how far, the residuals tell, and that part
-counts by so much less (random effects). F₁ is a spline over ln R, in which the radar equation is a straight line; it rises
+with each other, and only those of one strip along the tunnel, half a metre wide and a stretch of 5 m long: around the section
+soot, grime and damp go with range and incidence, which no scanner that moves along the tunnel could tell apart. So a
+reflectance that depends on the place in the section cancels; what changes along the tunnel is averaged out, and as far as
+the residuals show that it changes, that part counts by so much less (random effects). A profiler sees all of a strip from
+the same range, and its curve is uncertain. F₁ is a spline over ln R, in which the radar equation is a straight line; it rises
 to one maximum, or from the first, and falls (Fig. 3 of Xu et al.: defocus at near range). F₂ is Oren–Nayar's with the σ of
 least loss.
 
-The uncertainty is that of clustered residuals (sandwich), of σ, and of what a reflectance could do that changes around the
-section, or from one stretch to the next, as much as the residuals show that it changes anywhere.
+The uncertainty is that of clustered residuals (sandwich), and of σ.
 """
 
 from __future__ import annotations
@@ -47,7 +49,7 @@ BEYOND = 1.1
 """Factor by which the curve goes on beyond the ranges seen, by its slope over ln R: full density reaches a little farther."""
 
 NODES = 60
-"""Rows of the curve."""
+"""Rows of the curve, without those at the ranges between which it must be known."""
 
 ADVICE = "scan a target and give its curve with --reference CSV, give the maker's, or take a reflectance dimension"
 
@@ -67,7 +69,7 @@ class RangeCurve:
     roughness, roughness_sigma : float
         Roughness σ of the lining and its standard deviation, degrees.
     nearest, farthest : float
-        Ranges between which nearly all points lie, m.
+        Ranges between which nearly all points lie, m; rows of the curve.
     cells, overlapping : int
         Cells used, and those of them that several scans saw.
     noise, lining : float
@@ -88,12 +90,18 @@ class RangeCurve:
     @property
     def worst(self) -> tuple[float, float]:
         """Largest standard deviation within the ranges present, dB, and the range where it is, m."""
-        at = np.union1d(
-            self.curve.range_m[(self.curve.range_m > self.nearest) & (self.curve.range_m < self.farthest)],
-            [self.nearest, self.farthest],
-        )
-        sigma = np.interp(at, self.curve.range_m, self.sigma_db)
-        return float(sigma.max()), float(at[np.argmax(sigma)])
+        sigma = np.where(self.present, self.sigma_db, 0.0)
+        return float(sigma.max()), float(self.curve.range_m[np.argmax(sigma)])
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Rows of the curve within the ranges present; beyond them it goes on by its slope."""
+        return np.asarray((self.curve.range_m >= self.nearest) & (self.curve.range_m <= self.farthest))
+
+    @property
+    def hardly_overlaps(self) -> bool:
+        """Whether it rests on cells being alike along the tunnel, as hardly any were seen by several scans."""
+        return self.overlapping < FEWEST_CELLS
 
     def require(self) -> None:
         """Raise UserError where the curve is too uncertain to correct with."""
@@ -139,7 +147,10 @@ def estimate_range_curve(sight: Sight, *, unrolled: bool = True, reach: tuple[fl
         )
     spline = RangeSpline.over(nearest, farthest)
     cells = group(sight, spline, unrolled=unrolled)
-    rows = np.geomspace(min(reach[0], sight.range_m.min()) / BEYOND, max(reach[1], sight.range_m.max()) * BEYOND, NODES)
+    rows = np.union1d(
+        np.geomspace(min(reach[0], sight.range_m.min()) / BEYOND, max(reach[1], sight.range_m.max()) * BEYOND, NODES),
+        [nearest, farthest],
+    )
     curves = []
     if cells.overlapping >= FEWEST_CELLS:
         curves.append(_curve(cells, spline, fit(cells, spline, among=False), rows, (nearest, farthest)))

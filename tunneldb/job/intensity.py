@@ -19,7 +19,7 @@ from tunneldb.intensity.cells import Sight
 from tunneldb.intensity.correct import Kind, needs_reference, to_decibel
 from tunneldb.intensity.look import Look, pool
 from tunneldb.intensity.oren_nayar import incidence_db
-from tunneldb.intensity.range_curve import FEWEST_CELLS, RangeCurve, estimate_range_curve
+from tunneldb.intensity.range_curve import RangeCurve, estimate_range_curve
 from tunneldb.intensity.reference import ReferenceCurve
 from tunneldb.job.detect import ASIDE, load_floor
 from tunneldb.job.radiometry import UNKNOWN, find_radiometer, find_range_curve, roughness_of, take_sample
@@ -185,8 +185,8 @@ def _look(
             f" to {sigma:.2f} dB between {found.nearest:.1f} and {found.farthest:.1f} m (worst at {where:.1f} m),"
             f" roughness {found.roughness:.1f}° ± {found.roughness_sigma:.1f}°"
         )
-        if found.overlapping < FEWEST_CELLS:
-            notes.append(f"{title}: hardly any of it was seen by two scans, so it is taken to be alike all around and along")
+        if found.hardly_overlaps:
+            notes.append(f"{title}: hardly any of it was seen by two scans, so it is taken to be alike within a few metres")
     if refused:
         notes.append(f"{title}: {refused}")
     return Look(

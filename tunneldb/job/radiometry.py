@@ -44,6 +44,12 @@ NEAR_SURFACE = 0.05
 UNKNOWN = ReferenceCurve(np.array([1e-3, 1e4]), np.zeros(2))
 """Stands for a range curve that is yet to be found: changes nothing."""
 
+BORROW = (
+    "or, where the curve of a neighbouring kilometre was found, export its range_m and intensity_db"
+    " (tunnel_api.range_curve) and run this one in a survey with that file as its --reference"
+)
+"""What else helps where no range curve could be found."""
+
 
 @dataclass(frozen=True)
 class Sample:
@@ -101,6 +107,13 @@ class Calibration:
     view: Sample
     roughness: Roughness
     found: RangeCurve | None
+
+    @property
+    def note(self) -> str | None:
+        """What the ledger is to say about it."""
+        if self.found is None or not self.found.hardly_overlaps:
+            return None
+        return "hardly any lining was seen by two scans: the range curve rests on its being alike along the tunnel, within 5 m"
 
 
 def find_radiometer(conn: psycopg.Connection[Any], survey: Survey, max_incidence: float, max_range: float) -> Radiometer | None:
@@ -166,7 +179,7 @@ def calibrate(conn: psycopg.Connection[Any], survey: Survey, eye: Eye, drawn: li
         found = find_range_curve(view, eye)
         found.require()
     except UserError as error:
-        raise UserError(f"survey {survey.name}, kilometre {eye.km}: {error}") from None
+        raise UserError(f"survey {survey.name}, kilometre {eye.km}: {error}; {BORROW}") from None
     eye = replace(eye, radiometer=replace(eye.radiometer, reference=found.curve))
     view = view.along(found.curve)
     return Calibration(eye, view, roughness_of(view, drawn) if drawn else _roughness_found(view, found), found)
