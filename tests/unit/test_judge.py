@@ -211,7 +211,7 @@ def _region(side: int, drop: float, share: float = 1.0, pixel: float = PIXEL) ->
     row, column = np.mgrid[:side, :side]
     mask = np.hypot(row - side / 2 + 0.5, column - side / 2 + 0.5) < side / 2
     filled = round(share * mask.sum())
-    traits = Traits(sigma=filled * SIGMA, square=filled * drop**2, rim=4.0 * side, steps=4.0 * side, inside=4.0 * side * drop)
+    traits = Traits(sigma=filled * SIGMA, rim=4.0 * side, steps=4.0 * side, inside=4.0 * side * drop)
     return Region(pixel, 0, 0, mask, filled, filled * drop, drop, traits)
 
 

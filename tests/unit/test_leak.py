@@ -282,7 +282,7 @@ def cut_out(mask, level, min_area, dry_mean=0.0):
     whole[:, 50 : 50 + mask.shape[1]] = mask
     state = (drop != NODATA).astype(np.uint8)
     sigma = np.full((-(-len(mask) // 25), grid.columns // 25), 0.3, np.float32)
-    found = regions(whole, Relative(grid, state, drop, 25, sigma), min_area)
+    found = regions(whole, whole, Relative(grid, state, drop, 25, sigma), min_area, lambda _: True)
     return [shapely.affinity.translate(region.outline, -50 * PIXEL) for region in found], found
 
 

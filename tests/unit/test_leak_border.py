@@ -35,7 +35,7 @@ def cut_by_kilometre(mask: np.ndarray, level: np.ndarray, first: int, bottom: in
         drop = np.where(levels == NODATA, NODATA, 100 * DRY - levels).astype(np.int16)
         sigma = np.full((len(wet), grid.columns), 0.25, np.float32)
         relative = Relative(grid, (drop != NODATA).astype(np.uint8), drop, 1, sigma)
-        found += [(km, region) for region in regions(wet, relative, 0.0)]
+        found += [(km, region) for region in regions(wet, wet, relative, 0.0, lambda _: True)]
     return found
 
 

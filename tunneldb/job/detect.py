@@ -13,18 +13,29 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.store import load_surface
 from tunneldb.geometry.surface import Surface
 from tunneldb.intensity.roughness import Roughness
-from tunneldb.job.radiometry import dry_sigma, find_radiometer, roughness_of, take_sample
+from tunneldb.intensity.store import save_range_curve
+from tunneldb.job.radiometry import calibrate, dry_sigma, find_radiometer
 from tunneldb.job.scene import load_arcs
 from tunneldb.job.sources import Source, sources
-from tunneldb.leak.detection import detect as find_leaks
+from tunneldb.leak.coverage import cover
+from tunneldb.leak.detection import detect as find_anomalies
+from tunneldb.leak.dry_map import map_dry
 from tunneldb.leak.gather import Counts, gather
 from tunneldb.leak.image import KILOMETRE, Accumulator, Grid
-from tunneldb.leak.leaks import save_leaks
+from tunneldb.leak.leaks import save_anomalies
 from tunneldb.leak.lining import HIDDEN, Astray, Floor
 from tunneldb.leak.picture import develop, halo
 from tunneldb.leak.raster import KINDS
+from tunneldb.leak.relative import relative
 from tunneldb.leak.seen import Eye
-from tunneldb.leak.store import ImageStore, drop_radiometry, load_regions, save_radiometry
+from tunneldb.leak.store import (
+    ImageStore,
+    drop_coverage,
+    drop_radiometry,
+    load_regions,
+    save_coverage,
+    save_radiometry,
+)
 
 ASIDE = 50.0
 """Length of the surface beyond the ends that is loaded too: sections are judged by the three before and after them, m."""
@@ -49,34 +60,43 @@ def detect(
     surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
     grid = _grid(surface, km, values["image.pixel"])
     files = sources(conn, survey, km)
-    radiometer = find_radiometer(conn, survey, values["intensity.max_incidence"])
+    radiometer = find_radiometer(conn, survey, values["intensity.max_incidence"], values["intensity.max_range"])
     beyond = grid.halo * grid.pixel
-    eye = Eye.of(surface, km, values["lining.tolerance"], radiometer, load_floor(conn, survey, km, beyond), beyond)
+    depth = values["lining.tolerance"], values["lining.recess"]
+    eye = Eye.of(surface, km, depth, radiometer, load_floor(conn, survey, km, beyond), beyond)
     with Accumulator(grid) as image:
         if radiometer is None:
             return _offset_only(conn, survey, eye, files, image, progress)
-        view = take_sample(conn, survey, eye)
-        roughness = roughness_of(view, load_regions(conn, survey, km, "homogeneous"))
+        known = calibrate(conn, survey, eye, load_regions(conn, survey, km, "homogeneous"))
+        eye, view, roughness = known.eye, known.view, known.roughness
         counts = _gather(eye, files, image, roughness.sigma, progress)
         images = ImageStore(conn, survey, grid, KINDS)
         picture = develop(image, eye.floor, Astray.of(surface), values["appendage.distance"], images.save)
     dry_regions = load_regions(conn, survey, km, "dry")
-    found = find_leaks(picture, values["leak.min_area"], dry_regions)
-    save_radiometry(conn, survey, km, roughness, found, dry_sigma(view, picture, found, roughness, dry_regions))
-    matched = save_leaks(conn, survey, km, surface, found.leaks, found.cut, values["leak.min_area"])
+    dry = map_dry(picture, dry_regions)
+    darker = relative(picture, dry)
+    found = find_anomalies(darker, dry, values["leak.min_area"])
+    images.save_states(darker.state, found.dark)
+    save_range_curve(conn, survey, km, known.found)
+    save_radiometry(conn, survey, km, roughness, dry, found, dry_sigma(view, darker, found, roughness, dry_regions))
+    coverage = cover(darker.state, found.wet, grid, found.size)
+    save_coverage(conn, survey, km, coverage)
+    matched = save_anomalies(conn, survey, km, surface, found.found, found.cut, values["leak.min_area"])
     return {
         **counts,
-        "points_used": images.points,
         "pixels": images.pixels,
         "lining_pixels": found.pixels,
         "wet_pixels": found.wet_pixels,
+        "seen": round(float(coverage.seen.sum() / max(coverage.lining.sum(), 1e-9)), 4),
         "leaks": matched.new + matched.again,
+        "joints": matched.kinds["joint"],
+        "dark": matched.kinds["dark"],
         "leaks_over_ends": matched.over_ends,
         "leaks_new": matched.new,
         "leaks_again": matched.again,
         "leaks_kept_for_review": matched.kept,
         "leaks_gone": matched.gone,
-        **_report(roughness, matched.other_pixels),
+        **_report(roughness, known.note, matched.other_pixels),
     }
 
 
@@ -108,10 +128,11 @@ def _offset_only(
     for block in image.inner_blocks():
         images.save(image.window(block * image.grid.block_columns, (block + 1) * image.grid.block_columns))
     drop_radiometry(conn, survey, eye.km)
-    save_leaks(conn, survey, eye.km, eye.surface, [], [], 0.0)
+    drop_coverage(conn, survey, eye.km)
+    save_range_curve(conn, survey, eye.km, None)
+    save_anomalies(conn, survey, eye.km, eye.surface, [], [], 0.0)
     return {
         **counts,
-        "points_used": images.points,
         "pixels": images.pixels,
         "leaks": 0,
         "note": "no intensity: offset image only, no leaks sought",
@@ -136,7 +157,7 @@ def _grid(surface: Surface, km: int, pixel: float) -> Grid:
     return Grid.covering(km, pixel, float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max()), beyond)
 
 
-def _report(roughness: Roughness, other_pixels: list[int]) -> Counts:
+def _report(roughness: Roughness, note: str | None, other_pixels: list[int]) -> Counts:
     """What the ledger says about the roughness, and what else there is to note."""
 
     def known(value: float, digits: int) -> float | None:
@@ -150,7 +171,7 @@ def _report(roughness: Roughness, other_pixels: list[int]) -> Counts:
         "incidence_from": known(roughness.incidence_from, 1),
         "incidence_to": known(roughness.incidence_to, 1),
     }
-    notes = []
+    notes = [note] if note else []
     if not roughness.determined:
         notes.append(
             "the lining is seen at too similar incidence angles to tell its roughness;"

@@ -142,13 +142,13 @@ def _regions(dark: Mask, relative: Relative, min_area: float) -> list[Region]:
     inner = relative.grid.inner
     joints = lines(dark, inner.start, inner.stop, relative.grid.pixel)
     if not joints.any():
-        return regions(dark, relative, min_area, _wet)
-    found = regions(dark & ~joints, relative, min_area, _wet) + regions(joints, relative, min_area, _wet)
-    return sorted(found, key=lambda region: (region.column, region.row))
+        return regions(dark, dark, relative, min_area, _may_drip)
+    parts = [regions(part, dark, relative, min_area, _may_drip) for part in (dark & ~joints, joints)]
+    return sorted([*parts[0], *parts[1]], key=lambda region: (region.column, region.row))
 
 
-def _wet(region: Region) -> bool:
-    return judge(region).kind == "leak"
+def _may_drip(region: Region) -> bool:
+    return bool(region.filled) and judge(region).kind == "leak"
 
 
 def dry_places(relative: Relative, found: Detection, chainage: Float, arc: Float) -> Mask:

@@ -57,7 +57,7 @@ class Dark:
         return cut
 
 
-def hang(pieces: Dark, wanted: Mask, grid: Grid) -> tuple[Int, Int]:
+def hang(pieces: Dark, wanted: Mask, cut: Mask, grid: Grid) -> tuple[Int, Int]:
     """Find what each piece is a part of.
 
     A drip is narrower than WIDE, smaller than what it hangs below, and begins within GAP of it, towards the crown, or of
@@ -68,7 +68,10 @@ def hang(pieces: Dark, wanted: Mask, grid: Grid) -> tuple[Int, Int]:
     pieces : Dark
         Connected pieces.
     wanted : (k,) bool array
-        Those that are regions of their own; the others may hang below one.
+        Those that are regions of their own: what drips hang below.
+    cut : (k,) bool array
+        Those that an end of the kilometre cuts: how large they are is not known, so that they are no drips, and that all
+        others are taken for smaller.
     grid : Grid
         The pixels.
 
@@ -83,12 +86,12 @@ def hang(pieces: Dark, wanted: Mask, grid: Grid) -> tuple[Int, Int]:
     starts = np.searchsorted(runs[:, 0], np.arange(grid.rows + 1))
     crown = grid.bottom + grid.rows  # rows before this one lie at arcs above 0
     gap = max(1, round(GAP / grid.pixel))
-    above, row, column, distance = _above(runs, pieces.label, starts, pieces.width <= WIDE / grid.pixel, crown, gap)
+    above, row, column, distance = _above(runs, pieces.label, starts, (pieces.width <= WIDE / grid.pixel) & ~cut, crown, gap)
     whole = np.arange(len(pieces.pixels))
     for _ in range(8):  # a drip below a drip below a drip …
         hung = np.flatnonzero((above >= 0) & (whole == np.arange(len(whole))))
         root = whole[above[hung]]
-        ready = wanted[root] & (pieces.pixels[hung] < pieces.pixels[root]) & (root != hung)
+        ready = wanted[root] & (cut[root] | (pieces.pixels[hung] < pieces.pixels[root])) & (root != hung)
         if not ready.any():
             break
         whole[hung[ready]] = root[ready]

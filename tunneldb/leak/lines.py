@@ -35,6 +35,8 @@ def lines(dark: Mask, first: int, stop: int, pixel: float) -> Mask:
         Side of a pixel, m.
     """
     found = np.zeros(dark.shape, np.bool_)
+    if 2 * pixel > NARROW_AROUND:
+        return found  # a line of two pixels may be anything
     across, along = short_runs(dark, first, stop, max(2, round(NARROW_AROUND / pixel)), max(2, round(NARROW_ALONG / pixel)))
     for runs, upright in ((across, True), (along, False)):
         long = round((LONG_AROUND if upright else LONG_ALONG) / pixel)

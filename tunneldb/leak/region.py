@@ -35,8 +35,6 @@ class Traits(NamedTuple):
     ----------
     sigma : float
         Local standard deviation of dry lining, dB, over the pixels with points.
-    square : float
-        Square of the drop, dB², over the same.
     recess : float
         Pixels on lining set back behind the wall.
     rim, rim_off, rim_recess : float
@@ -48,7 +46,6 @@ class Traits(NamedTuple):
     """
 
     sigma: float = 0.0
-    square: float = 0.0
     recess: float = 0.0
     rim: float = 0.0
     rim_off: float = 0.0
@@ -113,15 +110,17 @@ class Region:
         return outline(self.mask, self.column, self.row, self.pixel)
 
 
-def regions(dark: Mask, relative: Relative, min_area: float, drips: Callable[[Region], bool] = lambda _: True) -> list[Region]:
+def regions(part: Mask, dark: Mask, relative: Relative, min_area: float, drips: Callable[[Region], bool]) -> list[Region]:
     """Connected dark regions of a kilometre that are large or long enough, or are cut by its ends and may be a part of one.
 
     Drips that hang below a region are a part of it.
 
     Parameters
     ----------
+    part : (rows, columns) bool array
+        Dark pixels that may belong to a region; those beyond the ends of the kilometre don't count.
     dark : (rows, columns) bool array
-        Dark pixels; those beyond the ends of the kilometre don't count.
+        All dark pixels; sides towards these are no rim.
     relative : Relative
         Their drop.
     min_area : float
@@ -131,14 +130,14 @@ def regions(dark: Mask, relative: Relative, min_area: float, drips: Callable[[Re
     """
     grid = relative.grid
     inner = grid.inner
-    runs = _runs(dark, inner.start, inner.stop)
+    runs = _runs(part, inner.start, inner.stop)
     if not len(runs):
         return []
     count, label = sparse.csgraph.connected_components(_beside(runs), directed=False)
     pieces = Dark.of(runs, label.astype(np.int64), count)
     ends = pieces.touches(inner.start, inner.stop)
     wanted = ends | (pieces.pixels * grid.pixel**2 >= min_area * (1 - 1e-12)) | (pieces.extent * grid.pixel >= LONG)
-    whole, bridges = hang(pieces, wanted, grid)
+    whole, bridges = hang(pieces, wanted, ends, grid)
     alone = _by_label(runs, label, count)
     for k in np.unique(whole[whole != np.arange(count)]).tolist():
         if not drips(_cut_out(alone(k), dark, relative)):
@@ -270,7 +269,7 @@ def _read(
     step: float,
 ) -> NDArray[np.float64]:  # pragma: no cover - compiled
     """Draw a region's runs into its mask and sum up what they show: filled, drop's sum and maximum, and the traits."""
-    sums = np.zeros(12)
+    sums = np.zeros(11)
     sums[2] = -np.inf
     rows, columns = dark.shape
     for k in range(runs.shape[0]):
@@ -279,28 +278,27 @@ def _read(
             mask[i - top, j - left] = True
             if not dark[i, j]:
                 continue  # between a drip and what it hangs below
-            sums[5] += state[i, j] == 2
+            sums[4] += state[i, j] == 2
             if drop[i, j] != NODATA:
                 value = drop[i, j] * step
                 sums[0] += 1
                 sums[1] += value
                 sums[2] = max(sums[2], value)
                 sums[3] += sigma[i // tile, j // tile]
-                sums[4] += value * value
             for di, dj in ((-1, 0), (1, 0), (0, -1), (0, 1)):
                 m, n = i + di, j + dj
                 if m < 0 or m >= rows or n < 0 or n >= columns or dark[m, n]:
                     continue
-                sums[6] += 1
-                sums[7] += state[m, n] >= 3
-                sums[8] += state[m, n] == 2
+                sums[5] += 1
+                sums[6] += state[m, n] >= 3
+                sums[7] += state[m, n] == 2
                 # The step: what is dark there behind the rim, and what is not before it.
                 m, n = i + across * di, j + across * dj
                 p, q = i - (across - 1) * di, j - (across - 1) * dj
                 if m < 0 or m >= rows or n < 0 or n >= columns or p < 0 or p >= rows or q < 0 or q >= columns:
                     continue
                 if dark[p, q] and not dark[m, n] and drop[p, q] != NODATA and 1 <= state[m, n] <= 2:
-                    sums[9] += 1
-                    sums[10] += drop[p, q] * step
-                    sums[11] += drop[m, n] * step
+                    sums[8] += 1
+                    sums[9] += drop[p, q] * step
+                    sums[10] += drop[m, n] * step
     return sums

@@ -135,12 +135,17 @@ def _wander(mask: Mask, piece: int) -> float:  # pragma: no cover - compiled
     if stop - begin < 3:
         return 0.0
     pieces = -(-(stop - begin) // piece)
-    total = 0.0
+    total, number = 0.0, 0
     for side in (first, last):
         for k in range(pieces):
             a, b = begin + (stop - begin) * k // pieces, begin + (stop - begin) * (k + 1) // pieces
-            x, y = np.arange(a, b) - 0.5 * (a + b - 1), side[a:b]
+            x = a + np.flatnonzero(side[a:b] >= 0.0).astype(np.float64)
+            if len(x) < 3:
+                continue
+            y = side[a:b][side[a:b] >= 0.0]
+            x -= x.mean()
             slope = (x * y).sum() / (x * x).sum()
             left = y - y.mean() - slope * x
             total += (left * left).sum()
-    return float(np.sqrt(total / (2 * (stop - begin))))
+            number += len(x)
+    return float(np.sqrt(total / max(number, 1)))
