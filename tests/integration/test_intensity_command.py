@@ -1,4 +1,4 @@
-"""The verb intensity on scan files by themselves."""
+"""The verb intensity on scan files by themselves, and surveys whose range curve is found on the lining."""
 
 from pathlib import Path
 
@@ -7,7 +7,9 @@ import pytest
 from click.testing import CliRunner
 
 from tunneldb.cli.main import main
+from tunneldb.intensity.range_curve import MOST_UNCERTAIN
 from tunneldb.simulate import Parameters, Simulation, write
+from tunneldb.simulate.intensity import range_term
 
 
 @pytest.fixture(scope="module")
@@ -55,3 +57,57 @@ def test_nothing_is_guessed(scan, arguments, says):
     assert code == 2
     assert says in output
     assert len(output.strip().splitlines()) == 1
+
+
+@pytest.fixture(scope="module")
+def stations(tmp_path_factory) -> Path:
+    """A short tunnel seen from static stations."""
+    folder = tmp_path_factory.mktemp("stations")
+    write(
+        Simulation(
+            Parameters(name="auto", length=24, station_spacing=8, angular_step=0.25, leaks=2, start_chainage=1000, seed=3)
+        ),
+        folder,
+    )
+    return folder
+
+
+def _tunneldb(*arguments, code=0) -> str:
+    result = CliRunner().invoke(main, list(map(str, arguments)), catch_exceptions=False)
+    assert result.exit_code == code, result.output
+    return result.stderr
+
+
+def _add(folder: Path, dimension: str, kind: str, code: int = 0) -> str:
+    _tunneldb("tunnel", "add", "auto", "--srid", 25830, "--axis", folder / "auto.axis.csv", "--start-chainage", 1000)
+    return _tunneldb(
+        "survey", "add", "auto", "--tunnel", "auto", "--date", "2024-05-04", "--stations", folder / "auto.stations.csv",
+        "--intensity", dimension, "--intensity-kind", kind, "--reference", "auto", code=code,
+    )  # fmt: skip
+
+
+def test_detection_by_a_curve_found_on_the_lining(conn, stations):
+    """It is kept, within its deviation of the simulator's, and a rerun puts it in place of the one before."""
+    _add(stations, "Amplitude", "amplitude")
+    _tunneldb("load", "auto", *sorted(stations.glob("*.laz")))
+    _tunneldb("run", "auto")
+    curve = "SELECT range_m, intensity_db, sigma_db FROM tunnel_api.range_curve ORDER BY range_m"
+    found = conn.execute(curve).fetchall()
+    range_m, level, sigma = np.array(found, dtype=float).T
+    there = np.isfinite(sigma)
+    off = (level - range_term(range_m))[there]
+    assert np.abs(off - off.mean()).max() < 0.3
+    told = conn.execute("SELECT range_from, range_to, range_sigma FROM tunnel_api.radiometry").fetchone()
+    assert told == pytest.approx((range_m[there].min(), range_m[there].max(), sigma[there].max()))
+    assert told[2] <= MOST_UNCERTAIN
+    conn.execute("UPDATE tunnel.range_curve SET intensity_db = array_fill(7.0::float8, ARRAY[cardinality(range_m)])")
+    conn.commit()
+    _tunneldb("run", "auto", "--from", "detect")
+    np.testing.assert_allclose(np.array(conn.execute(curve).fetchall(), dtype=float), np.array(found, dtype=float))
+
+
+def test_a_curve_that_the_maker_removed_is_not_sought(conn, stations):
+    says = _add(stations, "Reflectance", "reflectance", code=2)
+    assert "--reference auto has nothing to find" in says
+    assert len(says.strip().splitlines()) == 1
+    assert conn.execute("SELECT count(*) FROM tunnel.survey").fetchone() == (0,)
