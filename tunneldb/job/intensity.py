@@ -79,7 +79,7 @@ def _look_at_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, v
     depth = values["lining.tolerance"], values["lining.recess"]
     eye = Eye.of(surface, km, depth, radiometer, load_floor(conn, survey, km, 0.0))
     view = take_sample(conn, survey, eye)
-    found, refused = _attempt(lambda: find_range_curve(view, eye))
+    found, refused = _attempt(lambda: find_range_curve(view, eye), view.views.raw_db[view.telling])
     if needs_reference(kind) and measured is None:
         roughness = found.roughness if found else None
         view = view.along(found.curve if found else UNKNOWN)
@@ -139,7 +139,7 @@ def look_at_file(path: Path, dimension: str, kind: Kind, scanner: tuple[float, f
         raise UserError(f"{path}: no surface is flat enough for its normal, and so for incidence angles, to be known")
     sight = Sight(xyz, scan_id, range_m, cosine, level).some(flat)
     range_m, cosine, level = sight.range_m, sight.cosine, sight.level
-    found, refused = _attempt(lambda: estimate_range_curve(sight, unrolled=False))
+    found, refused = _attempt(lambda: estimate_range_curve(sight, unrolled=False), level)
     distance = level
     if found and needs_reference(kind):
         distance = level - found.curve(range_m)
@@ -202,8 +202,11 @@ def _look(
     )
 
 
-def _attempt(find: Callable[[], RangeCurve]) -> tuple[RangeCurve | None, str | None]:
-    """A range curve if one could be found, and why detection would refuse it, if it would."""
+def _attempt(find: Callable[[], RangeCurve], raw: NDArray[np.floating]) -> tuple[RangeCurve | None, str | None]:
+    """A range curve if one could be found, and why detection would refuse it, if it would.
+
+    One less certain than that intensity, dB, is within so much of its mean anywhere, says nothing and is not shown.
+    """
     try:
         found = find()
     except UserError as error:
@@ -211,7 +214,7 @@ def _attempt(find: Callable[[], RangeCurve]) -> tuple[RangeCurve | None, str | N
     try:
         found.require()
     except UserError as error:
-        return found, str(error)
+        return found if found.worst[0] < float(np.std(raw)) else None, str(error)
     return found, None
 
 
