@@ -15,8 +15,8 @@ Mask = NDArray[np.bool_]
 DELTA = 0.03
 """Distance from the plane from which a pixel is an appendage (eq. 23), m."""
 
-PART = 1.0
-"""Side of the part of the lining that a plane is fitted to, m."""
+PART = 2.0
+"""Side of the part of the lining that a plane is fitted to, m: signs and boxes are smaller than half of it."""
 
 STEP = 0.25
 """Side of the middle of a part, for which its plane is used, m."""
@@ -28,7 +28,7 @@ SCALES = np.array([0.06, 0.05, 0.04, 0.03, 0.03])
 """Distances from the plane, m, beyond which a pixel has no weight, fit after fit."""
 
 _BIN, _BINS, _REACH = 0.01, 8, 2
-_EVERY = 4  # of the pixels of a part every fourth is taken, in slanting lines: enough for three numbers
+_SAMPLES = 6  # pixels of each row of a part that are taken, in slanting lines: some hundred are enough for three numbers
 _NONE = np.float32(1e9)  # an offset that no plane comes near
 _SUPPORT = 0.15  # share of the pixels about one in a recess that must lie at its depth: one profile's, less an outlier
 
@@ -56,7 +56,11 @@ def distance_from_plane(offset: Single, pixel: float, corner: tuple[int, int] = 
     (rows, columns) float32 array
         m, positive into the tunnel, NaN where there is no point.
     """
-    distance: Single = _distance(np.ascontiguousarray(offset), *_sides(pixel), *corner, SCALES.astype(np.float32), MIN_PIXELS)
+    distance: Single = _distance(
+        np.ascontiguousarray(offset), *_sides(pixel), _every(pixel), *corner, SCALES.astype(np.float32), MIN_PIXELS
+    )
+        np.ascontiguousarray(offset), *_sides(pixel), _every(pixel), *corner, SCALES.astype(np.float32), MIN_PIXELS
+    )
     return distance
 
 
@@ -108,6 +112,12 @@ def _sides(pixel: float) -> tuple[int, int]:
     return max(1, round(STEP / pixel)), max(1, round((PART - STEP) / 2 / pixel))
 
 
+def _every(pixel: float) -> int:
+    """Of the pixels of a row one in so many is taken."""
+    step, margin = _sides(pixel)
+    return max(1, (step + 2 * margin) // _SAMPLES)
+
+
 def _growth(pixel: float) -> int:
     """Pixels by which an appendage is grown: two of 2 cm, fewer of larger ones."""
     return max(1, round(0.04 / pixel))
@@ -120,7 +130,7 @@ def _look(pixel: float) -> int:
 
 @njit(cache=True, nogil=True, parallel=True)
 def _distance(
-    offset: Single, step: int, margin: int, row: int, column: int, scales: Single, min_pixels: int
+    offset: Single, step: int, margin: int, every: int, row: int, column: int, scales: Single, min_pixels: int
 ) -> Single:  # pragma: no cover - compiled
     rows, columns = offset.shape
     out = np.empty((rows, columns), np.float32)
@@ -129,10 +139,10 @@ def _distance(
     tall, wide = (row + rows - 1) // step - down + 1, (column + columns - 1) // step - across + 1
     first_row, first_column = down * step - margin, across * step - margin
     thin = _thinned(
-        offset, row - first_row, column - first_column, tall * step + 2 * margin, wide * step + 2 * margin, row - column
+        offset, row - first_row, column - first_column, tall * step + 2 * margin, wide * step + 2 * margin, row - column, every
     )
-    x, y = _places(side)
-    each = side // _EVERY
+    x, y = _places(side, every)
+    each = side // every
     for tile_row in prange(tall):
         z = np.full(x.shape[1], _NONE, np.float32)
         counts = np.empty((2, 2 * _BINS + 2), np.int32)
@@ -144,10 +154,10 @@ def _distance(
                 out[r0:r1, c0:c1] = np.nan
                 continue
             counts[:] = 0
-            phase = (top + row - left - column) % _EVERY
+            phase = (top + row - left - column) % every
             for i in range(side):
                 # Where the row's first sample in the part lies among all its samples.
-                begin = (tile * step + (phase + i) % _EVERY) // _EVERY
+                begin = (tile * step + (phase + i) % every) // every
                 for k in range(each):
                     value = thin[tile_row * step + i, begin + k]
                     z[i * each + k] = value
@@ -163,30 +173,30 @@ def _distance(
 
 @njit(cache=True, nogil=True)
 def _thinned(
-    offset: Single, skip_rows: int, skip_columns: int, rows: int, columns: int, slant: int
+    offset: Single, skip_rows: int, skip_columns: int, rows: int, columns: int, slant: int, every: int
 ) -> Single:  # pragma: no cover - compiled
-    """Every fourth pixel of each row, in slanting lines, with a margin; _NONE where there is no point."""
-    thin = np.full((rows, columns // _EVERY + 2), _NONE, np.float32)
+    """Every n-th pixel of each row, in slanting lines, with a margin; _NONE where there is no point."""
+    thin = np.full((rows, columns // every + 2), _NONE, np.float32)
     for i in range(offset.shape[0]):
-        # The columns whose number is that of the row, but for multiples of four.
-        shift = (i + slant + skip_columns) % _EVERY
+        # The columns whose number is that of the row, but for multiples of n.
+        shift = (i + slant + skip_columns) % every
         for m in range(thin.shape[1]):
-            j = shift + _EVERY * m - skip_columns
+            j = shift + every * m - skip_columns
             if 0 <= j < offset.shape[1] and not np.isnan(offset[i, j]):
                 thin[i + skip_rows, m] = offset[i, j]
     return thin
 
 
 @njit(cache=True, nogil=True)
-def _places(side: int) -> tuple[Single, Single]:  # pragma: no cover - compiled
-    """Where the samples of a part lie in it, for each of four phases: x (4, n) and y (n,), in sides from its middle."""
-    each = side // _EVERY
+def _places(side: int, every: int) -> tuple[Single, Single]:  # pragma: no cover - compiled
+    """Where the samples of a part lie in it, for each phase: x (every, n) and y (n,), in sides from its middle."""
+    each = side // every
     room = (side * each + 63) // 64 * 64  # whole vectors
-    x, y = np.zeros((_EVERY, room), np.float32), np.zeros(room, np.float32)
+    x, y = np.zeros((every, room), np.float32), np.zeros(room, np.float32)
     for i in range(side):
         for k in range(each):
-            for phase in range(_EVERY):
-                x[phase, i * each + k] = ((phase + i) % _EVERY + _EVERY * k - 0.5 * side) / side
+            for phase in range(every):
+                x[phase, i * each + k] = ((phase + i) % every + every * k - 0.5 * side) / side
             y[i * each + k] = (i - 0.5 * side) / side
     return x, y
 

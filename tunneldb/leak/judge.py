@@ -77,10 +77,10 @@ def _thin(shape: Shape, pixel: float) -> float:
 
 
 def _recess(region: Region) -> float:
-    """A bolt pocket is dark as a whole: it is set back, and what is about it is not."""
+    """A bolt pocket is dark as a whole, and small: it is set back, and what is about it is not."""
     traits, pixels = region.traits, np.count_nonzero(region.mask)
     about = traits.rim_recess / traits.rim if traits.rim else 0.0
-    return min(_ramp(traits.recess / pixels, 0.3, 0.7), _ramp(about, 0.4, 0.2), _ramp(region.area, 0.25, 0.15))
+    return min(_ramp(traits.recess / pixels, 0.3, 0.7), _ramp(about, 0.4, 0.2), _ramp(region.area, 0.12, 0.08))
 
 
 def _gradual(region: Region, shape: Shape) -> float:

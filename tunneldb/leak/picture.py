@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tunneldb.leak.image import Accumulator, Grid, Window
-from tunneldb.leak.lining import Astray, Floor, reach, states
+from tunneldb.geometry.surface import Surface
+from tunneldb.leak.image import BLOCK, Accumulator, Grid, Window
+from tunneldb.leak.lining import Astray, Floor, State, reach, states
 from tunneldb.leak.raster import NODATA, whole
 from tunneldb.leak.threshold import MAX_MEDIAN
 
@@ -63,11 +64,11 @@ def develop(image: Accumulator, floor: Floor, astray: Astray, delta: float, keep
         Takes the means of each block of the kilometre itself.
     """
     grid = image.grid
-    state = np.zeros((grid.rows, grid.columns), np.uint8)
+    state = np.full((grid.rows, grid.columns), State.OFF, np.uint8)
     level = np.full((grid.rows, grid.columns), NODATA, np.int16)
     judged = min(_judged(), grid.halo)
     inner = set(image.inner_blocks())
-    for block in image.blocks():
+    for block in sorted({*image.blocks(), *_with_surface(grid, astray.surface)}):
         first = max(block * grid.block_columns, grid.inner.start - judged)
         columns = slice(first, min((block + 1) * grid.block_columns, grid.inner.stop + judged))
         if columns.start >= columns.stop:
@@ -79,3 +80,10 @@ def develop(image: Accumulator, floor: Floor, astray: Astray, delta: float, keep
         if block in inner:
             keep(here)
     return Picture(grid, state, level)
+
+
+def _with_surface(grid: Grid, surface: Surface) -> range:
+    """Blocks in which the tunnel lies: what was not scanned there is unseen lining."""
+    west, east = surface.chainages[[0, -1]] + (-surface.reach, surface.reach)
+    first, last = np.floor((np.array([west, east]) - grid.west) / BLOCK).astype(int)
+    return range(max(int(first), 0), min(int(last), grid.blocks - 1) + 1)
