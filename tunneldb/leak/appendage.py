@@ -59,8 +59,6 @@ def distance_from_plane(offset: Single, pixel: float, corner: tuple[int, int] = 
     distance: Single = _distance(
         np.ascontiguousarray(offset), *_sides(pixel), _every(pixel), *corner, SCALES.astype(np.float32), MIN_PIXELS
     )
-        np.ascontiguousarray(offset), *_sides(pixel), _every(pixel), *corner, SCALES.astype(np.float32), MIN_PIXELS
-    )
     return distance
 
 

@@ -14,6 +14,9 @@ STRONG_CONTRAST, STRONG_DROP = 8.0, 3.0
 """Standard deviations and dB from which a patch with straight sides may be water after all, that fills a panel between joints:
 of shades of concrete and mortar neither is expected, water takes away half of the light and more."""
 
+DARKEST_JOINT = 3.0
+"""A joint of up to 1 cm takes no more than half of the light from a pixel of 2 cm, dB; what is darker is wet."""
+
 Kind = Literal["leak", "joint", "dark"]
 
 
@@ -43,7 +46,8 @@ def judge(region: Region) -> Verdict:
     """
     shape = measure(region.mask, region.pixel)
     degrees = {
-        "thin": _thin(shape, region.pixel),
+        "faint": _ramp(region.contrast, 3.8, 3.3),
+        "thin": _thin(region, shape),
         "recess": _recess(region),
         "gradual": _gradual(region, shape),
         "rectangular": _rectangular(region, shape),
@@ -66,13 +70,15 @@ def evidence(region: Region) -> float:
     return float(contrast * area / (area + 0.02) * (1.0 - np.exp(-share / 0.15)))
 
 
-def _thin(shape: Shape, pixel: float) -> float:
-    """Joints are at most 2 cm wide, which the beam, the pixels and the median filter widen, and straight."""
+def _thin(region: Region, shape: Shape) -> float:
+    """Joints are at most 2 cm wide, which the beam, the pixels and the median filter widen, straight, and not as dark as water."""
+    pixel = region.pixel
     wander = shape.wander_along if shape.along > shape.across else shape.wander_across
     return min(
-        _ramp(shape.mean_width, 0.09, 0.06),
+        _ramp(shape.mean_width, 0.10, 0.07),
         _ramp(shape.length / max(shape.mean_width, pixel), 4.0, 8.0),
         _ramp(wander, 2.0 * pixel, pixel),
+        _ramp(region.drop_mean, DARKEST_JOINT + 0.5, DARKEST_JOINT),
     )
 
 
@@ -97,7 +103,7 @@ def _gradual(region: Region, shape: Shape) -> float:
 
 
 def _rectangular(region: Region, shape: Shape) -> float:
-    """A repaired patch: straight sides along the tunnel and around it, three of them seen at least.
+    """A repaired patch: straight sides along the tunnel and around it, of which appendages hide a part at most.
 
     A small blob may have straight sides by chance, but no corners; of a very small one pixels don't show the corners.
     """
@@ -108,7 +114,7 @@ def _rectangular(region: Region, shape: Shape) -> float:
     corners = max(_ramp(shape.corners, 0.35, 0.65), _ramp(wander / np.sqrt(shape.area), 0.025, 0.01))
     # Water that fills a panel between joints is rectangular too, and darker than repairs are.
     panel = _ramp(min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP), 0.8, 1.0)
-    hidden = _ramp(traits.rim_off / traits.rim, 0.4, 0.55)
+    hidden = _ramp(traits.rim_off / traits.rim, 0.85, 0.95)
     large = _ramp(min(shape.along, shape.across), 12.0 * pixel, 18.0 * pixel)
     sides = _ramp(wander, 1.2 * pixel, 0.6 * pixel)
     return min(sides, _ramp(shape.fill, 0.85, 0.93), corners, large, 1.0 - max(panel, hidden))
@@ -116,12 +122,14 @@ def _rectangular(region: Region, shape: Shape) -> float:
 
 def _stripe(shape: Shape, pixel: float) -> float:
     """A painted stripe: a band along the tunnel, straight and as wide at its ends; water along a joint keeps to no edge."""
-    return min(
-        _ramp(shape.slender, 6.0, 10.0),
+    neat = min(
         _ramp(shape.wander_box, pixel, 0.6 * pixel),
         _ramp(shape.fill, 0.85, 0.93),
         _ramp(shape.corners, 0.4, 0.7),
     )
+    # Ragged ones are as long as no leak along the tunnel.
+    long = min(_ramp(shape.along, 2.0, 2.5), _ramp(shape.wander_along, 2.0 * pixel, pixel))
+    return min(_ramp(shape.slender, 6.0, 10.0), max(neat, long))
 
 
 def _shadow(region: Region, shape: Shape) -> float:
