@@ -29,7 +29,7 @@ def upgrade() -> None:
         [
             ("range_m", postgresql.ARRAY(sa.Double()), "Ranges, growing, m"),
             ("intensity_db", postgresql.ARRAY(sa.Double()), "Intensity of dry lining at right angles there, dB"),
-            ("sigma_db", postgresql.ARRAY(sa.Double()), "Its shape's standard deviation there, dB; NULL beyond the ranges seen"),
+            ("sigma_db", postgresql.ARRAY(sa.Double()), "Standard deviation of its shape, dB; NULL beyond the ranges seen"),
         ],
     )
     _per_kilometre(

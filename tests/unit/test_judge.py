@@ -217,7 +217,7 @@ def _region(side: int, drop: float, share: float = 1.0, pixel: float = PIXEL) ->
 
 def test_confidence_grows_with_contrast_size_and_support() -> None:
     for grown in (
-        [_region(30, drop) for drop in (0.9, 1.2, 1.5, 2.0, 3.0)],
+        [_region(30, drop) for drop in (1.1, 1.3, 1.5, 2.0, 3.0)],
         [_region(side, 1.5) for side in (13, 20, 30, 50, 90)],
         [_region(30, 1.5, share) for share in (0.05, 0.1, 0.3, 0.6, 1.0)],
     ):

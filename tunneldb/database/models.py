@@ -542,7 +542,7 @@ class RangeCurve(Base):
     km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=_KM)
     range_m: Mapped[Floats] = mapped_column(comment="Ranges, growing, m")
     intensity_db: Mapped[Floats] = mapped_column(comment="Intensity of dry lining at right angles there, dB")
-    sigma_db: Mapped[Floats] = mapped_column(comment="Its shape's standard deviation there, dB; NULL beyond the ranges seen")
+    sigma_db: Mapped[Floats] = mapped_column(comment="Standard deviation of its shape, dB; NULL beyond the ranges seen")
 
 
 class Coverage(Base):

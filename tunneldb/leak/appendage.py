@@ -65,7 +65,7 @@ def distance_from_plane(offset: Single, pixel: float, corner: tuple[int, int] = 
 def recessed(offset: Single, distance: Single, pixel: float, delta: float = DELTA) -> Mask:
     """Mark pixels behind their plane that lie on a surface there: the back of a niche or of a bolt pocket.
 
-    About such a pixel, over 0.1 m, those with points lie at about its own depth, within δ; one may be an outlier. So
+    About such a pixel, over 0.1 m, those with points lie on one slope of up to 45°, within δ; one may be an outlier. So
     neither its edges are recesses, with the mixed pixels there, nor what lies scattered behind the wall.
 
     Parameters
@@ -77,7 +77,7 @@ def recessed(offset: Single, distance: Single, pixel: float, delta: float = DELT
     delta : float
         δ, m.
     """
-    marked: Mask = _recessed(offset, distance, delta, _growth(pixel))
+    marked: Mask = _recessed(offset, distance, delta, _growth(pixel), pixel)
     return marked
 
 
@@ -289,7 +289,9 @@ def _weighted(
 
 
 @njit(cache=True, nogil=True)
-def _recessed(offset: Single, distance: Single, delta: float, half: int) -> Mask:  # pragma: no cover - compiled
+def _recessed(
+    offset: Single, distance: Single, delta: float, half: int, steepest: float
+) -> Mask:  # pragma: no cover - compiled
     rows, columns = offset.shape
     out = np.zeros((rows, columns), np.bool_)
     enough = _SUPPORT * (2 * half + 1) ** 2
@@ -297,11 +299,19 @@ def _recessed(offset: Single, distance: Single, delta: float, half: int) -> Mask
         for j in range(columns):
             if not distance[i, j] <= -delta:
                 continue
+            down, along = 0.0, 0.0  # the slope, per pixel
+            if half <= i < rows - half:
+                down = (offset[i + half, j] - offset[i - half, j]) / (2 * half)
+            if half <= j < columns - half:
+                along = (offset[i, j + half] - offset[i, j - half]) / (2 * half)
+            down = down if abs(down) <= steepest else 0.0  # nor where it is unknown
+            along = along if abs(along) <= steepest else 0.0
             alike, other = 0, 0
             for m in range(max(i - half, 0), min(i + half + 1, rows)):
                 for n in range(max(j - half, 0), min(j + half + 1, columns)):
-                    alike += abs(offset[m, n] - offset[i, j]) < delta
-                    other += abs(offset[m, n] - offset[i, j]) >= delta
+                    gap = abs(offset[m, n] - offset[i, j] - down * (m - i) - along * (n - j))
+                    alike += gap < delta
+                    other += gap >= delta
                 if other > 1:
                     break
             out[i, j] = other <= 1 and alike >= enough

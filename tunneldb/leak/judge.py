@@ -46,7 +46,7 @@ def judge(region: Region) -> Verdict:
     """
     shape = measure(region.mask, region.pixel)
     degrees = {
-        "faint": _ramp(region.contrast, 3.8, 3.3),
+        "faint": _ramp(region.contrast, 3.4, 3.0),
         "thin": _thin(region, shape),
         "recess": _recess(region),
         "gradual": _gradual(region, shape),
@@ -71,7 +71,7 @@ def evidence(region: Region) -> float:
 
 
 def _thin(region: Region, shape: Shape) -> float:
-    """Joints are at most 2 cm wide, which the beam, the pixels and the median filter widen, straight, and not as dark as water."""
+    """Joints are at most 2 cm wide, which the beam, the pixels and the median filter widen, straight, not as dark as water."""
     pixel = region.pixel
     wander = shape.wander_along if shape.along > shape.across else shape.wander_across
     return min(
@@ -113,11 +113,16 @@ def _rectangular(region: Region, shape: Shape) -> float:
     wander = max(shape.wander_along, shape.wander_across)
     corners = max(_ramp(shape.corners, 0.35, 0.65), _ramp(wander / np.sqrt(shape.area), 0.025, 0.01))
     # Water that fills a panel between joints is rectangular too, and darker than repairs are.
-    panel = _ramp(min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP), 0.8, 1.0)
+    panel = _strong(region) * _ramp(region.area, 0.8, 1.2)
     hidden = _ramp(traits.rim_off / traits.rim, 0.85, 0.95)
-    large = _ramp(min(shape.along, shape.across), 12.0 * pixel, 18.0 * pixel)
+    large = _ramp(min(shape.along, shape.across), 10.0 * pixel, 14.0 * pixel)
     sides = _ramp(wander, 1.2 * pixel, 0.6 * pixel)
     return min(sides, _ramp(shape.fill, 0.85, 0.93), corners, large, 1.0 - max(panel, hidden))
+
+
+def _strong(region: Region) -> float:
+    """Whether a region is as dark as water, and no shade of concrete is."""
+    return _ramp(min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP), 0.8, 1.0)
 
 
 def _stripe(shape: Shape, pixel: float) -> float:
