@@ -115,7 +115,7 @@ def _rectangular(region: Region, shape: Shape) -> float:
     # Water that fills a panel between joints is rectangular too, and darker than repairs are.
     panel = _strong(region) * _ramp(region.area, 0.8, 1.2)
     hidden = _ramp(traits.rim_off / traits.rim, 0.85, 0.95)
-    large = _ramp(min(shape.along, shape.across), 10.0 * pixel, 14.0 * pixel)
+    large = _ramp(min(shape.along, shape.across), 12.0 * pixel, 18.0 * pixel)
     sides = _ramp(wander, 1.2 * pixel, 0.6 * pixel)
     return min(sides, _ramp(shape.fill, 0.85, 0.93), corners, large, 1.0 - max(panel, hidden))
 
