@@ -38,7 +38,7 @@ IMAGE = Path(__file__).parent / "images" / "leak-steps.png"
 TUNNEL = (
     "--length", 44, "--section", "horseshoe", "--scanner", "static", "--angular-step", 0.1, "--station-spacing", 15,
     "--lining", "segments", "--soot", 3, "--grime", 1.5, "--patches", 6, "--paint", 6, "--joint-leaks", 3, "--leaks", 12,
-    "--drips", "--clutter", "--seed", 4,
+    "--drips", "--clutter", 2, "--niche-leaks", 1, "--beam", 0.3, "--seed", 4,
 )  # fmt: skip
 FROM, TO = 14.0, 26.0  # chainage of the stretch, m
 KIND = {"leak": "#0072b2", "joint": "#d55e00", "dark": "#cc79a7"}
