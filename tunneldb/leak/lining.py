@@ -65,7 +65,8 @@ class Floor:
         """Make a floor of the arcs of the walls' feet (k,), m, NaN for none, at each metre from ``start`` on."""
         left, right = _bridged(left), _bridged(right)
         none = np.isnan(left), np.isnan(right)
-        return cls(start, np.where(none[0], -np.inf, left + FLOOR_EDGE), np.where(none[1], np.inf, right - FLOOR_EDGE))
+        left, right = np.where(none[0], -np.inf, left + FLOOR_EDGE), np.where(none[1], np.inf, right - FLOOR_EDGE)
+        return cls(start, -_steady(-left), _steady(right))
 
     def bounds(self, chainage: Float) -> tuple[Float, Float]:
         """Arc at which the floor begins on the left and on the right, m."""
@@ -78,6 +79,12 @@ class Floor:
         left, right = self.bounds(chainage)
         with np.errstate(invalid="ignore"):
             return np.asarray((arc <= left + above) | (arc >= right - above), dtype=np.bool_)
+
+
+def _steady(arcs: Float) -> Float:
+    """Arcs of the foot, no more than FLOOR_EDGE beyond those beside: of a section measured off the wall arcs are longer."""
+    beside = ndimage.minimum_filter1d(arcs, 3, mode="nearest")
+    return np.minimum(arcs, beside + FLOOR_EDGE)
 
 
 def _bridged(arcs: Float) -> Float:
