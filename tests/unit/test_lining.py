@@ -252,3 +252,12 @@ def test_clock_area_and_coordinates_of_a_patch(degrees, hours):
     points = np.array(shaped.surface.exterior.coords)
     np.testing.assert_allclose(np.hypot(points[:, 1], points[:, 2] - 100.0), 4.0, atol=1e-3)
     assert np.hypot(*np.diff(points[:, :2], axis=0).T).max() < 0.11
+
+
+def test_floor_begins_no_farther_down_the_wall_than_beside() -> None:
+    left, right = np.full(9, -9.36), np.full(9, 9.36)
+    left[4], right[4] = -9.54, 9.54
+    floor = Floor.of(100, left, right)
+    assert np.abs(floor.left).max() <= 9.36 + 1e-9
+    assert np.abs(floor.right).max() <= 9.36 + 1e-9
+    assert floor.right[0] == pytest.approx(9.34)
