@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.common import print_table, progress, save
 from tunneldb.errors import UserError
+from tunneldb.intensity.cells import Sight
 from tunneldb.intensity.range_curve import estimate_range_curve
 from tunneldb.scan.thin import thin, voxel_edge
 from tunneldb.simulate.generate import Cloud, simulate
@@ -65,7 +66,7 @@ def measured(parameters: Parameters, name: str) -> dict[str, Any]:
     chosen = np.flatnonzero(near & thin(cloud.xyz, voxel_edge(100.0)))
     out: dict[str, Any] = {"tunnel": name, "seed": parameters.seed, "roughness": parameters.roughness}
     try:
-        found = estimate_range_curve(*_seen(cloud, chosen))
+        found = estimate_range_curve(_seen(cloud, chosen))
     except UserError as error:
         return out | dict.fromkeys(("found", "m", "to", "rms", "max", "at", "said"), "") | {"refused": str(error)[:60]}
     at = np.linspace(found.nearest, found.farthest, 200)
@@ -91,11 +92,11 @@ def measured(parameters: Parameters, name: str) -> dict[str, Any]:
     }
 
 
-def _seen(cloud: Cloud, chosen: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Place, range, cosine and intensity of some points."""
+def _seen(cloud: Cloud, chosen: np.ndarray) -> Sight:
+    """Some points as they were seen."""
     place = np.column_stack([cloud.chainage[chosen], cloud.arc[chosen].astype(np.float64)])
     columns = cloud.range[chosen], np.cos(cloud.incidence[chosen]), cloud.amplitude[chosen]
-    return place, *(column.astype(np.float64) for column in columns)
+    return Sight(place, cloud.scan_id[chosen], *(column.astype(np.float64) for column in columns))
 
 
 if __name__ == "__main__":
