@@ -149,7 +149,9 @@ PARTS = (
     Part("steps of the radius: left in", [(lining.step, "steps", lambda offset, *others: np.zeros_like(offset))]),
     Part("judging: all that is dark is a leak", [(detection, "judge", lambda region: Verdict("leak", (), 1.0))]),
     Part("edges: where three sigma lie", [(detection, "settle", lambda dark, relative, size: dark)]),
-    Part("drips: left alone", [(region, "hang", lambda pieces, wanted, grid: (np.arange(len(wanted)), np.empty((0, 4), int)))]),
+    Part(
+        "drips: left alone", [(region, "hang", lambda pieces, wanted, *others: (np.arange(len(wanted)), np.empty((0, 4), int)))]
+    ),
     Part("range curve: auto for measured, and the other way round", swap_curve=True),
 )
 

@@ -171,6 +171,12 @@ def fill_levels(
             out[i, j] = dry_level(left + j, line, rings, per_pixel)
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _bin(level: int, expected: np.float32, per_bin: np.float32) -> int:  # pragma: no cover - compiled
+    """Bin, counted from the middle, of what a pixel shows beyond what is expected there, dB."""
+    return int(np.floor(np.float32(level * PER_LEVEL) - per_bin * expected))
+
+
 @njit(cache=True, nogil=True)
 def row_modes(
     state: State,
@@ -204,8 +210,7 @@ def row_modes(
                 continue
             for j in range(t * tile, (t + 1) * tile):
                 if state[i, j] == 1:
-                    beyond = np.float32(level[i, j] * PER_LEVEL) - per_bin * dry_level(j, line, rings, per_pixel)
-                    k = int(np.floor(beyond)) + BINS // 2
+                    k = _bin(level[i, j], dry_level(j, line, rings, per_pixel), per_bin) + BINS // 2
                     if 0 <= k < BINS:
                         histogram[t // per_block, k] += 1
         for b in range(blocks):
@@ -255,8 +260,7 @@ def column_modes(
                     continue
                 for j in range(t * tile, (t + 1) * tile):
                     if state[i, j] == 1:
-                        beyond = np.float32(level[i, j] * PER_LEVEL) - per_bin * dry_level(j, line, rings, per_pixel)
-                        k = int(np.floor(beyond)) + BINS // 2
+                        k = _bin(level[i, j], dry_level(j, line, rings, per_pixel), per_bin) + BINS // 2
                         if 0 <= k < BINS:
                             histogram[j - start * tile, k] += 1
         for j in range(start * tile, stop * tile):
@@ -291,8 +295,7 @@ def tile_histograms(
             histogram = out[i // tile, t]
             for j in range(t * tile, (t + 1) * tile):
                 if state[i, j] == 1:
-                    beyond = np.float32(level[i, j] * PER_LEVEL) - per_bin * dry_level(j, line, rings, per_pixel)
-                    k = int(np.floor(beyond)) + TILE_BINS // 2
+                    k = _bin(level[i, j], dry_level(j, line, rings, per_pixel), per_bin) + TILE_BINS // 2
                     if 0 <= k < TILE_BINS:
                         histogram[k] += np.uint16(1)
     return out

@@ -104,7 +104,7 @@ def short_runs(dark: Mask, first: int, stop: int, wide: int, high: int) -> tuple
                     behind += 1
                 if behind - j <= wide:
                     if flat == len(across):
-                        across = _longer(across)
+                        across = longer(across)
                     across[flat] = i, j, behind
                     flat += 1
             if i == 0 or not dark[i - 1, j]:
@@ -113,7 +113,7 @@ def short_runs(dark: Mask, first: int, stop: int, wide: int, high: int) -> tuple
                     behind += 1
                 if behind - i <= high:
                     if upright == len(along):
-                        along = _longer(along)
+                        along = longer(along)
                     along[upright] = j, i, behind
                     upright += 1
     along = along[:upright]
@@ -121,10 +121,11 @@ def short_runs(dark: Mask, first: int, stop: int, wide: int, high: int) -> tuple
 
 
 @njit(cache=True, nogil=True)
-def _longer(runs: Int) -> Int:  # pragma: no cover - compiled
-    longer = np.empty((2 * len(runs), 3), np.int64)
-    longer[: len(runs)] = runs
-    return longer
+def longer(values: NDArray[np.integer]) -> NDArray[np.integer]:  # pragma: no cover - compiled
+    """An array with twice the room along its first axis."""
+    out = np.empty((2 * len(values), *values.shape[1:]), values.dtype)
+    out[: len(values)] = values
+    return out
 
 
 @njit(cache=True, nogil=True)

@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tunneldb.leak.inside import inside
+from tunneldb.leak.lines import longer
 from tunneldb.leak.raster import NODATA
 from tunneldb.leak.relative import Relative
 
@@ -104,17 +105,10 @@ def _near(dark: Mask) -> tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.
                         if not near[m, n] & LISTED:
                             near[m, n] |= LISTED
                             if count == len(row):
-                                row, column = _longer(row), _longer(column)
+                                row, column = longer(row), longer(column)
                             row[count], column[count] = m, n
                             count += 1
     return near, row[:count], column[:count]
-
-
-@njit(cache=True, nogil=True)
-def _longer(numbers: NDArray[np.int32]) -> NDArray[np.int32]:  # pragma: no cover - compiled
-    longer = np.empty(2 * len(numbers), np.int32)
-    longer[: len(numbers)] = numbers
-    return longer
 
 
 @njit(cache=True, nogil=True)
