@@ -55,7 +55,8 @@ COMMENT ON FUNCTION tunnel_api.section_corner(float8, float8, float8, float8, fl
 --
 -- 1. Where the wall is curved, the points of a class lie inside its tangent by half the curvature times their variance
 --    along it; the radius is put back by that much.
--- 2. A class that holds a corner (its points fit no line, the lines of its neighbours meet in it) gives way to the corner.
+-- 2. A class that holds a corner (its points fit no line, the lines of its neighbours meet in it) gives way to the corner; so
+--    do up to three in a row where a pipe or a cable runs beside the corner.
 -- 3. Up to three classes that stand inwards of the smooth wall on both sides, by more than `protrusion` and by more than the
 --    lining is uneven here, are something hung on it: they are rejected.
 -- 4. Between the classes left the curve is a cubic in polar coordinates, or two lines with a corner where the wall turns
@@ -74,7 +75,7 @@ DECLARE
     r float8[] := radius;       -- radius of each class
     b float8[] := slope;        -- slope of each class' line, m/m
     a int; c int; i int; j int; g int; first int; last int;
-    turn float8; chord float8; usual float8; uneven float8; tolerance float8; corner float8[];
+    turn float8; chord float8; usual float8; uneven float8; tolerance float8; loose float8;
     differences float8[] := '{}'::float8[];
     angles float8[] := '{}'::float8[]; radii float8[] := '{}'::float8[]; slopes float8[] := '{}'::float8[];   -- the classes left, once round and more
     apart boolean;
@@ -129,16 +130,26 @@ BEGIN
     SELECT percentile_cont(0.5) WITHIN GROUP (ORDER BY q) INTO usual FROM unnest(sigma) q;
     tolerance := greatest(protrusion, 3 * 1.4826 * uneven);
 
-    -- 2. corners inside a class
-    FOR k IN 1 .. classes LOOP
-        a := (k + classes - 2) % classes + 1;
-        c := k % classes + 1;
-        CONTINUE WHEN r[k] IS NULL OR r[a] IS NULL OR r[c] IS NULL OR sigma[k] <= greatest(3 * usual, 0.01);
-        CONTINUE WHEN abs(2 * step - (atan(b[c]) - atan(b[a]))) < radians(45);
-        corner := tunnel_api.section_corner(-angle_step, r[a], b[a], angle_step, r[c], b[c]);
-        IF corner IS NOT NULL AND abs(corner[1]) <= angle_step THEN
-            class_state[k] := 'rejected';
-        END IF;
+    -- 2. corners inside a class, or inside some of which a corner and what hangs beside it leave no line
+    FOR g IN 1 .. 3 LOOP
+        loose := greatest(3 * usual, CASE WHEN g = 1 THEN 0.01 ELSE protrusion END);
+        FOR k IN 1 .. classes LOOP
+            -- classes k .. k+g-1 stand between i and j, whose points lie on lines
+            i := (k + classes - 2) % classes + 1;
+            j := (k + g - 1) % classes + 1;
+            CONTINUE WHEN r[i] IS NULL OR r[j] IS NULL OR sigma[i] > loose OR sigma[j] > loose;
+            apart := true;
+            FOR c IN 0 .. g - 1 LOOP
+                a := (k + c - 1) % classes + 1;
+                apart := apart AND r[a] IS NOT NULL AND sigma[a] > loose;
+                EXIT WHEN NOT apart;
+            END LOOP;
+            CONTINUE WHEN NOT apart OR abs((g + 1) * step - (atan(b[j]) - atan(b[i]))) < radians(45)
+                OR tunnel_api.section_corner(0, r[i], b[i], (g + 1) * angle_step, r[j], b[j]) IS NULL;
+            FOR c IN 0 .. g - 1 LOOP
+                class_state[(k + c - 1) % classes + 1] := 'rejected';
+            END LOOP;
+        END LOOP;
     END LOOP;
 
     -- 3. what hangs on the wall

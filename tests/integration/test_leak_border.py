@@ -39,7 +39,7 @@ START, PLANE = 12_990.0, 13_000.0
 SHIFT = 480.0
 """So much lower is the chainage at which there is no end: a multiple of all that is laid out along the tunnel, m."""
 
-ROUGHNESS = Roughness(14.0, True, 0.0, 0.0, 2, 0.0, 60.0)
+ROUGHNESS = Roughness(14.0, True, False, 0.0, 0.0, 2, 0.0, 60.0)
 PIXEL = 0.02
 
 

@@ -135,6 +135,23 @@ def test_roughness_is_not_claimed_where_incidence_hardly_varies():
     assert found.incidence_to < 12.0
 
 
+@pytest.mark.parametrize("brighter", [0.03, 0.1])
+def test_roughness_is_not_taken_for_what_soot_does(brighter):
+    """Lining that gets brighter the more slantingly it is seen follows no roughness: that of concrete is taken, and said."""
+    chainage, arc, view, cosine, level = _lining(10.0, 2, steepest=40.0)
+    angle = np.degrees(np.arccos(cosine))
+    found = find_roughness(automatic_regions(chainage, arc, view, cosine, level + brighter * angle))
+    assert (found.sigma, found.assumed, found.determined) == (9.0, True, False)
+    assert "soot" in found.note
+
+
+def test_roughness_of_nothing_is_that_of_concrete():
+    nothing = np.zeros(0)
+    found = find_roughness(Regions(nothing, nothing, nothing.astype(int)))
+    assert (found.sigma, found.assumed, found.determined) == (9.0, True, False)
+    assert "too little" in found.note
+
+
 def test_roughness_of_drawn_regions():
     chainage, arc, view, cosine, level = _lining(15.0, 5)
     dry = np.sin(1.3 * chainage + 5) + np.sin(1.7 * arc + 1) < 1.0

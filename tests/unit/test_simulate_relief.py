@@ -12,7 +12,7 @@ import shapely
 from tunneldb.simulate import Cloud, Parameters, Simulation, simulate
 from tunneldb.simulate.beam import segment_share
 from tunneldb.simulate.intensity import oren_nayar
-from tunneldb.simulate.truth import dry_features
+from tunneldb.simulate.truth import as_built, dry_features
 
 BARE: dict[str, Any] = {
     "length": 24.0, "straight": 5.0, "scanner": "profiler", "profile_spacing": 0.03, "profile_points": 600, "leaks": 0,
@@ -91,6 +91,17 @@ def test_the_section_is_wider_over_the_second_half_and_the_floor_goes_on() -> No
     wide = (cloud.klass == 1) & (cloud.chainage > 12.1)
     u = np.sum((cloud.xyz - f.position) * f.u, axis=1)
     assert np.abs(u[wide]).max() > simulation.tunnel.section.half_width + 0.05
+
+
+def test_truth_lies_on_the_section_as_built() -> None:
+    """Where a round section is wider, arcs are longer as the radii are."""
+    simulation, _ = scan(radius_step=0.08, section="circular")
+    lay = as_built(simulation)
+    radius, middle = 4.0, 0.5 * (simulation.tunnel.line.start + simulation.tunnel.line.end)
+    before, behind = shapely.box(middle - 3, -5, middle - 1, 2), shapely.box(middle + 1, -5, middle + 3, 2)
+    assert lay(before).equals(before)
+    longer = (radius + 0.08) / radius
+    np.testing.assert_allclose(lay(behind).bounds, (middle + 1, -5 * longer, middle + 3, 2 * longer), atol=1e-4)
 
 
 def test_shotcrete_is_rough_by_millimetres_and_hides_nothing_wrongly() -> None:

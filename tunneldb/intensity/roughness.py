@@ -42,6 +42,12 @@ TELLING = 3.0
 NOTICEABLE = 0.1
 """Smallest change of the intensity's course over the incidence angles that is taken for real, dB."""
 
+TYPICAL = 9.0
+"""Roughness of a concrete lining (Xu et al., 2018, fig. 5), degrees: taken where the lining's own can't be told."""
+
+ROUGHEST = 60.0
+"""No lining is rougher, degrees: where more comes out, something else than incidence, soot or damp, makes intensity change."""
+
 
 @dataclass(frozen=True)
 class Regions:
@@ -63,12 +69,14 @@ class Roughness:
     Attributes
     ----------
     sigma : float
-        σ at the objective's minimum, degrees.
+        σ at the objective's minimum, or TYPICAL, degrees.
     determined : bool
         False when the regions' incidence angles are too much alike to tell one σ from another; correcting
         with ``sigma`` is then as good as with any other near it.
+    assumed : bool
+        Whether ``sigma`` is TYPICAL, since no roughness explains what the regions show, or there are none; not determined then.
     objective : float
-        The objective there, √dB.
+        The objective for it, √dB.
     contrast : float
         By how much the correction at the steepest incidence would change against that at the flattest, if σ
         were 3° less or more, dB: the objective's flatness.
@@ -80,11 +88,29 @@ class Roughness:
 
     sigma: float
     determined: bool
+    assumed: bool
     objective: float
     contrast: float
     regions: int
     incidence_from: float
     incidence_to: float
+
+    @property
+    def note(self) -> str | None:
+        """What is to be said about it, if anything."""
+        if self.assumed:
+            return (
+                f"no roughness explains how intensity changes with incidence (something else changes along with it, soot"
+                f" perhaps): {self.sigma:g}° is taken, that of concrete"
+                if self.regions >= 2
+                else f"too little is seen of the lining to tell its roughness: {self.sigma:g}° is taken, that of concrete"
+            )
+        if not self.determined:
+            return (
+                "the lining is seen at too similar incidence angles to tell its roughness;"
+                " whichever is taken hardly changes the corrected intensity"
+            )
+        return None
 
 
 def objective(regions: Regions, roughness: float) -> float:
@@ -101,26 +127,28 @@ def objective(regions: Regions, roughness: float) -> float:
 def find_roughness(regions: Regions) -> Roughness:
     """Find the σ of the least objective (eq. 18): 0° to 90° in steps of 1°, then of 0.02° about the best.
 
-    Parameters
-    ----------
-    regions : Regions
-        At least two.
+    One above ROUGHEST is no roughness of a lining; TYPICAL is taken in its place, as it is where there are fewer than two
+    regions.
     """
     if len(regions) < 2:
-        raise ValueError(f"{len(regions)} regions")
+        return Roughness(TYPICAL, False, True, float("nan"), 0.0, len(regions), float("nan"), float("nan"))
     coarse = np.arange(0.0, 91.0)
     best = coarse[np.argmin([objective(regions, s) for s in coarse])]
     fine = np.clip(best + np.arange(-50, 51) * 0.02, 0.0, 90.0)
     values = [objective(regions, s) for s in fine]
     sigma = float(fine[np.argmin(values)])
+    least = float(min(values))
+    if assumed := sigma > ROUGHEST:
+        sigma, least = TYPICAL, objective(regions, TYPICAL)
     flattest, steepest = float(regions.cosine.max()), float(regions.cosine.min())
     ends = np.array([flattest, steepest])
     course = [float(np.diff(incidence_db(ends, float(np.clip(s, 0, 90))))[0]) for s in (sigma - TELLING, sigma + TELLING)]
     contrast = abs(course[1] - course[0])
     return Roughness(
         sigma=sigma,
-        determined=contrast > NOTICEABLE,
-        objective=float(min(values)),
+        determined=contrast > NOTICEABLE and not assumed,
+        assumed=assumed,
+        objective=least,
         contrast=contrast,
         regions=len(regions),
         incidence_from=float(np.degrees(np.arccos(min(flattest, 1.0)))),

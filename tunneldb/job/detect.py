@@ -172,11 +172,8 @@ def _report(roughness: Roughness, note: str | None, other_pixels: list[int]) -> 
         "incidence_to": known(roughness.incidence_to, 1),
     }
     notes = [note] if note else []
-    if not roughness.determined:
-        notes.append(
-            "the lining is seen at too similar incidence angles to tell its roughness;"
-            " whichever is taken hardly changes the corrected intensity"
-        )
+    if text := roughness.note:
+        notes.append(text)
     if other_pixels:
         notes.append(
             f"leaks over the end towards kilometre {' and '.join(map(str, other_pixels))} are in two pieces: its pixels are of"

@@ -81,10 +81,11 @@ def _look_at_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, v
     view = take_sample(conn, survey, eye)
     found, refused = _attempt(lambda: find_range_curve(view, eye), view.views.raw_db[view.telling])
     if needs_reference(kind) and measured is None:
-        roughness = found.roughness if found else None
+        roughness, note = found.roughness if found else None, None
         view = view.along(found.curve if found else UNKNOWN)
     else:
-        roughness = roughness_of(view, load_regions(conn, survey, km, "homogeneous")).sigma
+        known = roughness_of(view, load_regions(conn, survey, km, "homogeneous"))
+        roughness, note = known.sigma, known.note
     near = np.flatnonzero(view.telling)
     near = near[:: max(1, len(near) // most)]
     seen = view.views
@@ -95,7 +96,7 @@ def _look_at_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, v
         roughness,
         found,
         measured,
-        refused,
+        [note, refused],
     )
 
 
@@ -144,7 +145,7 @@ def look_at_file(path: Path, dimension: str, kind: Kind, scanner: tuple[float, f
     if found and needs_reference(kind):
         distance = level - found.curve(range_m)
     roughness = found.roughness if found else None
-    return _look(path.name, kind, _Points(range_m, cosine, level, distance), roughness, found, None, refused)
+    return _look(path.name, kind, _Points(range_m, cosine, level, distance), roughness, found, None, [refused])
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ def _look(
     roughness: float | None,
     found: RangeCurve | None,
     measured: ReferenceCurve | None,
-    refused: str | None,
+    remarks: list[str | None],
 ) -> Look:
     """Correct points by what is known, and say by what."""
     nothing = roughness is None or (needs_reference(kind) and found is None and measured is None)
@@ -187,8 +188,7 @@ def _look(
         )
         if found.hardly_overlaps:
             notes.append(f"{title}: hardly any of it was seen by two scans, so it is taken to be alike within a few metres")
-    if refused:
-        notes.append(f"{title}: {refused}")
+    notes += [f"{title}: {remark}" for remark in remarks if remark]
     return Look(
         f"{title}: {kind}",
         points.range_m,

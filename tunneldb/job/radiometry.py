@@ -21,7 +21,6 @@ from tunneldb.intensity.reference import ReferenceCurve
 from tunneldb.intensity.roughness import (
     STEEPEST,
     TELLING,
-    Regions,
     Roughness,
     automatic_regions,
     drawn_regions,
@@ -210,6 +209,7 @@ def _roughness_found(view: Sample, found: RangeCurve) -> Roughness:
     return Roughness(
         found.roughness,
         found.roughness_sigma < TELLING,
+        False,
         float("nan"),
         float("nan"),
         found.cells,
@@ -229,12 +229,7 @@ def roughness_of(view: Sample, drawn: list[Polygon]) -> Roughness:
     regions = automatic_regions(
         seen.chainage[near], seen.arc[near], view.scan_id[near], views.cosine[near], views.distance_db[near]
     )
-    return find_roughness(regions) if len(regions) >= 2 else _unknown(regions)
-
-
-def _unknown(regions: Regions) -> Roughness:
-    """Lambert's law, for want of regions that tell."""
-    return Roughness(0.0, False, float("nan"), 0.0, len(regions), float("nan"), float("nan"))
+    return find_roughness(regions)
 
 
 def _polygon_of(seen: Seen, polygons: list[Polygon]) -> NDArray[np.int64]:

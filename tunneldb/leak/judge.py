@@ -103,21 +103,21 @@ def _gradual(region: Region, shape: Shape) -> float:
 
 
 def _rectangular(region: Region, shape: Shape) -> float:
-    """A repaired patch: straight sides along the tunnel and around it, of which appendages hide a part at most.
+    """What was built, a repaired patch or a segment of another shade: its sharp sides lie along the tunnel and around it.
 
-    A small blob may have straight sides by chance, but no corners; of a very small one pixels don't show the corners.
+    However joints and appendages cut it up. A small blob may have straight sides by chance, a narrow band along a joint has.
     """
-    traits, pixel = region.traits, region.pixel
-    if not traits.rim or min(shape.along, shape.across) < 4 * pixel:
+    traits = region.traits
+    shown = traits.rim - traits.rim_off
+    if not traits.sharp or not shown:
         return 0.0
-    wander = max(shape.wander_along, shape.wander_across)
-    corners = max(_ramp(shape.corners, 0.35, 0.65), _ramp(wander / np.sqrt(shape.area), 0.025, 0.01))
+    wide = _ramp(shape.mean_width, 0.20, 0.35)
+    lines = _ramp(traits.straight / traits.sharp, 0.79 - 0.08 * wide, 0.87 - 0.08 * wide)
     # Water that fills a panel between joints is rectangular too, and darker than repairs are.
-    panel = _strong(region) * _ramp(region.area, 0.8, 1.2)
+    panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), 1.0 - wide)
     hidden = _ramp(traits.rim_off / traits.rim, 0.85, 0.95)
-    large = _ramp(min(shape.along, shape.across), 12.0 * pixel, 18.0 * pixel)
-    sides = _ramp(wander, 1.2 * pixel, 0.6 * pixel)
-    return min(sides, _ramp(shape.fill, 0.85, 0.93), corners, large, 1.0 - max(panel, hidden))
+    large = _ramp(shape.mean_width, 0.16, 0.22)
+    return min(lines, _ramp(traits.sharp / shown, 0.15, 0.25), large, 1.0 - max(panel, hidden))
 
 
 def _strong(region: Region) -> float:

@@ -17,6 +17,7 @@ from tunneldb.leak.lines import beside
 from tunneldb.leak.polygon import outline
 from tunneldb.leak.raster import NODATA, STEP
 from tunneldb.leak.relative import Relative
+from tunneldb.leak.sides import SHARP, straight
 
 Mask = NDArray[np.bool_]
 Int = NDArray[np.int64]
@@ -43,6 +44,9 @@ class Traits(NamedTuple):
         Sides at which the drop was measured on both, ACROSS from them.
     inside, outside : float
         Sum of the drop there, dB.
+    sharp, straight : float
+        Sides over which half of the region's drop is lost, and those of them that lie on straight lines
+        (:func:`tunneldb.leak.sides.straight`).
     """
 
     sigma: float = 0.0
@@ -53,6 +57,8 @@ class Traits(NamedTuple):
     steps: float = 0.0
     inside: float = 0.0
     outside: float = 0.0
+    sharp: float = 0.0
+    straight: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -164,6 +170,8 @@ def _cut_out(runs: Int, dark: Mask, relative: Relative) -> Region:
     sums = _read(
         runs, dark, relative.drop, relative.state, relative.sigma, relative.tile, mask, top, first, across, STEP["corrected"]
     )
+    least = SHARP * float(sums[1]) / max(float(sums[0]), 1.0) / STEP["corrected"]
+    sides = straight(runs, dark, relative.drop, relative.state, across, least)
     return Region(
         grid.pixel,
         grid.first_column + first,
@@ -172,7 +180,7 @@ def _cut_out(runs: Int, dark: Mask, relative: Relative) -> Region:
         int(sums[0]),
         float(sums[1]),
         float(sums[2]),
-        Traits(*sums[3:].tolist()),
+        Traits(*sums[3:].tolist(), *map(float, sides)),
     )
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 STEP = 1.0  # m between the vertices of soot
+FINE = 0.005  # m between the places by which arcs on a wider section are measured
 
 
 class Dry(NamedTuple):
@@ -31,6 +34,30 @@ class Dry(NamedTuple):
     outline: Polygon
     kind: str
     drop: float
+
+
+def as_built(simulation: Simulation) -> Callable[[BaseGeometry], BaseGeometry]:
+    """What lays outlines on the nominal lining out on the one that was built, where the section is wider: there arcs are longer.
+
+    Chainages stay.
+    """
+    parameters, tunnel = simulation.parameters, simulation.tunnel
+    middle = 0.5 * (tunnel.line.start + tunnel.line.end)
+    half = np.linspace(0.0, tunnel.section.floor_arc, math.ceil(tunnel.section.floor_arc / FINE) + 1)
+    if not parameters.radius_step:
+        return lambda outline: outline
+
+    def length(arc: Array) -> Array:
+        point, normal = tunnel.section.point(arc)
+        return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(point - parameters.radius_step * normal, axis=0), axis=1))])
+
+    arcs, lengths = np.concatenate([-half[:0:-1], half]), np.concatenate([-length(-half)[:0:-1], length(half)])
+
+    def lay(places: Array) -> Array:
+        s, arc = places.T
+        return np.column_stack([s, np.where(s > middle, np.interp(arc, arcs, lengths), arc)])
+
+    return lambda outline: shapely.transform(outline, lay)
 
 
 def joints(rings: Rings, start: float, end: float, lowest: float) -> list[Dry]:
@@ -93,8 +120,10 @@ def dry_features(simulation: Simulation) -> list[Dry]:
 
 
 def write_truth(simulation: Simulation, path: Path) -> None:
-    """Write leaks and what is dark but dry as layers ``leak`` and ``dry`` of a GeoPackage, in the unrolled plane."""
-    leaks, dry = simulation.leaks, dry_features(simulation)
+    """Write leaks and what is dark but dry as layers ``leak`` and ``dry`` of a GeoPackage, in the unrolled plane as built."""
+    lay = as_built(simulation)
+    leaks = [replace(k, polygon=lay(k.polygon)) for k in simulation.leaks]
+    dry = [d._replace(outline=lay(d.outline)) for d in dry_features(simulation)]
     wet = {
         "id": np.array([k.id for k in leaks], dtype=np.int32),
         "kind": np.array([k.kind for k in leaks], dtype=object),
