@@ -61,7 +61,8 @@ class Scene:
 
     @property
     def scans(self) -> list[Path]:
-        return sorted(self.folder.glob(f"{self.name}*.laz"))
+        """Its scan files; other tunnels in the folder may begin with the same name."""
+        return [self.folder / name for name in json.loads(self.file("json").read_text())["files"]]
 
     @cached_property
     def xyz(self) -> Float:

@@ -112,7 +112,7 @@ def _rectangular(region: Region, shape: Shape) -> float:
     if not traits.sharp or not shown:
         return 0.0
     wide = _ramp(shape.mean_width, 0.20, 0.35)
-    lines = _ramp(traits.straight / traits.sharp, 0.79 - 0.08 * wide, 0.87 - 0.08 * wide)
+    lines = _ramp(traits.straight / traits.sharp, 0.86 - 0.15 * wide, 0.94 - 0.15 * wide)
     # Water that fills a panel between joints is rectangular too, and darker than repairs are.
     panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), 1.0 - wide)
     hidden = _ramp(traits.rim_off / traits.rim, 0.85, 0.95)
@@ -138,10 +138,10 @@ def _stripe(shape: Shape, pixel: float) -> float:
 
 
 def _shadow(region: Region, shape: Shape) -> float:
-    """A narrow band beside a cable or a pipe."""
+    """A narrow band beside a cable or a pipe; or what shows between appendages and ends nowhere on dry lining."""
     traits = region.traits
     beside = traits.rim_off / traits.rim if traits.rim else 0.0
-    return min(_ramp(beside, 0.25, 0.45), _ramp(shape.width, 0.14, 0.08))
+    return max(min(_ramp(beside, 0.25, 0.45), _ramp(shape.width, 0.14, 0.08)), _ramp(beside, 0.8, 0.9))
 
 
 def _ramp(value: float, none: float, full: float) -> float:
