@@ -155,7 +155,7 @@ def prepare(folder: Path, points: int, dsn: str) -> Scene:
     length = points / POINTS_PER_METRE
     start = BORDER - length / 2
     scene = Scene(folder, NAME, start)
-    if not scene.scans:
+    if not scene.file("json").exists():
         progress(f"simulating {length:g} m")
         options = ["--length", length, "--radius", 300, "--s-curve", "--scanner", "profiler", "--no-truth"]
         scene = Scene.simulate(folder, NAME, *options, start_chainage=start)
