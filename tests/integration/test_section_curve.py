@@ -47,7 +47,8 @@ def classes(points: NDArray[np.float64]) -> list[list[float]]:
 def curve(conn: psycopg.Connection, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[str]]:
     """Arc of each degree from -180 to 180, and what became of the classes."""
     row = conn.execute(
-        "SELECT node_arc, class_state FROM tunnel_api.section_curve(%s, %s::float8[], %s::float8[], %s::float8[], %s::float8[])",
+        "SELECT node_arc, class_state"
+        " FROM tunnel_api.section_curve(%s, %s::float8[], %s::float8[], %s::float8[], %s::float8[])",
         (STEP, *classes(points)),
     ).fetchone()
     assert row is not None

@@ -166,6 +166,50 @@ def test_repairs_and_stripes_have_straight_sides(drop: float) -> None:
     assert sum("stripe" in anomaly.verdict.reasons for anomaly in found) == 1
 
 
+@pytest.mark.parametrize("drop", [1.2, 2.0])
+def test_repairs_that_joints_and_appendages_cut_up_have_straight_sides_still(drop: float) -> None:
+    canvas = Canvas(10)
+    patches = [box(1.0, 0.4, 2.8, 1.6), box(5.0, 0.4, 6.4, 1.9), box(9.0, 0.2, 10.6, 1.4)]
+    for patch in patches:
+        canvas.paint(patch, drop)
+    canvas.paint(box(2.2, -HALF, 2.22, HALF), 3.0)  # a joint through the first
+    for hidden in (box(2.3, 1.2, 2.65, 1.6), box(4.0, 0.8, 8.0, 0.95), box(9.9, 0.2, 10.2, 0.5), box(8.9, 1.1, 9.3, 1.5)):
+        canvas.state[canvas.inside(hidden) > 0] = State.OFF
+    found = [anomaly for anomaly in canvas.detect().found if anomaly.verdict.kind != "joint"]
+    assert len(found) == 4
+    assert all(anomaly.verdict.reasons[0] == "rectangular" for anomaly in found)
+
+
+def test_a_segment_of_a_darker_shade_of_which_a_part_is_dark_enough_is_no_leak() -> None:
+    """It ends at its joints, and fades within."""
+    canvas = Canvas(11)
+    canvas.paint(box(4.0, -1.0, 5.5, 2.0), 1.2)
+    canvas.drop -= canvas.inside(box(4.0, -1.0, 5.5, 2.0)) * 0.5 * np.clip((canvas.arc + 1.0) / 2.0, 0.0, 1.0)
+    found = canvas.detect()
+    assert found.found
+    assert not of_kind(found, "leak")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_leaks_of_many_shapes_are_not_taken_for_something_built(seed: int) -> None:
+    canvas = Canvas(20 + seed)
+    areas = np.tile((0.12, 0.25, 0.5, 0.9, 1.3, 0.4), 2)
+    for k, area in enumerate(areas):
+        leak = blob(1.3 + 2.2 * (k % 6), -2.0 if k < 6 else 2.0, float(area), 100 * seed + k)
+        canvas.paint(leak, (1.5, 2.2, 4.0)[k % 3])
+    assert len(of_kind(canvas.detect(), "leak")) == len(areas)
+
+
+def test_what_shows_between_appendages_only_is_no_leak() -> None:
+    canvas = Canvas(12)
+    canvas.state[canvas.inside(box(3.0, 0.0, 6.0, 1.2)) > 0] = State.OFF
+    canvas.state[canvas.inside(box(3.3, 0.4, 5.7, 0.8)) > 0] = State.LINING
+    canvas.paint(box(3.3, 0.4, 5.7, 0.8), 4.0)
+    (only,) = canvas.detect().found
+    assert only.verdict.kind == "dark"
+    assert "shadow" in only.verdict.reasons
+
+
 def test_soot_fades_out() -> None:
     canvas = Canvas(6)
     canvas.drop += 2.2 * np.exp(-((canvas.arc / 1.2) ** 2) - ((canvas.chainage - 7) / 4) ** 2)

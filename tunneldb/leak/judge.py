@@ -105,16 +105,16 @@ def _gradual(region: Region, shape: Shape) -> float:
 def _rectangular(region: Region, shape: Shape) -> float:
     """What was built, a repaired patch or a segment of another shade: its sharp sides lie along the tunnel and around it.
 
-    However joints and appendages cut it up. A small blob may have straight sides by chance, a narrow band along a joint has.
+    However joints and appendages cut it up. Of a small blob or a narrow band along a joint more sides do by chance.
     """
     traits = region.traits
     shown = traits.rim - traits.rim_off
     if not traits.sharp or not shown:
         return 0.0
-    wide = _ramp(shape.mean_width, 0.20, 0.35)
-    lines = _ramp(traits.straight / traits.sharp, 0.86 - 0.15 * wide, 0.94 - 0.15 * wide)
-    # Water that fills a panel between joints is rectangular too, and darker than repairs are.
-    panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), 1.0 - wide)
+    most = 0.71 + 0.15 * _ramp(shape.mean_width, 0.35, 0.20) + 0.12 * _ramp(region.area, 0.3, 0.1)
+    lines = _ramp(traits.straight / traits.sharp, most, most + 0.08)
+    # Water that fills a panel between joints is rectangular too, and darker than repairs are, and so are small blobs.
+    panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), _ramp(shape.mean_width, 0.45, 0.30))
     hidden = _ramp(traits.rim_off / traits.rim, 0.85, 0.95)
     large = _ramp(shape.mean_width, 0.16, 0.22)
     return min(lines, _ramp(traits.sharp / shown, 0.15, 0.25), large, 1.0 - max(panel, hidden))

@@ -37,19 +37,17 @@ class Dry(NamedTuple):
 
 
 def as_built(simulation: Simulation) -> Callable[[BaseGeometry], BaseGeometry]:
-    """What lays outlines on the nominal lining out on the one that was built, where the section is wider: there arcs are longer.
-
-    Chainages stay.
-    """
+    """What lays outlines on the nominal lining out on the one that was built: where the section is wider, arcs are longer."""
     parameters, tunnel = simulation.parameters, simulation.tunnel
     middle = 0.5 * (tunnel.line.start + tunnel.line.end)
-    half = np.linspace(0.0, tunnel.section.floor_arc, math.ceil(tunnel.section.floor_arc / FINE) + 1)
     if not parameters.radius_step:
         return lambda outline: outline
+    half = np.linspace(0.0, tunnel.section.floor_arc, math.ceil(tunnel.section.floor_arc / FINE) + 1)
 
     def length(arc: Array) -> Array:
         point, normal = tunnel.section.point(arc)
-        return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(point - parameters.radius_step * normal, axis=0), axis=1))])
+        pieces = np.diff(point - parameters.radius_step * normal, axis=0)
+        return np.concatenate([[0.0], np.cumsum(np.linalg.norm(pieces, axis=1))])
 
     arcs, lengths = np.concatenate([-half[:0:-1], half]), np.concatenate([-length(-half)[:0:-1], length(half)])
 
