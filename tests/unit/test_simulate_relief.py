@@ -95,7 +95,7 @@ def test_the_section_is_wider_over_the_second_half_and_the_floor_goes_on() -> No
 
 def test_truth_lies_on_the_section_as_built() -> None:
     """Where a round section is wider, arcs are longer as the radii are."""
-    simulation, _ = scan(radius_step=0.08, section="circular")
+    simulation = Simulation(Parameters(**{**BARE, "radius_step": 0.08, "section": "circular"}))
     lay = as_built(simulation)
     radius, middle = 4.0, 0.5 * (simulation.tunnel.line.start + simulation.tunnel.line.end)
     before, behind = shapely.box(middle - 3, -5, middle - 1, 2), shapely.box(middle + 1, -5, middle + 3, 2)

@@ -137,7 +137,7 @@ def find_roughness(regions: Regions) -> Roughness:
     fine = np.clip(best + np.arange(-50, 51) * 0.02, 0.0, 90.0)
     values = [objective(regions, s) for s in fine]
     sigma = float(fine[np.argmin(values)])
-    least = float(min(values))
+    least = min(values)
     if assumed := sigma > ROUGHEST:
         sigma, least = TYPICAL, objective(regions, TYPICAL)
     flattest, steepest = float(regions.cosine.max()), float(regions.cosine.min())

@@ -111,13 +111,12 @@ def _rectangular(region: Region, shape: Shape) -> float:
     shown = traits.rim - traits.rim_off
     if not traits.sharp or not shown:
         return 0.0
-    most = 0.71 + 0.15 * _ramp(shape.mean_width, 0.35, 0.20) + 0.12 * _ramp(region.area, 0.3, 0.1)
+    width, pixels = shape.mean_width / region.pixel, region.area / region.pixel**2
+    most = 0.71 + 0.15 * _ramp(width, 17.5, 10.0) + 0.12 * _ramp(pixels, 750.0, 250.0)
     lines = _ramp(traits.straight / traits.sharp, most, most + 0.08)
     # Water that fills a panel between joints is rectangular too, and darker than repairs are, and so are small blobs.
-    panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), _ramp(shape.mean_width, 0.45, 0.30))
-    hidden = _ramp(traits.rim_off / traits.rim, 0.85, 0.95)
-    large = _ramp(shape.mean_width, 0.16, 0.22)
-    return min(lines, _ramp(traits.sharp / shown, 0.15, 0.25), large, 1.0 - max(panel, hidden))
+    panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), _ramp(width, 22.5, 15.0))
+    return min(lines, _ramp(traits.sharp / shown, 0.15, 0.25), _ramp(width, 8.0, 11.0), 1.0 - panel)
 
 
 def _strong(region: Region) -> float:
