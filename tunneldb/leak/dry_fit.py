@@ -21,8 +21,8 @@ Float = NDArray[np.float64]
 Single = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-SAMPLE = 15_000_000
-"""Pixels, about, that each step looks at."""
+SAMPLE, LINES = 15_000_000, 6_000_000
+"""Pixels, about, that are looked at for tiles, and for rows and columns, which hold far more each."""
 
 BESIDE = 1
 """Blocks to either side by which a band is told: with the block itself 150 m, of which a leak is a small part."""
@@ -73,7 +73,7 @@ class Fit:
     def __init__(self, picture: Picture, tile: int, count: int, drawn: Sequence[Polygon]) -> None:
         grid = self.grid = picture.grid
         self.picture, self.tile, self.drawn = picture, tile, drawn
-        self.every = max(1, count // SAMPLE)
+        self.every, self.apart = max(1, count // SAMPLE), max(1, count // LINES)
         shape = -(-grid.rows // tile), grid.columns // tile
         total = robust_statistics(_sample(picture.state, picture.level, max(1, count // 500_000)) * STEP["corrected"])
         self.base, self.spread = total.mean, max(total.sigma, STEP["corrected"])
@@ -98,8 +98,8 @@ class Fit:
         """Add what each row shows: about each block, or where too little is seen of it, in the whole kilometre."""
         scanned, per_block = int(self.lining.any(axis=0).sum()), self.smooth.shape[1] // self.bands.shape[1]
         along = min(scanned, (2 * BESIDE + 1) * per_block)
-        enough = max(FEW, round(PART * along * self.per_tile / self.tile / self.every))
-        found, whole = row_modes(*self._plain, *self.parts, self.every, BESIDE, enough)
+        enough = max(FEW, round(PART * along * self.per_tile / self.tile / self.apart))
+        found, whole = row_modes(*self._plain, *self.parts, self.apart, BESIDE, enough)
         found = np.where(np.isfinite(found), found, whole[:, None])
         rows = np.flatnonzero(np.isfinite(whole))
         if not len(rows):
@@ -113,7 +113,7 @@ class Fit:
         """Add what each column shows, without joints."""
         pixel = self.grid.pixel
         per_column = self.per_tile * self.lining.shape[0] / self.tile
-        found = column_modes(*self._plain, *self.parts, self.every, max(FEW, round(PART * per_column / self.every)))
+        found = column_modes(*self._plain, *self.parts, self.apart, max(FEW, round(PART * per_column / self.apart)))
         # Where columns hold little, more of them are taken together.
         size = _odd(max(RING / pixel, 10.0 * ENOUGH / max(per_column, 1.0)))
         found = _running_median(found, size // 2)

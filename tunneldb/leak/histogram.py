@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tunneldb.intensity.dry import CLIP, CLIPPED_SIGMA
-from tunneldb.leak.raster import STEP
+from tunneldb.leak.raster import NODATA, STEP
 
 Float = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -37,6 +37,7 @@ LONGER = 1.5
 """Of runs of bins up to so much longer than the shortest the brightest is taken: where half is wet, it is the dry one."""
 
 PER_LEVEL = STEP["corrected"] / BIN
+PER_DECIBEL = 1.0 / STEP["corrected"]
 
 CHUNK = 10
 """Tiles along the tunnel whose columns are worked on together: their histograms fit a processor's cache."""
@@ -169,6 +170,21 @@ def fill_levels(
         row_line(top + i, base, bands, smooth, tile, first, stop, line)
         for j in range(out.shape[1]):
             out[i, j] = dry_level(left + j, line, rings, per_pixel)
+
+
+@njit(cache=True, nogil=True)
+def take_levels(
+    base: float, rings: Single, bands: Single, smooth: Single, tile: int, level: Level
+) -> None:  # pragma: no cover - compiled
+    """Put level of dry lining less level in the place of all levels (rows, columns), steps; NODATA stays."""
+    line = np.zeros(smooth.shape[1], np.float32)
+    per_pixel, per_step = np.float32(1.0 / tile), np.float32(PER_DECIBEL)
+    for i in range(level.shape[0]):
+        row_line(i, base, bands, smooth, tile, 0, smooth.shape[1], line)
+        for j in range(level.shape[1]):
+            if level[i, j] != NODATA:
+                drop = np.rint(dry_level(j, line, rings, per_pixel) * per_step) - level[i, j]
+                level[i, j] = min(max(drop, NODATA + 1), -NODATA - 1)
 
 
 @njit(cache=True, nogil=True, inline="always")

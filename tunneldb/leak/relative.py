@@ -9,13 +9,10 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from tunneldb.leak.dry_map import DryMap
+from tunneldb.leak.histogram import take_levels
 from tunneldb.leak.image import Grid
 from tunneldb.leak.inside import inside
 from tunneldb.leak.picture import Picture
-from tunneldb.leak.raster import NODATA, STEP
-
-ROWS = 64
-"""Rows that are worked on at a time: their levels are all that is held in single precision."""
 
 
 @dataclass(frozen=True)
@@ -49,16 +46,8 @@ class Relative:
 
 def relative(picture: Picture, dry: DryMap) -> Relative:
     """Take the level of dry lining from that of all pixels, in the memory of ``picture.level``, which is lost."""
-    drop, columns = picture.level, slice(0, picture.grid.columns)
-    per_step = np.float32(1.0 / STEP["corrected"])
-    for first in range(0, picture.grid.rows, ROWS):
-        rows = slice(first, min(first + ROWS, picture.grid.rows))
-        expected = np.rint(dry.levels(rows, columns) * per_step)
-        here = drop[rows]
-        none = here == NODATA
-        np.subtract(expected, here, out=expected)
-        here[:] = np.clip(expected, NODATA + 1, -NODATA - 1).astype(np.int16)
-        here[none] = NODATA
+    drop = picture.level
+    take_levels(dry.base, dry.rings, dry.bands, dry.smooth, dry.tile, drop)
     for block, mask in inside(picture.grid, dry.drawn):
         here = drop[:, block]
         here[mask] = np.minimum(here[mask], 0)
