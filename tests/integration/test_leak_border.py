@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,7 @@ from tunneldb.job.scene import load_arcs
 from tunneldb.job.sources import sources
 from tunneldb.leak import detection
 from tunneldb.leak.border import replace_parts
-from tunneldb.leak.dry_map import map_dry
+from tunneldb.leak.dry_map import DryMap, map_dry
 from tunneldb.leak.gather import gather
 from tunneldb.leak.image import Accumulator, Grid
 from tunneldb.leak.lining import Astray, Floor
@@ -75,23 +75,11 @@ def sections(conn: psycopg.Connection, scan: Path) -> psycopg.Connection:
     return conn
 
 
-@dataclass(frozen=True)
-class Flat:
+def flat(grid: Grid, mean: float, spread: float) -> DryMap:
     """Dry lining that is everywhere alike."""
-
-    grid: Grid
-    mean: float
-    spread: float
-    count: int = 1
-    tile: int = 25
-    drawn: tuple[Polygon, ...] = ()
-
-    @property
-    def sigma(self) -> np.ndarray:
-        return np.full((-(-self.grid.rows // 25), -(-self.grid.columns // 25)), self.spread, np.float32)
-
-    def levels(self, rows: slice, columns: slice) -> np.ndarray:
-        return np.full((rows.stop - rows.start, columns.stop - columns.start), self.mean, np.float32)
+    rings, bands = np.zeros(grid.columns, np.float32), np.zeros((grid.rows, grid.blocks), np.float32)
+    smooth = np.zeros((-(-grid.rows // 25), grid.columns // 25), np.float32)
+    return DryMap(grid, 25, np.full_like(smooth, spread), mean, spread, 1, mean, rings, bands, smooth)
 
 
 @pytest.fixture
@@ -115,10 +103,10 @@ def uncut(sections: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> list
         picture = develop(image, eye.floor, Astray.of(surface), values["appendage.distance"], lambda window: None)
     dry = map_dry(picture)
     mean, spread = dry.mean, dry.spread
-    flat = Flat(grid, mean, spread)
-    found = detection.detect(relative(picture, flat), flat, 0.05)
+    even = flat(grid, mean, spread)
+    found = detection.detect(relative(picture, even), even, 0.05)
     conn.rollback()
-    monkeypatch.setattr(job, "map_dry", lambda picture, _: Flat(picture.grid, mean, spread))
+    monkeypatch.setattr(job, "map_dry", lambda picture, _: flat(picture.grid, mean, spread))
     monkeypatch.setattr(radiometry, "roughness_of", lambda *_: ROUGHNESS)
     return [shapely.affinity.translate(anomaly.outline, SHIFT) for anomaly in found.found]
 
