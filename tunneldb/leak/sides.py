@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tunneldb.leak.lines import longer
 from tunneldb.leak.raster import NODATA
 
 Mask = NDArray[np.bool_]
@@ -78,9 +79,7 @@ def _sharp(
                 if _step(dark, drop, state, i, j, di, dj, across) < least:
                     continue
                 if count == len(found):
-                    longer = np.empty((2 * count, 3), np.int64)
-                    longer[:count] = found
-                    found = longer
+                    found = longer(found)
                 found[count] = (facing, j, i) if di else (facing, i, j)
                 count += 1
     return found[:count]

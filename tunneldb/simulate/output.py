@@ -7,7 +7,7 @@ import math
 import shutil
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,7 +21,7 @@ from shapely.geometry import mapping
 import tunneldb
 from tunneldb.errors import UserError
 from tunneldb.simulate.generate import Cloud, Simulation
-from tunneldb.simulate.truth import as_built, write_truth
+from tunneldb.simulate.truth import leaks_as_built, write_truth
 
 # Resolution of the stored coordinates, m; as scanner makers export.
 SCALE = 0.00025
@@ -168,7 +168,6 @@ def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
         files.poses = _csv(Path(f"{base}.trajectory.csv"), "time,x,y,z", scanner.trajectory(), ["%.3f"] + ["%.4f"] * 3)
     files.reference = _csv(Path(f"{base}.reference.csv"), "range_m,intensity_db", simulation.reference, ["%.2f", "%.3f"])
     files.leaks = Path(f"{base}.truth.geojson")
-    lay = as_built(simulation)
     features = [
         {
             "type": "Feature",
@@ -182,7 +181,7 @@ def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
             },
             "geometry": mapping(leak.polygon),
         }
-        for leak in (replace(leak, polygon=lay(leak.polygon)) for leak in simulation.leaks)
+        for leak in leaks_as_built(simulation)
     ]
     files.leaks.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
     files.lining = Path(f"{base}.truth.gpkg")

@@ -63,9 +63,14 @@ class Skin(NamedTuple):
     floor: float
 
 
+def wider_from(tunnel: Tunnel) -> float:
+    """Chainage from which on the section is wider, where it is, m."""
+    return 0.5 * (tunnel.line.start + tunnel.line.end)
+
+
 def skin(parameters: Parameters, tunnel: Tunnel, rings: Rings, seed: np.random.SeedSequence) -> Skin | None:
     """Relief as asked; None: the surface is the nominal one."""
-    p, line = parameters, tunnel.line
+    p = parameters
     is_rough = p.lining == "shotcrete"
     if not (is_rough or rings.pocket_depth or p.ring_step or p.radius_step):
         return None
@@ -75,7 +80,7 @@ def skin(parameters: Parameters, tunnel: Tunnel, rings: Rings, seed: np.random.S
     return Skin(
         rings,
         step,
-        np.array([0.5 * (line.start + line.end), p.radius_step]),
+        np.array([wider_from(tunnel), p.radius_step]),
         1.0 if is_rough else 0.0,
         int(seed.generate_state(1)[0]),
         min(0.0, float(step.min(initial=0.0))) - rings.pocket_depth - p.radius_step - rough,

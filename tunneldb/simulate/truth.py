@@ -17,7 +17,9 @@ from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from tunneldb.simulate.coat import GRIME_RISE, Coat, soot_amount
+from tunneldb.simulate.leaks import Leak
 from tunneldb.simulate.rings import POCKET, POCKET_FROM_JOINT, POCKETS, Rings
+from tunneldb.simulate.skin import wider_from
 
 if TYPE_CHECKING:
     from tunneldb.simulate.generate import Simulation
@@ -39,9 +41,9 @@ class Dry(NamedTuple):
 def as_built(simulation: Simulation) -> Callable[[BaseGeometry], BaseGeometry]:
     """What lays outlines on the nominal lining out on the one that was built: where the section is wider, arcs are longer."""
     parameters, tunnel = simulation.parameters, simulation.tunnel
-    middle = 0.5 * (tunnel.line.start + tunnel.line.end)
     if not parameters.radius_step:
         return lambda outline: outline
+    wider = wider_from(tunnel)
     half = np.linspace(0.0, tunnel.section.floor_arc, math.ceil(tunnel.section.floor_arc / FINE) + 1)
 
     def length(arc: Array) -> Array:
@@ -53,9 +55,15 @@ def as_built(simulation: Simulation) -> Callable[[BaseGeometry], BaseGeometry]:
 
     def lay(places: Array) -> Array:
         s, arc = places.T
-        return np.column_stack([s, np.where(s > middle, np.interp(arc, arcs, lengths), arc)])
+        return np.column_stack([s, np.where(s > wider, np.interp(arc, arcs, lengths), arc)])
 
     return lambda outline: shapely.transform(outline, lay)
+
+
+def leaks_as_built(simulation: Simulation) -> list[Leak]:
+    """Leaks with their outlines where they came to lie."""
+    lay = as_built(simulation)
+    return [replace(leak, polygon=lay(leak.polygon)) for leak in simulation.leaks]
 
 
 def joints(rings: Rings, start: float, end: float, lowest: float) -> list[Dry]:
@@ -119,8 +127,7 @@ def dry_features(simulation: Simulation) -> list[Dry]:
 
 def write_truth(simulation: Simulation, path: Path) -> None:
     """Write leaks and what is dark but dry as layers ``leak`` and ``dry`` of a GeoPackage, in the unrolled plane as built."""
-    lay = as_built(simulation)
-    leaks = [replace(k, polygon=lay(k.polygon)) for k in simulation.leaks]
+    lay, leaks = as_built(simulation), leaks_as_built(simulation)
     dry = [d._replace(outline=lay(d.outline)) for d in dry_features(simulation)]
     wet = {
         "id": np.array([k.id for k in leaks], dtype=np.int32),
