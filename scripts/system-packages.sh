@@ -32,6 +32,7 @@ collect() {
                 need python3-qgis '/usr/lib/python3/dist-packages/qgis/core/__init__.py'
                 need qgis-providers '/usr/lib/qgis/plugins/libprovider_postgres.so'
                 need iproute2 '/usr/*bin/ip'
+                need chromium '/usr/bin/chromium'
                 ;;
             bench)
                 need "postgresql-${version}-pointcloud" '/usr/share/postgresql/*/extension/pointcloud.control'

@@ -1,0 +1,48 @@
+"""The tables of schema `tunnel`, as SQLAlchemy knows them.
+
+Alembic compares these with the database; migrations are written by hand from the difference. Units: metres,
+decibels, seconds, square metres, unless a comment says otherwise.
+"""
+
+from tunneldb.database.models.base import SCHEMA, Base
+from tunneldb.database.models.catalog import AlignmentElement, Pose, Reference, Station, StationEquation, Survey, Tunnel
+from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
+from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
+from tunneldb.database.models.ground import Cluster, Ground, Lining, TargetSphere
+from tunneldb.database.models.leak import Anomaly, AnomalyPart, Coverage, Image, Radiometry, RangeCurve, Region
+from tunneldb.database.models.work import Audit, Goal, Run, Worker
+
+__all__ = [
+    "SCHEMA",
+    "AlignmentElement",
+    "Anomaly",
+    "AnomalyPart",
+    "Audit",
+    "AxisVertex",
+    "Base",
+    "Cluster",
+    "Coverage",
+    "FileKm",
+    "Goal",
+    "Ground",
+    "Image",
+    "Incoming",
+    "Lining",
+    "Point",
+    "Pose",
+    "Radiometry",
+    "RangeCurve",
+    "Reference",
+    "Region",
+    "Run",
+    "ScanFile",
+    "Section",
+    "SectionClass",
+    "Segment",
+    "Station",
+    "StationEquation",
+    "Survey",
+    "TargetSphere",
+    "Tunnel",
+    "Worker",
+]

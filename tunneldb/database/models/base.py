@@ -1,0 +1,62 @@
+"""What all models share: the base class, names of constraints, types and common columns."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Annotated, Any
+
+from geoalchemy2 import Geometry
+from sqlalchemy import REAL, CheckConstraint, DateTime, Double, ForeignKey, Integer, LargeBinary, MetaData, Text, text
+from sqlalchemy.dialects.postgresql import ARRAY, JSONB
+from sqlalchemy.orm import DeclarativeBase, mapped_column
+
+SCHEMA = "tunnel"
+
+_NAMES = {
+    "ix": "%(table_name)s_%(column_0_N_name)s_idx",
+    "uq": "%(table_name)s_%(column_0_N_name)s_key",
+    "ck": "%(table_name)s_%(constraint_name)s_check",
+    "fk": "%(table_name)s_%(column_0_N_name)s_fkey",
+    "pk": "%(table_name)s_pkey",
+}
+
+Floats = Annotated[list[float], mapped_column(ARRAY(Double))]
+Reals = Annotated[list[float], mapped_column(ARRAY(REAL))]
+
+
+class Base(DeclarativeBase):
+    """Base of all models; gives the types and the constraints' names."""
+
+    metadata = MetaData(schema=SCHEMA, naming_convention=_NAMES)
+    type_annotation_map = {  # noqa: RUF012
+        str: Text,
+        float: Double,
+        int: Integer,
+        list[float]: ARRAY(Double),
+        dt.datetime: DateTime(timezone=True),
+        dict[str, Any]: JSONB,
+        bytes: LargeBinary,
+    }
+
+
+def geometry(kind: str) -> Geometry:
+    """Return a geometry type without SRID: tunnels differ in theirs, so each value carries its own."""
+    return Geometry(kind, spatial_index=False)
+
+
+def one_of(column: str, *values: str) -> CheckConstraint:
+    """Return the constraint that a column holds one of these."""
+    listed = ", ".join(f"'{value}'" for value in values)
+    return CheckConstraint(f"{column} IN ({listed})", name=column)
+
+
+def parent(table: str) -> ForeignKey:
+    """Return the reference to a row of another table, with which this one goes."""
+    return ForeignKey(f"{SCHEMA}.{table}.id", ondelete="CASCADE")
+
+
+TUNNEL = "Tunnel that the row belongs to"
+SURVEY = "Survey that the row belongs to"
+KM = "Kilometre: floor(chainage / 1000)"
+NOW = text("now()")
+CLOCK = text("clock_timestamp()")

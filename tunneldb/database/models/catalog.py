@@ -1,0 +1,154 @@
+"""Tunnels and their alignments, surveys and where their scanners were."""
+
+from __future__ import annotations
+
+import datetime as dt
+
+from geoalchemy2 import WKBElement
+from sqlalchemy import CheckConstraint, Identity, Index, SmallInteger, text
+from sqlalchemy.orm import Mapped, mapped_column
+
+from tunneldb.database.models.base import NOW, SURVEY, TUNNEL, Base, geometry, one_of, parent
+
+
+class Tunnel(Base):
+    """A structure with its given axis."""
+
+    __tablename__ = "tunnel"
+    __table_args__ = (
+        CheckConstraint("spacing > 0", name="spacing"),
+        {"comment": "A structure: its spatial reference, stationing and given axis"},
+    )
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
+    name: Mapped[str] = mapped_column(unique=True, comment="Name that the commands use")
+    srid: Mapped[int] = mapped_column(comment="Spatial reference of all coordinates of this tunnel; projected, metres")
+    start_chainage: Mapped[float] = mapped_column(
+        server_default=text("0"), comment="Chainage of the given axis's first vertex, m"
+    )
+    spacing: Mapped[float] = mapped_column(
+        server_default=text("10"), comment="Distance between vertices of the averaged axis, m of chainage"
+    )
+    alignment: Mapped[WKBElement] = mapped_column(
+        geometry("LINESTRINGZ"), comment="Axis as given, in growing chainage, in the tunnel's SRID"
+    )
+    design: Mapped[str | None] = mapped_column(
+        comment="File and alignment that the given axis was read from, if it is a design alignment (LandXML, IFC)"
+    )
+    created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was added")
+
+
+class AlignmentElement(Base):
+    """An element of a tunnel's design alignment."""
+
+    __tablename__ = "alignment_element"
+    __table_args__ = (
+        one_of("plane", "horizontal", "vertical"),
+        one_of("kind", "line", "arc", "clothoid", "grade", "parabola", "circle"),
+        CheckConstraint("length > 0", name="length"),
+        {"comment": "Elements of the design alignment, where the given axis came as one (LandXML, IFC)"},
+    )
+
+    tunnel_id: Mapped[int] = mapped_column(parent("tunnel"), primary_key=True, comment=TUNNEL)
+    plane: Mapped[str] = mapped_column(primary_key=True, comment="horizontal or vertical")
+    n: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment="Number along the alignment, from 1")
+    kind: Mapped[str] = mapped_column(comment="line, arc, clothoid (horizontal); grade, parabola, circle (vertical)")
+    chainage: Mapped[float] = mapped_column(comment="Chainage of its beginning, m")
+    length: Mapped[float] = mapped_column(comment="Its length in plan, m")
+    x: Mapped[float | None] = mapped_column(comment="Where a horizontal one begins, tunnel's SRID, m")
+    y: Mapped[float | None] = mapped_column(comment="Where a horizontal one begins, tunnel's SRID, m")
+    bearing: Mapped[float | None] = mapped_column(
+        comment="Direction in which a horizontal one begins, radians from the x axis towards y"
+    )
+    curvature_from: Mapped[float | None] = mapped_column(
+        comment="Curvature of a horizontal one at its beginning, 1/m, positive to the left; in between it is linear"
+    )
+    curvature_to: Mapped[float | None] = mapped_column(comment="The same at its end, 1/m")
+    z: Mapped[float | None] = mapped_column(comment="Height at which a vertical one begins, m")
+    grade_from: Mapped[float | None] = mapped_column(comment="Rise per metre in plan of a vertical one at its beginning")
+    grade_to: Mapped[float | None] = mapped_column(comment="The same at its end")
+
+
+class StationEquation(Base):
+    """A piece of a tunnel's own stationing."""
+
+    __tablename__ = "station_equation"
+    __table_args__ = (
+        CheckConstraint("direction IN (-1, 1)", name="direction"),
+        {"comment": "Stationing of tunnels whose stations jump or run backwards, piece by piece; others have no rows"},
+    )
+
+    tunnel_id: Mapped[int] = mapped_column(parent("tunnel"), primary_key=True, comment=TUNNEL)
+    chainage: Mapped[float] = mapped_column(
+        primary_key=True, autoincrement=False, comment="Chainage (distance) from which the piece holds, m"
+    )
+    station: Mapped[float] = mapped_column(comment="Station there, m")
+    direction: Mapped[int] = mapped_column(
+        SmallInteger, server_default=text("1"), comment="1 where stations grow with chainage, -1 where they run backwards"
+    )
+
+
+class Survey(Base):
+    """One scanning campaign of a tunnel."""
+
+    __tablename__ = "survey"
+    __table_args__ = (
+        one_of("intensity_kind", "amplitude", "reflectance", "linear", "none"),
+        one_of("platform", "static", "mobile"),
+        one_of("reference", "none", "measured", "auto"),
+        CheckConstraint("(intensity_dimension IS NULL) = (intensity_kind = 'none')", name="intensity_dimension"),
+        Index(None, "tunnel_id"),
+        {"comment": "A scanning campaign (an epoch) of a tunnel"},
+    )
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
+    tunnel_id: Mapped[int] = mapped_column(parent("tunnel"), comment="Tunnel that was scanned")
+    name: Mapped[str] = mapped_column(unique=True, comment="Name that the commands use")
+    date: Mapped[dt.date] = mapped_column(comment="Day of the scan")
+    intensity_dimension: Mapped[str | None] = mapped_column(
+        comment="Dimension of the scan files that holds the intensity; none when the kind is none"
+    )
+    intensity_kind: Mapped[str] = mapped_column(
+        comment="amplitude (dB, falls with range), reflectance (dB, range removed), linear (counts) or none"
+    )
+    platform: Mapped[str] = mapped_column(comment="static (rows in station) or mobile (rows in pose)")
+    reference: Mapped[str] = mapped_column(
+        server_default=text("'none'"),
+        comment="Range curve: none, measured on a target (rows in reference) or auto, from the lining of each kilometre",
+    )
+    created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was added")
+
+
+class Pose(Base):
+    """The scanner's trajectory."""
+
+    __tablename__ = "pose"
+    __table_args__ = {"comment": "Trajectory of a mobile scanner"}  # noqa: RUF012
+
+    survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
+    time: Mapped[float] = mapped_column(primary_key=True, comment="Time as in the points' gps_time, s")
+    geom: Mapped[WKBElement] = mapped_column(geometry("POINTZ"), comment="Scanner's position, tunnel's SRID, m")
+
+
+class Station(Base):
+    """Where a static scanner stood."""
+
+    __tablename__ = "station"
+    __table_args__ = {"comment": "Stations of a static scanner"}  # noqa: RUF012
+
+    survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
+    scan_id: Mapped[int] = mapped_column(
+        primary_key=True, autoincrement=False, comment="Scan, as in the points' point_source_id"
+    )
+    geom: Mapped[WKBElement] = mapped_column(geometry("POINTZ"), comment="Scanner's position, tunnel's SRID, m")
+
+
+class Reference(Base):
+    """The scanner's intensity over range."""
+
+    __tablename__ = "reference"
+    __table_args__ = {"comment": "Reference curve of the scanner: intensity over range (Xu et al. 2018)"}  # noqa: RUF012
+
+    survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
+    range_m: Mapped[float] = mapped_column(primary_key=True, comment="Range, m")
+    intensity_db: Mapped[float] = mapped_column(comment="Intensity of the reference target, dB")

@@ -1,0 +1,107 @@
+"""Scan files, and the points that were kept of them."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Any
+
+from sqlalchemy import REAL, BigInteger, Column, Double, Identity, Index, Integer, SmallInteger, Table, UniqueConstraint, text
+from sqlalchemy.dialects.postgresql import INT8MULTIRANGE
+from sqlalchemy.orm import Mapped, mapped_column
+
+from tunneldb.database.models.base import CLOCK, KM, NOW, SURVEY, Base, geometry, parent
+
+
+class ScanFile(Base):
+    """One loaded file."""
+
+    __tablename__ = "scan_file"
+    __table_args__ = (
+        UniqueConstraint("survey_id", "name"),
+        {"comment": "Scan files that were loaded, with what was kept of them"},
+    )
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    name: Mapped[str] = mapped_column(comment="File name without its folder")
+    path: Mapped[str] = mapped_column(comment="Where the file lay when it was loaded; read again at full density")
+    checksum: Mapped[str] = mapped_column(comment="SHA-256 of the file, hexadecimal")
+    bytes: Mapped[int] = mapped_column(BigInteger, comment="Size of the file, bytes")
+    points: Mapped[int] = mapped_column(BigInteger, comment="Points in the file")
+    noise: Mapped[int] = mapped_column(BigInteger, comment="Points dropped as noise")
+    outside: Mapped[int] = mapped_column(BigInteger, comment="Points dropped as too far from the given axis")
+    thinned: Mapped[int] = mapped_column(BigInteger, comment="Points dropped by thinning to survey density")
+    kept: Mapped[int] = mapped_column(BigInteger, comment="Points kept, the rows in point")
+    chainage_from: Mapped[float | None] = mapped_column(comment="Least chainage of the kept points, m")
+    chainage_to: Mapped[float | None] = mapped_column(comment="Greatest chainage of the kept points, m")
+    extent: Mapped[list[float] | None] = mapped_column(
+        comment="Box of the kept points: xmin, ymin, zmin, xmax, ymax, zmax, tunnel's SRID, m"
+    )
+    srid: Mapped[int | None] = mapped_column(comment="Spatial reference that the file states, if it states one")
+    loaded_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was loaded")
+
+
+class FileKm(Base):
+    """A kilometre that a file touches."""
+
+    __tablename__ = "file_km"
+    __table_args__ = {  # noqa: RUF012
+        "comment": "Which kilometres a file touches. Points read and not loaded yet lie in fragment_s<survey>_f<file>_km<km>"
+    }
+
+    file_id: Mapped[int] = mapped_column(parent("scan_file"), primary_key=True, comment="File (scan_file.id)")
+    km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)
+    rows: Mapped[int] = mapped_column(BigInteger, comment="Points of the file that wait or waited to be loaded there")
+    points: Mapped[Any] = mapped_column(
+        INT8MULTIRANGE,
+        comment="Where in the file the points of the kilometre and 10 m to both sides are: ranges of point numbers from 0",
+    )
+    read_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When the file was read")
+    loaded_at: Mapped[dt.datetime | None] = mapped_column(
+        comment="When they were loaded into the kilometre; none while they wait"
+    )
+
+
+class Incoming(Base):
+    """A file that waits to be read."""
+
+    __tablename__ = "incoming"
+    __table_args__ = {"comment": "Files that a batch is to read, until they are read"}  # noqa: RUF012
+
+    survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
+    name: Mapped[str] = mapped_column(primary_key=True, comment="File name without its folder")
+    path: Mapped[str] = mapped_column(comment="Where the file lies")
+    bytes: Mapped[int] = mapped_column(BigInteger, comment="Size of the file, bytes")
+    points: Mapped[int] = mapped_column(BigInteger, comment="Points that its header announces; 0 if it is unreadable")
+    km_from: Mapped[int | None] = mapped_column(comment="First kilometre that it may touch, by its header's box")
+    km_to: Mapped[int | None] = mapped_column(comment="Last kilometre that it may touch, by its header's box")
+    parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="How it is to be read")
+    requested_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When it was asked for")
+    failed_at: Mapped[dt.datetime | None] = mapped_column(comment="When reading it failed")
+    message: Mapped[str | None] = mapped_column(comment="Why it failed")
+
+
+Point = Table(
+    "point",
+    Base.metadata,
+    Column("survey_id", Integer, nullable=False, comment=SURVEY),
+    Column("km", Integer, nullable=False, comment=KM + " along the given axis"),
+    Column(
+        "chainage",
+        Double,
+        nullable=False,
+        comment="Chainage, m: along the given axis as loaded, along the axis found after stage segments; the rows' order",
+    ),
+    Column("gps_time", Double, nullable=False, comment="Time of the shot, as in the file, s"),
+    Column("geom", geometry("POINTZ"), nullable=False, comment="Position, tunnel's SRID, m"),
+    Column("segment", Integer, comment="Number of the segment (segment.n) that the point lies in"),
+    Column("scan_id", Integer, nullable=False, comment="Scan that it is of (point_source_id)"),
+    Column("file_id", Integer, nullable=False, comment="File that it came from (scan_file.id)"),
+    Column("intensity", REAL, nullable=False, comment="Intensity as the file has it; 0 when the kind is none"),
+    Column("classification", SmallInteger, nullable=False, comment="Class as in the file (ASPRS)"),
+    Column("class", SmallInteger, comment="Class found by stage ground (tunnel_api.class); none before it has run"),
+    Index("point_chainage_idx", "chainage", postgresql_using="brin", postgresql_with={"pages_per_range": "16"}),
+    postgresql_partition_by="LIST (survey_id)",
+    comment="Points at survey density: partition point_s<survey> and in it point_s<survey>_km<km>, "
+    "each in the order of chainage",
+)

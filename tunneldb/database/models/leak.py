@@ -1,0 +1,181 @@
+"""Intensity, images and what is dark in them."""
+
+from __future__ import annotations
+
+import datetime as dt
+
+from geoalchemy2 import WKBElement
+from sqlalchemy import BigInteger, ForeignKey, Identity, Index, Integer, Text, text
+from sqlalchemy.dialects.postgresql import ARRAY
+from sqlalchemy.orm import Mapped, mapped_column
+
+from tunneldb.database.models.base import KM, NOW, SURVEY, Base, Floats, Reals, geometry, one_of, parent
+
+
+class Radiometry(Base):
+    """How the intensity of a kilometre was corrected."""
+
+    __tablename__ = "radiometry"
+    __table_args__ = {"comment": "Correction of the intensity, per kilometre (Xu et al. 2018)"}  # noqa: RUF012
+
+    survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
+    km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)
+    roughness: Mapped[float | None] = mapped_column(comment="Oren-Nayar roughness, degrees")
+    dry_mean: Mapped[float | None] = mapped_column(comment="Mean corrected intensity of dry lining, dB")
+    dry_sigma: Mapped[float | None] = mapped_column(comment="Its standard deviation, dB")
+    threshold: Mapped[float | None] = mapped_column(comment="Corrected intensity below which lining is wet, dB")
+    sigma_raw: Mapped[float | None] = mapped_column(comment="Standard deviation of dry lining before correction, dB")
+    sigma_lambert: Mapped[float | None] = mapped_column(comment="The same, incidence by Lambert, dB")
+    sigma_oren_nayar: Mapped[float | None] = mapped_column(comment="The same, incidence by Oren-Nayar, dB")
+    regions: Mapped[int] = mapped_column(comment="Homogeneous regions that the roughness is from")
+    pixels: Mapped[int] = mapped_column(BigInteger, comment="Pixels of the image that show lining")
+    wet_pixels: Mapped[int] = mapped_column(BigInteger, comment="Lining pixels found wet, after the median filter")
+
+
+class RangeCurve(Base):
+    """The range curve of a kilometre, found on its lining."""
+
+    __tablename__ = "range_curve"
+    __table_args__ = {"comment": "Range curve found on the lining of a kilometre, of surveys whose reference is auto"}  # noqa: RUF012
+
+    survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
+    km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)
+    range_m: Mapped[Floats] = mapped_column(comment="Ranges, growing, m")
+    intensity_db: Mapped[Floats] = mapped_column(comment="Intensity of dry lining at right angles there, dB")
+    sigma_db: Mapped[Floats] = mapped_column(comment="Standard deviation of its shape, dB; NULL beyond the ranges seen")
+
+
+class Coverage(Base):
+    """What detection saw of the lining of a kilometre."""
+
+    __tablename__ = "coverage"
+    __table_args__ = {"comment": "Lining of a kilometre, what was seen of it and what is dark, by steps of chainage"}  # noqa: RUF012
+
+    survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
+    km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)
+    step: Mapped[float] = mapped_column(comment="Length of a step, m; the first begins with the kilometre")
+    lining: Mapped[Reals] = mapped_column(comment="Lining in each step, seen or not, in the unrolled plane, m²")
+    seen: Mapped[Reals] = mapped_column(comment="What of it was seen within the limits of range and incidence, m²")
+    wet: Mapped[Reals] = mapped_column(comment="What of that is wet: pixels below the threshold, after the median filter, m²")
+
+
+class Region(Base):
+    """A region drawn by the user."""
+
+    __tablename__ = "region"
+    __table_args__ = (
+        one_of("kind", "homogeneous", "dry"),
+        Index(None, "geom", postgresql_using="gist"),
+        Index(None, "survey_id"),
+        {"comment": "Regions of the lining that the user has drawn, to be used in place of automatic ones"},
+    )
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    kind: Mapped[str] = mapped_column(comment="homogeneous (one material, for the roughness) or dry (for the threshold)")
+    geom: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="Region in the unrolled plane (chainage, arc), m")
+    drawn_by: Mapped[str] = mapped_column(server_default=text("CURRENT_USER"), comment="Who drew it")
+    drawn_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was drawn")
+
+
+class Image(Base):
+    """A block of an unrolled image."""
+
+    __tablename__ = "image"
+    __table_args__ = (
+        one_of("kind", "raw", "corrected", "offset", "state"),
+        {
+            "comment": "Unrolled images in blocks of 50 m: partition image_s<survey>",
+            "postgresql_partition_by": "LIST (survey_id)",
+        },
+    )
+
+    survey_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=SURVEY)
+    km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)
+    kind: Mapped[str] = mapped_column(
+        primary_key=True, comment="raw or corrected intensity, dB, offset from the surface, m, or state of the pixel"
+    )
+    block: Mapped[int] = mapped_column(
+        primary_key=True, autoincrement=False, comment="Block along the tunnel: floor(chainage / 50)"
+    )
+    tiff: Mapped[bytes] = mapped_column(comment="GeoTIFF in the unrolled plane (chainage, arc), m")
+
+
+class Anomaly(Base):
+    """A leak, or what is dark but dry."""
+
+    __tablename__ = "anomaly"
+    __table_args__ = (
+        one_of("kind", "leak", "joint", "dark"),
+        one_of("judged", "leak", "joint", "dark"),
+        one_of("review", "open", "confirmed", "rejected"),
+        Index(None, "survey_id", "km"),
+        Index(None, "unrolled", postgresql_using="gist"),
+        Index(None, "map", postgresql_using="gist"),
+        {"comment": "What is darker than dry lining: leaks, joints and other dark spots, in three geometries"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    km: Mapped[int] = mapped_column(comment=KM + " of its middle")
+    chainage_from: Mapped[float] = mapped_column(comment="Least chainage, m")
+    chainage_to: Mapped[float] = mapped_column(comment="Greatest chainage, m")
+    arc_from: Mapped[float] = mapped_column(comment="Least arc, m, positive right looking up-chainage")
+    arc_to: Mapped[float] = mapped_column(comment="Greatest arc, m, positive right looking up-chainage")
+    clock: Mapped[float] = mapped_column(
+        comment="Clock position of its middle, hours: 12 is the crown, 3 is right looking up-chainage"
+    )
+    kind: Mapped[str] = mapped_column(
+        server_default=text("'leak'"), comment="What detection takes it for: leak, joint or dark (dark but dry)"
+    )
+    reasons: Mapped[list[str]] = mapped_column(
+        ARRAY(Text), server_default=text("'{}'"), comment="Why, such as thin, straight, gradual, rectangular, recess"
+    )
+    confidence: Mapped[float | None] = mapped_column(comment="Confidence that it is of its kind, 0 to 1; none from before")
+    contrast: Mapped[float | None] = mapped_column(
+        comment="Mean drop in standard deviations of the dry lining about it; none from before"
+    )
+    judged: Mapped[str | None] = mapped_column(comment="What an inspector takes it for, where he says so")
+    area: Mapped[float] = mapped_column(comment="Area on the surface, m²")
+    drop_mean: Mapped[float] = mapped_column(comment="Mean drop below dry lining, dB")
+    drop_max: Mapped[float] = mapped_column(comment="Greatest drop below dry lining, dB")
+    image_share: Mapped[float] = mapped_column(comment="Share of its pixels that hold measured data, 0 to 1")
+    unrolled: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="In the unrolled plane (chainage, arc), m")
+    map: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="On the map strip beside the axis, tunnel's SRID, m")
+    surface: Mapped[WKBElement] = mapped_column(geometry("POLYGONZ"), comment="On the lining in space, tunnel's SRID, m")
+    review: Mapped[str] = mapped_column(server_default=text("'open'"), comment="open, confirmed or rejected, by an inspector")
+    reviewed_by: Mapped[str | None] = mapped_column(comment="Who reviewed it")
+    reviewed_at: Mapped[dt.datetime | None] = mapped_column(comment="When it was reviewed")
+    remark: Mapped[str | None] = mapped_column(comment="Inspector's remark")
+    detected: Mapped[bool] = mapped_column(server_default=text("true"), comment="Whether the last detection found it again")
+    created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was first found")
+    detected_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was last found")
+
+
+class AnomalyPart(Base):
+    """A dark region that an end of its kilometre cuts."""
+
+    __tablename__ = "anomaly_part"
+    __table_args__ = (
+        Index(None, "survey_id", "km"),
+        Index(None, "anomaly_id"),
+        {"comment": "Dark regions cut by an end of their kilometre, from which anomalies over several are put together"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    km: Mapped[int] = mapped_column(comment=KM)
+    pixel: Mapped[float] = mapped_column(comment="Edge of a pixel, m")
+    box: Mapped[list[int]] = mapped_column(
+        ARRAY(Integer), comment="First column (chainage / pixel), first row (arc / pixel), columns and rows of the mask"
+    )
+    mask: Mapped[bytes] = mapped_column(comment="Its dark pixels, a bit each, row by row from the lowest arc")
+    filled: Mapped[int] = mapped_column(BigInteger, comment="Its pixels that hold measured data")
+    drop_sum: Mapped[float] = mapped_column(comment="Sum over them of the drop below dry lining, dB")
+    drop_max: Mapped[float] = mapped_column(comment="Greatest drop below dry lining, dB")
+    traits: Mapped[Floats] = mapped_column(
+        server_default=text("'{}'"), comment="Sums over its pixels by which it is told what it is, see Region in leak/region.py"
+    )
+    anomaly_id: Mapped[int | None] = mapped_column(
+        ForeignKey(Anomaly.id, ondelete="SET NULL"), comment="Anomaly that it is a part of, if it is large enough"
+    )

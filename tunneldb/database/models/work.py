@@ -1,0 +1,96 @@
+"""What is wanted, who works on it, what was done, and what people changed by hand."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Any
+
+from sqlalchemy import BigInteger, Identity, Index, text
+from sqlalchemy.orm import Mapped, mapped_column
+
+from tunneldb.database.models.base import CLOCK, KM, SURVEY, Base, one_of, parent
+
+
+class Goal(Base):
+    """What is wanted of a kilometre."""
+
+    __tablename__ = "goal"
+    __table_args__ = {"comment": "What batches want of each kilometre"}  # noqa: RUF012
+
+    survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
+    km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)
+    stage: Mapped[str] = mapped_column(comment="Stage up to which the kilometre is to be brought")
+    parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Parameters of the stages")
+    requested_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When it was asked for")
+    retry_after: Mapped[dt.datetime | None] = mapped_column(comment="Stages that failed before this moment are tried again")
+
+
+class Worker(Base):
+    """A worker."""
+
+    __tablename__ = "worker"
+    __table_args__ = {"comment": "Workers that serve the queue"}  # noqa: RUF012
+
+    id: Mapped[int] = mapped_column(
+        BigInteger, primary_key=True, autoincrement=False, comment="Key: that of the queue's worker"
+    )
+    host: Mapped[str] = mapped_column(comment="Machine that it runs on")
+    pid: Mapped[int] = mapped_column(comment="Its process there")
+    started_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When it started")
+    stop: Mapped[bool] = mapped_column(
+        server_default=text("false"), comment="Whether it was asked to finish what it is at and leave"
+    )
+
+
+class Run(Base):
+    """One run of a stage."""
+
+    __tablename__ = "run"
+    __table_args__ = (
+        one_of("outcome", "running", "done", "failed"),
+        Index(None, "survey_id", "stage", "km"),
+        Index(None, "job_id"),
+        {"comment": "Ledger of every stage that was run"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    km: Mapped[int | None] = mapped_column(comment="Kilometre; none for the whole survey")
+    stage: Mapped[str] = mapped_column(comment="read, load, axis, segments, sections, ground, detect; spheres")
+    parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Parameters that it ran with")
+    versions: Mapped[dict[str, Any]] = mapped_column(
+        server_default=text("'{}'"), comment="Versions of the program and of its libraries"
+    )
+    counts: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="What it counted and measured")
+    backend_pid: Mapped[int] = mapped_column(server_default=text("pg_backend_pid()"), comment="Server process that it ran in")
+    backend_start: Mapped[dt.datetime | None] = mapped_column(
+        comment="When that process began, as in pg_stat_activity; tells a run that was cut off"
+    )
+    started_at: Mapped[dt.datetime] = mapped_column(server_default=text("clock_timestamp()"), comment="When it began")
+    finished_at: Mapped[dt.datetime | None] = mapped_column(comment="When it ended")
+    outcome: Mapped[str] = mapped_column(server_default=text("'running'"), comment="running, done or failed")
+    message: Mapped[str | None] = mapped_column(comment="Why it failed")
+    worker: Mapped[str | None] = mapped_column(comment="Machine and process that it ran on")
+    job_id: Mapped[int | None] = mapped_column(BigInteger, comment="Job of the queue that it was, if it was one")
+
+
+class Audit(Base):
+    """A row that somebody changed by hand."""
+
+    __tablename__ = "audit"
+    __table_args__ = (
+        one_of("action", "insert", "update", "delete"),
+        Index(None, "survey", "at"),
+        Index(None, "view", "row_id"),
+        {"comment": "What people changed through the views: who, when, before and after; outlives what it speaks of"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When")
+    who: Mapped[str] = mapped_column(server_default=text("SESSION_USER"), comment="Who was logged in")
+    survey: Mapped[str] = mapped_column(comment="Name of the survey")
+    view: Mapped[str] = mapped_column(comment="What was changed: anomaly, axis_vertex or region")
+    row_id: Mapped[int] = mapped_column(BigInteger, comment="Its id there")
+    action: Mapped[str] = mapped_column(comment="insert, update or delete")
+    before: Mapped[dict[str, Any] | None] = mapped_column(comment="Columns that changed, as they were; none of an insert")
+    after: Mapped[dict[str, Any] | None] = mapped_column(comment="The same as they are now; none of a delete")
