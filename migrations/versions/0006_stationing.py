@@ -112,6 +112,4 @@ def _tunnel() -> sa.Column[int]:
 
 
 def _tunnel_key(table: str) -> sa.ForeignKeyConstraint:
-    return sa.ForeignKeyConstraint(
-        ["tunnel_id"], ["tunnel.tunnel.id"], name=f"{table}_tunnel_id_fkey", ondelete="CASCADE"
-    )
+    return sa.ForeignKeyConstraint(["tunnel_id"], ["tunnel.tunnel.id"], name=f"{table}_tunnel_id_fkey", ondelete="CASCADE")
