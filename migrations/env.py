@@ -1,4 +1,4 @@
-"""Alembic's environment: schema `tunnel` only, on the connection that `tunneldb init` hands over."""
+"""Alembic's environment: schemas `tunnel` and `tunnel_audit` only, on the connection that `tunneldb init` hands over."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from alembic import context
 from sqlalchemy import Connection, text
 
-from tunneldb.database.models import SCHEMA, Base
+from tunneldb.database.models import AUDIT_SCHEMA, SCHEMA, Base
 
 # Partitions and fragments come and go with surveys, files and kilometres; the models know only the partitions' parent.
 PARTITION = re.compile(r"(point|image|fragment)_s\d+")
@@ -17,7 +17,7 @@ PARTITION = re.compile(r"(point|image|fragment)_s\d+")
 def include_name(name: str | None, kind: str, parents: Any) -> bool:
     """Leave other schemas and partitions and fragments out of comparisons."""
     if kind == "schema":
-        return name == SCHEMA
+        return name in (SCHEMA, AUDIT_SCHEMA)
     return not (kind == "table" and name is not None and PARTITION.match(name))
 
 

@@ -51,6 +51,7 @@ REVOKE ALL ON SCHEMA tunnel_api FROM PUBLIC;
 REVOKE EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_api FROM PUBLIC;
 REVOKE EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api FROM PUBLIC;
 REVOKE ALL ON SCHEMA tunnel_queue FROM PUBLIC;
+REVOKE ALL ON SCHEMA tunnel_audit FROM PUBLIC;  -- nobody's but the owner's: operators, who own schema tunnel, could drop it there
 
 -- Viewers: all views, and the functions that only read. One that reads tables must itself run with the owner's rights
 -- (SECURITY DEFINER) to be of use to them.

@@ -1,10 +1,13 @@
 -- What may be written through the views, by INSTEAD OF triggers: the position of axis vertices, review, remark and kind of
 -- leaks and other anomalies (view_anomaly.sql), and regions drawn by hand. The functions run with the owner's rights, so that who edits
--- needs no right on schema tunnel, and stamp each row with session_user, which stays the person's own name in them.
+-- needs no right on schema tunnel, and stamp each row with session_user, which stays the person's own name in them. Each locks
+-- its row and takes only what the person changed: what somebody else did meanwhile stays, and the audit says what truly was.
 
 -- Moves an axis vertex. Frame and unit: the tunnel's SRID, m.
 CREATE OR REPLACE FUNCTION tunnel_api.edit_axis_vertex() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+DECLARE
+    was tunnel.axis_vertex;
 BEGIN
     IF (NEW.id, NEW.survey_id, NEW.survey, NEW.n, NEW.km, NEW.chainage, NEW.label, NEW.points, NEW.source,
         NEW.edited_by, NEW.edited_at) IS DISTINCT FROM
@@ -31,12 +34,19 @@ BEGIN
     IF NEW.geom = OLD.geom THEN
         RETURN NEW;
     END IF;
+    SELECT v.* INTO was FROM tunnel.axis_vertex v WHERE v.id = OLD.id FOR UPDATE;
+    IF NOT FOUND THEN
+        RETURN NULL;  -- gone meanwhile
+    END IF;
     NEW.source := 'edited';
     NEW.edited_by := session_user;
     NEW.edited_at := clock_timestamp();
     UPDATE tunnel.axis_vertex
        SET geom = NEW.geom, source = NEW.source, edited_by = NEW.edited_by, edited_at = NEW.edited_at
      WHERE id = OLD.id;
+    PERFORM tunnel_api.note_edit(OLD.survey, 'axis_vertex', OLD.id,
+                                 jsonb_build_object('geom', ST_AsEWKT(was.geom), 'source', was.source),
+                                 jsonb_build_object('geom', ST_AsEWKT(NEW.geom), 'source', NEW.source));
     RETURN NEW;
 END
 $$;
@@ -50,6 +60,8 @@ CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.axis_vertex
 -- Geometries, whose columns differ between the views, are never written back.
 CREATE OR REPLACE FUNCTION tunnel_api.review_anomaly() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+DECLARE
+    was record;
 BEGIN
     IF (NEW.id, NEW.survey_id, NEW.survey, NEW.km, NEW.segment, NEW.chainage_from, NEW.chainage_to, NEW.label,
         NEW.arc_from, NEW.arc_to, NEW.clock, NEW.found, NEW.reasons, NEW.confidence, NEW.contrast, NEW.area, NEW.drop_mean,
@@ -73,12 +85,22 @@ BEGIN
     IF (NEW.review, NEW.remark, NEW.kind) IS NOT DISTINCT FROM (OLD.review, OLD.remark, OLD.kind) THEN
         RETURN NEW;
     END IF;
+    SELECT a.review, a.remark, coalesce(a.judged, a.kind) AS kind INTO was
+      FROM tunnel.anomaly a WHERE a.id = OLD.id FOR UPDATE;
+    IF NOT FOUND THEN
+        RETURN NULL;  -- gone meanwhile
+    END IF;
+    NEW.review := CASE WHEN NEW.review = OLD.review THEN was.review ELSE NEW.review END;
+    NEW.remark := CASE WHEN NEW.remark IS NOT DISTINCT FROM OLD.remark THEN was.remark ELSE NEW.remark END;
+    NEW.kind := CASE WHEN NEW.kind = OLD.kind THEN was.kind ELSE NEW.kind END;
     NEW.reviewed_by := session_user;
     NEW.reviewed_at := clock_timestamp();
     UPDATE tunnel.anomaly a
        SET review = NEW.review, remark = NEW.remark, reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at,
-           judged = CASE WHEN NEW.kind = OLD.kind THEN a.judged ELSE nullif(NEW.kind, a.kind) END
+           judged = CASE WHEN NEW.kind = was.kind THEN a.judged ELSE nullif(NEW.kind, a.kind) END
      WHERE a.id = OLD.id;
+    PERFORM tunnel_api.note_edit(OLD.survey, 'anomaly', OLD.id, to_jsonb(was),
+                                 jsonb_build_object('review', NEW.review, 'remark', NEW.remark, 'kind', NEW.kind));
     RETURN NEW;
 END
 $$;
@@ -101,21 +123,48 @@ $$;
 -- without that, by name.
 CREATE OR REPLACE FUNCTION tunnel_api.edit_region() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+DECLARE
+    was tunnel.region;
+    its tunnel.survey;
 BEGIN
     IF TG_OP = 'DELETE' THEN
-        DELETE FROM tunnel.region WHERE id = OLD.id;
+        DELETE FROM tunnel.region r WHERE r.id = OLD.id RETURNING r.* INTO was;
+        IF NOT FOUND THEN
+            RETURN NULL;  -- gone meanwhile
+        END IF;
+        PERFORM tunnel_api.note_edit(OLD.survey, 'region', OLD.id,
+                                     jsonb_build_object('kind', was.kind, 'geom', ST_AsEWKT(was.geom)), NULL);
         RETURN OLD;
     END IF;
     IF NOT coalesce(ST_IsValid(NEW.geom), false) THEN
         RAISE EXCEPTION 'a region must be a valid polygon: %', coalesce(ST_IsValidReason(NEW.geom), 'it is empty')
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
-    IF TG_OP = 'INSERT' AND NEW.survey_id IS NULL THEN
-        SELECT s.id INTO NEW.survey_id FROM tunnel.survey s WHERE s.name = NEW.survey;
+    IF TG_OP = 'UPDATE' THEN
+        IF (NEW.id, NEW.survey_id, NEW.survey, NEW.drawn_by, NEW.drawn_at) IS DISTINCT FROM
+           (OLD.id, OLD.survey_id, OLD.survey, OLD.drawn_by, OLD.drawn_at) THEN
+            RAISE EXCEPTION 'of a region only the kind and the outline (geom) can be edited'
+                USING ERRCODE = 'feature_not_supported';
+        END IF;
+        IF NEW.kind IS NOT DISTINCT FROM OLD.kind AND NEW.geom = OLD.geom THEN
+            RETURN NEW;
+        END IF;
+        SELECT r.* INTO was FROM tunnel.region r WHERE r.id = OLD.id FOR UPDATE;
         IF NOT FOUND THEN
-            RAISE EXCEPTION 'a region needs the survey it belongs to; there is none named %', coalesce(NEW.survey, '(empty)')
+            RETURN NULL;
+        END IF;
+        NEW.kind := CASE WHEN NEW.kind = OLD.kind THEN was.kind ELSE NEW.kind END;
+        NEW.geom := CASE WHEN NEW.geom = OLD.geom THEN was.geom ELSE NEW.geom END;
+    ELSE
+        SELECT s.* INTO its FROM tunnel.survey s
+         WHERE CASE WHEN NEW.survey_id IS NULL THEN s.name = NEW.survey ELSE s.id = NEW.survey_id END;
+        IF NOT FOUND THEN
+            RAISE EXCEPTION 'a region needs the survey it belongs to; there is none %',
+                coalesce('with id ' || NEW.survey_id, 'named ' || NEW.survey, 'without a name')
                 USING ERRCODE = 'invalid_parameter_value';
         END IF;
+        NEW.survey_id := its.id;
+        NEW.survey := its.name;
     END IF;
     NEW.drawn_by := session_user;
     NEW.drawn_at := clock_timestamp();
@@ -128,6 +177,9 @@ BEGIN
            SET kind = NEW.kind, geom = NEW.geom, drawn_by = NEW.drawn_by, drawn_at = NEW.drawn_at
          WHERE id = OLD.id;
     END IF;
+    PERFORM tunnel_api.note_edit(NEW.survey, 'region', NEW.id,
+                                 CASE TG_OP WHEN 'UPDATE' THEN jsonb_build_object('kind', was.kind, 'geom', ST_AsEWKT(was.geom)) END,
+                                 jsonb_build_object('kind', NEW.kind, 'geom', ST_AsEWKT(NEW.geom)));
     RETURN NEW;
 END
 $$;

@@ -53,11 +53,11 @@ def _alignment_element() -> None:
         sa.Column("grade_to", sa.Double(), comment="The same at its end"),
         sa.PrimaryKeyConstraint("tunnel_id", "plane", "n", name="alignment_element_pkey"),
         _tunnel_key("alignment_element"),
-        sa.CheckConstraint("plane IN ('horizontal', 'vertical')", name="alignment_element_plane_check"),
+        sa.CheckConstraint("plane IN ('horizontal', 'vertical')", name=op.f("alignment_element_plane_check")),
         sa.CheckConstraint(
-            "kind IN ('line', 'arc', 'clothoid', 'grade', 'parabola', 'circle')", name="alignment_element_kind_check"
+            "kind IN ('line', 'arc', 'clothoid', 'grade', 'parabola', 'circle')", name=op.f("alignment_element_kind_check")
         ),
-        sa.CheckConstraint("length > 0", name="alignment_element_length_check"),
+        sa.CheckConstraint("length > 0", name=op.f("alignment_element_length_check")),
         schema="tunnel",
         comment="Elements of the design alignment, where the given axis came as one (LandXML, IFC)",
     )  # fmt: skip
@@ -78,15 +78,33 @@ def _station_equation() -> None:
         ),
         sa.PrimaryKeyConstraint("tunnel_id", "chainage", name="station_equation_pkey"),
         _tunnel_key("station_equation"),
-        sa.CheckConstraint("direction IN (-1, 1)", name="station_equation_direction_check"),
+        sa.CheckConstraint("direction IN (-1, 1)", name=op.f("station_equation_direction_check")),
         schema="tunnel",
         comment="Stationing of tunnels whose stations jump or run backwards, piece by piece; others have no rows",
     )  # fmt: skip
 
 
+# An audit is of use only where nobody changes it: not by mistake either, so the owner's DELETE is refused, too.
+_APPEND_ONLY = """
+CREATE FUNCTION tunnel_audit.refuse() RETURNS trigger
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp AS $$
+BEGIN
+    RAISE EXCEPTION 'entries of the audit are neither changed nor deleted' USING ERRCODE = 'insufficient_privilege';
+END
+$$;
+COMMENT ON FUNCTION tunnel_audit.refuse() IS 'Trigger of tunnel_audit.entry: entries are neither changed nor deleted';
+REVOKE EXECUTE ON FUNCTION tunnel_audit.refuse() FROM PUBLIC;
+CREATE TRIGGER append_only BEFORE UPDATE OR DELETE OR TRUNCATE ON tunnel_audit.entry
+    FOR EACH STATEMENT EXECUTE FUNCTION tunnel_audit.refuse();
+"""
+
+
 def _audit() -> None:
+    # in a schema of its own: operators own schema tunnel, and who owns a schema may drop any table in it
+    op.execute("CREATE SCHEMA tunnel_audit")
+    op.execute("COMMENT ON SCHEMA tunnel_audit IS 'What people changed by hand; read it through tunnel_api.audit'")
     op.create_table(
-        "audit",
+        "entry",
         sa.Column("id", sa.BigInteger(), sa.Identity(always=True), nullable=False, comment="Key"),
         sa.Column(
             "at", sa.DateTime(timezone=True), server_default=sa.text("clock_timestamp()"), nullable=False, comment="When"
@@ -98,13 +116,14 @@ def _audit() -> None:
         sa.Column("action", sa.Text(), nullable=False, comment="insert, update or delete"),
         sa.Column("before", JSONB(), comment="Columns that changed, as they were; none of an insert"),
         sa.Column("after", JSONB(), comment="The same as they are now; none of a delete"),
-        sa.PrimaryKeyConstraint("id", name="audit_pkey"),
-        sa.CheckConstraint("action IN ('insert', 'update', 'delete')", name="audit_action_check"),
-        schema="tunnel",
+        sa.PrimaryKeyConstraint("id", name="entry_pkey"),
+        sa.CheckConstraint("action IN ('insert', 'update', 'delete')", name=op.f("entry_action_check")),
+        schema="tunnel_audit",
         comment="What people changed through the views: who, when, before and after; outlives what it speaks of",
     )
-    op.create_index("audit_survey_at_idx", "audit", ["survey", "at"], schema="tunnel")
-    op.create_index("audit_view_row_id_idx", "audit", ["view", "row_id"], schema="tunnel")
+    op.create_index("entry_survey_at_idx", "entry", ["survey", "at"], schema="tunnel_audit")
+    op.create_index("entry_view_row_id_idx", "entry", ["view", "row_id"], schema="tunnel_audit")
+    op.execute(_APPEND_ONLY)
 
 
 def _tunnel() -> sa.Column[int]:

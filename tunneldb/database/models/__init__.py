@@ -1,10 +1,10 @@
-"""The tables of schema `tunnel`, as SQLAlchemy knows them.
+"""The tables of schemas `tunnel` and `tunnel_audit`, as SQLAlchemy knows them.
 
 Alembic compares these with the database; migrations are written by hand from the difference. Units: metres,
 decibels, seconds, square metres, unless a comment says otherwise.
 """
 
-from tunneldb.database.models.base import SCHEMA, Base
+from tunneldb.database.models.base import AUDIT_SCHEMA, SCHEMA, Base
 from tunneldb.database.models.catalog import AlignmentElement, Pose, Reference, Station, StationEquation, Survey, Tunnel
 from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
 from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
@@ -13,6 +13,7 @@ from tunneldb.database.models.leak import Anomaly, AnomalyPart, Coverage, Image,
 from tunneldb.database.models.work import Audit, Goal, Run, Worker
 
 __all__ = [
+    "AUDIT_SCHEMA",
     "SCHEMA",
     "AlignmentElement",
     "Anomaly",

@@ -11,6 +11,7 @@ from sqlalchemy.dialects.postgresql import ARRAY, JSONB
 from sqlalchemy.orm import DeclarativeBase, mapped_column
 
 SCHEMA = "tunnel"
+AUDIT_SCHEMA = "tunnel_audit"
 
 _NAMES = {
     "ix": "%(table_name)s_%(column_0_N_name)s_idx",

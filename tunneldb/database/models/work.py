@@ -8,7 +8,7 @@ from typing import Any
 from sqlalchemy import BigInteger, Identity, Index, text
 from sqlalchemy.orm import Mapped, mapped_column
 
-from tunneldb.database.models.base import CLOCK, KM, SURVEY, Base, one_of, parent
+from tunneldb.database.models.base import AUDIT_SCHEMA, CLOCK, KM, SURVEY, Base, one_of, parent
 
 
 class Goal(Base):
@@ -77,12 +77,15 @@ class Run(Base):
 class Audit(Base):
     """A row that somebody changed by hand."""
 
-    __tablename__ = "audit"
+    __tablename__ = "entry"
     __table_args__ = (
         one_of("action", "insert", "update", "delete"),
         Index(None, "survey", "at"),
         Index(None, "view", "row_id"),
-        {"comment": "What people changed through the views: who, when, before and after; outlives what it speaks of"},
+        {
+            "schema": AUDIT_SCHEMA,
+            "comment": "What people changed through the views: who, when, before and after; outlives what it speaks of",
+        },
     )
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
