@@ -1,6 +1,7 @@
 # make demo   a simulated tunnel from its scan to leaks in QGIS, in ./demo
 # make test   lint, types and all tests, against the wheel as a user would install it
 # make faults 100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
+# make docs   the documentation as a site, in ./site
 # make bench  the figures of the README and the docs
 # Each installs what it lacks: PostgreSQL with PostGIS by apt, and a virtual environment in .venv.
 
@@ -9,7 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find tunneldb sql migrations -type f -not -name '*.py[co]' -not -name '*.nb[ic]') pyproject.toml README.md LICENSE
 
-.PHONY: install demo test faults bench lint clean
+.PHONY: install demo test faults docs bench lint clean
 .DELETE_ON_ERROR:
 
 install: $(VENV)/wheel
@@ -51,8 +52,11 @@ test: lint $(VENV)/tests
 faults: install $(VENV)/tests
 	KILLS=$${KILLS:-100} $(BIN)/pytest -n 0 -s tests/faults/test_kills.py
 
+docs: $(VENV)/dependencies
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
 bench: install
 	$(BIN)/python -m benchmarks.run
 
 clean:
-	rm -rf $(VENV) build dist demo .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist demo site .pytest_cache .mypy_cache .ruff_cache .hypothesis
