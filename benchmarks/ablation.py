@@ -6,7 +6,7 @@
 First Table 1 and Fig. 8 of Xu et al. (2018): the standard deviation of dry lining, and the share of the wet area that is
 missed, for raw intensity and for that corrected by Lambert's law and by Oren and Nayar's, by one threshold for all of the
 lining as there, and by the local one. Then the parts. There are no switches for them in the program: its functions are
-replaced here.
+replaced here. Points are gathered once for all that takes the same ones.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ from tunneldb.intensity.dry import robust_statistics
 from tunneldb.job import detect as stage
 from tunneldb.leak import detection, gather, lining, region
 from tunneldb.leak.dry_map import DryMap, map_dry
+from tunneldb.leak.image import Accumulator
 from tunneldb.leak.judge import Verdict
 from tunneldb.leak.lining import State
 from tunneldb.leak.picture import Picture
@@ -44,12 +45,16 @@ Replacement = tuple[Any, str, Any]
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the detection, and how it is switched off: functions replaced, parameters set, the range curve swapped."""
+    """A part of the detection, and how it is switched off: functions replaced, parameters set, the range curve swapped.
+
+    ``points`` names what is gathered; parts of the same name share it.
+    """
 
     name: str
     replaced: Sequence[Replacement] = ()
     parameters: Sequence[str] = ()
     swap_curve: bool = False
+    points: str = "as detection takes them"
 
     @contextmanager
     def off(self, dsn: str, scene: Scene) -> Iterator[list[str]]:
@@ -116,6 +121,24 @@ def without_weights() -> list[Replacement]:
     return [(gather.Lens, "look", same)]
 
 
+class Kept:
+    """The sums of all points of a tunnel, by what was gathered; of those that were gathered before the files are not read."""
+
+    def __init__(self) -> None:
+        self.name = ""
+        self._kept: dict[str, tuple[dict[int, np.ndarray], Any]] = {}
+        self._gather = stage._gather
+
+    def gather(self, eye: Any, files: Any, image: Accumulator, *others: Any) -> Any:
+        if self.name not in self._kept:
+            counts = self._gather(eye, files, image, *others)
+            self._kept[self.name] = {block: image._fetch(block).copy() for block in image.blocks()}, counts
+        blocks, counts = self._kept[self.name]
+        for block, sums in blocks.items():
+            image._fetch(block)[:] = sums
+        return counts
+
+
 def after(function: Callable[..., Any], change: Callable[[Any], Any]) -> Callable[..., Any]:
     return lambda *arguments, **named: change(function(*arguments, **named))
 
@@ -123,6 +146,12 @@ def after(function: Callable[..., Any], change: Callable[[Any], Any]) -> Callabl
 def recess_is_off(picture: Picture) -> Picture:
     picture.state[picture.state == State.RECESS] = State.OFF
     return picture
+
+
+def law(name: str) -> str:
+    """What is gathered for one of LAWS: that of Oren and Nayar is detection's own."""
+    given = name.split(",")[0]
+    return Part.points if given == "Oren-Nayar" else given
 
 
 GLOBAL: list[Replacement] = [(stage, "map_dry", one_level)]
@@ -142,8 +171,12 @@ LAWS = {
 }
 PARTS = (
     Part("local dry map: one mean and sigma for all", GLOBAL),
-    Part("weights of points: all alike", without_weights()),
-    Part("limits of incidence and range: none", parameters=("intensity.max_incidence=89", "intensity.max_range=1000")),
+    Part("weights of points: all alike", without_weights(), points="without weights"),
+    Part(
+        "limits of incidence and range: none",
+        parameters=("intensity.max_incidence=89", "intensity.max_range=1000"),
+        points="without limits",
+    ),
     Part("removal of appendages: none", [(lining.appendage, "off_plane", nothing_off)]),
     Part("recesses: taken for appendages", [(stage, "develop", after(stage.develop, recess_is_off))]),
     Part("steps of the radius: left in", [(lining.step, "steps", lambda offset, *others: np.zeros_like(offset))]),
@@ -152,7 +185,7 @@ PARTS = (
     Part(
         "drips: left alone", [(region, "hang", lambda pieces, wanted, *others: (np.arange(len(wanted)), np.empty((0, 4), int)))]
     ),
-    Part("range curve: auto for measured, and the other way round", swap_curve=True),
+    Part("range curve: auto for measured, and the other way round", swap_curve=True, points="by the other curve"),
 )
 
 
@@ -166,7 +199,7 @@ def main() -> None:
     arguments = parser.parse_args()
     wanted = [Part("all of it")]
     wanted += [part for part in PARTS if arguments.part is None or any(text in part.name for text in arguments.part)]
-    laws = [] if arguments.part else [Part(name, replaced) for name, replaced in LAWS.items()]
+    laws = [] if arguments.part else [Part(name, replaced, points=law(name)) for name, replaced in LAWS.items()]
     outcomes: dict[str, list[Outcome]] = {part.name: [] for part in [*wanted, *laws]}
     table_1 = []
     with nullcontext(arguments.folder) if arguments.folder else tempfile.TemporaryDirectory() as folder:
@@ -197,10 +230,11 @@ def measure(
 ) -> Iterator[tuple[str, Outcome, list[float]]]:
     """Run a tunnel once for each part switched off; with each outcome Table 1's three standard deviations, dB."""
     with scratch_database(dsn) as database:
-        scene = prepare(case, seed, folder, database)
+        scene, kept = prepare(case, seed, folder, database), Kept()
         for part in parts:
             progress(f"  {part.name}")
-            with part.off(database, scene) as options:
+            kept.name = part.points
+            with part.off(database, scene) as options, patch.object(stage, "_gather", kept.gather):
                 arguments = ["--dsn", database, "run", scene.name, "--from", "detect", *options]
                 done = CliRunner().invoke(command, arguments)
             if done.exit_code:  # without a part things may go wrong that can't go wrong with it
