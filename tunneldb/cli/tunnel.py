@@ -23,23 +23,47 @@ def tunnel() -> None:
     "--axis",
     type=click.Path(path_type=Path),
     required=True,
-    help="CSV with the header x,y,z: points of the axis in growing chainage.",
+    help="Design alignment (LandXML, IFC 4.3), or CSV with the header x,y,z: points of the axis in growing chainage.",
 )
+@click.option("--alignment", metavar="NAME", help="Which alignment of a LandXML or IFC file, if it holds several.")
+@click.option("--profile", metavar="NAME", help="Which profile of the alignment, if it has several.")
 @click.option(
-    "--start-chainage", type=float, default=0.0, show_default=True, metavar="M", help="Chainage of the axis's first point."
+    "--start-chainage",
+    type=float,
+    metavar="M",
+    help="Chainage of the axis's beginning. [default: that of the alignment; 0 of a CSV]",
 )
 @click.option(
     "--spacing", type=float, default=10.0, show_default=True, metavar="M", help="Distance between the axis's vertices."
 )
 @click.pass_obj
-def add(settings: Settings, name: str, srid: int, axis: Path, start_chainage: float, spacing: float) -> None:
-    """Add the tunnel NAME with its given axis."""
+def add(
+    settings: Settings,
+    name: str,
+    srid: int,
+    axis: Path,
+    alignment: str | None,
+    profile: str | None,
+    start_chainage: float | None,
+    spacing: float,
+) -> None:
+    """Add the tunnel NAME with its given axis.
+
+    Of a design alignment the elements (lines, arcs, clothoids; grades, parabolas, circles) and the stationing are kept, and
+    the axis follows them to a millimetre. Lengths in feet are turned into metres when the file says that they are feet.
+    """
+    from tunneldb.alignment.given import read_given
     from tunneldb.database.catalog import add_tunnel
 
+    given = read_given(axis, start_chainage, alignment, profile)
     with connect(settings.dsn) as connection:
-        alignment = add_tunnel(connection, name, srid, axis, start_chainage, spacing)
-    length = alignment.end - alignment.start
-    click.echo(f"{name}: {length:.3f} m of axis, chainage {alignment.start:.3f} to {alignment.end:.3f} m", err=True)
+        line = add_tunnel(connection, name, srid, given, spacing)
+    click.echo(f"{name}: {line.end - line.start:.3f} m of axis, chainage {line.start:.3f} to {line.end:.3f} m", err=True)
+    if given.design is not None:
+        plan, profiles = len(given.design.plan), len(given.design.profile)
+        click.echo(f"{given.source}: {plan} elements in plan, {profiles} in profile", err=True)
+        for note in given.design.notes:
+            click.echo(f"{axis}: {note}", err=True)
 
 
 @tunnel.command("list")

@@ -17,13 +17,14 @@ import shapely
 from numpy.typing import NDArray
 from psycopg import sql
 
+from tunneldb.alignment.given import XYZ, GivenAxis
 from tunneldb.csvfile import CsvTable, read_csv
 from tunneldb.database.copy import PointZ, copy_binary, pack
+from tunneldb.database.design import save_design
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.scan.stations import read_stations
 
-XYZ = ("x", "y", "z")
 FARTHEST_SCANNER = 50.0  # m from the axis; a scanner that was never nearer stood in another tunnel
 
 
@@ -39,8 +40,7 @@ def add_tunnel(
     connection: psycopg.Connection[Any],
     name: str,
     srid: int,
-    axis: Path,
-    start_chainage: float,
+    axis: GivenAxis,
     spacing: float,
 ) -> Alignment:
     """Add a tunnel with its given axis, and return the axis.
@@ -48,9 +48,7 @@ def add_tunnel(
     Parameters
     ----------
     axis
-        CSV with x,y,z in growing chainage, metres in the SRID.
-    start_chainage
-        Chainage of the axis's first point, m.
+        Axis as read by `tunneldb.alignment.given.read_given`, metres in the SRID.
     spacing
         Distance between the vertices of the averaged axis, m.
 
@@ -60,36 +58,23 @@ def add_tunnel(
         For a name that is taken, an SRID that is unknown or not in metres, or an axis that is none.
     """
     _require_name(name)
-    if not math.isfinite(start_chainage) or not math.isfinite(spacing):
-        raise UserError(f"start chainage {start_chainage:g} m and spacing {spacing:g} m must be finite numbers")
+    if not math.isfinite(axis.start) or not math.isfinite(spacing):
+        raise UserError(f"start chainage {axis.start:g} m and spacing {spacing:g} m must be finite numbers")
     _require_metres(connection, srid)
-    xyz = _read_axis(axis)
-    alignment = Alignment.from_polyline(xyz, start_chainage, spacing)
-    line = shapely.set_srid(shapely.LineString(xyz), srid)
+    alignment = Alignment.from_polyline(axis.xyz, axis.start, spacing)
+    line = shapely.set_srid(shapely.LineString(axis.xyz), srid)
     try:
-        connection.execute(
-            "INSERT INTO tunnel.tunnel (name, srid, start_chainage, spacing, alignment) VALUES (%s, %s, %s, %s, %s::geometry)",
-            [name, srid, start_chainage, spacing, shapely.to_wkb(line, hex=True, include_srid=True)],
-        )
+        row = connection.execute(
+            "INSERT INTO tunnel.tunnel (name, srid, start_chainage, spacing, alignment, design)"
+            " VALUES (%s, %s, %s, %s, %s::geometry, %s) RETURNING id",
+            [name, srid, axis.start, spacing, shapely.to_wkb(line, hex=True, include_srid=True), axis.source],
+        ).fetchone()
     except psycopg.errors.UniqueViolation:
         raise UserError(f"there is a tunnel {name!r} already: tunneldb tunnel list") from None
+    assert row is not None
+    if axis.design is not None:
+        save_design(connection, row[0], axis.design)
     return alignment
-
-
-def _read_axis(path: Path) -> NDArray[np.float64]:
-    """Return the vertices of an axis file; it must not turn back on itself."""
-    table = read_csv(path, XYZ)
-    if len(table) < 2:
-        raise UserError(f"{path}: an axis needs at least 2 points, this one has {len(table)}")
-    xyz = table.columns(XYZ)
-    steps = np.diff(xyz[:, :2], axis=0)
-    standing = np.flatnonzero(~steps.any(axis=1))
-    if len(standing):
-        raise table.error(int(standing[0]) + 1, "the same x,y as the point before; remove one of them")
-    turns = np.flatnonzero(np.einsum("ij,ij->i", steps[1:], steps[:-1]) <= 0)
-    if len(turns):
-        raise table.error(int(turns[0]) + 2, "the axis turns back here; its points must be in growing chainage")
-    return xyz
 
 
 def _require_name(name: str) -> None:

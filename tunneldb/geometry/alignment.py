@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +14,7 @@ from tunneldb.geometry.frame import Float, frame_at, locate, nearest_segment, se
 
 KILOMETRE = 1000.0
 MILLIMETRE = 0.001
+DENSE = 2.0  # m between vertices
 
 
 @dataclass(frozen=True)
@@ -103,8 +103,10 @@ def _curve(xyz: Float, chord: Float) -> tuple[Float, Float, CubicSpline]:
     """Spline over the chord length, with a table of its parameter against its length in plan."""
     knots = np.concatenate([[0.0], np.cumsum(chord)])
     position = CubicSpline(knots, xyz)
-    steps = 64
-    parameter = np.unique(np.concatenate([np.linspace(a, b, steps + 1) for a, b in itertools.pairwise(knots)]))
+    # A design alignment has a vertex a metre, between which the curve hardly bends.
+    steps = np.where(chord > DENSE, 64, 4)
+    within = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
+    parameter = np.append(np.repeat(knots[:-1], steps) + within * np.repeat(chord / steps, steps), knots[-1])
     slope = position(parameter, 1)
     middle = position((parameter[1:] + parameter[:-1]) / 2, 1)
     speed, between = np.hypot(slope[:, 0], slope[:, 1]), np.hypot(middle[:, 0], middle[:, 1])

@@ -1,0 +1,236 @@
+"""Design alignments from IFC 4.3: the segments of IfcAlignmentHorizontal and IfcAlignmentVertical.
+
+Read are the design parameters, not the geometry that the file may hold beside them. Needs ifcopenshell (the extra ``ifc``).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tunneldb.alignment.design import Design, StationPiece
+from tunneldb.alignment.elements import PlanElement, PlanKind, ProfileElement, ProfileKind
+from tunneldb.errors import UserError
+
+PLAN: dict[str, PlanKind] = {"LINE": "line", "CIRCULARARC": "arc", "CLOTHOID": "clothoid"}
+PROFILE: dict[str, ProfileKind] = {"CONSTANTGRADIENT": "grade", "PARABOLICARC": "parabola", "CIRCULARARC": "circle"}
+
+SAME_STATION = 0.001  # m; a station that goes on as before begins no new piece
+SCHEMAS = ("IFC4X3", "IFC4X3_TC1", "IFC4X3_ADD1", "IFC4X3_ADD2")
+HEADER = 10_000  # characters within which a file names its schema
+LARGEST_SCALE = 1e-6  # by which a map scale may differ from 1 before lengths in plan are no longer those of the map
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """From the alignment's coordinates (m) to the map's: turn, then shift."""
+
+    turn: float
+    shift: tuple[float, float, float]
+
+    def point(self, x: float, y: float) -> tuple[float, float]:
+        cosine, sine = math.cos(self.turn), math.sin(self.turn)
+        return self.shift[0] + cosine * x - sine * y, self.shift[1] + sine * x + cosine * y
+
+
+class Ifc:
+    """The alignments of an IFC file.
+
+    Attributes
+    ----------
+    names : list of str
+        Names of the alignments, in the file's order.
+    profiles : list of list of str
+        Names of the profiles (IfcAlignmentVertical) of each; of child alignments with a profile each, theirs.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file = _open(path)
+        from ifcopenshell.util.unit import calculate_unit_scale
+
+        self._unit = float(calculate_unit_scale(self._file))
+        self._angle = float(calculate_unit_scale(self._file, "PLANEANGLEUNIT"))
+        self._alignments = [
+            alignment for alignment in self._file.by_type("IfcAlignment") if _nested(alignment, "IfcAlignmentHorizontal")
+        ]
+        self.names = [alignment.Name or "" for alignment in self._alignments]
+        self.profiles = [[profile.Name or "" for profile in _verticals(alignment)] for alignment in self._alignments]
+
+    def design(self, number: int, profile: int) -> Design:
+        """Return an alignment with one of its profiles, both counted from 0."""
+        alignment = self._alignments[number]
+        frame = self._frame(alignment)
+        horizontal = _nested(alignment, "IfcAlignmentHorizontal")[0]
+        plan = tuple(self._plan_element(segment, frame) for segment in _segments(horizontal))
+        vertical = _verticals(alignment)[profile]
+        heights = tuple(self._profile_element(segment, frame) for segment in _segments(vertical, "HorizontalLength"))
+        if not plan or not heights:
+            raise UserError(
+                f"{self._path}: alignment {self.names[number]!r} has no segments in {'profile' if plan else 'plan'}"
+            )
+        start, pieces = self._stationing(alignment)
+        notes = [] if self._unit == 1.0 else [f"lengths are turned into metres: 1 unit is {self._unit:.9g} m"]
+        crs = self._file.by_type("IfcProjectedCRS")
+        if crs and crs[0].Name:
+            notes.append(f"the file says its coordinates are {crs[0].Name}")
+        return Design(self.names[number], plan, heights, start, pieces, tuple(notes))
+
+    def _plan_element(self, segment: Any, frame: _Frame) -> PlanElement:
+        kind = PLAN.get(segment.PredefinedType)
+        if kind is None:
+            raise self._unknown("plan", segment.PredefinedType, PLAN)
+        x, y = (value * self._unit for value in segment.StartPoint.Coordinates[:2])
+        before, after = (
+            1.0 / (radius * self._unit) if radius else 0.0
+            for radius in (segment.StartRadiusOfCurvature, segment.EndRadiusOfCurvature)
+        )  # fmt: skip
+        bearing = math.remainder(segment.StartDirection * self._angle + frame.turn, 2.0 * math.pi)
+        return PlanElement(kind, segment.SegmentLength * self._unit, *frame.point(x, y), bearing, before, after)
+
+    def _profile_element(self, segment: Any, frame: _Frame) -> ProfileElement:
+        kind = PROFILE.get(segment.PredefinedType)
+        if kind is None:
+            raise self._unknown("profile", segment.PredefinedType, PROFILE)
+        return ProfileElement(
+            kind,
+            segment.StartDistAlong * self._unit,
+            segment.HorizontalLength * self._unit,
+            segment.StartHeight * self._unit + frame.shift[2],
+            segment.StartGradient,
+            segment.EndGradient,
+        )
+
+    def _unknown(self, where: str, kind: str, known: dict[str, Any]) -> UserError:
+        return UserError(f"{self._path}: the {where} has a segment of type {kind}; {', '.join(known)} are read")
+
+    def _frame(self, alignment: Any) -> _Frame:
+        """Where the alignment's coordinates lie on the map: its placement, then the file's map conversion."""
+        from ifcopenshell.util.geolocation import auto_xyz2enh
+        from ifcopenshell.util.placement import get_local_placement
+
+        matrix = np.eye(4) if alignment.ObjectPlacement is None else get_local_placement(alignment.ObjectPlacement)
+        if abs(matrix[2, 2] - 1.0) > 1e-9:
+            raise UserError(f"{self._path}: the placement of alignment {alignment.Name!r} is tilted, so it has no plan")
+        unit = self._map_unit()
+        corners = [matrix @ (x, 0.0, 0.0, 1.0) for x in (0.0, 1.0 / self._unit)]
+        origin, aside = (np.array(auto_xyz2enh(self._file, *corner[:3]), dtype=np.float64) * unit for corner in corners)
+        step = aside - origin
+        scale = float(np.hypot(step[0], step[1]))
+        if abs(scale - 1.0) > LARGEST_SCALE:
+            raise UserError(
+                f"{self._path}: its map conversion has the scale {scale:.9g}, so lengths on the map are not the alignment's; "
+                "export it in map coordinates"
+            )
+        return _Frame(float(np.arctan2(step[1], step[0])), (float(origin[0]), float(origin[1]), float(origin[2])))
+
+    def _map_unit(self) -> float:
+        """Metres in a unit of the map's coordinates."""
+        conversion = self._file.by_type("IfcCoordinateOperation")
+        crs = conversion[0].TargetCRS if conversion else None
+        unit = getattr(crs, "MapUnit", None)
+        if unit is None:
+            return self._unit
+        from ifcopenshell.util.unit import get_unit_scale
+
+        return float(get_unit_scale(unit))
+
+    def _stationing(self, alignment: Any) -> tuple[float, tuple[StationPiece, ...]]:
+        """Chainage at the beginning, and the pieces of the stationing where that is not the chainage."""
+        pieces = sorted(self._stations(alignment), key=lambda piece: piece.distance)
+        if not pieces:
+            return 0.0, ()
+        first = pieces[0]
+        start = first.station - first.direction * first.distance
+        kept = [StationPiece(0.0, start, first.direction)]
+        for piece in pieces[1:]:
+            before = kept[-1]
+            expected = before.station + before.direction * (piece.distance - before.distance)
+            if abs(expected - piece.station) > SAME_STATION or piece.direction != before.direction:
+                kept.append(piece)
+        if len(kept) == 1 and first.direction == 1:
+            return start, ()
+        return (start if first.direction == 1 else 0.0), tuple(kept)
+
+    def _stations(self, alignment: Any) -> Iterator[StationPiece]:
+        """Stations that referents of the alignment state, with their direction from there on."""
+        from ifcopenshell.util.element import get_pset
+
+        direction = 1
+        found = []
+        for referent in _nested(alignment, "IfcReferent"):
+            stationing = get_pset(referent, "Pset_Stationing") or {}
+            distance = self._distance_along(referent)
+            if distance is not None and stationing.get("Station") is not None:
+                found.append((distance, float(stationing["Station"]) * self._unit, stationing.get("HasIncreasingStation")))
+        for distance, station, increasing in sorted(found, key=lambda row: row[0]):
+            if increasing is not None:
+                direction = 1 if increasing else -1
+            yield StationPiece(distance, station, direction)
+
+    def _distance_along(self, referent: Any) -> float | None:
+        placement = referent.ObjectPlacement
+        if placement is None:
+            return None
+        if not placement.is_a("IfcLinearPlacement"):
+            return 0.0 if np.allclose(_origin(placement), 0.0) else None
+        location = placement.RelativePlacement.Location
+        if not location.is_a("IfcPointByDistanceExpression"):
+            return None
+        return float(location.DistanceAlong.wrappedValue) * self._unit
+
+
+def _origin(placement: Any) -> Any:
+    from ifcopenshell.util.placement import get_local_placement
+
+    return get_local_placement(placement)[:3, 3]
+
+
+def _open(path: Path) -> Any:
+    try:
+        import ifcopenshell
+    except ImportError as error:
+        raise UserError('IFC files are read by ifcopenshell, which is not installed: pip install "tunneldb[ifc]"') from error
+    schema, text = _schema(path)
+    if schema not in SCHEMAS:
+        raise UserError(f"{path} is of {schema}; alignments are read from IFC 4.3 (IFC4X3_ADD2): export it as that")
+    try:
+        # The releases of 4.3 differ in nothing that is read here, and ifcopenshell knows the last one.
+        return ifcopenshell.file.from_string(text.replace(f"'{schema}'", "'IFC4X3_ADD2'", 1))
+    except (RuntimeError, ifcopenshell.Error) as error:
+        raise UserError(f"{path} cannot be read as IFC: {str(error).strip().splitlines()[0]}") from None
+
+
+def _schema(path: Path) -> tuple[str, str]:
+    """Schema that a STEP file names in its header, and its text."""
+    try:
+        text = path.read_text(encoding="latin-1")  # STEP writes other letters by escapes
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}") from None
+    found = re.search(r"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'", text[:HEADER])
+    if found is None:
+        raise UserError(f"{path} is no IFC file: its header names no schema")
+    return found[1].upper(), text
+
+
+def _nested(entity: Any, kind: str) -> list[Any]:
+    """Parts of an entity, of a class, in order."""
+    return [part for nest in entity.IsNestedBy for part in nest.RelatedObjects if part.is_a(kind)]
+
+
+def _verticals(alignment: Any) -> list[Any]:
+    """Profiles of an alignment: its own, or those of its child alignments, which share its plan."""
+    children = [part for whole in alignment.IsDecomposedBy for part in whole.RelatedObjects if part.is_a("IfcAlignment")]
+    return [vertical for owner in (alignment, *children) for vertical in _nested(owner, "IfcAlignmentVertical")]
+
+
+def _segments(layout: Any, length: str = "SegmentLength") -> list[Any]:
+    """Design parameters of a layout's segments; the last one may have no length, as a mark of the end."""
+    parameters = [segment.DesignParameters for segment in _nested(layout, "IfcAlignmentSegment")]
+    return [segment for segment in parameters if getattr(segment, length) > 0.0]

@@ -1,0 +1,255 @@
+"""Design alignments from LandXML 1.0 to 1.2 and what builds on it (Inframodel, J-LandXML).
+
+Points are written northing first. Lengths are in the file's linear unit. Stations of the profile and ``staInternal`` of station
+equations are the alignment's continuous ones, from ``staStart`` on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree.ElementTree import Element, ParseError, iterparse
+
+from tunneldb.alignment.design import Design, StationPiece
+from tunneldb.alignment.elements import PlanElement, clothoid_from_chord
+from tunneldb.alignment.profile import Pvi, profile_elements
+from tunneldb.errors import UserError
+
+UNITS = {
+    "millimeter": 0.001, "centimeter": 0.01, "meter": 1.0, "kilometer": 1000.0,
+    "inch": 0.0254, "foot": 0.3048, "USSurveyFoot": 1200.0 / 3937.0, "mile": 1609.344,
+}  # fmt: skip
+"""Metres in each linear unit of the schema."""
+
+MISMATCH = 0.02  # m between a length as stated and as the points have it; files are rounded to millimetres or centimetres
+_PVIS = ("PVI", "ParaCurve", "UnsymParaCurve", "CircCurve")
+_KEPT = ("Alignments", "Units", "CoordinateSystem", "CgPoints")
+
+Point = tuple[float, float]
+
+
+class LandXml:
+    """The alignments of a LandXML file.
+
+    Attributes
+    ----------
+    names : list of str
+        Names of the alignments, in the file's order.
+    profiles : list of list of str
+        Names of the profiles (ProfAlign) of each.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        root = _read(path)
+        self._unit = self._linear_unit(root)
+        self._points = {
+            point.get("name"): point.text for point in root.iter() if _tag(point) == "CgPoint" and point.get("name")
+        }
+        self._alignments = [element for element in root.iter() if _tag(element) == "Alignment"]
+        self._epsg = next((e.get("epsgCode") for e in root.iter() if _tag(e) == "CoordinateSystem"), None)
+        self.names = [element.get("name", "") for element in self._alignments]
+        self.profiles = [[p.get("name", "") for p in self._profiles(element)] for element in self._alignments]
+
+    def design(self, number: int, profile: int) -> Design:
+        """Return an alignment with one of its profiles, both counted from 0."""
+        alignment = self._alignments[number]
+        start = self._length(alignment, "staStart", default=0.0)
+        geometry = _child(alignment, "CoordGeom")
+        if geometry is None or not len(geometry):
+            raise UserError(f"{self._path}: alignment {self.names[number]!r} has no geometry in plan (CoordGeom)")
+        elements = [self._element(element) for element in geometry if _tag(element) not in ("Feature", "Description")]
+        plan = tuple(element for element in elements if element.length > 0.0)
+        pvis = list(self._pvis(self._profiles(alignment)[profile], start))
+        notes = []
+        if self._unit != 1.0:
+            notes.append(f"lengths are turned into metres: 1 unit is {self._unit:.9g} m")
+        if self._epsg:
+            notes.append(f"the file says its coordinates are EPSG:{self._epsg}")
+        return Design(
+            self.names[number],
+            plan,
+            profile_elements(pvis, self._path),
+            start,
+            self._stationing(alignment, start),
+            tuple(notes),
+        )
+
+    def _linear_unit(self, root: Element) -> float:
+        for units in (element for element in root.iter() if _tag(element) == "Units"):
+            for system in units:
+                unit = system.get("linearUnit", "meter" if _tag(system) == "Metric" else "foot")
+                if unit not in UNITS:
+                    raise UserError(f"{self._path}: its linearUnit {unit!r} is none of {', '.join(UNITS)}")
+                return UNITS[unit]
+        return 1.0
+
+    def _profiles(self, alignment: Element) -> list[Element]:
+        return [
+            element
+            for profile in alignment
+            if _tag(profile) == "Profile"
+            for element in profile
+            if _tag(element) == "ProfAlign"
+        ]
+
+    def _element(self, element: Element) -> PlanElement:
+        kind = _tag(element)
+        if kind == "Line":
+            return self._line(element)
+        if kind == "Curve":
+            return self._curve(element)
+        if kind == "Spiral":
+            return self._spiral(element)
+        raise UserError(f"{self._path}: the plan has a {kind}; Line, Curve and Spiral are read")
+
+    def _line(self, element: Element) -> PlanElement:
+        start, end = self._point(element, "Start"), self._point(element, "End")
+        dx, dy = end[0] - start[0], end[1] - start[1]
+        return PlanElement("line", math.hypot(dx, dy), *start, math.atan2(dy, dx))
+
+    def _curve(self, element: Element) -> PlanElement:
+        """Arc about its centre: start and end hold, a radius or length that says otherwise is an error."""
+        start, end, centre = (self._point(element, name) for name in ("Start", "End", "Center"))
+        turn = self._turn(element)
+        radius = math.dist(start, centre)
+        first, last = (math.atan2(p[1] - centre[1], p[0] - centre[0]) for p in (start, end))
+        angle = (turn * (last - first)) % (2.0 * math.pi)
+        length = radius * angle
+        self._compare(element, "radius", math.dist(end, centre), radius)
+        self._compare(element, "radius", self._length(element, "radius", radius), radius)
+        self._compare(element, "length", self._length(element, "length", length), length)
+        bearing = math.remainder(first + turn * math.pi / 2.0, 2.0 * math.pi)
+        return PlanElement("arc", length, *start, bearing, turn / radius, turn / radius)
+
+    def _spiral(self, element: Element) -> PlanElement:
+        """Clothoid between two points, whose length and radii say how it bends."""
+        kind = element.get("spiType", "clothoid")
+        if kind != "clothoid":
+            raise UserError(f"{self._path}: the plan has a spiral of type {kind}; only clothoids are read")
+        turn = self._turn(element)
+        length = self._length(element, "length")
+        before, after = (turn * self._curvature(element, name) for name in ("radiusStart", "radiusEnd"))
+        start, end = self._point(element, "Start"), self._point(element, "End")
+        clothoid, excess = clothoid_from_chord(start, end, length, before, after)
+        self._compare(element, "distance of its ends", excess, 0.0)
+        return clothoid
+
+    def _curvature(self, element: Element, name: str) -> float:
+        text = (element.get(name) or "INF").strip().upper()
+        if text in ("INF", "INFINITY", "0"):
+            return 0.0
+        radius = self._length(element, name)
+        return 1.0 / radius if radius else 0.0
+
+    def _turn(self, element: Element) -> float:
+        rotation = element.get("rot")
+        if rotation not in ("cw", "ccw"):
+            raise UserError(f"{self._path}: a {_tag(element)} has the rotation {rotation!r}; it must be cw or ccw")
+        return 1.0 if rotation == "ccw" else -1.0
+
+    def _compare(self, element: Element, what: str, stated: float, measured: float) -> None:
+        if abs(stated - measured) > MISMATCH:
+            place = element.find("{*}Start")
+            raise UserError(
+                f"{self._path}: the {what} of the {_tag(element)} from {'' if place is None else (place.text or '').strip()} "
+                f"is off by {abs(stated - measured):.3f} m from what its points, radii and length say"
+            )
+
+    def _point(self, element: Element, name: str) -> Point:
+        """Easting and northing of a point, which is given or refers to a CgPoint."""
+        place = _child(element, name)
+        if place is None:
+            raise UserError(f"{self._path}: a {_tag(element)} has no {name}")
+        reference = place.get("pntRef")
+        text = (self._points.get(reference) if reference else place.text) or ""
+        try:
+            north, east = (float(value) for value in text.split()[:2])
+        except ValueError:
+            raise UserError(
+                f"{self._path}: {name} of a {_tag(element)} is {text.strip()!r}, not northing and easting"
+            ) from None
+        return east * self._unit, north * self._unit
+
+    def _pvis(self, element: Element, start: float) -> Iterator[Pvi]:
+        """Points of vertical intersection of a ProfAlign, with what rounds them."""
+        for point in element:
+            kind = _tag(point)
+            if kind in ("Feature", "Description"):
+                continue
+            if kind not in _PVIS:
+                raise UserError(
+                    f"{self._path}: the profile has a {kind}; PVI, ParaCurve, UnsymParaCurve and CircCurve are read"
+                )
+            try:
+                station, height = (float(value) * self._unit for value in (point.text or "").split())
+            except ValueError:
+                raise UserError(
+                    f"{self._path}: a {kind} of the profile is {(point.text or '').strip()!r}, not station and height"
+                ) from None
+            before, after, radius = 0.0, 0.0, 0.0
+            if kind == "UnsymParaCurve":
+                before, after = self._length(point, "lengthIn"), self._length(point, "lengthOut")
+            elif kind == "ParaCurve":
+                before = after = self._length(point, "length") / 2.0
+            elif kind == "CircCurve":
+                radius = abs(self._length(point, "radius"))
+            yield Pvi(station - start, height, before, after, radius)
+
+    def _stationing(self, alignment: Element, start: float) -> tuple[StationPiece, ...]:
+        """Pieces of the alignment's own stationing; none where that is its chainage."""
+        pieces = []
+        for element in (e for e in alignment if _tag(e) == "StaEquation"):
+            internal, ahead = self._length(element, "staInternal"), self._length(element, "staAhead")
+            direction = -1 if element.get("staIncrement") == "decreasing" else 1
+            pieces.append(StationPiece(internal - start, ahead, direction))
+        if not pieces:
+            return ()
+        pieces.sort(key=lambda piece: piece.distance)
+        first = () if pieces[0].distance <= 0.0 else (StationPiece(0.0, start),)
+        return (*first, *pieces)
+
+    def _length(self, element: Element, name: str, default: float | None = None) -> float:
+        """Return an attribute that is a length, m."""
+        text = element.get(name)
+        if text is None and default is not None:
+            return default
+        try:
+            value = float(text or "")
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise UserError(f"{self._path}: {name} of a {_tag(element)} is {text!r}, not a number")
+        return value * self._unit
+
+
+def _read(path: Path) -> Element:
+    """Parse a file, without keeping its surfaces and points, which may be hundreds of megabytes."""
+    stack: list[Element] = []
+    kept = 0
+    try:
+        for event, element in iterparse(path, events=("start", "end")):
+            if event == "start":
+                stack.append(element)
+                kept += _tag(element) in _KEPT
+                continue
+            stack.pop()
+            if not kept and stack:
+                stack[-1].remove(element)
+            kept -= _tag(element) in _KEPT
+    except ParseError as error:
+        raise UserError(f"{path} is not a whole XML file: {error}") from None
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}") from None
+    if _tag(element) != "LandXML":
+        raise UserError(f"{path} is XML, but its root is {_tag(element)}, not LandXML")
+    return element
+
+
+def _tag(element: Element) -> str:
+    return element.tag.rpartition("}")[2]
+
+
+def _child(element: Element, name: str) -> Element | None:
+    return next((child for child in element if _tag(child) == name), None)
