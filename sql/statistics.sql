@@ -186,10 +186,12 @@ ROWS 4
 SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
 AS $$
     WITH found AS MATERIALIZED (
-        SELECT t.* FROM tunnel_api.leak_statistics($1, $2, $3) t
+        SELECT t.*, (SELECT s.tunnel_id FROM tunnel.survey s WHERE s.name = $1) AS tunnel_id
+        FROM tunnel_api.leak_statistics($1, $2, $3) t
     ), leak AS MATERIALIZED (
-        SELECT l.id, l.area, tunnel_api.chainage_label((l.chainage_from + l.chainage_to) / 2) AS label
-        FROM tunnel.anomaly l
+        SELECT l.id, l.area,
+            (SELECT c.label FROM tunnel_api.stationing(s.tunnel_id, (l.chainage_from + l.chainage_to) / 2) c) AS label
+        FROM tunnel.anomaly l JOIN tunnel.survey s ON s.id = l.survey_id
         WHERE l.survey_id = tunnel_api.survey_id($1) AND l.detected AND l.review <> 'rejected'
             AND coalesce(l.judged, l.kind) = 'leak' AND l.chainage_to > $2 AND l.chainage_from < $3
     ), breach AS (
@@ -207,8 +209,8 @@ AS $$
         UNION ALL
         SELECT c.id, 3, CASE c.patches_per_100 WHEN 0 THEN format('wet patches: %s', t.patches)
                              ELSE format('%s patches in 100 m² between %s and %s > %s', t.window_patches,
-                                 tunnel_api.chainage_label(t.window_from), tunnel_api.chainage_label(t.window_to),
-                                 c.patches_per_100) END,
+                                 tunnel_api.station_label(t.tunnel_id, t.window_from),
+                                 tunnel_api.station_label(t.tunnel_id, t.window_to), c.patches_per_100) END,
             CASE c.patches_per_100 WHEN 0 THEN (SELECT array_agg(l.id) FROM leak l) ELSE t.window_leaks END
         FROM found t
         JOIN tunnel_api.waterproof_limit c ON t.window_patches > c.patches_per_100 OR (c.patches_per_100 = 0 AND t.patches > 0)
@@ -234,6 +236,7 @@ AS $$
 #variable_conflict use_column
 DECLARE
     survey_key constant int := tunnel_api.survey_id(survey);
+    tunnel_key constant int := (SELECT s.tunnel_id FROM tunnel_api.survey s WHERE s.id = survey_key);
     extent record;
     starts float8[];
     ends float8[];
@@ -252,10 +255,10 @@ BEGIN
                          ceil((extent.chainage_to - first_chainage) / ring_length)::int) i;
     RETURN QUERY
         SELECT round((t.chainage_from - first_chainage) / ring_length)::int + 1, t.chainage_from, t.chainage_to,
-            tunnel_api.chainage_label(t.chainage_from), t.lining_area, t.seen_share, t.wet_area, t.wet_ratio, t.patches,
-            t.largest_area, t.class
+            (SELECT c.label FROM tunnel_api.stationing(tunnel_key, t.chainage_from) c), t.lining_area, t.seen_share,
+            t.wet_area, t.wet_ratio, t.patches, t.largest_area, t.class
         FROM tunnel_api.stretch_statistics(survey_key, starts, ends) t;
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.ring_statistics(text, float8, float8) IS
-'Statistics of leaks, as leak_statistics gives them, for each ring of a segmental lining: rings of ring_length (m) from first_chainage on, where the first begins, to the end of the survey. label: chainage at which the ring begins. A leak over several rings counts in each.';
+'Statistics of leaks, as leak_statistics gives them, for each ring of a segmental lining: rings of ring_length (m) from first_chainage on, where the first begins, to the end of the survey. label: station at which the ring begins, in growing chainage. A leak over several rings counts in each.';

@@ -1,6 +1,6 @@
 -- Views of a tunnel and its geometry: tunnel, survey, file, point, axis, axis_vertex, segment, section, section_unrolled,
--- region. Each has a stable integer key first and its geometry last; all lengths are metres. Needs chainage_label
--- (leak.sql).
+-- region. Each has a stable integer key first and its geometry last; all lengths are metres. Labels are
+-- stations. Needs stationing (stationing.sql).
 --
 -- Tunnels differ in SRID, so what lies on the map is cast to plain geometry: a column that states a type but no SRID
 -- makes QGIS look for rows of SRID 0, of which there are none. Of a plain column QGIS reads 100 rows (with "estimated
@@ -62,8 +62,8 @@ COMMENT ON COLUMN tunnel_api.point.intensity IS 'As in the file, in the unit of 
 CREATE OR REPLACE VIEW tunnel_api.axis AS
 SELECT s.id, s.id AS survey_id, s.name AS survey, t.name AS tunnel, a.vertices, a.interpolated, a.edited,
        a.first * t.spacing AS chainage_from, a.last * t.spacing AS chainage_to,
-       tunnel_api.chainage_label(a.first * t.spacing) AS label_from,
-       tunnel_api.chainage_label(a.last * t.spacing) AS label_to,
+       (SELECT l.label FROM tunnel_api.stationing(t.id, a.first * t.spacing) l) AS label_from,
+       (SELECT l.label FROM tunnel_api.stationing(t.id, a.last * t.spacing) l) AS label_to,
        a.geom::public.geometry AS geom
   FROM tunnel.survey s
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
@@ -79,7 +79,7 @@ COMMENT ON COLUMN tunnel_api.axis.edited IS 'Vertices placed by hand';
 
 CREATE OR REPLACE VIEW tunnel_api.axis_vertex AS
 SELECT v.id, v.survey_id, s.name AS survey, v.n, v.km, v.n * t.spacing AS chainage,
-       tunnel_api.chainage_label(v.n * t.spacing) AS label, v.points, v.source, v.edited_by, v.edited_at,
+       (SELECT l.label FROM tunnel_api.stationing(t.id, v.n * t.spacing) l) AS label, v.points, v.source, v.edited_by, v.edited_at,
        v.geom::public.geometry AS geom
   FROM tunnel.axis_vertex v
   JOIN tunnel.survey s ON s.id = v.survey_id
@@ -96,7 +96,8 @@ COMMENT ON COLUMN tunnel_api.axis_vertex.edited_at IS 'When it was moved last, s
 -- where the segments were built.
 CREATE OR REPLACE VIEW tunnel_api.segment AS
 SELECT g.id, g.survey_id, s.name AS survey, g.n, g.km, g.chainage_from, g.chainage_to,
-       tunnel_api.chainage_label(g.chainage_from) AS label_from, tunnel_api.chainage_label(g.chainage_to) AS label_to,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, g.chainage_from) l) AS label_from,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, g.chainage_to) l) AS label_to,
        g.points,
        100 * (g.vertex_to[3] - g.vertex_from[3]) / nullif(g.chainage_to - g.chainage_from, 0) AS slope,
        EXISTS (SELECT FROM tunnel.segment o
@@ -117,7 +118,7 @@ COMMENT ON COLUMN tunnel_api.segment.stale IS 'True when the axis has moved sinc
 
 CREATE OR REPLACE VIEW tunnel_api.section AS
 SELECT c.id, c.survey_id, s.name AS survey, c.km, c.segment, c.half, c.chainage,
-       tunnel_api.chainage_label(c.chainage) AS label, c.half_width, c.angle_step, c.points, c.interpolated,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, c.chainage) l) AS label, c.half_width, c.angle_step, c.points, c.interpolated,
        c.geom::public.geometry AS geom
   FROM tunnel.section c
   JOIN tunnel.survey s ON s.id = c.survey_id;
@@ -129,7 +130,7 @@ COMMENT ON COLUMN tunnel_api.section.interpolated IS 'Angular classes that are n
 
 CREATE OR REPLACE VIEW tunnel_api.section_unrolled AS
 SELECT c.id, c.survey_id, s.name AS survey, c.km, c.segment, c.half, c.chainage,
-       tunnel_api.chainage_label(c.chainage) AS label, e.arc_from, e.arc_to, c.angle_step, c.interpolated,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, c.chainage) l) AS label, e.arc_from, e.arc_to, c.angle_step, c.interpolated,
        public.st_makeline(public.st_makepoint(c.chainage, e.arc_from), public.st_makepoint(c.chainage, e.arc_to)
            )::public.geometry(LineString, 0) AS geom
   FROM tunnel.section c

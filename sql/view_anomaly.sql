@@ -1,6 +1,6 @@
 -- Views of what is darker than dry lining. A leak on a vertical wall has no area in plan, so there are three geometries,
 -- each with a view of its own for QGIS: unrolled (chainage, arc; SRID 0), on the map beside the axis, and in space.
--- Views named leak hold the anomalies of kind leak. Needs chainage_label (leak.sql).
+-- Views named leak hold the anomalies of kind leak. Needs stationing (stationing.sql).
 
 CREATE OR REPLACE VIEW tunnel_api.anomaly AS
 SELECT a.id, a.survey_id, s.name AS survey, a.km,
@@ -8,7 +8,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
          WHERE g.survey_id = a.survey_id AND g.n BETWEEN m.near - 2 AND m.near + 2
            AND m.chainage BETWEEN g.chainage_from AND g.chainage_to) AS segment,
        a.chainage_from, a.chainage_to,
-       tunnel_api.chainage_label(m.chainage) AS label,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, m.chainage) l) AS label,
        a.arc_from, a.arc_to, a.clock,
        coalesce(a.judged, a.kind) AS kind, a.kind AS found, a.reasons, a.confidence, a.contrast,
        a.area, a.drop_mean, a.drop_max, a.image_share,
@@ -55,7 +55,7 @@ BEGIN
     END LOOP;
     FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
         ('segment', 'Number of the segment that holds its middle'),
-        ('label', 'Chainage of its middle, as 12+345.678'),
+        ('label', 'Station of its middle, as 12+345.678'),
         ('chainage_from', 'Least chainage, m'),
         ('chainage_to', 'Greatest chainage, m'),
         ('arc_from', 'Least arc, m from the crown, positive right looking up-chainage'),

@@ -1,5 +1,5 @@
 -- Views of what stage ground and `tunneldb spheres` find: the classes of points, the ground, clusters, target spheres.
--- Needs chainage_label (leak.sql).
+-- Needs stationing (stationing.sql).
 
 CREATE OR REPLACE VIEW tunnel_api.class AS
 SELECT c.id, c.name, c.description
@@ -20,8 +20,8 @@ COMMENT ON COLUMN tunnel_api.class.description IS 'What the points lie on';
 
 CREATE OR REPLACE VIEW tunnel_api.ground AS
 SELECT g.survey_id::bigint * 100000000 + 50000000 + g.n AS id, g.survey_id, s.name AS survey, g.km, g.n::float8 AS chainage,
-       tunnel_api.chainage_label(g.n) AS label, g.across, g.height, g.gamma, g.foot[1] AS foot_left, g.foot[2] AS foot_right,
-       g.arc_left, g.arc_right, g.geom::public.geometry AS geom
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, g.n) l) AS label, g.across, g.height, g.gamma,
+       g.foot[1] AS foot_left, g.foot[2] AS foot_right, g.arc_left, g.arc_right, g.geom::public.geometry AS geom
   FROM tunnel.ground g
   JOIN tunnel.survey s ON s.id = g.survey_id;
 COMMENT ON VIEW tunnel_api.ground IS 'Ground at each metre along the tunnel that has one (Li et al., 2023)';
@@ -34,7 +34,8 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km,
        (SELECT min(g.n) FROM tunnel.segment g
          WHERE g.survey_id = c.survey_id AND g.n BETWEEN m.near - 2 AND m.near + 2
            AND m.chainage BETWEEN g.chainage_from AND g.chainage_to) AS segment,
-       c.class, k.name AS class_name, c.chainage_from, c.chainage_to, tunnel_api.chainage_label(m.chainage) AS label,
+       c.class, k.name AS class_name, c.chainage_from, c.chainage_to,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, m.chainage) l) AS label,
        c.height_from, c.height_to, c.points, public.st_area(c.geom) AS area, c.geom::public.geometry AS geom
   FROM tunnel.cluster c
   JOIN tunnel.survey s ON s.id = c.survey_id
@@ -45,7 +46,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km,
 COMMENT ON VIEW tunnel_api.cluster IS 'What stands in the tunnel or hangs on its lining, found by stage ground (Li et al., 2023)';
 COMMENT ON COLUMN tunnel_api.cluster.segment IS 'Number of the segment that holds its middle';
 COMMENT ON COLUMN tunnel_api.cluster.class_name IS 'Name of its class';
-COMMENT ON COLUMN tunnel_api.cluster.label IS 'Chainage of its middle, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.cluster.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.cluster.area IS 'Area of its hull in plan, m²';
 
 CREATE OR REPLACE VIEW tunnel_api.target_sphere AS
@@ -53,7 +54,7 @@ SELECT p.id, p.survey_id, s.name AS survey, p.km,
        (SELECT min(g.n) FROM tunnel.segment g
          WHERE g.survey_id = p.survey_id AND g.n BETWEEN m.near - 2 AND m.near + 2
            AND p.chainage BETWEEN g.chainage_from AND g.chainage_to) AS segment,
-       p.number, p.scan_id, p.chainage, tunnel_api.chainage_label(p.chainage) AS label,
+       p.number, p.scan_id, p.chainage, (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, p.chainage) l) AS label,
        public.st_x(p.geom) AS x, public.st_y(p.geom) AS y, public.st_z(p.geom) AS z,
        p.radius, p.nominal, p.rms, p.sigma, p.coverage, p.points, p.found_at, p.geom::public.geometry AS geom
   FROM tunnel.target_sphere p
@@ -62,7 +63,7 @@ SELECT p.id, p.survey_id, s.name AS survey, p.km,
  CROSS JOIN LATERAL (SELECT floor(p.chainage / t.spacing)::integer AS near) m;
 COMMENT ON VIEW tunnel_api.target_sphere IS 'Target spheres, one row for each scan that saw one (Li et al., 2023)';
 COMMENT ON COLUMN tunnel_api.target_sphere.segment IS 'Number of the segment that holds its centre';
-COMMENT ON COLUMN tunnel_api.target_sphere.label IS 'Chainage of its centre, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.target_sphere.label IS 'Station of its centre, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.target_sphere.x IS 'Centre in the tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel_api.target_sphere.y IS 'Centre in the tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel_api.target_sphere.z IS 'Height of the centre, m';
