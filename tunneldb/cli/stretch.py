@@ -1,0 +1,70 @@
+"""Options of a stretch of tunnel, --from and --to, in the tunnel's own stationing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import click
+import psycopg
+
+from tunneldb.database import Survey
+from tunneldb.errors import UserError
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a tunnel between two chainages.
+
+    Attributes
+    ----------
+    low, high : float
+        Chainage, m; infinite where it isn't bounded.
+    """
+
+    low: float = -math.inf
+    high: float = math.inf
+
+
+def stretch_options(command: Command) -> Command:
+    """Add the options --from and --to, which the command gets as ``start`` and ``end``."""
+    help_from = "Begin at this place: a station of the tunnel, as 12+345.678 or in metres."
+    end = click.option("--to", "end", metavar="PLACE", help="End there.")
+    return click.option("--from", "start", metavar="PLACE", help=help_from)(end(command))
+
+
+def parse_stretch(conn: psycopg.Connection[Any], survey: Survey, start: str | None, end: str | None) -> Stretch:
+    """Stretch of a survey's tunnel between two places; where stations run backwards they may be given in either order.
+
+    Raises
+    ------
+    UserError
+        For a place that can't be read, that the tunnel hasn't, or that it has more than once; or for two that are one.
+    """
+    low = -math.inf if start is None else _chainage(conn, survey, "--from", start)
+    high = math.inf if end is None else _chainage(conn, survey, "--to", end)
+    if start is not None and end is not None:
+        low, high = sorted((low, high))
+        if low == high:
+            raise UserError(f"--from {start} --to {end}: between them lies no tunnel")
+    return Stretch(low, high)
+
+
+def _chainage(conn: psycopg.Connection[Any], survey: Survey, option: str, place: str) -> float:
+    try:
+        with conn.transaction():
+            rows = conn.execute(
+                "SELECT chainage FROM tunnel_api.station_chainages(%s, %s) AS chainage ORDER BY 1", [survey.tunnel_id, place]
+            ).fetchall()
+    except psycopg.errors.InvalidTextRepresentation:
+        raise UserError(f"{option} takes a station as 12+345.678, or metres, not {place!r}") from None
+    if not rows:
+        raise UserError(f"{option} {place}: tunnel {survey.tunnel} has no such station: tunneldb status {survey.name}")
+    if len(rows) > 1:
+        where = " and ".join(f"{row[0]:.3f}" for row in rows)
+        raise UserError(f"{option} {place}: tunnel {survey.tunnel} has that station {len(rows)} times, at chainages {where} m")
+    return float(rows[0][0])
