@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -65,8 +65,15 @@ class CsvTable:
             raise self.error(row, f"{name} {column[row]:.15g} {how} that of the row before; sort by {name}, each once")
 
 
-def read_csv(path: Path, names: Sequence[str]) -> CsvTable:
+def read_csv(path: Path, names: Sequence[str], default: Mapping[str, float] | None = None) -> CsvTable:
     """Read numeric columns of a CSV file with a header; other columns are left out.
+
+    Parameters
+    ----------
+    path, names
+        The file, and the columns.
+    default
+        Columns that may be missing, with the value that all rows have then.
 
     Raises
     ------
@@ -76,7 +83,7 @@ def read_csv(path: Path, names: Sequence[str]) -> CsvTable:
     """
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows, lines = _read_rows(path, csv.reader(file), names)
+            rows, lines = _read_rows(path, csv.reader(file), names, default or {})
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError as error:
@@ -87,11 +94,13 @@ def read_csv(path: Path, names: Sequence[str]) -> CsvTable:
     return CsvTable(path, tuple(names), values, np.array(lines, dtype=np.int64))
 
 
-def _read_rows(path: Path, reader: _csv.Reader, names: Sequence[str]) -> tuple[list[list[float]], list[int]]:
+def _read_rows(
+    path: Path, reader: _csv.Reader, names: Sequence[str], default: Mapping[str, float]
+) -> tuple[list[list[float]], list[int]]:
     header = next(reader, None)
     if header is None:
         raise UserError(f"{path} is empty; it needs the header {','.join(names)}")
-    indices = _indices(path, [cell.strip() for cell in header], names)
+    indices = _indices(path, [cell.strip() for cell in header], names, default)
     rows: list[list[float]] = []
     lines: list[int] = []
     for row in reader:
@@ -99,20 +108,21 @@ def _read_rows(path: Path, reader: _csv.Reader, names: Sequence[str]) -> tuple[l
             continue
         if len(row) != len(header):
             raise UserError(f"{path}, line {reader.line_num}: {len(row)} values under a header of {len(header)} columns")
-        rows.append([_number(path, reader.line_num, name, row[i]) for name, i in zip(names, indices, strict=True)])
+        cells = {name: row[index] for name, index in indices.items()}
+        rows.append([_number(path, reader.line_num, name, cells[name]) if name in cells else default[name] for name in names])
         lines.append(reader.line_num)
     return rows, lines
 
 
-def _indices(path: Path, header: list[str], names: Sequence[str]) -> list[int]:
-    missing = [name for name in names if name not in header]
+def _indices(path: Path, header: list[str], names: Sequence[str], default: Mapping[str, float]) -> dict[str, int]:
+    missing = [name for name in names if name not in header and name not in default]
     if missing:
         hint = "; separate columns by commas" if len(header) == 1 else ""
         raise UserError(f"{path} has no column {', '.join(missing)}: its header is {','.join(header)!r}{hint}")
     repeated = [name for name in names if header.count(name) > 1]
     if repeated:
         raise UserError(f"{path} has the column {repeated[0]} twice")
-    return [header.index(name) for name in names]
+    return {name: header.index(name) for name in names if name in header}
 
 
 def _number(path: Path, line: int, name: str, text: str) -> float:

@@ -61,6 +61,7 @@ def spheres(
     and the best rigid motion onto the control points are reported, never applied. Stages need not have been run; after
     sections the spheres have a chainage, and after ground the search leaves out the ground.
     """
+    from tunneldb.database.stationing import load_stationing
     from tunneldb.export.atomic import replacing
     from tunneldb.export.spheres import (
         CONTROL_HEADER,
@@ -86,10 +87,11 @@ def spheres(
         bar = points_bar()
         with bar:
             found = search(conn, chosen, radius, tolerance, step(bar))
+        stationing = load_stationing(conn, chosen.tunnel_id)
     comparison = compare(found.spheres, points, within) if points else None
     count = len({row.number for row in found.spheres})
     if found.spheres:
-        print_table(HEADER, sphere_rows(found.spheres), right=(0, 1, 3, 4, 5, 6, 7, 8, 9, 10))
+        print_table(HEADER, sphere_rows(found.spheres, stationing), right=(0, 1, 3, 4, 5, 6, 7, 8, 9, 10))
     click.echo(f"{count} target spheres, seen {len(found.spheres)} times; {len(found.refusals)} other round things")
     if comparison is not None:
         click.echo(how_line(comparison))
@@ -101,5 +103,5 @@ def spheres(
             click.echo(line)
     if report is not None:
         with replacing(report) as temporary:
-            temporary.write_text(as_report(chosen, found, radius, tolerance, comparison), encoding="utf-8")
+            temporary.write_text(as_report(chosen, stationing, found, radius, tolerance, comparison), encoding="utf-8")
         click.echo(f"report to {report}", err=True)

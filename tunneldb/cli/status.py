@@ -66,8 +66,8 @@ def _all(connection: psycopg.Connection[Any]) -> None:
     """A line a survey: what is loaded, and at how many of its kilometres each stage is done."""
     rows = connection.execute(
         """
-        SELECT s.name, s.tunnel, s.date, s.files, s.points, tunnel_api.chainage_label(s.chainage_from),
-               tunnel_api.chainage_label(s.chainage_to), k.kilometres, k.done
+        SELECT s.name, s.tunnel, s.date, s.files, s.points, tunnel_api.station_label(s.tunnel_id, s.chainage_from),
+               tunnel_api.station_label(s.tunnel_id, s.chainage_to), k.kilometres, k.done
           FROM tunnel_api.survey s
           LEFT JOIN LATERAL (
                SELECT max(d.there) AS kilometres, array_agg(d.done ORDER BY d.step) AS done
@@ -95,8 +95,8 @@ def _one(connection: psycopg.Connection[Any], survey: str, as_json: bool) -> Non
         return
     rows = connection.execute(
         """
-        SELECT name, tunnel, date, files, points, tunnel_api.chainage_label(chainage_from),
-               tunnel_api.chainage_label(chainage_to)
+        SELECT name, tunnel, date, files, points, tunnel_api.station_label(tunnel_id, chainage_from),
+               tunnel_api.station_label(tunnel_id, chainage_to)
           FROM tunnel_api.survey WHERE name = %s
         """,
         [survey],

@@ -97,7 +97,7 @@ def list_(settings: Settings) -> None:
         rows = connection.execute(
             """
             SELECT name, tunnel, date, platform, intensity_kind, files, points,
-                   tunnel_api.chainage_label(chainage_from), tunnel_api.chainage_label(chainage_to)
+                   tunnel_api.station_label(tunnel_id, chainage_from), tunnel_api.station_label(tunnel_id, chainage_to)
               FROM tunnel_api.survey ORDER BY tunnel, date, name
             """
         ).fetchall()

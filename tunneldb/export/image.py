@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from tunneldb.database import Survey, snapshot
+from tunneldb.database.stationing import load_stationing
 from tunneldb.export import preview
 from tunneldb.export.atomic import replacing
 from tunneldb.export.classes import ClassPainter
@@ -63,7 +64,8 @@ def _export_kind(conn: psycopg.Connection, survey: Survey, km: int, kind: str, f
     leaks = _leaks(conn, survey, km) if kind == "corrected" else []
     with replacing(png) as temporary:
         title = f"{survey.name}  km {km}  {_TITLES[kind]}"
-        preview.draw(temporary, title, kind, list(sheet.strips()), extent.transform.f, sheet.pixel, leaks)
+        stationing = load_stationing(conn, survey.tunnel_id)
+        preview.draw(temporary, title, kind, list(sheet.strips()), stationing, extent.transform.f, sheet.pixel, leaks)
     return [tiff, png]
 
 

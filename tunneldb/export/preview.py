@@ -17,6 +17,7 @@ from scipy import ndimage
 from shapely.geometry import Polygon
 
 from tunneldb.export.palette import PALETTES
+from tunneldb.geometry.stationing import Stationing
 from tunneldb.ground.classes import Klass
 
 Single = NDArray[np.float32]
@@ -103,7 +104,14 @@ def _filled(kind: str, values: Single, reach: float) -> Single:
 
 
 def draw(
-    path: Path, title: str, kind: str, strips: Sequence[Strip], top: float, pixel: float, leaks: Sequence[Polygon] = ()
+    path: Path,
+    title: str,
+    kind: str,
+    strips: Sequence[Strip],
+    stationing: Stationing,
+    top: float,
+    pixel: float,
+    leaks: Sequence[Polygon] = (),
 ) -> None:
     """Draw strips below one another and write them as PNG.
 
@@ -118,6 +126,8 @@ def draw(
         surface) to red (inside), states and classes in their colours.
     strips : sequence of Strip
         In order of chainage.
+    stationing : Stationing
+        What is written at their ticks, which stand every 10 m of chainage.
     top : float
         Arc of the upper edge, m.
     pixel : float
@@ -144,19 +154,13 @@ def draw(
         y = _HEAD + number * (height + _GAP)
         colours = _colours(kind, _filled(kind, strip.values, FILL / pixel), low, high)
         sheet.paste(Image.fromarray(colours), (_MARGIN, y))
-        _ticks(pen, strip, (_MARGIN, y), (width, height), top, pixel, small)
+        _ticks(pen, strip, stationing, (_MARGIN, y), (width, height), top, pixel, small)
         for leak in leaks:
             if leak.bounds[0] < strip.start + STRIP and leak.bounds[2] > strip.start:
                 for ring in (leak.exterior, *leak.interiors):
                     line = [(_MARGIN + (c - strip.start) / pixel, y + (top - a) / pixel) for c, a in ring.coords]
                     pen.line(_clip(line, _MARGIN, _MARGIN + width), _LEAK, 2)
     sheet.save(path, "PNG")
-
-
-def label(chainage: float) -> str:
-    """Chainage in whole metres as km + m."""
-    metres = round(chainage)
-    return f"{'-' if metres < 0 else ''}{abs(metres) // 1000}+{abs(metres) % 1000:03d}"
 
 
 def _clip(line: list[tuple[float, float]], left: float, right: float) -> list[tuple[float, float]]:
@@ -211,6 +215,7 @@ def _colours(kind: str, values: Single, low: float, high: float) -> NDArray[np.u
 def _ticks(
     pen: ImageDraw.ImageDraw,
     strip: Strip,
+    stationing: Stationing,
     corner: tuple[int, int],
     size: tuple[int, int],
     top: float,
@@ -223,7 +228,7 @@ def _ticks(
         x = x0 + round(metre / pixel)
         pen.line([(x, y0), (x, y0 + height)], _GRID, 1)
         if metre < STRIP:
-            pen.text((x + 2, y0 + height + 4), label(strip.start + metre), _INK, font)
+            pen.text((x + 2, y0 + height + 4), stationing.label(strip.start + metre, 0), _INK, font)
     bottom = top - height * pixel
     for arc in range(int(np.ceil(bottom / 5)) * 5, int(np.floor(top)) + 1, 5):
         y = y0 + round((top - arc) / pixel)

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from tunneldb.database.survey import Survey
+from tunneldb.geometry.stationing import Stationing
 from tunneldb.ground.control import Motion
 from tunneldb.job.control import Comparison, mean_centres
 from tunneldb.job.spheres import Found, Search
@@ -27,13 +28,13 @@ _DETERMINED = {
 HEADER = ("sphere", "scan", "chainage", "x", "y", "z", "radius mm", "rms mm", "sigma mm", "coverage", "points")
 
 
-def sphere_rows(rows: Iterable[Found]) -> list[tuple[str, ...]]:
+def sphere_rows(rows: Iterable[Found], stationing: Stationing) -> list[tuple[str, ...]]:
     """Cells of the table of spheres, under `HEADER`."""
     return [
         (
             str(row.number),
             str(row.scan),
-            "" if row.chainage is None else _label(row.chainage),
+            "" if row.chainage is None else stationing.label(row.chainage),
             *(f"{value:.4f}" for value in row.sphere.centre),
             f"{1e3 * row.sphere.radius:.1f}",
             f"{1e3 * row.sphere.rms:.1f}",
@@ -45,7 +46,14 @@ def sphere_rows(rows: Iterable[Found]) -> list[tuple[str, ...]]:
     ]
 
 
-def report(survey: Survey, found: Search, radius: float, tolerance: float, comparison: Comparison | None) -> str:
+def report(
+    survey: Survey,
+    stationing: Stationing,
+    found: Search,
+    radius: float,
+    tolerance: float,
+    comparison: Comparison | None,
+) -> str:
     """Report of a search; nothing in it has been applied to the survey."""
     spheres = len({row.number for row in found.spheres})
     parts = [
@@ -56,7 +64,7 @@ def report(survey: Survey, found: Search, radius: float, tolerance: float, compa
         " sigma is the standard deviation of the centre in space.",
     ]
     if found.spheres:
-        parts += ["## Spheres", _table(HEADER, sphere_rows(found.spheres))]
+        parts += ["## Spheres", _table(HEADER, sphere_rows(found.spheres, stationing))]
         parts += _between_scans(found.spheres)
     if comparison is not None:
         parts += _control(comparison)
@@ -160,14 +168,6 @@ def _between_scans(rows: list[Found]) -> list[str]:
     head = ("sphere", "scan", "dx mm", "dy mm", "dz mm", "length mm")
     text = f"Spheres that several scans saw, against the mean of the scans; rms {1e3 * rms:.1f} mm."
     return ["## Between scans", text, _table(head, cells)]
-
-
-def _label(chainage: float) -> str:
-    """Chainage as 12+345.678, like tunnel_api.chainage_label."""
-    millimetres = round(1000.0 * chainage)
-    sign = "-" if millimetres < 0 else ""
-    kilometres, rest = divmod(abs(millimetres), 1_000_000)
-    return f"{sign}{kilometres}+{rest / 1000.0:07.3f}"
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
