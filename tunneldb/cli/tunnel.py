@@ -9,6 +9,7 @@ import click
 from tunneldb.cli.main import Settings
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
+from tunneldb.errors import UserError
 
 
 @click.group()
@@ -36,6 +37,13 @@ def tunnel() -> None:
 @click.option(
     "--spacing", type=float, default=10.0, show_default=True, metavar="M", help="Distance between the axis's vertices."
 )
+@click.option(
+    "--stationing",
+    "equations",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="The tunnel's own stationing, see tunneldb tunnel stationing. [default: that of the alignment]",
+)
 @click.pass_obj
 def add(
     settings: Settings,
@@ -46,6 +54,7 @@ def add(
     profile: str | None,
     start_chainage: float | None,
     spacing: float,
+    equations: Path | None,
 ) -> None:
     """Add the tunnel NAME with its given axis.
 
@@ -53,17 +62,55 @@ def add(
     the axis follows them to a millimetre. Lengths in feet are turned into metres when the file says that they are feet.
     """
     from tunneldb.alignment.given import read_given
-    from tunneldb.database.catalog import add_tunnel
+    from tunneldb.database.catalog import add_tunnel, get_tunnel
+    from tunneldb.database.stationing import read_equations, save_equations
 
     given = read_given(axis, start_chainage, alignment, profile)
+    own = read_equations(equations) if equations else None
     with connect(settings.dsn) as connection:
         line = add_tunnel(connection, name, srid, given, spacing)
+        if own is not None:
+            save_equations(connection, get_tunnel(connection, name), own)
     click.echo(f"{name}: {line.end - line.start:.3f} m of axis, chainage {line.start:.3f} to {line.end:.3f} m", err=True)
     if given.design is not None:
         plan, profiles = len(given.design.plan), len(given.design.profile)
         click.echo(f"{given.source}: {plan} elements in plan, {profiles} in profile", err=True)
         for note in given.design.notes:
             click.echo(f"{axis}: {note}", err=True)
+
+
+@tunnel.command()
+@click.argument("name")
+@click.argument("file", type=click.Path(path_type=Path), required=False)
+@click.option("--show", is_flag=True, help="Print the pieces of the stationing.")
+@click.option("--clear", is_flag=True, help="Take the tunnel's own stationing away: stations are chainages again.")
+@click.pass_obj
+def stationing(settings: Settings, name: str, file: Path | None, show: bool, clear: bool) -> None:
+    """Give the tunnel NAME its own stationing from FILE, show it, or take it away.
+
+    FILE is a CSV with a row for each piece of the stationing: chainage,station and, if a piece runs backwards, direction.
+    From that chainage (distance along the axis, m) the station is station + direction × (chainage - that of the row), up to
+    the next row; before the first row it is reckoned back from that. Nothing else is changed: all is stored in chainage,
+    and the labels of views, lists and pictures (12+345.678) are stations from then on.
+    """
+    from tunneldb.database.catalog import get_tunnel
+    from tunneldb.database.stationing import read_equations, save_equations
+
+    if [file is not None, show, clear].count(True) != 1:
+        raise UserError("give either a FILE, or --show, or --clear")
+    with connect(settings.dsn) as connection:
+        tunnel_id = get_tunnel(connection, name)
+        if not show:
+            save_equations(connection, tunnel_id, read_equations(file) if file else [])
+        rows = connection.execute(
+            """
+            SELECT to_char(p.chainage_from, 'FM999999990.000'), to_char(p.chainage_to, 'FM999999990.000'), p.label_from,
+                   p.label_to, CASE p.direction WHEN 1 THEN 'up' ELSE 'back' END
+              FROM tunnel_api.station_pieces(%s) p
+            """,
+            [tunnel_id],
+        ).fetchall()
+    print_table(["chainage from", "to", "station from", "to", "runs"], rows, right=(0, 1, 2, 3))
 
 
 @tunnel.command("list")
@@ -73,7 +120,7 @@ def list_(settings: Settings) -> None:
     with connect(settings.dsn) as connection:
         rows = connection.execute(
             """
-            SELECT t.name, t.srid, tunnel_api.chainage_label(t.start_chainage), round(ST_Length(t.geom)::numeric, 1),
+            SELECT t.name, t.srid, tunnel_api.station_label(t.id, t.start_chainage), round(ST_Length(t.geom)::numeric, 1),
                    t.spacing, count(s.id)
               FROM tunnel_api.tunnel t LEFT JOIN tunnel_api.survey s ON s.tunnel_id = t.id
              GROUP BY t.id, t.name, t.srid, t.start_chainage, t.geom, t.spacing ORDER BY t.name

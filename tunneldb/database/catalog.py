@@ -177,11 +177,29 @@ def _alignment(connection: psycopg.Connection[Any], tunnel: str) -> tuple[int, i
         "SELECT id, srid, start_chainage, spacing, ST_AsBinary(alignment) FROM tunnel.tunnel WHERE name = %s", [tunnel]
     ).fetchone()
     if row is None:
-        known = ", ".join(found[0] for found in connection.execute("SELECT name FROM tunnel.tunnel ORDER BY name"))
-        raise UserError(f"there is no tunnel {tunnel!r}; the database has {known or 'none: tunneldb tunnel add'}")
+        raise _unknown(connection, tunnel)
     key, srid, start, spacing, wkb = row
     xyz = shapely.get_coordinates(shapely.from_wkb(wkb), include_z=True)
     return key, srid, Alignment.from_polyline(xyz, start, spacing)
+
+
+def get_tunnel(connection: psycopg.Connection[Any], name: str) -> int:
+    """Return the key of the tunnel of that name.
+
+    Raises
+    ------
+    UserError
+        When there is none; the message lists those that exist.
+    """
+    row = connection.execute("SELECT id FROM tunnel.tunnel WHERE name = %s", [name]).fetchone()
+    if row is None:
+        raise _unknown(connection, name)
+    return int(row[0])
+
+
+def _unknown(connection: psycopg.Connection[Any], tunnel: str) -> UserError:
+    known = ", ".join(row[0] for row in connection.execute("SELECT name FROM tunnel.tunnel ORDER BY name"))
+    return UserError(f"there is no tunnel {tunnel!r}; the database has {known or 'none: tunneldb tunnel add'}")
 
 
 def _read_trajectory(path: Path) -> CsvTable:
