@@ -2,6 +2,7 @@
 
 Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK [LAYER [KIND]]
        | draw KIND | add VIEW | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG
+       | atlas PDF | where CHAINAGE ARC
 """
 
 from __future__ import annotations
@@ -9,14 +10,21 @@ from __future__ import annotations
 import json
 import os
 import sys
+import types
 from typing import Any
 
+import qgis.utils
 from qgis._3d import Qgs3D
 from qgis.core import (
     QgsApplication,
     QgsDataSourceUri,
+    QgsExpression,
+    QgsExpressionContext,
+    QgsExpressionContextScope,
+    QgsExpressionContextUtils,
     QgsFeature,
     QgsGeometry,
+    QgsLayoutExporter,
     QgsMapLayer,
     QgsMapRendererParallelJob,
     QgsMapSettings,
@@ -98,6 +106,34 @@ def draw_layer(project: QgsProject, layer_id: str, box: str, path: str) -> dict[
     settings = QgsMapSettings()
     settings.setLayers([project.mapLayer(PREFIX + layer_id)])
     return _paint(settings, QgsRectangle(*map(float, box.split(","))), path)
+
+
+def atlas(project: QgsProject, path: str) -> dict[str, Any]:
+    """Print the inspection sheets to one PDF."""
+    layout = project.layoutManager().layoutByName("Inspection sheets")
+    sheets = layout.atlas()
+    settings = QgsLayoutExporter.PdfExportSettings()
+    settings.rasterizeWholeImage = False
+    result, error = QgsLayoutExporter.exportToPdf(sheets, path, settings)
+    return {"saved": result == QgsLayoutExporter.Success, "error": error, "sheets": sheets.count()}
+
+
+def where(project: QgsProject, chainage: str, arc: str) -> dict[str, Any]:
+    """Click on a place of the unrolled plane with the action of the sheets, and read its map tip there."""
+    told: list[str] = []
+    bar = types.SimpleNamespace(pushInfo=lambda *words: told.extend(words))
+    qgis.utils.iface = types.SimpleNamespace(messageBar=lambda: bar)
+    layer = project.mapLayer(PREFIX + "sheet")
+    context = QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
+    click = QgsExpressionContextScope()
+    click.setVariable("click_x", float(chainage))
+    click.setVariable("click_y", float(arc))
+    click.setVariable("layer_cursor_point", QgsGeometry.fromPointXY(QgsPointXY(float(chainage), float(arc))))
+    context.appendScope(click)
+    context.setFeature(next(f for f in layer.getFeatures() if f["chainage_from"] <= float(chainage) < f["chainage_to"]))
+    (action,) = layer.actions().actions("Canvas")
+    exec(QgsExpression.replaceExpressionText(action.command(), context), {})
+    return {"told": told, "tip": QgsExpression.replaceExpressionText(layer.mapTipTemplate(), context)}
 
 
 def _paint(settings: QgsMapSettings, extent: QgsRectangle, path: str) -> dict[str, Any]:

@@ -85,6 +85,16 @@ def unrolled_extents(conn: psycopg.Connection, survey: str) -> list[tuple[int, E
     return [(km, Extent(*bounds)) for km, *bounds in rows]
 
 
+def sheet_extent(conn: psycopg.Connection, survey: str) -> Extent | None:
+    """Return the first sheet of a survey, None if it has no sections; all of its sheets are alike in size."""
+    row = conn.execute(
+        "SELECT ST_XMin(geom), ST_YMin(geom), ST_XMax(geom), ST_YMax(geom) FROM tunnel_api.sheet "
+        "WHERE survey = %s ORDER BY number LIMIT 1",
+        (survey,),
+    ).fetchone()
+    return None if row is None else Extent(*row)
+
+
 def first_window(conn: psycopg.Connection, survey: str, kilometres: list[tuple[int, Extent]]) -> Extent:
     """Return a stretch of lining in which one can see something: around the largest leak, or at the start.
 

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 MAP, UNROLLED, SPACE = "Map", "Unrolled", "3D"
 """Groups of the layer tree, and the map themes of the same names."""
 
+SHEETS = "Inspection sheets"
+"""The print layout, and the map theme that it shows."""
+
 
 @dataclass(frozen=True)
 class VectorLayer:
@@ -82,6 +85,11 @@ LAYERS = (
     VectorLayer(
         "section_unrolled", "Sections, unrolled", "section_unrolled", "LineString", "section_unrolled", UNROLLED,
         (UNROLLED,),
+    ),
+    VectorLayer("sheet", "Sheets of 50 m (identify: chainage, arc)", "sheet", "Polygon", "sheet", UNROLLED, (UNROLLED,)),
+    VectorLayer(
+        "leak_sheet", "Leaks, numbered (sheets)", "leak_unrolled", "Polygon", "leak_sheet", UNROLLED, (SHEETS,),
+        where="\"review\" <> 'rejected' AND \"detected\"",
     ),
     VectorLayer("leak_3d", "Leaks in space (review)", "leak_3d", "PolygonZ", "leak_3d", SPACE, (SPACE,), True),
     VectorLayer("ground", "Ground", "ground", "LineStringZ", "ground", SPACE, (SPACE,)),

@@ -17,9 +17,10 @@ from tunneldb import __version__
 from tunneldb.database import Survey
 from tunneldb.export.atomic import replacing
 from tunneldb.export.qgis.crs import crs_element, no_crs
-from tunneldb.export.qgis.extent import Extent, View, first_window, map_extent, unrolled_extents
-from tunneldb.export.qgis.layer import LAYERS, MAP, SPACE, UNROLLED, VectorLayer
+from tunneldb.export.qgis.extent import Extent, View, first_window, map_extent, sheet_extent, unrolled_extents
+from tunneldb.export.qgis.layer import LAYERS, MAP, SHEETS, SPACE, UNROLLED, VectorLayer
 from tunneldb.export.qgis.raster import KINDS, image_kind, pipe
+from tunneldb.export.qgis.sheet import layouts
 from tunneldb.export.qgis.source import Source
 from tunneldb.export.qgis.styles import style_elements
 
@@ -92,6 +93,10 @@ def write_project(
     root.append(_themes(entries))
     root.append(_bookmarks(views, crs))
     root.append(_properties())
+    sheet = sheet_extent(conn, survey.name)
+    if sheet is not None:
+        known = {layer.id: (layer_id(layer.id), source.layer(layer, survey.name, survey.srid)) for layer in LAYERS}
+        root.append(layouts(survey, sheet, known["sheet"], known["leak_sheet"]))
     view_settings = ET.SubElement(root, "ProjectViewSettings", UseProjectScales="0")
     _extent(view_settings, views[0].extent, "DefaultViewExtent").append(deepcopy(crs))
     metadata = ET.SubElement(root, "projectMetadata")
@@ -144,7 +149,7 @@ def _rasters(images: Sequence[Path], folder: Path) -> list[_Entry]:
             ET.SubElement(element, "provider").text = "gdal"
             element.append(deepcopy(drawn))
             ET.SubElement(element, "blendMode").text = "0"
-            themes = (UNROLLED,) if kind == shown else ()
+            themes = (UNROLLED, SHEETS) if kind == shown else ()
             entries.append(_Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))
     return entries
 
@@ -178,7 +183,7 @@ def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
 def _themes(entries: Sequence[_Entry]) -> ET.Element:
     """Map themes: which layers are visible, and the groups that must be switched on for it."""
     presets = ET.Element("visibility-presets")
-    for theme in (MAP, UNROLLED, SPACE):
+    for theme in (MAP, UNROLLED, SPACE, SHEETS):
         preset = ET.SubElement(presets, "visibility-preset", {"name": theme, "has-expanded-info": "1"})
         shown = [entry for entry in entries if theme in entry.themes]
         for entry in shown:

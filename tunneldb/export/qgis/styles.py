@@ -68,8 +68,11 @@ def store_styles(conn: psycopg.Connection) -> int:
 
 
 def styled_columns() -> list[tuple[str, str, str, str]]:
-    """Return view, geometry column, style and title of whatever has a style; some views have several geometries."""
-    return [(layer.view, layer.column, layer.style, layer.title) for layer in LAYERS] + [
+    """Return view, geometry column, style and title of whatever has a style; some views have several geometries.
+
+    Of a view that is in a project twice, the layer of its own name has the style.
+    """
+    return [(layer.view, layer.column, layer.style, layer.title) for layer in LAYERS if layer.id == layer.view] + [
         ("anomaly", "unrolled", "anomaly", "Leaks, joints and dark spots, unrolled"),
         ("anomaly", "map", "anomaly", "Leaks, joints and dark spots beside the axis"),
         ("leak", "unrolled", "leak", "Leaks, unrolled"),

@@ -1,0 +1,262 @@
+"""The print layout "Inspection sheets": an atlas with a sheet for each 50 m of tunnel."""
+
+from __future__ import annotations
+
+import uuid
+import xml.etree.ElementTree as ET
+
+from tunneldb import __version__
+from tunneldb.database import Survey
+from tunneldb.export.qgis.extent import Extent
+from tunneldb.export.qgis.layer import SHEETS
+
+LENGTH = 50.0
+"""Length of tunnel on a sheet, m, as in the view."""
+
+PAGE = (297.0, 210.0)
+"""A4, across, mm."""
+
+PAGES = 6
+"""The sheet itself, and those that its table goes on to if it is long."""
+
+_SCALES = (200, 250, 300, 400, 500, 750, 1000)
+_MARGIN = 10.0
+_TOP = 24.0  # where the strip begins, mm
+_TABLE_LEAST = 40.0  # what is kept for the table, mm
+_FOOT = 196.0  # where the foot begins, mm
+_GAP = 10.0  # between the pages of a layout, mm
+_FONT = "Sans Serif"
+
+# Numbers by which QGIS knows kinds of layout items.
+_LABEL, _MAP, _SCALE_BAR, _FRAME, _TABLE, _PAGE = 65641, 65639, 65646, 65647, 65649, 65638
+
+_SHEET = "attribute(@atlas_feature, '{}')"
+_TICK = "(@grid_number - attribute(@atlas_feature, 'chainage_from')) / 10"
+# Stations are the tunnel's own and may jump: they come with the sheet, a label each 10 m.
+_CHAINAGE_LABEL = (
+    f"if(@grid_axis = 'x' and round({_TICK}) >= 0 and round({_TICK}) <= 5, "
+    f"array_get(attribute(@atlas_feature, 'ticks'), round({_TICK})), '')"
+)
+_ARC_LABEL = "if(@grid_axis = 'y', to_string(round(@grid_number)), '')"
+
+# Heading, expression, width in mm, alignment (1 left, 2 right), what rows are sorted by.
+_COLUMNS = (
+    ("Leak", '"id"', 11, 2),
+    ("Chainage", '"label"', 19, 2),
+    ("Arc, m", 'format_number(("arc_from" + "arc_to") / 2, 1)', 10, 2),
+    ("Clock", 'format_number("clock", 1)', 9, 2),
+    ("Area, m²", 'format_number("area", 2)', 12.5, 2),
+    ("Drop, dB", 'format_number("drop_mean", 1)', 12.5, 2),
+    ("Sure", "coalesce(round(100 * \"confidence\") || ' %', '')", 9, 2),
+    ("Review", '"review"', 15, 1),
+    ("Remark", "coalesce(\"remark\", '')", 23, 1),
+)
+_CELL_MARGIN = 0.7
+_TABLE_WIDTH = sum(column[2] + 2 * _CELL_MARGIN for column in _COLUMNS)
+
+
+def strip_scale(extent: Extent) -> int:
+    """Return the number of the scale at which a sheet's strip leaves room for its table."""
+    room = _FOOT - _TOP - _TABLE_LEAST - 8.0
+    height = extent.ymax - extent.ymin
+    return next((scale for scale in _SCALES if height * 1000.0 / scale <= room), _SCALES[-1])
+
+
+def layouts(survey: Survey, extent: Extent, coverage: tuple[str, str], leaks: tuple[str, str]) -> ET.Element:
+    """Return the element ``Layouts`` of a project.
+
+    Parameters
+    ----------
+    survey : Survey
+        The survey.
+    extent : Extent
+        One of the sheets, m; all are of this height.
+    coverage, leaks : (str, str)
+        Id and data source of the layer of the sheets, and of the layer whose rows their tables list.
+    """
+    root = ET.Element("Layouts")
+    layout = ET.SubElement(root, "Layout", name=SHEETS, units="mm", printResolution="300")
+    pages = ET.SubElement(layout, "PageCollection")
+    for page in range(PAGES):
+        pages.append(_item(_PAGE, f"page {page + 1}", (0.0, 0.0, *PAGE), page, background="true"))
+    scale = strip_scale(extent)
+    strip = _strip(scale, extent)
+    bottom = _TOP + (extent.ymax - extent.ymin) * 1000.0 / scale + 1.0
+    layout.append(strip)
+    layout.extend(_texts(survey, scale, bottom))
+    layout.append(_scale_bar(strip.attrib["uuid"]))
+    layout.extend(_table(leaks, bottom + 7.0))
+    ET.SubElement(
+        layout, "Atlas", enabled="1", coverageLayer=coverage[0], coverageLayerSource=coverage[1],
+        coverageLayerProvider="postgres", coverageLayerName=SHEETS, hideCoverage="1", sortFeatures="1", sortAscending="1",
+        sortKey='"number"', pageNameExpression='"label_from"', filterFeatures="0",
+        filenamePattern=f"'{survey.name}-' || \"label_from\"",
+    )  # fmt: skip
+    options = ET.SubElement(ET.SubElement(layout, "customproperties"), "Option", type="Map")
+    ET.SubElement(options, "Option", type="bool", name="singleFile", value="true")
+    return root
+
+
+def _item(kind: int, name: str, box: tuple[float, float, float, float], page: int = 0, **more: str) -> ET.Element:
+    """An item of a layout; box: left, top, width and height on its page, mm."""
+    x, y, width, height = box
+    key = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, f'{SHEETS} {name}')}}}"
+    element = ET.Element(
+        "LayoutItem", type=str(kind), id=name, uuid=key, templateUuid=key, position=f"{x:g},{y + page * (PAGE[1] + _GAP):g},mm",
+        positionOnPage=f"{x:g},{y:g},mm", size=f"{width:g},{height:g},mm", referencePoint="0", visibility="1", opacity="1",
+        outlineWidthM="0.2,mm",
+    )  # fmt: skip
+    element.attrib.update({"frame": "false", "background": "false", **more})
+    ET.SubElement(element, "FrameColor", red="90", green="90", blue="90", alpha="255")
+    ET.SubElement(element, "BackgroundColor", red="255", green="255", blue="255", alpha="255")
+    return element
+
+
+def _strip(scale: int, extent: Extent) -> ET.Element:
+    """The unrolled lining of the sheet, with a metre beyond its ends, under a grid of 10 m by 2 m."""
+    width, height = (LENGTH + 2) * 1000.0 / scale, (extent.ymax - extent.ymin) * 1000.0 / scale
+    element = _item(
+        _MAP, "strip", ((PAGE[0] - width) / 2 + 4, _TOP, width, height), frame="true", background="true", followPreset="true",
+        followPresetName=SHEETS, mapRotation="0", drawCanvasItems="false", labelMargin="0,mm", keepLayerSet="false",
+    )  # fmt: skip
+    sides = {"xmin": extent.xmin - 1, "xmax": extent.xmax + 1, "ymin": extent.ymin, "ymax": extent.ymax}
+    ET.SubElement(element, "Extent", {side: repr(value) for side, value in sides.items()})
+    element.append(_grid("chainage", "10", "0", _CHAINAGE_LABEL, bottom=True))
+    element.append(_grid("arc", "0", "2", _ARC_LABEL, bottom=False))
+    ET.SubElement(element, "AtlasMap", atlasDriven="1", scalingMode="1", margin="0")
+    return element
+
+
+def _grid(name: str, x: str, y: str, label: str, *, bottom: bool) -> ET.Element:
+    """Lines at multiples of x and y metres, labelled on one side; the sides are shown in QGIS' numbers."""
+    shown, hidden = "0", "3"
+    labelled = "bottom" if bottom else "left"
+    sides: dict[str, str] = {}
+    for side in ("left", "right", "top", "bottom"):
+        sides |= {f"{side}AnnotationDisplay": shown if side == labelled else hidden, f"{side}AnnotationPosition": "1"}
+    element = ET.Element(
+        "ComposerMapGrid", sides, name=name, uuid=f"{{{uuid.uuid5(uuid.NAMESPACE_OID, f'{SHEETS} grid {name}')}}}", show="1",
+        position="3", gridStyle="0", unit="0", intervalX=x, intervalY=y, offsetX="0", offsetY="0", blendMode="0",
+        showAnnotation="1", annotationFormat="8", annotationExpression=label, annotationPrecision="0",
+        frameAnnotationDistance="1", gridFrameStyle="0",
+    )  # fmt: skip
+    line = ET.SubElement(ET.SubElement(element, "lineStyle"), "symbol", type="line", name="", alpha="1", clip_to_extent="1")
+    layer = ET.SubElement(line, "layer", {"class": "SimpleLine", "enabled": "1", "pass": "0", "locked": "0"})
+    style = ET.SubElement(layer, "Option", type="Map")
+    for key, value in (("line_color", "0,120,130,110"), ("line_width", "0.12"), ("line_width_unit", "MM")):
+        ET.SubElement(style, "Option", type="QString", name=key, value=value)
+    element.append(_text_style(7.0))
+    return element
+
+
+def _texts(survey: Survey, scale: int, bottom: float) -> list[ET.Element]:
+    """Head and foot of the sheet, and heads of the pages on which its table goes on."""
+    stretch = "[% {} %] – [% {} %]".format(_SHEET.format("label_from"), _SHEET.format("label_to"))
+    number = "[% @atlas_featurenumber %] of [% @atlas_totalfeatures %]"
+    left, right, wide = _MARGIN, PAGE[0] - _MARGIN, PAGE[0] - 2 * _MARGIN
+    what = f"Tunnel {survey.tunnel}, survey {survey.name} of {survey.date:%Y-%m-%d}"
+    lining, seen, leaks, wet = (_SHEET.format(name) for name in ("lining_area", "seen_share", "leaks", "wet_area"))
+    sums = (
+        f"Lining [% coalesce(format_number({lining}, 0) || ' m², ' || format_number(100 * {seen}, 1) || ' % of it seen',"
+        f" 'not seen yet') %]; leaks [% {leaks} %], [% format_number({wet}, 2) %] m²"
+    )
+    how = (
+        f"Unrolled lining seen from inside the tunnel, 1:{scale} on A4: along it chainage, up it arc from the crown (0), m, "
+        "the right wall above. Orange: open, blue: confirmed; a number is the leak's."
+    )
+    texts = [
+        _label("stretch", stretch, (left, 7, 150, 8), 15, bold=True),
+        _label("number", f"Inspection sheet {number}", (right - 110, 7, 110, 8), 10, align="right"),
+        _label("what", what, (left, 15.5, 140, 5), 8),
+        _label("sums", sums, (right - 140, 15.5, 140, 5), 8, align="right"),
+        _label("how", how, (left + 55, _FOOT + 1, wide - 55, 4), 6.5, align="right"),
+        _label(
+            "signature", "Inspected by ______________________________   on ____________________",
+            (left + 55, _FOOT + 6, wide - 55 - 60, 5), 8,
+        ),
+        _label(
+            "made", f"tunneldb {__version__}, [% format_date(now(), 'yyyy-MM-dd') %]", (right - 60, _FOOT + 6, 60, 5), 6.5,
+            align="right",
+        ),
+    ]  # fmt: skip
+    for page in range(1, PAGES):
+        texts += [
+            _label(f"stretch {page + 1}", f"{stretch}, leaks continued", (left, 7, 150, 8), 12, page=page, bold=True),
+            _label(f"number {page + 1}", f"Inspection sheet {number}", (right - 110, 7, 110, 8), 10, page=page, align="right"),
+            _label(f"what {page + 1}", what, (left, 15.5, 140, 5), 8, page=page),
+        ]
+    return texts
+
+
+def _label(
+    name: str, text: str, box: tuple[float, float, float, float], size: float, *, page: int = 0, bold: bool = False,
+    align: str = "left",
+) -> ET.Element:  # fmt: skip
+    """A text with expressions between ``[%`` and ``%]``; size in points."""
+    element = _item(
+        _LABEL, name, box, page, labelText=text, htmlState="0", marginX="0", marginY="0",
+        halign={"left": "1", "right": "2"}[align], valign="128",
+    )  # fmt: skip
+    ET.SubElement(element, "LabelFont", description=f"{_FONT},{size:g},-1,5,{75 if bold else 50},0,0,0,0,0", style="")
+    ET.SubElement(element, "FontColor", red="20", green="20", blue="20", alpha="255")
+    return element
+
+
+def _scale_bar(strip: str) -> ET.Element:
+    element = _item(
+        _SCALE_BAR, "scale bar", (_MARGIN, _FOOT, 50, 10), style="Line Ticks Up", mapUuid=strip, unitType="meters",
+        unitLabel="m", numUnitsPerSegment="5", numSegments="2", numSegmentsLeft="0", numMapUnitsPerScaleBarUnit="1",
+        segmentSizeMode="0", height="1.5", labelBarSpace="1", boxContentSpace="1", outlineWidth="0.2", alignment="0",
+        numSubdivisions="1", minBarWidth="10", maxBarWidth="100", lineJoinStyle="miter", lineCapStyle="square",
+    )  # fmt: skip
+    element.append(_text_style(7.0))
+    return element
+
+
+def _table(leaks: tuple[str, str], top: float) -> list[ET.Element]:
+    """The table of leaks and its frames, two abreast on each page; a page whose first frame is empty is not printed."""
+    key = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, f'{SHEETS} table')}}}"
+    frames = []
+    for page in range(PAGES):
+        y = top if page == 0 else _TOP
+        for half in range(2):
+            x = _MARGIN + half * (PAGE[0] - 2 * _MARGIN - _TABLE_WIDTH)
+            frames.append(
+                _item(
+                    _FRAME, f"leaks {2 * page + half + 1}", (x, y, _TABLE_WIDTH, _FOOT - 1 - y), page, multiFrame=key,
+                    multiFrameTemplateUuid=key, hidePageIfEmpty=str(int(page > 0 and half == 0)), hideBackgroundIfEmpty="0",
+                )
+            )  # fmt: skip
+    table = ET.Element(
+        "LayoutMultiFrame", type=str(_TABLE), uuid=key, templateUuid=key, source="0", vectorLayer=leaks[0],
+        vectorLayerName="Leaks", vectorLayerSource=leaks[1], vectorLayerProvider="postgres", maxFeatures="100000",
+        filterToAtlasIntersection="1", filterFeatures="false", featureFilter="", resizeMode="0", headerMode="1",
+        headerHAlignment="0", emptyTableMode="0", emptyTableMessage="", showEmptyRows="1", showUniqueRowsOnly="0",
+        showOnlyVisibleFeatures="0", useConditionalStyling="0", wrapBehavior="1", wrapString="",
+        cellMargin=str(_CELL_MARGIN), showGrid="1", horizontalGrid="1", verticalGrid="0", gridStrokeWidth="0.1",
+        gridColor="150,150,150,255", backgroundColor="255,255,255,0",
+    )  # fmt: skip
+    for frame in frames:
+        ET.SubElement(table, "childFrame", uuid=frame.attrib["uuid"], templateUuid=frame.attrib["uuid"])
+    ET.SubElement(table, "headerTextFormat").append(_text_style(6.5, bold=True))
+    ET.SubElement(table, "contentTextFormat").append(_text_style(7.0))
+    columns = ET.SubElement(table, "displayColumns")
+    for heading, expression, width, align in _COLUMNS:
+        _column(columns, heading, expression, width, align)
+    order = ET.SubElement(table, "sortColumns")
+    _column(order, "", '"chainage_from" + "chainage_to"', 0, 1)
+    return [*frames, table]
+
+
+def _column(parent: ET.Element, heading: str, expression: str, width: float, align: int) -> None:
+    ET.SubElement(
+        parent, "column", heading=heading, attribute=expression, width=f"{width:g}", hAlignment=str(align), vAlignment="128",
+        sortOrder="0", sortByRank="0",
+    )  # fmt: skip
+
+
+def _text_style(size: float, *, bold: bool = False) -> ET.Element:
+    return ET.Element(
+        "text-style", fontFamily=_FONT, namedStyle="Bold" if bold else "Regular", fontWeight="75" if bold else "50",
+        fontSize=f"{size:g}", fontSizeUnit="Point", textColor="20,20,20,255", textOpacity="1", multilineHeight="1",
+    )  # fmt: skip
