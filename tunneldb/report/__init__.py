@@ -1,0 +1,1 @@
+"""The inspection report of a survey: one HTML file that asks nothing of the network, or a PDF of it."""

@@ -1,0 +1,298 @@
+"""What a report states, read from the database within one snapshot; chainages and lengths in m, areas in m²."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+import psycopg
+import shapely
+from numpy.typing import NDArray
+from psycopg import sql
+from psycopg.rows import class_row, dict_row
+from shapely.geometry import Polygon
+
+from tunneldb.database import Survey
+from tunneldb.errors import UserError
+
+Float = NDArray[np.float64]
+Row = dict[str, Any]
+
+HIDDEN_SHARE, HIDDEN_LENGTH = 0.5, 5.0
+"""Where less than this share of the lining was seen over at least so many metres, the report lists the stretch."""
+
+
+@dataclass(frozen=True)
+class Leak:
+    """A leak as it is reported.
+
+    Attributes
+    ----------
+    id : int
+        Key; the same in QGIS and on the command line.
+    chainage_from, chainage_to, arc_from, arc_to : float
+        Extents in the unrolled plane, m.
+    label : str
+        Chainage of its middle, in the tunnel's stationing.
+    clock : float
+        Hours, 12 is the crown.
+    area : float
+        m².
+    drop_mean, drop_max : float
+        dB below dry lining.
+    contrast, confidence : float or None
+        Drop in standard deviations of dry lining; 0 to 1.
+    image_share : float
+        Share of it on which the image holds measurements, 0 to 1.
+    review : str
+        open, confirmed or rejected.
+    reviewed_by, reviewed_at, remark
+        Who, when and what he noted.
+    detected : bool
+        False where the last detection found it no more.
+    outline : Polygon
+        In the unrolled plane.
+    """
+
+    id: int
+    chainage_from: float
+    chainage_to: float
+    label: str
+    arc_from: float
+    arc_to: float
+    clock: float
+    area: float
+    drop_mean: float
+    drop_max: float
+    contrast: float | None
+    confidence: float | None
+    image_share: float
+    review: str
+    reviewed_by: str | None
+    reviewed_at: dt.datetime | None
+    remark: str | None
+    detected: bool
+    outline: Polygon
+
+    @property
+    def counts(self) -> bool:
+        """Whether statistics count it: found last, and not rejected."""
+        return self.detected and self.review != "rejected"
+
+    @property
+    def middle(self) -> float:
+        """Chainage of its middle, m."""
+        return (self.chainage_from + self.chainage_to) / 2
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Lining by bins along the tunnel.
+
+    Attributes
+    ----------
+    edges : (n + 1,) array
+        Chainage, m.
+    lining, seen : (n,) arrays
+        m²; no lining where nothing was detected.
+    """
+
+    edges: Float
+    lining: Float
+    seen: Float
+
+    @property
+    def share(self) -> Float:
+        """Share of the lining seen, 0 to 1; NaN where detection did not run."""
+        return np.divide(self.seen, self.lining, out=np.full(len(self.seen), np.nan), where=self.lining > 1e-6)
+
+    def merged(self, count: int) -> Coverage:
+        """Take so many bins together."""
+        starts = np.arange(0, len(self.lining), count)
+        return Coverage(
+            np.append(self.edges[starts], self.edges[-1]),
+            np.add.reduceat(self.lining, starts),
+            np.add.reduceat(self.seen, starts),
+        )
+
+
+def find_stretch(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> tuple[float, float]:
+    """Return the stretch to report, m: what is asked for, as far as the survey reaches.
+
+    Raises
+    ------
+    UserError
+        If the survey has no segments, or none of them lies in the stretch.
+    """
+    row = conn.execute("SELECT * FROM tunnel_api.survey_ends(%s)", [survey.id]).fetchone()
+    if row is None or row[0] is None:
+        raise UserError(f"survey {survey.name} has nothing to report yet: tunneldb run {survey.name}")
+    start, end = max(row[0], low), min(row[1], high)
+    if start >= end:
+        asked = f"from chainage {max(low, -1e9):.3f} to {min(high, 1e9):.3f} m"
+        raise UserError(f"survey {survey.name} reaches from chainage {row[0]:.3f} to {row[1]:.3f} m: nothing lies {asked}")
+    return start, end
+
+
+_LEAK = sql.SQL(
+    "SELECT {columns}, public.ST_AsBinary(unrolled) AS outline FROM tunnel_api.leak"
+    " WHERE survey_id = %s AND (detected OR review = 'confirmed') AND chainage_to > %s AND chainage_from < %s"
+    " ORDER BY chainage_from, arc_from, id"
+).format(columns=sql.SQL(", ").join(sql.Identifier(f.name) for f in fields(Leak) if f.name != "outline"))
+
+
+def read_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Leak]:
+    """Read the leaks of a stretch in order of chainage: found last, or confirmed although found no more; also the rejected."""
+    with conn.cursor(row_factory=dict_row) as cursor:
+        rows = cursor.execute(_LEAK, [survey.id, low, high]).fetchall()
+    return [Leak(**{**row, "outline": shapely.from_wkb(bytes(row["outline"]))}) for row in rows]
+
+
+def read_coverage(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> Coverage:
+    """Read lining and lining seen of a stretch by bins of 1 m."""
+    edges = np.unique(np.concatenate([[low], np.arange(np.ceil(low), np.floor(high) + 1), [high]]))
+    edges = edges[(edges >= low) & (edges <= high)]
+    row = conn.execute(
+        "SELECT tunnel_api.interpolate(%(edges)s, c.chainage, c.lining), tunnel_api.interpolate(%(edges)s, c.chainage, c.seen)"
+        " FROM tunnel_api.coverage_sums(%(id)s, %(first)s, %(last)s) c WHERE c.chainage IS NOT NULL",
+        {"edges": edges.tolist(), "id": survey.id, "first": int(low // 1000), "last": int(high // 1000)},
+    ).fetchone()
+    if row is None or row[0] is None:
+        return Coverage(edges, np.zeros(len(edges) - 1), np.zeros(len(edges) - 1))
+    return Coverage(edges, np.diff(np.array(row[0])), np.diff(np.array(row[1])))
+
+
+def hidden_stretches(coverage: Coverage) -> list[tuple[float, float, float]]:
+    """Find where too little of the lining was seen: begin and end, m, and the share that was (0 without detection)."""
+    share = np.nan_to_num(coverage.share)
+    turns = np.flatnonzero(np.diff(np.concatenate([[False], share < HIDDEN_SHARE, [False]]).astype(np.int8)))
+    found = []
+    for first, last in turns.reshape(-1, 2).tolist():
+        low, high = float(coverage.edges[first]), float(coverage.edges[last])
+        if high - low >= HIDDEN_LENGTH:
+            lining = coverage.lining[first:last].sum()
+            found.append((low, high, float(coverage.seen[first:last].sum() / lining) if lining > 0 else 0.0))
+    return found
+
+
+def read_statistics(conn: psycopg.Connection[Any], survey: Survey, starts: Sequence[float], ends: Sequence[float]) -> list[Row]:
+    """Read statistics of leaks over stretches one after another, m (``tunnel_api.stretch_statistics``)."""
+    with conn.cursor(row_factory=dict_row) as cursor:
+        return cursor.execute(
+            "SELECT * FROM tunnel_api.stretch_statistics(%s, %s::float8[], %s::float8[])", [survey.id, list(starts), list(ends)]
+        ).fetchall()
+
+
+def read_classes(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
+    """Read which classes of GB 50108-2008 a stretch keeps, and what breaks them, with their limits."""
+    with conn.cursor(row_factory=dict_row) as cursor:
+        return cursor.execute(
+            "SELECT w.class, w.holds, w.breaks, w.leaks, l.wet_ratio, l.patch_area, l.patches_per_100, l.description"
+            " FROM tunnel_api.waterproof_class(%s, %s, %s) w JOIN tunnel_api.waterproof_limit l ON l.id = w.class"
+            " ORDER BY w.class",
+            [survey.name, low, high],
+        ).fetchall()
+
+
+def read_files(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
+    """Read the scan files that reach into a stretch."""
+    with conn.cursor(row_factory=dict_row) as cursor:
+        return cursor.execute(
+            "SELECT name, checksum, bytes, points, noise, outside, thinned, kept, chainage_from, chainage_to, loaded_at"
+            " FROM tunnel_api.file WHERE survey_id = %s AND chainage_to >= %s AND chainage_from <= %s"
+            " ORDER BY chainage_from, name",
+            [survey.id, low, high],
+        ).fetchall()
+
+
+def read_runs(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
+    """Read how each stage last succeeded, the same parameters and versions together, with the kilometres they hold for."""
+    with conn.cursor(row_factory=dict_row) as cursor:
+        return cursor.execute(
+            """
+            SELECT d.stage, d.parameters, d.versions, array_agg(d.km ORDER BY d.km) AS kilometres,
+                   min(d.finished_at) AS first, max(d.finished_at) AS last
+              FROM (SELECT DISTINCT ON (r.km, r.stage) r.km, r.stage, r.parameters, r.versions, r.finished_at
+                      FROM tunnel.run r
+                     WHERE r.survey_id = %s AND r.outcome = 'done' AND r.km BETWEEN %s AND %s AND r.stage = ANY (%s)
+                     ORDER BY r.km, r.stage, r.started_at DESC, r.id DESC) d
+             GROUP BY d.stage, d.parameters, d.versions
+             ORDER BY array_position(%s, d.stage), min(d.km)
+            """,
+            [survey.id, *_kilometres(low, high), STAGES, STAGES],
+        ).fetchall()
+
+
+STAGES = ["load", "axis", "segments", "sections", "ground", "detect"]
+
+
+def read_stale(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
+    """Read which stages of which kilometres are out of date or have not succeeded, and why."""
+    with conn.cursor(row_factory=dict_row) as cursor:
+        return cursor.execute(
+            "SELECT stage, coalesce(reason, CASE WHEN done_at IS NULL THEN 'not done: ' || outcome END) AS reason,"
+            " array_agg(km ORDER BY km) AS kilometres"
+            " FROM tunnel_api.stage_status WHERE survey_id = %s AND km BETWEEN %s AND %s AND (stale OR done_at IS NULL)"
+            " GROUP BY stage, step, 2 ORDER BY step, 2",
+            [survey.id, *_kilometres(low, high)],
+        ).fetchall()
+
+
+def read_radiometry(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
+    """Read how the intensity of each kilometre was corrected."""
+    with conn.cursor(row_factory=dict_row) as cursor:
+        return cursor.execute(
+            "SELECT km, roughness, dry_mean, dry_sigma, threshold, sigma_raw, sigma_lambert, sigma_oren_nayar"
+            " FROM tunnel_api.radiometry WHERE survey_id = %s AND km BETWEEN %s AND %s ORDER BY km",
+            [survey.id, *_kilometres(low, high)],
+        ).fetchall()
+
+
+def read_others(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> dict[str, int]:
+    """Count what is dark but no leak: joints and other dark spots."""
+    rows = conn.execute(
+        "SELECT kind, count(*) FROM tunnel_api.anomaly WHERE survey_id = %s AND detected AND kind <> 'leak'"
+        " AND chainage_to > %s AND chainage_from < %s GROUP BY kind",
+        [survey.id, low, high],
+    ).fetchall()
+    return dict(rows)
+
+
+@dataclass(frozen=True)
+class Edit:
+    """A change that somebody made by hand: who and when, of what, from what to what."""
+
+    at: dt.datetime
+    who: str
+    view: str
+    row_id: int
+    action: str
+    before: Row | None
+    after: Row | None
+
+
+def read_edits(conn: psycopg.Connection[Any], survey: Survey) -> list[Edit]:
+    """Read what people changed by hand in a survey, latest first."""
+    with conn.cursor(row_factory=class_row(Edit)) as cursor:
+        return cursor.execute(
+            "SELECT at, who, view, row_id, action, before, after FROM tunnel_api.audit"
+            " WHERE survey = %s ORDER BY at DESC, id DESC",
+            [survey.name],
+        ).fetchall()
+
+
+def label_chainages(conn: psycopg.Connection[Any], survey: Survey, chainages: Sequence[float]) -> list[str]:
+    """Chainages, m, as they are written in the tunnel."""
+    rows = conn.execute(
+        "SELECT tunnel_api.station_label(%s, c) FROM unnest(%s::float8[]) WITH ORDINALITY AS q (c, n) ORDER BY n",
+        [survey.tunnel_id, list(chainages)],
+    ).fetchall()
+    return [str(label) for (label,) in rows]
+
+
+def _kilometres(low: float, high: float) -> tuple[int, int]:
+    """First and last kilometre of a stretch."""
+    return int(np.floor(low / 1000)), int(np.ceil(high / 1000)) - 1

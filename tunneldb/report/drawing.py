@@ -1,0 +1,152 @@
+"""Shapes of a report's drawings as SVG paths: outlines of leaks, cross-sections, the tunnel at a glance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import LineString, Polygon
+
+from tunneldb.report.data import Coverage, Leak
+
+Float = NDArray[np.float64]
+
+STEPS = (1.0, 2.0, 5.0, 10.0, 20.0, 25.0, 50.0, 100.0, 200.0, 250.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0)
+"""Distances between ticks, and lengths of bins, m."""
+
+
+def step_for(length: float, most: int) -> float:
+    """Return the least of STEPS that divides a length, m, into at most so many parts."""
+    return next((step for step in STEPS if length / step <= most), STEPS[-1])
+
+
+def ticks(low: float, high: float, step: float) -> list[float]:
+    """Multiples of a step from low to high."""
+    return [float(n * step) for n in range(int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9)) + 1)]
+
+
+def line_path(xy: Float, decimals: int = 2) -> str:
+    """Path through points (n, 2)."""
+    return "M" + "L".join(f"{_number(x, decimals)} {_number(y, decimals)}" for x, y in xy)
+
+
+def outline_path(outline: Polygon, west: float, north: float, tolerance: float) -> str:
+    """Path of an outline in the unrolled plane, simplified by a tolerance, m: x from ``west``, y downwards from ``north``."""
+    simple = outline.simplify(tolerance)
+    rings = [simple.exterior, *simple.interiors]
+    return "".join(line_path(np.array(ring.coords)[:-1, :2] * [1, -1] + [-west, north]) + "Z" for ring in rings)
+
+
+def _number(value: float, decimals: int) -> str:
+    """Shortest text of a number so rounded."""
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".") if decimals else f"{value:.0f}"
+    return "0" if text in ("-0", "") else text
+
+
+@dataclass(frozen=True)
+class Section:
+    """A cross-section of the lining, looking up-chainage; m, x to the right of the axis, y above it.
+
+    Attributes
+    ----------
+    arc : (n,) array
+        Arc of its nodes, growing, m.
+    x, y : (n,) arrays
+        Where they lie.
+    """
+
+    arc: Float
+    x: Float
+    y: Float
+
+    @classmethod
+    def of(cls, radius: Sequence[float], arc: Sequence[float]) -> Section:
+        """Take the radius and the arc at each whole degree from -180 to 180, m."""
+        angle = np.radians(np.arange(-180.0, 181.0))
+        far = np.asarray(radius, dtype=np.float64)
+        return cls(np.asarray(arc, dtype=np.float64), far * np.sin(angle), far * np.cos(angle))
+
+    def path(self) -> str:
+        """Closed path to 1 cm, y downwards."""
+        line = LineString(np.column_stack([self.x, -self.y])).simplify(0.01)
+        return line_path(np.array(line.coords)) + "Z"
+
+    def band(self, arc_from: float, arc_to: float) -> str:
+        """Path of the part between two arcs, m."""
+        inner = self.arc[(self.arc > arc_from) & (self.arc < arc_to)]
+        arcs = np.concatenate([[arc_from], inner, [arc_to]])
+        x, y = (np.interp(arcs, self.arc, v) for v in (self.x, self.y))
+        return line_path(np.array(LineString(np.column_stack([x, -y])).simplify(0.01).coords))
+
+    def box(self) -> str:
+        """``viewBox`` that holds it with a margin of 0.7 m, for the clock's hours."""
+        west, east, low, high = self.x.min() - 0.7, self.x.max() + 0.7, self.y.min() - 0.7, self.y.max() + 0.7
+        return f"{west:.2f} {-high:.2f} {east - west:.2f} {high - low:.2f}"
+
+
+def share_path(coverage: Coverage, low: float, high: float, base: float, height: float, scale: float = 1.0) -> str:
+    """Path of the area under the share of lining seen, in steps; ``base`` is where 0 lies, ``height`` how far up 1 is.
+
+    x is the chainage from ``low``, times ``scale``; only what lies between ``low`` and ``high``.
+    """
+    share = np.nan_to_num(coverage.share)
+    parts = []
+    for n in np.flatnonzero((coverage.edges[1:] > low) & (coverage.edges[:-1] < high)).tolist():
+        left = (max(coverage.edges[n], low) - low) * scale
+        right = (min(coverage.edges[n + 1], high) - low) * scale
+        if share[n] > 0:
+            parts.append(f"M{left:.2f} {base:.2f}V{base - height * share[n]:.2f}H{right:.2f}V{base:.2f}Z")
+    return "".join(parts)
+
+
+def without_detection(coverage: Coverage, low: float, high: float) -> list[tuple[float, float]]:
+    """Stretches between two chainages, m, in which detection did not run."""
+    none = np.isnan(coverage.share)
+    turns = np.flatnonzero(np.diff(np.concatenate([[False], none, [False]]).astype(np.int8))).reshape(-1, 2)
+    ends = [(max(float(coverage.edges[a]), low), min(float(coverage.edges[b]), high)) for a, b in turns.tolist()]
+    return [(a, b) for a, b in ends if b > a]
+
+
+def wet_bins(leaks: Sequence[Leak], edges: Float) -> Float:
+    """Wet area in bins of chainage, m²: that of each leak spread evenly over its length."""
+    total = np.zeros(len(edges) - 1)
+    for leak in leaks:
+        if not leak.counts:
+            continue
+        first = int(np.clip(np.searchsorted(edges, leak.chainage_from, side="right") - 1, 0, len(total) - 1))
+        last = int(np.clip(np.searchsorted(edges, leak.chainage_to, side="left") - 1, first, len(total) - 1))
+        for n in range(first, last + 1):
+            inside = min(edges[n + 1], leak.chainage_to) - max(edges[n], leak.chainage_from)
+            total[n] += leak.area * max(inside, 0.0) / max(leak.chainage_to - leak.chainage_from, 1e-9)
+    return total
+
+
+@dataclass(frozen=True)
+class Sign:
+    """A number beside a picture that points at a leak: its id, where it stands and where the leak's middle is, m."""
+
+    id: int
+    x: float
+    at: float
+
+
+def place_signs(leaks: Sequence[Leak], low: float, high: float, width: float) -> list[Sign]:
+    """Place numbers of leaks along a strip, of the largest first, as many as fit; a digit is ``width`` m wide."""
+    placed: list[tuple[float, float, Sign]] = []
+    for leak in sorted(leaks, key=lambda leak: -leak.area):
+        half = width * (len(str(leak.id)) + 1) / 2
+        x = float(np.clip(leak.middle, low + half, high - half))
+        if all(x + half <= left or x - half >= right for left, right, _ in placed):
+            placed.append((x - half, x + half, Sign(leak.id, x, leak.middle)))
+    return sorted((sign for _, _, sign in placed), key=lambda sign: sign.x)
+
+
+def near(leak: Leak, least: float, shape: float) -> tuple[float, float, float, float]:
+    """Window about a leak: west, east, south, north, m; at least so wide, and ``shape`` times as wide as high."""
+    west, south, east, north = shapely.bounds(leak.outline)
+    width = max(least, 1.5 * (east - west), 1.5 * (north - south) * shape)
+    x, y = (west + east) / 2, (south + north) / 2
+    return x - width / 2, x + width / 2, y - width / shape / 2, y + width / shape / 2

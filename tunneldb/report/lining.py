@@ -1,0 +1,233 @@
+"""The unrolled images of a survey as one picture, of which any window may be had at any pixel; only a few blocks in memory."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import psycopg
+from numpy.typing import NDArray
+from PIL import Image
+from scipy import ndimage
+
+from tunneldb.database import Survey
+from tunneldb.leak.image import BLOCK
+from tunneldb.leak.lining import State
+from tunneldb.leak.raster import Raster, decode
+
+Single = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
+
+KEPT = 3
+"""Blocks in memory."""
+
+HELD = 0.2
+"""Lining is shown as seen where at least this share of its pixels holds points: the same share as the median filter needs to
+tell whether it is wet."""
+
+FILLED = 0.14
+"""Pixels without points take the mean of those about them, in a square so wide, m: about what the median filter looks at."""
+
+QUALITY = 55
+"""Of the WebP pictures, 0 to 100."""
+
+UNSEEN, COVERED, FLOOR, NOTHING = (216, 200, 230), (186, 208, 188), (236, 239, 242), (255, 255, 255)
+"""Colours: lining not seen; something hangs before it; floor, which is not judged; no image."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """A rectangle of the unrolled plane: chainage from ``west`` to ``east``, arc from ``south`` to ``north``, m."""
+
+    west: float
+    east: float
+    south: float
+    north: float
+
+    @property
+    def width(self) -> float:
+        """Length along the tunnel, m."""
+        return self.east - self.west
+
+    @property
+    def height(self) -> float:
+        """Length round the section, m."""
+        return self.north - self.south
+
+    def widened(self, side: float) -> Window:
+        """Return the least window of whole pixels of that side, m, which holds it."""
+        low, high = (
+            np.floor(np.array([self.west, self.south]) / side + 1e-6),
+            np.ceil(np.array([self.east, self.north]) / side - 1e-6),
+        )
+        return Window(float(low[0] * side), float(high[0] * side), float(low[1] * side), float(high[1] * side))
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a window shows, as WebP."""
+
+    window: Window
+    webp: bytes
+
+    @property
+    def base64(self) -> str:
+        """The same as text."""
+        return base64.b64encode(self.webp).decode()
+
+
+@dataclass(frozen=True)
+class _Block:
+    """A stored block: corrected intensity, dB, and states (None from before there were states)."""
+
+    corrected: Raster
+    state: Raster | None
+
+
+class Lining:
+    """Reads windows of the images of a survey.
+
+    Parameters
+    ----------
+    conn, survey
+        Where from.
+    """
+
+    def __init__(self, conn: psycopg.Connection[Any], survey: Survey) -> None:
+        self._conn, self._survey = conn, survey
+        self._kept: OrderedDict[int, _Block | None] = OrderedDict()
+        rows = conn.execute(
+            "SELECT block, min(km) FROM tunnel.image WHERE survey_id = %s AND kind = 'corrected' GROUP BY block", [survey.id]
+        ).fetchall()
+        self._km: dict[int, int] = dict(rows)
+        self._span: dict[int, tuple[float, float]] = {}
+
+    def picture(self, window: Window, pixel: float) -> Picture | None:
+        """Draw a window, None where there is no image.
+
+        A pixel of the picture is about so large, m: a whole number of the image's own, which bounds the window anew.
+        """
+        blocks = self._blocks(window)
+        if not blocks:
+            return None
+        native = max(block.corrected.transform.a for block in blocks.values())
+        side = native * max(1, round(pixel / native))
+        window = window.widened(side)
+        canvas = np.full((round(window.height / side), round(window.width / side), 3), NOTHING, np.uint8)
+        for number, block in blocks.items():
+            _paint(canvas, window, side, block, self._span_of(self._km[number]))
+        out = io.BytesIO()
+        Image.fromarray(canvas).save(out, "WEBP", quality=QUALITY, method=4)
+        return Picture(window, out.getvalue())
+
+    def _blocks(self, window: Window) -> dict[int, _Block]:
+        """Blocks that a window touches, those that are there."""
+        numbers = range(int(np.floor(window.west / BLOCK)), int(np.ceil(window.east / BLOCK)))
+        found = {number: self._block(number) for number in numbers if number in self._km}
+        return {number: block for number, block in found.items() if block is not None}
+
+    def _block(self, number: int) -> _Block | None:
+        if number in self._kept:
+            self._kept.move_to_end(number)
+            return self._kept[number]
+        rows: dict[str, bytes] = dict(
+            self._conn.execute(
+                "SELECT kind, tiff FROM tunnel.image WHERE survey_id = %s AND km = %s AND block = %s"
+                " AND kind IN ('corrected', 'state')",
+                [self._survey.id, self._km[number], number],
+                binary=True,
+            ).fetchall()
+        )
+        state = decode(rows["state"]) if "state" in rows else None
+        block = _Block(decode(rows["corrected"]), state)
+        self._kept[number] = block
+        while len(self._kept) > KEPT:
+            self._kept.popitem(last=False)
+        return block
+
+    def _span_of(self, km: int) -> tuple[float, float]:
+        """Intensity drawn black and white in a kilometre, dB: the 2nd and 98th percentile of the lining of up to three blocks."""
+        if km not in self._span:
+            numbers = sorted(number for number, where in self._km.items() if where == km)
+            held = [self._lining_of(numbers[i]) for i in sorted({0, len(numbers) // 2, len(numbers) - 1})]
+            values = np.concatenate(held)
+            low, high = (float(v) for v in np.percentile(values, [1, 98])) if len(values) else (0.0, 1.0)
+            self._span[km] = low, max(high, low + 0.1)
+        return self._span[km]
+
+    def _lining_of(self, number: int) -> Single:
+        """Intensity of the lining of a block, thinned."""
+        block = self._block(number)
+        assert block is not None
+        values = block.corrected.values[::4, ::4]
+        lining = np.isfinite(values)
+        if block.state is not None:
+            state = block.state.values[::4, ::4]
+            lining &= (state == State.LINING) | (state == State.RECESS) | (state > State.FLOOR)
+        return values[lining]
+
+
+def _paint(canvas: Bytes, window: Window, side: float, block: _Block, span: tuple[float, float]) -> None:
+    """Paint what a block shows of a window onto the canvas, whose pixels are of that side, m."""
+    transform, (height, width) = block.corrected.transform, block.corrected.values.shape
+    # the canvas's column and row that each column and row of the block falls into
+    column = np.floor((transform.c + transform.a * (np.arange(width) + 0.5) - window.west) / side).astype(np.intp)
+    row = np.floor((window.north - transform.f - transform.e * (np.arange(height) + 0.5)) / side).astype(np.intp)
+    part = _inside(row, canvas.shape[0]), _inside(column, canvas.shape[1])
+    row, column = row[part[0]], column[part[1]]
+    if len(row) and len(column):
+        state = None if block.state is None else block.state.values[part]
+        there = slice(row[0], row[-1] + 1), slice(column[0], column[-1] + 1)
+        canvas[there] = _colours(block.corrected.values[part], state, (row, column), side, span)
+
+
+def _inside(place: NDArray[np.intp], count: int) -> slice:
+    """Those of growing places that lie from 0 to ``count`` - 1."""
+    return slice(int(np.searchsorted(place, 0)), int(np.searchsorted(place, count)))
+
+
+def _colours(
+    values: Single,
+    state: Single | None,
+    places: tuple[NDArray[np.intp], NDArray[np.intp]],
+    side: float,
+    span: tuple[float, float],
+) -> Bytes:
+    """Colours of the pixels that rows and columns of a block fall into; both of these places grow without gaps."""
+    rows, columns = (np.flatnonzero(np.diff(place, prepend=place[0] - 1)) for place in places)
+    about = 2 * round(FILLED / side / 2) + 1
+
+    def add(what: NDArray[Any]) -> Single:
+        return np.add.reduceat(np.add.reduceat(what.astype(np.float32), rows, axis=0), columns, axis=1)
+
+    def smooth(what: Single) -> Single:
+        return ndimage.uniform_filter(what, about, mode="nearest") if about > 1 else what
+
+    held = np.isfinite(values)
+    total, count = add(np.ones(values.shape, np.bool_)), add(held)
+    level = add(np.where(held, values, 0.0))
+    mean = np.where(count > 0, _ratio(level, count), _ratio(smooth(level), smooth(count)))
+    shade = np.clip((mean - span[0]) / (span[1] - span[0]), 0.0, 1.0)
+    grey = np.repeat(255.0 * np.nan_to_num(shade, nan=0.75), 3).reshape(*shade.shape, 3)
+    if state is None:
+        return _laid(grey, [(smooth(count) < HELD * smooth(total), UNSEEN, 1.0)])
+    off, floor = add(state == State.OFF), add((state == State.FLOOR) | np.isnan(state))
+    lining, empty = total - off - floor, add(state == State.EMPTY)
+    unseen = smooth(lining - empty) < HELD * smooth(lining)
+    return _laid(grey, [(unseen, UNSEEN, 1.0), (off > total / 2, COVERED, 0.55), (floor > total / 2, FLOOR, 0.92)])
+
+
+def _ratio(part: Single, whole: Single) -> Single:
+    """Quotient, NaN where the divisor is none."""
+    return np.divide(part, whole, out=np.full(part.shape, np.nan, np.float32), where=whole > 1e-3)
+
+
+def _laid(grey: Single, layers: list[tuple[NDArray[np.bool_], tuple[int, int, int], float]]) -> Bytes:
+    """Lay colours over a picture, each so opaque, where its mask says so."""
+    for mask, colour, opaque in layers:
+        grey[mask] = (1 - opaque) * grey[mask] + opaque * np.array(colour, np.float32)
+    return grey.astype(np.uint8)

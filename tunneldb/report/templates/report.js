@@ -1,0 +1,273 @@
+"use strict";
+(() => {
+  const $ = (selector, from = document) => from.querySelector(selector);
+  const data = JSON.parse($("#data").textContent);
+  const leaks = data.rows.map((row) => Object.fromEntries(data.columns.map((name, i) => [name, row[i]])));
+  const byId = new Map(leaks.map((leak) => [leak.id, leak]));
+  const PAGE = 100;
+  const state = { sort: "chainage", up: true, page: 0, stretch: null, all: false };
+
+  // Elements: name, attributes, children (nodes or text); "svg:" before the name for drawings.
+  function make(name, attributes = {}, ...children) {
+    const drawing = name.startsWith("svg:");
+    const node = drawing
+      ? document.createElementNS("http://www.w3.org/2000/svg", name.slice(4))
+      : document.createElement(name);
+    for (const [key, value] of Object.entries(attributes)) {
+      if (key.startsWith("on")) node.addEventListener(key.slice(2), value);
+      else node.setAttribute(key, value);
+    }
+    node.append(...children);
+    return node;
+  }
+
+  const fixed = (value, decimals) => (value === null ? "–" : value.toFixed(decimals));
+  const signed = (value) => (value > 0 ? "+" : value < 0 ? "−" : "") + Math.abs(value).toFixed(2);
+  const clock = (hours) => {
+    const minutes = Math.round(hours * 60) % 720;
+    return `${Math.floor(minutes / 60) || 12}:${String(minutes % 60).padStart(2, "0")}`;
+  };
+  const arc = (leak) => `${signed(leak.arcFrom)} to ${signed(leak.arcTo)}`;
+  const review = (leak) => make("span", { class: `review ${leak.review}` }, leak.review + (leak.detected ? "" : ", not found again"));
+
+  // Columns of the table: heading, key, cell, class; minor ones are left out on a phone.
+  const columns = [
+    ["No.", "id", (l) => l.id, "n"],
+    ["Chainage", "chainage", (l) => l.label, ""],
+    ["Clock", "clock", (l) => clock(l.clock), "n"],
+    ["Arc m", "arcFrom", arc, "n minor"],
+    ["Length m", "length", (l) => fixed(l.length, 2), "n minor"],
+    ["Area m²", "area", (l) => fixed(l.area, 2), "n"],
+    ["Drop dB", "drop", (l) => fixed(l.drop, 1), "n minor"],
+    ["Contrast σ", "contrast", (l) => fixed(l.contrast, 1), "n minor"],
+    ["Confidence", "confidence", (l) => fixed(l.confidence, 2), "n minor"],
+    ["Review", "review", review, ""],
+    ["By", "by", (l) => l.by, "minor"],
+    ["Remark", "remark", (l) => l.remark, "minor remark"],
+  ];
+
+  function wanted(leak, filters) {
+    const kept = leak.review !== "rejected";
+    if (filters.review === "counted" ? !kept : filters.review && leak.review !== filters.review) return false;
+    if (filters.area && !(leak.area >= Number(filters.area))) return false;
+    const hour = leak.clock % 12;
+    if (filters.clock === "crown" && hour > 2 && hour < 10) return false;
+    if (filters.clock === "right" && (hour < 2 || hour > 6)) return false;
+    if (filters.clock === "left" && (hour < 6 || hour > 10)) return false;
+    if (state.stretch !== null && leak.strip !== state.stretch) return false;
+    const text = filters.text.trim().toLowerCase();
+    return !text || String(leak.id) === text || [leak.label, leak.remark, leak.by].some((value) => value.toLowerCase().includes(text));
+  }
+
+  function chosen() {
+    const filters = Object.fromEntries(new FormData($("#filters")));
+    const way = state.up ? 1 : -1;
+    const value = (leak) => leak[state.sort];
+    return leaks
+      .filter((leak) => wanted(leak, filters))
+      .sort((a, b) => {
+        const [x, y] = [value(a), value(b)];
+        if (x === y) return a.chainage - b.chainage || a.id - b.id;
+        if (x === null) return 1;
+        if (y === null) return -1;
+        return way * (typeof x === "string" ? x.localeCompare(y) : x - y);
+      });
+  }
+
+  function sortBy(key) {
+    state.up = state.sort === key ? !state.up : !["area", "drop", "contrast", "confidence", "length"].includes(key);
+    state.sort = key;
+    state.page = 0;
+    show();
+  }
+
+  let listed = [];
+  function show(here = null) {
+    listed = state.all ? leaks : chosen();
+    const pages = Math.max(1, Math.ceil(listed.length / PAGE));
+    if (here !== null) {
+      const place = listed.findIndex((leak) => leak.id === here);
+      if (place >= 0) state.page = Math.floor(place / PAGE);
+    }
+    state.page = Math.min(state.page, pages - 1);
+    const area = listed.reduce((sum, leak) => sum + leak.area, 0);
+    $("#found").textContent = state.all
+      ? `${listed.length} leaks, with those rejected, in order of chainage`
+      : `${listed.length} of ${leaks.length} leaks, ${area.toFixed(2)} m²`;
+    $("#table thead").replaceChildren(
+      make("tr", {}, ...columns.map(([heading, key, , kind]) => {
+        const sorted = state.sort === key ? { "aria-sort": state.up ? "ascending" : "descending" } : {};
+        return make("th", { class: kind, ...sorted }, make("button", { type: "button", onclick: () => sortBy(key) }, heading));
+      })),
+    );
+    const part = state.all ? listed : listed.slice(state.page * PAGE, (state.page + 1) * PAGE);
+    $("#table tbody").replaceChildren(...part.map((leak) => row(leak, here)));
+    const turn = (by) => () => { state.page += by; show(); $("#leaks").scrollIntoView(); };
+    $("#pages").replaceChildren(
+      ...(pages > 1
+        ? [
+            make("button", { type: "button", onclick: turn(-1), ...(state.page === 0 ? { disabled: "" } : {}) }, "Previous"),
+            `Page ${state.page + 1} of ${pages}`,
+            make("button", { type: "button", onclick: turn(1), ...(state.page === pages - 1 ? { disabled: "" } : {}) }, "Next"),
+          ]
+        : []),
+    );
+    const chip = $("#stretch");
+    chip.hidden = state.stretch === null;
+    if (state.stretch !== null) chip.textContent = `Only ${$(`#strip-${state.stretch} figcaption b`).textContent} ✕`;
+  }
+
+  function row(leak, here) {
+    const cells = columns.map(([, key, cell, kind]) => {
+      const content = cell(leak);
+      return key === "id"
+        ? make("td", { class: kind }, make("a", { href: `#leak-${leak.id}` }, String(content)))
+        : make("td", { class: kind }, content instanceof Node ? content : String(content));
+    });
+    const attributes = { class: `${leak.review}${leak.id === here ? " here" : ""}`, "data-id": leak.id };
+    return make("tr", { ...attributes, onclick: () => { location.hash = `leak-${leak.id}`; } }, ...cells);
+  }
+
+  // What a leak's picture and section show lies in its strip, and is read when it is asked for.
+  const read = new Map();
+  function detail(leak) {
+    if (!read.has(leak.strip)) {
+      if (read.size > 3) read.delete(read.keys().next().value);
+      const script = $(`#strip-${leak.strip} script`);
+      read.set(leak.strip, script ? JSON.parse(script.textContent) : {});
+    }
+    return read.get(leak.strip)[leak.id];
+  }
+
+  function picture(leak, shown) {
+    const [width, height] = shown.size;
+    const bar = [0.5, 1, 2, 5, 10, 20, 50].findLast((length) => length < width / 2) ?? 0.5;
+    const [x, y] = [width * 0.04, height * 0.95];
+    const drawing = make("svg:svg", { viewBox: `0 0 ${width} ${height}`, class: `view ${leak.review}`, role: "img", "aria-label": `Lining about leak ${leak.id}` });
+    if (shown.picture) {
+      drawing.append(make("svg:image", { width, height, preserveAspectRatio: "none", href: `data:image/webp;base64,${shown.picture}` }));
+    }
+    drawing.append(make("svg:path", { d: shown.outline }));
+    for (let n = 0; n < 2; n += 1) drawing.append(make("svg:line", { x1: x, x2: x + bar, y1: y, y2: y, class: "scale" }));
+    const caption = shown.picture ? `${width.toFixed(1)} m of lining; bar ${bar} m` : `No image here; bar ${bar} m`;
+    return make("figure", {}, drawing, make("figcaption", {}, caption));
+  }
+
+  function section(leak, shown) {
+    const drawing = make("svg:svg", { viewBox: shown.box, class: "section", role: "img", "aria-label": `Cross-section at leak ${leak.id}` });
+    drawing.append(make("svg:path", { d: shown.section, class: "lining" }), make("svg:path", { d: shown.band, class: "band" }));
+    drawing.append(make("svg:path", { d: "M-.15 0H.15M0-.15V.15", class: "axis" }));
+    const [x, y, width, height] = shown.box.split(" ").map(Number);
+    for (const [hour, at, up] of [["12", 0, y + 0.35], ["3", x + width - 0.35, 0], ["6", 0, y + height - 0.35], ["9", x + 0.35, 0]]) {
+      drawing.append(make("svg:text", { x: at, y: up }, hour));
+    }
+    const off = Math.abs(shown.at) < 0.05 ? "" : ` ${Math.abs(shown.at).toFixed(1)} m ${shown.at > 0 ? "up" : "down"}-chainage of it`;
+    return make("figure", {}, drawing, make("figcaption", {}, `Section${off}`));
+  }
+
+  function card(leak) {
+    const shown = detail(leak);
+    const facts = [
+      ["Area", `${fixed(leak.area, 2)} m²`], ["Clock", clock(leak.clock)], ["Arc, m", arc(leak)], ["Length", `${fixed(leak.length, 2)} m`],
+      ["Drop, most", `${fixed(leak.drop, 1)}, ${fixed(leak.dropMax, 1)} dB`], ["Contrast", `${fixed(leak.contrast, 1)} σ`],
+      ["Confidence", fixed(leak.confidence, 2)], ["Measured", `${Math.round(100 * leak.imageShare)} % of it`],
+    ];
+    const list = make("dl", {}, ...facts.map(([term, value]) => make("div", {}, make("dt", {}, term), make("dd", {}, value))));
+    if (leak.by) list.append(make("div", { class: "long" }, make("dt", {}, "Reviewed"), make("dd", {}, `${leak.review} by ${leak.by}, ${leak.at}`)));
+    if (leak.remark) list.append(make("div", { class: "long" }, make("dt", {}, "Remark"), make("dd", {}, leak.remark)));
+    const pictures = make("div", { class: "pictures" });
+    if (shown) pictures.append(picture(leak, shown));
+    if (shown && shown.section) pictures.append(section(leak, shown));
+    return make("article", { class: "card" },
+      make("header", {}, make("b", {}, `Leak ${leak.id}`), make("span", {}, leak.label), review(leak)), pictures, list);
+  }
+
+  const dialog = $("#leak");
+  function open(leak) {
+    const place = listed.indexOf(leak);
+    const go = (other) => () => { location.hash = `leak-${other.id}`; };
+    const step = (by, text) => {
+      const other = place < 0 ? undefined : listed[place + by];
+      return make("button", { type: "button", ...(other ? { onclick: go(other) } : { disabled: "" }) }, text);
+    };
+    dialog.replaceChildren(card(leak), make("div", { class: "bar-of" },
+      step(-1, "Previous"), step(1, "Next"),
+      make("button", { type: "button", class: "to-strip", onclick: () => { dialog.close(); find(leak); } }, "Show on the lining"),
+      make("button", { type: "button", class: "to-table", onclick: () => { dialog.close(); point(leak); } }, "Show in the table"),
+      make("button", { type: "button", class: "close", onclick: () => dialog.close() }, "Close")));
+    if (!dialog.open) dialog.showModal();
+  }
+
+  function find(leak) {
+    for (const link of document.querySelectorAll(".strip a.here")) link.classList.remove("here");
+    const strip = $(`#strip-${leak.strip}`);
+    const link = $(`a.${leak.review}[href="#leak-${leak.id}"]`, strip);
+    link.classList.add("here");
+    strip.scrollIntoView({ block: "center" });
+    const box = $(".scroll", strip);
+    box.scrollLeft = (link.getBBox().x / data.strip) * box.scrollWidth - box.clientWidth / 2;
+  }
+
+  function point(leak) {
+    if (!chosen().includes(leak)) { $("#filters").reset(); $("#filters").elements.review.value = ""; state.stretch = null; }
+    show(leak.id);
+    const found = $(`#table tr[data-id="${leak.id}"]`);
+    if (found) found.scrollIntoView({ block: "center" });
+  }
+
+  function follow() {
+    const match = /^#leak-(\d+)$/.exec(location.hash);
+    const leak = match && byId.get(Number(match[1]));
+    if (leak) open(leak);
+    else if (dialog.open) dialog.close();
+  }
+
+  // On paper there are all leaks in the table, and cards of the largest.
+  function toPaper() {
+    if (state.all) return;
+    Object.assign(state, { all: true });
+    show();
+    const largest = [...leaks].sort((a, b) => (a.review === "rejected") - (b.review === "rejected") || b.area - a.area).slice(0, data.cards);
+    const order = largest.sort((a, b) => a.chainage - b.chainage || a.id - b.id);
+    $("#sheets-note").textContent = order.length < leaks.length
+      ? `The ${order.length} largest of ${leaks.length} leaks, in order of chainage; the HTML file of this report shows each.`
+      : `All ${order.length} leaks, in order of chainage.`;
+    $("#sheets .cards").replaceChildren(...order.map(card));
+  }
+  function toScreen() {
+    state.all = false;
+    show();
+    $("#sheets .cards").replaceChildren();
+  }
+  async function print() {
+    toPaper();
+    const images = [...document.querySelectorAll("image")].map((image) => {
+      const loaded = new Image();
+      loaded.src = image.href.baseVal;
+      return loaded.decode().catch(() => undefined);
+    });
+    await Promise.all(images);
+    window.print();
+  }
+
+  $("#filters").addEventListener("input", () => { state.page = 0; show(); });
+  $("#filters").addEventListener("submit", (event) => event.preventDefault());
+  $("#stretch").addEventListener("click", () => { state.stretch = null; show(); });
+  $("#print").addEventListener("click", print);
+  dialog.addEventListener("close", () => {
+    if (location.hash.startsWith("#leak-")) history.replaceState(null, "", location.pathname + location.search);
+  });
+  dialog.addEventListener("click", (event) => { if (event.target === dialog) dialog.close(); });
+  document.addEventListener("click", (event) => {
+    // the same leak again: its hash stands there already, and no event would come
+    const link = event.target.closest?.('a[href^="#leak-"]');
+    if (link && link.getAttribute("href") === location.hash) follow();
+    const caption = event.target.closest?.(".strip figcaption button");
+    if (caption) { state.stretch = Number(caption.value); state.page = 0; show(); $("#leaks").scrollIntoView(); }
+  });
+  window.addEventListener("hashchange", follow);
+  window.addEventListener("beforeprint", toPaper);
+  window.addEventListener("afterprint", toScreen);
+  if (location.hash === "#print") toPaper();
+  else { show(); follow(); }
+})();

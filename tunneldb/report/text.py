@@ -1,0 +1,179 @@
+"""Numbers, moments and tallies of a report as text."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+import shapely
+
+from tunneldb.report.data import Edit, Leak, Row
+
+DASH = "–"
+SPACE = "\u202f"
+"""Between thousands."""
+
+
+def percent(share: float | None, decimals: int = 1) -> str:
+    """Share as per cent; never 100 % of what is less, nor 0 % of what is more than nothing."""
+    if share is None:
+        return DASH
+    least = 10**-decimals
+    value = 100 * share
+    if 0 < value < least:
+        return f"< {least:.{decimals}f} %"
+    if 100 - least / 2 <= value < 100:
+        return f"> {100 - least:.{decimals}f} %"
+    return f"{value:.{decimals}f} %"
+
+
+def number(value: float | None, decimals: int = 2) -> str:
+    """Return a number with so many decimals, thousands apart; a dash for none."""
+    return DASH if value is None else f"{value:,.{decimals}f}".replace(",", SPACE).replace("-", "−")
+
+
+def whole(value: float | None) -> str:
+    """Return a whole number, thousands apart; a dash for none."""
+    return number(value, 0)
+
+
+def rounded(value: float | None, decimals: int) -> float | None:
+    """Round what may be none."""
+    return None if value is None else round(value, decimals)
+
+
+def when(moment: dt.datetime) -> str:
+    """Moment to the minute, UTC."""
+    return moment.astimezone(dt.UTC).strftime("%Y-%m-%d %H:%M UTC")
+
+
+def day(date: dt.date) -> str:
+    """Day with the month's name: 4 May 2024."""
+    return f"{date.day} {date:%B %Y}"
+
+
+def size(count: int) -> str:
+    """Bytes in the unit that suits."""
+    value = float(count)
+    for unit in ("B", "kB", "MB", "GB"):
+        if value < 1000:
+            return f"{value:.3g} {unit}"
+        value /= 1000
+    return f"{value:.3g} TB"
+
+
+def short(label: str) -> str:
+    """Label of a chainage without decimals that say nothing: 12+300.000 is 12+300."""
+    return label.rstrip("0").rstrip(".") if "." in label else label
+
+
+def kilometres(numbers: Iterable[int]) -> str:
+    """Kilometres with those in a row taken together: 12, 14–17."""
+    parts = []
+    for _, group in groupby(enumerate(sorted(numbers)), key=lambda pair: pair[1] - pair[0]):
+        row = [km for _, km in group]
+        parts.append(str(row[0]) if len(row) == 1 else f"{row[0]}{DASH}{row[-1]}")
+    return ", ".join(parts)
+
+
+def css(value: str) -> str:
+    """Text for a string in a style sheet: only what cannot end it."""
+    return "".join(c if c.isalnum() or c in " .,:;·–-_+()/" else f"\\{ord(c):x} " for c in value)
+
+
+def versions(runs: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return the different sets of versions, with the stages and kilometres that each holds for."""
+    by: defaultdict[str, list[Row]] = defaultdict(list)
+    for run in runs:
+        by[", ".join(f"{name} {value}" for name, value in sorted(run["versions"].items()))].append(run)
+    return [
+        {
+            "versions": said,
+            "stages": ", ".join(dict.fromkeys(run["stage"] for run in theirs)),
+            "kilometres": kilometres({km for run in theirs for km in run["kilometres"]}),
+        }
+        for said, theirs in by.items()
+    ]
+
+
+def by_clock(leaks: Sequence[Leak]) -> list[dict[str, Any]]:
+    """Return number and area of leaks by hour, from the foot of the left wall over the crown to that of the right, and below."""
+    hours = [7, 8, 9, 10, 11, 12, 1, 2, 3, 4, 5, 6]
+    tally = {hour: {"name": str(hour), "count": 0, "area": 0.0} for hour in hours}
+    for leak in leaks:
+        bar = tally[round(leak.clock) % 12 or 12]
+        bar["count"] += 1  # type: ignore[operator]
+        bar["area"] += leak.area  # type: ignore[operator]
+    return _scaled([tally[hour] for hour in hours])
+
+
+SIZES = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0)
+"""Limits of the classes of size, m²; 0.2 and 0.3 are limits of GB 50108-2008."""
+
+
+def by_size(leaks: Sequence[Leak]) -> list[dict[str, Any]]:
+    """Return number and area of leaks by their size."""
+    names = [f"≤ {SIZES[0]:g}", *(f"{a:g}{DASH}{b:g}" for a, b in zip(SIZES, SIZES[1:], strict=False)), f"> {SIZES[-1]:g}"]
+    bars: list[dict[str, Any]] = [{"name": name, "count": 0, "area": 0.0} for name in names]
+    for leak in leaks:
+        bar = bars[sum(leak.area > limit for limit in SIZES)]
+        bar["count"] += 1
+        bar["area"] += leak.area
+    return _scaled(bars)
+
+
+def _scaled(bars: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Add to each bar its number in per cent of the greatest."""
+    most = max((bar["count"] for bar in bars), default=0) or 1
+    return [bar | {"width": round(100 * bar["count"] / most, 1)} for bar in bars]
+
+
+def reviewers(leaks: Sequence[Leak]) -> list[dict[str, Any]]:
+    """Return who reviewed how many leaks, and when first and last."""
+    by: defaultdict[str, list[Leak]] = defaultdict(list)
+    for leak in leaks:
+        if leak.reviewed_by and leak.reviewed_at:
+            by[leak.reviewed_by].append(leak)
+    people = []
+    for name, theirs in sorted(by.items()):
+        moments = [leak.reviewed_at for leak in theirs if leak.reviewed_at]
+        people.append(
+            {"name": name, "first": min(moments), "last": max(moments)}
+            | {state: sum(leak.review == state for leak in theirs) for state in ("open", "confirmed", "rejected")}
+        )
+    return people
+
+
+_WHAT = {"anomaly": "leak or dark spot", "axis_vertex": "axis vertex", "region": "region"}
+
+
+def edit(entry: Edit) -> dict[str, str]:
+    """Return a change made by hand in words: who, when, of what, and each column from what to what."""
+    before, after = entry.before or {}, entry.after or {}
+    changes = [_change(name, before.get(name), after.get(name)) for name in sorted({*before, *after})]
+    said = "; ".join(changes) if entry.action == "update" else entry.action + "d" if entry.action == "delete" else "drawn"
+    return {
+        "at": when(entry.at),
+        "who": entry.who,
+        "what": f"{_WHAT.get(entry.view, entry.view)} {entry.row_id}",
+        "change": said,
+    }
+
+
+def _change(name: str, before: Any, after: Any) -> str:
+    """Return the change of a column in words; of a geometry, how far it moved."""
+    if name != "geom":
+        return f"{name}: {DASH if before in (None, '') else before} → {DASH if after in (None, '') else after}"
+    old, new = (shapely.get_coordinates(_shape(value), include_z=True) for value in (before, after))
+    if len(old) == len(new) == 1:
+        return f"moved by {float(np.linalg.norm(np.nan_to_num(new - old))):.3f} m"
+    return "drawn anew"
+
+
+def _shape(ewkt: Any) -> shapely.Geometry:
+    """Geometry of an EWKT."""
+    return shapely.from_wkt(str(ewkt).rpartition(";")[2])
