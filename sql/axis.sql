@@ -13,27 +13,31 @@ LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
 ROWS 100
 AS $$
     WITH vertex AS (
-        SELECT v.n, v.x, v.y, v.z
-        FROM unnest(axis_frame.n, axis_frame.x, axis_frame.y, axis_frame.z) AS v (n, x, y, z)
+        SELECT v.n, v.x, v.y, v.z,
+            CASE WHEN lag(v.n) OVER along = v.n - 1 THEN lag(v.p) OVER along END AS a,
+            CASE WHEN lag(v.n, 2) OVER along = v.n - 2 THEN lag(v.p, 2) OVER along END AS a2,
+            CASE WHEN lead(v.n) OVER along = v.n + 1 THEN lead(v.p) OVER along END AS b,
+            CASE WHEN lead(v.n, 2) OVER along = v.n + 2 THEN lead(v.p, 2) OVER along END AS b2
+        FROM (SELECT q.n, q.x, q.y, q.z, ARRAY[q.x, q.y, q.z] AS p
+              FROM unnest(axis_frame.n, axis_frame.x, axis_frame.y, axis_frame.z) AS q (n, x, y, z)) v
+        WINDOW along AS (ORDER BY v.n)
     ), direction AS (
         SELECT v.n, v.x, v.y, v.z,
             CASE
-                WHEN a.n IS NOT NULL AND b.n IS NOT NULL THEN ARRAY[b.x - a.x, b.y - a.y, b.z - a.z]
-                WHEN b2.n IS NOT NULL AND b.n IS NOT NULL THEN
-                    ARRAY[4 * b.x - 3 * v.x - b2.x, 4 * b.y - 3 * v.y - b2.y, 4 * b.z - 3 * v.z - b2.z]
-                WHEN b.n IS NOT NULL THEN ARRAY[b.x - v.x, b.y - v.y, b.z - v.z]
-                WHEN a2.n IS NOT NULL AND a.n IS NOT NULL THEN
-                    ARRAY[3 * v.x - 4 * a.x + a2.x, 3 * v.y - 4 * a.y + a2.y, 3 * v.z - 4 * a.z + a2.z]
-                ELSE ARRAY[v.x - a.x, v.y - a.y, v.z - a.z]
+                WHEN v.a IS NOT NULL AND v.b IS NOT NULL THEN ARRAY[b[1] - a[1], b[2] - a[2], b[3] - a[3]]
+                WHEN v.b2 IS NOT NULL THEN
+                    ARRAY[4 * b[1] - 3 * v.x - b2[1], 4 * b[2] - 3 * v.y - b2[2], 4 * b[3] - 3 * v.z - b2[3]]
+                WHEN v.b IS NOT NULL THEN ARRAY[b[1] - v.x, b[2] - v.y, b[3] - v.z]
+                WHEN v.a2 IS NOT NULL THEN
+                    ARRAY[3 * v.x - 4 * a[1] + a2[1], 3 * v.y - 4 * a[2] + a2[2], 3 * v.z - 4 * a[3] + a2[3]]
+                ELSE ARRAY[v.x - a[1], v.y - a[2], v.z - a[3]]
             END AS d
         FROM vertex v
-        LEFT JOIN vertex a ON a.n = v.n - 1
-        LEFT JOIN vertex a2 ON a2.n = v.n - 2
-        LEFT JOIN vertex b ON b.n = v.n + 1
-        LEFT JOIN vertex b2 ON b2.n = v.n + 2
+        OFFSET 0  -- a fence: each step is reckoned once, not in each place where it is used
     ), tangent AS (
         SELECT q.n, q.x, q.y, q.z, q.d[1] / q.length AS tx, q.d[2] / q.length AS ty, q.d[3] / q.length AS tz
-        FROM (SELECT d.*, sqrt(d.d[1] ^ 2 + d.d[2] ^ 2 + d.d[3] ^ 2) AS length FROM direction d) q
+        FROM (SELECT d.*, sqrt(d.d[1] ^ 2 + d.d[2] ^ 2 + d.d[3] ^ 2) AS length FROM direction d OFFSET 0) q
+        OFFSET 0
     )
     SELECT t.n, t.x, t.y, t.z, t.tx, t.ty, t.tz,
         t.ty / p.plan, -t.tx / p.plan,

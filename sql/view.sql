@@ -7,13 +7,14 @@
 -- table metadata" in its connection) to find type, SRID and Z.
 
 CREATE OR REPLACE VIEW tunnel_api.tunnel AS
-SELECT t.id, t.name, t.srid, t.start_chainage, t.spacing, t.created_at,
+SELECT t.id, t.name, t.srid, t.start_chainage, t.spacing, t.design, t.created_at,
        t.alignment::public.geometry AS geom
   FROM tunnel.tunnel t;
 COMMENT ON VIEW tunnel_api.tunnel IS 'Tunnels, with the axis as it was given';
 COMMENT ON COLUMN tunnel_api.tunnel.srid IS 'Coordinate reference system of all the tunnel''s geometry on the map';
 COMMENT ON COLUMN tunnel_api.tunnel.start_chainage IS 'Chainage of the first vertex of the given axis, m';
 COMMENT ON COLUMN tunnel_api.tunnel.spacing IS 'Distance between the vertices of a survey''s axis, m';
+COMMENT ON COLUMN tunnel_api.tunnel.design IS 'File and alignment that the axis was read from, where it is a design alignment';
 COMMENT ON COLUMN tunnel_api.tunnel.geom IS 'Axis as given, in the tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.survey AS

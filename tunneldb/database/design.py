@@ -1,12 +1,19 @@
-"""A tunnel's design alignment in the database."""
+"""A tunnel's design alignment in the database, and how far the axis as measured lies from it."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import numpy as np
 import psycopg
 
 from tunneldb.alignment.design import Design
+from tunneldb.alignment.deviation import Deviation, Part
+from tunneldb.database.stationing import load_stationing, save_equations
+from tunneldb.database.survey import Survey
+from tunneldb.errors import UserError
+from tunneldb.geometry.stationing import Equation
 
 
 def save_design(connection: psycopg.Connection[Any], tunnel_id: int, design: Design) -> None:
@@ -36,8 +43,50 @@ def save_design(connection: psycopg.Connection[Any], tunnel_id: int, design: Des
             profile,
         )
     if design.pieces:
-        from tunneldb.database.stationing import save_equations
-        from tunneldb.geometry.stationing import Equation
-
         pieces = [Equation(design.start + piece.distance, piece.station, piece.direction) for piece in design.pieces]
-        save_equations(connection, tunnel_id, pieces)
+        _, end = design.chainages
+        save_equations(connection, tunnel_id, [piece for piece in pieces if piece.chainage < end])
+
+
+def load_deviation(
+    connection: psycopg.Connection[Any], survey: Survey, low: float = -math.inf, high: float = math.inf
+) -> Deviation:
+    """Return how far a survey's axis lies from the axis given, between two chainages (m).
+
+    Raises
+    ------
+    UserError
+        When the survey has no axis there.
+    """
+    rows = connection.execute(
+        """
+        SELECT d.chainage, d.label, d.source, d.to_right, d.up, ST_X(d.geom), ST_Y(d.geom), ST_Z(d.geom)
+          FROM tunnel_api.axis_deviation d
+         WHERE d.survey_id = %s AND d.chainage BETWEEN %s AND %s ORDER BY d.chainage
+        """,
+        [survey.id, low, high],
+    ).fetchall()
+    if not rows:
+        raise UserError(f"survey {survey.name} has no axis there: tunneldb run {survey.name} --to axis")
+    elements = connection.execute(
+        """
+        SELECT plane, kind, turn, chainage_from, chainage_to, label_from, label_to, radius_from, radius_to, grade_from, grade_to
+          FROM tunnel_api.alignment_element WHERE tunnel_id = %s ORDER BY id
+        """,
+        [survey.tunnel_id],
+    ).fetchall()
+    found = connection.execute("SELECT design FROM tunnel_api.tunnel WHERE id = %s", [survey.tunnel_id]).fetchone()
+    assert found is not None
+    numbers = np.array([(row[0], *row[3:]) for row in rows])
+    return Deviation(
+        survey=survey.name,
+        design=found[0],
+        chainage=numbers[:, 0],
+        label=tuple(row[1] for row in rows),
+        source=tuple(row[2] for row in rows),
+        to_right=numbers[:, 1],
+        up=numbers[:, 2],
+        vertices=numbers[:, 3:],
+        elements=tuple(Part(*row) for row in elements),
+        stationing=load_stationing(connection, survey.tunnel_id),
+    )

@@ -1,0 +1,51 @@
+"""The verb ``axis``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.stretch import parse_stretch, stretch_options
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect, get_survey
+
+
+@click.command()
+@click.argument("survey")
+@stretch_options
+@click.option(
+    "-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write: .png, .pdf, .svg, or .csv."
+)
+@click.pass_obj
+def axis(settings: Settings, survey: str, start: str | None, end: str | None, output: Path | None) -> None:
+    """Show how far the axis of SURVEY lies from the axis given.
+
+    Measured minus given, to the right looking up-chainage and upwards, mm: on average and at most, for each element of the
+    design alignment, or for each kilometre where the axis was given as a table. Vertices without enough points around them
+    (interpolated) are not counted. With -o, a figure of the deviation along the tunnel with the elements of the design
+    marked, or a table (.csv, metres) of all vertices.
+    """
+    from tunneldb.database.design import load_deviation
+    from tunneldb.export.deviation import check_format, write_deviation
+
+    if output is not None:
+        check_format(output)
+    with connect(settings.dsn) as conn:
+        found = get_survey(conn, survey)
+        stretch = parse_stretch(conn, found, start, end)
+        deviation = load_deviation(conn, found, stretch.low, stretch.high)
+    header = ["from", "to", "what", "vertices", "right mm", "at most", "up mm", "at most"]
+    rows = [
+        (s.label_from, s.label_to, s.title, s.vertices, *map(_millimetres, (s.right_mean, s.right_most, s.up_mean, s.up_most)))
+        for s in deviation.summaries()
+    ]
+    print_table(header, rows, right=(0, 1, 3, 4, 5, 6, 7))
+    if output is not None:
+        write_deviation(deviation, output)
+        click.echo(f"deviation to {output}", err=True)
+
+
+def _millimetres(metres: float) -> str:
+    return "" if metres != metres else f"{1000.0 * metres:+.1f}"
