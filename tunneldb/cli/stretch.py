@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -12,6 +13,8 @@ import psycopg
 
 from tunneldb.database import Survey
 from tunneldb.errors import UserError
+
+_METRES = re.compile(r"-?\d+(\.\d*)?")
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -32,7 +35,7 @@ class Stretch:
 
 def stretch_options(command: Command) -> Command:
     """Add the options --from and --to, which the command gets as ``start`` and ``end``."""
-    help_from = "Begin at this place: a station of the tunnel, as 12+345.678 or in metres."
+    help_from = "Begin at this place: a station of the tunnel, as 12+345.678, or a chainage in plain metres, as 345.678."
     end = click.option("--to", "end", metavar="PLACE", help="End there.")
     return click.option("--from", "start", metavar="PLACE", help=help_from)(end(command))
 
@@ -55,16 +58,24 @@ def parse_stretch(conn: psycopg.Connection[Any], survey: Survey, start: str | No
 
 
 def _chainage(conn: psycopg.Connection[Any], survey: Survey, option: str, place: str) -> float:
+    """A station may be there twice or not at all; a chainage is one place, and may lie beyond the tunnel's ends."""
+    if _METRES.fullmatch(place.strip()):
+        return float(place)
     try:
         with conn.transaction():
             rows = conn.execute(
                 "SELECT chainage FROM tunnel_api.station_chainages(%s, %s) AS chainage ORDER BY 1", [survey.tunnel_id, place]
             ).fetchall()
     except psycopg.errors.InvalidTextRepresentation:
-        raise UserError(f"{option} takes a station as 12+345.678, or metres, not {place!r}") from None
+        raise UserError(f"{option} takes a station as 12+345.678, or a chainage in metres, not {place!r}") from None
     if not rows:
-        raise UserError(f"{option} {place}: tunnel {survey.tunnel} has no such station: tunneldb status {survey.name}")
+        raise UserError(
+            f"{option} {place}: tunnel {survey.tunnel} has no such station: tunneldb tunnel stationing {survey.tunnel} --show"
+        )
     if len(rows) > 1:
         where = " and ".join(f"{row[0]:.3f}" for row in rows)
-        raise UserError(f"{option} {place}: tunnel {survey.tunnel} has that station {len(rows)} times, at chainages {where} m")
+        raise UserError(
+            f"{option} {place}: tunnel {survey.tunnel} has that station {len(rows)} times, at chainages {where} m; "
+            f"give one of these, as {option} {rows[0][0]:.3f}"
+        )
     return float(rows[0][0])

@@ -92,7 +92,7 @@
   </renderer-v2>
   <labeling type="simple">
     <settings calloutType="simple">
-      <text-style fieldName="&quot;class_name&quot; || coalesce(' ' || format_number(&quot;height_to&quot;, 1) || ' m', '')" isExpression="1" fontFamily="Sans Serif" namedStyle="Regular" fontWeight="50" fontSize="7" fontSizeUnit="Point" textColor="40,52,64,255" textOpacity="1" multilineHeight="1" allowHtml="0">
+      <text-style fieldName="&quot;class_name&quot; || if(&quot;height_to&quot; >= 0.05, ' ' || format_number(&quot;height_to&quot;, 1) || ' m', '')" isExpression="1" fontFamily="Sans Serif" namedStyle="Regular" fontWeight="50" fontSize="7" fontSizeUnit="Point" textColor="40,52,64,255" textOpacity="1" multilineHeight="1" allowHtml="0">
         <text-buffer bufferDraw="1" bufferSize="0.7" bufferSizeUnits="MM" bufferColor="255,255,255,215" bufferOpacity="1" bufferJoinStyle="128" bufferNoFill="1"/>
         <background shapeDraw="0"/>
         <shadow shadowDraw="0"/>
