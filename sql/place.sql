@@ -1,0 +1,36 @@
+-- Places as people in a tunnel speak of them: by the clock and by the ring. Short enough for the planner to put them in the
+-- place of a call.
+
+-- Clock position (hours) as it is written: 12.5 and 0.5 are 12:30, 11.999 is 12:00.
+CREATE OR REPLACE FUNCTION tunnel_api.clock_text(clock float8)
+RETURNS text
+LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
+AS $$
+    SELECT (((round($1 * 60)::int % 720 + 1380) % 720) / 60 + 1)::text || ':'
+        || lpad(((round($1 * 60)::int % 720 + 720) % 60)::text, 2, '0')
+$$;
+COMMENT ON FUNCTION tunnel_api.clock_text(float8) IS
+'Clock position (hours, 12 is the crown, 3 the right wall looking up-chainage) as text: 0.5 -> 12:30.';
+
+
+-- Whether a clock position lies on the way round from one to another, ends included; all in hours.
+CREATE OR REPLACE FUNCTION tunnel_api.clock_between(clock float8, clock_from float8, clock_to float8)
+RETURNS boolean
+LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
+AS $$
+    SELECT $1 - $2 - 12 * floor(($1 - $2) / 12) <= $3 - $2 - 12 * floor(($3 - $2) / 12)
+$$;
+COMMENT ON FUNCTION tunnel_api.clock_between(float8, float8, float8) IS
+'Whether a clock position lies between two others, clockwise and ends included (hours): from 10 to 2 goes over the crown, from 2 to 10 under the floor.';
+
+
+-- Number of the ring that holds a chainage, of a lining of rings of one length, the first of which begins at
+-- first_chainage; all in m. A joint belongs to the ring that begins there, also where its chainage was rounded.
+CREATE OR REPLACE FUNCTION tunnel_api.ring_number(chainage float8, ring_length float8, first_chainage float8)
+RETURNS int
+LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
+AS $$
+    SELECT floor(($1 - $3) / $2 + 1e-9)::int + 1
+$$;
+COMMENT ON FUNCTION tunnel_api.ring_number(float8, float8, float8) IS
+'Number of the ring of a segmental lining that holds a chainage (m), by the length of the rings and the chainage at which ring 1 begins (m), as in ring_statistics; 0 and less before that.';
