@@ -18,12 +18,17 @@ from tunneldb.database import Survey
 from tunneldb.leak.image import BLOCK
 from tunneldb.leak.lining import State
 from tunneldb.leak.raster import Raster, decode
+from tunneldb.leak.store import DARK
 
 Single = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
+Places = NDArray[np.intp]
 
-KEPT = 3
-"""Blocks in memory."""
+KEPT = 6
+"""Blocks in memory: those of a strip of 250 m, and the one before."""
+
+NO_STATE = 255
+"""Where a block has no state."""
 
 HELD = 0.2
 """Lining is shown as seen where at least this share of its pixels holds points: the same share as the median filter needs to
@@ -60,11 +65,9 @@ class Window:
 
     def widened(self, side: float) -> Window:
         """Return the least window of whole pixels of that side, m, which holds it."""
-        low, high = (
-            np.floor(np.array([self.west, self.south]) / side + 1e-6),
-            np.ceil(np.array([self.east, self.north]) / side - 1e-6),
-        )
-        return Window(float(low[0] * side), float(high[0] * side), float(low[1] * side), float(high[1] * side))
+        west, south = (float(np.floor(edge / side + 1e-6) * side) for edge in (self.west, self.south))
+        east, north = (float(np.ceil(edge / side - 1e-6) * side) for edge in (self.east, self.north))
+        return Window(west, east, south, north)
 
 
 @dataclass(frozen=True)
@@ -82,10 +85,36 @@ class Picture:
 
 @dataclass(frozen=True)
 class _Block:
-    """A stored block: corrected intensity, dB, and states (None from before there were states)."""
+    """A stored block.
+
+    Attributes
+    ----------
+    corrected : Raster
+        Corrected intensity, dB.
+    state : (rows, columns) uint8 array or None
+        Values of :class:`State`, NO_STATE for none; None from before there were states.
+    """
 
     corrected: Raster
-    state: Raster | None
+    state: Bytes | None
+
+    def lining(self) -> Single:
+        """Intensity of its lining, thinned, dB."""
+        thin = (slice(None, None, 4), slice(None, None, 4))
+        values = self.corrected.values[thin]
+        held = np.isfinite(values)
+        if self.state is not None:
+            held &= np.isin(self.state[thin], (State.LINING, State.RECESS, DARK))
+        return values[held]
+
+
+@dataclass(frozen=True)
+class _Kilometre:
+    """How a kilometre is drawn: side of its pixels, m, and intensity shown black and white, dB."""
+
+    pixel: float
+    low: float
+    high: float
 
 
 class Lining:
@@ -99,38 +128,33 @@ class Lining:
 
     def __init__(self, conn: psycopg.Connection[Any], survey: Survey) -> None:
         self._conn, self._survey = conn, survey
-        self._kept: OrderedDict[int, _Block | None] = OrderedDict()
         rows = conn.execute(
             "SELECT block, min(km) FROM tunnel.image WHERE survey_id = %s AND kind = 'corrected' GROUP BY block", [survey.id]
         ).fetchall()
         self._km: dict[int, int] = dict(rows)
-        self._span: dict[int, tuple[float, float]] = {}
+        self._kept: OrderedDict[int, _Block] = OrderedDict()
+        self._known: dict[int, _Kilometre] = {}
 
     def picture(self, window: Window, pixel: float) -> Picture | None:
         """Draw a window, None where there is no image.
 
         A pixel of the picture is about so large, m: a whole number of the image's own, which bounds the window anew.
         """
-        blocks = self._blocks(window)
-        if not blocks:
+        numbers = range(int(np.floor(window.west / BLOCK)), int(np.ceil(window.east / BLOCK)))
+        there = {number: self._kilometre(self._km[number]) for number in numbers if number in self._km}
+        if not there:
             return None
-        native = max(block.corrected.transform.a for block in blocks.values())
+        native = max(kilometre.pixel for kilometre in there.values())
         side = native * max(1, round(pixel / native))
         window = window.widened(side)
         canvas = np.full((round(window.height / side), round(window.width / side), 3), NOTHING, np.uint8)
-        for number, block in blocks.items():
-            _paint(canvas, window, side, block, self._span_of(self._km[number]))
+        for number, kilometre in there.items():
+            _paint(canvas, window, side, self._block(number), kilometre)
         out = io.BytesIO()
         Image.fromarray(canvas).save(out, "WEBP", quality=QUALITY, method=4)
         return Picture(window, out.getvalue())
 
-    def _blocks(self, window: Window) -> dict[int, _Block]:
-        """Blocks that a window touches, those that are there."""
-        numbers = range(int(np.floor(window.west / BLOCK)), int(np.ceil(window.east / BLOCK)))
-        found = {number: self._block(number) for number in numbers if number in self._km}
-        return {number: block for number, block in found.items() if block is not None}
-
-    def _block(self, number: int) -> _Block | None:
+    def _block(self, number: int) -> _Block:
         if number in self._kept:
             self._kept.move_to_end(number)
             return self._kept[number]
@@ -142,36 +166,24 @@ class Lining:
                 binary=True,
             ).fetchall()
         )
-        state = decode(rows["state"]) if "state" in rows else None
-        block = _Block(decode(rows["corrected"]), state)
-        self._kept[number] = block
+        state = np.nan_to_num(decode(rows["state"]).values, nan=NO_STATE).astype(np.uint8) if "state" in rows else None
+        self._kept[number] = block = _Block(decode(rows["corrected"]), state)
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)
         return block
 
-    def _span_of(self, km: int) -> tuple[float, float]:
-        """Intensity drawn black and white in a kilometre, dB: the 2nd and 98th percentile of the lining of up to three blocks."""
-        if km not in self._span:
+    def _kilometre(self, km: int) -> _Kilometre:
+        """Intensities are drawn from the 1st to the 98th percentile of the lining in up to three of the kilometre's blocks."""
+        if km not in self._known:
             numbers = sorted(number for number, where in self._km.items() if where == km)
-            held = [self._lining_of(numbers[i]) for i in sorted({0, len(numbers) // 2, len(numbers) - 1})]
-            values = np.concatenate(held)
+            blocks = [self._block(numbers[n]) for n in sorted({0, len(numbers) // 2, len(numbers) - 1})]
+            values = np.concatenate([block.lining() for block in blocks])
             low, high = (float(v) for v in np.percentile(values, [1, 98])) if len(values) else (0.0, 1.0)
-            self._span[km] = low, max(high, low + 0.1)
-        return self._span[km]
-
-    def _lining_of(self, number: int) -> Single:
-        """Intensity of the lining of a block, thinned."""
-        block = self._block(number)
-        assert block is not None
-        values = block.corrected.values[::4, ::4]
-        lining = np.isfinite(values)
-        if block.state is not None:
-            state = block.state.values[::4, ::4]
-            lining &= (state == State.LINING) | (state == State.RECESS) | (state > State.FLOOR)
-        return values[lining]
+            self._known[km] = _Kilometre(blocks[0].corrected.transform.a, low, max(high, low + 0.1))
+        return self._known[km]
 
 
-def _paint(canvas: Bytes, window: Window, side: float, block: _Block, span: tuple[float, float]) -> None:
+def _paint(canvas: Bytes, window: Window, side: float, block: _Block, kilometre: _Kilometre) -> None:
     """Paint what a block shows of a window onto the canvas, whose pixels are of that side, m."""
     transform, (height, width) = block.corrected.transform, block.corrected.values.shape
     # the canvas's column and row that each column and row of the block falls into
@@ -180,22 +192,22 @@ def _paint(canvas: Bytes, window: Window, side: float, block: _Block, span: tupl
     part = _inside(row, canvas.shape[0]), _inside(column, canvas.shape[1])
     row, column = row[part[0]], column[part[1]]
     if len(row) and len(column):
-        state = None if block.state is None else block.state.values[part]
+        state = None if block.state is None else block.state[part]
         there = slice(row[0], row[-1] + 1), slice(column[0], column[-1] + 1)
-        canvas[there] = _colours(block.corrected.values[part], state, (row, column), side, span)
+        canvas[there] = _colours(block.corrected.values[part], state, (row, column), side, kilometre)
 
 
-def _inside(place: NDArray[np.intp], count: int) -> slice:
+def _inside(place: Places, count: int) -> slice:
     """Those of growing places that lie from 0 to ``count`` - 1."""
     return slice(int(np.searchsorted(place, 0)), int(np.searchsorted(place, count)))
 
 
 def _colours(
     values: Single,
-    state: Single | None,
-    places: tuple[NDArray[np.intp], NDArray[np.intp]],
+    state: Bytes | None,
+    places: tuple[Places, Places],
     side: float,
-    span: tuple[float, float],
+    kilometre: _Kilometre,
 ) -> Bytes:
     """Colours of the pixels that rows and columns of a block fall into; both of these places grow without gaps."""
     rows, columns = (np.flatnonzero(np.diff(place, prepend=place[0] - 1)) for place in places)
@@ -211,11 +223,11 @@ def _colours(
     total, count = add(np.ones(values.shape, np.bool_)), add(held)
     level = add(np.where(held, values, 0.0))
     mean = np.where(count > 0, _ratio(level, count), _ratio(smooth(level), smooth(count)))
-    shade = np.clip((mean - span[0]) / (span[1] - span[0]), 0.0, 1.0)
+    shade = np.clip((mean - kilometre.low) / (kilometre.high - kilometre.low), 0.0, 1.0)
     grey = np.repeat(255.0 * np.nan_to_num(shade, nan=0.75), 3).reshape(*shade.shape, 3)
     if state is None:
         return _laid(grey, [(smooth(count) < HELD * smooth(total), UNSEEN, 1.0)])
-    off, floor = add(state == State.OFF), add((state == State.FLOOR) | np.isnan(state))
+    off, floor = add(state == State.OFF), add((state == State.FLOOR) | (state == NO_STATE))
     lining, empty = total - off - floor, add(state == State.EMPTY)
     unseen = smooth(lining - empty) < HELD * smooth(lining)
     return _laid(grey, [(unseen, UNSEEN, 1.0), (off > total / 2, COVERED, 0.55), (floor > total / 2, FLOOR, 0.92)])
@@ -226,7 +238,7 @@ def _ratio(part: Single, whole: Single) -> Single:
     return np.divide(part, whole, out=np.full(part.shape, np.nan, np.float32), where=whole > 1e-3)
 
 
-def _laid(grey: Single, layers: list[tuple[NDArray[np.bool_], tuple[int, int, int], float]]) -> Bytes:
+def _laid(grey: NDArray[Any], layers: list[tuple[NDArray[np.bool_], tuple[int, int, int], float]]) -> Bytes:
     """Lay colours over a picture, each so opaque, where its mask says so."""
     for mask, colour, opaque in layers:
         grey[mask] = (1 - opaque) * grey[mask] + opaque * np.array(colour, np.float32)

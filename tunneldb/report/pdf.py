@@ -31,11 +31,8 @@ def find_browser() -> str:
     stated = os.environ.get("TUNNELDB_BROWSER")
     found = shutil.which(stated) if stated else next((path for name in BROWSERS if (path := shutil.which(name))), None)
     if found is None:
-        said = (
-            f"TUNNELDB_BROWSER is {stated}, which is no program"
-            if stated
-            else "a PDF needs Chromium or Chrome, and none is installed"
-        )
+        lacking = "a PDF needs Chromium or Chrome, and none is installed"
+        said = f"TUNNELDB_BROWSER is {stated}, which is no program" if stated else lacking
         raise UserError(f"{said}: install one, or write the report as .html and print it from a browser")
     return found
 

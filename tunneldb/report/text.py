@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import datetime as dt
+import json
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
 import shapely
+from markupsafe import Markup
 
 from tunneldb.report.data import Edit, Leak, Row
 
@@ -100,8 +102,14 @@ def versions(runs: Sequence[Row]) -> list[dict[str, Any]]:
     ]
 
 
+def script_json(value: Any) -> Markup:
+    """JSON that may stand in a script element."""
+    plain = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return Markup(plain.replace("<", "\\u003c"))
+
+
 def by_clock(leaks: Sequence[Leak]) -> list[dict[str, Any]]:
-    """Return number and area of leaks by hour, from the foot of the left wall over the crown to that of the right, and below."""
+    """Return number and area of leaks by hour: up the left wall, down the right one, and below."""
     hours = [7, 8, 9, 10, 11, 12, 1, 2, 3, 4, 5, 6]
     tally = {hour: {"name": str(hour), "count": 0, "area": 0.0} for hour in hours}
     for leak in leaks:
@@ -117,7 +125,7 @@ SIZES = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0)
 
 def by_size(leaks: Sequence[Leak]) -> list[dict[str, Any]]:
     """Return number and area of leaks by their size."""
-    names = [f"≤ {SIZES[0]:g}", *(f"{a:g}{DASH}{b:g}" for a, b in zip(SIZES, SIZES[1:], strict=False)), f"> {SIZES[-1]:g}"]
+    names = [f"≤ {SIZES[0]:g}", *(f"{a:g}{DASH}{b:g}" for a, b in pairwise(SIZES)), f"> {SIZES[-1]:g}"]
     bars: list[dict[str, Any]] = [{"name": name, "count": 0, "area": 0.0} for name in names]
     for leak in leaks:
         bar = bars[sum(leak.area > limit for limit in SIZES)]
