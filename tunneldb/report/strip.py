@@ -1,0 +1,202 @@
+"""The lining strip by strip: pictures with the leaks on them, and what each leak shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import psycopg
+from markupsafe import Markup
+
+from tunneldb.database import Survey
+from tunneldb.report import text
+from tunneldb.report.data import Coverage, Leak, label_chainages
+from tunneldb.report.drawing import Section, Sign, near, outline_path, place_signs, share_path, ticks, without_detection
+from tunneldb.report.lining import Lining, Picture, Window
+
+PICTURE, SHAPE = 256, 4 / 3
+"""Width of a leak's picture at most, pixels, and its width for its height."""
+
+LEAST = 3.0
+"""Width of the lining that a leak's picture shows at least, m."""
+
+STRIP_PIXELS = 1600
+"""Width of the picture of a strip, pixels."""
+
+LETTERS = 80
+"""Height of letters beside a strip: so many make its length."""
+
+SLIVER = 0.1
+"""A last strip shorter than this is left out, m."""
+
+Progress = Callable[[int, int], None]
+"""Takes how many strips are drawn, and of how many."""
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A stretch of the lining as a picture with its leaks; lengths in m, y downwards from the greatest arc.
+
+    Attributes
+    ----------
+    low, left, high : float
+        Chainage at which its drawing begins, how far from there its picture does, and the chainage at which it ends.
+    title : str
+        Both, in the tunnel's stationing.
+    picture : Picture or None
+        None where there is no image.
+    ticks : list of (float, str)
+        Chainage and label.
+    leaks : list of (Leak, str)
+        Leaks with the path of their outline, x from ``low``.
+    signs : list of Sign
+        Their numbers.
+    ribbon : str
+        Path of the share seen.
+    blank : list of (float, float)
+        Where detection did not run.
+    summary : str
+        How many leaks, how much was seen.
+    details : Markup
+        What the leaks whose middle lies in it show, as JSON.
+    """
+
+    low: float
+    left: float
+    high: float
+    title: str
+    picture: Picture | None
+    ticks: list[tuple[float, str]]
+    leaks: list[tuple[Leak, str]]
+    signs: list[Sign]
+    ribbon: str
+    blank: list[tuple[float, float]]
+    summary: str
+    details: Markup
+
+
+def strip_length(length: float) -> float:
+    """Length of a strip, m, for a stretch so long: no more than about a hundred."""
+    return 50.0 if length <= 500 else 100.0 if length <= 5000 else 250.0 if length <= 50_000 else 500.0
+
+
+class Strips:
+    """Draws the strips of a stretch, one after another.
+
+    Parameters
+    ----------
+    conn, survey
+        Where from.
+    low, high : float
+        The stretch, m.
+    leaks : sequence of Leak
+        Leaks in it.
+    coverage : Coverage
+        What was seen of it.
+    pictured : collection of int
+        Leaks that get a picture, by their id.
+    progress : callable
+        Told after each strip.
+
+    Attributes
+    ----------
+    length : float
+        Length of a strip, m.
+    south, north : float
+        Least and greatest arc, m.
+    """
+
+    def __init__(
+        self,
+        conn: psycopg.Connection[Any],
+        survey: Survey,
+        low: float,
+        high: float,
+        leaks: Sequence[Leak],
+        coverage: Coverage,
+        pictured: Collection[int],
+        progress: Progress,
+    ) -> None:
+        self.conn, self.survey, self.low, self.high = conn, survey, low, high
+        self.leaks, self.coverage, self._pictured, self.progress = leaks, coverage, pictured, progress
+        self.length = strip_length(high - low)
+        row = conn.execute(
+            "SELECT min(arc[1]), max(arc[361]) FROM tunnel.section WHERE survey_id = %s AND chainage BETWEEN %s AND %s",
+            [survey.id, low - survey.spacing, high + survey.spacing],
+        ).fetchone()
+        assert row is not None
+        self.south, self.north = (-9.0, 9.0) if row[0] is None else (float(row[0]), float(row[1]))
+
+    def of(self, leak: Leak) -> int:
+        """Begin of the strip that shows a leak's middle, m."""
+        inside = min(max(leak.middle, self.low), self.high - SLIVER)
+        return int(np.floor(inside / self.length) * self.length)
+
+    def __iter__(self) -> Iterator[Strip]:
+        """Draw one strip after another."""
+        lining = Lining(self.conn, self.survey)
+        starts = np.arange(np.floor(self.low / self.length), np.ceil((self.high - SLIVER) / self.length)) * self.length
+        for done, start in enumerate(starts.tolist(), start=1):
+            low, high = max(start, self.low), min(start + self.length, self.high)
+            yield self._strip(lining, start, low, high)
+            self.progress(done, len(starts))
+
+    def _strip(self, lining: Lining, start: float, low: float, high: float) -> Strip:
+        leaks = [leak for leak in self.leaks if leak.chainage_to > low and leak.chainage_from < high]
+        seen = self.coverage
+        inside = (seen.edges[:-1] < high) & (seen.edges[1:] > low)
+        total = seen.lining[inside].sum()
+        wet = [leak for leak in leaks if leak.counts]
+        places = ticks(low, high, self.length / 10)
+        names = label_chainages(self.conn, self.survey, [low, high, *places])
+        picture = lining.picture(Window(low, high, self.south, self.north), self.length / STRIP_PIXELS)
+        share = text.percent(seen.seen[inside].sum() / total) if total > 0 else "nothing"
+        return Strip(
+            low=start,
+            left=low - start,
+            high=high,
+            title=f"{text.short(names[0])} to {text.short(names[1])}",
+            picture=picture,
+            ticks=[(place, text.short(name)) for place, name in zip(places, names[2:], strict=True)],
+            leaks=[(leak, outline_path(leak.outline, start, self.north, self.length / 2000)) for leak in leaks],
+            signs=place_signs(wet, start, start + self.length, self.length / LETTERS * 0.6),
+            ribbon=share_path(seen, start, high, 0.0, 0.8 * self.length / LETTERS),
+            blank=without_detection(seen, low, high),
+            summary=f"{len(wet)} leak{'s' * (len(wet) != 1)}, {share} of the lining seen",
+            details=text.script_json(self._details(lining, [leak for leak in leaks if self.of(leak) == int(start)])),
+        )
+
+    def _details(self, lining: Lining, leaks: list[Leak]) -> dict[int, Any]:
+        """Return picture, outline and section of leaks, by their id."""
+        leaks = [leak for leak in leaks if leak.id in self._pictured]
+        if not leaks:
+            return {}
+        sections = self._sections(min(leak.middle for leak in leaks), max(leak.middle for leak in leaks))
+        details = {}
+        for leak in leaks:
+            window = Window(*near(leak, LEAST, SHAPE))
+            picture = lining.picture(window, window.width / PICTURE)
+            window = window if picture is None else picture.window
+            detail: dict[str, Any] = {
+                "size": [round(window.width, 2), round(window.height, 2)],
+                "outline": outline_path(leak.outline, window.west, window.north, window.width / 400),
+            }
+            if picture is not None:
+                detail["picture"] = picture.base64
+            if sections:
+                chainage, section = min(sections, key=lambda known: abs(known[0] - leak.middle))
+                detail |= {
+                    "box": section.box(), "section": section.path(), "band": section.band(leak.arc_from, leak.arc_to),
+                    "at": round(chainage - leak.middle, 1),
+                }  # fmt: skip
+            details[leak.id] = detail
+        return details
+
+    def _sections(self, low: float, high: float) -> list[tuple[float, Section]]:
+        rows = self.conn.execute(
+            "SELECT chainage, radius, arc FROM tunnel.section WHERE survey_id = %s AND chainage BETWEEN %s AND %s ORDER BY 1",
+            [self.survey.id, low - self.survey.spacing, high + self.survey.spacing],
+        ).fetchall()
+        return [(chainage, Section.of(radius, arc)) for chainage, radius, arc in rows]
