@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import cast
 
@@ -10,6 +11,7 @@ import psycopg
 from rich.console import Console
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
@@ -29,6 +31,8 @@ from tunneldb.job.run import loaded_kilometres, parse_km
 
 _BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
 _WIDTH = 180
+_HOUR = r"(1[0-2]|[1-9])(?::([0-5]\d))?"
+_CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
 
 
 @click.command()
@@ -55,6 +59,8 @@ _WIDTH = 180
 )
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write.")
 @click.option("--km", metavar="A-B", help="Only these kilometres: 12 or 12-14.")
+@stretch_options
+@click.option("--clock", metavar="A-B", help="Only those between these hours, clockwise; 12 is the crown: 10-2 or 10:30-1:30.")
 @click.option("--min-area", type=click.FloatRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
 @click.option("--by-km", is_flag=True, help="Leaks of each kilometre summed up instead, with its class of waterproofing.")
 @click.pass_obj
@@ -66,10 +72,15 @@ def leaks(
     form: str | None,
     output: Path | None,
     km: str | None,
+    start: str | None,
+    end: str | None,
+    clock: str | None,
     min_area: float,
     by_km: bool,
 ) -> None:
     """List the leaks of SURVEY, or what else is dark on its lining, or export them.
+
+    Of a stretch those are listed that reach into it; of hours of the clock, looking up-chainage, those whose middle lies there.
 
     With --by-km a line for each kilometre: wet area and number of leaks, the most in any 100 m² of lining, and the best
     class of GB 50108-2008 that the lining seen keeps, as far as a scan can tell. Any other stretch, and what breaks a
@@ -79,15 +90,18 @@ def leaks(
     form = form or (_BY_SUFFIX.get(output.suffix.lower(), "table") if output else "table")
     if form == "gpkg" and output is None:
         raise UserError("a GeoPackage needs a file to be written to: add -o leaks.gpkg")
-    if by_km and (output is not None or form != "table" or kind != "leak" or min_area > 0):
+    parted = start is not None or end is not None or clock is not None
+    if by_km and (output is not None or form != "table" or kind != "leak" or min_area > 0 or parted):
         raise UserError("--by-km prints a table of all leaks; elsewhere read the view tunnel_api.km_waterproof")
+    hours = parse_clock(clock) if clock else None
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
         kilometres = parse_km(km, loaded_kilometres(conn, found)) if km else None
         if by_km:
             _print_classes(conn, found, kilometres)
             return
-        rows = read_leaks(conn, found, chosen, kilometres, min_area, what)
+        stretch = parse_stretch(conn, found, start, end)
+        rows = read_leaks(conn, found, chosen, kilometres, min_area, what, stretch.low, stretch.high, hours)
     if output is None:
         _print(rows, form, chosen, what, found)
         return
@@ -97,6 +111,23 @@ def leaks(
         else:
             temporary.write_text(_text(rows, form, chosen, what, found), encoding="utf-8")
     click.echo(f"{total(rows, what)} to {output}", err=True)
+
+
+def parse_clock(text: str) -> tuple[float, float]:
+    """Return the hours of a part of the clock given as ``10-2`` or ``10:30-1:30``.
+
+    Raises
+    ------
+    UserError
+        When it is no such part.
+    """
+    part = _CLOCK.fullmatch(text.strip())
+    if part is None:
+        raise UserError(f"--clock takes hours from 1 to 12, as 10-2 or 10:30-1:30, not {text!r}")
+    hours = [int(part[n]) % 12 + int(part[n + 1] or 0) / 60 for n in (1, 3)]
+    if hours[0] == hours[1]:
+        raise UserError(f"--clock {text} is one position; give two, as 10-2")
+    return hours[0], hours[1]
 
 
 def _print_classes(conn: psycopg.Connection, survey: Survey, kilometres: list[int] | None) -> None:

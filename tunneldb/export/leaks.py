@@ -6,6 +6,7 @@ import csv
 import datetime as dt
 import io
 import json
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -109,6 +110,9 @@ def read_leaks(
     kilometres: Sequence[int] | None = None,
     min_area: float = 0.0,
     kind: Kind = "leak",
+    low: float = -math.inf,
+    high: float = math.inf,
+    clock: tuple[float, float] | None = None,
 ) -> list[Anomaly]:
     """Read the leaks of a survey, or what else is dark on its lining, in order of chainage.
 
@@ -126,16 +130,29 @@ def read_leaks(
         Smaller ones are left out, m².
     kind : {'leak', 'joint', 'dark', 'all'}
         What to read.
+    low, high : float
+        Only those that reach between these chainages, m.
+    clock : (float, float), optional
+        Only those whose middle lies between these hours, clockwise.
     """
     query = sql.SQL(
         "SELECT {columns}, public.ST_AsBinary({geometry}) FROM tunnel_api.anomaly"
         " WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed')"
         " AND (%(km)s::int[] IS NULL OR km = ANY (%(km)s)) AND area >= %(min_area)s"
-        " AND %(kind)s IN (kind, 'all')"
+        " AND %(kind)s IN (kind, 'all') AND chainage_to >= %(low)s AND chainage_from <= %(high)s"
+        " AND (%(clock)s::float8[] IS NULL OR tunnel_api.clock_between(clock, (%(clock)s)[1], (%(clock)s)[2]))"
         " ORDER BY chainage_from, arc_from, id"
     ).format(columns=sql.SQL(", ").join(map(sql.Identifier, COLUMNS)), geometry=sql.Identifier(_COLUMN[geometry]))
-    wanted = None if kilometres is None else list(kilometres)
-    rows = conn.execute(query, {"survey": survey.id, "km": wanted, "min_area": min_area, "kind": kind}).fetchall()
+    asked = {
+        "survey": survey.id,
+        "km": None if kilometres is None else list(kilometres),
+        "min_area": min_area,
+        "kind": kind,
+        "low": low,
+        "high": high,
+        "clock": None if clock is None else list(clock),
+    }
+    rows = conn.execute(query, asked).fetchall()
     names = [*COLUMNS, "geometry"]
     return [Anomaly(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True))) for row in rows]
 
