@@ -24,6 +24,7 @@ PROFILE: dict[str, ProfileKind] = {"CONSTANTGRADIENT": "grade", "PARABOLICARC": 
 SAME_STATION = 0.001  # m; a station that goes on as before begins no new piece
 SCHEMAS = ("IFC4X3", "IFC4X3_TC1", "IFC4X3_ADD1", "IFC4X3_ADD2")
 HEADER = 10_000  # characters within which a file names its schema
+ARM = 1e6  # m by which directions on the map are found; a short one would not carry over coordinates of millions
 LARGEST_SCALE = 1e-6  # by which a map scale may differ from 1 before lengths in plan are no longer those of the map
 
 
@@ -119,9 +120,9 @@ class Ifc:
         if abs(matrix[2, 2] - 1.0) > 1e-9:
             raise UserError(f"{self._path}: the placement of alignment {alignment.Name!r} is tilted, so it has no plan")
         unit = self._map_unit()
-        corners = [matrix @ (x, 0.0, 0.0, 1.0) for x in (0.0, 1.0 / self._unit)]
+        corners = [matrix @ (x, 0.0, 0.0, 1.0) for x in (0.0, ARM / self._unit)]
         origin, aside = (np.array(auto_xyz2enh(self._file, *corner[:3]), dtype=np.float64) * unit for corner in corners)
-        step = aside - origin
+        step = (aside - origin) / ARM
         scale = float(np.hypot(step[0], step[1]))
         if abs(scale - 1.0) > LARGEST_SCALE:
             raise UserError(
