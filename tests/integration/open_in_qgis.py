@@ -33,6 +33,7 @@ from qgis.core import (
     QgsProject,
     QgsReadWriteContext,
     QgsRectangle,
+    QgsRenderContext,
     QgsVectorLayer,
     QgsVectorLayerUtils,
     QgsWkbTypes,
@@ -113,7 +114,8 @@ def atlas(project: QgsProject, path: str) -> dict[str, Any]:
     layout = project.layoutManager().layoutByName("Inspection sheets")
     sheets = layout.atlas()
     settings = QgsLayoutExporter.PdfExportSettings()
-    settings.rasterizeWholeImage = False
+    wanted = int(layout.customProperty("pdfTextFormat"))  # as the dialogue takes it from there
+    settings.textRenderFormat = QgsRenderContext.TextRenderFormat(wanted)
     result, error = QgsLayoutExporter.exportToPdf(sheets, path, settings)
     return {"saved": result == QgsLayoutExporter.Success, "error": error, "sheets": sheets.count()}
 

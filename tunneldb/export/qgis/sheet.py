@@ -94,6 +94,7 @@ def layouts(survey: Survey, extent: Extent, coverage: tuple[str, str], leaks: tu
     )  # fmt: skip
     options = ET.SubElement(ET.SubElement(layout, "customproperties"), "Option", type="Map")
     ET.SubElement(options, "Option", type="bool", name="singleFile", value="true")
+    ET.SubElement(options, "Option", type="int", name="pdfTextFormat", value="1")  # text that can be searched, not outlines
     return root
 
 
