@@ -3,56 +3,94 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
+import psycopg
 
 from tunneldb.cli.classes import print_classes, told_to_end
 from tunneldb.cli.main import Settings
 from tunneldb.cli.progress import points_bar, step
-from tunneldb.database import connect, get_survey
+from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
+from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.export.atomic import make_folder
+from tunneldb.export.atomic import make_folder, replacing
 from tunneldb.job.run import loaded_kilometres, parse_km
+
+_PLAIN = (".gpkg", ".dxf")
 
 
 @click.command()
 @click.argument("survey")
-@click.option("--classified", is_flag=True, help="Scan files at full density, each point with its class.")
 @click.option(
     "-o",
     "--output",
     required=True,
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder to write to; made if it isn't there.",
+    type=click.Path(path_type=Path),
+    help="File to write, .gpkg or .dxf; with --classified a folder, made if it isn't there.",
 )
-@click.option("--km", metavar="A-B", help="Only files that touch these kilometres: 12 or 12-14.")
+@stretch_options
+@click.option("--classified", is_flag=True, help="Scan files at full density, each point with its class.")
+@click.option("--km", metavar="A-B", help="With --classified: only files that touch these kilometres, 12 or 12-14.")
 @click.pass_obj
-def export(settings: Settings, survey: str, classified: bool, output: Path, km: str | None) -> None:
-    """Write the scan files of SURVEY again, as LAZ 1.4 with the class of each point.
+def export(
+    settings: Settings, survey: str, output: Path, start: str | None, end: str | None, classified: bool, km: str | None
+) -> None:
+    """Write SURVEY for programs that don't reach the database: as GeoPackage, as DXF drawing, or its classed scan files.
 
-    The classes are those of stage ground, which must have run and be up to date in every kilometre that a file touches: 2
-    ground, 64 lining, 65 niche, 66 appendage, 67 rail, 68 object, 69 target sphere, 70 noise, 1 outside of the surveyed
-    tunnel. All else stays as it is in the files. A file is written whole and once, also where it touches several
-    kilometres; it appears when it is complete, and is never written over a file of the survey.
+    A GeoPackage holds what the QGIS project shows, in layers of the same names with their styles, and chainage ticks and
+    the lining laid flat besides. Layers of the unrolled plane (x is the chainage, y the arc, m) are in an undefined
+    Cartesian system there, all others in the tunnel's.
+
+    A DXF drawing (2010, metres) holds axis, sections and leaks in their true places, with chainage ticks; below the map
+    the unrolled lining and, side by side, the profiles of the sections, with what leaks on them. What an inspector
+    rejected isn't drawn.
+
+    With --classified the scan files are written again, as LAZ 1.4 with the class of each point. The classes are those of
+    stage ground, which must have run and be up to date in every kilometre that a file touches: 2 ground, 64 lining, 65
+    niche, 66 appendage, 67 rail, 68 object, 69 target sphere, 70 noise, 1 outside of the surveyed tunnel. All else stays as
+    it is in the files. A file is written whole and once, also where it touches several kilometres; it appears when it is
+    complete, and is never written over a file of the survey.
     """
-    if not classified:
-        raise UserError(f"say what to export: tunneldb export {survey} --classified -o {output}")
-    from tunneldb.export.classified import export_classified
-
-    total = np.zeros(256, np.int64)
+    if classified and (start is not None or end is not None):
+        raise UserError("--classified writes whole scan files: choose them by --km, not by --from and --to")
+    if not classified and km is not None:
+        raise UserError("--km goes with --classified: a stretch of a GeoPackage or DXF is chosen by --from and --to")
+    if not classified and output.suffix.lower() not in _PLAIN:
+        raise UserError(f"{output}: say by the ending what to write, .gpkg or .dxf; scan files by --classified")
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
-        there = loaded_kilometres(conn, found)
-        if not there:
-            raise UserError(f"survey {survey} holds no points yet: tunneldb load {survey} FILE...")
-        wanted = parse_km(km, there)
-        conn.rollback()
-        make_folder(output)
-        with told_to_end(), points_bar() as progress:
-            for file in export_classified(conn, found, output, wanted, step(progress)):
-                points = int(file.counts.sum())
-                rate = points / file.seconds / 1e6
-                click.echo(f"{file.path}: {points} points, {rate:.1f} million/s", err=True)
-                total += file.counts
+        if classified:
+            _write_classified(conn, found, output, km)
+        else:
+            _write_plain(conn, found, output, parse_stretch(conn, found, start, end))
+
+
+def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, stretch: Stretch) -> None:
+    from tunneldb.export.plain import write_survey
+
+    with replacing(output) as temporary:
+        counts = write_survey(conn, survey, stretch.low, stretch.high, temporary)
+    click.echo(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count), err=True)
+
+
+def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Path, km: str | None) -> None:
+    from tunneldb.export.classified import export_classified
+
+    if output.exists() and not output.is_dir():
+        raise UserError(f"{output}: --classified writes a file for each scan file: name a folder")
+    total = np.zeros(256, np.int64)
+    there = loaded_kilometres(conn, survey)
+    if not there:
+        raise UserError(f"survey {survey.name} holds no points yet: tunneldb load {survey.name} FILE...")
+    wanted = parse_km(km, there)
+    conn.rollback()
+    make_folder(output)
+    with told_to_end(), points_bar() as progress:
+        for file in export_classified(conn, survey, output, wanted, step(progress)):
+            points = int(file.counts.sum())
+            rate = points / file.seconds / 1e6
+            click.echo(f"{file.path}: {points} points, {rate:.1f} million/s", err=True)
+            total += file.counts
     print_classes(total)

@@ -1,0 +1,42 @@
+"""A survey for programs that don't reach the database: GeoPackage and DXF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import psycopg
+
+from tunneldb.database import Survey
+from tunneldb.errors import UserError
+from tunneldb.geometry.store import load_surface
+
+
+def write_survey(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float, path: Path) -> dict[str, int]:
+    """Write a stretch of a survey as a file of the kind that its ending says, and return how much of each layer.
+
+    Parameters
+    ----------
+    conn, survey
+        What is read.
+    low, high : float
+        Chainage, m; infinite for the whole survey.
+    path : Path
+        File that isn't there yet, ``.gpkg`` or ``.dxf``.
+
+    Raises
+    ------
+    UserError
+        The survey has no sections yet, or nothing between the two chainages.
+    """
+    row = conn.execute("SELECT chainage_from, chainage_to FROM tunnel_api.survey_ends(%s)", [survey.id]).fetchone()
+    if row is not None and row[0] is not None and (row[0] >= high or row[1] <= low):
+        raise UserError(f"survey {survey.name} has nothing there: it lies between chainages {row[0]:.3f} and {row[1]:.3f} m")
+    surface = load_surface(conn, survey, low, high)
+    if path.suffix.lower() == ".gpkg":
+        from tunneldb.export.plain.gpkg import write_survey_gpkg
+
+        return write_survey_gpkg(conn, survey, surface, low, high, path)
+    from tunneldb.export.plain.dxf import write_survey_dxf
+
+    return write_survey_dxf(conn, survey, surface, low, high, path)
