@@ -30,6 +30,9 @@ Geometry = Literal["unrolled", "map", "3d"]
 Kind = Literal["leak", "joint", "dark", "all"]
 """What is listed: leaks, joints, what else is dark but dry, or all of it."""
 
+UNDEFINED_CARTESIAN = {"SRID": "-1"}
+"""Coordinate system of the unrolled plane in a GeoPackage, by its standard."""
+
 DECIMALS = 4
 """Decimals of coordinates in text, m."""
 
@@ -254,6 +257,7 @@ def _write_layer(
         crs=None if geometry == "unrolled" else f"EPSG:{srid}",
         driver="GPKG",
         layer=layer,
+        **(UNDEFINED_CARTESIAN if geometry == "unrolled" else {}),
     )
 
 

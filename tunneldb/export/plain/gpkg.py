@@ -15,15 +15,13 @@ import shapely
 
 from tunneldb import __version__
 from tunneldb.database import Survey
+from tunneldb.export.leaks import UNDEFINED_CARTESIAN
 from tunneldb.export.plain.lines import edges, is_hundred, on_map, outline, stretches, tick_chainages, ticks
 from tunneldb.export.plain.places import crs_text, labels
 from tunneldb.export.plain.table import Column, Table, read_table
 from tunneldb.export.qgis.layer import LAYERS, VectorLayer
 from tunneldb.export.qgis.styles import STYLE_NAME, style_text
 from tunneldb.geometry.surface import Surface
-
-UNDEFINED = "-1"
-"""Coordinate system of the unrolled plane by the standard: undefined, Cartesian."""
 
 VERSION = {"VERSION": "1.2"}
 """Of the GeoPackage: one that QGIS and others of some years ago read without a warning."""
@@ -107,7 +105,7 @@ def _write(path: Path, name: str, table: Table, wkb: str, crs: str | None) -> No
             driver="GPKG",
             layer=name,
             DESCRIPTION=table.description,
-            **({} if crs else {"SRID": UNDEFINED}),
+            **({} if crs else UNDEFINED_CARTESIAN),
             **VERSION,
         )
 
