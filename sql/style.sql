@@ -1,5 +1,5 @@
--- Table in which QGIS looks for the style of a layer that somebody adds by hand; `tunneldb qgis` fills it. Laid out as
--- QGIS makes it, in its place: schema public. Runs after role.sql, for its grants.
+-- Tables in which QGIS looks for the style of a layer that somebody adds by hand, and for projects; `tunneldb qgis` fills
+-- them. Laid out as QGIS makes them, in their place: schema public. Runs after role.sql, for its grants.
 
 DO $$
 BEGIN
@@ -36,6 +36,29 @@ BEGIN
         IF to_regrole('tunnel_operator') IS NOT NULL THEN
             GRANT INSERT, UPDATE, DELETE ON public.layer_styles TO tunnel_operator;
             GRANT USAGE ON SEQUENCE public.layer_styles_id_seq TO tunnel_operator;
+        END IF;
+    END IF;
+END
+$$;
+
+DO $$
+BEGIN
+    IF to_regclass('public.qgis_projects') IS NULL THEN
+        BEGIN
+            CREATE TABLE public.qgis_projects (name text PRIMARY KEY, metadata jsonb, content bytea);
+            COMMENT ON TABLE public.qgis_projects IS 'Projects that QGIS opens from the database';
+        EXCEPTION WHEN insufficient_privilege THEN
+            RAISE WARNING '% may not create public.qgis_projects, in which QGIS looks for projects', current_user;
+        END;
+    END IF;
+    IF to_regclass('public.qgis_projects') IS NOT NULL
+       AND pg_has_role(current_user, (SELECT relowner FROM pg_class WHERE oid = 'public.qgis_projects'::regclass), 'USAGE')
+    THEN
+        IF to_regrole('tunnel_viewer') IS NOT NULL THEN
+            GRANT SELECT ON public.qgis_projects TO tunnel_viewer;
+        END IF;
+        IF to_regrole('tunnel_operator') IS NOT NULL THEN
+            GRANT INSERT, UPDATE, DELETE ON public.qgis_projects TO tunnel_operator;
         END IF;
     END IF;
 END

@@ -69,17 +69,22 @@ def template(example_template: str) -> str:
     return example_template
 
 
-def write(output: Path, *options: str, dsn: str | None = None) -> Result:
+def write(output: Path | None, *options: str, dsn: str | None = None) -> Result:
     where = [] if dsn is None else ["--dsn", dsn]
-    return CliRunner().invoke(main, [*where, "qgis", "demo-2024", "-o", str(output), *options])
+    file = [] if output is None else ["-o", str(output)]
+    return CliRunner().invoke(main, [*where, "qgis", "demo-2024", *file, *options])
 
 
-def act(project: Path, *arguments: str) -> dict[str, Any]:
+def act(project: Path | str, *arguments: str, **environment: str) -> dict[str, Any]:
     """Run an action on a project in QGIS."""
     if not has_qgis():
         pytest.skip("QGIS is not installed")
     done = subprocess.run(
-        [PYTHON, str(SCRIPT), str(project), *arguments], env=ENVIRONMENT, capture_output=True, text=True, check=False
+        [PYTHON, str(SCRIPT), str(project), *arguments],
+        env=ENVIRONMENT | environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout.splitlines()[-1])
@@ -468,6 +473,49 @@ def test_offset_is_shown_where_there_is_no_intensity(conn: psycopg.Connection, e
     assert set(act(tmp_path / "demo.qgz", "describe")["themes"]["Unrolled"]) == {
         *UNROLLED, "demo-2024-km012-offset",
     } - NOT_AT_FIRST  # fmt: skip
+
+
+def test_project_in_the_database_opens_for_a_viewer(
+    conn: psycopg.Connection, server_dsn: str, example: str, tmp_path: Path
+) -> None:
+    conn.execute("DELETE FROM tunnel.image WHERE kind <> 'corrected'")
+    conn.execute("CREATE ROLE looker LOGIN IN ROLE tunnel_viewer")
+    conn.commit()
+    images = tmp_path / "some where" / "images"
+    (tmp_path / "service.conf").write_text(
+        f"[tunnels]\nhost={conn.info.host}\nport={conn.info.port}\ndbname={conn.info.dbname}\nuser=looker\n"
+    )
+    for _ in range(2):  # the second takes the place of the first
+        result = write(None, "--database", "--service", "tunnels", "--images", str(images))
+        assert result.exit_code == 0, result.output
+    assert conn.execute("SELECT name FROM public.qgis_projects").fetchall() == [("demo-2024",)]
+    stored = "postgresql:?service=tunnels&sslmode=disable&dbname=&schema=public&project=demo-2024"
+    seen = act(stored, "describe", PGSERVICEFILE=str(tmp_path / "service.conf"))
+    conn.execute("DROP ROLE looker")
+    conn.commit()
+    assert all(layer["valid"] for layer in seen["layers"].values())
+    assert seen["layers"]["demo-2024-km012-corrected"]["source"] == str(images / "demo-2024-km012-corrected.tif")
+    assert seen["layers"]["leak_map"]["features"] == len(LEAKS)
+    assert seen["bookmarks"] == ["Map", "Unrolled", "Unrolled, km 12"]
+    assert list(tmp_path.glob("*.qg?")) == []
+
+
+def test_project_goes_into_file_and_database(
+    conn: psycopg.Connection, example: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    conn.execute("DELETE FROM tunnel.image WHERE block <> 246 OR kind <> 'raw'")
+    conn.commit()
+    monkeypatch.chdir(tmp_path)
+    assert write(tmp_path / "demo.qgz", "--database", "the demo").exit_code == 0
+    content, by = conn.execute("SELECT content, metadata ->> 'last_modified_user' FROM public.qgis_projects").fetchone()  # type: ignore[misc]
+    (tmp_path / "stored.qgz").write_bytes(content)
+    image = tmp_path / "demo-images" / "demo-2024-km012-raw.tif"
+    assert f"<datasource>{image}</datasource>" in qgs(tmp_path / "stored.qgz")
+    assert f"<datasource>./{image.relative_to(tmp_path)}</datasource>" in qgs(tmp_path / "demo.qgz")
+    assert (by,) == conn.execute("SELECT session_user::text").fetchone()
+    assert write(None, "--database").exit_code == 0
+    assert (tmp_path / "demo-2024-images" / image.name).exists()
+    assert write(None).exit_code == 2
 
 
 def test_socket_that_qgis_cannot_reach_is_refused(conn: psycopg.Connection, dsn: str, example: str, tmp_path: Path) -> None:

@@ -10,34 +10,62 @@ import psycopg
 from tunneldb.cli.main import Settings
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
+from tunneldb.export.atomic import make_folder
 from tunneldb.export.image import export_kilometre, image_kilometres
-from tunneldb.export.qgis import store_styles, write_project
+from tunneldb.export.qgis import store_project, store_styles, write_project
 
 
 @click.command()
 @click.argument("survey")
 @click.option(
-    "-o", "--output", required=True, type=click.Path(dir_okay=False, path_type=Path),
+    "-o", "--output", type=click.Path(dir_okay=False, path_type=Path),
     help="Project to write, .qgz or .qgs; its images go into a folder beside it.",
+)  # fmt: skip
+@click.option(
+    "--database", "name", is_flag=False, flag_value="", metavar="[NAME]",
+    help="Put the project into the database, under this name or the survey's; in QGIS: Project, Open From, PostgreSQL.",
+)  # fmt: skip
+@click.option(
+    "--images", "folder", type=click.Path(file_okay=False, path_type=Path),
+    help="Folder of the images, one that all who open the project can reach; else FILE-images, or SURVEY-images here.",
 )  # fmt: skip
 @click.option("--service", metavar="NAME", help="Let the project connect by this entry of pg_service.conf (never a password).")
 @click.pass_obj
-def qgis(settings: Settings, survey: str, output: Path, service: str | None) -> None:
-    """Write a QGIS project of SURVEY: map, unrolled lining and 3D, with styled layers.
+def qgis(
+    settings: Settings, survey: str, output: Path | None, name: str | None, folder: Path | None, service: str | None
+) -> None:
+    """Write a QGIS project of SURVEY: map, unrolled lining, 3D and inspection sheets, with styled layers.
 
     Leaks can be reviewed and axis vertices moved in it. The styles also go into the database, where QGIS finds them
-    for layers that are added by hand.
-    """
-    if output.suffix.lower() not in (".qgz", ".qgs"):
+    for layers that are added by hand. A project in the database holds the images by their absolute paths.
+
+    \b
+      tunneldb qgis demo-2024 -o demo.qgz
+      tunneldb qgis demo-2024 --database --images /srv/tunnels/demo-2024
+      tunneldb qgis demo-2024 -o demo.qgz --database demo --service tunnels
+    """  # noqa: D301 - \b is click's mark for lines to be kept
+    if output is None and name is None:
+        raise UserError("say where the project goes: -o FILE.qgz, or --database")
+    if output is not None and output.suffix.lower() not in (".qgz", ".qgs"):
         raise UserError(f"{output}: a QGIS project ends in .qgz or .qgs")
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
-        images = _export_images(conn, found, output.with_name(f"{output.stem}-images"))
-        write_project(conn, found, output, images, service)
+        beside = Path(f"{found.name}-images") if output is None else output.with_name(f"{output.stem}-images")
+        images = _export_images(conn, found, folder or beside)
+        written = []
+        if output is not None:
+            write_project(conn, found, output, images, service)
+            written.append(str(output))
+        if name is not None:
+            store_project(conn, found, name or found.name, images, service)
+            written.append(f"project {name or found.name} in public.qgis_projects")
         styles = _store_styles(conn)
-    click.echo(f"{output}: {len(images)} images, {styles}", err=True)
+        socket = conn.info.host.startswith("/")
+    click.echo(f"{', '.join(written)}: {len(images)} images, {styles}", err=True)
     if settings.dsn is None and service is None:
         click.echo("QGIS reads your own server; should it be stopped: tunneldb server start", err=True)
+    if name is not None and socket:
+        click.echo("QGIS finds projects behind a socket only by an entry of pg_service.conf: docs/howto-qgis.md", err=True)
 
 
 def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> list[Path]:
@@ -45,10 +73,7 @@ def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> li
     kilometres = image_kilometres(conn, survey)
     conn.rollback()
     if kilometres:
-        try:
-            folder.mkdir(exist_ok=True)
-        except OSError as error:
-            raise UserError(f"{folder}: cannot be made: {error.strerror}") from error
+        make_folder(folder)
     written = [path for km in kilometres for path in export_kilometre(conn, survey, km, folder)]
     return [path for path in written if path.suffix == ".tif"]
 

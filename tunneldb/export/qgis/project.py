@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import uuid
 import xml.etree.ElementTree as ET
@@ -15,6 +16,7 @@ import psycopg
 
 from tunneldb import __version__
 from tunneldb.database import Survey
+from tunneldb.errors import UserError
 from tunneldb.export.atomic import replacing
 from tunneldb.export.qgis.crs import crs_element, no_crs
 from tunneldb.export.qgis.extent import Extent, View, first_window, map_extent, sheet_extent, unrolled_extents
@@ -54,7 +56,7 @@ def write_project(
     images: Sequence[Path] = (),
     service: str | None = None,
 ) -> None:
-    """Write a project with the layers of a survey.
+    """Write a project with the layers of a survey into a file.
 
     Parameters
     ----------
@@ -75,9 +77,56 @@ def write_project(
     UserError
         The survey has no axis, or its SRID is unknown.
     """
+    text = _text(_project(conn, survey, images, output.parent, service))
+    with replacing(output) as temporary:
+        if output.suffix.lower() == ".qgs":
+            temporary.write_text(text, encoding="utf-8")
+        else:
+            temporary.write_bytes(_archive(text, output.stem))
+
+
+def store_project(
+    conn: psycopg.Connection,
+    survey: Survey,
+    name: str,
+    images: Sequence[Path] = (),
+    service: str | None = None,
+) -> None:
+    """Put a project into ``public.qgis_projects``, where QGIS opens it from; one of the same name is replaced.
+
+    Parameters
+    ----------
+    conn : psycopg.Connection
+        Connection whose transaction this joins.
+    survey, images, service
+        As in :func:`write_project`, but the project holds the images' absolute paths.
+    name : str
+        What it is called there.
+
+    Raises
+    ------
+    UserError
+        As in :func:`write_project`, or the table is missing.
+    """
+    exists = conn.execute("SELECT to_regclass('public.qgis_projects') IS NOT NULL").fetchone()
+    if exists is None or not exists[0]:
+        raise UserError('the table public.qgis_projects is missing: run "tunneldb init" as the database\'s owner')
+    content = _archive(_text(_project(conn, survey, images, None, service)), name)
+    conn.execute(
+        "INSERT INTO public.qgis_projects (name, metadata, content) VALUES (%s, jsonb_build_object("
+        "'last_modified_time', (clock_timestamp() AT TIME ZONE 'UTC')::text, 'last_modified_user', session_user), %s) "
+        "ON CONFLICT (name) DO UPDATE SET metadata = excluded.metadata, content = excluded.content",
+        (name, content),
+    )
+
+
+def _project(
+    conn: psycopg.Connection, survey: Survey, images: Sequence[Path], folder: Path | None, service: str | None
+) -> ET.Element:
+    """The project's root; with paths relative to its folder, or absolute if it is in none."""
     crs = crs_element(conn, survey.srid)
     source = Source.of_connection(conn) if service is None else Source.of_service(service)
-    entries = [_vector(layer, source, survey, crs) for layer in LAYERS] + _rasters(images, output.parent)
+    entries = [_vector(layer, source, survey, crs) for layer in LAYERS] + _rasters(images, folder)
     views = _views(conn, survey.name)
     root = ET.Element("qgis", version=QGIS_VERSION, projectname=survey.name, saveUser="", saveUserFull="")
     ET.SubElement(root, "homePath", path="")
@@ -92,7 +141,7 @@ def write_project(
     layers.extend(entry.element for entry in entries)
     root.append(_themes(entries))
     root.append(_bookmarks(views, crs))
-    root.append(_properties())
+    root.append(_properties(absolute=folder is None))
     sheet = sheet_extent(conn, survey.name)
     if sheet is not None:
         known = {layer.id: (layer_id(layer.id), source.layer(layer, survey.name, survey.srid)) for layer in LAYERS}
@@ -102,7 +151,7 @@ def write_project(
     metadata = ET.SubElement(root, "projectMetadata")
     ET.SubElement(metadata, "title").text = survey.name
     ET.SubElement(metadata, "abstract").text = f"Tunnel {survey.tunnel}, written by tunneldb {__version__}"
-    _save(root, output)
+    return root
 
 
 def layer_id(name: str) -> str:
@@ -131,7 +180,7 @@ def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element)
     return _Entry(layer_id(layer.id), layer.title, (layer.group,), layer.themes, element)
 
 
-def _rasters(images: Sequence[Path], folder: Path) -> list[_Entry]:
+def _rasters(images: Sequence[Path], folder: Path | None) -> list[_Entry]:
     """Layers of the images, a group for each kind; the first kind that there is is shown (offset, without intensity)."""
     entries = []
     of_kind = {kind: sorted(path for path in images if image_kind(path) == kind) for kind in KINDS}
@@ -142,8 +191,7 @@ def _rasters(images: Sequence[Path], folder: Path) -> list[_Entry]:
         for path in paths:
             element = ET.Element("maplayer", type="raster", styleCategories="AllStyleCategories")
             ET.SubElement(element, "id").text = layer_id(path.stem)
-            relative = os.path.relpath(path.resolve(), folder.resolve())
-            ET.SubElement(element, "datasource").text = relative if relative.startswith("..") else f"./{relative}"
+            ET.SubElement(element, "datasource").text = _path(path, folder)
             ET.SubElement(element, "layername").text = path.stem
             ET.SubElement(element, "srs").append(no_crs())
             ET.SubElement(element, "provider").text = "gdal"
@@ -152,6 +200,13 @@ def _rasters(images: Sequence[Path], folder: Path) -> list[_Entry]:
             themes = (UNROLLED, SHEETS) if kind == shown else ()
             entries.append(_Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))
     return entries
+
+
+def _path(path: Path, folder: Path | None) -> str:
+    if folder is None:
+        return str(path.resolve())
+    relative = os.path.relpath(path.resolve(), folder.resolve())
+    return relative if relative.startswith("..") else f"./{relative}"
 
 
 def _tree(entries: Iterable[_Entry]) -> ET.Element:
@@ -252,11 +307,11 @@ def _bookmarks(views: Sequence[View], crs: ET.Element) -> ET.Element:
     return bookmarks
 
 
-def _properties() -> ET.Element:
-    """Settings of the project: relative paths, lengths in plane metres."""
+def _properties(*, absolute: bool) -> ET.Element:
+    """Settings of the project: how it holds paths, lengths in plane metres."""
     properties = ET.Element("properties")
     paths = ET.SubElement(properties, "Paths")
-    ET.SubElement(paths, "Absolute", type="bool").text = "false"
+    ET.SubElement(paths, "Absolute", type="bool").text = str(absolute).lower()
     reference = ET.SubElement(properties, "SpatialRefSys")
     ET.SubElement(reference, "ProjectionsEnabled", type="int").text = "1"
     measure = ET.SubElement(properties, "Measure")
@@ -267,11 +322,13 @@ def _properties() -> ET.Element:
     return properties
 
 
-def _save(root: ET.Element, output: Path) -> None:
-    text = _DOCTYPE + ET.tostring(root, encoding="unicode")
-    with replacing(output) as temporary:
-        if output.suffix.lower() == ".qgs":
-            temporary.write_text(text, encoding="utf-8")
-        else:
-            with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-                archive.writestr(f"{output.stem}.qgs", text)
+def _text(root: ET.Element) -> str:
+    return _DOCTYPE + ET.tostring(root, encoding="unicode")
+
+
+def _archive(text: str, name: str) -> bytes:
+    """A project as a .qgz holds it."""
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(f"{name}.qgs", text)
+    return held.getvalue()
