@@ -35,16 +35,26 @@ def parameter_table(names: Iterable[str] = PARAMETERS) -> str:
 @click.option("--from", "first", metavar="STAGE", help="Begin with this stage: axis, segments, sections, ground or detect.")
 @click.option("--to", "last", metavar="STAGE", help="End with this stage.")
 @click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see below. May be repeated.")
+@click.option(
+    "--stale", is_flag=True,
+    help="Only what is out of date (tunneldb status), say after an axis vertex was moved, with the parameters that it had.",
+)  # fmt: skip
 @click.pass_obj
 def run(
-    settings_: Settings, survey: str, km: str | None, first: str | None, last: str | None, assignments: tuple[str, ...]
+    settings_: Settings,
+    survey: str,
+    km: str | None,
+    first: str | None,
+    last: str | None,
+    assignments: tuple[str, ...],
+    stale: bool,
 ) -> None:
     """Run the stages of SURVEY: axis, segments, sections, ground, detect.
 
     Each stage of each kilometre is one transaction that replaces what the stage made there before, so a run may be
     stopped at any moment and repeated. Axis vertices moved by hand and reviews of leaks stay.
     """
-    from tunneldb.job.run import choose_stages, loaded_kilometres, parse_km, run_stages
+    from tunneldb.job.run import choose_stages, loaded_kilometres, parse_km, run_tasks, stage_tasks, stale_tasks
 
     values = settings(assignments)
     stages = choose_stages(first, last)
@@ -55,9 +65,16 @@ def run(
         if not there:
             raise UserError(f"survey {survey} holds no points yet: tunneldb load {survey} FILE...")
         kilometres = parse_km(km, there)
-        shown = _Shown(len(stages) * len(kilometres))
+        if stale:
+            tasks = stale_tasks(conn, found, kilometres, stages, assignments)
+            conn.rollback()
+        else:
+            tasks = stage_tasks(kilometres, stages, values)
+        if not tasks:
+            click.echo(f"nothing of {survey} is stale")
+        shown = _Shown(len(tasks))
         with shown.progress:
-            run_stages(conn, found, kilometres, stages, values, shown.begin, shown.end)
+            run_tasks(conn, found, tasks, shown.begin, shown.end)
 
 
 class _Shown:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import psycopg
 
 from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.job.ledger import Run, stage_run
-from tunneldb.job.parameters import of_stage
+from tunneldb.job.parameters import of_stage, settings
 from tunneldb.job.stages import STAGES, Progress, Stage
 
 
@@ -70,27 +70,79 @@ def choose_stages(first: str | None, last: str | None) -> list[Stage]:
     return list(STAGES[begin : end + 1])
 
 
-def run_stages(
+class Task(NamedTuple):
+    """A stage of a kilometre that is to run, with the values of all parameters."""
+
+    stage: Stage
+    km: int
+    values: Mapping[str, float]
+
+
+def stage_tasks(kilometres: Iterable[int], stages: Iterable[Stage], values: Mapping[str, float]) -> list[Task]:
+    """Stages over kilometres: each for all kilometres before the next, for the axis of one shapes its neighbours' segments."""
+    return [Task(stage, km, values) for stage in stages for km in kilometres]
+
+
+def stale_tasks(
     conn: psycopg.Connection[Any],
     survey: Survey,
-    kilometres: list[int],
-    stages: list[Stage],
-    values: Mapping[str, float],
+    kilometres: Iterable[int],
+    stages: Iterable[Stage],
+    assignments: Sequence[str] = (),
+) -> list[Task]:
+    """What is stale of a survey, in the order in which it must run, as ``tunnel_api.stage_status`` has it.
+
+    Parameters
+    ----------
+    conn : psycopg.Connection
+        Left in the transaction that this reads in.
+    survey : Survey
+        The survey.
+    kilometres, stages
+        What to look among.
+    assignments : sequence of str
+        Parameters set as ``name=value``; others keep the values of the last run that was successful, there and then.
+
+    Raises
+    ------
+    UserError
+        If a kilometre awaits points that were read since it was loaded.
+    """
+    chosen, by_name = set(kilometres), {stage.name: stage for stage in stages}
+    given = {assignment.partition("=")[0] for assignment in assignments}
+    values = settings(assignments)
+    tasks = []
+    rows = conn.execute(
+        "SELECT km, stage, reason, done_parameters FROM tunnel_api.stage_state(%s) WHERE reason IS NOT NULL ORDER BY step, km",
+        [survey.id],
+    )
+    for km, name, reason, former in rows:
+        if km not in chosen:
+            continue
+        if name == "load":
+            raise UserError(f"kilometre {km} is to be loaded first, for {reason}: tunneldb batch {survey.name}")
+        if name in by_name:
+            kept = {key: value for key, value in (former or {}).items() if key in values and key not in given}
+            tasks.append(Task(by_name[name], km, {**values, **kept}))
+    return tasks
+
+
+def run_tasks(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    tasks: Iterable[Task],
     begin: Callable[[Stage, int], Progress],
     end: Callable[[Stage, int, Run], None],
 ) -> None:
-    """Run stages over kilometres, each stage of each kilometre in a transaction of its own.
-
-    A stage is done for all kilometres before the next one, for the axis of a kilometre shapes its neighbours' segments.
+    """Run stages of kilometres one after the other, each in a transaction of its own.
 
     Parameters
     ----------
     begin, end : callable
         Called before and after each; ``begin`` returns what takes the progress.
     """
-    for stage in stages:
-        for km in kilometres:
-            progress = begin(stage, km)
-            with stage_run(conn, survey.id, km, stage.name, of_stage(values, stage.parameters)) as run:
-                run.counts.update(stage.work(conn, survey, km, values, progress))
-            end(stage, km, run)
+    for stage, km, values in tasks:
+        progress = begin(stage, km)
+        with stage_run(conn, survey.id, km, stage.name, of_stage(values, stage.parameters)) as run:
+            run.counts.update(stage.work(conn, survey, km, values, progress))
+        end(stage, km, run)
