@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import psycopg
 import pytest
@@ -48,6 +50,32 @@ SEEN_FROM, WET = 12310.0, (12400.0, 12405.0)
 GIRTH = 2 * CORNER
 """Lining round the section, from foot to foot of the walls, m."""
 
+PEOPLE = {
+    "vera": "tunnel_viewer",
+    "ines": "tunnel_inspector",
+    "otto": "tunnel_operator",
+    "olga": "tunnel_operator",
+    "nobody": None,
+}
+"""Who can log in to the server, and with which role."""
+
+
+@pytest.fixture(scope="session")
+def people(server_dsn: str, example_template: str) -> None:
+    """Make the people; roles belong to the whole server."""
+    with psycopg.connect(server_dsn, autocommit=True) as connection:
+        for name, role in PEOPLE.items():
+            connection.execute(sql.SQL("CREATE ROLE {} LOGIN").format(sql.Identifier(name)))
+            if role is not None:
+                connection.execute(sql.SQL("GRANT {} TO {}").format(sql.Identifier(role), sql.Identifier(name)))
+
+
+@pytest.fixture
+def person(request: pytest.FixtureRequest, people: None, dsn: str) -> Iterator[psycopg.Connection]:
+    """Connection of the one of PEOPLE that the test is given as its parameter."""
+    with psycopg.connect(make_conninfo(dsn, user=request.param), autocommit=True) as connection:
+        yield connection
+
 
 @pytest.fixture(scope="session")
 def example_template(server_dsn: str) -> str:
@@ -90,8 +118,8 @@ def _fill(conn: psycopg.Connection) -> None:
     _images(conn, survey_id, surface, outlines)
     _ground(conn, survey_id, surface)
     _things(conn, survey_id, surface)
-    conn.execute(
-        "INSERT INTO tunnel.region (survey_id, kind, geom) VALUES (%s, 'dry', ST_MakeEnvelope(12410, -3, 12414, 0, 0))",
+    conn.execute(  # through the view, so that the audit has a row
+        "INSERT INTO tunnel_api.region (survey_id, kind, geom) VALUES (%s, 'dry', ST_MakeEnvelope(12410, -3, 12414, 0, 0))",
         (survey_id,),
     )
     conn.execute(

@@ -146,7 +146,7 @@ def test_status_shows_a_run_whose_program_is_gone(example: str, conn: psycopg.Co
         worker.commit()
         assert "running" in run("status", example).output
         pid = worker.info.backend_pid
-    while conn.execute("SELECT FROM pg_stat_activity WHERE pid = %s", [pid]).fetchone():
+    while conn.execute("SELECT 1 FROM pg_stat_activity WHERE pid = %s", [pid]).fetchone():
         conn.rollback()
         time.sleep(0.02)
     assert "interrupted" in run("status", example).output

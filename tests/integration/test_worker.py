@@ -369,8 +369,8 @@ def test_workers_are_asked_to_stop_and_what_is_wanted_stays_wanted(
     worker = spawn("worker", "--concurrency", 2)
     assert _eventually(conn, "SELECT count(*) = 2 FROM tunnel.worker", seconds=60)
     assert "2 workers asked to stop" in command(0, "stop", "--wait")
-    assert worker.wait(timeout=30) == 0
     assert one(conn, "SELECT count(*) FROM tunnel.worker") == 0
+    assert worker.wait(timeout=30) == 0
     assert one(conn, "SELECT count(*) FROM tunnel_queue.procrastinate_workers") == 0
 
 

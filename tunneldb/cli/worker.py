@@ -48,6 +48,6 @@ def stop(settings: Settings, wait: bool) -> None:
         conn.execute("SELECT tunnel_api.queue_rescue()")
         asked = conn.execute("UPDATE tunnel.worker SET stop = true RETURNING id").fetchall()
         click.echo(f"{len(asked)} worker{'s' * (len(asked) != 1)} asked to stop")
-        while wait and conn.execute("SELECT FROM tunnel.worker WHERE id = ANY (%s)", [[row[0] for row in asked]]).fetchone():
+        while wait and conn.execute("SELECT 1 FROM tunnel.worker WHERE id = ANY (%s)", [[row[0] for row in asked]]).fetchone():
             time.sleep(0.5)
             conn.execute("SELECT tunnel_api.queue_rescue()")

@@ -1,0 +1,192 @@
+"""The audit: what people change through the views is noted with before and after, and nobody takes it back."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import psycopg
+import pytest
+from click.testing import CliRunner
+from psycopg.conninfo import make_conninfo
+
+from tunneldb.cli.main import main
+
+SURVEY = "demo-2024"
+ENTRIES = "SELECT who, survey, view, row_id, action, before, after FROM tunnel_api.audit WHERE id > 1 ORDER BY id"
+"""All but the first, which the example survey brings."""
+
+
+@pytest.fixture(scope="session")
+def template(example_template: str) -> str:
+    return example_template
+
+
+def entries(connection: psycopg.Connection) -> list[tuple[Any, ...]]:
+    connection.commit()
+    return connection.execute(ENTRIES).fetchall()
+
+
+def first_leak(connection: psycopg.Connection) -> int:
+    row = connection.execute("SELECT id FROM tunnel_api.leak WHERE review = 'open' ORDER BY chainage_from").fetchone()
+    assert row is not None
+    return int(row[0])
+
+
+@pytest.mark.parametrize("person", ["ines"], indirect=True)
+def test_a_review_is_noted_with_only_what_changed(person: psycopg.Connection) -> None:
+    key = first_leak(person)
+    person.execute("UPDATE tunnel_api.leak_map SET review = 'confirmed' WHERE id = %s", (key,))
+    person.execute("UPDATE tunnel_api.leak SET remark = 'drips', review = 'confirmed' WHERE id = %s", (key,))
+    person.execute("UPDATE tunnel_api.anomaly_3d SET kind = 'joint' WHERE id = %s", (key,))
+    assert entries(person) == [
+        ("ines", SURVEY, "anomaly", key, "update", {"review": "open"}, {"review": "confirmed"}),
+        ("ines", SURVEY, "anomaly", key, "update", {"remark": None}, {"remark": "drips"}),
+        ("ines", SURVEY, "anomaly", key, "update", {"kind": "leak"}, {"kind": "joint"}),
+    ]
+    assert person.execute(
+        "SELECT max(d.at) = a.reviewed_at OR max(d.at) - a.reviewed_at < interval '1 s'"
+        "  FROM tunnel_api.anomaly a JOIN tunnel_api.audit d ON d.view = 'anomaly' AND d.row_id = a.id"
+        " WHERE a.id = %s GROUP BY a.reviewed_at", (key,)
+    ).fetchone() == (True,)  # fmt: skip
+
+
+@pytest.mark.parametrize("person", ["ines"], indirect=True)
+def test_of_many_rows_those_that_changed_are_noted(person: psycopg.Connection) -> None:
+    person.execute("UPDATE tunnel_api.leak SET review = 'confirmed'")  # two of the seven are already
+    was = [before["review"] for *_, before, _ in entries(person)]
+    assert sorted(was) == ["open"] * 4 + ["rejected"]
+    person.execute("UPDATE tunnel_api.leak SET review = 'confirmed'")
+    assert len(entries(person)) == 5
+
+
+@pytest.mark.parametrize("person", ["ines"], indirect=True)
+def test_what_was_undone_or_refused_is_not_noted(person: psycopg.Connection) -> None:
+    with person.transaction(force_rollback=True):
+        person.execute("UPDATE tunnel_api.leak SET review = 'rejected'")
+    with pytest.raises(psycopg.errors.CheckViolation):
+        person.execute("UPDATE tunnel_api.leak SET review = 'perhaps'")
+    assert entries(person) == []
+
+
+@pytest.mark.parametrize("person", ["ines"], indirect=True)
+def test_a_moved_vertex_can_be_put_back_exactly_by_the_audit(person: psycopg.Connection) -> None:
+    position = "SELECT ST_AsBinary(geom), ST_SRID(geom) FROM tunnel_api.axis_vertex WHERE n = 1240"
+    first = person.execute(position).fetchone()
+    person.execute("UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0.1, 1.0 / 3, -0.2) WHERE n = 1240")
+    second = person.execute(position).fetchone()
+    ((*_, view, _, action, before, after),) = entries(person)
+    assert (view, action, before["source"], after["source"]) == ("axis_vertex", "update", "measured", "edited")
+    parsed = "SELECT ST_AsBinary(g), ST_SRID(g) FROM ST_GeomFromEWKT(%s) g"
+    assert person.execute(parsed, (before["geom"],)).fetchone() == first
+    assert person.execute(parsed, (after["geom"],)).fetchone() == second
+    assert first != second
+    person.execute(
+        "UPDATE tunnel_api.axis_vertex v SET geom = ST_GeomFromEWKT(d.before ->> 'geom')"
+        "  FROM tunnel_api.audit d WHERE d.view = 'axis_vertex' AND d.row_id = v.id"
+    )
+    assert person.execute(position).fetchone() == first
+    assert [(sorted(before), sorted(after)) for *_, before, after in entries(person)] == [
+        (["geom", "source"], ["geom", "source"]), (["geom"], ["geom"]),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("person", ["ines"], indirect=True)
+def test_a_region_from_its_drawing_to_its_end(person: psycopg.Connection) -> None:
+    row = person.execute(
+        "INSERT INTO tunnel_api.region (survey, kind, geom) VALUES (%s, 'dry', 'POLYGON((0 0,2 0,2 1,0 0))') RETURNING id",
+        [SURVEY],
+    ).fetchone()
+    assert row is not None
+    key = row[0]
+    person.execute("UPDATE tunnel_api.region SET kind = 'homogeneous' WHERE id = %s", (key,))
+    person.execute("UPDATE tunnel_api.region SET kind = 'homogeneous' WHERE id = %s", (key,))
+    person.execute("DELETE FROM tunnel_api.region WHERE id = %s", (key,))
+    shape = "POLYGON((0 0,2 0,2 1,0 0))"
+    assert entries(person) == [
+        ("ines", SURVEY, "region", key, "insert", None, {"kind": "dry", "geom": shape}),
+        ("ines", SURVEY, "region", key, "update", {"kind": "dry"}, {"kind": "homogeneous"}),
+        ("ines", SURVEY, "region", key, "delete", {"kind": "homogeneous", "geom": shape}, None),
+    ]
+
+
+@pytest.mark.parametrize("person", ["ines"], indirect=True)
+def test_another_role_does_not_hide_the_person(person: psycopg.Connection) -> None:
+    person.execute("SET ROLE tunnel_inspector")
+    person.execute("UPDATE tunnel_api.leak SET review = 'rejected' WHERE id = %s", (first_leak(person),))
+    assert [who for who, *_ in entries(person)] == ["ines"]
+
+
+@pytest.mark.parametrize("person", ["ines"], indirect=True)
+def test_two_at_the_same_leak_both_keep_what_they_did(person: psycopg.Connection, dsn: str, conn: psycopg.Connection) -> None:
+    """Olga's statement begins while Ines has not yet committed; it must not take the review back to what Olga saw."""
+    key = first_leak(conn)
+    conn.rollback()
+    with psycopg.connect(make_conninfo(dsn, user="olga"), autocommit=True) as olga:
+        remark = threading.Thread(
+            target=olga.execute, args=("UPDATE tunnel_api.leak SET remark = 'crack' WHERE id = %s", (key,))
+        )
+        with person.transaction():
+            person.execute("UPDATE tunnel_api.leak SET review = 'confirmed' WHERE id = %s", (key,))
+            remark.start()
+            while not conn.execute(
+                "SELECT 1 FROM pg_stat_activity WHERE pid = %s AND wait_event_type = 'Lock'", (olga.info.backend_pid,)
+            ).fetchone():
+                conn.rollback()
+        remark.join(10)
+    assert conn.execute("SELECT review, remark FROM tunnel_api.leak WHERE id = %s", (key,)).fetchone() == ("confirmed", "crack")
+    assert [(who, before, after) for who, *_, before, after in entries(conn)] == [
+        ("ines", {"review": "open"}, {"review": "confirmed"}),
+        ("olga", {"remark": None}, {"remark": "crack"}),
+    ]
+
+
+def test_the_audit_outlives_the_survey(conn: psycopg.Connection) -> None:
+    conn.execute("UPDATE tunnel_api.leak SET review = 'rejected' WHERE id = %s", (first_leak(conn),))
+    conn.commit()
+    assert CliRunner().invoke(main, ["survey", "remove", SURVEY, "--yes"]).exit_code == 0
+    assert [(survey, after) for _, survey, *_, after in entries(conn)] == [(SURVEY, {"review": "rejected"})]
+
+
+@pytest.mark.parametrize("person", ["vera", "ines", "otto"], indirect=True)
+def test_no_role_touches_the_audit(person: psycopg.Connection) -> None:
+    for statement in (
+        "UPDATE tunnel_api.audit SET who = 'nobody'",
+        "DELETE FROM tunnel_api.audit",
+        "INSERT INTO tunnel_api.audit (who, survey, view, row_id, action) VALUES ('vera', 'demo-2024', 'anomaly', 1, 'update')",
+        "SELECT tunnel_api.note_edit('demo-2024', 'anomaly', 1, '{}', '{\"review\": \"confirmed\"}')",
+        "SELECT count(*) FROM tunnel_audit.entry",
+        "UPDATE tunnel_audit.entry SET who = 'nobody'",
+        "DELETE FROM tunnel_audit.entry",
+        "TRUNCATE tunnel_audit.entry",
+        "DROP TABLE tunnel_audit.entry",
+        "DROP SCHEMA tunnel_audit CASCADE",
+        "ALTER TABLE tunnel_audit.entry DISABLE TRIGGER ALL",
+        "ALTER TABLE tunnel_audit.entry OWNER TO tunnel_operator",
+        "DROP TRIGGER edit ON tunnel_api.leak",
+        "CREATE OR REPLACE VIEW tunnel_api.audit AS SELECT 1 AS id",
+        "ALTER FUNCTION tunnel_api.review_anomaly() RENAME TO unwatched",
+        "SET SESSION AUTHORIZATION postgres",
+    ):
+        with pytest.raises(psycopg.errors.InsufficientPrivilege):
+            person.execute(statement)  # type: ignore[arg-type]
+    assert person.execute("SELECT view, action FROM tunnel_api.audit").fetchall() == [("region", "insert")]
+
+
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
+def test_an_operator_who_drops_all_data_leaves_the_audit(person: psycopg.Connection, conn: psycopg.Connection) -> None:
+    person.execute("UPDATE tunnel_api.leak SET review = 'rejected'")
+    before = conn.execute("SELECT * FROM tunnel_audit.entry ORDER BY id").fetchall()
+    conn.commit()
+    person.execute("DROP SCHEMA tunnel CASCADE")
+    assert conn.execute("SELECT * FROM tunnel_audit.entry ORDER BY id").fetchall() == before
+    assert len(before) == 7
+
+
+@pytest.mark.parametrize(
+    "statement",
+    ["UPDATE tunnel_audit.entry SET who = 'x'", "DELETE FROM tunnel_api.audit", "TRUNCATE tunnel_audit.entry"],
+)
+def test_even_the_owner_does_not_change_it_by_mistake(conn: psycopg.Connection, statement: str) -> None:
+    with pytest.raises(psycopg.errors.InsufficientPrivilege, match="neither changed nor deleted"):
+        conn.execute(statement)  # type: ignore[arg-type]
