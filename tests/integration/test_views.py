@@ -85,7 +85,18 @@ def queue(conn: psycopg.Connection, example: str) -> None:
     add_job(conn, example, 12, "axis", add_worker(conn, "calc-1", 4711))
 
 
-def test_every_view_begins_with_a_stable_integer_key(conn: psycopg.Connection, example: str, points: None, queue: None) -> None:
+@pytest.fixture
+def stationing(conn: psycopg.Connection, example: str) -> None:
+    """Two station equations."""
+    conn.execute(
+        "INSERT INTO tunnel.station_equation (tunnel_id, chainage, station)"
+        " SELECT id, c, c FROM tunnel.tunnel, unnest('{0,1}'::int[]) c"
+    )
+
+
+def test_every_view_begins_with_a_stable_integer_key(
+    conn: psycopg.Connection, example: str, points: None, queue: None, stationing: None
+) -> None:
     for view in views(conn):
         with conn.cursor() as cursor:
             cursor.execute(sql.SQL("SELECT * FROM tunnel_api.{}").format(sql.Identifier(view)))
