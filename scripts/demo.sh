@@ -36,6 +36,7 @@ step intensity demo-2024 -o demo/intensity.png
 step leaks demo-2024 --geometry map --format gpkg -o demo/leaks.gpkg
 step image demo-2024 -o demo/images
 step qgis demo-2024 -o demo/demo.qgz
+step report demo-2024 -o demo/report.html
 
 cat <<TEXT
 
@@ -44,5 +45,6 @@ Done in $((SECONDS - start)) s. Look at
   demo/intensity.png   whether intensity depends on range or incidence, before and after correction
   demo/leaks.gpkg      the leaks on the map
   demo/demo.qgz        the project for QGIS
+  demo/report.html     the inspection report
 The demo's server runs on, for QGIS; to stop it: TUNNELDB_HOME=$TUNNELDB_HOME $tunneldb server stop
 TEXT

@@ -293,6 +293,12 @@ def label_chainages(conn: psycopg.Connection[Any], survey: Survey, chainages: Se
     return [str(label) for (label,) in rows]
 
 
+def place_name(conn: psycopg.Connection[Any], survey: Survey) -> str:
+    """Return what the label of a place is: its chainage, or its station where the tunnel has a stationing of its own."""
+    own = conn.execute("SELECT FROM tunnel.station_equation WHERE tunnel_id = %s LIMIT 1", [survey.tunnel_id]).fetchone()
+    return "Chainage" if own is None else "Station"
+
+
 def _kilometres(low: float, high: float) -> tuple[int, int]:
     """First and last kilometre of a stretch."""
     return int(np.floor(low / 1000)), int(np.ceil(high / 1000)) - 1

@@ -87,6 +87,7 @@ class _Report:
         by_size = sorted(self.leaks, key=lambda leak: (leak.review == "rejected", -leak.area))
         pictured = {leak.id for leak in by_size[:pictures]}
         self.strips = Strips(conn, survey, low, high, self.leaks, self.coverage, pictured, progress)
+        self.place = data.place_name(conn, survey)
         self.cards = min(CARDS, len(pictured))
 
     def context(self) -> dict[str, Any]:
@@ -208,7 +209,7 @@ class _Report:
             ]
             for leak in self.leaks
         ]  # fmt: skip
-        return text.script_json({"columns": TABLE, "rows": rows, "cards": self.cards, "strip": self.strips.length})
+        return text.script_json({"columns": TABLE, "rows": rows, "cards": self.cards, "strip": self.strips.length, "place": self.place})
 
 
 TABLE = [

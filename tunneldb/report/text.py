@@ -162,20 +162,17 @@ _WHAT = {"anomaly": "leak or dark spot", "axis_vertex": "axis vertex", "region":
 def edit(entry: Edit) -> dict[str, str]:
     """Return a change made by hand in words: who, when, of what, and each column from what to what."""
     before, after = entry.before or {}, entry.after or {}
-    changes = [_change(name, before.get(name), after.get(name)) for name in sorted({*before, *after})]
-    said = "; ".join(changes) if entry.action == "update" else entry.action + "d" if entry.action == "delete" else "drawn"
-    return {
-        "at": when(entry.at),
-        "who": entry.who,
-        "what": f"{_WHAT.get(entry.view, entry.view)} {entry.row_id}",
-        "change": said,
-    }
+    names = sorted({*before, *after}) if entry.action == "update" else ["geom"]  # only regions come and go
+    changes = "; ".join(_change(name, before.get(name), after.get(name)) for name in names)
+    return {"at": when(entry.at), "who": entry.who, "what": f"{_WHAT[entry.view]} {entry.row_id}", "change": changes}
 
 
 def _change(name: str, before: Any, after: Any) -> str:
     """Return the change of a column in words; of a geometry, how far it moved."""
     if name != "geom":
         return f"{name}: {DASH if before in (None, '') else before} → {DASH if after in (None, '') else after}"
+    if before is None or after is None:
+        return "drawn" if before is None else "deleted"
     old, new = (shapely.get_coordinates(_shape(value), include_z=True) for value in (before, after))
     if len(old) == len(new) == 1:
         return f"moved by {float(np.linalg.norm(np.nan_to_num(new - old))):.3f} m"

@@ -33,7 +33,7 @@
   // Columns of the table: heading, key, cell, class; minor ones are left out on a phone.
   const columns = [
     ["No.", "id", (l) => l.id, "n"],
-    ["Chainage", "chainage", (l) => l.label, ""],
+    [data.place, "chainage", (l) => l.label, ""],
     ["Clock", "clock", (l) => clock(l.clock), "n"],
     ["Arc m", "arcFrom", arc, "n minor"],
     ["Length m", "length", (l) => fixed(l.length, 2), "n minor"],
