@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from tunneldb import __version__
+from tunneldb.cli.output import AT_FAULT, DONE, JSON, run_as_json, write_lines
 from tunneldb.errors import UserError
 
 
@@ -24,6 +25,8 @@ class Settings:
 
     dsn: str | None
 
+
+_AS_JSON = "tunneldb.json"
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "init": ("tunneldb.cli.init:init", "Create or upgrade the schema, the functions and the roles."),
@@ -52,6 +55,32 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "simulate": ("tunneldb.cli.simulate:simulate", "Make a simulated scan of a tunnel, with its truth."),
 }
 
+MANUAL: dict[str, list[tuple[str, str]]] = {
+    "Output": [
+        ("stdout", "results; with --json one JSON object, also when the verb fails"),
+        ("stderr", "messages; on a terminal a bar with rate and time left, in a pipe none"),
+    ],
+    "Exit codes": [
+        ("0", DONE),
+        ("1", "of some verbs: done, and something is wrong, see their help"),
+        ("2", AT_FAULT),
+    ],
+    "Environment": [
+        ("TUNNELDB_DSN", "database to use, as --dsn"),
+        ("TUNNELDB_HOME", "folder of the embedded server; two folders are two servers"),
+        ("TUNNELDB_BROWSER", "program that prints reports as PDF, if it isn't found: Chromium or Chrome"),
+        ("TMPDIR", "folder for what does not fit into memory"),
+        ("PGPASSFILE, PGSERVICEFILE", "and the others of libpq, for passwords and services"),
+    ],
+}
+EXAMPLES = (
+    "tunneldb simulate demo --preset demo",
+    "tunneldb init",
+    "tunneldb tunnel add demo --srid 25830 --axis demo/demo.axis.csv",
+    "tunneldb batch demo-2024 demo/*.laz",
+    "tunneldb leaks demo-2024 --json | python -m json.tool",
+)
+
 
 class LazyGroup(click.Group):
     """A click group that knows its verbs' names and help without importing them."""
@@ -74,19 +103,35 @@ class LazyGroup(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Note whether JSON is asked for: what is wrong with the rest of the line is to be said in it, too."""
+        ctx.meta[_AS_JSON] = JSON in args and "psql" not in args
+        return super().parse_args(ctx, args)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a verb; turn the user's errors and the server's into one line and exit code 2."""
+        if ctx.meta[_AS_JSON]:
+            return ctx.exit(run_as_json(ctx, lambda: click.Group.invoke(self, ctx), _describe))
         try:
             return super().invoke(ctx)
-        except UserError as error:
-            message = str(error)
         except Exception as error:
-            described = _describe_database_error(error)
-            if described is None:
+            message = _describe(error)
+            if message is None:
                 raise
-            message = described
         click.echo(f"tunneldb: {message}", err=True)
         return ctx.exit(2)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write what holds for all verbs."""
+        for title, rows in MANUAL.items():
+            with formatter.section(title):
+                formatter.write_dl(rows)
+        write_lines(formatter, "Examples", EXAMPLES)
+
+
+def _describe(error: Exception) -> str | None:
+    """Return one line for what is no bug, None for one."""
+    return str(error) if isinstance(error, UserError) else _describe_database_error(error)
 
 
 def _describe_database_error(error: Exception) -> str | None:

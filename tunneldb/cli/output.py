@@ -1,0 +1,158 @@
+"""What all verbs have in common: their help as a manual page, and ``--json``.
+
+Under ``--json`` standard output holds exactly one JSON object, also when the verb fails; what the verb would print there
+for people is left out. Keys that every object has: ``verb``, ``ok``, ``exit_code``, ``seconds``; ``error`` where there is
+one. The others are what the verb told.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import click
+
+JSON = "--json"
+DONE = "done"
+AT_FAULT = "the input, the server or the command line is at fault: one line says what, where, and what to do"
+
+_TOLD = "tunneldb.told"
+_VERB = "tunneldb.verb"
+
+
+def tell(**values: Any) -> None:
+    """Add to what ``--json`` prints; a later value takes the place of an earlier one.
+
+    Parameters
+    ----------
+    **values
+        What was done: names, counts, paths, rows. Lengths in metres, times in seconds.
+    """
+    context = click.get_current_context(silent=True)
+    if context is not None:
+        context.meta.setdefault(_TOLD, {}).update(values)
+
+
+class Verb(click.Command):
+    """A command with ``--json``, and with examples and exit codes in its help.
+
+    Parameters
+    ----------
+    *arguments, **options
+        As of click.Command.
+    examples : sequence of str
+        Command lines to copy.
+    wrong : str
+        What exit code 1 means; empty when the verb does not have it.
+    """
+
+    def __init__(self, *arguments: Any, examples: Sequence[str] = (), wrong: str = "", **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.examples = tuple(examples)
+        self.wrong = wrong
+        help_ = "Print one JSON object: what was done, counts, seconds; also when it fails."
+        self.params.append(click.Option([JSON], is_flag=True, expose_value=False, help=help_))
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the verb, and note which it is."""
+        ctx.meta[_VERB] = ctx.command_path.partition(" ")[2]
+        return super().invoke(ctx)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write what the verb appends, then examples and exit codes."""
+        super().format_epilog(ctx, formatter)
+        write_lines(formatter, "Examples", self.examples)
+        codes = {"0": DONE, "1": self.wrong, "2": AT_FAULT}
+        with formatter.section("Exit codes"):
+            formatter.write_dl([(code, text) for code, text in codes.items() if text])
+
+
+class VerbGroup(click.Group):
+    """A group whose commands are verbs."""
+
+    command_class = Verb
+
+
+def verb(name: str | None = None, cls: type[Verb] = Verb, **options: Any) -> Callable[[Callable[..., Any]], Verb]:
+    """Return the decorator that makes a verb of a function; options are those of `Verb`."""
+    return click.command(name, cls=cls, **options)
+
+
+def write_lines(formatter: click.HelpFormatter, title: str, lines: Sequence[str]) -> None:
+    """Write a section of lines that are not to be wrapped."""
+    if lines:
+        with formatter.section(title):
+            for line in lines:
+                formatter.write(f"{'':>{formatter.current_indent}}{line}\n")
+
+
+def run_as_json(ctx: click.Context, run: Callable[[], Any], describe: Callable[[Exception], str | None]) -> int:
+    """Run a verb, print its JSON object, and return the exit code.
+
+    Parameters
+    ----------
+    ctx
+        Context of the whole program.
+    run
+        Runs the verb.
+    describe
+        Returns the one line for an error that is not a bug. Bugs are raised on.
+    """
+    began, code, error = time.monotonic(), 0, None
+    try:
+        with Path(os.devnull).open("w", encoding="utf-8") as nowhere, redirect_stdout(nowhere):
+            run()
+    except (SystemExit, click.exceptions.Exit) as ended:
+        code = _exit_code(ended)
+    except (KeyboardInterrupt, click.Abort):
+        code, error = 1, "interrupted"
+    except click.ClickException as wrong:
+        wrong.show()
+        code, error = wrong.exit_code, wrong.format_message()
+    except Exception as wrong:
+        error = describe(wrong)
+        if error is None:
+            raise
+        click.echo(f"tunneldb: {error}", err=True)
+        code = 2
+    said = {"error": error} if error is not None else {}
+    told = ctx.meta.get(_TOLD, {})
+    name = ctx.meta.get(_VERB, ctx.invoked_subcommand)
+    seconds = round(time.monotonic() - began, 3)
+    result = {"verb": name, "ok": code == 0, "exit_code": code, "seconds": seconds} | said | told
+    click.echo(json.dumps(plain(result), ensure_ascii=False, indent=1, allow_nan=False))
+    return code
+
+
+def _exit_code(ended: BaseException) -> int:
+    code = ended.exit_code if isinstance(ended, click.exceptions.Exit) else getattr(ended, "code", 0)
+    return code if isinstance(code, int) else int(code is not None)
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON knows it: numbers that are none become null, arrays lists, all else that is no number text."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, set, frozenset, range)):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):  # of NumPy, which help must not import
+        return plain(value.tolist())
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if hasattr(value, "as_integer_ratio"):  # float, Decimal
+        number = float(value)
+        return number if math.isfinite(number) else None
+    if hasattr(value, "isoformat"):
+        return value.isoformat()
+    if hasattr(value, "total_seconds"):
+        return value.total_seconds()
+    return str(value)
