@@ -12,7 +12,10 @@ MARGIN = 0.08
 """Margin around what is shown, as a share of its size."""
 
 WINDOW = 60.0
-"""Length of tunnel that the unrolled theme shows at first, m."""
+"""Least length of tunnel that the unrolled theme shows at first, m."""
+
+PANEL = 3.5
+"""Width of the panel that shows it, of its height: a narrower extent would be widened over the end of the tunnel."""
 
 
 @dataclass(frozen=True)
@@ -112,11 +115,8 @@ def first_window(conn: psycopg.Connection, survey: str, kilometres: list[tuple[i
         (survey,),
     ).fetchone()
     low, high = kilometres[0][1].xmin, kilometres[-1][1].xmax
-    middle = row[0] if row is not None else low + WINDOW / 2
-    start = max(low, min(middle - WINDOW / 2, high - WINDOW))
-    return Extent(
-        start,
-        min(extent.ymin for _, extent in kilometres),
-        min(start + WINDOW, high),
-        max(extent.ymax for _, extent in kilometres),
-    ).grown()
+    bottom, top = min(extent.ymin for _, extent in kilometres), max(extent.ymax for _, extent in kilometres)
+    length = max(WINDOW, PANEL * (top - bottom))
+    middle = row[0] if row is not None else low + length / 2
+    start = max(low, min(middle - length / 2, high - length))
+    return Extent(start, bottom, min(start + length, high), top).grown()
