@@ -179,7 +179,8 @@ def test_verdict_is_the_databases(shared: str, reading: Reading) -> None:
 
 def test_stretch(shared: str, leaks: list[dict[str, Any]], tmp_path: Path) -> None:
     path = tmp_path / "part.html"
-    run("--dsn", shared, "report", SURVEY, "-o", path, "--from", "12+400", "--to", "12+432.5")
+    told = json.loads(run("--dsn", shared, "report", SURVEY, "-o", path, "--from", "12+400", "--to", "12+432.5", "--json").stdout)
+    assert (told["ok"], told["leaks"], told["bytes"]) == (True, 3, path.stat().st_size)
     part = Reading(path)
     assert [row["id"] for row in part.rows] == [leak["id"] for leak in leaks if 12400 < leak["chainage"] < 12432]
     assert "12+400.000 to 12+432.500" in part.text
