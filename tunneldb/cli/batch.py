@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from rich.console import Console
 
 from tunneldb.cli.load import density_of
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb, wants_json
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
 from tunneldb.job.parameters import PARAMETERS, settings
@@ -22,7 +25,15 @@ if TYPE_CHECKING:
     from tunneldb.cli.watch import Watch
 
 
-@click.command()
+@verb(
+    examples=[
+        "tunneldb batch pajares-2026 /data/pajares/*.laz --preview",
+        "tunneldb batch pajares-2026 /data/pajares/*.laz",
+        "tunneldb batch pajares-2026                          # go on after a stop",
+        "tunneldb batch pajares-2026 --km 3-7 --retry-failed",
+    ],
+    wrong="something failed; of --preview: the disk is too small",
+)
 @click.argument("survey")
 @click.argument("files", nargs=-1, type=click.Path(path_type=Path), metavar="[FILES...]")
 @click.option("--workers", type=click.IntRange(1, 1000), metavar="N", help="Worker processes to start; one a core by default.")
@@ -57,9 +68,6 @@ def batch(
     without FILES. A file or kilometre that fails holds up no other. Workers of other machines on the same database help.
 
     Ctrl-C ends the stages that are under way, and stops; a second one stops at once.
-
-    Exit code: 0 when all is done, 1 when something failed, 2 when nothing could be begun. Of --preview: 1 when the disk is too
-    small.
     """
     from tunneldb.job.batch import STEPS, plan, register
 
@@ -81,6 +89,7 @@ def batch(
 
             seen = look_ahead(conn, found, asked, _range(km), settings_.dsn is None, count)
             show(seen)
+            tell(survey=survey, preview=seen, fits=seen.fits)
             raise SystemExit(0 if seen.fits else 1)
         register(conn, found, asked, retry=retry_failed)
         busy = _busy(conn, found)
@@ -109,7 +118,9 @@ def _work(survey: Survey, dsn: str | None, count: int) -> Watch:
     from tunneldb.job.worker import Orders
 
     team = Team(Orders(dsn, 1, survey.id), count)
-    with interrupts(team), Watch(dsn, survey.name) as watch:
+    # the picture is drawn on stdout, which JSON has for itself
+    console = Console(stderr=True) if wants_json() and sys.stderr.isatty() else None
+    with interrupts(team), Watch(dsn, survey.name, console) as watch:
         watch.look()
         team.start()
         while team.tend():
@@ -133,6 +144,12 @@ def _summary(conn: psycopg.Connection[Any], survey: Survey, watch: Watch, second
     files = failed_files(conn, survey)
     done = sum(result.state == "done" for result in found)
     points = watch.ledger.points if watch.ledger is not None else 0
+    tell(
+        survey=survey.name,
+        kilometres=found,
+        failed_files=[{"name": name, "message": why} for name, why in files],
+        points=points,
+    )
     speed = f", {number(points / seconds)} points/s" if points else ""
     click.echo(f"{done} of {len(found)} kilometres done; {duration(seconds)}{speed}")
     if watch.live is None and watch.seen is not None:  # on a terminal it stands there already

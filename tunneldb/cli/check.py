@@ -7,24 +7,28 @@ import sys
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
 
 
-@click.command()
+@verb(
+    examples=["tunneldb check", "tunneldb check --json"], wrong="something is wrong, and stands in the list with what mends it"
+)
 @click.pass_obj
 def check(settings: Settings) -> None:
     """Check the server and the database; say what mends them.
 
-    Exit code 1 if something is wrong.
+    ✓ is as it should be, • works but could be better, ✗ is wrong.
     """
-    from tunneldb.database.health import examine
+    from tunneldb.database.health import Finding, examine
 
-    healthy = True
+    findings: list[Finding] = []
+    tell(findings=findings)
     for finding in examine(settings.dsn):
+        findings.append(finding)
         mark = {"ok": "✓", "note": "•", "wrong": "✗"}[finding.level]
         colour = {"ok": "green", "note": "yellow", "wrong": "red"}[finding.level]
         click.echo(f"{click.style(mark, fg=colour)} {finding.subject}: {finding.text}")
         if finding.mend:
             click.echo(f"    {finding.mend}")
-        healthy = healthy and finding.level != "wrong"
-    if not healthy:
+    if any(finding.level == "wrong" for finding in findings):
         sys.exit(1)

@@ -10,13 +10,15 @@ from types import FrameType
 import numpy as np
 from numpy.typing import NDArray
 
+from tunneldb.cli.output import tell
 from tunneldb.cli.tables import print_table
 from tunneldb.ground.classes import Klass
 
 
 def print_classes(counts: NDArray[np.int64]) -> None:
-    """Print a table of the classes that points (256,) have."""
+    """Print a table of the classes that points (256,) have, and tell of them."""
     total = int(counts.sum())
+    tell(points=total, classes={klass.name.lower(): int(counts[klass]) for klass in Klass if counts[klass]})
     rows = [
         (int(klass), klass.name.lower(), f"{int(counts[klass]):,}".replace(",", " "), f"{100.0 * counts[klass] / total:.2f} %")
         for klass in Klass

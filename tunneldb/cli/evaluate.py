@@ -7,12 +7,19 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
 
 
-@click.command()
+@verb(
+    examples=[
+        "tunneldb evaluate demo-2024 demo/demo.truth.gpkg",
+        "tunneldb evaluate demo-2024 truth.geojson --km 12 -o figures.json",
+    ]
+)
 @click.argument("survey")
 @click.argument("truth", type=click.Path(dir_okay=False, path_type=Path))
 @click.option("--layer", metavar="NAME", help="Layer of the file that holds the true leaks [the only one, or leak].")
@@ -53,12 +60,15 @@ def evaluate(
     form = output.suffix.lower() if output else ""
     if output and form not in (".json", ".csv"):
         raise UserError(f"{output}: the name must end in .json or .csv")
-    with connect(settings.dsn) as conn:
+    with connect(settings.dsn) as conn, bar("") as progress:
         conn.rollback()
         conn.read_only = True
         found = get_survey(conn, survey)
+        advance = step(progress)(f"comparing with {truth.name}", 4)
         true = read_truth(conn, found, truth, layer)
+        advance(1)
         findings = read_findings(conn, found, km)
+        advance(1)
         comparison = compare(true.shapes, findings.shapes, min_area, findings.stretch)
         outside = sum(not shape.intersects(findings.stretch) for shape in true.shapes)
         if outside == len(true.shapes):
@@ -66,13 +76,15 @@ def evaluate(
             raise UserError(
                 f"{truth}: no leak lies where leaks were sought, kilometres {kilometres}; x must be the chainage, m"
             )
+        advance(1)
         distances = (
             scanner_distance(conn, found, list(comparison.true_shape)),
             scanner_distance(conn, found, list(comparison.found_shape)),
         )
     done = reports.make_report(comparison, true.ids, [str(k) for k in findings.ids], distances, min_area, findings.seen)
+    about = {"survey": survey, "truth": str(truth), "kilometres": findings.kilometres, "min_area_m2": min_area}
+    tell(**reports.as_values(done, about), outside=outside, file=output)
     if output:
-        about = {"survey": survey, "truth": str(truth), "kilometres": findings.kilometres, "min_area_m2": min_area}
         with replacing(output) as temporary:
             temporary.write_text(reports.as_json(done, about) if form == ".json" else reports.as_csv(done), encoding="utf-8")
     print_table(reports.COUNT_HEADER, reports.count_rows(done), right=range(1, len(reports.COUNT_HEADER)))

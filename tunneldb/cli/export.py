@@ -11,6 +11,7 @@ import psycopg
 
 from tunneldb.cli.classes import print_classes, told_to_end
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import points_bar, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import Survey, connect, get_survey
@@ -21,7 +22,13 @@ from tunneldb.job.run import loaded_kilometres, parse_km
 _PLAIN = (".gpkg", ".dxf")
 
 
-@click.command()
+@verb(
+    examples=[
+        "tunneldb export ringo-2024 -o ringo.gpkg",
+        "tunneldb export ringo-2024 -o ringo.dxf --from 511+700 --to 511+800",
+        "tunneldb export ringo-2024 --classified -o classed --km 511",
+    ]
+)
 @click.argument("survey")
 @click.option(
     "-o",
@@ -72,6 +79,7 @@ def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, st
 
     with replacing(output) as temporary:
         counts = write_survey(conn, survey, stretch.low, stretch.high, temporary)
+    tell(survey=survey.name, file=output, layers=counts)
     click.echo(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count), err=True)
 
 
@@ -87,10 +95,13 @@ def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Pat
     wanted = parse_km(km, there)
     conn.rollback()
     make_folder(output)
+    files: list[dict[str, Any]] = []
+    tell(survey=survey.name, files=files)
     with told_to_end(), points_bar() as progress:
         for file in export_classified(conn, survey, output, wanted, step(progress)):
             points = int(file.counts.sum())
             rate = points / file.seconds / 1e6
             click.echo(f"{file.path}: {points} points, {rate:.1f} million/s", err=True)
+            files.append({"file": file.path, "points": points, "seconds": file.seconds})
             total += file.counts
     print_classes(total)

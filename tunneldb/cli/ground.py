@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.classes import print_classes, told_to_end
+from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import points_bar, step
 from tunneldb.cli.run import parameter_table
 from tunneldb.errors import UserError
@@ -16,7 +17,10 @@ _PREFIXES = ("ground.", "cluster.")
 _NAMES = [name for name in PARAMETERS if name.startswith(_PREFIXES)]
 
 
-@click.command(epilog="\b\nParameters for --set, with their defaults:\n" + parameter_table(_NAMES))
+@verb(
+    epilog="\b\nParameters for --set, with their defaults:\n" + parameter_table(_NAMES),
+    examples=["tunneldb ground scan.laz -o classed.laz"],
+)
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
     "-o", "--output", required=True, type=click.Path(dir_okay=False, path_type=Path), help="File to write, .laz; not FILE."
@@ -37,6 +41,7 @@ def ground(file: Path, output: Path, assignments: tuple[str, ...]) -> None:
 
     with told_to_end(), points_bar() as progress:
         found = classify_file(file, output, values, step(progress))
+    tell(file=output, ground=found.ground, lining=found.lining)
     print_classes(found.counts)
     if not found.ground:
         click.echo("no ground: nothing in the file is a floor")

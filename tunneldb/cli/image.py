@@ -7,6 +7,8 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.progress import bar, step
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
 from tunneldb.export.atomic import make_folder
@@ -14,7 +16,7 @@ from tunneldb.export.image import export_kilometre, image_kilometres
 from tunneldb.job.run import parse_km
 
 
-@click.command()
+@verb(examples=["tunneldb image ringo-2024 -o images --km 511-512"])
 @click.argument("survey")
 @click.option(
     "-o",
@@ -41,6 +43,12 @@ def image(settings: Settings, survey: str, output: Path, km: str | None) -> None
         wanted = parse_km(km, there)
         conn.rollback()
         make_folder(output)
-        for number, kilometre in enumerate(wanted, start=1):
-            for path in export_kilometre(conn, found, kilometre, output):
-                click.echo(f"[{number}|{len(wanted)}] {path}", err=True)
+        files: list[Path] = []
+        tell(survey=survey, files=files)
+        with bar("km") as progress:
+            advance = step(progress)("images", len(wanted))
+            for number, kilometre in enumerate(wanted, start=1):
+                for path in export_kilometre(conn, found, kilometre, output):
+                    files.append(path)
+                    click.echo(f"[{number}|{len(wanted)}] {path}", err=True)
+                advance(1)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
 from tunneldb.database import open_connection
 from tunneldb.database.schema import install, schema_revision
 
 
-@click.command()
+@verb(examples=["tunneldb init", 'tunneldb --dsn "host=gis.example.org dbname=tunnels user=anna" init'])
 @click.pass_obj
 def init(settings: Settings) -> None:
     """Create or upgrade the schema, the functions and the roles.
@@ -30,5 +31,6 @@ def init(settings: Settings) -> None:
         install(connection)
         after = schema_revision(connection)
     change = "created" if before is None else "is up to date" if before == after else f"upgraded from {before}"
+    tell(before=before, revision=after)
     where = "the embedded server" if settings.dsn is None else "the database"
     click.echo(f"{where}: schema tunnel {change} ({after}), tunnel_api installed", err=True)

@@ -8,6 +8,8 @@ from typing import cast, get_args
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
@@ -18,7 +20,12 @@ from tunneldb.intensity.look import Look
 _FILES = (".las", ".laz", ".e57")
 
 
-@click.command()
+@verb(
+    examples=[
+        "tunneldb intensity ringo-2024 --km 511 -o intensity.png",
+        "tunneldb intensity scan.laz --intensity Amplitude --intensity-kind amplitude --scanner 0 0 1.8",
+    ]
+)
 @click.argument("survey", metavar="SURVEY|FILE")
 @click.option("--km", metavar="A-B", help="Only these kilometres of the survey: 12 or 12-14.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="Figure to write: .png, .pdf or .svg.")
@@ -56,6 +63,7 @@ def intensity(
         if intensity is not None or intensity_kind is not None or scanner is not None:
             raise UserError(f"--intensity, --intensity-kind and --scanner are for a file; the survey {survey} has its own")
         look = _look_at_survey(settings, survey, km)
+    tell(title=look.title, dependence=look.dependence, verdict=look.dependence.verdict(), notes=look.notes, file=output)
     _print(look)
     if output is not None:
         write_figure(look, output)
@@ -79,7 +87,9 @@ def _look_at_survey(settings: Settings, name: str, km: str | None) -> Look:
 
     with connect(settings.dsn) as conn:
         survey = get_survey(conn, name)
-        return look_at_survey(conn, survey, parse_km(km, loaded_kilometres(conn, survey)), defaults())
+        kilometres = parse_km(km, loaded_kilometres(conn, survey))
+        with bar("km") as progress:
+            return look_at_survey(conn, survey, kilometres, defaults(), step(progress)("intensity", len(kilometres)))
 
 
 def _print(look: Look) -> None:

@@ -11,6 +11,7 @@ import psycopg
 from rich.console import Console
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import records, tell, verb
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import Survey, connect, get_survey
@@ -35,7 +36,14 @@ _HOUR = r"(1[0-2]|[1-9])(?::([0-5]\d))?"
 _CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
 
 
-@click.command()
+@verb(
+    examples=[
+        "tunneldb leaks ringo-2024",
+        "tunneldb leaks ringo-2024 --from 511+700 --to 511+800 --clock 10-2 --min-area 0.1",
+        "tunneldb leaks ringo-2024 -o leaks.gpkg --geometry 3d",
+        "tunneldb leaks ringo-2024 --by-km",
+    ]
+)
 @click.argument("survey")
 @click.option(
     "--kind",
@@ -102,7 +110,9 @@ def leaks(
             return
         stretch = parse_stretch(conn, found, start, end)
         rows = read_leaks(conn, found, chosen, kilometres, min_area, what, stretch.low, stretch.high, hours)
+    tell(survey=survey, kind=kind, count=len(rows), area=sum(row.area for row in rows))
     if output is None:
+        tell(geometry=geometry, leaks=rows)
         _print(rows, form, chosen, what, found)
         return
     with replacing(output) as temporary:
@@ -110,6 +120,7 @@ def leaks(
             write_gpkg(temporary, rows, chosen, found.srid, what)
         else:
             temporary.write_text(_text(rows, form, chosen, what, found), encoding="utf-8")
+    tell(file=output)
     click.echo(f"{total(rows, what)} to {output}", err=True)
 
 
@@ -137,6 +148,10 @@ def _print_classes(conn: psycopg.Connection, survey: Survey, kilometres: list[in
         " ORDER BY km",
         {"survey": survey.id, "km": kilometres},
     ).fetchall()
+    names = (
+        "km", "lining_area", "seen_share", "wet_area", "wet_per_mille", "patches", "largest_area", "window_patches", "class",
+    )  # fmt: skip
+    tell(survey=survey.name, kilometres=records(names, rows))
     header = ("km", "lining m²", "seen %", "wet m²", "wet ‰", "leaks", "largest m²", "in 100 m²", "class")
     formats = ("d", ".0f", ".1%", ".2f", ".2f", "d", ".2f", "d", "d")
     lines = [

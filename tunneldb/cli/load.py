@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import points_bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
@@ -17,7 +18,12 @@ if TYPE_CHECKING:
     from tunneldb.job.files import Loaded
 
 
-@click.command()
+@verb(
+    examples=[
+        "tunneldb load ringo-2024 scans/km-511.laz scans/km-512.laz",
+        "tunneldb load ringo-2024 scans/*.e57 --density all",
+    ]
+)
 @click.argument("survey")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILES...")
 @click.option(
@@ -69,6 +75,7 @@ def load(
 
     chosen = FilterSettings(density_of(density), noise_points, noise_diameter, max_distance)
     done: list[Loaded] = []
+    tell(survey=survey, files=done)
     with connect(settings.dsn) as connection:
         found = get_survey(connection, survey)
         try:

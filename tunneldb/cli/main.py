@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from tunneldb import __version__
-from tunneldb.cli.output import AT_FAULT, DONE, JSON, run_as_json, write_lines
+from tunneldb.cli.output import AS_JSON, AT_FAULT, DONE, JSON, run_as_json, write_lines
 from tunneldb.errors import UserError
 
 
@@ -25,8 +25,6 @@ class Settings:
 
     dsn: str | None
 
-
-_AS_JSON = "tunneldb.json"
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "init": ("tunneldb.cli.init:init", "Create or upgrade the schema, the functions and the roles."),
@@ -105,12 +103,12 @@ class LazyGroup(click.Group):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Note whether JSON is asked for: what is wrong with the rest of the line is to be said in it, too."""
-        ctx.meta[_AS_JSON] = JSON in args and "psql" not in args
+        ctx.meta[AS_JSON] = JSON in args and "psql" not in args
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a verb; turn the user's errors and the server's into one line and exit code 2."""
-        if ctx.meta[_AS_JSON]:
+        if ctx.meta[AS_JSON]:
             return ctx.exit(run_as_json(ctx, lambda: click.Group.invoke(self, ctx), _describe))
         try:
             return super().invoke(ctx)

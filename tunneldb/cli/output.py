@@ -12,7 +12,7 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,9 @@ import click
 JSON = "--json"
 DONE = "done"
 AT_FAULT = "the input, the server or the command line is at fault: one line says what, where, and what to do"
+
+AS_JSON = "tunneldb.json"
+"""Key in the context's meta: whether JSON is asked for."""
 
 _TOLD = "tunneldb.told"
 _VERB = "tunneldb.verb"
@@ -38,6 +41,17 @@ def tell(**values: Any) -> None:
     context = click.get_current_context(silent=True)
     if context is not None:
         context.meta.setdefault(_TOLD, {}).update(values)
+
+
+def records(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> list[dict[str, Any]]:
+    """Return rows of a table as mappings, to be told."""
+    return [dict(zip(names, row, strict=True)) for row in rows]
+
+
+def wants_json() -> bool:
+    """Whether the verb under way is to print JSON."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(AS_JSON))
 
 
 class Verb(click.Command):
@@ -144,6 +158,8 @@ def plain(value: Any) -> Any:
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple, set, frozenset, range)):
         return [plain(item) for item in value]
+    if hasattr(value, "__geo_interface__"):
+        return plain(value.__geo_interface__)
     if hasattr(value, "tolist"):  # of NumPy, which help must not import
         return plain(value.tolist())
     if value is None or isinstance(value, (bool, int, str)):

@@ -8,6 +8,8 @@ import click
 import psycopg
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.progress import bar, step
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
 from tunneldb.export.atomic import make_folder
@@ -15,7 +17,13 @@ from tunneldb.export.image import export_kilometre, image_kilometres
 from tunneldb.export.qgis import store_project, store_styles, write_project
 
 
-@click.command()
+@verb(
+    examples=[
+        "tunneldb qgis demo-2024 -o demo.qgz",
+        "tunneldb qgis demo-2024 --database --images /srv/tunnels/demo-2024",
+        "tunneldb qgis demo-2024 -o demo.qgz --database demo --service tunnels",
+    ]
+)
 @click.argument("survey")
 @click.option(
     "-o", "--output", type=click.Path(dir_okay=False, path_type=Path),
@@ -38,12 +46,7 @@ def qgis(
 
     Leaks can be reviewed and axis vertices moved in it. The styles also go into the database, where QGIS finds them
     for layers that are added by hand. A project in the database holds the images by their absolute paths.
-
-    \b
-      tunneldb qgis demo-2024 -o demo.qgz
-      tunneldb qgis demo-2024 --database --images /srv/tunnels/demo-2024
-      tunneldb qgis demo-2024 -o demo.qgz --database demo --service tunnels
-    """  # noqa: D301 - \b is click's mark for lines to be kept
+    """
     if output is None and name is None:
         raise UserError("say where the project goes: -o FILE.qgz, or --database")
     if output is not None and output.suffix.lower() not in (".qgz", ".qgs"):
@@ -61,6 +64,7 @@ def qgis(
             written.append(f"project {name or found.name} in public.qgis_projects")
         styles = _store_styles(conn)
         socket = conn.info.host.startswith("/")
+    tell(survey=survey, written=written, images=images, styles=styles)
     click.echo(f"{', '.join(written)}: {len(images)} images, {styles}", err=True)
     if settings.dsn is None and service is None:
         click.echo("QGIS reads your own server; should it be stopped: tunneldb server start", err=True)
@@ -74,7 +78,12 @@ def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> li
     conn.rollback()
     if kilometres:
         make_folder(folder)
-    written = [path for km in kilometres for path in export_kilometre(conn, survey, km, folder)]
+    written: list[Path] = []
+    with bar("km") as progress:
+        advance = step(progress)("images", len(kilometres))
+        for km in kilometres:
+            written += export_kilometre(conn, survey, km, folder)
+            advance(1)
     return [path for path in written if path.suffix == ".tif"]
 
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.progress import bar
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
 from tunneldb.job.ledger import Run
@@ -27,8 +26,14 @@ def parameter_table(names: Iterable[str] = PARAMETERS) -> str:
     return "\n".join(f"  {name:<{width}}  {p.text} [{f'{p.default:g} {p.unit}'.rstrip()}]" for name, p in chosen.items())
 
 
-@click.command(
+@verb(
     epilog="\b\nParameters for --set, with their defaults:\n" + parameter_table(),
+    examples=[
+        "tunneldb run ringo-2024",
+        "tunneldb run ringo-2024 --km 511-512 --from sections --to ground",
+        "tunneldb run ringo-2024 --from detect --set leak.sigmas=3.5",
+        "tunneldb run ringo-2024 --stale",
+    ],
 )
 @click.argument("survey")
 @click.option("--km", metavar="A[-B]", help="Only these kilometres, 511 or 511-512; all that are loaded by default.")
@@ -73,37 +78,31 @@ def run(
         if not tasks:
             click.echo(f"nothing of {survey} is stale")
         shown = _Shown(len(tasks))
+        tell(survey=survey, stages=shown.stages)
         with shown.progress:
             run_tasks(conn, found, tasks, shown.begin, shown.end)
 
 
 class _Shown:
-    """A bar per stage and kilometre on a terminal, and a line for each when it is done."""
+    """A bar on a terminal that each stage of each kilometre moves on, and a line for each when it is done."""
 
     def __init__(self, total: int) -> None:
-        self.console = Console(file=sys.stderr)
-        self.progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TimeElapsedColumn(),
-            console=self.console,
-            transient=True,
-            disable=not self.console.is_terminal,
-        )
+        self.progress = bar("stages")
+        self.task = self.progress.add_task("", total=total)
         self.total = total
-        self.done = 0
-        self.task = TaskID(0)
+        self.stages: list[dict[str, Any]] = []
 
     def begin(self, stage: Stage, km: int) -> Callable[[float], None]:
-        task = self.progress.add_task(f"[{self.done + 1}/{self.total}] {stage.name} km {km}", total=1.0)
-        self.task = task
-        return lambda share: self.progress.update(task, completed=share)
+        done = len(self.stages)
+        self.progress.update(self.task, description=f"[{done + 1}/{self.total}] {stage.name} km {km}")
+        return lambda share: self.progress.update(self.task, completed=done + share)
 
     def end(self, stage: Stage, km: int, run: Run) -> None:
-        self.done += 1
-        self.progress.remove_task(self.task)
+        self.stages.append({"stage": stage.name, "km": km, "counts": run.counts})
+        done = len(self.stages)
+        self.progress.update(self.task, completed=done)
         counts = ", ".join(f"{name} {_short(value)}" for name, value in run.counts.items())
-        click.echo(f"[{self.done}/{self.total}] {stage.name} km {km}: {counts}")
+        click.echo(f"[{done}/{self.total}] {stage.name} km {km}: {counts}")
 
 
 def _short(value: object) -> str:

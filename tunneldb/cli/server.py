@@ -5,11 +5,12 @@ from __future__ import annotations
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import VerbGroup, tell
 from tunneldb.database.server import Server
 from tunneldb.errors import UserError
 
 
-@click.group()
+@click.group(cls=VerbGroup)
 @click.pass_obj
 def server(settings: Settings) -> None:
     """Start, stop or look at the embedded server.
@@ -20,26 +21,32 @@ def server(settings: Settings) -> None:
         raise UserError("a DSN is given (--dsn or TUNNELDB_DSN), so the embedded server is not used")
 
 
-@server.command()
+@server.command(examples=['psql "$(tunneldb server start)"'])
 def start() -> None:
     """Start it, and print its DSN."""
-    click.echo(Server().start())
+    dsn = Server().start()
+    tell(dsn=dsn)
+    click.echo(dsn)
 
 
-@server.command()
+@server.command(examples=["tunneldb server stop"])
 def stop() -> None:
     """Stop it; what other commands are doing is undone."""
     embedded = Server()
-    click.echo(f"{'stopped' if embedded.stop() else 'was not running'}: {embedded.folder}", err=True)
+    stopped = embedded.stop()
+    tell(stopped=stopped, folder=embedded.folder)
+    click.echo(f"{'stopped' if stopped else 'was not running'}: {embedded.folder}", err=True)
 
 
-@server.command()
+@server.command(examples=["tunneldb server status"])
 def status() -> None:
     """Print whether it runs, and where its data are."""
     embedded = Server()
     state = embedded.state()
+    tell(state=state, folder=embedded.folder)
     click.echo(f"{state}: {embedded.folder}")
     if state == "absent":
         return
     home = embedded.home()
+    tell(data=home.cluster, log=home.log, socket=home.run)
     click.echo(f"data: {home.cluster}\nlog: {home.log}\nsocket: {home.run}")

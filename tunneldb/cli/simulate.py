@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from tunneldb.cli.output import Verb, tell, verb
+from tunneldb.cli.progress import points_bar
 from tunneldb.simulate import PRESETS, Parameters, Simulation, write
 
 
@@ -151,7 +151,7 @@ _FLAGS = {
 }
 
 
-class _GroupedCommand(click.Command):
+class _GroupedVerb(Verb):
     """A command that lists its options under headings."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -188,7 +188,16 @@ def _options(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-@click.command(cls=_GroupedCommand)
+@verb(
+    cls=_GroupedVerb,
+    examples=[
+        "tunneldb simulate demo --preset demo",
+        "tunneldb simulate out --name bend --section horseshoe --length 100 --radius 300 --slope 4",
+        "tunneldb simulate out --section box --scanner profiler --leaks 20 --leak-area 0.1 2 --seed 7",
+        "tunneldb simulate out --length 50 --people 4 --equipment 6 --spheres 6 --ballast 0.02 --sleepers --catenary",
+        "tunneldb simulate out --name km --length 25000 --radius 4000 --scanner profiler --density 100 --no-truth",
+    ],
+)
 @click.argument("out", type=click.Path(file_okay=False, path_type=Path))
 @click.option(
     "--preset",
@@ -222,36 +231,21 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
     OUT/NAME.spheres.csv     id,x,y,z,radius,kind of the target spheres, if any; id is their number among the things
     OUT/NAME.json            all parameters, appendages, niches, things that stand free
 
-    \b
-    Examples:
-      tunneldb simulate demo --preset demo
-      tunneldb simulate out --name bend --section horseshoe --length 100 --radius 300 --slope 4
-      tunneldb simulate out --section box --scanner profiler --leaks 20 --leak-area 0.1 2 --seed 7
-      tunneldb simulate out --length 50 --people 4 --equipment 6 --spheres 6 --ballast 0.02 --sleepers --catenary
-      tunneldb simulate out --name km --length 25000 --radius 4000 --scanner profiler --density 100 --no-truth
-
     Lengths are in metres, angles in degrees, levels in dB.
     """  # noqa: D301 - \b is click's mark for lines to be kept
     values = PRESETS[preset] if preset else {}
     parameters = Parameters(**{**values, **{k: v for k, v in given.items() if v is not None}})
     simulation = Simulation(parameters)
-    console = Console(stderr=True)
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.fields[points]:,} points"),
-        TimeElapsedColumn(),
-        console=console,
-        disable=not console.is_terminal,
-    ) as bar:
-        task = bar.add_task(f"Scanning {parameters.name}", total=1.0, points=0)
-        files = write(
-            simulation,
-            out,
-            truth=not no_truth,
-            progress=lambda share, points: bar.update(task, completed=share, points=points),
-        )
+    with points_bar() as progress:
+        task = progress.add_task(f"scanning {parameters.name}", total=None)
+
+        def scanned(share: float, points: int) -> None:
+            # how many there will be is known only from how many there are
+            progress.update(task, completed=points, total=points / share if share > 0.0 else None)
+
+        files = write(simulation, out, truth=not no_truth, progress=scanned)
+    area = sum(leak.area for leak in simulation.leaks)
+    tell(points=files.points, leaks=len(simulation.leaks), leak_area=area, files=files)
     click.echo(
-        f"{files.points:,} points, {len(simulation.leaks)} leaks of {sum(k.area for k in simulation.leaks):.2f} m²: "
-        + ", ".join(str(p) for p in files.clouds)
+        f"{files.points:,} points, {len(simulation.leaks)} leaks of {area:.2f} m²: " + ", ".join(str(p) for p in files.clouds)
     )

@@ -7,13 +7,19 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import points_bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
 
 
-@click.command()
+@verb(
+    examples=[
+        "tunneldb spheres ringo-2024 --radius 0.0725",
+        "tunneldb spheres ringo-2024 --radius 0.0725 --control control.csv --report spheres.md",
+    ]
+)
 @click.argument("survey")
 @click.option(
     "--radius",
@@ -90,6 +96,8 @@ def spheres(
         stationing = load_stationing(conn, chosen.tunnel_id)
     comparison = compare(found.spheres, points, within) if points else None
     count = len({row.number for row in found.spheres})
+    tell(survey=survey, count=count, spheres=found.spheres, others=len(found.refusals), points=found.points)
+    tell(comparison=comparison, file=report)
     if found.spheres:
         print_table(HEADER, sphere_rows(found.spheres, stationing), right=(0, 1, 3, 4, 5, 6, 7, 8, 9, 10))
     click.echo(f"{count} target spheres, seen {len(found.spheres)} times; {len(found.refusals)} other round things")

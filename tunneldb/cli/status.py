@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from contextlib import suppress
 from typing import Any
 
@@ -12,6 +11,7 @@ import psycopg
 from rich.console import Console
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import records, tell, verb, wants_json
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
@@ -19,7 +19,7 @@ from tunneldb.errors import UserError
 STAGES = ("load", "axis", "segments", "sections", "ground", "detect")
 
 
-@click.command()
+@verb(examples=["tunneldb status", "tunneldb status pajares-2026 --watch", "tunneldb status pajares-2026 --json"])
 @click.argument("survey", required=False)
 @click.option("--watch", is_flag=True, help="Look again and again until nothing is left to do, or Ctrl-C.")
 @click.option(
@@ -30,9 +30,8 @@ STAGES = ("load", "axis", "segments", "sections", "ground", "detect")
     metavar="S",
     help="Time between two looks of --watch, seconds.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print what is to be seen of SURVEY as JSON, for programs.")
 @click.pass_obj
-def status(settings: Settings, survey: str | None, watch: bool, interval: float, as_json: bool) -> None:
+def status(settings: Settings, survey: str | None, watch: bool, interval: float) -> None:
     """Show how far each kilometre of SURVEY has come, files, workers, speed and time left; or all surveys in short.
 
     \b
@@ -46,15 +45,17 @@ def status(settings: Settings, survey: str | None, watch: bool, interval: float,
     never        not yet run
     empty        the kilometre holds no points, and awaits none
     """  # noqa: D301 - \b is click's
-    if survey is None and (watch or as_json):
-        raise UserError("--watch and --json are for one survey: tunneldb status SURVEY --watch")
+    if watch and survey is None:
+        raise UserError("--watch is for one survey: tunneldb status SURVEY --watch")
+    if watch and wants_json():
+        raise UserError("--watch draws again and again; --json is one look: leave --watch out")
     with connect(settings.dsn) as connection:
         if survey is None:
             _all(connection)
             return
         get_survey(connection, survey)
         if not watch:
-            _one(connection, survey, as_json)
+            _one(connection, survey)
             return
     from tunneldb.cli.watch import watch as look_on
 
@@ -79,20 +80,20 @@ def _all(connection: psycopg.Connection[Any]) -> None:
         """,
         [list(STAGES)],
     ).fetchall()
+    names = ("name", "tunnel", "date", "files", "points", "label_from", "label_to", "kilometres", "done")
+    tell(surveys=[row | {"done": dict(zip(STAGES, row["done"] or (), strict=False))} for row in records(names, rows)])
     table = [[*fixed, there, *(done or [None] * len(STAGES))] for *fixed, there, done in rows]
     print_table(["survey", "tunnel", "date", "files", "points", "from", "to", "km", *STAGES], table, right=range(3, 14))
     if not rows:
         click.echo("there is no survey yet: tunneldb tunnel add, then tunneldb survey add")
 
 
-def _one(connection: psycopg.Connection[Any], survey: str, as_json: bool) -> None:
+def _one(connection: psycopg.Connection[Any], survey: str) -> None:
     from tunneldb.cli.overview import render
     from tunneldb.job.overview import overview
 
     seen = overview(connection, survey)
-    if as_json:
-        click.echo(json.dumps(dataclasses.asdict(seen), default=str, ensure_ascii=False, indent=1))
-        return
+    tell(**{field.name: getattr(seen, field.name) for field in dataclasses.fields(seen)})
     rows = connection.execute(
         """
         SELECT name, tunnel, date, files, points, tunnel_api.station_label(tunnel_id, chainage_from),

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import VerbGroup, records, tell
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
@@ -15,12 +16,18 @@ from tunneldb.errors import UserError
 FILE = click.Path(path_type=Path)
 
 
-@click.group()
+@click.group(cls=VerbGroup)
 def survey() -> None:
     """Add, list or remove the scanning campaigns of a tunnel."""
 
 
-@survey.command()
+@survey.command(
+    examples=[
+        "tunneldb survey add ringo-2024 --tunnel ringo --date 2024-05-04 --stations stations.csv --intensity-kind none",
+        "tunneldb survey add bend-2024 --tunnel bend --date 2024-05-04 --trajectory trajectory.csv \\",
+        "    --intensity Amplitude --intensity-kind amplitude --reference auto",
+    ]
+)
 @click.argument("name")
 @click.option("--tunnel", required=True, help="Tunnel that was scanned.")
 @click.option("--date", type=click.DateTime(["%Y-%m-%d"]), required=True, metavar="YYYY-MM-DD", help="Day of the scan.")
@@ -86,10 +93,11 @@ def add(
             reference="auto" if reference == "auto" else None if reference is None else Path(reference),
             intensity=Intensity(intensity_kind, intensity),
         )
+    tell(survey=name, tunnel=tunnel, date=date.date(), poses=count)
     click.echo(f"{name}: {count} {'poses' if trajectory else 'stations'} of {tunnel}, {date:%Y-%m-%d}", err=True)
 
 
-@survey.command("list")
+@survey.command("list", examples=["tunneldb survey list"])
 @click.pass_obj
 def list_(settings: Settings) -> None:
     """List the surveys."""
@@ -101,11 +109,15 @@ def list_(settings: Settings) -> None:
               FROM tunnel_api.survey ORDER BY tunnel, date, name
             """
         ).fetchall()
+    names = (
+        "name", "tunnel", "date", "platform", "intensity_kind", "files", "points", "label_from", "label_to",
+    )  # fmt: skip
+    tell(surveys=records(names, rows))
     header = ["survey", "tunnel", "date", "platform", "intensity", "files", "points", "from", "to"]
     print_table(header, rows, right=(5, 6, 7, 8))
 
 
-@survey.command()
+@survey.command(examples=["tunneldb survey remove ringo-2024"], wrong="it was not removed: the answer was no")
 @click.argument("name")
 @click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
@@ -127,6 +139,7 @@ def remove(settings: Settings, name: str, yes: bool) -> None:
         assert row is not None
         connection.rollback()
         question = f"Remove {name} with {row[0]} points and {row[1]} leaks and other dark spots, {row[2]} of them reviewed?"
-        if not yes and not click.confirm(question):
+        if not yes and not click.confirm(question, err=True):
             raise click.Abort
         remove_survey(connection, name)
+    tell(survey=name, points=row[0], anomalies=row[1], reviewed=row[2])

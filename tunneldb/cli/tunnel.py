@@ -7,17 +7,23 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import VerbGroup, records, tell
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 
 
-@click.group()
+@click.group(cls=VerbGroup)
 def tunnel() -> None:
     """Add, list or remove tunnels."""
 
 
-@tunnel.command()
+@tunnel.command(
+    examples=[
+        "tunneldb tunnel add ringo --srid 25833 --axis axis.csv --start-chainage 511700",
+        "tunneldb tunnel add ringo --srid 25833 --axis ringo.xml --alignment Mainline",
+    ]
+)
 @click.argument("name")
 @click.option("--srid", type=int, required=True, help="Spatial reference of all coordinates; projected, metres.")
 @click.option(
@@ -71,15 +77,17 @@ def add(
         line = add_tunnel(connection, name, srid, given, spacing)
         if own is not None:
             save_equations(connection, get_tunnel(connection, name), own)
+    tell(tunnel=name, srid=srid, chainage_from=line.start, chainage_to=line.end, source=given.source)
     click.echo(f"{name}: {line.end - line.start:.3f} m of axis, chainage {line.start:.3f} to {line.end:.3f} m", err=True)
     if given.design is not None:
         plan, profiles = len(given.design.plan), len(given.design.profile)
+        tell(plan_elements=plan, profile_elements=profiles, notes=given.design.notes)
         click.echo(f"{given.source}: {plan} elements in plan, {profiles} in profile", err=True)
         for note in given.design.notes:
             click.echo(f"{axis}: {note}", err=True)
 
 
-@tunnel.command()
+@tunnel.command(examples=["tunneldb tunnel stationing ringo equations.csv", "tunneldb tunnel stationing ringo --show"])
 @click.argument("name")
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 @click.option("--show", is_flag=True, help="Print the pieces of the stationing.")
@@ -110,10 +118,12 @@ def stationing(settings: Settings, name: str, file: Path | None, show: bool, cle
             """,
             [tunnel_id],
         ).fetchall()
+    names = ("chainage_from", "chainage_to", "label_from", "label_to", "direction")
+    tell(tunnel=name, pieces=records(names, rows))
     print_table(["chainage from", "to", "station from", "to", "runs"], rows, right=(0, 1, 2, 3))
 
 
-@tunnel.command("list")
+@tunnel.command("list", examples=["tunneldb tunnel list"])
 @click.pass_obj
 def list_(settings: Settings) -> None:
     """List the tunnels."""
@@ -126,10 +136,11 @@ def list_(settings: Settings) -> None:
              GROUP BY t.id, t.name, t.srid, t.start_chainage, t.geom, t.spacing ORDER BY t.name
             """
         ).fetchall()
+    tell(tunnels=records(("name", "srid", "label_from", "length", "spacing", "surveys"), rows))
     print_table(["tunnel", "SRID", "starts at", "length m", "spacing m", "surveys"], rows, right=(1, 2, 3, 4, 5))
 
 
-@tunnel.command()
+@tunnel.command(examples=["tunneldb tunnel remove ringo"])
 @click.argument("name")
 @click.pass_obj
 def remove(settings: Settings, name: str) -> None:
@@ -138,3 +149,4 @@ def remove(settings: Settings, name: str) -> None:
 
     with connect(settings.dsn) as connection:
         remove_tunnel(connection, name)
+    tell(tunnel=name)

@@ -10,6 +10,7 @@ import click
 import numpy as np
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import records, tell, verb
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
 
@@ -17,7 +18,7 @@ _SPACE = ("x", "y", "z")
 _PLANE = ("chainage", "arc", "offset")
 
 
-@click.command()
+@verb(examples=["tunneldb unroll ringo-2024 points.csv -o unrolled.csv", "tunneldb unroll ringo-2024 niches.csv --inverse"])
 @click.argument("survey")
 @click.argument("points", type=click.Path(dir_okay=False, path_type=Path))
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write, else standard output.")
@@ -48,7 +49,9 @@ def unroll(settings: Settings, survey: str, points: Path, output: Path | None, i
     table = [[*header, *added]]
     for row, values in zip(rows, result.tolist(), strict=True):
         table.append([*row, *("" if value != value else f"{value:.4f}" for value in values)])
+    tell(survey=survey, points=len(rows), off_tunnel=sum(row[-1] == "" for row in table[1:]), file=output)
     if output is None:
+        tell(rows=records(table[0], table[1:]))
         csv.writer(sys.stdout, lineterminator="\n").writerows(table)
     else:
         with replacing(output) as path, path.open("w", newline="", encoding="utf-8") as stream:

@@ -7,10 +7,11 @@ import time
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
 from tunneldb.database import connect
 
 
-@click.command()
+@verb(examples=["tunneldb worker --concurrency 8"])
 @click.option("--concurrency", type=click.IntRange(1, 1000), default=1, show_default=True, metavar="N", help="Jobs at a time.")
 @click.option(
     "--threads",
@@ -38,7 +39,7 @@ def worker(settings: Settings, concurrency: int, threads: int) -> None:
             time.sleep(0.2)
 
 
-@click.command()
+@verb(examples=["tunneldb stop --wait"])
 @click.option("--wait", is_flag=True, help="Wait until all have left.")
 @click.pass_obj
 def stop(settings: Settings, wait: bool) -> None:
@@ -47,6 +48,7 @@ def stop(settings: Settings, wait: bool) -> None:
         conn.autocommit = True
         conn.execute("SELECT tunnel_api.queue_rescue()")
         asked = conn.execute("UPDATE tunnel.worker SET stop = true RETURNING id").fetchall()
+        tell(workers=len(asked))
         click.echo(f"{len(asked)} worker{'s' * (len(asked) != 1)} asked to stop")
         while wait and conn.execute("SELECT 1 FROM tunnel.worker WHERE id = ANY (%s)", [[row[0] for row in asked]]).fetchone():
             time.sleep(0.5)

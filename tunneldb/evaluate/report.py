@@ -190,16 +190,20 @@ def false_line(report: Report) -> str:
     return f"{of_all.false_per_1000:.2f} false leaks for each 1000 m² of the {report.seen:.0f} m² of lining that were seen"
 
 
-def as_json(report: Report, about: dict[str, Any]) -> str:
-    """Write all figures, and each leak, as JSON; what can't be told is null."""
-    content = {
+def as_values(report: Report, about: dict[str, Any]) -> dict[str, Any]:
+    """Return all figures, and each leak, as plain values; what can't be told is None."""
+    return {
         **about,
         "seen_m2": _known(report.seen),
         "groups": [{"group": name, **_plain(of)} for name, of in report.groups.items()],
         "true": [asdict(leak) for leak in report.true],
         "found": [asdict(leak) for leak in report.found],
     }
-    return json.dumps(content, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
+
+
+def as_json(report: Report, about: dict[str, Any]) -> str:
+    """Write all figures, and each leak, as JSON; what can't be told is null."""
+    return json.dumps(as_values(report, about), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
 
 
 def as_csv(report: Report) -> str:

@@ -41,7 +41,11 @@ MOST_POINTS = 2_000_000
 
 
 def look_at_survey(
-    conn: psycopg.Connection[Any], survey: Survey, kilometres: Sequence[int], values: Mapping[str, float]
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    kilometres: Sequence[int],
+    values: Mapping[str, float],
+    progress: Callable[[float], None] = lambda count: None,
 ) -> Look:
     """Look at lining points of survey density of some kilometres; nothing is changed.
 
@@ -51,6 +55,8 @@ def look_at_survey(
         Where.
     values : mapping
         Parameters of the stages.
+    progress : callable
+        Given 1 after each kilometre.
 
     Raises
     ------
@@ -60,7 +66,10 @@ def look_at_survey(
     if survey.intensity_kind == "none":
         raise UserError(f"survey {survey.name} has no intensity: it was added with --intensity-kind none")
     share = max(1, SAMPLE // len(kilometres))
-    looks = [_look_at_kilometre(conn, survey, km, values, share) for km in kilometres]
+    looks = []
+    for km in kilometres:
+        looks.append(_look_at_kilometre(conn, survey, km, values, share))
+        progress(1)
     numbers = ", ".join(map(str, kilometres))
     return pool(f"{survey.name}, kilometre {numbers}: {survey.intensity_kind}", looks)
 
