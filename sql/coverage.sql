@@ -1,23 +1,30 @@
 -- How much of the lining was seen, from what detection notes of each kilometre by steps of chainage (tunnel.coverage).
 
--- Length of tunnel that was looked at (m), lining, lining seen and wet pixels (m²), summed from the first of the kilometres
--- on, at the edges of all steps. Over kilometres of which nothing is known the sums stay as they are.
+-- Length of tunnel that was looked at (m), lining, lining seen and wet pixels (m²), summed from the first of the steps that
+-- reach into a stretch on, at the edges of these steps. Over kilometres of which nothing is known the sums stay as they are.
 CREATE OR REPLACE FUNCTION tunnel_api.coverage_sums(
-    survey_id int, km_from int, km_to int,
+    survey_id int, chainage_from float8, chainage_to float8,
     OUT chainage float8[], OUT length float8[], OUT lining float8[], OUT seen float8[], OUT wet float8[])
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
 SET jit = off
 AS $$
-    WITH edge AS (
-        -- a step is summed up at its end, and a kilometre begins with an edge that adds nothing
-        SELECT c.km, s.n, least(c.km * 1000 + (s.n - 1) * c.step, (c.km + 1) * 1000) AS chainage,
-            CASE WHEN s.n = 1 THEN 0 ELSE least(c.step, 1000 - (s.n - 2) * c.step) END AS length,
-            s.lining::float8, s.seen::float8, s.wet::float8
+    WITH part AS (
+        SELECT c.km, c.step, i.first, c.lining[i.first + 1:i.last] AS lining, c.seen[i.first + 1:i.last] AS seen,
+            c.wet[i.first + 1:i.last] AS wet
         FROM tunnel.coverage c
+        CROSS JOIN LATERAL (
+            SELECT greatest(0, floor(($2 - c.km * 1000) / c.step))::int AS first,
+                   least(ceil(1000 / c.step), ceil(($3 - c.km * 1000) / c.step))::int AS last) i
+        WHERE c.survey_id = $1 AND c.km BETWEEN floor($2 / 1000) AND floor($3 / 1000)
+    ), edge AS (
+        -- a step is summed up at its end, and a kilometre begins with an edge that adds nothing
+        SELECT c.km, s.n, least(c.km * 1000 + (c.first + s.n - 1) * c.step, (c.km + 1) * 1000) AS chainage,
+            CASE WHEN s.n = 1 THEN 0 ELSE least(c.step, 1000 - (c.first + s.n - 2) * c.step) END AS length,
+            s.lining::float8, s.seen::float8, s.wet::float8
+        FROM part c
         CROSS JOIN LATERAL unnest(0::float4 || c.lining, 0::float4 || c.seen, 0::float4 || c.wet)
             WITH ORDINALITY AS s (lining, seen, wet, n)
-        WHERE c.survey_id = $1 AND c.km BETWEEN $2 AND $3
     ), total AS (
         SELECT e.chainage, sum(e.length) OVER upwards AS length, sum(e.lining) OVER upwards AS lining,
             sum(e.seen) OVER upwards AS seen, sum(e.wet) OVER upwards AS wet
@@ -27,8 +34,8 @@ AS $$
     )
     SELECT array_agg(t.chainage), array_agg(t.length), array_agg(t.lining), array_agg(t.seen), array_agg(t.wet) FROM total t
 $$;
-COMMENT ON FUNCTION tunnel_api.coverage_sums(int, int, int) IS
-'Running sums over the steps of some kilometres, at the edges of the steps: length looked at (m), lining, lining seen and wet pixels (m²). NULL where nothing was looked at.';
+COMMENT ON FUNCTION tunnel_api.coverage_sums(int, float8, float8) IS
+'Running sums over the steps that reach into a stretch of a survey, at the edges of the steps: length looked at (m), lining, lining seen and wet pixels (m²). NULL where nothing was looked at.';
 
 
 -- Straight lines through points, at many places at once; before the first point and after the last one as there.
@@ -63,7 +70,7 @@ AS $$
     FROM (SELECT tunnel_api.survey_id($1) AS id) s
     CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
     CROSS JOIN LATERAL (SELECT ARRAY[greatest($2, e.chainage_from), least($3, e.chainage_to)] AS ends) r
-    CROSS JOIN LATERAL tunnel_api.coverage_sums(s.id, floor(r.ends[1] / 1000)::int, floor(r.ends[2] / 1000)::int) c
+    CROSS JOIN LATERAL tunnel_api.coverage_sums(s.id, r.ends[1], r.ends[2]) c
     CROSS JOIN LATERAL (SELECT tunnel_api.interpolate(r.ends, c.chainage, c.lining) AS lining,
         tunnel_api.interpolate(r.ends, c.chainage, c.seen) AS seen, tunnel_api.interpolate(r.ends, c.chainage, c.wet) AS wet) a
     CROSS JOIN LATERAL (SELECT a.lining[2] - a.lining[1] AS lining, a.seen[2] - a.seen[1] AS seen, a.wet[2] - a.wet[1] AS wet) d

@@ -40,8 +40,7 @@ SET jit = off
 SET enable_nestloop = off  -- how few or many rows there are is not known when it is planned
 AS $$
     WITH sums AS MATERIALIZED (
-        SELECT c.* FROM tunnel_api.coverage_sums(
-            $1, floor(($2)[1] / 1000)::int, floor(($3)[cardinality($3)] / 1000)::int) c
+        SELECT c.* FROM tunnel_api.coverage_sums($1, ($2)[1], ($3)[cardinality($3)]) c
     ), stretch AS MATERIALIZED (
         SELECT q.n::int AS n, q.low, q.high, q.a, q.b, q.seen_b - q.seen_a AS seen,
             least(coalesce(q.length_b - q.length_a, 0), q.high - q.low) / nullif(q.high - q.low, 0) AS looked_at
@@ -54,15 +53,17 @@ AS $$
     ), roomy AS (
         SELECT s.n, s.a, s.b - 100 AS last FROM stretch s WHERE s.b - s.a > 100
     ), leak AS (
-        SELECT l.id, l.area, l.unrolled, l.chainage_from AS low, l.chainage_to AS high
+        SELECT l.id, l.area, l.chainage_from AS low, l.chainage_to AS high
         FROM tunnel.anomaly l
         WHERE l.survey_id = $1 AND l.detected AND l.review <> 'rejected' AND coalesce(l.judged, l.kind) = 'leak'
             AND l.chainage_to > ($2)[1] AND l.chainage_from < ($3)[cardinality($3)]
     ), cut AS (
         SELECT s.n, l.id, greatest(l.low, s.low) AS low, least(l.high, s.high) AS high, l.area AS whole,
             CASE WHEN l.low >= s.low AND l.high <= s.high THEN l.area
-                 ELSE l.area * ST_Area(ST_ClipByBox2D(l.unrolled, ST_MakeBox2D(
-                     ST_MakePoint(s.low, -1e4), ST_MakePoint(s.high, 1e4)))) / ST_Area(l.unrolled) END AS area
+                 -- few are cut: only they are looked up, the others come from the index alone
+                 ELSE l.area * (SELECT ST_Area(ST_ClipByBox2D(a.unrolled, ST_MakeBox2D(
+                     ST_MakePoint(s.low, -1e4), ST_MakePoint(s.high, 1e4)))) / ST_Area(a.unrolled)
+                     FROM tunnel.anomaly a WHERE a.id = l.id) END AS area
         FROM leak l
         CROSS JOIN LATERAL generate_series(
             greatest(width_bucket(l.low, $2), 1), width_bucket(l.high, $2)) AS i (n)

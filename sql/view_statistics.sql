@@ -41,16 +41,19 @@ SELECT s.id::bigint * 1000000 + 500000 + g.km AS id, s.id AS survey_id, s.name A
        l.wet_area, l.wet_area / nullif(d.seen, 0) AS wet_share, c.wet / nullif(c.seen, 0) AS wet_pixel_share, l.leaks,
        l.leaks_open, l.leaks_confirmed, l.leaks_rejected, l.largest_area, l.greatest_drop
   FROM tunnel.survey s
-  JOIN (SELECT survey_id, km, min(chainage_from) AS chainage_from, max(chainage_to) AS chainage_to
+  JOIN (SELECT survey_id, km, min(chainage_from) AS chainage_from, max(chainage_to) AS chainage_to,
+               min(chainage_from) < km * 1000 + 1e-6 AND max(chainage_to) > (km + 1) * 1000 - 1e-6 AS whole
           FROM tunnel.segment GROUP BY survey_id, km) g ON g.survey_id = s.id
+  LEFT JOIN tunnel.coverage w ON w.survey_id = g.survey_id AND w.km = g.km
   LEFT JOIN LATERAL (
-        SELECT sum(v.lining * i.share) AS lining, sum(v.seen * i.share) AS seen, sum(v.wet * i.share) AS wet
-          FROM tunnel.coverage q
-         CROSS JOIN LATERAL unnest(q.lining, q.seen, q.wet) WITH ORDINALITY AS v (lining, seen, wet, n)
+        SELECT w.lining_total AS lining, w.seen_total AS seen, w.wet_total AS wet WHERE g.whole
+         UNION ALL
+        SELECT sum(v.lining * i.share), sum(v.seen * i.share), sum(v.wet * i.share)
+          FROM unnest(w.lining, w.seen, w.wet) WITH ORDINALITY AS v (lining, seen, wet, n)
          -- the tunnel may end within the kilometre, even within a step of it
-         CROSS JOIN LATERAL (SELECT greatest(0, least(g.chainage_to - q.km * 1000 - v.n * q.step, 0)
-                                 - greatest(g.chainage_from - q.km * 1000 - v.n * q.step, -q.step)) / q.step AS share) i
-         WHERE q.survey_id = g.survey_id AND q.km = g.km) c ON true
+         CROSS JOIN LATERAL (SELECT greatest(0, least(g.chainage_to - w.km * 1000 - v.n * w.step, 0)
+                                 - greatest(g.chainage_from - w.km * 1000 - v.n * w.step, -w.step)) / w.step AS share) i
+         WHERE NOT g.whole) c ON c.lining IS NOT NULL
  CROSS JOIN LATERAL (SELECT coalesce(c.seen, (
         SELECT (r.counts ->> 'lining_pixels')::float8 * (r.parameters ->> 'image.pixel')::float8 ^ 2
           FROM tunnel.run r
@@ -76,16 +79,13 @@ COMMENT ON COLUMN tunnel_api.km_statistics.wet_pixel_share IS 'Share of wet pixe
 COMMENT ON COLUMN tunnel_api.km_statistics.leaks IS 'Leaks open or confirmed';
 
 CREATE OR REPLACE VIEW tunnel_api.km_waterproof AS
-SELECT s.id::bigint * 1000000 + 500000 + k.km[t.n] AS id, s.id AS survey_id, s.name AS survey, k.km[t.n] AS km,
+SELECT s.id::bigint * 1000000 + 500000 + k.km AS id, s.id AS survey_id, s.name AS survey, k.km,
        t.chainage_from, t.chainage_to, t.lining_area, t.seen_share, t.wet_area, t.wet_ratio, t.patches, t.largest_area,
        t.largest_leak, t.window_patches, t.window_from, t.window_to, t.window_wet_area, t.class
   FROM tunnel.survey s
- CROSS JOIN LATERAL (
-        SELECT array_agg(g.km ORDER BY g.km) AS km, array_agg(g.chainage_from ORDER BY g.km) AS starts,
-               array_agg(g.chainage_to ORDER BY g.km) AS ends
-          FROM (SELECT km, min(chainage_from) AS chainage_from, max(chainage_to) AS chainage_to
-                  FROM tunnel.segment WHERE survey_id = s.id GROUP BY km) g) k
- CROSS JOIN LATERAL tunnel_api.stretch_statistics(s.id, k.starts, k.ends) t;
+  JOIN (SELECT survey_id, km, min(chainage_from) AS chainage_from, max(chainage_to) AS chainage_to
+          FROM tunnel.segment GROUP BY survey_id, km) k ON k.survey_id = s.id
+ CROSS JOIN LATERAL tunnel_api.stretch_statistics(s.id, ARRAY[k.chainage_from], ARRAY[k.chainage_to]) t;
 COMMENT ON VIEW tunnel_api.km_waterproof IS
     'Waterproofing of each kilometre by GB 50108-2008, as far as a scan can tell: see leak_statistics and waterproof_class';
 COMMENT ON COLUMN tunnel_api.km_waterproof.lining_area IS 'Lining, seen or not, m²';

@@ -157,8 +157,8 @@ def read_coverage(conn: psycopg.Connection[Any], survey: Survey, low: float, hig
     edges = edges[(edges >= low) & (edges <= high)]
     row = conn.execute(
         "SELECT tunnel_api.interpolate(%(edges)s, c.chainage, c.lining), tunnel_api.interpolate(%(edges)s, c.chainage, c.seen)"
-        " FROM tunnel_api.coverage_sums(%(id)s, %(first)s, %(last)s) c WHERE c.chainage IS NOT NULL",
-        {"edges": edges.tolist(), "id": survey.id, "first": int(low // 1000), "last": int(high // 1000)},
+        " FROM tunnel_api.coverage_sums(%(id)s, %(low)s, %(high)s) c WHERE c.chainage IS NOT NULL",
+        {"edges": edges.tolist(), "id": survey.id, "low": float(low), "high": float(high)},
     ).fetchone()
     if row is None or row[0] is None:
         return Coverage(edges, np.zeros(len(edges) - 1), np.zeros(len(edges) - 1))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 
 from geoalchemy2 import WKBElement
-from sqlalchemy import BigInteger, ForeignKey, Identity, Index, Integer, Text, text
+from sqlalchemy import BigInteger, Computed, ForeignKey, Identity, Index, Integer, Text, text
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
@@ -57,6 +57,9 @@ class Coverage(Base):
     lining: Mapped[Reals] = mapped_column(comment="Lining in each step, seen or not, in the unrolled plane, m²")
     seen: Mapped[Reals] = mapped_column(comment="What of it was seen within the limits of range and incidence, m²")
     wet: Mapped[Reals] = mapped_column(comment="What of that is wet: pixels below the threshold, after the median filter, m²")
+    lining_total: Mapped[float | None] = mapped_column(Computed("tunnel.total(lining)"), comment="Sum of lining, m²")
+    seen_total: Mapped[float | None] = mapped_column(Computed("tunnel.total(seen)"), comment="Sum of seen, m²")
+    wet_total: Mapped[float | None] = mapped_column(Computed("tunnel.total(wet)"), comment="Sum of wet, m²")
 
 
 class Region(Base):
@@ -109,11 +112,18 @@ class Anomaly(Base):
         one_of("kind", "leak", "joint", "dark"),
         one_of("judged", "leak", "joint", "dark"),
         one_of("review", "open", "confirmed", "rejected"),
-        Index(None, "survey_id", "km"),
+        Index(None, "survey_id", "km", postgresql_include=["kind", "judged", "review", "detected", "area", "drop_max"]),
+        Index(
+            None, "survey_id", "chainage_from", "chainage_to",
+            postgresql_include=["id", "kind", "judged", "review", "detected", "area"],
+        ),
+        Index(None, "survey_id", "area"),
+        Index(None, "survey_id", "created_at"),
+        Index("anomaly_gone_idx", "survey_id", postgresql_where=text("NOT detected")),
         Index(None, "unrolled", postgresql_using="gist"),
         Index(None, "map", postgresql_using="gist"),
         {"comment": "What is darker than dry lining: leaks, joints and other dark spots, in three geometries"},
-    )
+    )  # fmt: skip
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
