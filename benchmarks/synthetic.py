@@ -1,7 +1,6 @@
 """A long surveyed tunnel without scans, made set by set in SQL: axis, segments, sections, points, leaks, reviews, ledger.
 
-    with connect(dsn) as connection:
-        survey_id = make(connection, "demo-2024", Size(kilometres=25, leaks=100_000, points=60_000_000))
+    python -m benchmarks.synthetic --dsn DSN --km 25 --leaks 100000 --points 60000000      # into a database after tunneldb init
 
 The section is an arch of 4 m radius over a floor 2.5 m below the axis, which winds gently and rises by 1.7 %. Leaks lie on the
 arch, each in a cell of its own; where they lie, how large they are and who reviewed them follows from the seed of `random()`,
@@ -10,6 +9,7 @@ so that the same size makes the same rows.
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -20,7 +20,7 @@ import shapely
 from psycopg import sql
 
 from benchmarks.common import progress
-from tunneldb.database import PointZ, Survey, copy_binary, get_survey, pack
+from tunneldb.database import PointZ, Survey, connect, copy_binary, get_survey, pack, resolve_dsn
 from tunneldb.geometry.store import load_surface
 from tunneldb.ground.classes import Klass
 
@@ -350,3 +350,19 @@ STEPS = {
     "coverage and radiometry": (COVERAGE, RADIOMETRY, CURVES),
     "ground, clusters, target spheres": (GROUND, CLUSTERS, SPHERES),
 }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--dsn", help="database to fill; default: the embedded server's own")
+    parser.add_argument("--survey", default="demo-2024", help="name of the survey")
+    parser.add_argument("--km", type=int, default=Size.kilometres)
+    parser.add_argument("--leaks", type=int, default=Size.leaks)
+    parser.add_argument("--points", type=int, default=Size.points)
+    arguments = parser.parse_args()
+    with connect(resolve_dsn(arguments.dsn)) as connection:
+        make(connection, arguments.survey, Size(arguments.km, arguments.leaks, arguments.points))
+
+
+if __name__ == "__main__":
+    main()

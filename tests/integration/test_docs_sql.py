@@ -8,6 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 import psycopg
+from asked import prepare
 from queued import add_file, add_job, add_worker
 
 ROOT = Path(__file__).parents[2]
@@ -15,7 +16,8 @@ BLOCK = re.compile(r"^```sql\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def test_every_query_runs(conn: psycopg.Connection, example: str) -> None:
-    """Each by itself, on the example survey with a batch under way; one that selects must find something there."""
+    """Each by itself, on the example survey with edits and a batch under way; one that selects must find something there."""
+    prepare(conn, example)
     add_job(conn, example, 12, "axis", add_worker(conn, "calc-1", 4711))
     add_file(conn, example, "km-13.laz", 13)
     conn.commit()

@@ -1,0 +1,65 @@
+"""What the questions of the cookbook ask of beyond the example survey: points, a niche, edits by hand, a leak that is gone."""
+
+from __future__ import annotations
+
+import numpy as np
+import psycopg
+
+from tunneldb.ground.classes import Klass
+
+NICHE = (12399.0, 12401.0, 3.3, 4.3)
+"""From chainage to chainage, and how far right of the axis from and to, m."""
+
+POINTS = {Klass.LINING: 300, Klass.GROUND: 200}
+"""Points of each class between 12+340 and 12+345; as many again lie outside."""
+
+MOVED, SPARSE = 1245, 1233
+"""The vertex that was moved, and the segment that has few points."""
+
+CONFIRMED, REJECTED, GONE, OLD = 12344.0, 12318.0, 12436.0, 12471.0
+"""Middles of the leaks that were reviewed, that the last detection did not find again, and that was found weeks ago, m."""
+
+
+def prepare(conn: psycopg.Connection, survey: str) -> None:
+    """Add it to a copy of the example survey; to be committed or not by the caller."""
+    row = conn.execute("SELECT id FROM tunnel.survey WHERE name = %s", (survey,)).fetchone()
+    assert row is not None
+    for chainage, review in ((CONFIRMED, "confirmed"), (REJECTED, "rejected")):
+        conn.execute(
+            "UPDATE tunnel_api.leak SET review = %s, remark = 'seen'"
+            " WHERE survey = %s AND %s BETWEEN chainage_from AND chainage_to",
+            (review, survey, chainage),
+        )
+    conn.execute("UPDATE tunnel.anomaly SET detected = false WHERE %s BETWEEN chainage_from AND chainage_to", (GONE,))
+    conn.execute(
+        "UPDATE tunnel.anomaly SET created_at = now() - interval '20 days' WHERE %s BETWEEN chainage_from AND chainage_to",
+        (OLD,),
+    )
+    conn.execute(
+        "UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0.05, 0, 0.02) WHERE survey = %s AND n = %s",
+        (survey, MOVED),
+    )
+    conn.execute("UPDATE tunnel.segment SET points = 100 WHERE n = %s", (SPARSE,))
+    low, high, left, right = NICHE
+    conn.execute(
+        "INSERT INTO tunnel.cluster (survey_id, km, class, chainage_from, chainage_to, height_from, height_to, points, cell,"
+        " cells, geom) SELECT %s, 12, %s, %s, %s, 0.2, 2.2, 90, 0.1, '{0,0,0}',"
+        " tunnel_api.map_strip(%s, ST_MakeEnvelope(%s, %s, %s, %s, 0))",
+        (row[0], int(Klass.NICHE), low, high, row[0], low, left, high, right),
+    )
+    _points(conn, row[0])
+
+
+def _points(conn: psycopg.Connection, survey_id: int) -> None:
+    conn.execute("CREATE TABLE tunnel.point_s1_km12_new (LIKE tunnel.point)")
+    assert survey_id == 1
+    classes = np.repeat([int(klass) for klass in POINTS], list(POINTS.values())).tolist()
+    for start in (12340.001, 12345.001):
+        conn.execute(
+            "INSERT INTO tunnel.point_s1_km12_new (survey_id, km, chainage, gps_time, geom, scan_id, file_id, intensity,"
+            ' classification, "class")'
+            " SELECT 1, 12, %s + 0.009 * (n - 1), 0, ST_SetSRID(ST_MakePoint(0, 0, 0), 25830), 1, 1,"
+            ' CASE n %% 2 WHEN 0 THEN -10 ELSE -14 END, 0, "class" FROM unnest(%s::int2[]) WITH ORDINALITY AS c ("class", n)',
+            (start, classes),
+        )
+    conn.execute("SELECT tunnel_api.partition_swap(1, 12)")
