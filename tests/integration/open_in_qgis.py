@@ -2,7 +2,7 @@
 
 Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK [LAYER [KIND]]
        | draw KIND | add VIEW | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG
-       | atlas PDF | where CHAINAGE ARC
+       | atlas PDF | where CHAINAGE ARC | labels LAYER
 """
 
 from __future__ import annotations
@@ -136,6 +136,18 @@ def where(project: QgsProject, chainage: str, arc: str) -> dict[str, Any]:
     (action,) = layer.actions().actions("Canvas")
     exec(QgsExpression.replaceExpressionText(action.command(), context), {})
     return {"told": told, "tip": QgsExpression.replaceExpressionText(layer.mapTipTemplate(), context)}
+
+
+def labels(project: QgsProject, layer_id: str) -> dict[str, Any]:
+    """What is written beside the features of a layer."""
+    layer = project.mapLayer(PREFIX + layer_id)
+    expression = QgsExpression(layer.labeling().settings().fieldName)
+    context = QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
+    texts = []
+    for feature in layer.getFeatures():
+        context.setFeature(feature)
+        texts.append(expression.evaluate(context))
+    return {"texts": texts, "error": expression.evalErrorString()}
 
 
 def _paint(settings: QgsMapSettings, extent: QgsRectangle, path: str) -> dict[str, Any]:

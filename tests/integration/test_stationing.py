@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 from psycopg import sql
 
+from tests.integration.test_qgis import act
 from tunneldb.cli.main import main
 from tunneldb.database.stationing import load_stationing, save_equations
 from tunneldb.errors import UserError
@@ -247,6 +248,19 @@ def test_labels_cost_a_lookup_and_only_where_they_are_asked_for(conn: psycopg.Co
     assert "station_equation" in shown
     assert "tunnel_api." not in shown, "no function of ours is called for each row"
     assert "station_equation" not in plan("SELECT id, chainage_from, area FROM tunnel_api.leak")
+
+
+def test_qgis_labels_are_stations(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    save_equations(conn, conn.execute("SELECT tunnel_api.tunnel_id('demo')").fetchone()[0], OWN)
+    conn.execute("UPDATE tunnel.cluster SET height_from = -0.1, height_to = -0.04 WHERE height_to = 1.8")
+    conn.commit()
+    assert run("qgis", example, "-o", tmp_path / "demo.qgz").exit_code == 0
+    vertices = act(tmp_path / "demo.qgz", "labels", "axis_vertex")
+    assert vertices["error"] == ""
+    own = Stationing(OWN)
+    assert vertices["texts"] == [own.label(chainage, 0) for chainage in range(12300, 12501, 10)]
+    clusters = act(tmp_path / "demo.qgz", "labels", "cluster")
+    assert sorted(clusters["texts"]) == ["appendage 1.1 m", "object", "object 1.1 m", "rail 0.2 m"]
 
 
 def test_the_commands_show_and_take_stations(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
