@@ -251,6 +251,18 @@ def test_drawing_lies_in_its_true_place(files: Path) -> None:
     assert off.max() < 0.01
 
 
+def number_of(entity: Any) -> int:
+    return int(dict(fact.split("=") for _, fact in entity.get_xdata("TUNNELDB"))["id"])
+
+
+def distances(points: np.ndarray, ring: np.ndarray) -> np.ndarray:
+    """Distance of each point (n, 3) from a ring of straight sides through its vertices (m, 3)."""
+    start, side = ring[None], np.roll(ring, -1, axis=0)[None] - ring[None]
+    away = points[:, None] - start
+    share = np.clip((away * side).sum(axis=2) / (side**2).sum(axis=2), 0, 1)
+    return np.linalg.norm(away - share[..., None] * side, axis=2).min(axis=1)
+
+
 def test_leaks_are_drawn_thrice_and_bear_what_is_known(files: Path, shared_dsn: str) -> None:
     found = entities(files / "whole.dxf")
     with psycopg.connect(shared_dsn) as conn:
@@ -258,8 +270,17 @@ def test_leaks_are_drawn_thrice_and_bear_what_is_known(files: Path, shared_dsn: 
         map_area = dict(conn.execute("SELECT id, ST_Area(geom) FROM tunnel_api.leak_map").fetchall())
     assert len(kept) == 6
     for place in ("MAP", "3D", "UNROLLED"):
-        numbers = [int(dict(fact.split("=") for _, fact in e.get_xdata("TUNNELDB"))["id"]) for e in found[f"LEAK_{place}"]]
+        numbers = [number_of(entity) for entity in found[f"LEAK_{place}"]]
         assert sorted(numbers) == sorted(kept)
+    with psycopg.connect(shared_dsn) as conn:
+        surfaces = {
+            n: shapely.from_wkb(bytes(w)) for n, w in conn.execute("SELECT id, ST_AsBinary(geom) FROM tunnel_api.leak_3d")
+        }
+    for entity in found["LEAK_3D"]:
+        true = shapely.get_coordinates(surfaces[number_of(entity)], include_z=True)
+        drawn = np.array([vertex.dxf.location.xyz for vertex in entity.vertices])
+        assert len(drawn) < len(true) / 2
+        assert distances(true, drawn).max() < 0.0021
     assert len(found["JOINT_MAP"]) == len(found["DARK_3D"]) == 1
     for entity in found["LEAK_MAP"]:
         facts = dict(fact.split("=") for _, fact in entity.get_xdata("TUNNELDB"))
@@ -271,9 +292,8 @@ def test_leaks_are_drawn_thrice_and_bear_what_is_known(files: Path, shared_dsn: 
     lines = sorted((entity.get_points("xy") for entity in found["UNROLLED"]), key=lambda points: points[0][1])
     origin = np.array(lines[1][0]) - [FIRST, 0.0]  # left edge, crown, right edge
     for entity in found["LEAK_UNROLLED"]:
-        number = int(dict(fact.split("=") for _, fact in entity.get_xdata("TUNNELDB"))["id"])
         moved = shapely.Polygon(np.array(entity.get_points("xy")) - origin)
-        assert shapely.hausdorff_distance(moved, shapely.from_wkb(bytes.fromhex(kept[number]))) < 1e-6
+        assert shapely.hausdorff_distance(moved, shapely.from_wkb(bytes.fromhex(kept[number_of(entity)]))) < 1e-6
 
 
 def test_profiles_stand_side_by_side_with_their_leaks(files: Path) -> None:

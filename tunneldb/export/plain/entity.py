@@ -11,6 +11,8 @@ import shapely
 from ezdxf.enums import TextEntityAlignment as Align
 from shapely.geometry import Polygon
 
+from tunneldb.export.plain.lines import plain_ring
+
 APPLICATION = "TUNNELDB"
 """Under this name each leak, joint or dark spot bears what is known of it (extended data); also the name of the text style."""
 
@@ -59,7 +61,7 @@ def draw_spot(space: Any, spot: Spot, place: str, shift: Any = 0.0) -> None:
     attributes = {"layer": f"{spot.kind.upper()}_{place}"}
     for ring in spot.rings:
         line = (
-            space.add_polyline3d(ring, close=True, dxfattribs=attributes)
+            space.add_polyline3d(plain_ring(ring), close=True, dxfattribs=attributes)
             if place == "3D"
             else space.add_lwpolyline(ring + shift, format="xy", close=True, dxfattribs=attributes)
         )

@@ -25,7 +25,7 @@ PIECES = 4
 """Straight pieces of the axis in a segment; on a radius of 300 m a piece of 2.5 m leaves the arc by 3 mm."""
 
 TOLERANCE = 0.002
-"""How far a drawn section may leave the one that was found, m."""
+"""How far a drawn section, or an outline in space, may leave the one that was found, m."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +115,28 @@ def profiles(surface: Surface, low: float, high: float) -> list[Profile]:
         right, up = shapely.get_coordinates(shapely.simplify(line, TOLERANCE)).T
         found.append(Profile(float(chainage), right, up))
     return found
+
+
+def plain_ring(ring: Float) -> Float:
+    """A ring in space (n, 3), not closed, without the vertices that the tolerance makes needless (Douglas and Peucker)."""
+    closed = np.concatenate([ring, ring[:1]])
+    far = int(np.argmax(np.linalg.norm(closed - closed[0], axis=1)))
+    kept = np.zeros(len(closed), dtype=bool)
+    kept[[0, far, -1]] = True
+    pieces = [(0, far), (far, len(closed) - 1)]
+    while pieces:
+        first, last = pieces.pop()
+        if last - first < 2:
+            continue
+        along = closed[last] - closed[first]
+        away = closed[first + 1 : last] - closed[first]
+        share = np.clip(away @ along / max(along @ along, 1e-12), 0.0, 1.0)
+        distance = np.linalg.norm(away - share[:, None] * along, axis=1)
+        if distance.max() > TOLERANCE:
+            middle = first + 1 + int(distance.argmax())
+            kept[middle] = True
+            pieces += [(first, middle), (middle, last)]
+    return np.asarray(closed[:-1][kept[:-1]])
 
 
 def in_space(surface: Surface, profile: Profile) -> Float:
