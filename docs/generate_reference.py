@@ -20,6 +20,7 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
 from tunneldb.cli.main import COMMANDS, main
+from tunneldb.cli.output import JSON, Verb
 from tunneldb.database import install, open_connection, resolve_dsn
 from tunneldb.database.schema import sql_files
 from tunneldb.job.parameters import PARAMETERS
@@ -83,8 +84,9 @@ def commands() -> str:
         "# The command line",
         NOTE,
         "`tunneldb [--dsn DSN] VERB …`. Without `--dsn` or `TUNNELDB_DSN` the embedded server is used. Results go to standard "
-        "output, messages and progress to standard error. Exit codes: 0 done; 1 `check` found something wrong; 2 the input, "
-        "the server or the command line is at fault, said in one line `tunneldb: …`.",
+        "output, messages and progress to standard error. Every verb but `psql` takes `--json`: "
+        "[one JSON object](howto-operate.md#for-programs-json) on standard output. Exit codes: 0 done; 1, where a verb states "
+        "it; 2 the input, the server or the command line is at fault, said in one line `tunneldb: …`.",
         _options(main),
     ]
     for verb in COMMANDS:
@@ -107,6 +109,10 @@ def _command(command: click.Command, name: str) -> Iterator[str]:
     yield _help(command)
     if options := _options(command):
         yield options
+    if isinstance(command, Verb):
+        if command.wrong:
+            yield f"Exit code 1: {command.wrong}."
+        yield "\n".join(["```sh", *command.examples, "```"])
 
 
 def _argument(argument: click.Argument) -> str:
@@ -130,7 +136,7 @@ def _help(command: click.Command) -> str:
 def _options(command: click.Command) -> str:
     rows = []
     for option in command.params:
-        if isinstance(option, click.Option):
+        if isinstance(option, click.Option) and option.opts != [JSON]:
             names = ", ".join(f"`{name}{'' if option.is_flag else ' ' + _metavar(option)}`" for name in option.opts)
             text = option.help or ""
             if option.required:

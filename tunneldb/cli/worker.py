@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import platform
 import time
+from contextlib import suppress
 
 import click
+import psycopg
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.progress import bar
 from tunneldb.database import connect
+from tunneldb.errors import UserError
 
 
 @verb(examples=["tunneldb worker --concurrency 8"])
@@ -31,12 +36,48 @@ def worker(settings: Settings, concurrency: int, threads: int) -> None:
     from tunneldb.job.team import Team, interrupts
     from tunneldb.job.worker import Orders
 
-    connect(settings.dsn).close()
+    jobs = _Jobs(settings.dsn)
     team = Team(Orders(settings.dsn, threads), concurrency)
-    with interrupts(team):
+    with interrupts(team), bar("jobs") as progress:
+        task = progress.add_task("jobs", total=None)
         team.start()
+        looked = 0.0
         while team.tend():
+            jobs.crew.update(member.process.pid for member in team.members)
+            if not progress.disable and time.monotonic() - looked > 2.0:
+                done, left = jobs.count()
+                progress.update(task, completed=done, total=done + left or None)
+                looked = time.monotonic()
             time.sleep(0.2)
+    tell(jobs=jobs.count()[0])
+
+
+class _Jobs:
+    """How many jobs some worker processes of this machine have done since this was made."""
+
+    def __init__(self, dsn: str | None) -> None:
+        self.dsn = dsn
+        self.crew: set[int] = set()
+        self.seen = (0, 0)
+        with connect(dsn) as conn:
+            row = conn.execute("SELECT clock_timestamp()").fetchone()
+            assert row is not None
+            self.began = row[0]
+
+    def count(self) -> tuple[int, int]:
+        """Return the jobs done, and those of the database that are ready or under way; as before when the server is away."""
+        names = [f"{platform.node()}/{pid}" for pid in self.crew]
+        with suppress(psycopg.OperationalError, UserError), connect(self.dsn) as conn:
+            row = conn.execute(
+                """
+                SELECT (SELECT count(*) FROM tunnel_api.run WHERE worker = ANY (%s) AND finished_at > %s),
+                       (SELECT count(*) FROM tunnel_api.job WHERE state IN ('queued', 'running'))
+                """,
+                [names, self.began],
+            ).fetchone()
+            assert row is not None
+            self.seen = (row[0], row[1])
+        return self.seen
 
 
 @verb(examples=["tunneldb stop --wait"])
