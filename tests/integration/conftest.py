@@ -104,6 +104,13 @@ def _fill(conn: psycopg.Connection) -> None:
         "VALUES ('demo', %s, %s, %s, ST_GeomFromWKB(%s, %s)) RETURNING id",
         (SRID, FIRST * SPACING, SPACING, shapely.to_wkb(shapely.LineString(vertices)), SRID),
     ).fetchone()[0]
+    conn.execute(
+        "INSERT INTO tunnel.alignment_element (tunnel_id, plane, n, kind, chainage, length, x, y, bearing, curvature_from, "
+        "curvature_to, z, grade_from, grade_to) VALUES "
+        "(%(id)s, 'horizontal', 1, 'arc', 12300, 200, 500000, 4640000, pi() / 2, -1 / 300.0, -1 / 300.0, NULL, NULL, NULL), "
+        "(%(id)s, 'vertical', 1, 'grade', 12300, 200, NULL, NULL, NULL, NULL, NULL, 600, 0.02, 0.02)",
+        {"id": tunnel_id},
+    )
     survey_id = conn.execute(
         "INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_dimension, intensity_kind, platform, reference) "
         "VALUES (%s, %s, '2024-05-04', 'Amplitude', 'amplitude', 'static', 'auto') RETURNING id",

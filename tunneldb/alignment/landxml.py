@@ -107,7 +107,9 @@ class LandXml:
     def _line(self, element: Element) -> PlanElement:
         start, end = self._point(element, "Start"), self._point(element, "End")
         dx, dy = end[0] - start[0], end[1] - start[1]
-        return PlanElement("line", math.hypot(dx, dy), *start, math.atan2(dy, dx))
+        length = math.hypot(dx, dy)
+        self._compare(element, "length", self._length(element, "length", length), length)
+        return PlanElement("line", length, *start, math.atan2(dy, dx))
 
     def _curve(self, element: Element) -> PlanElement:
         """Arc about its centre: start and end hold, a radius or length that says otherwise is an error."""
