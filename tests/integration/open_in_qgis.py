@@ -34,6 +34,7 @@ from qgis.core import (
     QgsReadWriteContext,
     QgsRectangle,
     QgsRenderContext,
+    QgsRunProcess,
     QgsVectorLayer,
     QgsVectorLayerUtils,
     QgsWkbTypes,
@@ -90,6 +91,7 @@ def describe(project: QgsProject, canvas: QgsMapCanvas) -> dict[str, Any]:
         "canvas_theme": canvas.theme(),
         "canvas_extent": canvas.extent().toString(3),
         "extent": project.viewSettings().defaultViewExtent().toString(3),
+        "full_extent": project.viewSettings().fullExtent().toString(3),
     }
 
 
@@ -185,6 +187,17 @@ def review(
     for name, value in values:
         assert layer.changeAttributeValue(feature.id(), layer.fields().indexOf(name), value)
     return _commit(layer)
+
+
+def recompute(project: QgsProject) -> dict[str, Any]:
+    """The command of the action "Recompute", in words as QGIS starts it, and the layers that offer it."""
+    offered = {}
+    for layer_id in ("axis_vertex", "segment"):
+        layer = project.mapLayer(PREFIX + layer_id)
+        context = QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
+        (action,) = [action for action in layer.actions().actions("Layer") if action.shortTitle() == "Recompute"]
+        offered[layer_id] = QgsRunProcess.splitCommand(QgsExpression.replaceExpressionText(action.command(), context))
+    return offered
 
 
 def draw(project: QgsProject, kind: str) -> dict[str, Any]:

@@ -199,6 +199,8 @@ def test_themes_and_views(seen: dict[str, Any]) -> None:
     assert set(seen["themes"]["3D"]) == {"axis", "section", "leak_3d", "target_sphere", "ground"}
     assert set(seen["themes"]["Unrolled"]) == {*UNROLLED, "demo-2024-km012-corrected"} - NOT_AT_FIRST
     assert seen["bookmarks"] == ["Map", "Unrolled", "Unrolled, km 12"]
+    # all there is to the map, without the unrolled plane: there a new 3D view begins
+    assert seen["full_extent"] == seen["extent"]
     # the second canvas follows the theme, and starts where there is lining
     assert seen["canvas_theme"] == "Unrolled"
     low, high = (corner.split(",") for corner in seen["canvas_extent"].split(" : "))
@@ -390,6 +392,31 @@ def test_viewer_opens_the_project_but_cannot_edit(server_dsn: str, project: Path
         "target_sphere", "cluster", "ground",
     ],
 )  # fmt: skip
+def test_inspector_edits_and_what_is_stale_can_be_recomputed(conn: psycopg.Connection, server_dsn: str, project: Path) -> None:
+    with psycopg.connect(server_dsn, autocommit=True) as connection:
+        connection.execute("CREATE ROLE mover LOGIN IN ROLE tunnel_inspector")
+    conn.execute("DELETE FROM tunnel.run WHERE stage = 'detect'")
+    conn.commit()
+    project.write_text(project.read_text().replace("host=", "user='mover' host="), encoding="utf-8")
+    assert act(project, "move_vertex", "1235", "0", "0.125")["saved"]
+    assert act(project, "review", "3", "confirmed", "wet")["saved"]
+    edited = conn.execute("SELECT n, edited_by FROM tunnel.axis_vertex WHERE source = 'edited'").fetchall()
+    assert edited == [(1235, "mover")]
+    assert conn.execute("SELECT reviewed_by FROM tunnel.anomaly WHERE id = 3").fetchone() == ("mover",)
+    stale = conn.execute("SELECT stage FROM tunnel_api.stage_status WHERE stale ORDER BY step").fetchall()
+    assert stale == [("segments",), ("sections",), ("ground",)]
+    # as the action has it, but by one who may: without its points the example itself cannot be computed
+    commands = act(project, "recompute")
+    assert commands["segment"] == commands["axis_vertex"]
+    words = [word.replace("user='mover'", "") for word in commands["axis_vertex"]]
+    assert words[3:] == ["run", "demo-2024", "--stale"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "survey demo-2024 holds no points yet" in done.stderr
+    conn.execute("DROP ROLE mover")
+    conn.commit()
+
+
 def test_layer_added_by_hand_finds_its_style_srid_and_height(shared: Path, view: str) -> None:
     added = act(shared, "add", view)
     assert added["valid"]

@@ -18,6 +18,7 @@ from tunneldb import __version__
 from tunneldb.database import Survey
 from tunneldb.errors import UserError
 from tunneldb.export.atomic import replacing
+from tunneldb.export.qgis.action import RECOMPUTED_FROM, recompute
 from tunneldb.export.qgis.crs import crs_element, no_crs
 from tunneldb.export.qgis.extent import Extent, View, first_window, map_extent, sheet_extent, unrolled_extents
 from tunneldb.export.qgis.layer import LAYERS, MAP, SHEETS, SPACE, UNROLLED, VectorLayer
@@ -147,7 +148,9 @@ def _project(
         known = {layer.id: (layer_id(layer.id), source.layer(layer, survey.name, survey.srid)) for layer in LAYERS}
         root.append(layouts(survey, sheet, known["sheet"], known["leak_sheet"]))
     view_settings = ET.SubElement(root, "ProjectViewSettings", UseProjectScales="0")
-    _extent(view_settings, views[0].extent, "DefaultViewExtent").append(deepcopy(crs))
+    # Else the full extent would hold the unrolled plane, too, and new 3D views begin far from the tunnel.
+    for tag in ("DefaultViewExtent", "PresetFullExtent"):
+        _extent(view_settings, views[0].extent, tag).append(deepcopy(crs))
     metadata = ET.SubElement(root, "projectMetadata")
     ET.SubElement(metadata, "title").text = survey.name
     ET.SubElement(metadata, "abstract").text = f"Tunnel {survey.tunnel}, written by tunneldb {__version__}"
@@ -171,6 +174,8 @@ def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element)
     ET.SubElement(element, "srs").append(deepcopy(crs) if layer.on_map else no_crs())
     ET.SubElement(element, "provider", encoding="UTF-8").text = "postgres"
     element.extend(style_elements(layer.style))
+    if layer.id in RECOMPUTED_FROM:
+        element.append(recompute(survey, source))
     if layer.view == "region":
         # What is drawn belongs to this survey.
         defaults = ET.SubElement(element, "defaults")
