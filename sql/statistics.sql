@@ -227,7 +227,9 @@ COMMENT ON FUNCTION tunnel_api.waterproof_class(text, float8, float8) IS
 'Which classes of waterproofing (GB 50108-2008, table 3.2.1) a survey keeps between two chainages (m): one row a class, with what breaks it and the ids of the leaks that do. It speaks of the lining seen, the share seen_share: what was not seen cannot be certified. holds is NULL where nothing was seen and nothing breaks the class. Volumes of water, which the standard limits as well, cannot be told from a scan.';
 
 
-CREATE OR REPLACE FUNCTION tunnel_api.ring_statistics(survey text, ring_length float8, first_chainage float8)
+CREATE OR REPLACE FUNCTION tunnel_api.ring_statistics(
+    survey text, ring_length float8, first_chainage float8, stretch_from float8 DEFAULT '-Infinity',
+    stretch_to float8 DEFAULT 'Infinity')
 RETURNS TABLE (
     number int, chainage_from float8, chainage_to float8, label text, lining_area float8, seen_share float8,
     wet_area float8, wet_ratio float8, patches int, largest_area float8, class int)
@@ -252,8 +254,9 @@ BEGIN
     SELECT e.* INTO extent FROM tunnel_api.survey_ends(survey_key) e;
     SELECT array_agg(first_chainage + (i - 1) * ring_length ORDER BY i), array_agg(first_chainage + i * ring_length ORDER BY i)
     INTO starts, ends
-    FROM generate_series(greatest(1, floor((extent.chainage_from - first_chainage) / ring_length)::int + 1),
-                         ceil((extent.chainage_to - first_chainage) / ring_length)::int) i;
+    FROM generate_series(
+        greatest(1, floor((greatest(extent.chainage_from, stretch_from) - first_chainage) / ring_length)::int + 1),
+        ceil((least(extent.chainage_to, stretch_to) - first_chainage) / ring_length)::int) i;
     RETURN QUERY
         SELECT round((t.chainage_from - first_chainage) / ring_length)::int + 1, t.chainage_from, t.chainage_to,
             (SELECT c.label FROM tunnel_api.stationing(tunnel_key, t.chainage_from) c), t.lining_area, t.seen_share,
@@ -261,5 +264,5 @@ BEGIN
         FROM tunnel_api.stretch_statistics(survey_key, starts, ends) t;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.ring_statistics(text, float8, float8) IS
-'Statistics of leaks, as leak_statistics gives them, for each ring of a segmental lining: rings of ring_length (m) from first_chainage on, where the first begins, to the end of the survey. label: station at which the ring begins, in growing chainage. A leak over several rings counts in each.';
+COMMENT ON FUNCTION tunnel_api.ring_statistics(text, float8, float8, float8, float8) IS
+'Statistics of leaks, as leak_statistics gives them, for each ring of a segmental lining: rings of ring_length (m) from first_chainage on, where the first begins, to the end of the survey; of those only the ones that reach into a stretch, if one is given. label: station at which the ring begins, in growing chainage. A leak over several rings counts in each.';

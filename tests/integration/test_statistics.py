@@ -238,6 +238,29 @@ def test_rings_are_stretches_of_their_own(rows: psycopg.Connection, made: Made, 
     assert {row["class"] for row in rings} >= ({1, 4, None} if length < 20 else {4})
 
 
+def test_rings_of_a_stretch_are_those_that_reach_into_it(rows: psycopg.Connection, made: Made) -> None:
+    every = ask(rows, "SELECT * FROM tunnel_api.ring_statistics('s', 1.5, 3199.2)")
+    some = ask(rows, "SELECT * FROM tunnel_api.ring_statistics('s', 1.5, 3199.2, 3300, 3350)")
+    inside = [ring for ring in every if ring["chainage_to"] > 3300 and ring["chainage_from"] < 3350]
+    assert [ring["number"] for ring in some] == [ring["number"] for ring in inside]
+    assert 33 <= len(some) <= 36
+    for ring, same in zip(some, inside, strict=True):
+        assert (ring["patches"], ring["largest_area"], ring["class"]) == (same["patches"], same["largest_area"], same["class"])
+        assert (ring["lining_area"], ring["wet_area"]) == (pytest.approx(same["lining_area"]), pytest.approx(same["wet_area"]))
+    assert ask(rows, "SELECT * FROM tunnel_api.ring_statistics('s', 1.5, 3199.2, 9000, 9100)") == []
+
+
+def test_a_whole_kilometre_is_the_sum_of_its_steps(rows: psycopg.Connection, made: Made) -> None:
+    """The second kilometre lies in the tunnel from end to end; the others are cut by it."""
+    steps = np.random.default_rng(3).random((3, 10_000)).astype(np.float32)
+    with rows.transaction(force_rollback=True):
+        add_coverage(rows, 1, 4, *steps)
+        (row,) = ask(rows, "SELECT lining_area, seen_area, wet_pixel_share FROM tunnel_api.km_statistics WHERE km = 4")
+    lining, seen, wet = steps.astype(float).sum(axis=1)
+    assert (row["lining_area"], row["seen_area"]) == (pytest.approx(lining), pytest.approx(seen))
+    assert row["wet_pixel_share"] == pytest.approx(wet / seen)
+
+
 def test_kilometres_are_stretches_too(rows: psycopg.Connection, made: Made) -> None:
     kilometres = ask(rows, "SELECT * FROM tunnel_api.km_waterproof ORDER BY km")
     assert [(row["km"], row["chainage_from"], row["chainage_to"]) for row in kilometres] == [

@@ -507,6 +507,7 @@ def test_functions_pass_plpgsql_check(conn: psycopg.Connection) -> None:
     complaints = conn.execute(
         "SELECT c.* FROM pg_trigger t JOIN pg_class r ON r.oid = t.tgrelid AND r.relnamespace = 'tunnel_api'::regnamespace "
         "CROSS JOIN LATERAL plpgsql_check_function(t.tgfoid, t.tgrelid) c "
-        "UNION ALL SELECT c.* FROM plpgsql_check_function('tunnel_api.ring_statistics(text, float8, float8)'::regprocedure) c"
+        "UNION ALL SELECT c.* FROM plpgsql_check_function("
+        "'tunnel_api.ring_statistics(text, float8, float8, float8, float8)'::regprocedure) c"
     ).fetchall()
     assert complaints == []
