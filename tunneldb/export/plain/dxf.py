@@ -42,7 +42,7 @@ TEXT = 1.0
 FEW = 20
 """Fewer ticks than this all bear their station, not only those of whole hundreds."""
 
-_BLACK, _RED, _GREEN, _CYAN, _BLUE, _MAGENTA, _GREY = 7, 1, 94, 4, 5, 6, 8
+_BLACK, _RED, _GREEN, _CYAN, _BLUE, _MAGENTA, _GREY = 7, 1, 94, 4, 150, 6, 8
 
 LAYERS = {
     "AXIS": (_RED, "Axis through the middle of the tunnel, 3D"),
