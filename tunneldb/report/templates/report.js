@@ -161,7 +161,7 @@
     for (const [hour, at, up] of [["12", 0, y + 0.35], ["3", x + width - 0.35, 0], ["6", 0, y + height - 0.35], ["9", x + 0.35, 0]]) {
       drawing.append(make("svg:text", { x: at, y: up }, hour));
     }
-    const off = Math.abs(shown.at) < 0.05 ? "" : ` ${Math.abs(shown.at).toFixed(1)} m ${shown.at > 0 ? "up" : "down"}-chainage of it`;
+    const off = Math.abs(shown.at) < 0.05 ? "" : ` ${Math.abs(shown.at).toFixed(1)} m ${shown.at > 0 ? "up" : "down"}-chainage`;
     return make("figure", {}, drawing, make("figcaption", {}, `Section${off}`));
   }
 
