@@ -1,9 +1,10 @@
-"""Draw what each step of leak detection does to one stretch of lining: ``docs/images/leak-steps.png``.
+"""Make pictures of the documentation: what each step of leak detection does (``docs/images/leak-steps.png``), and the tutorial.
 
-    python docs/generate_pictures.py
+    python docs/generate_pictures.py steps
+    python docs/generate_pictures.py tutorial    # docs/tutorial_pictures.py
 
-A tunnel of segments with soot, painted numbers, repaired patches, bolt pockets, cables and leaks is simulated, loaded and
-run; detection is then gone through once more, its results looked at on the way, and nothing of that is kept.
+For the steps a tunnel of segments with soot, painted numbers, repaired patches, bolt pockets, cables and leaks is simulated,
+loaded and run; detection is then gone through once more, its results looked at on the way, and nothing of that is kept.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
+from tutorial_pictures import take
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -209,7 +211,7 @@ def outline(axis: Axes, shape: BaseGeometry, colour: str, *, fill: bool = False)
             axis.plot(x, y, color=colour, linewidth=1.2)
 
 
-def main() -> None:
+def draw_steps() -> None:
     """Simulate, run, watch and draw."""
     with tempfile.TemporaryDirectory() as folder, scratch_database(None) as dsn:
         scene = Scene.simulate(Path(folder), "steps", *TUNNEL)
@@ -221,4 +223,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    {"steps": draw_steps, "tutorial": take}[sys.argv[1]]()

@@ -40,6 +40,12 @@ def test_links_lead_somewhere(page: Path) -> None:
     assert not dead
 
 
+def test_contents_lead_to_every_page() -> None:
+    contents = ROOT / "docs" / "index.md"
+    linked = {target.partition("#")[0] for target in LINK.findall(contents.read_text("utf-8"))}
+    assert {page.name for page in contents.parent.glob("*.md")} - linked <= {contents.name}
+
+
 def commands(page: Path) -> list[list[str]]:
     """Command lines of tunneldb: those of shell blocks, and those in the text."""
     text = page.read_text("utf-8")
