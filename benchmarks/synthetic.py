@@ -265,8 +265,8 @@ SELECT %(id)s, floor((o.chainage_from + o.chainage_to) / 2000), o.chainage_from,
     2 + 2 * s.drop, 3 + 4 * s.drop, 0.9 + s.luck / 10, o.unrolled, o.map, o.surface,
     CASE WHEN NOT r.reviewed THEN 'open' WHEN s.fate < 0.1 THEN 'rejected' ELSE 'confirmed' END,
     CASE WHEN r.reviewed THEN ('{hansen,iversen,olsen}'::text[])[1 + s.number %% 3] END, CASE WHEN r.reviewed THEN r.at END,
-    CASE WHEN r.reviewed AND s.luck < 0.02 THEN 'drips' END, NOT r.reviewed OR s.luck > 0.01, '2024-05-06 06:00Z',
-    '2024-05-06 06:00Z'
+    CASE WHEN r.reviewed AND s.luck < 0.02 THEN 'drips' END, NOT r.reviewed OR s.luck > 0.01,
+    CASE WHEN s.luck > 0.99 THEN now() - s.day * interval '60 days' ELSE '2024-05-06 06:00Z' END, '2024-05-06 06:00Z'
 FROM outline o JOIN spot s USING (number)
 CROSS JOIN LATERAL (SELECT s.fate < 0.45 AS reviewed, '2024-05-07 07:00Z'::timestamptz + s.day * interval '60 days' AS at) r
 ORDER BY o.chainage_from
