@@ -173,6 +173,9 @@ def test_axis_shows_and_draws_it(road: str, conn: psycopg.Connection, tmp_path: 
     with Image.open(tmp_path / "a.png") as picture:
         assert picture.width > 1000
         assert len(picture.convert("RGB").getcolors(1_000_000)) > 20
+    # of a stretch with nothing but the vertex that was carried along there is a picture, too
+    alone = done("axis", "s", "--from", "499", "--to", "501", "-o", tmp_path / "alone.png").stdout.splitlines()
+    assert re.fullmatch(r"0\+500\.375 +0\+500\.375 +all +0 *", alone[-1])
     done("axis", "s", "-o", tmp_path / "a.svg")
     svg = ElementTree.parse(tmp_path / "a.svg").getroot()
     assert svg.tag.endswith("svg")

@@ -76,10 +76,13 @@ def _write_figure(deviation: Deviation, path: Path) -> None:
                 axes.axvspan(part.chainage_from, part.chainage_to, color=_COLOUR[part.kind], alpha=0.5, lw=0)
     _stations(panels, deviation)
     whole = deviation.summaries()[-1]
+    figures = (
+        f"right {_text(whole.right_mean)} on average, at most {_text(whole.right_most)}; "
+        f"up {_text(whole.up_mean)} on average, at most {_text(whole.up_most)}"
+    )
     figure.suptitle(
         f"{deviation.survey}: measured axis minus {deviation.design or 'the axis given'}\n"
-        f"{whole.vertices} vertices; right {_text(whole.right_mean)} on average, at most {_text(whole.right_most)}; "
-        f"up {_text(whole.up_mean)} on average, at most {_text(whole.up_most)}",
+        f"{whole.vertices} vertices measured{'; ' + figures if whole.vertices else ''}",
         fontsize=11,
     )
     with warnings.catch_warnings():
@@ -92,6 +95,8 @@ def _stations(panels: Sequence[Axes], deviation: Deviation) -> None:
     from matplotlib.ticker import FixedLocator, MaxNLocator
 
     low, high = float(deviation.chainage[0]), float(deviation.chainage[-1])
+    if low == high:
+        low, high = low - 1.0, high + 1.0
     step = float(np.diff(MaxNLocator(10, steps=[1, 2, 5, 10]).tick_values(low, high))[0])
     jumps = [piece for piece in deviation.stationing.equations if low < piece.chainage < high]
     ends = [low, *(piece.chainage for piece in jumps), high]
