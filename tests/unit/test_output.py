@@ -19,6 +19,7 @@ from shapely.geometry import Point
 from tunneldb.cli.main import COMMANDS, EXAMPLES, main
 from tunneldb.cli.output import Verb, plain
 from tunneldb.cli.progress import rate
+from tunneldb.job.parameters import settings
 
 
 def verbs() -> Iterator[tuple[str, click.Command]]:
@@ -42,7 +43,8 @@ def test_each_verb_has_examples_that_are_right(name: str, command: click.Command
         words = shlex.split(line, comments=True)
         words = words[3:] if words[1] == "--dsn" else words[1:]
         assert words[: len(name.split())] == name.split(), line
-        command.make_context(name, words[len(name.split()) :])  # raises on what the verb does not take
+        context = command.make_context(name, words[len(name.split()) :])  # raises on what the verb does not take
+        settings(context.params.get("assignments", ()))  # raises on what is no parameter
 
 
 def test_the_examples_of_the_program_are_right() -> None:

@@ -28,7 +28,9 @@ def bar(unit: str) -> Progress:
         """Counts a second, or a minute where they are few."""
 
         def render(self, task: Task) -> Text:
-            return Text(rate(task.finished_speed or task.speed, unit), "progress.data.speed")
+            # rich knows a speed from the second count on; what comes in one count has taken all the time so far
+            speed = task.finished_speed or task.speed or (task.completed / task.elapsed if task.elapsed else None)
+            return Text(rate(speed, unit), "progress.data.speed")
 
     columns = (
         TextColumn("{task.description}"), BarColumn(bar_width=24), TaskProgressColumn(), Rate(), TimeRemainingColumn(),

@@ -31,7 +31,7 @@ def parameter_table(names: Iterable[str] = PARAMETERS) -> str:
     examples=[
         "tunneldb run ringo-2024",
         "tunneldb run ringo-2024 --km 511-512 --from sections --to ground",
-        "tunneldb run ringo-2024 --from detect --set leak.sigmas=3.5",
+        "tunneldb run ringo-2024 --from detect --set leak.min_area=0.1",
         "tunneldb run ringo-2024 --stale",
     ],
 )

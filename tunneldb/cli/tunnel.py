@@ -20,8 +20,8 @@ def tunnel() -> None:
 
 @tunnel.command(
     examples=[
-        "tunneldb tunnel add ringo --srid 25833 --axis axis.csv --start-chainage 511700",
-        "tunneldb tunnel add ringo --srid 25833 --axis ringo.xml --alignment Mainline",
+        "tunneldb tunnel add ringo --srid 3794 --axis ringo.axis.csv --start-chainage 511746.75",
+        "tunneldb tunnel add ringo --srid 3794 --axis ringo.xml --alignment Mainline",
     ]
 )
 @click.argument("name")

@@ -1,0 +1,173 @@
+"""``--json`` of every verb: one object on standard output, which says what the database and the files say."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import laspy
+import psycopg
+import pytest
+import shapely
+from click.testing import CliRunner
+
+from tunneldb.cli.main import COMMANDS, main
+
+TUNNELDB = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
+
+
+def told(code: int, *words: object) -> dict[str, Any]:
+    """Run a verb in this process; returns its object, which must be all of standard output, and without NaN."""
+    result = CliRunner().invoke(main, [*map(str, words), "--json"])
+    assert result.exit_code == code, result.output
+    said = json.loads(result.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    assert isinstance(said, dict)
+    assert (said["ok"], said["exit_code"]) == (code == 0, code)
+    assert " ".join(map(str, words)).startswith(said["verb"])
+    assert 0 <= said["seconds"] < 600
+    assert ("error" in said) is (code == 2)
+    return said
+
+
+def rows(conn: psycopg.Connection, query: str) -> list[tuple[Any, ...]]:
+    found = conn.execute(query.encode()).fetchall()
+    conn.rollback()
+    return found
+
+
+def test_what_is_listed_is_what_the_views_hold(example: str, conn: psycopg.Connection) -> None:
+    leaks = told(0, "leaks", example)
+    held = rows(
+        conn, "SELECT id, area, chainage_from, review, ST_AsGeoJSON(unrolled, 15)::json FROM tunnel_api.leak WHERE detected"
+    )
+    assert leaks["count"] == len(leaks["leaks"]) == len(held)
+    by_id = {leak["id"]: leak for leak in leaks["leaks"]}
+    for key, area, chainage, review, outline in held:
+        assert (by_id[key]["area"], by_id[key]["chainage_from"], by_id[key]["review"]) == (area, chainage, review)
+        assert shapely.equals_exact(shapely.geometry.shape(by_id[key]["geometry"]), shapely.geometry.shape(outline), 1e-9)
+    by_km = told(0, "leaks", example, "--by-km")["kilometres"]
+    assert [(km["km"], km["wet_area"]) for km in by_km] == rows(conn, "SELECT km, wet_area FROM tunnel_api.km_waterproof")
+    (survey,) = told(0, "survey", "list")["surveys"]
+    assert (survey["name"], survey["points"], survey["date"]) == (example, 60, "2024-05-04")
+    (tunnel,) = told(0, "tunnel", "list")["tunnels"]
+    assert (tunnel["name"], tunnel["srid"], tunnel["spacing"], tunnel["surveys"]) == ("demo", 25830, 10.0, 1)
+    (short,) = told(0, "status")["surveys"]
+    assert short["done"] == dict.fromkeys(("load", "axis", "segments", "sections", "ground", "detect"), 1)
+    status = told(0, "status", example)
+    assert status["survey"] == example
+    assert {cell["state"] for cell in status["kilometres"]["12"].values()} == {"done"}
+    vertices = rows(conn, "SELECT count(*)::int FROM tunnel_api.axis_vertex WHERE source <> 'interpolated'")[0][0]
+    assert all(0 < element["vertices"] <= vertices for element in told(0, "axis", example)["elements"])
+    assert told(0, "tunnel", "stationing", "demo", "--show")["tunnel"] == "demo"
+
+
+def test_what_is_written_is_named(example: str, tmp_path: Path, conn: psycopg.Connection) -> None:
+    images = told(0, "image", example, "-o", tmp_path / "images")["files"]
+    assert {Path(path).suffix for path in images} == {".tif", ".png"}
+    assert sorted(map(str, (tmp_path / "images").iterdir())) == sorted(images)
+    leaks = told(0, "leaks", example, "-o", tmp_path / "leaks.csv")
+    assert len(Path(leaks["file"]).read_text("utf-8").splitlines()) == leaks["count"] + 1
+    assert "leaks" not in leaks
+    project = told(0, "qgis", example, "-o", tmp_path / "demo.qgz")
+    assert project["written"] == [str(tmp_path / "demo.qgz")]
+    assert all(Path(path).is_file() for path in project["images"])
+    plain = told(0, "export", example, "-o", tmp_path / "demo.dxf", "--from", "12+300", "--to", "12+400")
+    assert plain["file"] == str(tmp_path / "demo.dxf")
+    assert plain["layers"]
+    report = told(0, "report", example, "-o", tmp_path / "demo.html")
+    assert report["bytes"] == (tmp_path / "demo.html").stat().st_size
+    assert report["leaks"] == rows(conn, "SELECT count(*)::int FROM tunnel_api.leak")[0][0]
+
+
+def test_what_is_compared_and_computed(example: str, tmp_path: Path, conn: psycopg.Connection) -> None:
+    conn.execute(
+        "INSERT INTO tunnel.station (survey_id, scan_id, geom) SELECT survey_id, 1, geom FROM tunnel.axis_vertex WHERE n = 1240"
+    )
+    conn.commit()
+    assert told(0, "leaks", example, "-o", tmp_path / "truth.geojson")["count"] == 7
+    figures = told(0, "evaluate", example, tmp_path / "truth.geojson")
+    everything = next(group for group in figures["groups"] if group["group"] == "all")
+    assert everything["area_recall"] < 1.0  # one leak was rejected, and counts as not found
+    assert len(figures["true"]) == 7
+    points = tmp_path / "points.csv"
+    points.write_text("name,chainage,arc\na,12345,2\nb,99999,0\n")
+    unrolled = told(0, "unroll", example, points, "--inverse")
+    assert (unrolled["points"], unrolled["off_tunnel"]) == (2, 1)
+    on, off = unrolled["rows"]
+    survey = rows(conn, "SELECT id FROM tunnel.survey")[0][0]
+    place = rows(conn, f"SELECT ST_X(g), ST_Y(g), ST_Z(g) FROM tunnel_api.roll({survey}, 12345.0, 2.0, 0.0) g")[0]
+    assert [float(on[name]) for name in "xyz"] == pytest.approx(place, abs=1e-3)
+    assert off["x"] == ""
+
+
+def test_what_is_wrong_is_told_with_what_was_done_before(example: str, tmp_path: Path) -> None:
+    for words in (
+        ["load", example, "nowhere.laz"], ["run", example], ["batch", example, "--to", "roof"],
+        ["ground", "a.laz", "-o", "b.laz"],
+        ["spheres", "nobody", "--radius", "0.07"], ["intensity", "nobody"], ["server", "stop"], ["server", "status"],
+        ["server", "start"], ["tunnel", "remove", "demo"], ["survey", "remove", "nobody", "--yes"], ["tunnel", "add", "demo"],
+        ["survey", "add", "x"], ["export", example, "-o", str(tmp_path / "x.pdf")], ["status", example, "--watch"],
+    ):  # fmt: skip
+        assert told(2, *words)["error"]
+
+
+def test_check_tells_what_is_wrong_and_what_mends_it(dsn: str, conn: psycopg.Connection) -> None:
+    assert {finding["level"] for finding in told(0, "check")["findings"]} <= {"ok", "note"}
+    conn.execute("COMMENT ON SCHEMA tunnel_api IS 'Functions and views of tunneldb 0.0.9, abc'")
+    conn.commit()
+    (wrong,) = [finding for finding in told(1, "check")["findings"] if finding["level"] == "wrong"]
+    assert (wrong["subject"], wrong["mend"]) == ("schema tunnel_api", "tunneldb init")
+    assert told(0, "init")["revision"] == told(0, "init")["before"]
+
+
+def test_a_survey_from_its_scan_to_its_end(dsn: str, tmp_path: Path, conn: psycopg.Connection) -> None:
+    made = told(0, "simulate", tmp_path, "--name", "s", "--length", 40, "--density", 100, "--scanner", "profiler", "--leaks", 2)
+    with laspy.open(made["files"]["clouds"][0]) as scan:
+        points = scan.header.point_count
+    assert made["points"] == points
+    added = told(0, "tunnel", "add", "t", "--srid", 25830, "--axis", made["files"]["axis"])
+    assert added["chainage_to"] == pytest.approx(40.0, abs=0.01)
+    posed = told(
+        0, "survey", "add", "s", "--tunnel", "t", "--date", "2024-05-04", "--trajectory", made["files"]["poses"],
+        "--intensity", "Amplitude", "--intensity-kind", "amplitude", "--reference", made["files"]["reference"],
+    )  # fmt: skip
+    assert posed["poses"] == rows(conn, "SELECT count(*)::int FROM tunnel.pose")[0][0]
+    (file,) = told(0, "load", "s", made["files"]["clouds"][0])["files"]
+    assert (file["points"], file["kept"]) == (points, rows(conn, "SELECT count(*)::int FROM tunnel.point")[0][0])
+    ran = told(0, "run", "s", "--to", "sections")["stages"]
+    assert [(done["stage"], done["km"]) for done in ran] == [("axis", 0), ("segments", 0), ("sections", 0)]
+    assert ran[1]["counts"] == rows(conn, "SELECT counts FROM tunnel.run WHERE stage = 'segments'")[0][0]
+    found = told(0, "spheres", "s", "--radius", 0.0725)
+    assert (found["points"], found["count"], found["spheres"]) == (points, 0, [])
+    preview = told(0, "batch", "s", "--to", "sections", "--preview")
+    assert preview["fits"] is True
+    batch = told(0, "batch", "s", "--to", "sections", "--workers", 1)
+    assert [(km["km"], km["state"]) for km in batch["kilometres"]] == [(0, "done")]
+    assert told(0, "survey", "remove", "s", "--yes")["points"] == file["kept"]
+    assert told(0, "tunnel", "remove", "t")["tunnel"] == "t"
+
+
+def test_a_worker_tells_when_it_leaves(dsn: str, conn: psycopg.Connection) -> None:
+    with subprocess.Popen([*TUNNELDB, "worker", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as worker:
+        while not rows(conn, "SELECT 1 FROM tunnel.worker"):
+            assert worker.poll() is None
+        assert told(0, "stop", "--wait")["workers"] == 1
+        output, errors = worker.communicate(timeout=60)
+    assert (json.loads(output)["jobs"], errors) == (0, "")
+
+
+def test_a_program_reads_it_from_the_pipe(example: str) -> None:
+    piped = (
+        " ".join(f"'{word}'" for word in [*TUNNELDB, "leaks", example, "--json"])
+        + f" | {sys.executable} -m json.tool --compact"
+    )
+    done = subprocess.run(["bash", "-o", "pipefail", "-c", piped], capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout)["count"] == 7
+
+
+def test_no_verb_was_left_out() -> None:
+    text = Path(__file__).read_text("utf-8")
+    assert [name for name in COMMANDS if name != "psql" and f'"{name}"' not in text] == []
