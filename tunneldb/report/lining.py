@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import psycopg
+from numba import njit
 from numpy.typing import NDArray
 from PIL import Image
 from scipy import ndimage
@@ -29,6 +30,8 @@ KEPT = 6
 
 NO_STATE = 255
 """Where a block has no state."""
+
+EMPTY, OFF, FLOOR_CODE = int(State.EMPTY), int(State.OFF), int(State.FLOOR)
 
 HELD = 0.2
 """Lining is shown as seen where at least this share of its pixels holds points: the same share as the median filter needs to
@@ -91,21 +94,18 @@ class _Block:
     ----------
     corrected : Raster
         Corrected intensity, dB.
-    state : (rows, columns) uint8 array or None
-        Values of :class:`State`, NO_STATE for none; None from before there were states.
+    state : (rows, columns) uint8 array
+        Values of :class:`State`, DARK or NO_STATE.
     """
 
     corrected: Raster
-    state: Bytes | None
+    state: Bytes
 
     def lining(self) -> Single:
         """Intensity of its lining, thinned, dB."""
         thin = (slice(None, None, 4), slice(None, None, 4))
         values = self.corrected.values[thin]
-        held = np.isfinite(values)
-        if self.state is not None:
-            held &= np.isin(self.state[thin], (State.LINING, State.RECESS, DARK))
-        return values[held]
+        return values[np.isfinite(values) & np.isin(self.state[thin], (State.LINING, State.RECESS, DARK))]
 
 
 @dataclass(frozen=True)
@@ -166,8 +166,12 @@ class Lining:
                 binary=True,
             ).fetchall()
         )
-        state = np.nan_to_num(decode(rows["state"]).values, nan=NO_STATE).astype(np.uint8) if "state" in rows else None
-        self._kept[number] = block = _Block(decode(rows["corrected"]), state)
+        corrected = decode(rows["corrected"])
+        if "state" in rows:
+            state = np.nan_to_num(decode(rows["state"]).values, nan=NO_STATE)
+        else:  # from before there were states
+            state = np.where(np.isfinite(corrected.values), np.float32(State.LINING), np.float32(State.EMPTY))
+        self._kept[number] = block = _Block(corrected, state.astype(np.uint8))
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)
         return block
@@ -192,9 +196,8 @@ def _paint(canvas: Bytes, window: Window, side: float, block: _Block, kilometre:
     part = _inside(row, canvas.shape[0]), _inside(column, canvas.shape[1])
     row, column = row[part[0]], column[part[1]]
     if len(row) and len(column):
-        state = None if block.state is None else block.state[part]
         there = slice(row[0], row[-1] + 1), slice(column[0], column[-1] + 1)
-        canvas[there] = _colours(block.corrected.values[part], state, (row, column), side, kilometre)
+        canvas[there] = _colours(block.corrected.values[part], block.state[part], (row, column), side, kilometre)
 
 
 def _inside(place: Places, count: int) -> slice:
@@ -202,44 +205,49 @@ def _inside(place: Places, count: int) -> slice:
     return slice(int(np.searchsorted(place, 0)), int(np.searchsorted(place, count)))
 
 
-def _colours(
-    values: Single,
-    state: Bytes | None,
-    places: tuple[Places, Places],
-    side: float,
-    kilometre: _Kilometre,
-) -> Bytes:
+def _colours(values: Single, state: Bytes, places: tuple[Places, Places], side: float, kilometre: _Kilometre) -> Bytes:
     """Colours of the pixels that rows and columns of a block fall into; both of these places grow without gaps."""
-    rows, columns = (np.flatnonzero(np.diff(place, prepend=place[0] - 1)) for place in places)
+    row, column = (place - place[0] for place in places)
+    held, level, lining, empty, off, floor = _gathered(values, state, row, column)
     about = 2 * round(FILLED / side / 2) + 1
-
-    def add(what: NDArray[Any]) -> Single:
-        return np.add.reduceat(np.add.reduceat(what.astype(np.float32), rows, axis=0), columns, axis=1)
 
     def smooth(what: Single) -> Single:
         return ndimage.uniform_filter(what, about, mode="nearest") if about > 1 else what
 
-    held = np.isfinite(values)
-    total, count = add(np.ones(values.shape, np.bool_)), add(held)
-    level = add(np.where(held, values, 0.0))
-    mean = np.where(count > 0, _ratio(level, count), _ratio(smooth(level), smooth(count)))
+    mean = np.where(held > 0, _ratio(level, held), _ratio(smooth(level), smooth(held)))
     shade = np.clip((mean - kilometre.low) / (kilometre.high - kilometre.low), 0.0, 1.0)
     grey = np.repeat(255.0 * np.nan_to_num(shade, nan=0.75), 3).reshape(*shade.shape, 3)
-    if state is None:
-        return _laid(grey, [(smooth(count) < HELD * smooth(total), UNSEEN, 1.0)])
-    off, floor = add(state == State.OFF), add((state == State.FLOOR) | (state == NO_STATE))
-    lining, empty = total - off - floor, add(state == State.EMPTY)
     unseen = smooth(lining - empty) < HELD * smooth(lining)
-    return _laid(grey, [(unseen, UNSEEN, 1.0), (off > total / 2, COVERED, 0.55), (floor > total / 2, FLOOR, 0.92)])
+    other = lining + off + floor
+    for mask, colour, opaque in ((unseen, UNSEEN, 1.0), (off > other / 2, COVERED, 0.55), (floor > other / 2, FLOOR, 0.92)):
+        grey[mask] = (1 - opaque) * grey[mask] + opaque * np.array(colour, np.float32)
+    return grey.astype(np.uint8)
+
+
+@njit(cache=True, nogil=True)
+def _gathered(values: Single, state: Bytes, row: Places, column: Places) -> Single:  # pragma: no cover - compiled
+    """Tally the pixels that fall into each coarser one.
+
+    How many hold points, their intensities added up, how many are lining, lining without points, what hangs before it, floor.
+    """
+    out = np.zeros((6, row[-1] + 1, column[-1] + 1), np.float32)
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            r, c, code = row[i], column[j], state[i, j]
+            if np.isfinite(values[i, j]):
+                out[0, r, c] += 1
+                out[1, r, c] += values[i, j]
+            if code == OFF:
+                out[4, r, c] += 1
+            elif code in (FLOOR_CODE, NO_STATE):
+                out[5, r, c] += 1
+            else:
+                out[2, r, c] += 1
+                if code == EMPTY:
+                    out[3, r, c] += 1
+    return out
 
 
 def _ratio(part: Single, whole: Single) -> Single:
     """Quotient, NaN where the divisor is none."""
     return np.divide(part, whole, out=np.full(part.shape, np.nan, np.float32), where=whole > 1e-3)
-
-
-def _laid(grey: NDArray[Any], layers: list[tuple[NDArray[np.bool_], tuple[int, int, int], float]]) -> Bytes:
-    """Lay colours over a picture, each so opaque, where its mask says so."""
-    for mask, colour, opaque in layers:
-        grey[mask] = (1 - opaque) * grey[mask] + opaque * np.array(colour, np.float32)
-    return grey.astype(np.uint8)

@@ -209,7 +209,9 @@ class _Report:
             ]
             for leak in self.leaks
         ]  # fmt: skip
-        return text.script_json({"columns": TABLE, "rows": rows, "cards": self.cards, "strip": self.strips.length, "place": self.place})
+        return text.script_json(
+            {"columns": TABLE, "rows": rows, "cards": self.cards, "strip": self.strips.length, "place": self.place}
+        )
 
 
 TABLE = [
