@@ -124,7 +124,8 @@ class Strips:
         self.length = strip_length(high - low)
         row = conn.execute(
             # not of the widest: a section that is measured astray would make all strips higher
-            "SELECT percentile_cont(0.02) WITHIN GROUP (ORDER BY arc[1]), percentile_cont(0.98) WITHIN GROUP (ORDER BY arc[361])"
+            "SELECT percentile_cont(0.02) WITHIN GROUP (ORDER BY arc[1]),"
+            " percentile_cont(0.98) WITHIN GROUP (ORDER BY arc[361])"
             " FROM tunnel.section WHERE survey_id = %s AND chainage BETWEEN %s AND %s",
             [survey.id, low - survey.spacing, high + survey.spacing],
         ).fetchone()
