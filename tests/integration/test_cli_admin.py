@@ -104,6 +104,37 @@ def test_check_says_what_is_missing_and_what_mends_it(empty_dsn: str) -> None:
     assert "newer than this program" in check(1)
 
 
+def test_check_sees_an_audit_that_is_open(dsn: str, conn: psycopg.Connection) -> None:
+    assert "✓ audit" in run("check").output
+    conn.execute("ALTER TABLE tunnel_audit.entry DISABLE TRIGGER append_only")
+    conn.commit()
+    result = run("check")
+    assert result.exit_code == 1
+    assert "✗ audit" in result.output
+    mend = next(line.strip() for line in result.output.splitlines() if "ENABLE TRIGGER" in line)
+    conn.execute(mend.encode())
+    conn.execute("ALTER TABLE tunnel_audit.entry OWNER TO tunnel_operator")
+    conn.commit()
+    result = run("check")
+    assert (result.exit_code, "✗ audit" in result.output) == (1, True)
+    conn.execute(next(line.strip() for line in result.output.splitlines() if "OWNER TO" in line).encode())
+    conn.commit()
+    assert run("check").exit_code == 0
+
+
+def test_check_names_what_waits_and_what_is_stale(example: str, conn: psycopg.Connection) -> None:
+    assert example not in run("check").output
+    conn.execute("UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0, 0, 0.1) WHERE n = 1240")
+    conn.execute(
+        "INSERT INTO tunnel.incoming (survey_id, name, path, bytes, points, km_from, km_to, failed_at, message)"
+        " SELECT id, 'b.laz', '/b.laz', 1, 1, 12, 12, now(), 'b.laz is cut off' FROM tunnel.survey"
+    )
+    conn.commit()
+    output = run("check").output
+    assert f"tunneldb run {example} --stale" in output
+    assert "b.laz is cut off" in output
+
+
 def test_check_of_a_server_that_is_down(tmp_path: Path) -> None:
     result = run("--dsn", make_conninfo(host=str(tmp_path)), "check")
     assert result.exit_code == 1

@@ -68,8 +68,11 @@ def examine(dsn: str | None) -> Iterator[Finding]:
             return
         yield _api(connection)
         yield from _roles(connection)
+        yield _audit(connection)
         yield from _settings(connection, embedded=dsn is None)
         yield from _work(connection)
+        yield from _queue(connection)
+        yield from _stale(connection)
         if dsn is None:
             yield _space()
 
@@ -125,6 +128,25 @@ def _roles(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
         yield Finding("ok", "roles", ", ".join(ROLES))
 
 
+def _audit(connection: psycopg.Connection[Any]) -> Finding:
+    """Whether what people change by hand is kept: the table's own trigger is on, and operators don't own the table."""
+    row = connection.execute(
+        """
+        SELECT EXISTS (SELECT FROM pg_trigger t WHERE t.tgrelid = c.oid AND t.tgname = 'append_only' AND t.tgenabled <> 'D'),
+               pg_get_userbyid(c.relowner) = 'tunnel_operator', quote_ident(current_user)
+          FROM pg_class c WHERE c.oid = 'tunnel_audit.entry'::regclass
+        """
+    ).fetchone()
+    assert row is not None
+    if not row[0]:
+        mend = "ALTER TABLE tunnel_audit.entry ENABLE TRIGGER append_only;"
+        return Finding("wrong", "audit", "entries can be changed and deleted: its trigger is switched off", mend)
+    if row[1]:
+        mend = f"ALTER SCHEMA tunnel_audit OWNER TO {row[2]}; ALTER TABLE tunnel_audit.entry OWNER TO {row[2]};"
+        return Finding("wrong", "audit", "it belongs to the operators, who could drop it", mend)
+    return Finding("ok", "audit", "takes new entries only")
+
+
 def _settings(connection: psycopg.Connection[Any], *, embedded: bool) -> Iterator[Finding]:
     """Settings that make a survey slow; the embedded server has its own."""
     if embedded:
@@ -159,6 +181,33 @@ def _work(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
         yield Finding("note", "work", f"{survey} km {km}, {stage} {outcome}{why}", mend)
     if not rows:
         yield Finding("ok", "work", "no stage failed or was interrupted")
+
+
+def _queue(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+    """Files that could not be read, and jobs that nobody takes."""
+    for survey, name, path, message in connection.execute(
+        "SELECT survey, name, path, message FROM tunnel_api.incoming WHERE state = 'failed' ORDER BY survey, name"
+    ).fetchall():
+        why = (message or "it could not be read").splitlines()[0]
+        yield Finding("note", "files", f"{survey}, {name}: {why}", f"tunneldb batch {survey} {path}   -- once it is mended")
+    row = connection.execute(
+        """
+        SELECT (SELECT count(*) FROM tunnel_api.job WHERE state = 'queued'), (SELECT count(*) FROM tunnel_api.worker)
+        """
+    ).fetchone()
+    assert row is not None
+    queued, workers = row
+    if queued and not workers:
+        yield Finding("note", "queue", f"{queued} jobs wait, and no worker serves them", "tunneldb worker")
+
+
+def _stale(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+    """Results that are out of date, a line a survey."""
+    for survey, stages, kilometres in connection.execute(
+        "SELECT survey, count(*), count(DISTINCT km) FROM tunnel_api.stage_status WHERE stale GROUP BY survey ORDER BY survey"
+    ).fetchall():
+        text = f"{survey}: {stages} stages of {kilometres} kilometres are out of date"
+        yield Finding("note", "work", text, f"tunneldb run {survey} --stale")
 
 
 def _space() -> Finding:
