@@ -57,9 +57,11 @@ class Coverage(Base):
     lining: Mapped[Reals] = mapped_column(comment="Lining in each step, seen or not, in the unrolled plane, m²")
     seen: Mapped[Reals] = mapped_column(comment="What of it was seen within the limits of range and incidence, m²")
     wet: Mapped[Reals] = mapped_column(comment="What of that is wet: pixels below the threshold, after the median filter, m²")
-    lining_total: Mapped[float | None] = mapped_column(Computed("tunnel.total(lining)"), comment="Sum of lining, m²")
-    seen_total: Mapped[float | None] = mapped_column(Computed("tunnel.total(seen)"), comment="Sum of seen, m²")
-    wet_total: Mapped[float | None] = mapped_column(Computed("tunnel.total(wet)"), comment="Sum of wet, m²")
+    lining_total: Mapped[float | None] = mapped_column(
+        Computed("tunnel.total(lining)", persisted=True), comment="Sum of lining, m²"
+    )
+    seen_total: Mapped[float | None] = mapped_column(Computed("tunnel.total(seen)", persisted=True), comment="Sum of seen, m²")
+    wet_total: Mapped[float | None] = mapped_column(Computed("tunnel.total(wet)", persisted=True), comment="Sum of wet, m²")
 
 
 class Region(Base):

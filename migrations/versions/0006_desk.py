@@ -142,7 +142,9 @@ def _totals() -> None:
     for name in ("lining", "seen", "wet"):
         op.add_column(
             "coverage",
-            sa.Column(f"{name}_total", sa.Double(), sa.Computed(f"tunnel.total({name})"), comment=f"Sum of {name}, m²"),
+            sa.Column(
+                f"{name}_total", sa.Double(), sa.Computed(f"tunnel.total({name})", persisted=True), comment=f"Sum of {name}, m²"
+            ),
             schema="tunnel",
         )
 
