@@ -385,13 +385,6 @@ def test_viewer_opens_the_project_but_cannot_edit(server_dsn: str, project: Path
     assert "cannot be edited" in done.stderr
 
 
-@pytest.mark.parametrize(
-    "view",
-    [
-        "leak_map", "leak_3d", "leak_unrolled", "anomaly_map", "anomaly_unrolled", "axis_vertex", "segment", "section",
-        "target_sphere", "cluster", "ground",
-    ],
-)  # fmt: skip
 def test_inspector_edits_and_what_is_stale_can_be_recomputed(conn: psycopg.Connection, server_dsn: str, project: Path) -> None:
     with psycopg.connect(server_dsn, autocommit=True) as connection:
         connection.execute("CREATE ROLE mover LOGIN IN ROLE tunnel_inspector")
@@ -417,6 +410,13 @@ def test_inspector_edits_and_what_is_stale_can_be_recomputed(conn: psycopg.Conne
     conn.commit()
 
 
+@pytest.mark.parametrize(
+    "view",
+    [
+        "leak_map", "leak_3d", "leak_unrolled", "anomaly_map", "anomaly_unrolled", "axis_vertex", "segment", "section",
+        "target_sphere", "cluster", "ground",
+    ],
+)  # fmt: skip
 def test_layer_added_by_hand_finds_its_style_srid_and_height(shared: Path, view: str) -> None:
     added = act(shared, "add", view)
     assert added["valid"]

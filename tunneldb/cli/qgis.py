@@ -51,6 +51,8 @@ def qgis(
         raise UserError("say where the project goes: -o FILE.qgz, or --database")
     if output is not None and output.suffix.lower() not in (".qgz", ".qgs"):
         raise UserError(f"{output}: a QGIS project ends in .qgz or .qgs")
+    if output is not None and not output.parent.is_dir():
+        raise UserError(f"{output}: there is no folder {output.parent}")
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
         beside = Path(f"{found.name}-images") if output is None else output.with_name(f"{output.stem}-images")
