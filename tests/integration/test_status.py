@@ -178,7 +178,7 @@ def test_json_is_for_programs(batch: str) -> None:
     found = json.loads(CliRunner().invoke(main, ["status", batch, "--json"]).output)
     assert found["kilometres"]["2"]["axis"]["state"] == "failed"
     assert found["files"][1]["message"] == DAMAGED
-    assert CliRunner().invoke(main, ["status", "--json"]).exit_code == 2
+    assert CliRunner().invoke(main, ["status", "--watch", "--json"]).exit_code == 2
 
 
 def test_watch_in_a_pipe_says_what_changes_and_ends_when_nothing_is_left(conn: psycopg.Connection, batch: str) -> None:
