@@ -11,6 +11,7 @@ import traceback
 from collections.abc import Iterator
 from typing import Any
 
+from osgeo import gdal
 from qgis.core import QgsGeometry, QgsLayoutExporter, QgsProject, QgsRectangle, QgsVectorLayer
 from qgis.gui import QgsMapCanvas
 from qgis.PyQt.QtCore import Qt, QTimer
@@ -41,8 +42,9 @@ def review(picture: str) -> Iterator[None]:
     form.setWindowFlags(Qt.Window)
     form.attributeForm().changeAttribute("review", "confirmed")
     form.attributeForm().changeAttribute("remark", "dripping, 2 l/min")
-    form.setGeometry(600, 120, 880, 760)
     form.show()
+    yield
+    form.move(WINDOW[0] - form.width(), 90)  # it is as wide as it needs to be
     yield
     grab(picture)
     form.accept()
@@ -66,18 +68,13 @@ def vertex(picture: str) -> Iterator[None]:
 
 
 def sheets(picture: str) -> Iterator[None]:
-    """Print the inspection sheets, as *Atlas › Export Atlas as PDF* does, beside the project."""
+    """Print the inspection sheets, as *Atlas › Export Atlas as PDF* does, beside the project; the picture is the first."""
     layout = QgsProject.instance().layoutManager().layoutByName("Inspection sheets")
     target = f"{QgsProject.instance().homePath()}/sheets.pdf"
     result, error = QgsLayoutExporter.exportToPdf(layout.atlas(), target, QgsLayoutExporter.PdfExportSettings())
     assert result == QgsLayoutExporter.Success, error
-    designer = iface.openLayoutDesigner(layout)
-    designer.window().setGeometry(0, 0, *WINDOW)
-    designer.setAtlasPreviewEnabled(True)
+    gdal.Translate(picture, gdal.OpenEx(f"PDF:1:{target}", gdal.OF_RASTER, open_options=["DPI=110"]), format="PNG")
     yield
-    designer.view().zoomFull()
-    yield
-    grab(picture)
 
 
 def tidy() -> Iterator[None]:
