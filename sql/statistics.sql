@@ -252,11 +252,14 @@ BEGIN
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     SELECT e.* INTO extent FROM tunnel_api.survey_ends(survey_key) e;
+    IF extent.chainage_from IS NULL THEN
+        RETURN;  -- no axis yet
+    END IF;
     SELECT array_agg(first_chainage + (i - 1) * ring_length ORDER BY i), array_agg(first_chainage + i * ring_length ORDER BY i)
     INTO starts, ends
     FROM generate_series(
-        greatest(1, floor((greatest(extent.chainage_from, stretch_from) - first_chainage) / ring_length)::int + 1),
-        ceil((least(extent.chainage_to, stretch_to) - first_chainage) / ring_length)::int) i;
+        greatest(1, floor((greatest(extent.chainage_from, stretch_from) - first_chainage) / ring_length + 1e-9)::int + 1),
+        ceil((least(extent.chainage_to, stretch_to) - first_chainage) / ring_length - 1e-9)::int) i;
     RETURN QUERY
         SELECT round((t.chainage_from - first_chainage) / ring_length)::int + 1, t.chainage_from, t.chainage_to,
             (SELECT c.label FROM tunnel_api.stationing(tunnel_key, t.chainage_from) c), t.lining_area, t.seen_share,

@@ -250,6 +250,15 @@ def test_rings_of_a_stretch_are_those_that_reach_into_it(rows: psycopg.Connectio
     assert ask(rows, "SELECT * FROM tunnel_api.ring_statistics('s', 1.5, 3199.2, 9000, 9100)") == []
 
 
+@pytest.mark.parametrize(("low", "high"), [(0, 10), (1, 2), (7, 9), (33, 100)])
+def test_a_stretch_from_joint_to_joint_has_no_ring_more(conn: psycopg.Connection, low: int, high: int) -> None:
+    """The joints of such rings are no round numbers, and a stretch may be given rounded."""
+    add_survey(conn, 12300, 12500)
+    for joint in (lambda n: 12300.1 + n * 1.2, lambda n: round(12300.1 + n * 1.2, 1)):
+        found = ask(conn, "SELECT number FROM tunnel_api.ring_statistics('s', 1.2, 12300.1, %s, %s)", joint(low), joint(high))
+        assert [row["number"] for row in found] == list(range(low + 1, high + 1))
+
+
 def test_a_whole_kilometre_is_the_sum_of_its_steps(rows: psycopg.Connection, made: Made) -> None:
     """The second kilometre lies in the tunnel from end to end; the others are cut by it."""
     steps = np.random.default_rng(3).random((3, 10_000)).astype(np.float32)
@@ -390,6 +399,8 @@ def test_ranges_are_cut_to_the_survey(conn: psycopg.Connection, plain: int) -> N
     conn.execute("DELETE FROM tunnel.segment")
     for function in ("coverage", "leak_statistics"):
         assert ask(conn, f"SELECT * FROM tunnel_api.{function}('s', '-Infinity', 'Infinity') f WHERE f.lining_area > 0") == []
+    assert ask(conn, "SELECT * FROM tunnel_api.ring_statistics('s', 1.5, 0)") == []
+    assert ask(conn, "SELECT * FROM tunnel_api.ring_statistics('s', 1.5, 0, 100, 200)") == []
     with pytest.raises(psycopg.Error, match="there is no survey x"):
         conn.execute("SELECT tunnel_api.coverage('x', 0, 1)")
 
