@@ -113,6 +113,10 @@ def test_check_sees_an_audit_that_is_open(dsn: str, conn: psycopg.Connection) ->
     assert "✗ audit" in result.output
     mend = next(line.strip() for line in result.output.splitlines() if "ENABLE TRIGGER" in line)
     conn.execute(mend.encode())
+    conn.execute("ALTER TABLE tunnel_audit.entry ENABLE REPLICA TRIGGER append_only")  # on, but not for what people do
+    conn.commit()
+    assert "✗ audit" in run("check").output
+    conn.execute(mend.encode())
     conn.execute("ALTER TABLE tunnel_audit.entry OWNER TO tunnel_operator")
     conn.commit()
     result = run("check")
@@ -120,6 +124,37 @@ def test_check_sees_an_audit_that_is_open(dsn: str, conn: psycopg.Connection) ->
     conn.execute(next(line.strip() for line in result.output.splitlines() if "OWNER TO" in line).encode())
     conn.commit()
     assert run("check").exit_code == 0
+
+
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
+def test_check_is_for_operators_too(person: psycopg.Connection, dsn: str, conn: psycopg.Connection) -> None:
+    result = run("--dsn", make_conninfo(dsn, user="otto"), "check")
+    assert result.exit_code == 0, result.output
+    assert "✓ audit" in result.output
+    conn.execute("DROP TABLE tunnel_audit.entry CASCADE")
+    conn.commit()
+    result = run("--dsn", make_conninfo(dsn, user="otto"), "check")
+    assert (result.exit_code, "✗ audit" in result.output) == (1, True), result.output
+
+
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
+def test_check_reports_triggers_that_are_not_the_projects(person: psycopg.Connection, dsn: str) -> None:
+    """Of an operator, also one that takes the place and the name of the project's own."""
+    assert "✓ triggers" in run("check").output
+    body = "RETURNS trigger LANGUAGE plpgsql AS 'BEGIN RETURN NEW; END'"
+    for name, table in (("mine", "point"), ("drop_points", "survey")):
+        person.execute(f"DROP FUNCTION IF EXISTS tunnel.{name} CASCADE".encode())
+        person.execute(f"CREATE FUNCTION tunnel.{name}() {body}".encode())
+        person.execute(
+            f"CREATE TRIGGER {name} BEFORE INSERT ON tunnel.{table} FOR EACH ROW EXECUTE FUNCTION tunnel.{name}()".encode()
+        )
+    for by in (dsn, make_conninfo(dsn, user="otto")):
+        result = run("--dsn", by, "check")
+        assert (result.exit_code, result.output.count("✗ triggers")) == (1, 2), result.output
+        assert "mine on tunnel.point is not tunneldb's" in result.output
+    for mend in [line.strip() for line in result.output.splitlines() if "DROP TRIGGER" in line]:
+        person.execute(mend.encode())
+    assert "✓ triggers" in run("check").output
 
 
 def test_check_names_what_waits_and_what_is_stale(example: str, conn: psycopg.Connection) -> None:

@@ -23,6 +23,7 @@ from tunneldb.database.server import Server
 from tunneldb.errors import UserError
 
 ROLES = ("tunnel_viewer", "tunnel_inspector", "tunnel_operator")
+TRIGGERS = ("drop_points", "make_images")  # of tunnel.survey, each of the function of its name
 LITTLE_SPACE = 5 * 1024**3  # bytes; a kilometre at survey density takes some 0.5 GB with its rewrite
 GIB = 1024**3
 
@@ -69,6 +70,7 @@ def examine(dsn: str | None) -> Iterator[Finding]:
         yield _api(connection)
         yield from _roles(connection)
         yield _audit(connection)
+        yield from _triggers(connection)
         yield from _settings(connection, embedded=dsn is None)
         yield from _work(connection)
         yield from _queue(connection)
@@ -132,12 +134,16 @@ def _audit(connection: psycopg.Connection[Any]) -> Finding:
     """Whether what people change by hand is kept: the table's own trigger is on, and operators don't own the table."""
     row = connection.execute(
         """
-        SELECT EXISTS (SELECT FROM pg_trigger t WHERE t.tgrelid = c.oid AND t.tgname = 'append_only' AND t.tgenabled <> 'D'),
-               pg_get_userbyid(c.relowner) = 'tunnel_operator', quote_ident(current_user)
-          FROM pg_class c WHERE c.oid = 'tunnel_audit.entry'::regclass
+        SELECT EXISTS (SELECT FROM pg_trigger t
+                        WHERE t.tgrelid = c.oid AND t.tgname = 'append_only' AND t.tgenabled IN ('O', 'A')),
+               'tunnel_operator' IN (pg_get_userbyid(c.relowner), pg_get_userbyid(n.nspowner)),
+               (SELECT quote_ident(pg_get_userbyid(a.nspowner)) FROM pg_namespace a WHERE a.nspname = 'tunnel_api')
+          FROM pg_class c JOIN pg_namespace n ON n.oid = c.relnamespace
+         WHERE n.nspname = 'tunnel_audit' AND c.relname = 'entry'
         """
     ).fetchone()
-    assert row is not None
+    if row is None:
+        return Finding("wrong", "audit", "its table tunnel_audit.entry is missing", "restore schema tunnel_audit from a backup")
     if not row[0]:
         mend = "ALTER TABLE tunnel_audit.entry ENABLE TRIGGER append_only;"
         return Finding("wrong", "audit", "entries can be changed and deleted: its trigger is switched off", mend)
@@ -145,6 +151,29 @@ def _audit(connection: psycopg.Connection[Any]) -> Finding:
         mend = f"ALTER SCHEMA tunnel_audit OWNER TO {row[2]}; ALTER TABLE tunnel_audit.entry OWNER TO {row[2]};"
         return Finding("wrong", "audit", "it belongs to the operators, who could drop it", mend)
     return Finding("ok", "audit", "takes new entries only")
+
+
+def _triggers(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+    """Triggers on the tables that are not the project's own: they run with the rights of whoever writes there."""
+    rows = connection.execute(
+        """
+        SELECT format('%%I.%%I', n.nspname, c.relname), quote_ident(t.tgname), pg_get_userbyid(p.proowner)
+          FROM pg_trigger t JOIN pg_class c ON c.oid = t.tgrelid JOIN pg_namespace n ON n.oid = c.relnamespace
+          JOIN pg_proc p ON p.oid = t.tgfoid JOIN pg_namespace f ON f.oid = p.pronamespace
+         WHERE n.nspname = 'tunnel' AND NOT t.tgisinternal AND t.tgparentid = 0
+           AND NOT (c.relname = 'survey' AND t.tgname = ANY(%s) AND p.proname = t.tgname AND f.nspname = 'tunnel'
+                    AND (p.proowner IN (SELECT oid FROM pg_roles WHERE rolsuper)
+                         OR p.proowner IN (SELECT nspowner FROM pg_namespace WHERE nspname = 'tunnel_api')
+                         OR p.proowner IN (SELECT datdba FROM pg_database WHERE datname = current_database())))
+         ORDER BY 1, 2
+        """,
+        [list(TRIGGERS)],
+    ).fetchall()
+    for table, name, owner in rows:
+        text = f"{name} on {table} is not tunneldb's: it runs what {owner} wrote with the rights of whoever writes there"
+        yield Finding("wrong", "triggers", text, f"DROP TRIGGER {name} ON {table};")
+    if not rows:
+        yield Finding("ok", "triggers", "none but tunneldb's own")
 
 
 def _settings(connection: psycopg.Connection[Any], *, embedded: bool) -> Iterator[Finding]:
