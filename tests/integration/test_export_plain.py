@@ -380,6 +380,37 @@ def test_stations_choose_the_stretch(dsn: str, example: str, conn: psycopg.Conne
     assert columns["label"].tolist() == ["5+100.000", "5+090.000", "5+080.000", "5+070.000"]
 
 
+def test_a_stretch_between_two_ticks(shared_dsn: str, tmp_path: Path) -> None:
+    for suffix in ("gpkg", "dxf"):
+        run("export", "demo-2024", "-o", tmp_path / f"x.{suffix}", "--from", "12+301", "--to", "12+305", dsn=shared_dsn)
+    with sqlite3.connect(tmp_path / "x.gpkg") as file:
+        counts = [file.execute(f"SELECT count(*) FROM {name}").fetchone()[0] for name in ("axis", "chainage", "lining_map")]
+    assert counts == [1, 0, 1]
+    found = entities(tmp_path / "x.dxf")
+    assert [len(found[name]) for name in ("AXIS", "CHAINAGE", "SECTION_3D")] == [1, 0, 1]
+
+
+@pytest.mark.parametrize(("low", "high"), [("12353", "12358"), ("12390", "12399")])
+def test_a_stretch_in_a_gap_of_the_survey(example: str, conn: psycopg.Connection, tmp_path: Path, low: str, high: str) -> None:
+    """Near the end of what there is, and farther from it than the surface reaches."""
+    conn.execute("DELETE FROM tunnel.section WHERE chainage BETWEEN 12350 AND 12450")
+    conn.execute("DELETE FROM tunnel.segment WHERE chainage_from >= 12350 AND chainage_to <= 12450")
+    conn.commit()
+    for suffix in ("gpkg", "dxf"):
+        output = run("export", example, "-o", tmp_path / f"x.{suffix}", "--from", low, "--to", high, code=2)
+        assert f"demo-2024 has no axis between chainages {low}.000 and {high}.000 m" in output
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_definition_of_several_lines_is_one_in_the_drawing(example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    conn.execute("UPDATE spatial_ref_sys SET auth_name = 'own', srtext = replace(srtext, ',', E',\n  ') WHERE srid = 25830")
+    conn.commit()
+    run("export", example, "-o", tmp_path / "x.dxf")
+    assert entities(tmp_path / "x.dxf")["AXIS"]
+    told = dict(ezdxf.readfile(tmp_path / "x.dxf").header.custom_vars.properties)["CRS"]
+    assert told.startswith('PROJCS["ETRS89 / UTM zone 30N", GEOGCS["ETRS89",')
+
+
 def test_a_survey_without_sections_says_so(dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
     conn.execute("DELETE FROM tunnel.section")
     conn.commit()

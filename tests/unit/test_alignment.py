@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -207,6 +208,14 @@ BROKEN = [
     (("<PVI>-90.00000000 90.90600001</PVI>", "<PVI>-90</PVI>"), r"a PVI of the profile is '-90', not station and height"),
     (("<PVI>-90.00000000 ", "<PVI>390.00000000 "), r"the profile turns back"),
     (('<ParaCurve length="80.000000">', '<ParaCurve length="580.0">'), r"curves of the profile overlap by 20\.000 m"),
+    (('<ParaCurve length="80.000000">', '<ParaCurve length="-80.0">'), r"length of a ParaCurve is '-80\.0'; it must not"),
+    (('length="62.50000000" radiusStart="INF"', 'length="-62.5" radiusStart="INF"'), r"length of a Spiral is '-62\.5'; it"),
+    (('length="62.50000000"', 'length="0"'), r"distance of its ends of the Spiral .* off by 62\.\d+ m"),
+    (("<PVI>-90.00000000 90.90600001</PVI>", "<PVI>-90 NaN</PVI>"), r"a PVI of the profile is '-90 NaN', not station and"),
+    (('<Start name="BP">-5851.24470669', '<Start name="BP">-INF'), r"Start of a Line is '-INF .*', not northing and easting"),
+    (("<Center>-5611.00629049 -16712.04332769<", "<Center>-5709.42743874 -16482.23193203<"), r"radius of the Curve .* is off"),
+    (("encoding='utf-8'", "encoding='Shift_JIS'"), r"cannot be read as XML: multi-byte encodings .*; save it as UTF-8"),
+    (("encoding='utf-8'", "encoding='sjis-2004-x'"), r"cannot be read as XML: .*sjis-2004-x.*; save it as UTF-8"),
 ]  # fmt: skip
 
 
@@ -217,6 +226,32 @@ def test_a_broken_landxml_is_refused(tmp_path: Path, change: tuple[str, str], me
         read_given(path)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+BEND = '<Spiral length="62.50000000" radiusStart="INF"'
+POINT = "-5764.59435677 -16511.51399200"
+BEHIND = "-5764.59521982 -16511.51449725"  # 1 mm before it, on the line that leads there
+EMPTY = {
+    "spiral": f'<Spiral length="0" radiusEnd="250" rot="cw"><Start>{POINT}</Start><PI/><End>{POINT}</End></Spiral>',
+    "centre": f'<Curve rot="cw"><Start>{POINT}</Start><Center>{POINT}</Center><End>{POINT}</End></Curve>',
+    "behind": f'<Curve rot="cw"><Start>{POINT}</Start><Center>-5814.9 -16425.4</Center><End>{BEHIND}</End></Curve>',
+}
+
+
+@pytest.mark.parametrize("element", EMPTY.values(), ids=EMPTY)
+def test_an_element_without_length_is_passed_over(tmp_path: Path, element: str) -> None:
+    path = edited(tmp_path, "j-landxml.xml", (BEND, element + BEND))
+    assert LandXml(path).design(0, 0).plan == landxml("j-landxml.xml").plan
+    read_given(path)
+
+
+def test_a_parabola_on_one_side_only_is_no_curve(tmp_path: Path) -> None:
+    curve = '<ParaCurve length="80.000000">300.00000029 82.71600000</ParaCurve>'
+    one_sided = '<UnsymParaCurve lengthIn="0" lengthOut="40">300.00000029 82.71600000</UnsymParaCurve>'
+    design = LandXml(edited(tmp_path, "j-landxml.xml", (curve, one_sided))).design(0, 0)
+    design.check()
+    bent = LandXml(edited(tmp_path, "j-landxml.xml", (curve, "<PVI>300.00000029 82.71600000</PVI>"))).design(0, 0)
+    assert design.profile == bent.profile
 
 
 def test_no_profile_no_axis(tmp_path: Path) -> None:
@@ -246,6 +281,18 @@ def test_a_surface_of_any_size_is_passed_over(tmp_path: Path) -> None:
     surface = "<Surfaces><Surface><Pnts>" + '<P id="1">1 2 3</P>' * 1000 + "</Pnts></Surface></Surfaces>"
     path = edited(tmp_path, "j-landxml.xml", ("<Alignments>", f"{surface}<Alignments>"))
     assert len(read_given(path).xyz) == len(read_given(DATA / "j-landxml.xml").xyz)
+
+
+def test_cross_sections_of_an_alignment_are_not_kept(tmp_path: Path) -> None:
+    section = '<CrossSect sta="1"><CrossSectSurf>' + "<PntList2D>1 2</PntList2D>" * 20 + "</CrossSectSurf></CrossSect>"
+    path = edited(tmp_path, "j-landxml.xml", ("</Alignment>", f"<CrossSects>{section * 2000}</CrossSects></Alignment>"))
+    tracemalloc.start()
+    try:
+        file = LandXml(path)
+        assert tracemalloc.get_traced_memory()[1] < path.stat().st_size
+    finally:
+        tracemalloc.stop()
+    assert file.design(0, 0).plan == landxml("j-landxml.xml").plan
 
 
 def test_start_chainage_moves_the_chainage_and_not_the_stations() -> None:

@@ -25,6 +25,7 @@ UNITS = {
 MISMATCH = 0.02  # m between a length as stated and as the points have it; files are rounded to millimetres or centimetres
 _PVIS = ("PVI", "ParaCurve", "UnsymParaCurve", "CircCurve")
 _KEPT = ("Alignments", "Units", "CoordinateSystem", "CgPoints")
+_DROPPED = ("CrossSects", "CrossSect")  # lie within Alignments, and are most of some files
 
 Point = tuple[float, float]
 
@@ -61,6 +62,8 @@ class LandXml:
             raise UserError(f"{self._path}: alignment {self.names[number]!r} has no geometry in plan (CoordGeom)")
         elements = [self._element(element) for element in geometry if _tag(element) not in ("Feature", "Description")]
         plan = tuple(element for element in elements if element.length > 0.0)
+        if not plan:
+            raise UserError(f"{self._path}: the plan of alignment {self.names[number]!r} (CoordGeom) has no length")
         pvis = list(self._pvis(self._profiles(alignment)[profile], start))
         notes = []
         if self._unit != 1.0:
@@ -108,7 +111,7 @@ class LandXml:
         start, end = self._point(element, "Start"), self._point(element, "End")
         dx, dy = end[0] - start[0], end[1] - start[1]
         length = math.hypot(dx, dy)
-        self._compare(element, "length", self._length(element, "length", length), length)
+        self._compare(element, "length", self._extent(element, "length", length), length)
         return PlanElement("line", length, *start, math.atan2(dy, dx))
 
     def _curve(self, element: Element) -> PlanElement:
@@ -118,12 +121,15 @@ class LandXml:
         radius = math.dist(start, centre)
         first, last = (math.atan2(p[1] - centre[1], p[0] - centre[0]) for p in (start, end))
         angle = (turn * (last - first)) % (2.0 * math.pi)
+        if radius * (2.0 * math.pi - angle) < MISMATCH:  # an arc of no length, whose rounded end lies behind its start
+            angle = 0.0
         length = radius * angle
         self._compare(element, "radius", math.dist(end, centre), radius)
         self._compare(element, "radius", self._length(element, "radius", radius), radius)
-        self._compare(element, "length", self._length(element, "length", length), length)
+        self._compare(element, "length", self._extent(element, "length", length), length)
         bearing = math.remainder(first + turn * math.pi / 2.0, 2.0 * math.pi)
-        return PlanElement("arc", length, *start, bearing, turn / radius, turn / radius)
+        curvature = turn / radius if length else 0.0
+        return PlanElement("arc", length, *start, bearing, curvature, curvature)
 
     def _spiral(self, element: Element) -> PlanElement:
         """Clothoid between two points, whose length and radii say how it bends."""
@@ -131,9 +137,12 @@ class LandXml:
         if kind != "clothoid":
             raise UserError(f"{self._path}: the plan has a spiral of type {kind}; only clothoids are read")
         turn = self._turn(element)
-        length = self._length(element, "length")
+        length = self._extent(element, "length")
         before, after = (turn * self._curvature(element, name) for name in ("radiusStart", "radiusEnd"))
         start, end = self._point(element, "Start"), self._point(element, "End")
+        if length == 0.0:
+            self._compare(element, "distance of its ends", math.dist(start, end), 0.0)
+            return PlanElement("clothoid", 0.0, *start, 0.0)
         clothoid, excess = clothoid_from_chord(start, end, length, before, after)
         self._compare(element, "distance of its ends", excess, 0.0)
         return clothoid
@@ -167,7 +176,7 @@ class LandXml:
         reference = place.get("pntRef")
         text = (self._points.get(reference) if reference else place.text) or ""
         try:
-            north, east = (float(value) for value in text.split()[:2])
+            north, east = (_number(value) for value in text.split()[:2])
         except ValueError:
             raise UserError(
                 f"{self._path}: {name} of a {_tag(element)} is {text.strip()!r}, not northing and easting"
@@ -185,16 +194,16 @@ class LandXml:
                     f"{self._path}: the profile has a {kind}; PVI, ParaCurve, UnsymParaCurve and CircCurve are read"
                 )
             try:
-                station, height = (float(value) * self._unit for value in (point.text or "").split())
+                station, height = (_number(value) * self._unit for value in (point.text or "").split())
             except ValueError:
                 raise UserError(
                     f"{self._path}: a {kind} of the profile is {(point.text or '').strip()!r}, not station and height"
                 ) from None
             before, after, radius = 0.0, 0.0, 0.0
             if kind == "UnsymParaCurve":
-                before, after = self._length(point, "lengthIn"), self._length(point, "lengthOut")
+                before, after = self._extent(point, "lengthIn"), self._extent(point, "lengthOut")
             elif kind == "ParaCurve":
-                before = after = self._length(point, "length") / 2.0
+                before = after = self._extent(point, "length") / 2.0
             elif kind == "CircCurve":
                 radius = abs(self._length(point, "radius"))
             yield Pvi(station - start, height, before, after, radius)
@@ -218,12 +227,16 @@ class LandXml:
         if text is None and default is not None:
             return default
         try:
-            value = float(text or "")
+            return _number(text or "") * self._unit
         except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise UserError(f"{self._path}: {name} of a {_tag(element)} is {text!r}, not a number")
-        return value * self._unit
+            raise UserError(f"{self._path}: {name} of a {_tag(element)} is {text!r}, not a number") from None
+
+    def _extent(self, element: Element, name: str, default: float | None = None) -> float:
+        """Return an attribute that is a length from one place to another, m."""
+        length = self._length(element, name, default)
+        if length < 0.0:
+            raise UserError(f"{self._path}: {name} of a {_tag(element)} is {element.get(name)!r}; it must not be negative")
+        return length
 
 
 def _read(path: Path) -> Element:
@@ -237,11 +250,13 @@ def _read(path: Path) -> Element:
                 kept += _tag(element) in _KEPT
                 continue
             stack.pop()
-            if not kept and stack:
+            if stack and (not kept or _tag(element) in _DROPPED):
                 stack[-1].remove(element)
             kept -= _tag(element) in _KEPT
     except ParseError as error:
         raise UserError(f"{path} is not a whole XML file: {error}") from None
+    except (ValueError, LookupError) as error:  # an encoding of several bytes, or one that isn't known
+        raise UserError(f"{path} cannot be read as XML: {error}; save it as UTF-8") from None
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from None
     if _tag(element) != "LandXML":
@@ -251,6 +266,13 @@ def _read(path: Path) -> Element:
 
 def _tag(element: Element) -> str:
     return element.tag.rpartition("}")[2]
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is no place and no length")
+    return value
 
 
 def _child(element: Element, name: str) -> Element | None:

@@ -73,9 +73,9 @@ def _curve(pvi: Pvi, grade: float, following: float) -> list[ProfileElement]:
         return []
     if pvi.radius:
         return [_circle(pvi, grade, following)]
-    whole = pvi.before + pvi.after
-    if whole == 0.0:
+    if pvi.before == 0.0 or pvi.after == 0.0:  # a parabola on one side only is a piece of its grade
         return []
+    whole = pvi.before + pvi.after
     begin, z = pvi.distance - pvi.before, pvi.z - pvi.before * grade
     kind: ProfileKind = "parabola"
     if pvi.before == pvi.after:

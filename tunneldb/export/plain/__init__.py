@@ -27,11 +27,19 @@ def write_survey(conn: psycopg.Connection[Any], survey: Survey, low: float, high
     Raises
     ------
     UserError
-        The survey has no sections yet, or nothing between the two chainages.
+        The survey has no sections yet, or no axis between the two chainages.
     """
     row = conn.execute("SELECT chainage_from, chainage_to FROM tunnel_api.survey_ends(%s)", [survey.id]).fetchone()
     if row is not None and row[0] is not None and (row[0] >= high or row[1] <= low):
         raise UserError(f"survey {survey.name} has nothing there: it lies between chainages {row[0]:.3f} and {row[1]:.3f} m")
+    held = conn.execute(
+        "SELECT bool_or(chainage_to > %s AND chainage_from < %s) FROM tunnel.segment WHERE survey_id = %s",
+        [low, high, survey.id],
+    ).fetchone()
+    if held is not None and held[0] is False:
+        raise UserError(
+            f"survey {survey.name} has no axis between chainages {low:.3f} and {high:.3f} m: they lie in a gap of it"
+        )
     surface = load_surface(conn, survey, low, high)
     if path.suffix.lower() == ".gpkg":
         from tunneldb.export.plain.gpkg import write_survey_gpkg

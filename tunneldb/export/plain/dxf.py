@@ -150,7 +150,7 @@ def _document(conn: psycopg.Connection[Any], survey: Survey) -> Any:
     document.header["$LUNITS"], document.header["$LUPREC"] = 2, 3
     about = {"Survey": survey.name, "Tunnel": survey.tunnel, "Scanned": survey.date.isoformat(), "Unit": "metre"}
     for name, text in {**about, "CRS": crs_text(conn, survey.srid), "Writer": f"tunneldb {__version__}"}.items():
-        document.header.custom_vars.append(name, text)
+        document.header.custom_vars.append(name, " ".join(text.split()))  # a value is a line of the file; WKT may have many
     document.appids.new(APPLICATION)
     document.styles.new(APPLICATION, dxfattribs={"font": "arial.ttf"})
     for name, (colour, text) in LAYERS.items():

@@ -88,7 +88,7 @@ def is_hundred(chainages: Float) -> NDArray[np.bool_]:
 
 def edges(surface: Surface, chainages: Float) -> tuple[Float, Float]:
     """Left and right edge of the unrolled lining, (n, 2) rows of chainage and arc, m, where there are sections."""
-    arcs = np.array([surface.arc_range(chainage) for chainage in chainages])
+    arcs = np.array([surface.arc_range(chainage) for chainage in chainages], dtype=np.float64).reshape(-1, 2)
     there = np.isfinite(arcs[:, 0])
     left, right = (np.column_stack([chainages, arcs[:, k]])[there] for k in (0, 1))
     return left, right
