@@ -28,7 +28,7 @@ class Settings:
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "init": ("tunneldb.cli.init:init", "Create or upgrade the schema, the functions and the roles."),
-    "tunnel": ("tunneldb.cli.tunnel:tunnel", "Add, list or remove tunnels."),
+    "tunnel": ("tunneldb.cli.tunnel:tunnel", "Add, list or remove tunnels, and give them a stationing."),
     "survey": ("tunneldb.cli.survey:survey", "Add, list or remove the scanning campaigns of a tunnel."),
     "load": ("tunneldb.cli.load:load", "Load LAS, LAZ and E57 files into a survey."),
     "run": ("tunneldb.cli.run:run", "Run the stages: axis, segments, sections, ground, detect."),
@@ -40,7 +40,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "spheres": ("tunneldb.cli.spheres:spheres", "Find target spheres, and compare them with control points."),
     "axis": ("tunneldb.cli.axis:axis", "Show how far the measured axis lies from the one given, by element of its design."),
     "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),
-    "export": ("tunneldb.cli.export:export", "Write the scan files again with the class of each point."),
+    "export": (
+        "tunneldb.cli.export:export",
+        "Write a survey as GeoPackage, DXF, or its scan files with the class of each point.",
+    ),
     "ground": ("tunneldb.cli.ground:ground", "Class the points of a scan file by itself, without a database."),
     "intensity": ("tunneldb.cli.intensity:intensity", "Show whether intensity depends on range or incidence, and plot it."),
     "image": ("tunneldb.cli.image:image", "Write the unrolled images as GeoTIFF."),
@@ -103,7 +106,7 @@ class LazyGroup(click.Group):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Note whether JSON is asked for: what is wrong with the rest of the line is to be said in it, too."""
-        ctx.meta[AS_JSON] = JSON in args and "psql" not in args
+        ctx.meta[AS_JSON] = JSON in args and next((word for word in args if word in COMMANDS), None) != "psql"
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -155,14 +155,16 @@ def plain(value: Any) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {plain(str(key)): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple, set, frozenset, range)):
         return [plain(item) for item in value]
     if hasattr(value, "__geo_interface__"):
         return plain(value.__geo_interface__)
     if hasattr(value, "tolist"):  # of NumPy, which help must not import
         return plain(value.tolist())
-    if value is None or isinstance(value, (bool, int, str)):
+    if isinstance(value, str):  # names of files may hold what is not UTF-8
+        return value.encode("utf-8", "replace").decode()
+    if value is None or isinstance(value, (bool, int)):
         return value
     if hasattr(value, "as_integer_ratio"):  # float, Decimal
         number = float(value)
@@ -171,4 +173,4 @@ def plain(value: Any) -> Any:
         return value.isoformat()
     if hasattr(value, "total_seconds"):
         return value.total_seconds()
-    return str(value)
+    return plain(str(value))
