@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 
 from tunneldb.cli.main import main
 from tunneldb.database import Survey, get_survey
+from tunneldb.errors import UserError
 from tunneldb.geometry.store import load_surface
 from tunneldb.job.run import parse_km
 from tunneldb.simulate import Parameters, Simulation, write
@@ -342,6 +343,10 @@ def test_a_range_takes_the_kilometres_that_are_there() -> None:
     assert parse_km("511-512", [510, 511]) == [511]
     assert parse_km("0-9", [1, 3, 12]) == [1, 3]
     assert parse_km(None, [1, 3]) == [1, 3]
+    assert parse_km("-2", [-3, -2, 2]) == [-2]
+    assert parse_km("-3--2", [-3, -2, 2]) == parse_km("-9-1", [-3, -2, 2]) == [-3, -2]
+    with pytest.raises(UserError, match="backwards"):
+        parse_km("-2--3", [-3, -2])
 
 
 def test_too_few_points_is_one_line(loaded_curve: psycopg.Connection) -> None:

@@ -91,6 +91,11 @@ def test_each_keeps_the_parameters_that_it_had(surveyed: psycopg.Connection) -> 
     conn.execute(MOVE, [100])
     command("run", NAME, "--stale", "--set", "section.half_width=0.3")
     assert dict(conn.execute(widths, [since]).fetchall()) == {0: 0.3, 1: 0.3}
+    since = last_run(conn)
+    conn.execute(MOVE, [100])
+    result = command("run", NAME, "--stale", "--set", "section.max_half_width=0.2", code=2)
+    assert "sections of kilometre 0" in result.stderr, "0.3 m is kept, and wider"
+    assert runs(conn, since) == []
 
 
 def test_part_of_it_can_be_chosen_but_not_before_points_that_wait(surveyed: psycopg.Connection) -> None:

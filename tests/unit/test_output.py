@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import os
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,7 +20,8 @@ from shapely.geometry import Point
 from tunneldb.cli.main import COMMANDS, EXAMPLES, main
 from tunneldb.cli.output import Verb, plain
 from tunneldb.cli.progress import rate
-from tunneldb.job.parameters import settings
+from tunneldb.errors import UserError
+from tunneldb.job.parameters import check_together, settings
 
 
 def verbs() -> Iterator[tuple[str, click.Command]]:
@@ -85,6 +87,12 @@ def test_what_a_verb_tells_becomes_json() -> None:
     }
 
 
+def test_names_that_are_not_utf8_can_be_told() -> None:
+    name = os.fsdecode(b"n\xe9.laz")
+    told = plain({"file": Path("a") / name, name: [name]})
+    assert json.loads(json.dumps(told, ensure_ascii=False).encode()) == {"file": "a/n?.laz", "n?.laz": ["n?.laz"]}
+
+
 def test_numbers_keep_all_their_digits() -> None:
     number = 512_345.678_901_234
     assert json.loads(json.dumps(plain({"x": np.float64(number)})))["x"] == number
@@ -111,3 +119,13 @@ def test_a_wrong_command_line_is_told_in_json_too() -> None:
         said = json.loads(result.stdout)
         assert (result.exit_code, said["ok"], said["exit_code"], said["verb"]) == (2, False, 2, verb)
         assert said["error"] in result.stderr
+
+
+def test_a_survey_may_have_the_name_of_a_verb() -> None:
+    result = CliRunner().invoke(main, ["--dsn", "host=/nowhere", "report", "psql", "-o", "psql.doc", "--json"])
+    assert (result.exit_code, json.loads(result.stdout)["verb"]) == (2, "report")
+
+
+def test_parameters_are_checked_together() -> None:
+    with pytest.raises(UserError, match="half_width must not exceed"):
+        check_together(settings() | {"section.half_width": 2.0, "section.max_half_width": 1.0})

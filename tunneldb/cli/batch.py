@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
 import time
 from pathlib import Path
@@ -70,24 +69,26 @@ def batch(
     Ctrl-C ends the stages that are under way, and stops; a second one stops at once.
     """
     from tunneldb.job.batch import STEPS, plan, register
+    from tunneldb.job.run import km_range
 
     if last is not None and last not in STEPS:
         raise UserError(f"there is no stage {last!r}; the stages are {', '.join(STEPS)}")
     values = settings(assignments)
+    kilometres = None if km is None else km_range(km)
     chosen = {name: values[name] for name in (text.partition("=")[0] for text in assignments) if name in PARAMETERS}
     reading = {} if density is None else {"load.density": "all" if density == "all" else density_of(density)}
     with connect(settings_.dsn) as conn:
         conn.autocommit = True
         found = get_survey(conn, survey)
         asked = plan(
-            conn, found, files, kilometres=_range(km), stage=last, reading=reading, parameters=chosen, retry=retry_failed
+            conn, found, files, kilometres=kilometres, stage=last, reading=reading, parameters=chosen, retry=retry_failed
         )
         count = workers or os.cpu_count() or 1
         if preview:
             from tunneldb.cli.preview import show
             from tunneldb.job.preview import preview as look_ahead
 
-            seen = look_ahead(conn, found, asked, _range(km), settings_.dsn is None, count)
+            seen = look_ahead(conn, found, asked, kilometres, settings_.dsn is None, count)
             show(seen)
             tell(survey=survey, preview=seen, fits=seen.fits)
             raise SystemExit(0 if seen.fits else 1)
@@ -97,18 +98,6 @@ def batch(
     watch = _work(found, settings_.dsn, count if busy else 0)
     with connect(settings_.dsn) as conn:  # the server may have been restarted meanwhile
         raise SystemExit(_summary(conn, found, watch, time.monotonic() - began))
-
-
-def _range(text: str | None) -> range | None:
-    if text is None:
-        return None
-    match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?", text.strip())
-    if match is None:
-        raise UserError(f"--km takes a kilometre or a range of them, 511 or 511-513, not {text!r}")
-    first, last = int(match[1]), int(match[2] or match[1])
-    if last < first:
-        raise UserError(f"--km {text}: the range runs backwards")
-    return range(first, last + 1)
 
 
 def _work(survey: Survey, dsn: str | None, count: int) -> Watch:

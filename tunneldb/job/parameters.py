@@ -64,7 +64,7 @@ def settings(assignments: Iterable[str] = ()) -> dict[str, float]:
     Raises
     ------
     UserError
-        For an unknown name, a value that is no number, or one out of bounds.
+        For an unknown name, a value that is no number, one out of bounds, or two that do not go together.
     """
     values = {name: parameter.default for name, parameter in PARAMETERS.items()}
     for assignment in assignments:
@@ -72,11 +72,22 @@ def settings(assignments: Iterable[str] = ()) -> dict[str, float]:
         if name not in PARAMETERS:
             raise UserError(f"there is no parameter {name!r}; there are {', '.join(PARAMETERS)}")
         values[name] = _value(name, text if equals else "")
+    check_together(values)
+    return values
+
+
+def check_together(values: Mapping[str, float]) -> None:
+    """Check what bounds alone do not: that the values of all parameters go together.
+
+    Raises
+    ------
+    UserError
+        If they do not.
+    """
     if 180.0 / values["section.angle_step"] % 1 > 1e-9:
         raise UserError(f"section.angle_step must divide 180 degrees: {values['section.angle_step']:g} does not")
     if values["section.half_width"] > values["section.max_half_width"]:
         raise UserError("section.half_width must not exceed section.max_half_width")
-    return values
 
 
 def of_stage(values: Mapping[str, float], prefixes: Iterable[str]) -> dict[str, float]:

@@ -11,8 +11,25 @@ import psycopg
 from tunneldb.database.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.job.ledger import Run, stage_run
-from tunneldb.job.parameters import of_stage, settings
+from tunneldb.job.parameters import check_together, of_stage, settings
 from tunneldb.job.stages import STAGES, Progress, Stage
+
+
+def km_range(text: str) -> range:
+    """Kilometres of ``511`` or ``511-513``; before the zero of the chainage they are negative, ``-2`` or ``-2--1``.
+
+    Raises
+    ------
+    UserError
+        If the text is no range.
+    """
+    match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?", text.strip())
+    if match is None:
+        raise UserError(f"--km takes a kilometre or a range of them, 511 or 511-513, not {text!r}")
+    first, last = int(match[1]), int(match[2] or match[1])
+    if last < first:
+        raise UserError(f"--km {text}: the range runs backwards")
+    return range(first, last + 1)
 
 
 def parse_km(text: str | None, there: list[int]) -> list[int]:
@@ -25,13 +42,8 @@ def parse_km(text: str | None, there: list[int]) -> list[int]:
     """
     if text is None:
         return there
-    match = re.fullmatch(r"(\d+)(?:-(\d+))?", text.strip())
-    if match is None:
-        raise UserError(f"--km takes a kilometre or a range of them, 511 or 511-513, not {text!r}")
-    first, last = int(match[1]), int(match[2] or match[1])
-    if last < first:
-        raise UserError(f"--km {text}: the range runs backwards")
-    chosen = [km for km in there if first <= km <= last]
+    wanted = km_range(text)
+    chosen = [km for km in there if km in wanted]
     if not chosen:
         loaded = ", ".join(map(str, there)) or "none"
         raise UserError(f"no points are loaded in kilometre {text.strip()}; loaded: {loaded}")
@@ -106,7 +118,7 @@ def stale_tasks(
     Raises
     ------
     UserError
-        If a kilometre awaits points that were read since it was loaded.
+        If a kilometre awaits points that were read since it was loaded, or what is set does not go with what is kept.
     """
     chosen, by_name = set(kilometres), {stage.name: stage for stage in stages}
     given = {assignment.partition("=")[0] for assignment in assignments}
@@ -123,7 +135,12 @@ def stale_tasks(
             raise UserError(f"kilometre {km} is to be loaded first, for {reason}: tunneldb batch {survey.name}")
         if name in by_name:
             kept = {key: value for key, value in (former or {}).items() if key in values and key not in given}
-            tasks.append(Task(by_name[name], km, {**values, **kept}))
+            together = {**values, **kept}
+            try:
+                check_together(together)
+            except UserError as error:
+                raise UserError(f"stage {name} of kilometre {km}, with the parameters that it had: {error}") from None
+            tasks.append(Task(by_name[name], km, together))
     return tasks
 
 
