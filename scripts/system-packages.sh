@@ -17,6 +17,10 @@ need() { # a package, unless a file that it brings is there
     compgen -G "$1" > /dev/null || packages+=("$package")
 }
 
+on_offer() { # whether apt has a package (Ubuntu has Chromium as a snap alone); as long as its lists are empty it may
+    [ -z "$(apt-cache madison bash 2> /dev/null)" ] || [ -n "$(apt-cache madison "$1" 2> /dev/null)" ]
+}
+
 collect() {
     local version
     version=$(postgresql_version)
@@ -32,7 +36,7 @@ collect() {
                 need python3-qgis '/usr/lib/python3/dist-packages/qgis/core/__init__.py'
                 need qgis-providers '/usr/lib/qgis/plugins/libprovider_postgres.so'
                 need iproute2 '/usr/*bin/ip'
-                need chromium '/usr/bin/chromium'
+                if on_offer chromium; then need chromium '/usr/bin/chromium'; fi
                 ;;
             bench)
                 need "postgresql-${version}-pointcloud" '/usr/share/postgresql/*/extension/pointcloud.control'

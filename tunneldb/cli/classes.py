@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
-from types import FrameType
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,17 +20,3 @@ def print_classes(counts: NDArray[np.int64]) -> None:
         if counts[klass]
     ]
     print_table(("class", "", "points", "share"), rows, right=(0, 2, 3))
-
-
-@contextmanager
-def told_to_end() -> Iterator[None]:
-    """Leave by an exception at SIGTERM, as at Ctrl-C, so that what is half-written is removed."""
-
-    def end(number: int, frame: FrameType | None) -> None:
-        raise SystemExit(128 + number)
-
-    before = signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -9,14 +9,14 @@ import click
 import numpy as np
 import psycopg
 
-from tunneldb.cli.classes import print_classes, told_to_end
+from tunneldb.cli.classes import print_classes
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import points_bar, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.export.atomic import make_folder, replacing
+from tunneldb.export.atomic import make_folder, replacing, told_to_end
 from tunneldb.job.run import loaded_kilometres, parse_km
 
 _PLAIN = (".gpkg", ".dxf")
@@ -77,7 +77,7 @@ def export(
 def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, stretch: Stretch) -> None:
     from tunneldb.export.plain import write_survey
 
-    with replacing(output) as temporary:
+    with told_to_end(), replacing(output) as temporary:
         counts = write_survey(conn, survey, stretch.low, stretch.high, temporary)
     tell(survey=survey.name, file=output, layers=counts)
     click.echo(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count), err=True)

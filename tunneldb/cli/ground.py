@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
-from tunneldb.cli.classes import print_classes, told_to_end
+from tunneldb.cli.classes import print_classes
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import points_bar, step
 from tunneldb.cli.run import parameter_table
 from tunneldb.errors import UserError
+from tunneldb.export.atomic import told_to_end
 from tunneldb.job.parameters import PARAMETERS, settings
 
 _PREFIXES = ("ground.", "cluster.")

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from tunneldb.errors import UserError
@@ -26,15 +29,34 @@ def find_browser() -> str:
     Raises
     ------
     UserError
-        If there is none.
+        If there is none, or none but snaps.
     """
     stated = os.environ.get("TUNNELDB_BROWSER")
-    found = shutil.which(stated) if stated else next((path for name in BROWSERS if (path := shutil.which(name))), None)
-    if found is None:
+    found = [path for name in ((stated,) if stated else BROWSERS) if (path := shutil.which(name))]
+    if not found:
         lacking = "a PDF needs Chromium or Chrome, and none is installed"
         said = f"TUNNELDB_BROWSER is {stated}, which is no program" if stated else lacking
         raise UserError(f"{said}: install one, or write the report as .html and print it from a browser")
-    return found
+    chosen = next((path for path in found if not _is_snap(Path(path))), None)
+    if chosen is None:
+        raise UserError(
+            f"{found[0]} is a snap, which sees neither /tmp nor hidden folders and can't print the report: install Chrome, name"
+            " another browser by TUNNELDB_BROWSER, or write the report as .html and print it from the browser"
+        )
+    return chosen
+
+
+def _is_snap(program: Path) -> bool:
+    """Whether a program is a snap, a link to one, or a script that starts one, as Ubuntu has it."""
+    target = program.resolve()  # of a snap the program snap itself
+    if target.name == "snap" or "/snap/" in f"{program} {target}":
+        return True
+    try:
+        with target.open("rb") as file:
+            head = file.read(8192)
+    except OSError:  # one that may be run, but not read
+        return False
+    return head.startswith(b"#!") and b"/snap/" in head
 
 
 def print_pdf(browser: str, page: Path, pdf: Path) -> None:
@@ -54,12 +76,26 @@ def print_pdf(browser: str, page: Path, pdf: Path) -> None:
             f"{page.absolute().as_uri()}#print",
         ]  # fmt: skip
         try:
-            done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=PATIENCE, check=False)
+            code, output = _run(command)
         except subprocess.TimeoutExpired:
             raise UserError(
                 f"{browser} did not print the report within {PATIENCE // 60} minutes: report a shorter stretch (--from, --to),"
                 " or write it as .html"
             ) from None
-    if done.returncode != 0 or not pdf.exists():
-        said = done.stderr.strip().splitlines()
-        raise UserError(f"{browser} did not print the report: {said[-1] if said else f'exit code {done.returncode}'}")
+    if code != 0 or not pdf.exists():
+        said = output.strip().splitlines()
+        raise UserError(f"{browser} did not print the report: {said[-1] if said else f'exit code {code}'}")
+
+
+def _run(command: Sequence[str]) -> tuple[int, str]:
+    """Run a program; returns exit code and standard error. Whatever breaks off the wait ends it, with all that it started."""
+    with subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True
+    ) as process:
+        try:
+            _, output = process.communicate(timeout=PATIENCE)
+        except BaseException:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            raise
+    return process.returncode, output
