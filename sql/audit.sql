@@ -25,4 +25,4 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp AS $
      WHERE $4 IS DISTINCT FROM $5
 $$;
 COMMENT ON FUNCTION tunnel_api.note_edit(text, text, bigint, jsonb, jsonb) IS
-    'Writes into the audit which columns of a row an edit changed; for the triggers of the views';
+    'Writes into the audit which columns of a row an edit changed; for the triggers of the views alone, called by no role';

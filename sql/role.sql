@@ -87,17 +87,24 @@ BEGIN
 END
 $$;
 
--- Operators: all functions, the queue, and schema tunnel as its owners, for to swap a partition one must own the table. Partitions
+-- Operators: all functions but what writes the audit, the queue, and schema tunnel as its owners, for to swap a partition one must own the table. Partitions
 -- that an operator makes are his own; another may drop them as owner of the schema.
 DO $$
 DECLARE
     t record;
+    f regprocedure;
 BEGIN
     IF to_regrole('tunnel_operator') IS NULL THEN
         RETURN;
     END IF;
     GRANT EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_api TO tunnel_operator;
     GRANT EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api TO tunnel_operator;
+    -- who may execute the function of a trigger may put it on a view of his own, which says what was before and after
+    FOR f IN SELECT p.oid FROM pg_proc p
+              WHERE p.pronamespace = 'tunnel_api'::regnamespace
+                AND (p.prorettype = 'trigger'::regtype OR p.proname = 'note_edit') LOOP
+        EXECUTE format('REVOKE EXECUTE ON FUNCTION %s FROM tunnel_operator', f);
+    END LOOP;
     GRANT USAGE ON SCHEMA tunnel_queue TO tunnel_operator;
     GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA tunnel_queue TO tunnel_operator;
     GRANT USAGE ON ALL SEQUENCES IN SCHEMA tunnel_queue TO tunnel_operator;

@@ -2,6 +2,7 @@
 -- leaks and other anomalies (view_anomaly.sql), and regions drawn by hand. The functions run with the owner's rights, so that who edits
 -- needs no right on schema tunnel, and stamp each row with session_user, which stays the person's own name in them. Each locks
 -- its row and takes only what the person changed: what somebody else did meanwhile stays, and the audit says what truly was.
+-- What both changed, each to something else, is refused to the later one, as a failure of serialization.
 
 -- Moves an axis vertex. Frame and unit: the tunnel's SRID, m.
 CREATE OR REPLACE FUNCTION tunnel_api.edit_axis_vertex() RETURNS trigger
@@ -37,6 +38,13 @@ BEGIN
     SELECT v.* INTO was FROM tunnel.axis_vertex v WHERE v.id = OLD.id FOR UPDATE;
     IF NOT FOUND THEN
         RETURN NULL;  -- gone meanwhile
+    END IF;
+    IF was.geom = NEW.geom THEN
+        RETURN NEW;
+    END IF;
+    IF NOT was.geom = OLD.geom THEN
+        RAISE EXCEPTION 'axis vertex % at chainage % was moved meanwhile', OLD.n, OLD.label
+            USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
     END IF;
     NEW.source := 'edited';
     NEW.edited_by := session_user;
@@ -93,6 +101,15 @@ BEGIN
     NEW.review := CASE WHEN NEW.review = OLD.review THEN was.review ELSE NEW.review END;
     NEW.remark := CASE WHEN NEW.remark IS NOT DISTINCT FROM OLD.remark THEN was.remark ELSE NEW.remark END;
     NEW.kind := CASE WHEN NEW.kind = OLD.kind THEN was.kind ELSE NEW.kind END;
+    IF (NEW.review, NEW.remark, NEW.kind) IS NOT DISTINCT FROM (was.review, was.remark, was.kind) THEN
+        RETURN NEW;
+    END IF;
+    IF was.review NOT IN (OLD.review, NEW.review) OR was.kind NOT IN (OLD.kind, NEW.kind)
+       OR (was.remark IS DISTINCT FROM OLD.remark AND was.remark IS DISTINCT FROM NEW.remark) THEN
+        RAISE EXCEPTION '% % at % was changed meanwhile: it is %, with the kind % and %', OLD.kind, OLD.id, OLD.label,
+            was.review, was.kind, coalesce('the remark ' || quote_literal(was.remark), 'no remark')
+            USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
+    END IF;
     NEW.reviewed_by := session_user;
     NEW.reviewed_at := clock_timestamp();
     UPDATE tunnel.anomaly a
@@ -155,6 +172,13 @@ BEGIN
         END IF;
         NEW.kind := CASE WHEN NEW.kind = OLD.kind THEN was.kind ELSE NEW.kind END;
         NEW.geom := CASE WHEN NEW.geom = OLD.geom THEN was.geom ELSE NEW.geom END;
+        IF NEW.kind IS NOT DISTINCT FROM was.kind AND NEW.geom = was.geom THEN
+            RETURN NEW;
+        END IF;
+        IF was.kind NOT IN (OLD.kind, NEW.kind) OR NOT (was.geom = OLD.geom OR was.geom = NEW.geom) THEN
+            RAISE EXCEPTION 'region % was changed meanwhile', OLD.id
+                USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
+        END IF;
     ELSE
         SELECT s.* INTO its FROM tunnel.survey s
          WHERE CASE WHEN NEW.survey_id IS NULL THEN s.name = NEW.survey ELSE s.id = NEW.survey_id END;

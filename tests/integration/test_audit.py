@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import Any
 
 import psycopg
@@ -117,28 +120,105 @@ def test_another_role_does_not_hide_the_person(person: psycopg.Connection) -> No
     assert [who for who, *_ in entries(person)] == ["ines"]
 
 
+@contextmanager
+def meanwhile(
+    dsn: str, conn: psycopg.Connection, first: psycopg.Connection, statement: str, *values: object
+) -> Iterator[Future[psycopg.Cursor]]:
+    """Olga's statement begins while what the first one does in the with block has not been committed; ends when it is."""
+    with psycopg.connect(make_conninfo(dsn, user="olga"), autocommit=True) as olga, ThreadPoolExecutor(1) as pool:
+        olga.execute("SET statement_timeout = '30 s'")
+        with first.transaction():
+            future: Future[psycopg.Cursor] = Future()
+            yield future
+            done = pool.submit(olga.execute, statement, values)  # type: ignore[arg-type]
+            until = time.monotonic() + 20
+            waits = "SELECT 1 FROM pg_stat_activity WHERE pid = %s AND wait_event_type = 'Lock'"
+            while not conn.execute(waits, (olga.info.backend_pid,)).fetchone():
+                conn.rollback()
+                assert not done.done(), done.result()
+                assert time.monotonic() < until, "her statement never waited"
+                time.sleep(0.01)
+            conn.rollback()
+        error = done.exception(30)
+        if error is not None:
+            future.set_exception(error)
+        else:
+            future.set_result(done.result())
+
+
 @pytest.mark.parametrize("person", ["ines"], indirect=True)
 def test_two_at_the_same_leak_both_keep_what_they_did(person: psycopg.Connection, dsn: str, conn: psycopg.Connection) -> None:
-    """Olga's statement begins while Ines has not yet committed; it must not take the review back to what Olga saw."""
+    """Olga's statement must not take the review back to what she saw."""
     key = first_leak(conn)
     conn.rollback()
-    with psycopg.connect(make_conninfo(dsn, user="olga"), autocommit=True) as olga:
-        remark = threading.Thread(
-            target=olga.execute, args=("UPDATE tunnel_api.leak SET remark = 'crack' WHERE id = %s", (key,))
-        )
-        with person.transaction():
-            person.execute("UPDATE tunnel_api.leak SET review = 'confirmed' WHERE id = %s", (key,))
-            remark.start()
-            while not conn.execute(
-                "SELECT 1 FROM pg_stat_activity WHERE pid = %s AND wait_event_type = 'Lock'", (olga.info.backend_pid,)
-            ).fetchone():
-                conn.rollback()
-        remark.join(10)
+    with meanwhile(dsn, conn, person, "UPDATE tunnel_api.leak SET remark = 'crack' WHERE id = %s", key) as olgas:
+        person.execute("UPDATE tunnel_api.leak SET review = 'confirmed' WHERE id = %s", (key,))
+    assert olgas.result().rowcount == 1
     assert conn.execute("SELECT review, remark FROM tunnel_api.leak WHERE id = %s", (key,)).fetchone() == ("confirmed", "crack")
     assert [(who, before, after) for who, *_, before, after in entries(conn)] == [
         ("ines", {"review": "open"}, {"review": "confirmed"}),
         ("olga", {"remark": None}, {"remark": "crack"}),
     ]
+
+
+REGION = "'POLYGON((12410 -3,12420 -3,12420 %d,12410 -3))'"
+
+
+@pytest.mark.parametrize("person", ["ines"], indirect=True)
+@pytest.mark.parametrize(
+    ("view", "ines", "olga"),
+    [
+        ("leak", "review = 'confirmed'", "review = 'rejected'"),
+        ("leak", "kind = 'joint'", "kind = 'dark'"),
+        ("leak", "remark = 'drips'", "remark = 'dry'"),
+        ("axis_vertex", "geom = ST_Translate(geom, 0, 0, 0.1)", "geom = ST_Translate(geom, 0, 0, 0.2)"),
+        ("region", f"geom = {REGION % 1}", f"geom = {REGION % 2}"),
+    ],
+)
+def test_two_who_judge_otherwise_are_not_both_right(
+    person: psycopg.Connection, dsn: str, conn: psycopg.Connection, view: str, ines: str, olga: str
+) -> None:
+    """The later statement saw what was before, so that its WHERE proves nothing: it is refused, and nothing overwritten."""
+    key = (
+        first_leak(conn)
+        if view in ("leak", "anomaly")
+        else conn.execute(f"SELECT min(id) FROM tunnel_api.{view}".encode()).fetchone()[0]
+    )
+    look = f"SELECT * FROM tunnel_api.{view} WHERE id = {key}".encode()
+    conn.rollback()
+    with meanwhile(dsn, conn, person, f"UPDATE tunnel_api.{view} SET {olga} WHERE id = %s", key) as olgas:
+        person.execute(f"UPDATE tunnel_api.{view} SET {ines} WHERE id = {key}".encode())
+        made = person.execute(look).fetchone()
+    with pytest.raises(psycopg.errors.SerializationFailure, match="meanwhile") as refused:
+        olgas.result()
+    assert refused.value.diag.message_hint == "Look at it again."
+    assert conn.execute(look).fetchone() == made
+    assert [who for who, *_ in entries(conn)] == ["ines"]
+
+
+@pytest.mark.parametrize("person", ["ines"], indirect=True)
+@pytest.mark.parametrize(
+    ("view", "change"),
+    [("anomaly", "review = 'confirmed', kind = 'joint'"), ("axis_vertex", "geom = ST_Translate(geom, 0, 0, 0.1)"),
+     ("region", f"kind = 'homogeneous', geom = {REGION % 1}")],
+)  # fmt: skip
+def test_two_of_one_mind_are_the_work_of_the_first(
+    person: psycopg.Connection, dsn: str, conn: psycopg.Connection, view: str, change: str
+) -> None:
+    key = (
+        first_leak(conn)
+        if view in ("leak", "anomaly")
+        else conn.execute(f"SELECT min(id) FROM tunnel_api.{view}".encode()).fetchone()[0]
+    )
+    look = f"SELECT * FROM tunnel_api.{view} WHERE id = {key}".encode()
+    conn.rollback()
+    with meanwhile(dsn, conn, person, f"UPDATE tunnel_api.{view} SET {change} WHERE id = %s", key) as olgas:
+        person.execute(f"UPDATE tunnel_api.{view} SET {change} WHERE id = {key}".encode())
+        made = person.execute(look).fetchone()
+    assert olgas.result().rowcount == 1
+    assert conn.execute(look).fetchone() == made
+    assert "ines" in made
+    assert [who for who, *_ in entries(conn)] == ["ines"]
 
 
 def test_the_audit_outlives_the_survey(conn: psycopg.Connection) -> None:

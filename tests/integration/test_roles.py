@@ -224,6 +224,23 @@ def test_operator_leaves_the_functions_alone(person: psycopg.Connection) -> None
     refused(person, "CREATE ROLE another")
 
 
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
+def test_operator_forges_no_entry_of_the_audit(person: psycopg.Connection, conn: psycopg.Connection) -> None:
+    """By a view of his own that says what was before and after, with the trigger that notes it; nor by the function itself."""
+    install(conn)  # once more, over what was granted before
+    conn.commit()
+    person.execute("CREATE TEMP VIEW mine AS SELECT * FROM tunnel_api.leak")
+    for function in ("review_anomaly", "edit_axis_vertex", "edit_region"):
+        refused(person, f"CREATE TRIGGER edit INSTEAD OF UPDATE ON mine FOR EACH ROW EXECUTE FUNCTION tunnel_api.{function}()")
+    with pytest.raises(psycopg.errors.InsufficientPrivilege, match="permission denied for function note_edit"):
+        person.execute("SELECT tunnel_api.note_edit('demo-2024', 'anomaly', 1, '{}', '{\"review\": \"confirmed\"}')")
+    assert conn.execute(
+        "SELECT count(*) FROM pg_proc p WHERE p.pronamespace = 'tunnel_api'::regnamespace"
+        " AND p.prorettype = 'trigger'::regtype AND has_function_privilege('tunnel_operator', p.oid, 'EXECUTE')"
+    ).fetchone() == (0,)
+    person.execute(REVIEW)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("person", ["nobody"], indirect=True)
 def test_someone_without_a_role_sees_nothing(person: psycopg.Connection) -> None:
     for statement in (READ, TABLE, "SELECT tunnel_api.chainage_label(1.0)", REVIEW):
