@@ -83,7 +83,7 @@ class Reading:
 
     def strip(self, start: int) -> tuple[np.ndarray, tuple[float, float, float, float]]:
         """Picture of a strip, and where it is drawn: x, y, width, height."""
-        image = r'<image x="(\S+)" y="(\S+)" width="(\S+)" height="(\S+)" .*?base64,([^"]+)"'
+        image = r'<image x="(\S+)" y="(\S+)" width="(\S+)" height="(\S+)" .*?href="data:image/webp;base64,([^"]+)"'
         ((*place, picture),) = re.findall(image, self.strips[str(start)])
         x, y, width, height = map(float, place)
         return decode(picture), (x, y, width, height)
@@ -153,7 +153,7 @@ def test_details_show_picture_outline_and_section(reading: Reading, leaks: list[
     for leak in leaks:
         detail = reading.details[leak["id"]]
         width, height = detail["size"]
-        picture = decode(detail["picture"])
+        picture = decode(detail["picture"].removeprefix("data:image/webp;base64,"))
         assert picture.shape[1] / picture.shape[0] == pytest.approx(width / height, rel=0.02)
         ring = shapely.Polygon(points(detail["outline"])[0])
         assert ring.area == pytest.approx(shapely.from_wkt(leak["outline"]).area, rel=0.05)
@@ -220,7 +220,8 @@ def test_state_that_does_not_hold_is_warned_of(example: str, conn: psycopg.Conne
     conn.commit()
     run("report", example, "-o", tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text("utf-8")
-    assert "kilometre 12, stage segments: axis edited since" in text
+    assert "<li>stage segments of kilometre 12</li>" in text
+    assert "Why: axis edited since (12)." in text
     assert "moved by 0.050 m" in text
     assert "1 confirmed leak that the last detection did not find again" in text
     assert "No class can be stated" in text

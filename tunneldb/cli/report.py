@@ -14,7 +14,7 @@ from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.export.atomic import replacing
+from tunneldb.export.atomic import replacing, told_to_end
 from tunneldb.report.page import CARDS, write_html
 from tunneldb.report.pdf import find_browser, print_pdf
 
@@ -50,24 +50,25 @@ def report(settings: Settings, survey: str, output: Path, start: str | None, end
         found = get_survey(conn, survey)
         stretch = parse_stretch(conn, found, start, end)
         conn.rollback()
-        with replacing(output) as temporary:
+        with told_to_end(), replacing(output) as temporary:
             if browser is None:
-                leaks = _write(conn, found, stretch, temporary)
+                leaks = _write(conn, found, stretch, temporary, paper=False)
             else:
                 with tempfile.TemporaryDirectory(prefix="tunneldb-report-") as folder:
                     page = Path(folder) / "report.html"
-                    leaks = _write(conn, found, stretch, page, CARDS)
+                    leaks = _write(conn, found, stretch, page, paper=True)
                     conn.close()  # a browser may take minutes
                     print_pdf(browser, page, temporary)
     tell(survey=survey, file=output, leaks=leaks, bytes=output.stat().st_size)
     click.echo(f"{output}: {leaks} leaks", err=True)
 
 
-def _write(conn: psycopg.Connection, survey: Survey, stretch: Stretch, page: Path, pictures: int | None = None) -> int:
-    """Write the page and show how far it is; returns the number of leaks."""
+def _write(conn: psycopg.Connection, survey: Survey, stretch: Stretch, page: Path, *, paper: bool) -> int:
+    """Write the page, for the screen or to be printed, and show how far it is; returns the number of leaks."""
     with bar("strips") as shown:
         task = shown.add_task(f"report of {survey.name}", total=None)
         return write_html(
             conn, survey, page, stretch.low, stretch.high,
-            progress=lambda done, count: shown.update(task, completed=done, total=count), pictures=pictures,
+            progress=lambda done, count: shown.update(task, completed=done, total=count),
+            pictures=CARDS if paper else None, form="JPEG" if paper else "WEBP",
         )  # fmt: skip

@@ -274,14 +274,25 @@ class Edit:
     after: Row | None
 
 
-def read_edits(conn: psycopg.Connection[Any], survey: Survey) -> list[Edit]:
-    """Read what people changed by hand in a survey, latest first."""
+EDITS = 500
+"""So many edits are listed at most, the latest."""
+
+# the audit knows a survey by its name, and outlives it: it may hold edits of one of that name that was removed
+_AUDIT = sql.SQL(
+    "SELECT {} FROM tunnel_api.audit"
+    " WHERE survey = %(name)s AND at >= (SELECT created_at FROM tunnel_api.survey WHERE id = %(id)s)"
+)
+
+
+def read_edits(conn: psycopg.Connection[Any], survey: Survey) -> tuple[int, list[Edit]]:
+    """Count what people changed by hand in a survey since it was added, and read the latest EDITS of it, latest first."""
+    which = {"name": survey.name, "id": survey.id, "most": EDITS}
+    row = conn.execute(_AUDIT.format(sql.SQL("count(*)")), which).fetchone()
+    assert row is not None
+    columns = sql.SQL(", ").join(sql.Identifier(f.name) for f in fields(Edit))
     with conn.cursor(row_factory=class_row(Edit)) as cursor:
-        return cursor.execute(
-            "SELECT at, who, view, row_id, action, before, after FROM tunnel_api.audit"
-            " WHERE survey = %s ORDER BY at DESC, id DESC",
-            [survey.name],
-        ).fetchall()
+        latest = _AUDIT.format(columns) + sql.SQL(" ORDER BY at DESC, id DESC LIMIT %(most)s")
+        return row[0], cursor.execute(latest, which).fetchall()
 
 
 def label_chainages(conn: psycopg.Connection[Any], survey: Survey, chainages: Sequence[float]) -> list[str]:

@@ -6,7 +6,7 @@ import base64
 import io
 from collections import OrderedDict
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import psycopg
@@ -25,6 +25,9 @@ Single = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 Places = NDArray[np.intp]
 
+Form = Literal["WEBP", "JPEG"]
+"""Format of pictures: WebP is smaller; JPEG goes into a PDF as it is, where browsers unpack others to many times the size."""
+
 KEPT = 6
 """Blocks in memory: those of a strip of 250 m, and the one before."""
 
@@ -40,8 +43,8 @@ tell whether it is wet."""
 FILLED = 0.14
 """Pixels without points take the mean of those about them, in a square so wide, m: about what the median filter looks at."""
 
-QUALITY = 55
-"""Of the WebP pictures, 0 to 100."""
+QUALITY = {"WEBP": 55, "JPEG": 70}
+"""Of the pictures, 0 to 100."""
 
 UNSEEN, COVERED, FLOOR, NOTHING = (216, 200, 230), (186, 208, 188), (236, 239, 242), (255, 255, 255)
 """Colours: lining not seen; something hangs before it; floor, which is not judged; no image."""
@@ -75,15 +78,16 @@ class Window:
 
 @dataclass(frozen=True)
 class Picture:
-    """What a window shows, as WebP."""
+    """What a window shows: a file of an image."""
 
     window: Window
-    webp: bytes
+    form: Form
+    content: bytes
 
     @property
-    def base64(self) -> str:
-        """The same as text."""
-        return base64.b64encode(self.webp).decode()
+    def url(self) -> str:
+        """Address that holds the image itself."""
+        return f"data:image/{self.form.lower()};base64,{base64.b64encode(self.content).decode()}"
 
 
 @dataclass(frozen=True)
@@ -124,10 +128,12 @@ class Lining:
     ----------
     conn, survey
         Where from.
+    form : {'WEBP', 'JPEG'}
+        Format of the pictures.
     """
 
-    def __init__(self, conn: psycopg.Connection[Any], survey: Survey) -> None:
-        self._conn, self._survey = conn, survey
+    def __init__(self, conn: psycopg.Connection[Any], survey: Survey, form: Form) -> None:
+        self._conn, self._survey, self._form = conn, survey, form
         rows = conn.execute(
             "SELECT block, min(km) FROM tunnel.image WHERE survey_id = %s AND kind = 'corrected' GROUP BY block", [survey.id]
         ).fetchall()
@@ -151,8 +157,8 @@ class Lining:
         for number, kilometre in there.items():
             _paint(canvas, window, side, self._block(number), kilometre)
         out = io.BytesIO()
-        Image.fromarray(canvas).save(out, "WEBP", quality=QUALITY, method=4)
-        return Picture(window, out.getvalue())
+        Image.fromarray(canvas).save(out, self._form, quality=QUALITY[self._form])
+        return Picture(window, self._form, out.getvalue())
 
     def _block(self, number: int) -> _Block:
         if number in self._kept:

@@ -16,6 +16,7 @@ from tunneldb import __version__
 from tunneldb.database import Survey, snapshot
 from tunneldb.report import data, text
 from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, without_detection
+from tunneldb.report.lining import Form
 from tunneldb.report.strip import LETTERS, Progress, Strips
 
 CARDS = 400
@@ -30,6 +31,7 @@ def write_html(
     high: float = np.inf,
     progress: Progress = lambda done, count: None,
     pictures: int | None = None,
+    form: Form = "WEBP",
 ) -> int:
     """Write the report of a survey, or of the stretch between two chainages, m, as an HTML file; the connection must be idle.
 
@@ -41,6 +43,8 @@ def write_html(
         Told after each strip.
     pictures : int, optional
         Only of so many leaks, the largest, pictures go into the file.
+    form : {'WEBP', 'JPEG'}
+        Format of the pictures.
 
     Returns
     -------
@@ -48,7 +52,7 @@ def write_html(
         Number of leaks reported.
     """
     with snapshot(conn):
-        report = _Report(conn, survey, *data.find_stretch(conn, survey, low, high), progress, pictures)
+        report = _Report(conn, survey, *data.find_stretch(conn, survey, low, high), progress, pictures, form)
         with path.open("w", encoding="utf-8") as file:
             file.writelines(_template().generate(report.context()))
         return len(report.leaks)
@@ -74,19 +78,26 @@ class _Report:
 
     Parameters
     ----------
-    conn, survey, low, high, progress, pictures
+    conn, survey, low, high, progress, pictures, form
         As in :func:`write_html`.
     """
 
     def __init__(
-        self, conn: psycopg.Connection[Any], survey: Survey, low: float, high: float, progress: Progress, pictures: int | None
+        self,
+        conn: psycopg.Connection[Any],
+        survey: Survey,
+        low: float,
+        high: float,
+        progress: Progress,
+        pictures: int | None,
+        form: Form,
     ) -> None:
-        self.conn, self.survey, self.low, self.high, self.progress = conn, survey, low, high, progress
+        self.conn, self.survey, self.low, self.high = conn, survey, low, high
         self.leaks = data.read_leaks(conn, survey, low, high)
         self.coverage = data.read_coverage(conn, survey, low, high)
         by_size = sorted(self.leaks, key=lambda leak: (leak.review == "rejected", -leak.area))
         pictured = {leak.id for leak in by_size[:pictures]}
-        self.strips = Strips(conn, survey, low, high, self.leaks, self.coverage, pictured, progress)
+        self.strips = Strips(conn, survey, low, high, self.leaks, self.coverage, pictured, form, progress)
         self.place = data.place_name(conn, survey)
         self.cards = min(CARDS, len(pictured))
 
@@ -98,6 +109,7 @@ class _Report:
         hidden = data.hidden_stretches(self.coverage)
         runs = data.read_runs(conn, survey, low, high)
         counted = [leak for leak in self.leaks if leak.counts]
+        edits_in_all, edits = data.read_edits(conn, survey)
         return {
             "survey": survey,
             "version": __version__,
@@ -120,12 +132,13 @@ class _Report:
             "unlooked": sum(b - a for a, b in without_detection(self.coverage, low, high)),
             "kilometres": self._kilometres(),
             "files": data.read_files(conn, survey, low, high),
-            "stale": data.read_stale(conn, survey, low, high),
+            "stale": text.stale(data.read_stale(conn, survey, low, high)),
             "runs": runs,
             "versions": text.versions(runs),
             "radiometry": data.read_radiometry(conn, survey, low, high),
             "people": text.reviewers(self.leaks),
-            "edits": [text.edit(edit) for edit in data.read_edits(conn, survey)],
+            "edits": [text.edit(edit) for edit in edits],
+            "edits_in_all": edits_in_all,
             "clock": text.by_clock(counted),
             "sizes": text.by_size(counted),
             "glance": self._glance(),

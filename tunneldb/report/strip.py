@@ -14,7 +14,7 @@ from tunneldb.database import Survey
 from tunneldb.report import text
 from tunneldb.report.data import Coverage, Leak, label_chainages
 from tunneldb.report.drawing import Section, Sign, near, outline_path, place_signs, share_path, ticks, without_detection
-from tunneldb.report.lining import Lining, Picture, Window
+from tunneldb.report.lining import Form, Lining, Picture, Window
 
 PICTURE, SHAPE = 256, 4 / 3
 """Width of a leak's picture at most, pixels, and its width for its height."""
@@ -97,6 +97,8 @@ class Strips:
         What was seen of it.
     pictured : collection of int
         Leaks that get a picture, by their id.
+    form : {'WEBP', 'JPEG'}
+        Format of the pictures.
     progress : callable
         Told after each strip.
 
@@ -117,10 +119,12 @@ class Strips:
         leaks: Sequence[Leak],
         coverage: Coverage,
         pictured: Collection[int],
+        form: Form,
         progress: Progress,
     ) -> None:
         self.conn, self.survey, self.low, self.high = conn, survey, low, high
-        self.leaks, self.coverage, self._pictured, self.progress = leaks, coverage, pictured, progress
+        self.leaks, self.coverage, self.progress = leaks, coverage, progress
+        self._pictured, self._form = pictured, form
         self.length = strip_length(high - low)
         row = conn.execute(
             # not of the widest: a section that is measured astray would make all strips higher
@@ -139,7 +143,7 @@ class Strips:
 
     def __iter__(self) -> Iterator[Strip]:
         """Draw one strip after another."""
-        lining = Lining(self.conn, self.survey)
+        lining = Lining(self.conn, self.survey, self._form)
         starts = np.arange(np.floor(self.low / self.length), np.ceil((self.high - SLIVER) / self.length)) * self.length
         for done, start in enumerate(starts.tolist(), start=1):
             low, high = max(start, self.low), min(start + self.length, self.high)
@@ -187,7 +191,7 @@ class Strips:
                 "outline": outline_path(leak.outline, window.west, window.north, window.width / 400),
             }
             if picture is not None:
-                detail["picture"] = picture.base64
+                detail["picture"] = picture.url
             if sections:
                 chainage, section = min(sections, key=lambda known: abs(known[0] - leak.middle))
                 detail |= {

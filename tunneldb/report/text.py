@@ -87,6 +87,20 @@ def css(value: str) -> str:
     return "".join(c if c.isalnum() or c in " .,:;·–-_+()/" else f"\\{ord(c):x} " for c in value)
 
 
+def stale(rows: Sequence[Row]) -> dict[str, list[tuple[str, str]]]:
+    """Return which stages are out of date, with their kilometres, and why: what is stale by another stage is no reason."""
+    stages: defaultdict[str, set[int]] = defaultdict(set)
+    reasons: defaultdict[str, set[int]] = defaultdict(set)
+    for row in rows:
+        stages[row["stage"]].update(row["kilometres"])
+        if not row["reason"].endswith(" is stale"):
+            reasons[row["reason"]].update(row["kilometres"])
+    return {
+        "stages": [(stage, kilometres(numbers)) for stage, numbers in stages.items()],
+        "reasons": [(reason, kilometres(numbers)) for reason, numbers in sorted(reasons.items())],
+    }
+
+
 def versions(runs: Sequence[Row]) -> list[dict[str, Any]]:
     """Return the different sets of versions, with the stages and kilometres that each holds for."""
     by: defaultdict[str, list[Row]] = defaultdict(list)

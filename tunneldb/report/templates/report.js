@@ -97,7 +97,7 @@
     $("#table thead").replaceChildren(
       make("tr", {}, ...columns.map(([heading, key, , kind]) => {
         const sorted = state.sort === key ? { "aria-sort": state.up ? "ascending" : "descending" } : {};
-        return make("th", { class: kind, ...sorted }, make("button", { type: "button", onclick: () => sortBy(key) }, heading));
+        return make("th", { class: kind, ...sorted }, state.all ? heading : make("button", { type: "button", onclick: () => sortBy(key) }, heading));
       })),
     );
     const part = state.all ? listed : listed.slice(state.page * PAGE, (state.page + 1) * PAGE);
@@ -145,7 +145,7 @@
     const [x, y] = [width * 0.04, height * 0.95];
     const drawing = make("svg:svg", { viewBox: `0 0 ${width} ${height}`, class: `view ${leak.review}`, role: "img", "aria-label": `Lining about leak ${leak.id}` });
     if (shown.picture) {
-      drawing.append(make("svg:image", { width, height, preserveAspectRatio: "none", href: `data:image/webp;base64,${shown.picture}` }));
+      drawing.append(make("svg:image", { width, height, preserveAspectRatio: "none", href: shown.picture }));
     }
     drawing.append(make("svg:path", { d: shown.outline }));
     for (let n = 0; n < 2; n += 1) drawing.append(make("svg:line", { x1: x, x2: x + bar, y1: y, y2: y, class: "scale" }));
