@@ -7,6 +7,7 @@ installed once a session. With pytest-xdist each worker has its own server.
 from __future__ import annotations
 
 import itertools
+import os
 import shutil
 import signal
 import tempfile
@@ -41,6 +42,15 @@ def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield home
     Server(home).stop()
     shutil.rmtree(home, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Path:
+    """Chromium, in which pages are looked at; without it their tests are skipped, but fail where CI=true, as in .ci/run."""
+    path = Path("/usr/bin/chromium")
+    if not path.exists():
+        (pytest.fail if os.environ.get("CI") == "true" else pytest.skip)("needs Chromium")
+    return path
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,6 @@ from markdown_it import MarkdownIt
 from playwright.sync_api import Browser, sync_playwright
 
 ROOT = Path(__file__).parents[2]
-CHROMIUM = Path("/usr/bin/chromium")
 SOURCES = {page.stem: page for page in sorted((ROOT / "docs").glob("*.md"))} | {
     "overview": ROOT / "README.md",
     "changes": ROOT / "CHANGELOG.md",
@@ -107,11 +106,9 @@ def test_dead_links_and_anchors_and_new_diagrams_fail(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    if not CHROMIUM.exists():
-        pytest.skip("needs Chromium")
+def browser(chromium: Path) -> Iterator[Browser]:
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         yield browser
         browser.close()
 
