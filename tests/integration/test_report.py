@@ -412,5 +412,10 @@ def test_thousands_of_leaks_come_by_pages(example: str, conn: psycopg.Connection
     for _ in range(2):
         page.get_by_role("button", name="No.").click()
     assert column(page, 1)[0] == str(max(row["id"] for row in Reading(path).rows))
+    pdf = page.pdf(prefer_css_page_size=True)
+    sheets = [" ".join(sheet.extract_text().split()) for sheet in pypdf.PdfReader(io.BytesIO(pdf)).pages]
+    listed = [sheet for sheet in sheets if sheet.count(" open ") + sheet.count(" confirmed ") > 20]
+    assert len(listed) > 5
+    assert all("Chainage Clock Arc m" in sheet for sheet in listed), "headings on each sheet"
     assert troubles == []
     page.close()
