@@ -19,6 +19,9 @@ MOVED, SPARSE = 1245, 1233
 CONFIRMED, REJECTED, GONE, OLD = 12344.0, 12318.0, 12436.0, 12471.0
 """Middles of the leaks that were reviewed, that the last detection did not find again, and that was found weeks ago, m."""
 
+COPIED, COPIES = 12428.0, (14.3, 9.4)
+"""Middle of the leak that has others like it near by, and how far up-chainage they are, m."""
+
 
 def prepare(conn: psycopg.Connection, survey: str) -> None:
     """Add it to a copy of the example survey; to be committed or not by the caller."""
@@ -35,6 +38,15 @@ def prepare(conn: psycopg.Connection, survey: str) -> None:
         "UPDATE tunnel.anomaly SET created_at = now() - interval '20 days' WHERE %s BETWEEN chainage_from AND chainage_to",
         (OLD,),
     )
+    for number, shift in enumerate(COPIES, start=1):
+        conn.execute(
+            "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, confidence,"
+            " contrast, area, drop_mean, drop_max, image_share, unrolled, map, surface, created_at)"
+            " SELECT survey_id, km, chainage_from + %(by)s, chainage_to + %(by)s, arc_from, arc_to, clock, kind, confidence,"
+            " contrast, area * %(share)s, drop_mean, drop_max, image_share, ST_Translate(unrolled, %(by)s, 0), map, surface,"
+            " created_at FROM tunnel.anomaly WHERE %(at)s BETWEEN chainage_from AND chainage_to",
+            {"by": shift, "at": COPIED, "share": 1 - 0.03 * number},
+        )
     conn.execute(
         "UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0.05, 0, 0.02) WHERE survey = %s AND n = %s",
         (survey, MOVED),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -161,14 +162,19 @@ def nearest(rows: Rows, a: Asked) -> None:
 
 
 def together(rows: Rows, a: Asked) -> None:
+    begins = {leak.id: 12415 <= leak.low <= 12440 for leak in a.wet}
     pairs = {
-        (p.id, q.id): p.unrolled.distance(q.unrolled)
-        for p in a.leaks for q in a.leaks
-        if p.id < q.id and 12415 <= p.low <= 12440 and p.unrolled.distance(q.unrolled) <= 10
-    }  # fmt: skip
-    assert {(row["id"], row["next"]) for row in rows} == set(pairs) != set()
-    for row in rows:
-        close(row, apart_m=pairs[row["id"], row["next"]])
+        frozenset((p.id, q.id)): p.unrolled.distance(q.unrolled)
+        for p, q in combinations(a.wet, 2)
+        if (begins[p.id] or begins[q.id]) and p.unrolled.distance(q.unrolled) <= 10
+    }
+    found = [frozenset((row["id"], row["next"])) for row in rows]
+    assert set(found) == set(pairs)
+    assert len(found) == len(pairs)
+    assert {sum(begins[key] for key in pair) for pair in pairs} == {1, 2}
+    assert any(begins[max(pair)] > begins[min(pair)] for pair in pairs)
+    for row, pair in zip(rows, found, strict=True):
+        close(row, apart_m=pairs[pair])
 
 
 def repaired(rows: Rows, a: Asked) -> None:
@@ -226,7 +232,7 @@ def kilometres(rows: Rows, a: Asked) -> None:
 
 
 def hundreds(rows: Rows, a: Asked) -> None:
-    assert [row["from"] for row in rows] == [label(12000 + 100 * i) for i in range(10)]
+    assert [row["chainage"] for row in rows] == [label(12000 + 100 * i) for i in range(10)]
     for i, row in enumerate(rows):
         close(row, wet_m2=sum(leak.part(12000 + 100 * i, 12100 + 100 * i) for leak in a.wet))
     assert sum(float(row["wet_m2"]) for row in rows) > 3
@@ -251,7 +257,7 @@ def worst(rows: Rows, a: Asked) -> None:
     most = max(sum(q.low <= p.high - 1e-6 + long and q.high >= p.high - 1e-6 for q in a.wet) for p in a.wet)
     (row,) = rows
     assert row["window_patches"] == len(row["window_leaks"]) == most
-    start, end = (1000 * int(text[:2]) + float(text[3:]) for text in (row["window_from"], row["window_to"]))
+    start, end = (1000 * int(text[:2]) + float(text[3:]) for text in (row["chainage_from"], row["chainage_to"]))
     assert end - start == pytest.approx(long, abs=0.002)
     assert row["window_leaks"] == sorted(leak.id for leak in a.wet if leak.low <= end and leak.high >= start)
 
