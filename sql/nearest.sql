@@ -21,4 +21,4 @@ AS $$
     ORDER BY l.distance
 $$;
 COMMENT ON FUNCTION tunnel_api.nearest_leaks(int, geometry, int) IS
-'The leaks, found last and not rejected, nearest to a point in the tunnel''s SRID, nearest first: distance along the lining from where the point stands over it (m), 0 on a leak. None where the point lies off the tunnel.';
+'The leaks, found last and not rejected, nearest to a point in the tunnel''s SRID, nearest first: distance along the lining from where the point stands over it (m), 0 on a leak; not across the seam in the middle of the floor, so that a leak beyond it is as far as over the crown. None where the point lies off the tunnel.';
