@@ -94,6 +94,18 @@ def test_stations_are_the_files(road: str, conn: psycopg.Connection) -> None:
     np.testing.assert_allclose(found, stated, atol=1e-7)
 
 
+def test_an_equation_at_the_very_end_is_left_out(dsn: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    """The line that is kept ends a little before the design, whose arcs it cuts short."""
+    last = '<StaEquation staBack="675.88262387" staInternal="675.50790516" staAhead="675.00000000"/>'
+    for end in ("995.9461", "995.946183", "995.9462"):
+        path = tmp_path / "road.xml"
+        text = (DATA / "j-landxml.xml").read_text()
+        assert last in text
+        path.write_text(text.replace(last, f'{last}<StaEquation staBack="995" staInternal="{end}" staAhead="5000"/>'))
+        done("tunnel", "add", f"t{end}", "--srid", SRID, "--axis", path)
+    assert [row[0] for row in conn.execute("SELECT count(*) FROM tunnel.station_equation GROUP BY tunnel_id")] == [3, 3, 3]
+
+
 def test_a_refused_tunnel_leaves_nothing(dsn: str, conn: psycopg.Connection, tmp_path: Path) -> None:
     done("tunnel", "add", "t", "--srid", 25830, "--axis", DATA / "aplitop-3.ifc")
     elements = count(conn, "alignment_element")

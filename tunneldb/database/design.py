@@ -44,7 +44,11 @@ def save_design(connection: psycopg.Connection[Any], tunnel_id: int, design: Des
         )
     if design.pieces:
         pieces = [Equation(design.start + piece.distance, piece.station, piece.direction) for piece in design.pieces]
-        _, end = design.chainages
+        row = connection.execute(  # of the line that is kept, a little shorter than its curves
+            "SELECT start_chainage + ST_Length(alignment) FROM tunnel.tunnel WHERE id = %s", [tunnel_id]
+        ).fetchone()
+        assert row is not None
+        (end,) = row
         save_equations(connection, tunnel_id, [piece for piece in pieces if piece.chainage < end])
 
 
