@@ -8,6 +8,7 @@ import json
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,6 @@ from tunneldb.cli.main import main
 from tunneldb.database import connect, get_survey
 from tunneldb.report.page import write_html
 
-CHROMIUM = Path("/usr/bin/chromium")
 SURVEY = "demo-2024"
 LENGTH, STRIP = 200.0, 50.0
 REMARK = "drips <b>after</b> rain</script><script>document.title='broken'</script>"
@@ -228,6 +228,58 @@ def test_state_that_does_not_hold_is_warned_of(example: str, conn: psycopg.Conne
     assert "Leaks have not been sought in 200.0 m of the stretch" in text
 
 
+def test_edits_are_those_of_this_survey_not_of_a_former_one(example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    edit = "UPDATE tunnel_api.leak SET remark = %s WHERE id = 2"
+    conn.execute(edit, ["of the former"])
+    conn.commit()
+    conn.execute("UPDATE tunnel.survey SET created_at = clock_timestamp()")
+    conn.execute("UPDATE tunnel.anomaly SET remark = NULL")
+    conn.execute(edit, ["of this one"])
+    conn.commit()
+    run("report", example, "-o", tmp_path / "r.html", "--from", "12+400", "--to", "12+450")
+    text = (tmp_path / "r.html").read_text("utf-8")
+    assert "of this one" in text
+    assert "of the former" not in text
+    assert "1 edit in the audit of the whole survey" in text
+
+
+def test_coordinate_system_of_its_own(example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    conn.execute(
+        "INSERT INTO spatial_ref_sys SELECT 990001, NULL, NULL, replace(srtext, 'UTM zone 30N', 'shifted'), proj4text"
+        " FROM spatial_ref_sys WHERE srid = 25830"
+    )
+    survey = get_survey(conn, example)
+    conn.commit()
+    for srid, said in ((25830, "EPSG:25830"), (990001, "ETRS89 / shifted")):
+        write_html(conn, replace(survey, srid=srid), tmp_path / "r.html")
+        assert f"<dt>Coordinates</dt><dd>{said}</dd>" in (tmp_path / "r.html").read_text("utf-8")
+
+
+def test_without_intensity_the_offset_is_shown(
+    example: str, conn: psycopg.Connection, tmp_path: Path, browser: Browser
+) -> None:
+    for table in ("anomaly", "coverage", "radiometry", "range_curve"):
+        conn.execute(sql.SQL("DELETE FROM tunnel.{}").format(sql.Identifier(table)))
+    conn.execute("DELETE FROM tunnel.image WHERE kind <> 'offset'")
+    conn.execute("UPDATE tunnel.survey SET intensity_kind = 'none', intensity_dimension = NULL, reference = 'none'")
+    conn.commit()
+    path = tmp_path / "r.html"
+    run("report", example, "-o", path)
+    picture, _ = Reading(path).strip(12350)
+    assert np.ptp(picture[::4, ::4].mean(axis=2)) > 200, "from black to white"
+    page = browser.new_page()
+    troubles = watch(page)
+    page.goto(path.as_uri())
+    for media in ("screen", "print"):
+        page.emulate_media(media=media)
+        shown = page.locator("body").inner_text()
+        assert shown.count("Leaks were not sought") == 1
+        for word in ("0 leaks", "class", "0.0 %", "seen", "wet or dark"):
+            assert word not in shown, (media, word)
+    assert troubles == []
+    page.close()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -261,11 +313,9 @@ def test_nothing_to_report_and_no_browser(
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    if not CHROMIUM.exists():
-        pytest.skip("needs Chromium")
+def browser(chromium: Path) -> Iterator[Browser]:
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         yield browser
         browser.close()
 
@@ -370,9 +420,7 @@ def test_on_paper_all_leaks_are_there(page: Page, leaks: list[dict[str, Any]]) -
     assert column(page, 1) == ["1"], "and the screen is as it was"
 
 
-def test_pdf(shared: str, leaks: list[dict[str, Any]], tmp_path: Path) -> None:
-    if not CHROMIUM.exists():
-        pytest.skip("needs Chromium")
+def test_pdf(shared: str, leaks: list[dict[str, Any]], tmp_path: Path, chromium: Path) -> None:
     path = tmp_path / "report.pdf"
     run("--dsn", shared, "report", SURVEY, "-o", path)
     assert [file.name for file in tmp_path.iterdir()] == ["report.pdf"]

@@ -43,6 +43,12 @@ tell whether it is wet."""
 FILLED = 0.14
 """Pixels without points take the mean of those about them, in a square so wide, m: about what the median filter looks at."""
 
+FAR = 0.6
+"""The same of a survey without intensity, whose profiles may lie so far apart: as the previews fill them."""
+
+LEAST = {"corrected": 0.1, "offset": 0.005}
+"""From black to white are at least so many dB or m."""
+
 QUALITY = {"WEBP": 55, "JPEG": 70}
 """Of the pictures, 0 to 100."""
 
@@ -96,33 +102,34 @@ class _Block:
 
     Attributes
     ----------
-    corrected : Raster
-        Corrected intensity, dB.
+    shown : Raster
+        Corrected intensity, dB, or offset from the surface, m.
     state : (rows, columns) uint8 array
         Values of :class:`State`, DARK or NO_STATE.
     """
 
-    corrected: Raster
+    shown: Raster
     state: Bytes
 
     def lining(self) -> Single:
-        """Intensity of its lining, thinned, dB."""
+        """What is shown of its lining, thinned, dB or m."""
         thin = (slice(None, None, 4), slice(None, None, 4))
-        values = self.corrected.values[thin]
+        values = self.shown.values[thin]
         return values[np.isfinite(values) & np.isin(self.state[thin], (State.LINING, State.RECESS, DARK))]
 
 
 @dataclass(frozen=True)
 class _Kilometre:
-    """How a kilometre is drawn: side of its pixels, m, and intensity shown black and white, dB."""
+    """How a kilometre is drawn: what it shows, side of its pixels, m, and values shown black and white, dB or m."""
 
+    kind: str
     pixel: float
     low: float
     high: float
 
 
 class Lining:
-    """Reads windows of the images of a survey.
+    """Reads windows of the images of a survey: of corrected intensity, or of the offset where there is no intensity.
 
     Parameters
     ----------
@@ -134,8 +141,9 @@ class Lining:
 
     def __init__(self, conn: psycopg.Connection[Any], survey: Survey, form: Form) -> None:
         self._conn, self._survey, self._form = conn, survey, form
+        self._kind = "offset" if survey.intensity_kind == "none" else "corrected"
         rows = conn.execute(
-            "SELECT block, min(km) FROM tunnel.image WHERE survey_id = %s AND kind = 'corrected' GROUP BY block", [survey.id]
+            "SELECT block, min(km) FROM tunnel.image WHERE survey_id = %s AND kind = %s GROUP BY block", [survey.id, self._kind]
         ).fetchall()
         self._km: dict[int, int] = dict(rows)
         self._kept: OrderedDict[int, _Block] = OrderedDict()
@@ -166,36 +174,36 @@ class Lining:
             return self._kept[number]
         rows: dict[str, bytes] = dict(
             self._conn.execute(
-                "SELECT kind, tiff FROM tunnel.image WHERE survey_id = %s AND km = %s AND block = %s"
-                " AND kind IN ('corrected', 'state')",
-                [self._survey.id, self._km[number], number],
+                "SELECT kind, tiff FROM tunnel.image WHERE survey_id = %s AND km = %s AND block = %s AND kind IN (%s, 'state')",
+                [self._survey.id, self._km[number], number, self._kind],
                 binary=True,
             ).fetchall()
         )
-        corrected = decode(rows["corrected"])
+        shown = decode(rows[self._kind])
         if "state" in rows:
             state = np.nan_to_num(decode(rows["state"]).values, nan=NO_STATE)
-        else:  # from before there were states
-            state = np.where(np.isfinite(corrected.values), np.float32(State.LINING), np.float32(State.EMPTY))
-        self._kept[number] = block = _Block(corrected, state.astype(np.uint8))
+        else:  # without intensity, and from before there were states
+            state = np.where(np.isfinite(shown.values), np.float32(State.LINING), np.float32(State.EMPTY))
+        self._kept[number] = block = _Block(shown, state.astype(np.uint8))
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)
         return block
 
     def _kilometre(self, km: int) -> _Kilometre:
-        """Intensities are drawn from the 1st to the 98th percentile of the lining in up to three of the kilometre's blocks."""
+        """Values are drawn from the 1st to the 98th percentile of the lining in up to three of the kilometre's blocks."""
         if km not in self._known:
             numbers = sorted(number for number, where in self._km.items() if where == km)
             blocks = [self._block(numbers[n]) for n in sorted({0, len(numbers) // 2, len(numbers) - 1})]
             values = np.concatenate([block.lining() for block in blocks])
             low, high = (float(v) for v in np.percentile(values, [1, 98])) if len(values) else (0.0, 1.0)
-            self._known[km] = _Kilometre(blocks[0].corrected.transform.a, low, max(high, low + 0.1))
+            pixel = blocks[0].shown.transform.a
+            self._known[km] = _Kilometre(self._kind, pixel, low, max(high, low + LEAST[self._kind]))
         return self._known[km]
 
 
 def _paint(canvas: Bytes, window: Window, side: float, block: _Block, kilometre: _Kilometre) -> None:
     """Paint what a block shows of a window onto the canvas, whose pixels are of that side, m."""
-    transform, (height, width) = block.corrected.transform, block.corrected.values.shape
+    transform, (height, width) = block.shown.transform, block.shown.values.shape
     # the canvas's column and row that each column and row of the block falls into
     column = np.floor((transform.c + transform.a * (np.arange(width) + 0.5) - window.west) / side).astype(np.intp)
     row = np.floor((window.north - transform.f - transform.e * (np.arange(height) + 0.5)) / side).astype(np.intp)
@@ -203,7 +211,7 @@ def _paint(canvas: Bytes, window: Window, side: float, block: _Block, kilometre:
     row, column = row[part[0]], column[part[1]]
     if len(row) and len(column):
         there = slice(row[0], row[-1] + 1), slice(column[0], column[-1] + 1)
-        canvas[there] = _colours(block.corrected.values[part], block.state[part], (row, column), side, kilometre)
+        canvas[there] = _colours(block.shown.values[part], block.state[part], (row, column), side, kilometre)
 
 
 def _inside(place: Places, count: int) -> slice:
@@ -215,7 +223,8 @@ def _colours(values: Single, state: Bytes, places: tuple[Places, Places], side: 
     """Colours of the pixels that rows and columns of a block fall into; both of these places grow without gaps."""
     row, column = (place - place[0] for place in places)
     held, level, lining, empty, off, floor = _gathered(values, state, row, column)
-    about = 2 * round(FILLED / side / 2) + 1
+    plain = kilometre.kind == "offset"
+    about = 2 * round((FAR if plain else FILLED) / side / 2) + 1
 
     def smooth(what: Single) -> Single:
         return ndimage.uniform_filter(what, about, mode="nearest") if about > 1 else what
@@ -223,6 +232,9 @@ def _colours(values: Single, state: Bytes, places: tuple[Places, Places], side: 
     mean = np.where(held > 0, _ratio(level, held), _ratio(smooth(level), smooth(held)))
     shade = np.clip((mean - kilometre.low) / (kilometre.high - kilometre.low), 0.0, 1.0)
     grey = np.repeat(255.0 * np.nan_to_num(shade, nan=0.75), 3).reshape(*shade.shape, 3)
+    if plain:
+        grey[np.isnan(mean)] = NOTHING
+        return grey.astype(np.uint8)
     unseen = smooth(lining - empty) < HELD * smooth(lining)
     other = lining + off + floor
     for mask, colour, opaque in ((unseen, UNSEEN, 1.0), (off > other / 2, COVERED, 0.55), (floor > other / 2, FLOOR, 0.92)):

@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from tunneldb import __version__
 from tunneldb.database import Survey, snapshot
+from tunneldb.export.plain.places import crs_text
 from tunneldb.report import data, text
 from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, without_detection
 from tunneldb.report.lining import Form
@@ -139,6 +140,9 @@ class _Report:
             "people": text.reviewers(self.leaks),
             "edits": [text.edit(edit) for edit in edits],
             "edits_in_all": edits_in_all,
+            "part": (low, high) != data.find_stretch(conn, survey, -np.inf, np.inf),
+            "sought": survey.intensity_kind != "none",
+            "crs": text.crs(crs_text(conn, survey.srid)),
             "clock": text.by_clock(counted),
             "sizes": text.by_size(counted),
             "glance": self._glance(),

@@ -56,9 +56,9 @@ class Strip:
     ribbon : str
         Path of the share seen.
     blank : list of (float, float)
-        Where detection did not run.
+        Where detection did not run; nowhere of a survey without intensity.
     summary : str
-        How many leaks, how much was seen.
+        How many leaks, how much was seen; empty of a survey without intensity.
     details : Markup
         What the leaks whose middle lies in it show, as JSON.
     """
@@ -160,6 +160,7 @@ class Strips:
         names = label_chainages(self.conn, self.survey, [low, high, *places])
         picture = lining.picture(Window(low, high, self.south, self.north), self.length / STRIP_PIXELS)
         share = text.percent(seen.seen[inside].sum() / total) if total > 0 else "nothing"
+        sought = self.survey.intensity_kind != "none"
         return Strip(
             low=start,
             left=low - start,
@@ -170,8 +171,8 @@ class Strips:
             leaks=[(leak, outline_path(leak.outline, start, self.north, self.length / 2000)) for leak in leaks],
             signs=place_signs(wet, start, start + self.length, self.length / LETTERS * 0.6),
             ribbon=share_path(seen, start, high, 0.0, 0.8 * self.length / LETTERS),
-            blank=without_detection(seen, low, high),
-            summary=f"{len(wet)} leak{'s' * (len(wet) != 1)}, {share} of the lining seen",
+            blank=without_detection(seen, low, high) if sought else [],
+            summary=f"{len(wet)} leak{'s' * (len(wet) != 1)}, {share} of the lining seen" if sought else "",
             details=text.script_json(self._details(lining, [leak for leak in leaks if self.of(leak) == int(start)])),
         )
 

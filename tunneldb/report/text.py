@@ -116,6 +116,11 @@ def versions(runs: Sequence[Row]) -> list[dict[str, Any]]:
     ]
 
 
+def crs(said: str) -> str:
+    """Return AUTHORITY:CODE as it is; of a definition the name, which is the first that it quotes."""
+    return said.split('"')[1] if '"' in said else said
+
+
 def script_json(value: Any) -> Markup:
     """JSON that may stand in a script element."""
     plain = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
