@@ -22,6 +22,9 @@ BROWSERS = (
 PATIENCE = 1800
 """Seconds that a browser may print at most."""
 
+LONGEST = 60
+"""Bytes of a folder's path in which a browser can still open its socket: with its name there they must not be over 107."""
+
 
 def find_browser() -> str:
     """Return the path of the browser that prints: that of TUNNELDB_BROWSER, or the first of BROWSERS that is installed.
@@ -76,7 +79,7 @@ def print_pdf(browser: str, page: Path, pdf: Path) -> None:
             f"{page.absolute().as_uri()}#print",
         ]  # fmt: skip
         try:
-            code, output = _run(command)
+            code, output = _run(command, profile)
         except subprocess.TimeoutExpired:
             raise UserError(
                 f"{browser} did not print the report within {PATIENCE // 60} minutes: report a shorter stretch (--from, --to),"
@@ -87,11 +90,16 @@ def print_pdf(browser: str, page: Path, pdf: Path) -> None:
         raise UserError(f"{browser} did not print the report: {said[-1] if said else f'exit code {code}'}")
 
 
-def _run(command: Sequence[str]) -> tuple[int, str]:
-    """Run a program; returns exit code and standard error. Whatever breaks off the wait ends it, with all that it started."""
+def _run(command: Sequence[str], folder: str) -> tuple[int, str]:
+    """Run a browser, its temporary files in a folder; returns exit code and standard error.
+
+    Whatever breaks off the wait ends the browser, with all that it has started.
+    """
+    temporary = {"TMPDIR": folder} if len(os.fsencode(folder)) <= LONGEST else {}
     with subprocess.Popen(
-        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True
-    ) as process:
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
+        env=os.environ | temporary, start_new_session=True,
+    ) as process:  # fmt: skip
         try:
             _, output = process.communicate(timeout=PATIENCE)
         except BaseException:
