@@ -15,7 +15,7 @@ from tunneldb.errors import UserError
 
 @click.group(cls=VerbGroup)
 def tunnel() -> None:
-    """Add, list or remove tunnels."""
+    """Add, list or remove tunnels, and give them a stationing."""
 
 
 @tunnel.command(
