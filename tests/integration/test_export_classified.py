@@ -114,7 +114,7 @@ def test_files_get_the_classes(
 
 
 def test_without_ground_it_says_what_to_type(loaded: Path, tmp_path: Path) -> None:
-    assert "say what to export" in command("export", NAME, "-o", tmp_path / "out", code=2)
+    assert "scan files by --classified" in command("export", NAME, "-o", tmp_path / "out", code=2)
     text = export(tmp_path / "out", code=2)
     assert text.count("\n") == 1
     assert f"kilometres 0, 1 without ground: tunneldb run {NAME} --km 0-1 --from axis --to ground" in text

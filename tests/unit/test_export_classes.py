@@ -16,6 +16,7 @@ from tunneldb.export.classes import ClassPainter
 from tunneldb.export.cog import Extent, write_cog
 from tunneldb.export.palette import COLOURS
 from tunneldb.geometry.frame import segment_rows, tangents
+from tunneldb.geometry.stationing import Stationing
 from tunneldb.geometry.surface import Surface
 from tunneldb.ground.classes import Klass
 from tunneldb.leak.raster import Raster
@@ -139,7 +140,7 @@ def test_preview_paints_classes_and_names_those_there(tmp_path: Path) -> None:
     values[:40] = Klass.LINING
     values[60:] = Klass.GROUND
     path = tmp_path / "class.png"
-    preview.draw(path, "x", "class", [preview.Strip(1000.0, values)], 2.5, 0.05)
+    preview.draw(path, "x", "class", [preview.Strip(1000.0, values)], Stationing(), 2.5, 0.05)
     pixels = np.asarray(Image.open(path).convert("RGB")).reshape(-1, 3)
     painted = {klass: int((pixels == colour).all(axis=1).sum()) for klass, colour in COLOURS.items()}
     # gaps of 1 m are closed from both sides by 0.3 m; lines of the grid take a little
