@@ -36,6 +36,16 @@ def first_leak(connection: psycopg.Connection) -> int:
     return int(row[0])
 
 
+def first_of(connection: psycopg.Connection, view: str) -> tuple[int, bytes]:
+    """Key of a row of a view, and the query that shows the row."""
+    if view in ("leak", "anomaly"):
+        key = first_leak(connection)
+    else:
+        key = connection.execute(f"SELECT min(id) FROM tunnel_api.{view}".encode()).fetchone()[0]
+    connection.rollback()
+    return key, f"SELECT * FROM tunnel_api.{view} WHERE id = {key}".encode()
+
+
 @pytest.mark.parametrize("person", ["ines"], indirect=True)
 def test_a_review_is_noted_with_only_what_changed(person: psycopg.Connection) -> None:
     key = first_leak(person)
@@ -179,13 +189,7 @@ def test_two_who_judge_otherwise_are_not_both_right(
     person: psycopg.Connection, dsn: str, conn: psycopg.Connection, view: str, ines: str, olga: str
 ) -> None:
     """The later statement saw what was before, so that its WHERE proves nothing: it is refused, and nothing overwritten."""
-    key = (
-        first_leak(conn)
-        if view in ("leak", "anomaly")
-        else conn.execute(f"SELECT min(id) FROM tunnel_api.{view}".encode()).fetchone()[0]
-    )
-    look = f"SELECT * FROM tunnel_api.{view} WHERE id = {key}".encode()
-    conn.rollback()
+    key, look = first_of(conn, view)
     with meanwhile(dsn, conn, person, f"UPDATE tunnel_api.{view} SET {olga} WHERE id = %s", key) as olgas:
         person.execute(f"UPDATE tunnel_api.{view} SET {ines} WHERE id = {key}".encode())
         made = person.execute(look).fetchone()
@@ -205,13 +209,7 @@ def test_two_who_judge_otherwise_are_not_both_right(
 def test_two_of_one_mind_are_the_work_of_the_first(
     person: psycopg.Connection, dsn: str, conn: psycopg.Connection, view: str, change: str
 ) -> None:
-    key = (
-        first_leak(conn)
-        if view in ("leak", "anomaly")
-        else conn.execute(f"SELECT min(id) FROM tunnel_api.{view}".encode()).fetchone()[0]
-    )
-    look = f"SELECT * FROM tunnel_api.{view} WHERE id = {key}".encode()
-    conn.rollback()
+    key, look = first_of(conn, view)
     with meanwhile(dsn, conn, person, f"UPDATE tunnel_api.{view} SET {change} WHERE id = %s", key) as olgas:
         person.execute(f"UPDATE tunnel_api.{view} SET {change} WHERE id = {key}".encode())
         made = person.execute(look).fetchone()

@@ -12,7 +12,7 @@ import psycopg
 from tunneldb.cli.classes import print_classes
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.progress import points_bar, step
+from tunneldb.cli.progress import bar, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
@@ -97,7 +97,7 @@ def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Pat
     make_folder(output)
     files: list[dict[str, Any]] = []
     tell(survey=survey.name, files=files)
-    with told_to_end(), points_bar() as progress:
+    with told_to_end(), bar("points") as progress:
         for file in export_classified(conn, survey, output, wanted, step(progress)):
             points = int(file.counts.sum())
             rate = points / file.seconds / 1e6

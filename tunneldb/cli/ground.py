@@ -8,7 +8,7 @@ import click
 
 from tunneldb.cli.classes import print_classes
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.progress import points_bar, step
+from tunneldb.cli.progress import bar, step
 from tunneldb.cli.run import parameter_table
 from tunneldb.errors import UserError
 from tunneldb.export.atomic import told_to_end
@@ -40,7 +40,7 @@ def ground(file: Path, output: Path, assignments: tuple[str, ...]) -> None:
     values = settings(assignments)
     from tunneldb.export.bare import classify_file
 
-    with told_to_end(), points_bar() as progress:
+    with told_to_end(), bar("points") as progress:
         found = classify_file(file, output, values, step(progress))
     tell(file=output, ground=found.ground, lining=found.lining)
     print_classes(found.counts)

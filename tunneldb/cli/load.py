@@ -9,7 +9,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.progress import points_bar, step
+from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
@@ -79,7 +79,7 @@ def load(
     with connect(settings.dsn) as connection:
         found = get_survey(connection, survey)
         try:
-            with points_bar() as progress:
+            with bar("points") as progress:
                 for file in load_files(connection, found, files, chosen, step(progress)):
                     done.append(file)  # noqa: PERF402 - those before a failure are in the summary too
         finally:

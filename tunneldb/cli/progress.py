@@ -47,11 +47,6 @@ def bar(unit: str) -> Progress:
     )
 
 
-def points_bar() -> Progress:
-    """Return the bar of a verb that counts points."""
-    return bar("points")
-
-
 def step(progress: Progress) -> Callable[[str, float], Callable[[float], None]]:
     """Show one step at a time: what it returns takes a text and a total, and returns what takes the counts."""
 

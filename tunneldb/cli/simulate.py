@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import click
 
 from tunneldb.cli.output import Verb, tell, verb
-from tunneldb.cli.progress import points_bar
+from tunneldb.cli.progress import bar
 from tunneldb.simulate import PRESETS, Parameters, Simulation, write
 
 
@@ -236,7 +236,7 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
     values = PRESETS[preset] if preset else {}
     parameters = Parameters(**{**values, **{k: v for k, v in given.items() if v is not None}})
     simulation = Simulation(parameters)
-    with points_bar() as progress:
+    with bar("points") as progress:
         task = progress.add_task(f"scanning {parameters.name}", total=None)
 
         def scanned(share: float, points: int) -> None:

@@ -8,7 +8,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.progress import points_bar, step
+from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
@@ -90,9 +90,8 @@ def spheres(
     with connect(settings.dsn) as conn:
         chosen = get_survey(conn, survey)
         conn.rollback()
-        bar = points_bar()
-        with bar:
-            found = search(conn, chosen, radius, tolerance, step(bar))
+        with bar("points") as progress:
+            found = search(conn, chosen, radius, tolerance, step(progress))
         stationing = load_stationing(conn, chosen.tunnel_id)
     comparison = compare(found.spheres, points, within) if points else None
     count = len({row.number for row in found.spheres})

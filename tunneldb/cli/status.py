@@ -15,8 +15,7 @@ from tunneldb.cli.output import records, tell, verb, wants_json
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
-
-STAGES = ("load", "axis", "segments", "sections", "ground", "detect")
+from tunneldb.job.order import STAGES
 
 
 @verb(examples=["tunneldb status", "tunneldb status pajares-2026 --watch", "tunneldb status pajares-2026 --json"])

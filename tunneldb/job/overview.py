@@ -10,11 +10,9 @@ from typing import Any, NamedTuple
 import psycopg
 from psycopg.rows import class_row
 
+from tunneldb.job.order import STAGES
 from tunneldb.job.pace import measure, points_per_second
 from tunneldb.job.worker import STALLED
-
-STAGES = ("load", "axis", "segments", "sections", "ground", "detect")
-"""Stages of a kilometre, in their order."""
 
 TO_DO = ("queued", "waits", "running")
 """States of a step that is done without anybody typing anything, as long as there are workers."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, LiteralString
 
 import numpy as np
 import psycopg
@@ -17,6 +17,7 @@ from shapely.geometry import Polygon
 
 from tunneldb.database import Survey
 from tunneldb.errors import UserError
+from tunneldb.job.order import STAGES
 
 Float = NDArray[np.float64]
 Row = dict[str, Any]
@@ -146,8 +147,7 @@ _LEAK = sql.SQL(
 
 def read_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Leak]:
     """Read the leaks of a stretch in order of chainage: found last, or confirmed although found no more; also the rejected."""
-    with conn.cursor(row_factory=dict_row) as cursor:
-        rows = cursor.execute(_LEAK, [survey.id, low, high]).fetchall()
+    rows = _rows(conn, _LEAK, [survey.id, low, high])
     return [Leak(**{**row, "outline": shapely.from_wkb(bytes(row["outline"]))}) for row in rows]
 
 
@@ -180,75 +180,73 @@ def hidden_stretches(coverage: Coverage) -> list[tuple[float, float, float]]:
 
 def read_statistics(conn: psycopg.Connection[Any], survey: Survey, starts: Sequence[float], ends: Sequence[float]) -> list[Row]:
     """Read statistics of leaks over stretches one after another, m (``tunnel_api.stretch_statistics``)."""
-    with conn.cursor(row_factory=dict_row) as cursor:
-        return cursor.execute(
-            "SELECT * FROM tunnel_api.stretch_statistics(%s, %s::float8[], %s::float8[])", [survey.id, list(starts), list(ends)]
-        ).fetchall()
+    return _rows(
+        conn,
+        "SELECT * FROM tunnel_api.stretch_statistics(%s, %s::float8[], %s::float8[])",
+        [survey.id, list(starts), list(ends)],
+    )
 
 
 def read_classes(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
     """Read which classes of GB 50108-2008 a stretch keeps, and what breaks them, with their limits."""
-    with conn.cursor(row_factory=dict_row) as cursor:
-        return cursor.execute(
-            "SELECT w.class, w.holds, w.breaks, w.leaks, l.wet_ratio, l.patch_area, l.patches_per_100, l.description"
-            " FROM tunnel_api.waterproof_class(%s, %s, %s) w JOIN tunnel_api.waterproof_limit l ON l.id = w.class"
-            " ORDER BY w.class",
-            [survey.name, low, high],
-        ).fetchall()
+    return _rows(
+        conn,
+        "SELECT w.class, w.holds, w.breaks, w.leaks, l.wet_ratio, l.patch_area, l.patches_per_100, l.description"
+        " FROM tunnel_api.waterproof_class(%s, %s, %s) w JOIN tunnel_api.waterproof_limit l ON l.id = w.class"
+        " ORDER BY w.class",
+        [survey.name, low, high],
+    )
 
 
 def read_files(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
     """Read the scan files that reach into a stretch."""
-    with conn.cursor(row_factory=dict_row) as cursor:
-        return cursor.execute(
-            "SELECT name, checksum, bytes, points, noise, outside, thinned, kept, chainage_from, chainage_to, loaded_at"
-            " FROM tunnel_api.file WHERE survey_id = %s AND chainage_to >= %s AND chainage_from <= %s"
-            " ORDER BY chainage_from, name",
-            [survey.id, low, high],
-        ).fetchall()
+    return _rows(
+        conn,
+        "SELECT name, checksum, bytes, points, noise, outside, thinned, kept, chainage_from, chainage_to, loaded_at"
+        " FROM tunnel_api.file WHERE survey_id = %s AND chainage_to >= %s AND chainage_from <= %s"
+        " ORDER BY chainage_from, name",
+        [survey.id, low, high],
+    )
 
 
 def read_runs(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
     """Read how each stage last succeeded, the same parameters and versions together, with the kilometres they hold for."""
-    with conn.cursor(row_factory=dict_row) as cursor:
-        return cursor.execute(
-            """
-            SELECT d.stage, d.parameters, d.versions, array_agg(d.km ORDER BY d.km) AS kilometres,
-                   min(d.finished_at) AS first, max(d.finished_at) AS last
-              FROM (SELECT DISTINCT ON (r.km, r.stage) r.km, r.stage, r.parameters, r.versions, r.finished_at
-                      FROM tunnel.run r
-                     WHERE r.survey_id = %s AND r.outcome = 'done' AND r.km BETWEEN %s AND %s AND r.stage = ANY (%s)
-                     ORDER BY r.km, r.stage, r.started_at DESC, r.id DESC) d
-             GROUP BY d.stage, d.parameters, d.versions
-             ORDER BY array_position(%s, d.stage), min(d.km)
-            """,
-            [survey.id, *_kilometres(low, high), STAGES, STAGES],
-        ).fetchall()
-
-
-STAGES = ["load", "axis", "segments", "sections", "ground", "detect"]
+    return _rows(
+        conn,
+        """
+        SELECT d.stage, d.parameters, d.versions, array_agg(d.km ORDER BY d.km) AS kilometres,
+               min(d.finished_at) AS first, max(d.finished_at) AS last
+          FROM (SELECT DISTINCT ON (r.km, r.stage) r.km, r.stage, r.parameters, r.versions, r.finished_at
+                  FROM tunnel.run r
+                 WHERE r.survey_id = %s AND r.outcome = 'done' AND r.km BETWEEN %s AND %s AND r.stage = ANY (%s)
+                 ORDER BY r.km, r.stage, r.started_at DESC, r.id DESC) d
+         GROUP BY d.stage, d.parameters, d.versions
+         ORDER BY array_position(%s, d.stage), min(d.km)
+        """,
+        [survey.id, *_kilometres(low, high), list(STAGES), list(STAGES)],
+    )
 
 
 def read_stale(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
     """Read which stages of which kilometres are out of date or have not succeeded, and why."""
-    with conn.cursor(row_factory=dict_row) as cursor:
-        return cursor.execute(
-            "SELECT stage, coalesce(reason, CASE WHEN done_at IS NULL THEN 'not done: ' || outcome END) AS reason,"
-            " array_agg(km ORDER BY km) AS kilometres"
-            " FROM tunnel_api.stage_status WHERE survey_id = %s AND km BETWEEN %s AND %s AND (stale OR done_at IS NULL)"
-            " GROUP BY stage, step, 2 ORDER BY step, 2",
-            [survey.id, *_kilometres(low, high)],
-        ).fetchall()
+    return _rows(
+        conn,
+        "SELECT stage, coalesce(reason, CASE WHEN done_at IS NULL THEN 'not done: ' || outcome END) AS reason,"
+        " array_agg(km ORDER BY km) AS kilometres"
+        " FROM tunnel_api.stage_status WHERE survey_id = %s AND km BETWEEN %s AND %s AND (stale OR done_at IS NULL)"
+        " GROUP BY stage, step, 2 ORDER BY step, 2",
+        [survey.id, *_kilometres(low, high)],
+    )
 
 
 def read_radiometry(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
     """Read how the intensity of each kilometre was corrected."""
-    with conn.cursor(row_factory=dict_row) as cursor:
-        return cursor.execute(
-            "SELECT km, roughness, dry_mean, dry_sigma, threshold, sigma_raw, sigma_lambert, sigma_oren_nayar"
-            " FROM tunnel_api.radiometry WHERE survey_id = %s AND km BETWEEN %s AND %s ORDER BY km",
-            [survey.id, *_kilometres(low, high)],
-        ).fetchall()
+    return _rows(
+        conn,
+        "SELECT km, roughness, dry_mean, dry_sigma, threshold, sigma_raw, sigma_lambert, sigma_oren_nayar"
+        " FROM tunnel_api.radiometry WHERE survey_id = %s AND km BETWEEN %s AND %s ORDER BY km",
+        [survey.id, *_kilometres(low, high)],
+    )
 
 
 def read_others(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> dict[str, int]:
@@ -308,6 +306,12 @@ def place_name(conn: psycopg.Connection[Any], survey: Survey) -> str:
     """Return what the label of a place is: its chainage, or its station where the tunnel has a stationing of its own."""
     own = conn.execute("SELECT FROM tunnel.station_equation WHERE tunnel_id = %s LIMIT 1", [survey.tunnel_id]).fetchone()
     return "Chainage" if own is None else "Station"
+
+
+def _rows(conn: psycopg.Connection[Any], query: sql.Composed | LiteralString, values: list[Any]) -> list[Row]:
+    """Rows of a query as mappings."""
+    with conn.cursor(row_factory=dict_row) as cursor:
+        return cursor.execute(query, values).fetchall()
 
 
 def _kilometres(low: float, high: float) -> tuple[int, int]:

@@ -16,7 +16,6 @@ import psycopg
 
 from tunneldb import __version__
 from tunneldb.database import Survey
-from tunneldb.errors import UserError
 from tunneldb.export.atomic import replacing
 from tunneldb.export.qgis.action import RECOMPUTED_FROM, recompute
 from tunneldb.export.qgis.crs import crs_element, no_crs
@@ -25,7 +24,7 @@ from tunneldb.export.qgis.layer import LAYERS, MAP, SHEETS, SPACE, UNROLLED, Vec
 from tunneldb.export.qgis.raster import KINDS, image_kind, pipe
 from tunneldb.export.qgis.sheet import layouts
 from tunneldb.export.qgis.source import Source
-from tunneldb.export.qgis.styles import style_elements
+from tunneldb.export.qgis.styles import require_table, style_elements
 
 QGIS_VERSION = "3.22.0-Białowieża"
 """Version whose form of project is written; later ones read it."""
@@ -109,9 +108,7 @@ def store_project(
     UserError
         As in :func:`write_project`, or the table is missing.
     """
-    exists = conn.execute("SELECT to_regclass('public.qgis_projects') IS NOT NULL").fetchone()
-    if exists is None or not exists[0]:
-        raise UserError('the table public.qgis_projects is missing: run "tunneldb init" as the database\'s owner')
+    require_table(conn, "public.qgis_projects")
     content = _archive(_text(_project(conn, survey, images, None, service)), name)
     conn.execute(
         "INSERT INTO public.qgis_projects (name, metadata, content) VALUES (%s, jsonb_build_object("

@@ -23,6 +23,13 @@ def style_elements(name: str) -> list[ET.Element]:
     return list(ET.fromstring(style_text(name)))
 
 
+def require_table(conn: psycopg.Connection, name: str) -> None:
+    """Raise UserError where a table that QGIS reads is missing."""
+    exists = conn.execute("SELECT to_regclass(%s) IS NOT NULL", [name]).fetchone()
+    if exists is None or not exists[0]:
+        raise UserError(f'the table {name} is missing: run "tunneldb init" as the database\'s owner')
+
+
 def store_styles(conn: psycopg.Connection) -> int:
     """Put each layer's style into ``public.layer_styles`` as its default; a rerun replaces ours and no other's.
 
@@ -41,9 +48,7 @@ def store_styles(conn: psycopg.Connection) -> int:
     UserError
         The table is missing.
     """
-    exists = conn.execute("SELECT to_regclass('public.layer_styles') IS NOT NULL").fetchone()
-    if exists is None or not exists[0]:
-        raise UserError('the table public.layer_styles is missing: run "tunneldb init" as the database\'s owner')
+    require_table(conn, "public.layer_styles")
     for view, column, style, title in styled_columns():
         place = {"view": view, "column": column, "name": STYLE_NAME}
         conn.execute(
