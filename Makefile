@@ -47,7 +47,7 @@ lint: install
 
 # Not `python -m pytest`: that would put the source tree before the wheel.
 test: lint $(VENV)/tests
-	$(BIN)/pytest -n 2 --dist loadscope -rs
+	$(BIN)/pytest -n 2 --dist loadscope --no-loadscope-reorder -rs
 
 faults: install $(VENV)/tests
 	KILLS=$${KILLS:-100} $(BIN)/pytest -n 0 -s tests/faults/test_kills.py
