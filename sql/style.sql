@@ -27,17 +27,6 @@ BEGIN
             RAISE WARNING '% may not create public.layer_styles, in which QGIS looks for styles', current_user;
         END;
     END IF;
-    IF to_regclass('public.layer_styles') IS NOT NULL
-       AND pg_has_role(current_user, (SELECT relowner FROM pg_class WHERE oid = 'public.layer_styles'::regclass), 'USAGE')
-    THEN
-        IF to_regrole('tunnel_viewer') IS NOT NULL THEN
-            GRANT SELECT ON public.layer_styles TO tunnel_viewer;
-        END IF;
-        IF to_regrole('tunnel_operator') IS NOT NULL THEN
-            GRANT INSERT, UPDATE, DELETE ON public.layer_styles TO tunnel_operator;
-            GRANT USAGE ON SEQUENCE public.layer_styles_id_seq TO tunnel_operator;
-        END IF;
-    END IF;
 END
 $$;
 
@@ -51,15 +40,28 @@ BEGIN
             RAISE WARNING '% may not create public.qgis_projects, in which QGIS looks for projects', current_user;
         END;
     END IF;
-    IF to_regclass('public.qgis_projects') IS NOT NULL
-       AND pg_has_role(current_user, (SELECT relowner FROM pg_class WHERE oid = 'public.qgis_projects'::regclass), 'USAGE')
-    THEN
+END
+$$;
+
+-- Rights on them, as far as their owner is who installs; they may have been QGIS' or another's before.
+DO $$
+DECLARE
+    held regclass;
+BEGIN
+    FOR held IN
+        SELECT c.oid FROM pg_class c
+         WHERE c.oid IN (to_regclass('public.layer_styles'), to_regclass('public.qgis_projects'))
+           AND pg_has_role(current_user, c.relowner, 'USAGE')
+    LOOP
         IF to_regrole('tunnel_viewer') IS NOT NULL THEN
-            GRANT SELECT ON public.qgis_projects TO tunnel_viewer;
+            EXECUTE format('GRANT SELECT ON %s TO tunnel_viewer', held);
         END IF;
         IF to_regrole('tunnel_operator') IS NOT NULL THEN
-            GRANT INSERT, UPDATE, DELETE ON public.qgis_projects TO tunnel_operator;
+            EXECUTE format('GRANT INSERT, UPDATE, DELETE ON %s TO tunnel_operator', held);
+            IF held = to_regclass('public.layer_styles') THEN
+                GRANT USAGE ON SEQUENCE public.layer_styles_id_seq TO tunnel_operator;
+            END IF;
         END IF;
-    END IF;
+    END LOOP;
 END
 $$;
