@@ -5,7 +5,7 @@ CREATE OR REPLACE VIEW tunnel_api.audit AS
 SELECT e.id, e.at, e.who, e.survey, e.view, e.row_id, e.action, e.before, e.after
   FROM tunnel_audit.entry e;
 COMMENT ON VIEW tunnel_api.audit IS
-    'What people changed through the views: who, when, before and after; it outlives what it speaks of. No role changes it, but for operators by a trigger of their own on a table, which tunneldb check reports';
+    'What people changed through the views: who, when, before and after; it outlives what it speaks of. No role changes it, but for operators by a trigger or a function of their own on a table, which tunneldb check reports';
 COMMENT ON COLUMN tunnel_api.audit.at IS 'When';
 COMMENT ON COLUMN tunnel_api.audit.who IS 'Who was logged in';
 COMMENT ON COLUMN tunnel_api.audit.view IS 'What was changed: anomaly (of leaks, too), axis_vertex or region';

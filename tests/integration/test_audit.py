@@ -268,3 +268,64 @@ def test_an_operator_who_drops_all_data_leaves_the_audit(person: psycopg.Connect
 def test_even_the_owner_does_not_change_it_by_mistake(conn: psycopg.Connection, statement: str) -> None:
     with pytest.raises(psycopg.errors.InsufficientPrivilege, match="neither changed nor deleted"):
         conn.execute(statement)  # type: ignore[arg-type]
+
+
+FORGE = """
+CREATE FUNCTION tunnel.forge() RETURNS void LANGUAGE plpgsql AS $$
+BEGIN
+    INSERT INTO tunnel_audit.entry (who, survey, view, row_id, action) VALUES ('nobody', 'demo-2024', 'anomaly', 1, 'update');
+EXCEPTION WHEN insufficient_privilege THEN
+END $$;
+CREATE FUNCTION tunnel.mine(text) RETURNS boolean LANGUAGE plpgsql IMMUTABLE AS $$
+BEGIN
+    PERFORM tunnel.forge();
+    RETURN true;
+END $$
+"""
+"""What forges an entry as soon as it may, in the guise of a harmless function."""
+
+
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
+@pytest.mark.parametrize(
+    ("way", "what"),
+    [
+        ("ALTER TABLE tunnel.anomaly ADD CONSTRAINT mine CHECK (tunnel.mine(review))", "check mine of tunnel.anomaly"),
+        ("ALTER TABLE tunnel.anomaly ADD CONSTRAINT mine CHECK (query_to_xml($x$SELECT tunnel.mine('')$x$, true, false, '')"
+         " IS NOT NULL)", "check mine of tunnel.anomaly"),
+        ("CREATE DOMAIN tunnel.word AS text CHECK (tunnel.mine(VALUE));"
+         "ALTER TABLE tunnel.region ADD mine tunnel.word DEFAULT ''",
+         "type of column mine of tunnel.region"),
+        ("CREATE OPERATOR tunnel.!! (FUNCTION = tunnel.mine, RIGHTARG = text);"
+         "ALTER TABLE tunnel.anomaly ADD CONSTRAINT mine CHECK (OPERATOR(tunnel.!!) review)", "check mine of tunnel.anomaly"),
+        ("ALTER TABLE tunnel.anomaly ADD mine boolean GENERATED ALWAYS AS (tunnel.mine(review)) STORED",
+         "default of column mine of tunnel.anomaly"),
+        ("ALTER TABLE tunnel.region ADD mine boolean DEFAULT tunnel.mine('')", "default of column mine of tunnel.region"),
+        ("CREATE INDEX mine ON tunnel.anomaly (tunnel.mine(review))", "index tunnel.mine of tunnel.anomaly"),
+        ("CREATE INDEX mine ON tunnel.anomaly (id) WHERE tunnel.mine(review)", "index tunnel.mine of tunnel.anomaly"),
+        ("CREATE RULE mine AS ON UPDATE TO tunnel.anomaly DO ALSO UPDATE tunnel.survey SET name = name WHERE tunnel.mine(name)",
+         "rule mine on tunnel.anomaly"),
+    ],
+    ids=["check", "built-in", "domain", "operator", "generated", "default", "index", "predicate", "rule"],
+)  # fmt: skip
+def test_what_operators_put_on_the_tables_gets_at_the_audit_and_is_reported(
+    person: psycopg.Connection, conn: psycopg.Connection, dsn: str, way: str, what: str
+) -> None:
+    """It runs with the owner's rights when somebody edits through the views."""
+    forged = "SELECT count(*) > 0 FROM tunnel_audit.entry WHERE who = 'nobody'"
+    person.execute(FORGE)
+    person.execute(way.encode())
+    assert conn.execute(forged).fetchone() == (False,)
+    conn.commit()
+    with psycopg.connect(make_conninfo(dsn, user="ines"), autocommit=True) as ines:
+        ines.execute("UPDATE tunnel_api.leak SET review = 'confirmed' WHERE id = %s", (first_leak(conn),))
+        ines.execute(
+            "INSERT INTO tunnel_api.region (survey, kind, geom) VALUES (%s, 'dry', 'POLYGON((0 0,2 0,2 1,0 0))')", [SURVEY]
+        )
+    assert conn.execute(forged).fetchone() == (True,)
+    conn.commit()
+    result = CliRunner().invoke(main, ["check"])
+    assert result.exit_code == 1
+    assert f"{what} is not tunneldb's: it runs" in result.output
+    for mend in [line.strip() for line in result.output.splitlines() if line.strip().startswith(("ALTER ", "DROP "))]:
+        person.execute(mend.encode())
+    assert "✓ expressions" in CliRunner().invoke(main, ["check"]).output

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import psycopg
 
 from tunneldb.database.connection import MINIMUM_POSTGIS, open_connection
+from tunneldb.database.foreign import SUBJECTS, foreign_objects
 from tunneldb.database.schema import (
     HEAD,
     api_version,
@@ -23,7 +24,6 @@ from tunneldb.database.server import Server
 from tunneldb.errors import UserError
 
 ROLES = ("tunnel_viewer", "tunnel_inspector", "tunnel_operator")
-TRIGGERS = ("drop_points", "make_images")  # of tunnel.survey, each of the function of its name
 LITTLE_SPACE = 5 * 1024**3  # bytes; a kilometre at survey density takes some 0.5 GB with its rewrite
 GIB = 1024**3
 
@@ -70,7 +70,7 @@ def examine(dsn: str | None) -> Iterator[Finding]:
         yield _api(connection)
         yield from _roles(connection)
         yield _audit(connection)
-        yield from _triggers(connection)
+        yield from _foreign(connection)
         yield from _settings(connection, embedded=dsn is None)
         yield from _work(connection)
         yield from _queue(connection)
@@ -153,27 +153,14 @@ def _audit(connection: psycopg.Connection[Any]) -> Finding:
     return Finding("ok", "audit", "takes new entries only")
 
 
-def _triggers(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
-    """Triggers on the tables that are not the project's own: they run with the rights of whoever writes there."""
-    rows = connection.execute(
-        """
-        SELECT format('%%I.%%I', n.nspname, c.relname), quote_ident(t.tgname), pg_get_userbyid(p.proowner)
-          FROM pg_trigger t JOIN pg_class c ON c.oid = t.tgrelid JOIN pg_namespace n ON n.oid = c.relnamespace
-          JOIN pg_proc p ON p.oid = t.tgfoid JOIN pg_namespace f ON f.oid = p.pronamespace
-         WHERE n.nspname = 'tunnel' AND NOT t.tgisinternal AND t.tgparentid = 0
-           AND NOT (c.relname = 'survey' AND t.tgname = ANY(%s) AND p.proname = t.tgname AND f.nspname = 'tunnel'
-                    AND (p.proowner IN (SELECT oid FROM pg_roles WHERE rolsuper)
-                         OR p.proowner IN (SELECT nspowner FROM pg_namespace WHERE nspname = 'tunnel_api')
-                         OR p.proowner IN (SELECT datdba FROM pg_database WHERE datname = current_database())))
-         ORDER BY 1, 2
-        """,
-        [list(TRIGGERS)],
-    ).fetchall()
-    for table, name, owner in rows:
-        text = f"{name} on {table} is not tunneldb's: it runs what {owner} wrote with the rights of whoever writes there"
-        yield Finding("wrong", "triggers", text, f"DROP TRIGGER {name} ON {table};")
-    if not rows:
-        yield Finding("ok", "triggers", "none but tunneldb's own")
+def _foreign(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+    """What is not the project's own on the tables: it runs with the rights of whoever writes there."""
+    found = list(foreign_objects(connection))
+    for subject, text, mend in found:
+        yield Finding("wrong", subject, f"{text} with the rights of whoever writes there", mend)
+    for subject in SUBJECTS:
+        if not any(subject == other for other, *_ in found):
+            yield Finding("ok", subject, "none but tunneldb's own")
 
 
 def _settings(connection: psycopg.Connection[Any], *, embedded: bool) -> Iterator[Finding]:

@@ -1,0 +1,133 @@
+"""What others than tunneldb have put on the tables of schema tunnel that runs with the rights of whoever writes there.
+
+Operators own the tables. A trigger, a rule, a policy, a view in a table's place, or a function in a check, a default, a
+generated column or an index runs with the rights of whoever writes: the database owner's behind the views and in his own runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import psycopg
+
+SUBJECTS = ("triggers", "expressions")
+"""What is looked at; rules and policies go with the expressions."""
+
+# Roles whose functions may run with the owner's rights: they have those anyway.
+_TRUSTED = """
+    SELECT oid FROM pg_roles WHERE rolsuper
+    UNION SELECT nspowner FROM pg_namespace WHERE nspname = 'tunnel_api'
+    UNION SELECT datdba FROM pg_database WHERE datname = current_database()
+"""
+
+# PostGIS may belong to another role, as on managed servers.
+_OF_EXTENSION = "EXISTS (SELECT FROM pg_depend e WHERE e.deptype = 'e' AND e.classid = {} AND e.objid = {})"
+
+# Tables of the schema, and all that inherit from them, wherever they are.
+_HELD = """
+    SELECT c.oid FROM pg_class c
+     WHERE c.relnamespace = 'tunnel'::regnamespace AND c.relkind IN ('r', 'p', 'v')
+    UNION
+    SELECT i.inhrelid FROM held JOIN pg_inherits i ON i.inhparent = held.oid
+"""
+
+# Table, trigger, schema and name of its function.
+_NOTES = ("note_insert", "note_update_old", "note_update_new", "note_delete")
+_OWN = (
+    *(("survey", name, "tunnel", name) for name in ("drop_points", "make_images")),
+    *((table, name, "tunnel", f"note_{table}") for table in ("anomaly", "coverage") for name in _NOTES),
+    *((table, "note_truncate", "tunnel", "forget_waterproof") for table in ("anomaly", "coverage")),
+    ("waterproof", "keep", "tunnel_api", "keep_at_commit"),
+)
+_OURS = ", ".join(str(each) for each in _OWN)
+
+_TRIGGERS = f"""
+WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_HELD})
+SELECT format('%s on %s is not tunneldb''s: it runs what %s wrote', quote_ident(t.tgname), t.tgrelid::regclass,
+              pg_get_userbyid(p.proowner)),
+       format('DROP TRIGGER %I ON %s;', t.tgname, t.tgrelid::regclass)
+  FROM pg_trigger t JOIN held ON held.oid = t.tgrelid JOIN pg_proc p ON p.oid = t.tgfoid
+ WHERE NOT t.tgisinternal AND t.tgparentid = 0
+   AND NOT (p.proowner IN (SELECT oid FROM trusted)
+            AND (t.tgrelid, t.tgname, p.pronamespace, p.proname) IN (
+                SELECT to_regclass('tunnel.' || o.held), o.trigger, o.namespace::regnamespace, o.function
+                  FROM (VALUES {_OURS}) AS o (held, trigger, namespace, function)))
+ ORDER BY 1
+"""
+
+# Rules and policies: tunneldb has none; a view in a table's place is one, too.
+_RULES = f"""
+WITH RECURSIVE held AS ({_HELD})
+SELECT format('rule %I on %s is not tunneldb''s: it runs', r.rulename, r.ev_class::regclass),
+       CASE WHEN r.rulename = '_RETURN' THEN format('DROP VIEW %s;', r.ev_class::regclass)
+            ELSE format('DROP RULE %I ON %s;', r.rulename, r.ev_class::regclass) END
+  FROM pg_rewrite r JOIN held ON held.oid = r.ev_class
+UNION ALL
+SELECT format('policy %I on %s is not tunneldb''s: it runs', y.polname, y.polrelid::regclass),
+       format('DROP POLICY %I ON %s;', y.polname, y.polrelid::regclass)
+  FROM pg_policy y JOIN held ON held.oid = y.polrelid
+ ORDER BY 1
+"""
+
+# Expressions by what they call: by the numbers of functions, operators and types in their trees, for dependences on what comes
+# with PostgreSQL, such as query_to_xml, are not kept. Those of tunneldb call what is immutable, the clock, and who is there.
+_EXPRESSIONS = f"""
+WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_HELD}),
+expression (relation, what, tree, mend) AS (
+    SELECT k.conrelid, format('check %I', k.conname), k.conbin::text,
+           format('ALTER TABLE %s DROP CONSTRAINT %I;', k.conrelid::regclass, k.conname)
+      FROM pg_constraint k JOIN held ON held.oid = k.conrelid WHERE k.contype = 'c' AND k.conislocal
+    UNION ALL
+    SELECT d.adrelid, format('default of column %I', a.attname), d.adbin::text,
+           format('ALTER TABLE %s ALTER COLUMN %I DROP %s;', d.adrelid::regclass, a.attname,
+                  CASE a.attgenerated WHEN '' THEN 'DEFAULT' ELSE 'EXPRESSION' END)
+      FROM pg_attrdef d JOIN held ON held.oid = d.adrelid JOIN pg_attribute a ON a.attrelid = d.adrelid AND a.attnum = d.adnum
+    UNION ALL
+    SELECT x.indrelid, format('index %s', x.indexrelid::regclass), concat(x.indexprs::text, x.indpred::text),
+           format('DROP INDEX %s;', x.indexrelid::regclass)
+      FROM pg_index x JOIN held ON held.oid = x.indrelid JOIN pg_class i ON i.oid = x.indexrelid AND NOT i.relispartition
+    UNION ALL
+    SELECT p.partrelid, 'partition key', p.partexprs::text, 'restore the table from a backup'
+      FROM pg_partitioned_table p JOIN held ON held.oid = p.partrelid
+    UNION ALL
+    SELECT a.attrelid, format('type of column %I', a.attname), format(':resulttype %s ', a.atttypid),
+           format('ALTER TABLE %s ALTER COLUMN %I TYPE %s;', a.attrelid::regclass, a.attname,
+                  format_type(coalesce(nullif(t.typbasetype, 0), 'text'::regtype), t.typtypmod))
+      FROM pg_attribute a JOIN held ON held.oid = a.attrelid JOIN pg_type t ON t.oid = a.atttypid
+     WHERE a.attnum > 0 AND NOT a.attisdropped
+),
+named AS (
+    SELECT e.*, m[1] AS kind, m[2]::oid AS number
+      FROM expression e CROSS JOIN LATERAL regexp_matches(e.tree, ':(funcid|opno|resulttype) (\\d+)', 'g') AS m
+),
+called AS (
+    SELECT n.relation, n.what, n.mend, p.oid::regprocedure::text AS name
+      FROM named n LEFT JOIN pg_operator o ON n.kind = 'opno' AND o.oid = n.number
+      JOIN pg_proc p ON p.oid = CASE n.kind WHEN 'funcid' THEN n.number WHEN 'opno' THEN o.oprcode END
+     WHERE (p.proowner NOT IN (SELECT oid FROM trusted) AND NOT {_OF_EXTENSION.format("'pg_proc'::regclass", "p.oid")})
+        OR (p.provolatile <> 'i'
+            AND p.oid NOT IN ('now()'::regprocedure, 'clock_timestamp()'::regprocedure, 'pg_backend_pid()'::regprocedure,
+                              'nextval(regclass)'::regprocedure))
+    UNION ALL
+    SELECT n.relation, n.what, n.mend, format_type(t.oid, NULL)
+      FROM named n JOIN pg_type t ON n.kind = 'resulttype' AND t.oid = n.number
+     WHERE t.typowner NOT IN (SELECT oid FROM trusted) AND NOT {_OF_EXTENSION.format("'pg_type'::regclass", "t.oid")}
+)
+SELECT format('%s of %s is not tunneldb''s: it runs %s', c.what, c.relation::regclass, string_agg(DISTINCT c.name, ', ')),
+       c.mend
+  FROM called c GROUP BY c.relation, c.what, c.mend ORDER BY 1
+"""
+
+
+def foreign_objects(connection: psycopg.Connection[Any]) -> Iterator[tuple[str, str, str]]:
+    """Yield what on the tables of schema tunnel is not tunneldb's and may run code with the rights of whoever writes there.
+
+    Yields
+    ------
+    (str, str, str)
+        One of SUBJECTS; what is where, to be followed by with whose rights it runs; the statement that takes it away.
+    """
+    for subject, query in (("triggers", _TRIGGERS), ("expressions", _RULES), ("expressions", _EXPRESSIONS)):
+        for text, mend in connection.execute(query.encode()).fetchall():
+            yield subject, text, mend
