@@ -29,54 +29,6 @@ from tunneldb.job.stages import STAGES
 FOLDER = Path(__file__).parent
 NOTE = "<!-- Written by generate_reference.py; edit what it reads, not this page. -->"
 
-# Columns that mean the same in every view.
-COMMON = {
-    "id": "Key",
-    "survey_id": "Key of the survey",
-    "survey": "Name of the survey",
-    "tunnel_id": "Key of the tunnel",
-    "tunnel": "Name of the tunnel",
-    "km": "Kilometre",
-    "n": "Number",
-    "segment": "Number of the segment",
-    "chainage": "Chainage, m",
-    "label": "Station, as 12+345.678",
-    "chainage_from": "Least chainage, m",
-    "chainage_to": "Greatest chainage, m",
-    "label_from": "Station at the least chainage, as 12+345.678",
-    "label_to": "Station at the greatest chainage, as 12+345.678",
-    "points": "Number of points",
-    "files": "Number of files",
-    "vertices": "Number of vertices",
-    "srid": "Coordinate reference system of the tunnel",
-    "half": "Place in the segment, %: 25 or 75",
-    "angle_step": "Width of an angular class, degrees",
-    "interpolated": "Angular classes without enough points of their own, or rejected",
-    "duration": "finished_at - started_at",
-    "leaks_open": "Of these, those not reviewed yet",
-    "leaks_confirmed": "Of these, those confirmed",
-    "leaks_rejected": "Leaks rejected",
-    "largest_area": "Area of the largest leak, m²",
-    "greatest_drop": "Greatest drop of intensity, dB",
-    "remark": "The reviewer's remark",
-    "created_at": "When the row was made",
-    "detected_at": "When it was last detected",
-    "drawn_by": "Who drew it last, set by the database",
-    "drawn_at": "When it was drawn last, set by the database",
-}
-# Tables whose columns have the same names and meaning as those of a view.
-TABLES = {"file": "scan_file", "stage_status": "run"} | dict.fromkeys(
-    [base + part for base in ("anomaly", "leak") for part in ("", "_unrolled", "_map", "_3d")], "anomaly"
-)
-# Columns geom that no table has.
-GEOMETRY = {
-    "axis": "The axis, tunnel's SRID",
-    "section_unrolled": "From its left to its right end, in the unrolled plane",
-    **dict.fromkeys(["leak_unrolled", "anomaly_unrolled"], "In the unrolled plane"),
-    **dict.fromkeys(["leak_map", "anomaly_map"], "On the map strip beside the axis, tunnel's SRID"),
-    **dict.fromkeys(["leak_3d", "anomaly_3d"], "On the lining in space, tunnel's SRID"),
-}
-
 
 def commands() -> str:
     """Return the page of the command line."""
@@ -213,30 +165,16 @@ def _views(conn: psycopg.Connection[Any]) -> Iterator[str]:
     rows = conn.execute(
         """
         SELECT c.relname, obj_description(c.oid, 'pg_class'), a.attname, format_type(a.atttypid, a.atttypmod),
-               coalesce(col_description(c.oid, a.attnum), '')
+               col_description(c.oid, a.attnum)
           FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid AND a.attnum > 0
          WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' ORDER BY c.oid, a.attnum
         """
     ).fetchall()
-    of_table = {
-        (table, column): text
-        for table, column, text in conn.execute(
-            """
-            SELECT c.relname, a.attname, col_description(c.oid, a.attnum)
-              FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid AND a.attnum > 0
-             WHERE c.relnamespace = 'tunnel'::regnamespace AND c.relkind IN ('r', 'p')
-            """
-        ).fetchall()
-    }
     for view in dict.fromkeys(row[0] for row in rows):
         columns = [row for row in rows if row[0] == view]
         yield f"### {view}"
         yield _sentence(columns[0][1])
-        lines = []
-        for _, _, column, kind, comment in columns:
-            text = comment or COMMON.get(column) or of_table.get((TABLES.get(view, view), column)) or GEOMETRY.get(view, "")
-            lines.append((f"`{column}`", kind, text))
-        yield _table(("column", "type", "meaning"), lines)
+        yield _table(("column", "type", "meaning"), [(f"`{column}`", kind, text) for _, _, column, kind, text in columns])
 
 
 def _functions(conn: psycopg.Connection[Any]) -> Iterator[str]:

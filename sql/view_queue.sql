@@ -20,6 +20,7 @@ COMMENT ON VIEW tunnel_api.incoming IS 'Files that a batch is to read: waiting, 
 COMMENT ON COLUMN tunnel_api.incoming.id IS 'Made from survey and name, for programs that need a key';
 COMMENT ON COLUMN tunnel_api.incoming.points IS 'Points that its header announces; 0 if it is unreadable';
 COMMENT ON COLUMN tunnel_api.incoming.km_from IS 'First kilometre that it may touch, by its header; NULL if that is unreadable';
+COMMENT ON COLUMN tunnel_api.incoming.state IS 'waiting to be read, or failed';
 COMMENT ON COLUMN tunnel_api.incoming.message IS 'Why it failed, and what to do';
 
 CREATE OR REPLACE VIEW tunnel_api.job AS
@@ -35,8 +36,10 @@ SELECT j.id, (j.args->>'survey_id')::integer AS survey_id, s.name AS survey, (j.
   LEFT JOIN LATERAL (SELECT u.message FROM tunnel.run u WHERE u.job_id = j.id ORDER BY u.id DESC LIMIT 1) r ON true;
 COMMENT ON VIEW tunnel_api.job IS 'Jobs of the queue: a stage of a kilometre, or the reading of a file';
 COMMENT ON COLUMN tunnel_api.job.file IS 'Name of the file to be read; NULL for a stage of a kilometre';
+COMMENT ON COLUMN tunnel_api.job.stage IS 'Stage of the kilometre; read where a file is to be read';
 COMMENT ON COLUMN tunnel_api.job.state IS 'queued, running, done, failed or cancelled';
 COMMENT ON COLUMN tunnel_api.job.attempts IS 'How often it was begun before';
+COMMENT ON COLUMN tunnel_api.job.worker_id IS 'Key of the worker that runs or ran it; NULL before and when that has left';
 COMMENT ON COLUMN tunnel_api.job.worker IS 'Machine and process that runs or ran it';
 COMMENT ON COLUMN tunnel_api.job.since IS 'When it came into this state';
 COMMENT ON COLUMN tunnel_api.job.message IS 'Why it failed';

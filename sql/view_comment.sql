@@ -1,0 +1,66 @@
+-- Comments of the views' columns that have none of their own, for psql, QGIS and the reference: what a name means in every view,
+-- else what the column of the same name in the table behind the view is said to be. Needs all views.
+
+COMMENT ON COLUMN tunnel_api.axis.geom IS 'The axis, tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.section_unrolled.geom IS 'From its left to its right end, in the unrolled plane';
+
+DO $$
+DECLARE
+    bare record;
+BEGIN
+    FOR bare IN
+        SELECT v.oid::regclass AS view, a.attname AS name, coalesce(m.text, col_description(t.oid, b.attnum), g.text) AS text
+          FROM pg_class v
+          JOIN pg_attribute a ON a.attrelid = v.oid AND a.attnum > 0
+          LEFT JOIN (VALUES
+                ('id', 'Key'),
+                ('survey_id', 'Key of the survey'),
+                ('survey', 'Name of the survey'),
+                ('tunnel_id', 'Key of the tunnel'),
+                ('tunnel', 'Name of the tunnel'),
+                ('km', 'Kilometre'),
+                ('n', 'Number'),
+                ('segment', 'Number of the segment'),
+                ('chainage', 'Chainage, m'),
+                ('label', 'Station, as 12+345.678'),
+                ('chainage_from', 'Least chainage, m'),
+                ('chainage_to', 'Greatest chainage, m'),
+                ('label_from', 'Station at the least chainage, as 12+345.678'),
+                ('label_to', 'Station at the greatest chainage, as 12+345.678'),
+                ('points', 'Number of points'),
+                ('files', 'Number of files'),
+                ('vertices', 'Number of vertices'),
+                ('srid', 'Coordinate reference system of the tunnel'),
+                ('half', 'Place in the segment, %: 25 or 75'),
+                ('angle_step', 'Width of an angular class, degrees'),
+                ('interpolated', 'Angular classes without enough points of their own, or rejected'),
+                ('duration', 'finished_at - started_at'),
+                ('leaks_open', 'Of these, those not reviewed yet'),
+                ('leaks_confirmed', 'Of these, those confirmed'),
+                ('leaks_rejected', 'Leaks rejected'),
+                ('largest_area', 'Area of the largest leak, m²'),
+                ('greatest_drop', 'Greatest drop of intensity, dB'),
+                ('remark', 'The reviewer''s remark'),
+                ('created_at', 'When the row was made'),
+                ('detected_at', 'When it was last detected'),
+                ('drawn_by', 'Who drew it last, set by the database'),
+                ('drawn_at', 'When it was drawn last, set by the database')) AS m (name, text) ON m.name = a.attname
+          LEFT JOIN (VALUES
+                ('_unrolled', 'In the unrolled plane'),
+                ('_map', 'On the map strip beside the axis, tunnel''s SRID'),
+                ('_3d', 'On the lining in space, tunnel''s SRID')) AS g (place, text)
+                 ON a.attname = 'geom' AND v.relname ~ ('^(leak|anomaly)' || g.place || '$')
+          LEFT JOIN pg_class t
+                 ON t.relnamespace = 'tunnel'::regnamespace AND t.relkind IN ('r', 'p')
+                AND t.relname = CASE WHEN v.relname = 'file' THEN 'scan_file'
+                                     WHEN v.relname = 'stage_status' THEN 'run'
+                                     WHEN v.relname ~ '^(leak|anomaly)(_|$)' THEN 'anomaly'
+                                     ELSE v.relname END
+          LEFT JOIN pg_attribute b ON b.attrelid = t.oid AND b.attname = a.attname
+         WHERE v.relnamespace = 'tunnel_api'::regnamespace AND v.relkind = 'v'
+           AND col_description(v.oid, a.attnum) IS NULL
+    LOOP
+        EXECUTE format('COMMENT ON COLUMN %s.%I IS %L', bare.view, bare.name, bare.text);
+    END LOOP;
+END
+$$;
