@@ -23,13 +23,14 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
                   FROM (SELECT t.chainage, t.arc[1] AS left_end, t.arc[361] AS right_end
                           FROM tunnel.section t WHERE t.survey_id = s.id) e
                 WINDOW w AS (ORDER BY e.chainage)) q) a
+ CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
  CROSS JOIN LATERAL (  -- a survey that ends some centimetres into the next sheet has none for them
         SELECT i AS number
           FROM tunnel.segment g
          CROSS JOIN generate_series(floor(g.chainage_from / 50)::integer, ceil(g.chainage_to / 50)::integer - 1) AS i
          WHERE g.survey_id = s.id
          GROUP BY i
-        HAVING sum(least(g.chainage_to, (i + 1) * 50) - greatest(g.chainage_from, i * 50)) >= 1) n
+        HAVING sum(least(g.chainage_to, e.chainage_to, (i + 1) * 50) - greatest(g.chainage_from, e.chainage_from, i * 50)) >= 1) n
  CROSS JOIN LATERAL (
         SELECT n.number * 50::float8 AS chainage_from, (n.number + 1) * 50::float8 AS chainage_to,
                floor(n.number / 20.0)::integer AS km) b
@@ -40,8 +41,9 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
   LEFT JOIN LATERAL (
         SELECT sum(v.lining::float8) AS lining, sum(v.seen::float8) AS seen
           FROM tunnel.coverage q
-         CROSS JOIN LATERAL (SELECT round((b.chainage_from - b.km * 1000) / q.step)::integer + 1 AS first,
-                                    round((b.chainage_to - b.km * 1000) / q.step)::integer AS last) p
+         CROSS JOIN LATERAL (
+                SELECT round((greatest(b.chainage_from, e.chainage_from) - b.km * 1000) / q.step)::integer + 1 AS first,
+                       round((least(b.chainage_to, e.chainage_to) - b.km * 1000) / q.step)::integer AS last) p
          CROSS JOIN LATERAL unnest(q.lining[p.first:p.last], q.seen[p.first:p.last]) AS v (lining, seen)
          WHERE q.survey_id = s.id AND q.km = b.km) c ON true
   LEFT JOIN LATERAL (

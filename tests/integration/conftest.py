@@ -19,7 +19,7 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.leak.geometries import shapes
 from tunneldb.leak.image import BLOCK, Grid
 from tunneldb.leak.lining import State
-from tunneldb.leak.raster import KINDS, Raster, encode
+from tunneldb.leak.raster import KINDS, Raster, decode, encode
 from tunneldb.leak.store import DARK
 
 DATABASE = "tunneldb_example"
@@ -170,7 +170,7 @@ def _files_and_runs(conn: psycopg.Connection, survey_id: int) -> None:
     conn.execute(
         "INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, thinned, kept, "
         "chainage_from, chainage_to, loaded_at) VALUES "
-        "(%s, 'demo.laz', '/scans/demo.laz', repeat('0', 64), 1000, 100, 1, 2, 37, 60, 12300.1, 12499.9, '2024-05-05 08:00Z')",
+        "(%s, 'demo.laz', '/scans/demo.laz', repeat('0', 64), 1000, 100, 1, 2, 37, 60, 12300, 12500, '2024-05-05 08:00Z')",
         (survey_id,),
     )
     for hour, stage in enumerate(["load", "axis", "segments", "sections", "ground", "detect"], start=8):
@@ -301,6 +301,20 @@ def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines
                 "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %s)",
                 (survey_id, KM, kind, block, encode(Raster(held, grid.transform(columns.start)), kind)),
             )
+
+
+def without_intensity(conn: psycopg.Connection, every: int = 1) -> None:
+    """Make the example a survey without intensity, of whose offset images only every so manyth column holds points."""
+    for table in ("anomaly", "coverage", "radiometry", "range_curve"):
+        conn.execute(sql.SQL("DELETE FROM tunnel.{}").format(sql.Identifier(table)))
+    conn.execute("DELETE FROM tunnel.image WHERE kind <> 'offset'")
+    conn.execute("UPDATE tunnel.survey SET intensity_kind = 'none', intensity_dimension = NULL, reference = 'none'")
+    for block, tiff in conn.execute("SELECT block, tiff FROM tunnel.image", binary=True).fetchall():
+        image = decode(bytes(tiff))
+        number = np.arange(image.values.shape[1]) + block * image.values.shape[1]
+        image.values[:, number % every > 0] = np.nan
+        conn.execute("UPDATE tunnel.image SET tiff = %s WHERE block = %s", [encode(image, "offset"), block])
+    conn.commit()
 
 
 def _states(x: np.ndarray, y: np.ndarray) -> np.ndarray:
