@@ -1,5 +1,5 @@
--- Views of what the leaks of each kilometre sum up to, and of the radiometry they rest on. Needs stretch_statistics
--- (statistics.sql).
+-- Views of what the leaks of each kilometre sum up to, and of the radiometry they rest on. Classes of waterproofing are in
+-- waterproof.sql.
 
 CREATE OR REPLACE VIEW tunnel_api.range_curve AS
 SELECT (r.survey_id::bigint * 1000000 + 500000 + r.km) * 10000 + c.n AS id, r.survey_id, s.name AS survey, r.km,
@@ -41,13 +41,9 @@ SELECT s.id::bigint * 1000000 + 500000 + g.km AS id, s.id AS survey_id, s.name A
        l.wet_area, l.wet_area / nullif(d.seen, 0) AS wet_share, c.wet / nullif(c.seen, 0) AS wet_pixel_share, l.leaks,
        l.leaks_open, l.leaks_confirmed, l.leaks_rejected, l.largest_area, l.greatest_drop
   FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
-  JOIN (SELECT survey_id, km, min(chainage_from) AS low, max(chainage_to) AS high
-          FROM tunnel.segment GROUP BY survey_id, km) k ON k.survey_id = s.id
- CROSS JOIN LATERAL (
-        SELECT k.survey_id, k.km, r.low AS chainage_from, r.high AS chainage_to,
-               r.low < k.km * 1000 + 1e-6 AND r.high > (k.km + 1) * 1000 - 1e-6 AS whole
-          FROM (SELECT greatest(k.low, e.chainage_from) AS low, least(k.high, e.chainage_to) AS high) r) g
+  JOIN (SELECT survey_id, km, min(chainage_from) AS chainage_from, max(chainage_to) AS chainage_to,
+               min(chainage_from) < km * 1000 + 1e-6 AND max(chainage_to) > (km + 1) * 1000 - 1e-6 AS whole
+          FROM tunnel.segment GROUP BY survey_id, km) g ON g.survey_id = s.id
   LEFT JOIN tunnel.coverage w ON w.survey_id = g.survey_id AND w.km = g.km
   LEFT JOIN LATERAL (
         SELECT w.lining_total AS lining, w.seen_total AS seen, w.wet_total AS wet WHERE g.whole
@@ -81,28 +77,3 @@ COMMENT ON COLUMN tunnel_api.km_statistics.wet_area IS 'Area of the leaks on the
 COMMENT ON COLUMN tunnel_api.km_statistics.wet_share IS 'wet_area / seen_area';
 COMMENT ON COLUMN tunnel_api.km_statistics.wet_pixel_share IS 'Share of wet pixels, after the median filter, in the lining seen (Xu et al., 2018)';
 COMMENT ON COLUMN tunnel_api.km_statistics.leaks IS 'Leaks open or confirmed';
-
-CREATE OR REPLACE VIEW tunnel_api.km_waterproof AS
-SELECT s.id::bigint * 1000000 + 500000 + k.km AS id, s.id AS survey_id, s.name AS survey, k.km,
-       t.chainage_from, t.chainage_to, t.lining_area, t.seen_share, t.wet_area, t.wet_ratio, t.patches, t.largest_area,
-       t.largest_leak, t.window_patches, t.window_from, t.window_to, t.window_wet_area, t.class
-  FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
-  JOIN (SELECT survey_id, km, min(chainage_from) AS low, max(chainage_to) AS high
-          FROM tunnel.segment GROUP BY survey_id, km) k ON k.survey_id = s.id
- CROSS JOIN LATERAL tunnel_api.stretch_statistics(
-        s.id, ARRAY[greatest(k.low, e.chainage_from)], ARRAY[least(k.high, e.chainage_to)]) t;
-COMMENT ON VIEW tunnel_api.km_waterproof IS
-    'Waterproofing of each kilometre by GB 50108-2008, as far as a scan can tell: see leak_statistics and waterproof_class';
-COMMENT ON COLUMN tunnel_api.km_waterproof.lining_area IS 'Lining, seen or not, m²';
-COMMENT ON COLUMN tunnel_api.km_waterproof.seen_share IS 'Share of it that was seen: the rest cannot be certified';
-COMMENT ON COLUMN tunnel_api.km_waterproof.wet_area IS 'Area of the leaks within the kilometre, m²; a leak over its end by its part';
-COMMENT ON COLUMN tunnel_api.km_waterproof.wet_ratio IS 'wet_area, of the lining seen';
-COMMENT ON COLUMN tunnel_api.km_waterproof.patches IS 'Leaks in the kilometre or over its ends';
-COMMENT ON COLUMN tunnel_api.km_waterproof.largest_area IS 'Area of the largest of them, whole, m²';
-COMMENT ON COLUMN tunnel_api.km_waterproof.largest_leak IS 'Its id';
-COMMENT ON COLUMN tunnel_api.km_waterproof.window_patches IS 'Most leaks in any 100 m² of lining';
-COMMENT ON COLUMN tunnel_api.km_waterproof.window_from IS 'Where those 100 m² begin, m';
-COMMENT ON COLUMN tunnel_api.km_waterproof.window_to IS 'Where they end, m';
-COMMENT ON COLUMN tunnel_api.km_waterproof.window_wet_area IS 'Greatest wet area in any 100 m² of lining, m²';
-COMMENT ON COLUMN tunnel_api.km_waterproof.class IS 'Best class that the lining seen keeps; NULL if none was seen';

@@ -155,14 +155,11 @@ def read_coverage(conn: psycopg.Connection[Any], survey: Survey, low: float, hig
     """Read lining and lining seen of a stretch by bins of 1 m."""
     edges = np.unique(np.concatenate([[low], np.arange(np.ceil(low), np.floor(high) + 1), [high]]))
     edges = edges[(edges >= low) & (edges <= high)]
-    row = conn.execute(
-        "SELECT tunnel_api.interpolate(%(edges)s, c.chainage, c.lining), tunnel_api.interpolate(%(edges)s, c.chainage, c.seen)"
-        " FROM tunnel_api.coverage_sums(%(id)s, %(low)s, %(high)s) c WHERE c.chainage IS NOT NULL",
-        {"edges": edges.tolist(), "id": survey.id, "low": float(low), "high": float(high)},
-    ).fetchone()
-    if row is None or row[0] is None:
-        return Coverage(edges, np.zeros(len(edges) - 1), np.zeros(len(edges) - 1))
-    return Coverage(edges, np.diff(np.array(row[0])), np.diff(np.array(row[1])))
+    rows = conn.execute(
+        "SELECT c.lining, c.seen FROM tunnel_api.coverage_at(%s, %s) c ORDER BY c.n", (survey.id, edges.tolist())
+    ).fetchall()
+    lining, seen = np.diff(np.array(rows, float), axis=0).T
+    return Coverage(edges, lining, seen)
 
 
 def hidden_stretches(coverage: Coverage) -> list[tuple[float, float, float]]:

@@ -9,7 +9,7 @@ from tunneldb.database.models.catalog import AlignmentElement, Pose, Reference, 
 from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
 from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
 from tunneldb.database.models.ground import Cluster, Ground, Lining, TargetSphere
-from tunneldb.database.models.leak import Anomaly, AnomalyPart, Coverage, Image, Radiometry, RangeCurve, Region
+from tunneldb.database.models.leak import Anomaly, AnomalyPart, Coverage, Image, Radiometry, RangeCurve, Region, Waterproof
 from tunneldb.database.models.work import Audit, Goal, Run, Worker
 
 __all__ = [
@@ -45,5 +45,6 @@ __all__ = [
     "Survey",
     "TargetSphere",
     "Tunnel",
+    "Waterproof",
     "Worker",
 ]

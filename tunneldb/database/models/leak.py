@@ -62,6 +62,48 @@ class Coverage(Base):
     )
     seen_total: Mapped[float | None] = mapped_column(Computed("tunnel.total(seen)", persisted=True), comment="Sum of seen, m²")
     wet_total: Mapped[float | None] = mapped_column(Computed("tunnel.total(wet)", persisted=True), comment="Sum of wet, m²")
+    lining_sums: Mapped[Floats | None] = mapped_column(
+        Computed("tunnel.running_sums(lining)", persisted=True), comment="Sum of lining before each step, and of all, m²"
+    )
+    seen_sums: Mapped[Floats | None] = mapped_column(
+        Computed("tunnel.running_sums(seen)", persisted=True), comment="Sum of seen before each step, and of all, m²"
+    )
+    wet_sums: Mapped[Floats | None] = mapped_column(
+        Computed("tunnel.running_sums(wet)", persisted=True), comment="Sum of wet before each step, and of all, m²"
+    )
+
+
+class Waterproof(Base):
+    """What is kept of a kilometre's waterproofing, or a note that something changed there."""
+
+    __tablename__ = "waterproof"
+    __table_args__ = (
+        Index(None, "survey_id", "km"),
+        {
+            "comment": "Statistics of waterproofing of kilometres, and notes that something changed there: the statistics hold "
+            "while their row is the only one of its kilometre"
+        },
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    km: Mapped[int] = mapped_column(comment=KM)
+    chainage_from: Mapped[float | None] = mapped_column(
+        comment="Where its stretch begins, m; NULL in a row that notes a change"
+    )
+    chainage_to: Mapped[float | None] = mapped_column(comment="Where it ends, m")
+    lining_area: Mapped[float | None] = mapped_column(comment="Lining, seen or not, m²")
+    seen_share: Mapped[float | None] = mapped_column(comment="Share of it that was seen")
+    wet_area: Mapped[float | None] = mapped_column(comment="Area of the leaks within the kilometre, m²")
+    wet_ratio: Mapped[float | None] = mapped_column(comment="wet_area, of the lining seen")
+    patches: Mapped[int | None] = mapped_column(comment="Leaks in the kilometre or over its ends")
+    largest_area: Mapped[float | None] = mapped_column(comment="Area of the largest of them, whole, m²")
+    largest_leak: Mapped[int | None] = mapped_column(BigInteger, comment="Its id")
+    window_patches: Mapped[int | None] = mapped_column(comment="Most leaks in any 100 m² of lining")
+    window_from: Mapped[float | None] = mapped_column(comment="Where those 100 m² begin, m")
+    window_to: Mapped[float | None] = mapped_column(comment="Where they end, m")
+    window_wet_area: Mapped[float | None] = mapped_column(comment="Greatest wet area in any 100 m² of lining, m²")
+    class_: Mapped[int | None] = mapped_column("class", comment="Best class of waterproofing that the lining seen keeps")
 
 
 class Region(Base):
@@ -119,6 +161,7 @@ class Anomaly(Base):
             None, "survey_id", "chainage_from", "chainage_to",
             postgresql_include=["id", "kind", "judged", "review", "detected", "area"],
         ),
+        Index("anomaly_length_idx", "survey_id", text("(chainage_to - chainage_from)")),
         Index(None, "survey_id", "area"),
         Index(None, "survey_id", "created_at"),
         Index("anomaly_gone_idx", "survey_id", postgresql_where=text("NOT detected")),
