@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 
 import numpy as np
 import psycopg
@@ -81,6 +82,43 @@ def test_table_lists_every_leak(example):
     rows = list(csv.DictReader(run("leaks", example, "--format", "csv").stdout.splitlines()))
     assert all(row["label"] in text for row in rows)
     assert "confirmed" in text
+
+
+HEADINGS = [
+    *("id", "chainage", "length m", "arc m", "clock", "kind", "conf.", "contrast", "area m²", "drop dB", "max dB", "image"),
+    *("review", "by"),
+]
+
+
+@pytest.mark.parametrize("kind", ["leak", "all"])
+@pytest.mark.parametrize("width", [80, 100, 120, 132, 200])
+def test_table_fits_the_terminal(conn, example, width, kind):
+    """What is shown is whole, on one line a leak; what there is no room for is named."""
+    conn.execute("UPDATE tunnel.anomaly SET detected = false, reviewed_by = 'inspectora.de.guardia' WHERE review = 'confirmed'")
+    conn.commit()
+    terminal = {"FORCE_COLOR": "1", "TERM": "xterm", "COLUMNS": str(width)}
+    result = CliRunner().invoke(main, ["leaks", example, "--kind", kind], env=terminal)
+    assert result.exit_code == 0
+    lines = re.sub(r"\x1b\[[0-9;]*m", "", result.stdout).splitlines()
+    assert max(map(len, lines)) <= width
+    (head,) = (line for line in lines if "chainage" in line)
+    shown = [cell.strip() for cell in head.strip("┃").split("┃")]
+    said = " ".join(line.strip() for line in lines[-4:])
+    hidden = said.partition("shows: ")[2].split(", ") if "shows: " in said else []
+    assert [name for name in HEADINGS if name in shown] == shown
+    assert sorted(shown + hidden) == sorted(HEADINGS)
+    assert {"id", "chainage", "area m²", "review", *(("kind",) if kind == "all" else ())} <= set(shown)
+    assert (width < 200) == bool(hidden)
+    rows = [[cell.strip() for cell in line.strip("│").split("│")] for line in lines if line.startswith("│")]
+    text = run("leaks", example, "--kind", kind, "--format", "csv").stdout
+    listed = {row["id"]: row for row in csv.DictReader(text.splitlines())}
+    assert {row[0] for row in rows} == set(listed)
+    for row in rows:
+        cells, leak = dict(zip(shown, row, strict=True)), listed[row[0]]
+        assert cells["chainage"] == leak["label"]
+        assert cells["review"].partition(",")[0] == leak["review"]
+        assert cells["area m²"] == f"{float(leak['area']):.2f}"
+    assert "…" not in "".join(lines)
 
 
 @pytest.mark.parametrize(("kind", "number"), [("leak", 6), ("joint", 1), ("dark", 2), ("all", 9)])

@@ -31,7 +31,7 @@ from tunneldb.export.leaks import (
 from tunneldb.job.run import loaded_kilometres, parse_km
 
 _BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
-_WIDTH = 180
+_WIDTH = 1000  # a pipe or a file has no width: nothing is to be cut there
 _HOUR = r"(1[0-2]|[1-9])(?::([0-5]\d))?"
 _CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
 
@@ -164,9 +164,10 @@ def _print_classes(conn: psycopg.Connection, survey: Survey, kilometres: list[in
 def _print(rows: list[Anomaly], form: str, geometry: Geometry, kind: Kind, survey: Survey) -> None:
     if form == "table":
         console = Console()
-        if not console.is_terminal:
-            console = Console(width=_WIDTH)
-        console.print(as_table(rows, survey.name, kind))
+        if console.is_terminal:
+            console.print(as_table(rows, survey.name, kind, console.width))
+        else:
+            Console(width=_WIDTH).print(as_table(rows, survey.name, kind))
     else:
         click.echo(_text(rows, form, geometry, kind, survey), nl=False)
 

@@ -8,7 +8,7 @@ import io
 import json
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
@@ -19,6 +19,7 @@ import pyogrio.raw
 import shapely
 from numpy.typing import NDArray
 from psycopg import sql
+from rich.cells import cell_len
 from rich.table import Table
 from shapely.geometry import Polygon, mapping
 
@@ -160,33 +161,54 @@ def read_leaks(
     return [Anomaly(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True))) for row in rows]
 
 
-def as_table(leaks: Sequence[Anomaly], title: str, kind: Kind) -> Table:
-    """Lay leaks or what else was read out for a terminal."""
-    table = Table(title=title, caption=total(leaks, kind))
-    left = ("kind", "review", "by")
-    for heading in (
-        *("id", "chainage", "length m", "arc m", "clock", "kind", "conf.", "contrast", "area m²", "drop dB", "max dB", "image"),
-        *("review", "by"),
-    ):
-        table.add_column(heading, justify="left" if heading in left else "right", no_wrap=True)
-    for leak in leaks:
-        table.add_row(
-            str(leak.id),
-            leak.label,
-            f"{leak.chainage_to - leak.chainage_from:.2f}",
-            f"{leak.arc_from:+.2f} to {leak.arc_to:+.2f}",
-            clock_label(leak.clock),
-            leak.kind,
-            "" if leak.confidence is None else f"{leak.confidence:.2f}",
-            "" if leak.contrast is None else f"{leak.contrast:.1f}",
-            f"{leak.area:.2f}",
-            f"{leak.drop_mean:.1f}",
-            f"{leak.drop_max:.1f}",
-            f"{100 * leak.image_share:.0f} %",
-            leak.review if leak.detected else f"{leak.review}, not found again",
-            leak.reviewed_by or "",
-        )
+def as_table(leaks: Sequence[Anomaly], title: str, kind: Kind, width: int | None = None) -> Table:
+    """Lay leaks or what else was read out for a terminal.
+
+    Parameters
+    ----------
+    leaks, title, kind
+        What was read, and from where.
+    width : int, optional
+        Columns of the terminal. Where there is no room for all, the least important are left out and named below.
+    """
+    cells = {heading: [cell(leak) for leak in leaks] for heading, cell in _CELLS.items()}
+    hidden = []
+    for heading in _LEAST_FIRST if kind == "all" else ("kind", *_LEAST_FIRST):
+        if width is None or _width(cells) <= width:
+            break
+        if cells.pop(heading, None) is not None:
+            hidden.append(heading)
+    lack = f"; a wider window or --format csv shows: {', '.join(h for h in _CELLS if h in hidden)}" if hidden else ""
+    table = Table(title=title, caption=f"{total(leaks, kind)}{lack}")
+    for heading in cells:
+        table.add_column(heading, justify="left" if heading in ("kind", "review", "by") else "right", no_wrap=True)
+    for row in zip(*cells.values(), strict=True):
+        table.add_row(*row)
     return table
+
+
+def _width(cells: dict[str, list[str]]) -> int:
+    """Width of a table with lines between its columns."""
+    return 1 + sum(3 + max(map(cell_len, (heading, *column))) for heading, column in cells.items())
+
+
+_CELLS: dict[str, Callable[[Anomaly], str]] = {
+    "id": lambda leak: str(leak.id),
+    "chainage": lambda leak: leak.label,
+    "length m": lambda leak: f"{leak.chainage_to - leak.chainage_from:.2f}",
+    "arc m": lambda leak: f"{leak.arc_from:+.2f} to {leak.arc_to:+.2f}",
+    "clock": lambda leak: clock_label(leak.clock),
+    "kind": lambda leak: leak.kind,
+    "conf.": lambda leak: "" if leak.confidence is None else f"{leak.confidence:.2f}",
+    "contrast": lambda leak: "" if leak.contrast is None else f"{leak.contrast:.1f}",
+    "area m²": lambda leak: f"{leak.area:.2f}",
+    "drop dB": lambda leak: f"{leak.drop_mean:.1f}",
+    "max dB": lambda leak: f"{leak.drop_max:.1f}",
+    "image": lambda leak: f"{100 * leak.image_share:.0f} %",
+    "review": lambda leak: leak.review if leak.detected else f"{leak.review}, not found again",
+    "by": lambda leak: leak.reviewed_by or "",
+}
+_LEAST_FIRST = ("image", "max dB", "contrast", "length m", "by", "drop dB", "conf.", "arc m", "kind")
 
 
 def clock_label(hours: float) -> str:
