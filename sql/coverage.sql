@@ -77,12 +77,28 @@ COMMENT ON FUNCTION tunnel_api.coverage_at(int, float8[]) IS
 'At each of some chainages of a survey (m): length of tunnel that was looked at (m), its lining, the lining seen and wet pixels (m²), all from where the survey begins on. The differences between two places are those of the stretch between; a step that a place cuts counts by its share.';
 
 
--- Where a survey begins and ends, by its segments.
+-- Where a survey begins and ends: at its first and last point, within its segments. Segments end at vertices, up to a spacing
+-- beyond the points, and lining out there is nothing that a survey should have seen. Files know where they reach along the
+-- given axis, on which segment n goes from n to n + 1 times the spacing; that is carried over to the axis found.
 CREATE OR REPLACE FUNCTION tunnel_api.survey_ends(survey_id int, OUT chainage_from float8, OUT chainage_to float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
+COST 5000  -- once a survey, not once a kilometre
 SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
-AS $$ SELECT min(g.chainage_from), max(g.chainage_to) FROM tunnel.segment g WHERE g.survey_id = $1 $$;
-COMMENT ON FUNCTION tunnel_api.survey_ends(int) IS 'Least and greatest chainage (m) of the segments of a survey.';
+AS $$
+    SELECT min(g.chainage_from + (g.chainage_to - g.chainage_from) * greatest(0, f.first - g.n)),
+        max(g.chainage_to - (g.chainage_to - g.chainage_from) * greatest(0, g.n + 1 - f.last))
+    FROM (SELECT coalesce(min(q.chainage_from) / t.spacing, '-Infinity') AS first,
+                 coalesce(max(q.chainage_to) / t.spacing, 'Infinity') AS last
+          FROM tunnel.survey s
+          JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+          LEFT JOIN tunnel.scan_file q ON q.survey_id = s.id
+          WHERE s.id = $1
+          GROUP BY t.spacing) f
+    JOIN tunnel.segment g ON g.n < f.last AND g.n + 1 > f.first
+    WHERE g.survey_id = $1
+$$;
+COMMENT ON FUNCTION tunnel_api.survey_ends(int) IS
+'Least and greatest chainage (m) of what a survey scanned: its first and last point, within its segments.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.coverage(

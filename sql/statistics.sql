@@ -330,6 +330,8 @@ DECLARE
     extent record;
     starts float8[];
     ends float8[];
+    first_whole float8;
+    last_whole float8;
 BEGIN
     IF NOT (ring_length >= 0.1 AND ring_length < 'Infinity') THEN
         RAISE EXCEPTION 'a ring must be at least 0.1 m long, not % m', ring_length USING ERRCODE = 'invalid_parameter_value';
@@ -347,11 +349,21 @@ BEGIN
     FROM generate_series(
         greatest(1, floor((greatest(extent.chainage_from, stretch_from) - first_chainage) / ring_length + 1e-9)::int + 1),
         ceil((least(extent.chainage_to, stretch_to) - first_chainage) / ring_length - 1e-9)::int) i;
+    IF starts IS NULL THEN
+        RETURN;
+    END IF;
+    first_whole := starts[1];
+    last_whole := ends[cardinality(ends)];
+    -- of a ring that was scanned in part, that part
+    starts[1] := greatest(starts[1], extent.chainage_from);
+    ends[cardinality(ends)] := least(last_whole, extent.chainage_to);
     RETURN QUERY
-        SELECT round((t.chainage_from - first_chainage) / ring_length)::int + 1, t.chainage_from, t.chainage_to,
-            (SELECT c.label FROM tunnel_api.stationing(tunnel_key, t.chainage_from) c), t.lining_area, t.seen_share,
+        SELECT round((r.low - first_chainage) / ring_length)::int + 1, r.low, r.high,
+            (SELECT c.label FROM tunnel_api.stationing(tunnel_key, r.low) c), t.lining_area, t.seen_share,
             t.wet_area, t.wet_ratio, t.patches, t.largest_area, t.class
-        FROM tunnel_api.stretch_statistics(survey_key, starts, ends) t;
+        FROM tunnel_api.stretch_statistics(survey_key, starts, ends) t
+        CROSS JOIN LATERAL (SELECT CASE t.n WHEN 1 THEN first_whole ELSE t.chainage_from END AS low,
+            CASE t.n WHEN cardinality(ends) THEN last_whole ELSE t.chainage_to END AS high) r;
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.ring_statistics(text, float8, float8, float8, float8) IS
