@@ -152,6 +152,8 @@ _TABLES = {
     f"{_COORDINATES.format('unrolled')}, {_COORDINATES.format('map')}, {_COORDINATES.format('surface')}, review, detected "
     "FROM tunnel.anomaly ORDER BY 2, 4",
     "anomaly_part": "SELECT km, pixel, box, mask, filled, drop_sum, drop_max, traits FROM tunnel.anomaly_part ORDER BY km, box",
+    "waterproof": "SELECT km, chainage_from, chainage_to, lining_area, seen_share, wet_area, patches, largest_area, "
+    "window_patches, window_wet_area, class FROM tunnel_api.km_waterproof ORDER BY km",
     "tables": "SELECT relname FROM pg_class WHERE relnamespace = 'tunnel'::regnamespace AND relkind IN ('r', 'p') ORDER BY 1",
     "goal": "SELECT km, stage, parameters::text FROM tunnel.goal ORDER BY km",
     "incoming": "SELECT name, message FROM tunnel.incoming ORDER BY name",
