@@ -17,8 +17,8 @@ from shapely.geometry import Polygon
 
 from tunneldb.simulate import Parameters, Simulation
 from tunneldb.simulate.leaks import Leak
-from tunneldb.simulate.ray import scene
 from tunneldb.simulate.scanner import BlockPlan
+from tunneldb.simulate.scene import scene
 
 SRID = 25830
 NAME = "long"

@@ -23,9 +23,10 @@ from tunneldb.simulate.overhead import overhead, sleepers
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.placing import stand
 from tunneldb.simulate.profile import slabs
-from tunneldb.simulate.ray import scene, trace
+from tunneldb.simulate.ray import trace
 from tunneldb.simulate.rings import build
 from tunneldb.simulate.scanner import BlockPlan, Rays, Scanner
+from tunneldb.simulate.scene import scene
 from tunneldb.simulate.skin import skin
 from tunneldb.simulate.things import TargetSphere, Thing, parts_table
 from tunneldb.simulate.tunnel import Tunnel
