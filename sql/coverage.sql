@@ -3,9 +3,9 @@
 -- What is known of each kilometre, and what was summed up before it. Over kilometres without detection the sums stay as they
 -- are. Read by coverage_at below and stretch_statistics (statistics.sql).
 CREATE OR REPLACE VIEW tunnel_api.coverage_sums AS
-SELECT c.survey_id, c.km, c.step, c.lining_sums, c.seen_sums, c.wet_sums, 1000 * count(*) OVER earlier AS length_before,
-       coalesce(sum(c.lining_total) OVER earlier, 0) AS lining_before, coalesce(sum(c.seen_total) OVER earlier, 0) AS seen_before,
-       coalesce(sum(c.wet_total) OVER earlier, 0) AS wet_before
+SELECT c.survey_id::bigint * 1000000 + 500000 + c.km AS id, c.survey_id, c.km, c.step, c.lining_sums, c.seen_sums,
+       c.wet_sums, 1000 * count(*) OVER earlier AS length_before, coalesce(sum(c.lining_total) OVER earlier, 0) AS lining_before,
+       coalesce(sum(c.seen_total) OVER earlier, 0) AS seen_before, coalesce(sum(c.wet_total) OVER earlier, 0) AS wet_before
   FROM tunnel.coverage c
 WINDOW earlier AS (PARTITION BY c.survey_id ORDER BY c.km ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING);
 COMMENT ON VIEW tunnel_api.coverage_sums IS
@@ -80,23 +80,27 @@ COMMENT ON FUNCTION tunnel_api.coverage_at(int, float8[]) IS
 -- Where a survey begins and ends: at its first and last point, within its segments. Segments end at vertices, up to a spacing
 -- beyond the points, and lining out there is nothing that a survey should have seen. Files know where they reach along the
 -- given axis, on which segment n goes from n to n + 1 times the spacing; that is carried over to the axis found.
+CREATE OR REPLACE VIEW tunnel_api.km_ends AS
+SELECT g.survey_id::bigint * 1000000 + 500000 + g.km AS id, g.survey_id, g.km,
+       min(g.chainage_from + (g.chainage_to - g.chainage_from) * greatest(0, f.first - g.n)) AS chainage_from,
+       max(g.chainage_to - (g.chainage_to - g.chainage_from) * greatest(0, g.n + 1 - f.last)) AS chainage_to
+  FROM (SELECT s.id AS survey_id, coalesce(min(q.chainage_from) / t.spacing, '-Infinity') AS first,
+               coalesce(max(q.chainage_to) / t.spacing, 'Infinity') AS last
+          FROM tunnel.survey s
+          JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+          LEFT JOIN tunnel.scan_file q ON q.survey_id = s.id
+         GROUP BY s.id, t.spacing) f
+  JOIN tunnel.segment g ON g.survey_id = f.survey_id AND g.n < f.last AND g.n + 1 > f.first
+ GROUP BY g.survey_id, g.km;
+COMMENT ON VIEW tunnel_api.km_ends IS
+    'Where each kilometre of a survey begins and ends: with its segments, as far as they were scanned';
+
+
 CREATE OR REPLACE FUNCTION tunnel_api.survey_ends(survey_id int, OUT chainage_from float8, OUT chainage_to float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 COST 5000  -- once a survey, not once a kilometre
 SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
-AS $$
-    SELECT min(g.chainage_from + (g.chainage_to - g.chainage_from) * greatest(0, f.first - g.n)),
-        max(g.chainage_to - (g.chainage_to - g.chainage_from) * greatest(0, g.n + 1 - f.last))
-    FROM (SELECT coalesce(min(q.chainage_from) / t.spacing, '-Infinity') AS first,
-                 coalesce(max(q.chainage_to) / t.spacing, 'Infinity') AS last
-          FROM tunnel.survey s
-          JOIN tunnel.tunnel t ON t.id = s.tunnel_id
-          LEFT JOIN tunnel.scan_file q ON q.survey_id = s.id
-          WHERE s.id = $1
-          GROUP BY t.spacing) f
-    JOIN tunnel.segment g ON g.n < f.last AND g.n + 1 > f.first
-    WHERE g.survey_id = $1
-$$;
+AS $$ SELECT min(k.chainage_from), max(k.chainage_to) FROM tunnel_api.km_ends k WHERE k.survey_id = $1 $$;
 COMMENT ON FUNCTION tunnel_api.survey_ends(int) IS
 'Least and greatest chainage (m) of what a survey scanned: its first and last point, within its segments.';
 

@@ -41,13 +41,8 @@ SELECT s.id::bigint * 1000000 + 500000 + g.km AS id, s.id AS survey_id, s.name A
        l.wet_area, l.wet_area / nullif(d.seen, 0) AS wet_share, c.wet / nullif(c.seen, 0) AS wet_pixel_share, l.leaks,
        l.leaks_open, l.leaks_confirmed, l.leaks_rejected, l.largest_area, l.greatest_drop
   FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
-  JOIN (SELECT survey_id, km, min(chainage_from) AS low, max(chainage_to) AS high
-          FROM tunnel.segment GROUP BY survey_id, km) k ON k.survey_id = s.id
- CROSS JOIN LATERAL (
-        SELECT k.survey_id, k.km, r.low AS chainage_from, r.high AS chainage_to,
-               r.low < k.km * 1000 + 1e-6 AND r.high > (k.km + 1) * 1000 - 1e-6 AS whole
-          FROM (SELECT greatest(k.low, e.chainage_from) AS low, least(k.high, e.chainage_to) AS high) r) g
+  JOIN (SELECT k.*, k.chainage_from < k.km * 1000 + 1e-6 AND k.chainage_to > (k.km + 1) * 1000 - 1e-6 AS whole
+          FROM tunnel_api.km_ends k) g ON g.survey_id = s.id
   LEFT JOIN tunnel.coverage w ON w.survey_id = g.survey_id AND w.km = g.km
   LEFT JOIN LATERAL (
         SELECT w.lining_total AS lining, w.seen_total AS seen, w.wet_total AS wet WHERE g.whole

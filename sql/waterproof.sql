@@ -1,5 +1,5 @@
--- Waterproofing of each kilometre, and how it is kept (tunnel.waterproof) for who asks of all of a long tunnel. Needs
--- stretch_statistics (statistics.sql).
+-- Waterproofing of each kilometre. Needs stretch_statistics (statistics.sql). The statistics of a kilometre are kept
+-- (tunnel.waterproof) for who asks of all of a long tunnel.
 --
 -- Whoever changes leaks or coverage adds a note, a row without statistics, for each kilometre that he touches, in the same
 -- transaction (triggers of schema tunnel). At its end the notes are replaced, and what was kept before, by new statistics; in
@@ -7,15 +7,6 @@
 -- their row and no other of its kilometre: any change that they do not know of has left a note, or statistics of its own, that
 -- nobody has replaced. Nobody waits for anybody: what somebody else is just replacing is left alone, and then two rows are left,
 -- of which none is believed until the next change. What is not kept is worked out when it is asked for.
-
-CREATE OR REPLACE VIEW tunnel_api.km_ends AS
-SELECT s.id AS survey_id, k.km, greatest(k.low, e.chainage_from) AS chainage_from, least(k.high, e.chainage_to) AS chainage_to
-  FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
-  JOIN (SELECT survey_id, km, min(chainage_from) AS low, max(chainage_to) AS high
-          FROM tunnel.segment GROUP BY survey_id, km) k ON k.survey_id = s.id;
-COMMENT ON VIEW tunnel_api.km_ends IS
-    'Where each kilometre of a survey begins and ends: with its segments, as far as they were scanned';
 
 CREATE OR REPLACE VIEW tunnel_api.km_waterproof AS
 SELECT s.id::bigint * 1000000 + 500000 + k.km AS id, s.id AS survey_id, s.name AS survey, k.km,
