@@ -24,7 +24,7 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from rasterio.errors import NotGeoreferencedWarning
 
-from tests.integration.conftest import LEAKS, example_surface
+from tests.integration.conftest import LEAKS, example_surface, without_intensity
 from tunneldb.cli.main import main
 from tunneldb.export.palette import COLOURS, PALETTES, hexadecimal
 from tunneldb.ground.classes import Klass
@@ -500,6 +500,51 @@ def test_offset_is_shown_where_there_is_no_intensity(conn: psycopg.Connection, e
     assert set(act(tmp_path / "demo.qgz", "describe")["themes"]["Unrolled"]) == {
         *UNROLLED, "demo-2024-km012-offset",
     } - NOT_AT_FIRST  # fmt: skip
+
+
+def test_lining_of_profiles_apart_is_seen_without_intensity(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    """Profiles 0.5 m apart: under the offset measured lies the same with gaps filled, which says that it is."""
+    without_intensity(conn, every=5)
+    project = tmp_path / "demo.qgz"
+    assert write(project).exit_code == 0
+    names = "demo-2024-km012-offset", "demo-2024-km012-offset-filled"
+    layers, shares = [], []
+    for name in names:
+        with rasterio.open(tmp_path / "demo-images" / f"{name}.tif") as image:
+            layers.append(image.read(1))
+            shares.append(np.isfinite(layers[-1]).mean())
+            told = image.descriptions[0]
+    assert told == "offset, gaps up to 0.6 m filled"
+    assert shares == [pytest.approx(0.2, abs=0.01), pytest.approx(1.0, abs=2e-3)]
+    held = np.isfinite(layers[0])
+    assert np.array_equal(layers[0][held], layers[1][held]), "what was measured is as it was"
+    seen = act(project, "describe")
+    for theme in ("Unrolled", "Inspection sheets"):
+        assert [name for name in seen["themes"][theme] if name in names] == list(names), "the measured one on top"
+    white = []
+    for name in names:
+        act(project, "draw_layer", name, "12352,-3,12392,3", str(tmp_path / "r.png"))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            image = rasterio.open(tmp_path / "r.png")
+        with image:
+            white.append(float((image.read([1, 2, 3]) > 250).all(axis=0)[200:-200].mean()))
+    assert white[0] > 0.5
+    assert white[1] < 0.01
+
+
+def test_sheets_without_intensity_speak_of_no_leaks(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    without_intensity(conn, every=5)
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    path = tmp_path / "sheets.pdf"
+    assert act(tmp_path / "demo.qgz", "atlas", str(path)) == {"saved": True, "error": "", "sheets": 4}
+    pages = words(path)
+    assert len(pages) == 4
+    for page in pages:
+        assert "leaks were not sought" in page
+        assert "gaps up to 0.6 m filled" in page
+        for word in ("Drop", "leaks 0", "seen yet", "Orange"):
+            assert word not in page
 
 
 def test_project_in_the_database_opens_for_a_viewer(

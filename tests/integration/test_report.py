@@ -23,6 +23,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
+from tests.integration.conftest import without_intensity
 from tunneldb.cli.main import main
 from tunneldb.database import connect, get_survey
 from tunneldb.report.page import write_html
@@ -258,15 +259,15 @@ def test_coordinate_system_of_its_own(example: str, conn: psycopg.Connection, tm
 def test_without_intensity_the_offset_is_shown(
     example: str, conn: psycopg.Connection, tmp_path: Path, browser: Browser
 ) -> None:
-    for table in ("anomaly", "coverage", "radiometry", "range_curve"):
-        conn.execute(sql.SQL("DELETE FROM tunnel.{}").format(sql.Identifier(table)))
-    conn.execute("DELETE FROM tunnel.image WHERE kind <> 'offset'")
-    conn.execute("UPDATE tunnel.survey SET intensity_kind = 'none', intensity_dimension = NULL, reference = 'none'")
-    conn.commit()
+    without_intensity(conn, every=6)
     path = tmp_path / "r.html"
     run("report", example, "-o", path)
-    picture, _ = Reading(path).strip(12350)
-    assert np.ptp(picture[::4, ::4].mean(axis=2)) > 200, "from black to white"
+    reading = Reading(path)
+    for strip in (12350, 12400):
+        picture, _ = reading.strip(strip)
+        inner = picture[4:-4].mean(axis=2)
+        assert np.ptp(inner[::4, ::4]) > 200, "from black to white"
+        assert (inner > 250).mean(axis=0).max() < 0.5, "no gap between profiles 0.6 m apart, nor where blocks of the image end"
     page = browser.new_page()
     troubles = watch(page)
     page.goto(path.as_uri())

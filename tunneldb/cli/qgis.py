@@ -13,7 +13,7 @@ from tunneldb.cli.progress import bar, step
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
 from tunneldb.export.atomic import make_folder
-from tunneldb.export.image import export_kilometre, image_kilometres
+from tunneldb.export.image import export_filled, export_kilometre, image_kilometres
 from tunneldb.export.qgis import store_project, store_styles, write_project
 
 
@@ -44,7 +44,8 @@ def qgis(
 ) -> None:
     """Write a QGIS project of SURVEY: map, unrolled lining, 3D and inspection sheets, with styled layers.
 
-    Leaks can be reviewed and axis vertices moved in it. The styles also go into the database, where QGIS finds them
+    Leaks can be reviewed and axis vertices moved in it. Without intensity it shows the offset, over the same with gaps between
+    profiles up to 0.6 m apart filled. The styles also go into the database, where QGIS finds them
     for layers that are added by hand. A project in the database holds the images by their absolute paths.
     """
     if output is None and name is None:
@@ -75,7 +76,7 @@ def qgis(
 
 
 def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> list[Path]:
-    """Write the images of all kilometres and return the GeoTIFFs."""
+    """Write the images of all kilometres and return the GeoTIFFs; where only the offset can be looked at, also without gaps."""
     kilometres = image_kilometres(conn, survey)
     conn.rollback()
     if kilometres:
@@ -85,6 +86,8 @@ def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> li
         advance = step(progress)("images", len(kilometres))
         for km in kilometres:
             written += export_kilometre(conn, survey, km, folder)
+            if survey.intensity_kind == "none":
+                written.append(export_filled(conn, survey, km, folder))
             advance(1)
     return [path for path in written if path.suffix == ".tif"]
 

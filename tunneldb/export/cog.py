@@ -35,7 +35,7 @@ class Extent:
     columns: int
 
 
-def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int, NDArray[Any]]]) -> None:
+def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int, NDArray[Any]]], name: str = "") -> None:
     """Write an image; where no block lies it holds nothing (GDAL fills what is never written with the nodata value).
 
     Parameters
@@ -49,6 +49,8 @@ def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int,
         Place and size of the image.
     blocks : iterable of (int, (rows, columns) array)
         First column and pixels of each block.
+    name : str
+        What the band is called, if not by its kind.
     """
     plain = path.with_name(f"plain-{path.name}")
     palette = PALETTES.get(kind)
@@ -57,7 +59,7 @@ def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int,
         dtype="uint8" if palette else "float32", nodata=palette.nodata if palette else np.nan,
         tiled=True, blockxsize=256, blockysize=256, bigtiff="if_safer",
     ) as image:  # fmt: skip
-        image.set_band_description(1, kind)
+        image.set_band_description(1, name or kind)
         if palette:
             image.write_colormap(1, {code: (*colour, 255) for code, (_, colour) in palette.entries.items()})
             image.update_tags(1, **{f"{kind.upper()}_{code}": name for code, (name, _) in palette.entries.items()})

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import psycopg
 import shapely
+from affine import Affine
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
@@ -18,7 +19,9 @@ from tunneldb.export import preview
 from tunneldb.export.atomic import replacing
 from tunneldb.export.classes import ClassPainter
 from tunneldb.export.cog import Extent, write_cog
+from tunneldb.export.gaps import FILL, TOLD, fill_blocks
 from tunneldb.export.palette import PALETTES
+from tunneldb.leak.image import BLOCK
 from tunneldb.leak.raster import KINDS, Raster, decode
 
 
@@ -44,6 +47,53 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
     """
     with snapshot(conn):
         return [path for kind in (*KINDS, *PALETTES) for path in _export_kind(conn, survey, km, kind, folder)]
+
+
+def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> Path:
+    """Write the offset image of a kilometre with its gaps filled, ``SURVEY-kmNNN-offset-filled.tif``, and return its path.
+
+    Its pixels are those of a preview: it is there to be looked at, under the offset that was measured. Its band's name and
+    metadata say what it is. A profile beyond the end of the kilometre fills, too. The connection must be idle.
+    """
+    with snapshot(conn):
+        blocks = _blocks(conn, survey, km, "offset")
+        first = _read(conn, survey, km, "offset", blocks[0])
+        factor = preview_factor(first.transform.a)
+        rows, columns = (-(-n // factor) for n in first.values.shape)
+        extent = Extent(first.transform @ Affine.scale(factor), rows, columns * (blocks[-1] - blocks[0] + 1))
+        around = [
+            *_beside(conn, survey, blocks[0] - 1),
+            *((km, block) for block in blocks),
+            *_beside(conn, survey, blocks[-1] + 1),
+        ]
+
+        def shrunk() -> Iterator[tuple[int, preview.Single]]:
+            for other, block in around:
+                raster = _read(conn, survey, other, "offset", block)
+                if raster.transform.a == first.transform.a:
+                    pixels = raster.values if other == km else _laid(raster, first)
+                    yield (block - blocks[0]) * columns, preview.shrink(pixels, factor)
+
+        path = folder / f"{survey.name}-km{km:03d}-offset-filled.tif"
+        filled = fill_blocks(shrunk(), FILL / extent.transform.a)
+        with replacing(path) as temporary:
+            write_cog(temporary, "offset", extent, (b for b in filled if 0 <= b[0] < extent.columns), f"offset, {TOLD}")
+    return path
+
+
+def _beside(conn: psycopg.Connection, survey: Survey, block: int) -> list[tuple[int, int]]:
+    """Kilometre and number of a block of offset, if there is one."""
+    query = "SELECT km, block FROM tunnel.image WHERE survey_id = %s AND kind = 'offset' AND block = %s"
+    return conn.execute(query, (survey.id, block)).fetchall()
+
+
+def _laid(raster: Raster, like: Raster) -> preview.Single:
+    """Values of a block in the rows of another one."""
+    down = round((like.transform.f - raster.transform.f) / like.transform.a)
+    values = np.full(like.values.shape, np.nan, np.float32)
+    rows = slice(max(down, 0), min(down + len(raster.values), len(values)))
+    values[rows] = raster.values[rows.start - down : rows.stop - down]
+    return values
 
 
 def _export_kind(conn: psycopg.Connection, survey: Survey, km: int, kind: str, folder: Path) -> list[Path]:
@@ -134,8 +184,8 @@ def _pixels(
 def preview_factor(pixel: float) -> int:
     """How many pixels of the image make one of the preview."""
     factor = max(1, round(preview.PIXEL / pixel))
-    # A strip must be a whole number of pixels.
-    while abs(preview.STRIP / (pixel * factor) - round(preview.STRIP / (pixel * factor))) > 1e-6:
+    # A block must be a whole number of pixels.
+    while abs(BLOCK / (pixel * factor) - round(BLOCK / (pixel * factor))) > 1e-6:
         factor -= 1
     return factor
 

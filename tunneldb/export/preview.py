@@ -1,7 +1,6 @@
 """PNG previews of a kilometre's image: one strip a hectometre, with a grid, ticks and a scale.
 
-Where profiles lie far apart the image has gaps between them. In a preview, and only there, a pixel without a
-point takes the value of the nearest one within 0.3 m, so that profiles up to 0.6 m apart join.
+Gaps between profiles are filled in it, see :mod:`tunneldb.export.gaps`.
 """
 
 from __future__ import annotations
@@ -13,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
-from scipy import ndimage
 from shapely.geometry import Polygon
 
+from tunneldb.export.gaps import FILL, fill_gaps
 from tunneldb.export.palette import PALETTES
 from tunneldb.geometry.stationing import Stationing
 from tunneldb.ground.classes import Klass
@@ -27,9 +26,6 @@ STRIP = 100.0
 
 PIXEL = 0.05
 """Side of a preview's pixel, m; that of the image where it is larger."""
-
-FILL = 0.3
-"""Gaps are filled from values at most so far away, m."""
 
 OFFSET_SPANS = (0.02, 0.05, 0.1, 0.2, 0.5)
 """Offsets beyond one of these are shown in the full colour, m: the first that nine tenths of the image stay within."""
@@ -80,17 +76,6 @@ def shrink_codes(values: NDArray[np.uint8], factor: int) -> Single:
         out[count >= most] = code
         most = np.maximum(most, count)
     return out
-
-
-def fill_gaps(values: Single, reach: float) -> Single:
-    """Give pixels without a value that of the nearest one within ``reach`` pixels."""
-    empty = np.isnan(values)
-    if empty.all() or not empty.any():
-        return values
-    distance, (row, column) = ndimage.distance_transform_edt(empty, return_indices=True)
-    filled = values[row, column]
-    filled[distance > reach] = np.nan
-    return np.asarray(filled, dtype=np.float32)
 
 
 def _filled(kind: str, values: Single, reach: float) -> Single:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +16,7 @@ from PIL import Image
 from scipy import ndimage
 
 from tunneldb.database import Survey
+from tunneldb.export.gaps import FILL, fill_gaps
 from tunneldb.leak.image import BLOCK
 from tunneldb.leak.lining import State
 from tunneldb.leak.raster import Raster, decode
@@ -28,8 +29,8 @@ Places = NDArray[np.intp]
 Form = Literal["WEBP", "JPEG"]
 """Format of pictures: WebP is smaller; JPEG goes into a PDF as it is, where browsers unpack others to many times the size."""
 
-KEPT = 6
-"""Blocks in memory: those of a strip of 250 m, and the one before."""
+KEPT = 7
+"""Blocks in memory: those of a strip of 250 m, the one before and the one after."""
 
 NO_STATE = 255
 """Where a block has no state."""
@@ -42,9 +43,6 @@ tell whether it is wet."""
 
 FILLED = 0.14
 """Pixels without points take the mean of those about them, in a square so wide, m: about what the median filter looks at."""
-
-FAR = 0.6
-"""The same of a survey without intensity, whose profiles may lie so far apart: as the previews fill them."""
 
 LEAST = {"corrected": 0.1, "offset": 0.005}
 """From black to white are at least so many dB or m."""
@@ -120,9 +118,8 @@ class _Block:
 
 @dataclass(frozen=True)
 class _Kilometre:
-    """How a kilometre is drawn: what it shows, side of its pixels, m, and values shown black and white, dB or m."""
+    """How a kilometre is drawn: side of its pixels, m, and values shown black and white, dB or m."""
 
-    kind: str
     pixel: float
     low: float
     high: float
@@ -162,11 +159,25 @@ class Lining:
         side = native * max(1, round(pixel / native))
         window = window.widened(side)
         canvas = np.full((round(window.height / side), round(window.width / side), 3), NOTHING, np.uint8)
+        offset = self._offset(window, side) if self._kind == "offset" else None
         for number, kilometre in there.items():
-            _paint(canvas, window, side, self._block(number), kilometre)
+            place = _Place.of(self._block(number), window, side)
+            if place is not None:
+                canvas[place.there] = _seen(place, side, kilometre) if offset is None else _grey(offset[place.there], kilometre)
         out = io.BytesIO()
         Image.fromarray(canvas).save(out, self._form, quality=QUALITY[self._form])
         return Picture(window, self._form, out.getvalue())
+
+    def _offset(self, window: Window, side: float) -> Single:
+        """Offset of a window, m, NaN for none, with gaps filled from what lies in it and about it."""
+        edge = int(np.ceil(FILL / side))
+        about = Window(*(end + way * edge * side for end, way in zip(astuple(window), (-1, 1, -1, 1), strict=True)))
+        sums = np.zeros((2, round(about.height / side), round(about.width / side)), np.float32)
+        for number in range(int(np.floor(about.west / BLOCK)), int(np.ceil(about.east / BLOCK))):
+            place = _Place.of(self._block(number), about, side) if number in self._km else None
+            if place is not None:
+                sums[:, *place.there] += place.gathered()[:2]
+        return fill_gaps(_ratio(sums[1], sums[0]), FILL / side)[edge:-edge, edge:-edge]
 
     def _block(self, number: int) -> _Block:
         if number in self._kept:
@@ -197,21 +208,47 @@ class Lining:
             values = np.concatenate([block.lining() for block in blocks])
             low, high = (float(v) for v in np.percentile(values, [1, 98])) if len(values) else (0.0, 1.0)
             pixel = blocks[0].shown.transform.a
-            self._known[km] = _Kilometre(self._kind, pixel, low, max(high, low + LEAST[self._kind]))
+            self._known[km] = _Kilometre(pixel, low, max(high, low + LEAST[self._kind]))
         return self._known[km]
 
 
-def _paint(canvas: Bytes, window: Window, side: float, block: _Block, kilometre: _Kilometre) -> None:
-    """Paint what a block shows of a window onto the canvas, whose pixels are of that side, m."""
-    transform, (height, width) = block.shown.transform, block.shown.values.shape
-    # the canvas's column and row that each column and row of the block falls into
-    column = np.floor((transform.c + transform.a * (np.arange(width) + 0.5) - window.west) / side).astype(np.intp)
-    row = np.floor((window.north - transform.f - transform.e * (np.arange(height) + 0.5)) / side).astype(np.intp)
-    part = _inside(row, canvas.shape[0]), _inside(column, canvas.shape[1])
-    row, column = row[part[0]], column[part[1]]
-    if len(row) and len(column):
+@dataclass(frozen=True)
+class _Place:
+    """What a block has in a window, and where.
+
+    Attributes
+    ----------
+    there : (slice, slice)
+        Rows and columns of the window's picture.
+    values, state : (rows, columns) arrays
+        Of the block's pixels in it.
+    row, column : (rows,), (columns,) arrays
+        Row and column of the picture that they fall into, from the first of these on; both grow without gaps.
+    """
+
+    there: tuple[slice, slice]
+    values: Single
+    state: Bytes
+    row: Places
+    column: Places
+
+    @classmethod
+    def of(cls, block: _Block, window: Window, side: float) -> _Place | None:
+        """Find the place of a block in a window whose picture has pixels of that side, m; None if it has none."""
+        transform, (height, width) = block.shown.transform, block.shown.values.shape
+        column = np.floor((transform.c + transform.a * (np.arange(width) + 0.5) - window.west) / side).astype(np.intp)
+        row = np.floor((window.north - transform.f - transform.e * (np.arange(height) + 0.5)) / side).astype(np.intp)
+        part = _inside(row, round(window.height / side)), _inside(column, round(window.width / side))
+        row, column = row[part[0]], column[part[1]]
+        if not len(row) or not len(column):
+            return None
         there = slice(row[0], row[-1] + 1), slice(column[0], column[-1] + 1)
-        canvas[there] = _colours(block.shown.values[part], block.state[part], (row, column), side, kilometre)
+        return cls(there, block.shown.values[part], block.state[part], row - row[0], column - column[0])
+
+    def gathered(self) -> Single:
+        """Tally the block's pixels, see :func:`_gathered`."""
+        tally: Single = _gathered(self.values, self.state, self.row, self.column)
+        return tally
 
 
 def _inside(place: Places, count: int) -> slice:
@@ -219,12 +256,18 @@ def _inside(place: Places, count: int) -> slice:
     return slice(int(np.searchsorted(place, 0)), int(np.searchsorted(place, count)))
 
 
-def _colours(values: Single, state: Bytes, places: tuple[Places, Places], side: float, kilometre: _Kilometre) -> Bytes:
-    """Colours of the pixels that rows and columns of a block fall into; both of these places grow without gaps."""
-    row, column = (place - place[0] for place in places)
-    held, level, lining, empty, off, floor = _gathered(values, state, row, column)
-    plain = kilometre.kind == "offset"
-    about = 2 * round((FAR if plain else FILLED) / side / 2) + 1
+def _grey(values: Single, kilometre: _Kilometre) -> Bytes:
+    """Values from black to white, and nothing where there is none."""
+    shade = np.clip((values - kilometre.low) / (kilometre.high - kilometre.low), 0.0, 1.0)
+    grey = np.repeat(255.0 * np.nan_to_num(shade), 3).reshape(*shade.shape, 3).astype(np.uint8)
+    grey[np.isnan(values)] = NOTHING
+    return grey
+
+
+def _seen(place: _Place, side: float, kilometre: _Kilometre) -> Bytes:
+    """Colours of corrected intensity and of lining that was not seen, is hidden or no lining."""
+    held, level, lining, empty, off, floor = place.gathered()
+    about = 2 * round(FILLED / side / 2) + 1
 
     def smooth(what: Single) -> Single:
         return ndimage.uniform_filter(what, about, mode="nearest") if about > 1 else what
@@ -232,9 +275,6 @@ def _colours(values: Single, state: Bytes, places: tuple[Places, Places], side: 
     mean = np.where(held > 0, _ratio(level, held), _ratio(smooth(level), smooth(held)))
     shade = np.clip((mean - kilometre.low) / (kilometre.high - kilometre.low), 0.0, 1.0)
     grey = np.repeat(255.0 * np.nan_to_num(shade, nan=0.75), 3).reshape(*shade.shape, 3)
-    if plain:
-        grey[np.isnan(mean)] = NOTHING
-        return grey.astype(np.uint8)
     unseen = smooth(lining - empty) < HELD * smooth(lining)
     other = lining + off + floor
     for mask, colour, opaque in ((unseen, UNSEEN, 1.0), (off > other / 2, COVERED, 0.55), (floor > other / 2, FLOOR, 0.92)):

@@ -47,4 +47,6 @@ def write_survey(conn: psycopg.Connection[Any], survey: Survey, low: float, high
         return write_survey_gpkg(conn, survey, surface, low, high, path)
     from tunneldb.export.plain.dxf import write_survey_dxf
 
+    if row is not None and row[0] is not None:  # what is drawn ends with the scan, not at the next vertex of the axis
+        low, high = max(low, row[0]), min(high, row[1])
     return write_survey_dxf(conn, survey, surface, low, high, path)

@@ -21,7 +21,7 @@ from tunneldb.export.qgis.action import RECOMPUTED_FROM, recompute
 from tunneldb.export.qgis.crs import crs_element, no_crs
 from tunneldb.export.qgis.extent import Extent, View, first_window, map_extent, sheet_extent, unrolled_extents
 from tunneldb.export.qgis.layer import LAYERS, MAP, SHEETS, SPACE, UNROLLED, VectorLayer
-from tunneldb.export.qgis.raster import KINDS, image_kind, pipe
+from tunneldb.export.qgis.raster import FILLED, KINDS, image_kind, pipe
 from tunneldb.export.qgis.sheet import layouts
 from tunneldb.export.qgis.source import Source
 from tunneldb.export.qgis.styles import require_table, style_elements
@@ -183,13 +183,16 @@ def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element)
 
 
 def _rasters(images: Sequence[Path], folder: Path | None) -> list[_Entry]:
-    """Layers of the images, a group for each kind; the first kind that there is is shown (offset, without intensity)."""
+    """Layers of the images, a group for each kind; the first kind that there is is shown.
+
+    Without intensity that is the offset, over the same with gaps filled.
+    """
     entries = []
     of_kind = {kind: sorted(path for path in images if image_kind(path) == kind) for kind in KINDS}
     shown = next((kind for kind, paths in of_kind.items() if paths), None)
     for kind, title in KINDS.items():
         paths = of_kind[kind]
-        drawn = pipe(kind, paths)
+        drawn = pipe(kind, of_kind["offset"] if kind == FILLED else paths)
         for path in paths:
             element = ET.Element("maplayer", type="raster", styleCategories="AllStyleCategories")
             ET.SubElement(element, "id").text = layer_id(path.stem)
@@ -199,7 +202,7 @@ def _rasters(images: Sequence[Path], folder: Path | None) -> list[_Entry]:
             ET.SubElement(element, "provider").text = "gdal"
             element.append(deepcopy(drawn))
             ET.SubElement(element, "blendMode").text = "0"
-            themes = (UNROLLED, SHEETS) if kind == shown else ()
+            themes = (UNROLLED, SHEETS) if kind in (shown, FILLED) else ()
             entries.append(_Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))
     return entries
 

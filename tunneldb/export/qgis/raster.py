@@ -8,20 +8,26 @@ from pathlib import Path
 
 import numpy as np
 import rasterio
+from numpy.typing import NDArray
 
+from tunneldb.export.gaps import TOLD
 from tunneldb.export.palette import PALETTES, hexadecimal
+
+FILLED = "offset-filled"
+"""Kind of image that lies under the offset measured, where there is nothing else to show."""
 
 KINDS = {
     "corrected": "Intensity, corrected",
     "raw": "Intensity, raw",
     "offset": "Offset",
+    FILLED: f"Offset, {TOLD}",
     "state": "States: seen, unseen, dark",
     "class": "Classes",
 }
 """Kinds of image, the one shown at first in front, with the names of their groups."""
 
-OFFSET_RANGE = 0.1
-"""Offset at which the colours are full, m."""
+OFFSET_RANGES = (0.1, 0.2, 0.5)
+"""Offset at which the colours are full, m: the least that nine tenths of the images stay within."""
 
 # Inwards red, outwards blue (ColorBrewer RdBu), the surface itself grey, to be told from paper.
 _OFFSET_COLOURS = ((-1.0, "#2166ac"), (-0.4, "#92c5de"), (0.0, "#e6e6e6"), (0.4, "#f4a582"), (1.0, "#b2182b"))
@@ -39,18 +45,30 @@ def grey_range(paths: Sequence[Path]) -> tuple[float, float]:
     The lining, which is most of an image, becomes a light grey, and a leak, darker by some decibels, stands out from its
     noise: black is the 2 % quantile or lower, at least 4 dB below the median; white 98 %, at least 1.6 dB above it.
     """
-    samples = []
+    values = _sample(paths)
+    if not len(values):
+        return 0.0, 1.0
+    low, middle, high = np.quantile(values, [0.02, 0.5, 0.98])
+    return float(min(low, middle - 4.0)), float(max(high, middle + 1.6))
+
+
+def offset_range(paths: Sequence[Path]) -> float:
+    """Return the offset, m, at which the colours of these images are full: rock is rougher than concrete."""
+    values = np.abs(_sample(paths))
+    usual = np.quantile(values, 0.9) if len(values) else 0.0
+    return next((limit for limit in OFFSET_RANGES if limit >= usual), OFFSET_RANGES[-1])
+
+
+def _sample(paths: Sequence[Path]) -> NDArray[np.float64]:
+    """Values of images, some from all over each."""
+    samples = [np.empty(0)]
     for path in paths:
         with rasterio.open(path) as image:
             rows, columns = min(image.height, _SAMPLE), min(image.width, _SAMPLE)
             band = image.read(1, out_shape=(rows, columns), masked=True)
         values = np.asarray(band.compressed(), dtype=np.float64)
         samples.append(values[np.isfinite(values)])
-    values = np.concatenate(samples) if samples else np.empty(0)
-    if not len(values):
-        return 0.0, 1.0
-    low, middle, high = np.quantile(values, [0.02, 0.5, 0.98])
-    return float(min(low, middle - 4.0)), float(max(high, middle + 1.6))
+    return np.concatenate(samples)
 
 
 def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
@@ -64,19 +82,20 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
         entries = ET.SubElement(renderer, "colorPalette")
         for code, (name, rgb) in PALETTES[kind].entries.items():
             ET.SubElement(entries, "paletteEntry", value=str(code), color=hexadecimal(rgb), label=name, alpha="255")
-    elif kind == "offset":
+    elif kind in ("offset", FILLED):
+        limit = offset_range(paths)
         renderer = ET.SubElement(
             element, "rasterrenderer", type="singlebandpseudocolor", band="1",
-            classificationMin=str(-OFFSET_RANGE), classificationMax=str(OFFSET_RANGE),
+            classificationMin=str(-limit), classificationMax=str(limit),
         )  # fmt: skip
         _origin(renderer)
         shader = ET.SubElement(
             ET.SubElement(renderer, "rastershader"), "colorrampshader", colorRampType="INTERPOLATED",
             classificationMode="1", clip="0",
-            minimumValue=str(-OFFSET_RANGE), maximumValue=str(OFFSET_RANGE),
+            minimumValue=str(-limit), maximumValue=str(limit),
         )  # fmt: skip
         for share, colour in _OFFSET_COLOURS:
-            value = share * OFFSET_RANGE
+            value = share * limit
             ET.SubElement(shader, "item", value=f"{value:g}", label=f"{value * 1000:+.0f} mm", color=colour, alpha="255")
     else:
         limits = grey_range(paths)

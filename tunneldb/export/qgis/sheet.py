@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 
 from tunneldb import __version__
 from tunneldb.database import Survey
+from tunneldb.export.gaps import TOLD
 from tunneldb.export.qgis.extent import Extent
 from tunneldb.export.qgis.layer import SHEETS
 
@@ -55,9 +56,9 @@ _CELL_MARGIN = 0.7
 _TABLE_WIDTH = sum(column[2] + 2 * _CELL_MARGIN for column in _COLUMNS)
 
 
-def strip_scale(extent: Extent) -> int:
-    """Return the number of the scale at which a sheet's strip leaves room for its table."""
-    room = _FOOT - _TOP - _TABLE_LEAST - 8.0
+def strip_scale(extent: Extent, *, table: bool) -> int:
+    """Return the number of the scale at which a sheet's strip leaves room for its table, if it has one."""
+    room = _FOOT - _TOP - (_TABLE_LEAST if table else 0.0) - 8.0
     height = extent.ymax - extent.ymin
     return next((scale for scale in _SCALES if height * 1000.0 / scale <= room), _SCALES[-1])
 
@@ -74,18 +75,21 @@ def layouts(survey: Survey, extent: Extent, coverage: tuple[str, str], leaks: tu
     coverage, leaks : (str, str)
         Id and data source of the layer of the sheets, and of the layer whose rows their tables list.
     """
+    sought = survey.intensity_kind != "none"  # else no leaks were, and there is no table of them
+    pages = PAGES if sought else 1
     root = ET.Element("Layouts")
     layout = ET.SubElement(root, "Layout", name=SHEETS, units="mm", printResolution="300")
-    pages = ET.SubElement(layout, "PageCollection")
-    for page in range(PAGES):
-        pages.append(_item(_PAGE, f"page {page + 1}", (0.0, 0.0, *PAGE), page, background="true"))
-    scale = strip_scale(extent)
+    collection = ET.SubElement(layout, "PageCollection")
+    for page in range(pages):
+        collection.append(_item(_PAGE, f"page {page + 1}", (0.0, 0.0, *PAGE), page, background="true"))
+    scale = strip_scale(extent, table=sought)
     strip = _strip(scale, extent)
     bottom = _TOP + (extent.ymax - extent.ymin) * 1000.0 / scale + 1.0
     layout.append(strip)
-    layout.extend(_texts(survey, scale, bottom))
+    layout.extend(_texts(survey, scale, pages))
     layout.append(_scale_bar(strip.attrib["uuid"]))
-    layout.extend(_table(leaks, bottom + 7.0))
+    if sought:
+        layout.extend(_table(leaks, bottom + 7.0))
     ET.SubElement(
         layout, "Atlas", enabled="1", coverageLayer=coverage[0], coverageLayerSource=coverage[1],
         coverageLayerProvider="postgres", coverageLayerName=SHEETS, hideCoverage="1", sortFeatures="1", sortAscending="1",
@@ -150,7 +154,7 @@ def _grid(name: str, x: str, y: str, label: str, *, bottom: bool) -> ET.Element:
     return element
 
 
-def _texts(survey: Survey, scale: int, bottom: float) -> list[ET.Element]:
+def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
     """Head and foot of the sheet, and heads of the pages on which its table goes on."""
     stretch = "[% {} %] – [% {} %]".format(_SHEET.format("label_from"), _SHEET.format("label_to"))
     number = "[% @atlas_featurenumber %] of [% @atlas_totalfeatures %]"
@@ -163,8 +167,13 @@ def _texts(survey: Survey, scale: int, bottom: float) -> list[ET.Element]:
     )
     how = (
         f"Unrolled lining seen from inside the tunnel, 1:{scale} on A4: along it chainage, up it arc from the crown (0), m, "
-        "the right wall above. Orange: open, blue: confirmed; a number is the leak's."
+        "the right wall above. "
     )
+    if survey.intensity_kind == "none":
+        sums = "No intensity: leaks were not sought"
+        how += f"Red: inwards, blue: outwards; {TOLD}."
+    else:
+        how += "Orange: open, blue: confirmed; a number is the leak's."
     texts = [
         _label("stretch", stretch, (left, 7, 150, 8), 15, bold=True),
         _label("number", f"Inspection sheet {number}", (right - 110, 7, 110, 8), 10, align="right"),
@@ -180,7 +189,7 @@ def _texts(survey: Survey, scale: int, bottom: float) -> list[ET.Element]:
             align="right",
         ),
     ]  # fmt: skip
-    for page in range(1, PAGES):
+    for page in range(1, pages):
         texts += [
             _label(f"stretch {page + 1}", f"{stretch}, leaks continued", (left, 7, 150, 8), 12, page=page, bold=True),
             _label(f"number {page + 1}", f"Inspection sheet {number}", (right - 110, 7, 110, 8), 10, page=page, align="right"),
