@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -55,6 +56,15 @@ def test_help_imports_no_verb() -> None:
     )
     output = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
     assert output.endswith("[]\n")
+
+
+def test_where_nothing_compiled_can_be_kept_one_line_says_what_to_do(tmp_path: Path) -> None:
+    """As for a user without a home whose tunneldb root has installed: Numba finds no folder that it may write to."""
+    nowhere = {"NUMBA_CACHE_LOCATOR_CLASSES": "UserWideCacheLocator"} | dict.fromkeys(["HOME", "XDG_CACHE_HOME"], "/proc/nowhere")
+    command = [*TUNNELDB, "simulate", str(tmp_path / "scan"), "--preset", "small"]
+    done = subprocess.run(command, env=os.environ | nowhere, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert re.fullmatch(r"tunneldb: .* set NUMBA_CACHE_DIR to a folder of your own\n", done.stderr)
 
 
 def test_without_a_dsn_everything_starts_by_itself(home: Path) -> None:

@@ -71,6 +71,7 @@ MANUAL: dict[str, list[tuple[str, str]]] = {
         ("TUNNELDB_HOME", "folder of the embedded server; two folders are two servers"),
         ("TUNNELDB_BROWSER", "program that prints reports as PDF, if it isn't found: Chromium or Chrome"),
         ("TMPDIR", "folder for what does not fit into memory"),
+        ("NUMBA_CACHE_DIR", "folder for what is compiled on first use, else beside the program, else in ~/.cache/numba"),
         ("PGPASSFILE, PGSERVICEFILE", "and the others of libpq, for passwords and services"),
     ],
 }
@@ -132,6 +133,11 @@ class LazyGroup(click.Group):
 
 def _describe(error: Exception) -> str | None:
     """Return one line for what is no bug, None for one."""
+    if isinstance(error, RuntimeError) and "no locator available" in str(error):  # Numba, as a module is imported
+        return (
+            "what is compiled can be kept nowhere: neither where tunneldb is installed nor in ~/.cache may be written;"
+            " set NUMBA_CACHE_DIR to a folder of your own"
+        )
     return str(error) if isinstance(error, UserError) else _describe_database_error(error)
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
     from rich.progress import Progress
 
 _REMEMBERED = 600.0  # time over which the rate is taken, s: steps of a kilometre come minutes apart
+_PATIENCE = 1.0  # time that Numba may compile unmentioned, s: on first use it is a minute or two, later nothing
 
 
 def bar(unit: str) -> Progress:
@@ -18,7 +21,7 @@ def bar(unit: str) -> Progress:
     Parameters
     ----------
     unit : str
-        What is counted, in the plural: ``points``, ``km``. Empty when the counts mean nothing: no rate is shown then.
+        What is counted, in the plural: ``points``, ``km``.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -32,12 +35,26 @@ def bar(unit: str) -> Progress:
             speed = task.finished_speed or task.speed or (task.completed / task.elapsed if task.elapsed else None)
             return Text(rate(speed, unit), "progress.data.speed")
 
+    class Left(TimeRemainingColumn):
+        """Time left, where it can be known at all."""
+
+        def render(self, task: Task) -> Text:
+            return Text() if task.total is None else super().render(task).append(" left", "")
+
+    class Bar(Progress):
+        """A bar that says, once, when the program stands still to compile."""
+
+        def get_renderables(self) -> Iterable[RenderableType]:
+            if not self.disable:  # rich asks once in any case
+                notice.attach()  # here, for Numba may be imported when the bar is drawn already
+            yield from super().get_renderables()
+
     columns = (
-        TextColumn("{task.description}"), BarColumn(bar_width=24), TaskProgressColumn(), Rate(), TimeRemainingColumn(),
-        TextColumn("left"),
+        TextColumn("{task.description}"), BarColumn(bar_width=24), TaskProgressColumn(), Rate(), Left(),
     )  # fmt: skip
     console = Console(stderr=True)
-    return Progress(
+    notice = _Notice(console.print)
+    return Bar(
         *columns,
         console=console,
         transient=True,
@@ -47,10 +64,46 @@ def bar(unit: str) -> Progress:
     )
 
 
-def step(progress: Progress) -> Callable[[str, float], Callable[[float], None]]:
-    """Show one step at a time: what it returns takes a text and a total, and returns what takes the counts."""
+class _Notice:
+    """Tells that Numba compiles, which it does once for an installation: it keeps what it has compiled.
 
-    def begin(text: str, total: float) -> Callable[[float], None]:
+    Parameters
+    ----------
+    say : callable
+        Takes the text.
+    """
+
+    def __init__(self, say: Callable[[str], object]) -> None:
+        self.say = say
+        self.attached = self.said = False
+        self.depth = 0
+        self.since = self.seconds = 0.0
+
+    def attach(self) -> None:
+        """Let Numba report, as soon as it is there: to import it for this would cost who does not need it."""
+        event = sys.modules.get("numba.core.event")
+        if self.attached or event is None or not hasattr(event, "Listener"):
+            return
+        told = {"on_start": lambda *_: self.count(1), "on_end": lambda *_: self.count(-1)}
+        event.register("numba:compile", type("Compiling", (event.Listener,), told)())
+        self.attached = True
+
+    def count(self, step: int) -> None:
+        """Count a function, the compiling of which begins (1) or ends (-1) inside of others."""
+        now = time.monotonic()
+        self.seconds += now - self.since if self.depth else 0.0
+        self.since = now
+        self.depth = max(self.depth + step, 0)  # what began before this was attached ends without a beginning
+        if self.seconds > _PATIENCE and not self.said:
+            self.said = True
+            self.say("compiling, on first use only: takes a minute or two")
+
+
+def step(progress: Progress) -> Callable[[str, float | None], Callable[[float], None]]:
+    """Show one step at a time: what it returns takes a text and a total, None if unknown, and returns what takes the counts."""
+
+    def begin(text: str, total: float | None) -> Callable[[float], None]:
+        progress.refresh()  # else the end of a short step would never be seen
         for task in progress.task_ids:
             progress.remove_task(task)
         task = progress.add_task(text, total=total)
@@ -61,7 +114,7 @@ def step(progress: Progress) -> Callable[[str, float], Callable[[float], None]]:
 
 def rate(speed: float | None, unit: str) -> str:
     """Return a rate as text, from counts a second: ``1.2 million points/s``, ``3.5 km/min``; empty when it is unknown."""
-    if not speed or not unit:
+    if not speed:
         return ""
     if speed >= 1e6:
         return f"{speed / 1e6:.1f} million {unit}/s"
