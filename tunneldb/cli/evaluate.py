@@ -60,23 +60,23 @@ def evaluate(
     form = output.suffix.lower() if output else ""
     if output and form not in (".json", ".csv"):
         raise UserError(f"{output}: the name must end in .json or .csv")
-    with connect(settings.dsn) as conn, bar("") as progress:
+    with connect(settings.dsn) as conn, bar("leaks") as progress:
         conn.rollback()
         conn.read_only = True
         found = get_survey(conn, survey)
-        advance = step(progress)(f"comparing with {truth.name}", 4)
+        begin = step(progress)
+        begin(f"reading {truth.name}", None)
         true = read_truth(conn, found, truth, layer)
-        advance(1)
         findings = read_findings(conn, found, km)
-        advance(1)
-        comparison = compare(true.shapes, findings.shapes, min_area, findings.stretch)
+        advance = begin(f"comparing with {truth.name}", len(true.shapes) + len(findings.shapes))
+        comparison = compare(true.shapes, findings.shapes, min_area, findings.stretch, advance)
         outside = sum(not shape.intersects(findings.stretch) for shape in true.shapes)
         if outside == len(true.shapes):
             kilometres = ", ".join(map(str, findings.kilometres))
             raise UserError(
                 f"{truth}: no leak lies where leaks were sought, kilometres {kilometres}; x must be the chainage, m"
             )
-        advance(1)
+        begin("distances from the scanner", None)
         distances = (
             scanner_distance(conn, found, list(comparison.true_shape)),
             scanner_distance(conn, found, list(comparison.found_shape)),

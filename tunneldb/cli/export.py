@@ -77,8 +77,8 @@ def export(
 def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, stretch: Stretch) -> None:
     from tunneldb.export.plain import write_survey
 
-    with told_to_end(), replacing(output) as temporary:
-        counts = write_survey(conn, survey, stretch.low, stretch.high, temporary)
+    with told_to_end(), replacing(output) as temporary, bar("parts") as progress:
+        counts = write_survey(conn, survey, stretch.low, stretch.high, temporary, step(progress))
     tell(survey=survey.name, file=output, layers=counts)
     click.echo(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count), err=True)
 

@@ -77,7 +77,8 @@ def _look_at_file(path: Path, dimension: str | None, kind: str | None, scanner: 
         raise UserError(f"{path}: say which dimension holds the intensity: --intensity DIMENSION")
     if kind is None:
         raise UserError(f"{path}: say what {dimension} is: --intensity-kind {'|'.join(get_args(Kind))}")
-    return look_at_file(path, dimension, cast(Kind, kind), scanner)
+    with bar("points") as progress:
+        return look_at_file(path, dimension, cast(Kind, kind), scanner, step(progress))
 
 
 def _look_at_survey(settings: Settings, name: str, km: str | None) -> Look:

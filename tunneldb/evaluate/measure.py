@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -118,6 +118,7 @@ def compare(
     found: Sequence[BaseGeometry],
     min_area: float,
     stretch: BaseGeometry | None = None,
+    progress: Callable[[float], None] = lambda count: None,
 ) -> Comparison:
     """Hold found leaks against true ones.
 
@@ -134,6 +135,8 @@ def compare(
         m².
     stretch : Polygon or MultiPolygon, optional
         Leaks are cut to it. Its own edges are no edges of leaks.
+    progress : callable
+        Given how many leaks, of both, were compared since it was called last; all of them in the end.
     """
     whole, called = _cut(true, stretch), _cut(found, stretch)
     areas, called_areas = shapely.area(whole), shapely.area(called)
@@ -158,6 +161,8 @@ def compare(
         iou[members] = shared / (one.area + other.area - shared)
         error[members] = abs(other.area - one.area) / one.area
         edges.append(_edges(one, shapely.union_all(outlines[parts]), small, stretch))
+        progress(len(members) + len(parts))
+    progress(len(true) + len(found) - np.count_nonzero(true_group >= 0) - np.count_nonzero(found_group >= 0))
     return Comparison(
         demanded, counted, shown, clear, areas[demanded], shapely.area(clear),
         _shares(shown, clear, t, f), _shares(clear, shown, f, t), true_group, found_group, iou, error, edges,

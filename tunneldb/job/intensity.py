@@ -28,7 +28,7 @@ from tunneldb.leak.image import KILOMETRE
 from tunneldb.leak.seen import Eye
 from tunneldb.leak.store import load_reference, load_regions
 from tunneldb.scan.e57 import is_e57, read_e57_scans
-from tunneldb.scan.reader import Points, read_chunks
+from tunneldb.scan.reader import Points, read_chunks, read_header
 from tunneldb.scan.thin import thin
 
 Float = NDArray[np.float64]
@@ -109,7 +109,13 @@ def _look_at_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, v
     )
 
 
-def look_at_file(path: Path, dimension: str, kind: Kind, scanner: tuple[float, float, float] | None) -> Look:
+def look_at_file(
+    path: Path,
+    dimension: str,
+    kind: Kind,
+    scanner: tuple[float, float, float] | None,
+    begin: Callable[[str, float | None], Callable[[float], None]] = lambda text, total: lambda count: None,
+) -> Look:
     """Look at a scan file by itself: normals are those of planes through neighbouring points.
 
     Parameters
@@ -122,6 +128,8 @@ def look_at_file(path: Path, dimension: str, kind: Kind, scanner: tuple[float, f
         What it is.
     scanner : three floats or None
         Where the scanner stood, in the file's coordinates, m; None to take the poses of an E57 file.
+    begin : callable
+        Called with a text and a number of points, None if unknown, before each step; returns what takes the points done.
 
     Raises
     ------
@@ -129,13 +137,14 @@ def look_at_file(path: Path, dimension: str, kind: Kind, scanner: tuple[float, f
         If the file can't be read, or it isn't known where the scanner stood.
     """
     stations = _stations(path, scanner)
-    xyz, scan_id, raw = _thinned(path, dimension)
+    xyz, scan_id, raw = _thinned(path, dimension, begin(path.name, read_header(path).points))
     scans = np.unique(scan_id)
     if scanner is not None and len(scans) > 1:
         raise UserError(
             f"{path} holds {len(scans)} scans ({_some(scans)}), and --scanner is the place of one: split the file by"
             " point_source_id, or load it into a survey with --stations"
         )
+    begin("fitting", None)
     at = (
         np.tile(np.asarray(scanner), (len(xyz), 1))
         if scanner is not None
@@ -247,7 +256,9 @@ def _stations(path: Path, scanner: tuple[float, float, float] | None) -> dict[in
     return posed
 
 
-def _thinned(path: Path, dimension: str) -> tuple[Float, NDArray[np.int32], NDArray[np.float32]]:
+def _thinned(
+    path: Path, dimension: str, progress: Callable[[float], None]
+) -> tuple[Float, NDArray[np.int32], NDArray[np.float32]]:
     """Coordinates, scan and raw intensity of a scan's points, each scan thinned to a point a voxel."""
     kept: list[Points] = []
     edge, count = THINNEST, 0
@@ -258,6 +269,7 @@ def _thinned(path: Path, dimension: str) -> tuple[Float, NDArray[np.int32], NDAr
             kept = [_thin(_joined(kept), edge)]
             count = len(kept[0])
             edge *= 1.0 if count <= MOST_POINTS else 2.0**0.5
+        progress(len(chunk))
     if not count:
         raise UserError(f"{path}: the file holds no points")
     points = _thin(_joined(kept), edge)

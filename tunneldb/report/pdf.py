@@ -7,7 +7,8 @@ import shutil
 import signal
 import subprocess
 import tempfile
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,6 +22,8 @@ BROWSERS = (
 
 PATIENCE = 1800
 """Seconds that a browser may print at most."""
+
+_TICK = 0.5  # seconds from one word on the wait to the next
 
 LONGEST = 60
 """Bytes of a folder's path in which a browser can still open its socket: with its name there they must not be over 107."""
@@ -62,8 +65,15 @@ def _is_snap(program: Path) -> bool:
     return head.startswith(b"#!") and b"/snap/" in head
 
 
-def print_pdf(browser: str, page: Path, pdf: Path) -> None:
+def print_pdf(browser: str, page: Path, pdf: Path, waiting: Callable[[float], None] = lambda seconds: None) -> None:
     """Print a page, with all that belongs on paper, as PDF.
+
+    Parameters
+    ----------
+    browser, page, pdf
+        What prints, what is printed, and where to.
+    waiting : callable
+        Told now and then for how many seconds it has printed; how far it is, a browser does not say.
 
     Raises
     ------
@@ -79,7 +89,7 @@ def print_pdf(browser: str, page: Path, pdf: Path) -> None:
             f"{page.absolute().as_uri()}#print",
         ]  # fmt: skip
         try:
-            code, output = _run(command, profile)
+            code, output = _run(command, profile, waiting)
         except subprocess.TimeoutExpired:
             raise UserError(
                 f"{browser} did not print the report within {PATIENCE // 60} minutes: report a shorter stretch (--from, --to),"
@@ -90,7 +100,7 @@ def print_pdf(browser: str, page: Path, pdf: Path) -> None:
         raise UserError(f"{browser} did not print the report: {said[-1] if said else f'exit code {code}'}")
 
 
-def _run(command: Sequence[str], folder: str) -> tuple[int, str]:
+def _run(command: Sequence[str], folder: str, waiting: Callable[[float], None]) -> tuple[int, str]:
     """Run a browser, its temporary files in a folder; returns exit code and standard error.
 
     Whatever breaks off the wait ends the browser, with all that it has started.
@@ -100,8 +110,17 @@ def _run(command: Sequence[str], folder: str) -> tuple[int, str]:
         command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
         env=os.environ | temporary, start_new_session=True,
     ) as process:  # fmt: skip
+        began = time.monotonic()
         try:
-            _, output = process.communicate(timeout=PATIENCE)
+            while True:
+                try:
+                    _, output = process.communicate(timeout=min(_TICK, PATIENCE))
+                    break
+                except subprocess.TimeoutExpired:
+                    seconds = time.monotonic() - began
+                    if seconds >= PATIENCE:
+                        raise
+                    waiting(seconds)
         except BaseException:
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,14 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.store import load_surface
 
 
-def write_survey(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float, path: Path) -> dict[str, int]:
+def write_survey(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    low: float,
+    high: float,
+    path: Path,
+    begin: Callable[[str, float | None], Callable[[float], None]] = lambda text, total: lambda count: None,
+) -> dict[str, int]:
     """Write a stretch of a survey as a file of the kind that its ending says, and return how much of each layer.
 
     Parameters
@@ -23,6 +31,8 @@ def write_survey(conn: psycopg.Connection[Any], survey: Survey, low: float, high
         Chainage, m; infinite for the whole survey.
     path : Path
         File that isn't there yet, ``.gpkg`` or ``.dxf``.
+    begin : callable
+        Called with a text and the number of parts that are written; returns what takes those that are done.
 
     Raises
     ------
@@ -42,11 +52,11 @@ def write_survey(conn: psycopg.Connection[Any], survey: Survey, low: float, high
         )
     surface = load_surface(conn, survey, low, high)
     if path.suffix.lower() == ".gpkg":
-        from tunneldb.export.plain.gpkg import write_survey_gpkg
+        from tunneldb.export.plain import gpkg
 
-        return write_survey_gpkg(conn, survey, surface, low, high, path)
-    from tunneldb.export.plain.dxf import write_survey_dxf
+        return gpkg.write_survey_gpkg(conn, survey, surface, low, high, path, begin(survey.name, gpkg.parts()))
+    from tunneldb.export.plain import dxf
 
     if row is not None and row[0] is not None:  # what is drawn ends with the scan, not at the next vertex of the axis
         low, high = max(low, row[0]), min(high, row[1])
-    return write_survey_dxf(conn, survey, surface, low, high, path)
+    return dxf.write_survey_dxf(conn, survey, surface, low, high, path, begin(survey.name, dxf.PARTS))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,9 @@ MARGIN = 50.0
 TEXT = 1.0
 """Height of text on the map, m: 2 mm at 1:500."""
 
+PARTS = 7
+"""It is made in: map, leaks on it and in space, unrolled lining, profiles, sections in space, the file."""
+
 FEW = 20
 """Fewer ticks than this all bear their station, not only those of whole hundreds."""
 
@@ -71,7 +74,13 @@ LAYERS = {
 
 
 def write_survey_dxf(
-    conn: psycopg.Connection[Any], survey: Survey, surface: Surface, low: float, high: float, path: Path
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    surface: Surface,
+    low: float,
+    high: float,
+    path: Path,
+    progress: Callable[[float], None] = lambda count: None,
 ) -> dict[str, int]:
     """Write a stretch of a survey as a DXF drawing (2010, metres), and return the number of entities on each layer.
 
@@ -89,24 +98,31 @@ def write_survey_dxf(
         Chainage, m.
     path : Path
         File that isn't there yet.
+    progress : callable
+        Given 1 after each of the PARTS.
     """
     document = _document(conn, survey)
     space = document.modelspace()
     parts = stretches(surface, low, high)
     box = _draw_map(conn, survey, surface, parts, space)
+    progress(1)
     for place, view in (("MAP", "anomaly_map"), ("3D", "anomaly_3d")):
         for spot in read_spots(conn, survey, view, low, high):
             draw_spot(space, spot, place)
+        progress(1)
     unrolled = read_spots(conn, survey, "anomaly_unrolled", low, high)
     sides = [side for side in (edges(surface, part) for part in parts) if len(side[0]) > 1]
     ticked = tick_chainages(surface, low, high)
     stations = list(zip(ticked.tolist(), labels(conn, survey, ticked), strict=True))
     strip = draw_unrolled(space, (box[0], box[1] - MARGIN), sides, stations, unrolled)
+    progress(1)
     found = profiles(surface, low, high)
     named = list(zip(found, labels(conn, survey, np.array([profile.chainage for profile in found])), strict=True))
     sheet = draw_profiles(space, (box[0], strip[1] - MARGIN), surface, named, unrolled)
+    progress(1)
     for profile in found:
         space.add_polyline3d(in_space(surface, profile), close=True, dxfattribs={"layer": "SECTION_3D"})
+    progress(1)
     for name, (west, south, east, north) in (("MAP", box), ("UNROLLED", strip), ("PROFILES", sheet)):
         document.views.new(
             name,
@@ -116,6 +132,7 @@ def write_survey_dxf(
     document.set_modelspace_vport(whole[3] - whole[1], ((whole[0] + whole[2]) / 2, (whole[1] + whole[3]) / 2))
     document.header["$EXTMIN"], document.header["$EXTMAX"] = (*whole[:2], 0.0), (*whole[2:], 0.0)
     document.saveas(path)
+    progress(1)
     counts = dict.fromkeys(LAYERS, 0)
     for entity in space:
         counts[entity.dxf.layer] += 1

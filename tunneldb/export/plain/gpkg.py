@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -48,8 +48,19 @@ def layers() -> list[VectorLayer]:
     return list(seen.values())
 
 
+def parts() -> int:
+    """Number of layers that a survey is written in."""
+    return len(layers()) + len(_DRAWN)
+
+
 def write_survey_gpkg(
-    conn: psycopg.Connection[Any], survey: Survey, surface: Surface, low: float, high: float, path: Path
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    surface: Surface,
+    low: float,
+    high: float,
+    path: Path,
+    progress: Callable[[float], None] = lambda count: None,
 ) -> dict[str, int]:
     """Write a stretch of a survey as a GeoPackage, and return the number of rows of each layer.
 
@@ -66,6 +77,8 @@ def write_survey_gpkg(
         Chainage, m. What reaches into the stretch is written whole, only the axis is cut.
     path : Path
         File that isn't there yet.
+    progress : callable
+        Given 1 after each layer.
 
     Raises
     ------
@@ -82,11 +95,13 @@ def write_survey_gpkg(
         _write(path, layer.id, table, layer.wkb, crs if layer.on_map else None)
         counts[layer.id] = len(table.geometry)
         styled.append((layer.id, layer.style, layer.title))
+        progress(1)
     made = _drawn(conn, survey, surface, low, high)
     for (name, wkb, style, with_crs, text), table in zip(_DRAWN, made, strict=True):
         _write(path, name, replace(table, description=text), wkb, crs if with_crs else None)
         counts[name] = len(table.geometry)
         styled.append((name, style, text))
+        progress(1)
     _write_styles(path, styled)
     return counts
 
