@@ -60,7 +60,7 @@ def test_help_imports_no_verb() -> None:
 
 def test_where_nothing_compiled_can_be_kept_one_line_says_what_to_do(tmp_path: Path) -> None:
     """As for a user without a home whose tunneldb root has installed: Numba finds no folder that it may write to."""
-    nowhere = {"NUMBA_CACHE_LOCATOR_CLASSES": "UserWideCacheLocator"} | dict.fromkeys(["HOME", "XDG_CACHE_HOME"], "/proc/nowhere")
+    nowhere = dict.fromkeys(["HOME", "XDG_CACHE_HOME"], "/proc/no") | {"NUMBA_CACHE_LOCATOR_CLASSES": "UserWideCacheLocator"}
     command = [*TUNNELDB, "simulate", str(tmp_path / "scan"), "--preset", "small"]
     done = subprocess.run(command, env=os.environ | nowhere, capture_output=True, text=True, check=False)
     assert done.returncode == 2
