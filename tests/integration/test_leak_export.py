@@ -15,6 +15,7 @@ import shapely
 from click.testing import CliRunner
 from PIL import Image
 
+from tests.integration.conftest import without_intensity
 from tunneldb.cli.main import main
 
 COLUMNS = [
@@ -263,3 +264,10 @@ def test_images_of_a_survey_without_any(conn, example):
     conn.execute("DELETE FROM tunnel.image")
     conn.commit()
     assert "tunneldb run" in run("image", example, code=2).stderr
+
+
+def test_no_leaks_where_none_were_sought_are_said_to_be_so(conn, example):
+    assert "sought" not in run("leaks", example).stderr
+    without_intensity(conn)
+    for option in ([], ["--by-km"], ["--format", "csv"]):
+        assert run("leaks", example, *option).stderr == f"survey {example} has no intensity: leaks were not sought\n"

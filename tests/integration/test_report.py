@@ -261,13 +261,16 @@ def test_without_intensity_the_offset_is_shown(
 ) -> None:
     without_intensity(conn, every=6)
     path = tmp_path / "r.html"
-    run("report", example, "-o", path)
+    assert "leaks were not sought" in run("report", example, "-o", path).stderr
     reading = Reading(path)
     for strip in (12350, 12400):
         picture, _ = reading.strip(strip)
         inner = picture[4:-4].mean(axis=2)
         assert np.ptp(inner[::4, ::4]) > 200, "from black to white"
         assert (inner > 250).mean(axis=0).max() < 0.5, "no gap between profiles 0.6 m apart, nor where blocks of the image end"
+    run("report", example, "-o", tmp_path / "part.html", "--from", "12+346")
+    _, (x, _, width, _) = Reading(tmp_path / "part.html").strip(12300)
+    assert (x, width) == (pytest.approx(0, abs=0.2), pytest.approx(4, abs=0.3)), "no blank before a stretch's first strip"
     page = browser.new_page()
     troubles = watch(page)
     page.goto(path.as_uri())

@@ -104,6 +104,8 @@ def leaks(
     hours = parse_clock(clock) if clock else None
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
+        if found.intensity_kind == "none":
+            click.echo(f"survey {survey} has no intensity: leaks were not sought", err=True)
         kilometres = parse_km(km, loaded_kilometres(conn, found)) if km else None
         if by_km:
             _print_classes(conn, found, kilometres)

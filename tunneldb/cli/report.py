@@ -67,7 +67,8 @@ def report(settings: Settings, survey: str, output: Path, start: str | None, end
                     conn.close()  # a browser may take minutes
                     _print(browser, page, temporary, shown)
     tell(survey=survey, file=output, leaks=leaks, bytes=output.stat().st_size)
-    click.echo(f"{output}: {leaks} leaks", err=True)
+    said = "no intensity, leaks were not sought" if found.intensity_kind == "none" else f"{leaks} leaks"
+    click.echo(f"{output}: {said}", err=True)
 
 
 def _write(conn: psycopg.Connection, survey: Survey, stretch: Stretch, page: Path, shown: Progress, *, paper: bool) -> int:

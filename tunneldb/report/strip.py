@@ -41,8 +41,10 @@ class Strip:
 
     Attributes
     ----------
-    low, left, high : float
-        Chainage at which its drawing begins, how far from there its picture does, and the chainage at which it ends.
+    number : int
+        Whole chainage from which it would be drawn if the stretch did not begin later: by this it is known.
+    low, high : float
+        Chainage at which it begins and ends.
     title : str
         Both, in the tunnel's stationing.
     picture : Picture or None
@@ -63,8 +65,8 @@ class Strip:
         What the leaks whose middle lies in it show, as JSON.
     """
 
+    number: int
     low: float
-    left: float
     high: float
     title: str
     picture: Picture | None
@@ -162,15 +164,15 @@ class Strips:
         share = text.percent(seen.seen[inside].sum() / total) if total > 0 else "nothing"
         sought = self.survey.intensity_kind != "none"
         return Strip(
-            low=start,
-            left=low - start,
+            number=int(start),
+            low=low,
             high=high,
             title=f"{text.short(names[0])} to {text.short(names[1])}",
             picture=picture,
             ticks=[(place, text.short(name)) for place, name in zip(places, names[2:], strict=True)],
-            leaks=[(leak, outline_path(leak.outline, start, self.north, self.length / 2000)) for leak in leaks],
-            signs=place_signs(wet, start, start + self.length, self.length / LETTERS * 0.6),
-            ribbon=share_path(seen, start, high, 0.0, 0.8 * self.length / LETTERS),
+            leaks=[(leak, outline_path(leak.outline, low, self.north, self.length / 2000)) for leak in leaks],
+            signs=place_signs(wet, low, low + self.length, self.length / LETTERS * 0.6),
+            ribbon=share_path(seen, low, high, 0.0, 0.8 * self.length / LETTERS),
             blank=without_detection(seen, low, high) if sought else [],
             summary=f"{len(wet)} leak{'s' * (len(wet) != 1)}, {share} of the lining seen" if sought else "",
             details=text.script_json(self._details(lining, [leak for leak in leaks if self.of(leak) == int(start)])),
