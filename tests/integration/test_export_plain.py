@@ -332,6 +332,19 @@ def test_part_of_a_drawing(files: Path) -> None:
     assert chainage_of(ends) == pytest.approx([12400, 12430], abs=0.01)
 
 
+def test_a_drawing_ends_with_the_scan(example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    """Not with the vertices of the axis farther out, which the GeoPackage has all."""
+    conn.execute("UPDATE tunnel.scan_file SET chainage_from = 12303.5, chainage_to = 12486.25")
+    conn.commit()
+    for name in ("x.dxf", "x.gpkg"):
+        run("export", example, "-o", tmp_path / name)
+    found = entities(tmp_path / "x.dxf")
+    (axis,) = found["AXIS"]
+    ends = np.array([axis.vertices[k].dxf.location.xyz[:2] for k in (0, -1)])
+    assert chainage_of(ends) == pytest.approx([12303.5, 12486.25], abs=0.01)
+    assert (len(found["AXIS_VERTEX"]), len(layer(tmp_path / "x.gpkg", "axis_vertex")[1])) == (18, 21)
+
+
 def test_other_programs_read_the_drawing(files: Path) -> None:
     meta, _, wkb, values = pyogrio.raw.read(files / "whole.dxf", columns=["Layer"])
     shapes = shapely.from_wkb(wkb)
