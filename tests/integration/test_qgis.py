@@ -302,21 +302,41 @@ def test_a_sheet_lists_its_leaks_and_no_others(sheets: Path) -> None:
         assert page.count("confirmed") == 1 + (2 if number == 2 else 0), "beside the legend"
 
 
-def test_long_tables_go_on_on_another_page(conn: psycopg.Connection, project: Path, tmp_path: Path) -> None:
+def crowd(conn: psycopg.Connection, count: int, apart: float, remark: str) -> None:
+    """Put so many leaks on the second sheet, some metres apart, each with a remark; in the database the last ones come first."""
     conn.execute("DELETE FROM tunnel.anomaly WHERE kind <> 'leak'")
     conn.execute(
         "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, area, "
         "drop_mean, drop_max, image_share, unrolled, map, surface, remark) "
-        "SELECT survey_id, km, 12360 + i * 0.2, 12360 + i * 0.2 + 0.1, 0, 0.1, clock, kind, reasons, 0.01, "
-        "drop_mean, drop_max, 1, ST_MakeEnvelope(12360 + i * 0.2, 0, 12360 + i * 0.2 + 0.1, 0.1), map, surface, 'No ' || i "
-        "FROM tunnel.anomaly, generate_series(1, 60) AS i WHERE id = 1"
+        "SELECT survey_id, km, at, at + 0.05, 0, 0.1, clock, kind, reasons, 0.01, drop_mean, drop_max, 1, "
+        "ST_MakeEnvelope(at, 0, at + 0.05, 0.1), map, surface, format(%s, i) "
+        "FROM tunnel.anomaly, generate_series(%s, 1, -1) AS i, LATERAL (SELECT 12351 + i * %s AS at) AS placed WHERE id = 1",
+        (remark, count, apart),
     )
     conn.commit()
+
+
+def test_long_tables_go_on_on_another_page(conn: psycopg.Connection, project: Path, tmp_path: Path) -> None:
+    crowd(conn, 60, 0.5, "No %s")
     assert act(project, "atlas", str(tmp_path / "long.pdf"))["sheets"] == 4
     pages = words(tmp_path / "long.pdf")
     assert ["leaks continued" in page for page in pages] == [False, False, True, False, False]
     remarks = [int(number) for page in pages for number in re.findall(r"\bNo (\d+)\b", page)]
     assert remarks == list(range(1, 61))
+    assert "more leaks" not in "".join(pages)
+
+
+def test_a_table_that_is_too_long_says_how_many_leaks_it_lacks(conn: psycopg.Connection, project: Path, tmp_path: Path) -> None:
+    """Also where each leak has a long remark, of which there is no room for more than a line."""
+    crowd(conn, 600, 0.08, "No %s drips\nfrom a crack beside the joint, more in winter")
+    assert act(project, "atlas", str(tmp_path / "long.pdf"))["sheets"] == 4
+    pages = words(tmp_path / "long.pdf")
+    listed = [int(number) for page in pages for number in re.findall(r"\bNo (\d+)\b", page)]
+    assert listed == list(range(1, len(listed) + 1))
+    assert 400 < len(listed) < 600
+    assert ["more leaks" in page for page in pages] == [False] * 6 + [True] + [False] * 2
+    assert f"... and {600 - len(listed)} more leaks: table of the report" in pages[6]
+    assert "leaks 600, " in pages[1]
 
 
 def test_place_on_the_image_is_told(rows: psycopg.Connection, shared: Path) -> None:

@@ -40,9 +40,14 @@ _CHAINAGE_LABEL = (
 )
 _ARC_LABEL = "if(@grid_axis = 'y', to_string(round(@grid_number)), '')"
 
+# On one line or several, and cut where there is no room for all of it, which says so.
+_REMARK = (
+    "with_variable('said', coalesce(regexp_replace(\"remark\", '\\\\s+', ' '), ''), "
+    "if(length(@said) > {0}, left(@said, {0} - 1) || '…', @said))"
+)
 # Heading, expression, width in mm, alignment (1 left, 2 right), what rows are sorted by.
 _COLUMNS = (
-    ("Leak", '"id"', 11, 2),
+    ("Leak", 'to_string("id")', 11, 2),
     ("Chainage", '"label"', 19, 2),
     ("Arc, m", 'format_number(("arc_from" + "arc_to") / 2, 1)', 10, 2),
     ("Clock", 'format_number("clock", 1)', 9, 2),
@@ -50,9 +55,11 @@ _COLUMNS = (
     ("Drop, dB", 'format_number("drop_mean", 1)', 12.5, 2),
     ("Sure", "coalesce(round(100 * \"confidence\") || ' %', '')", 9, 2),
     ("Review", '"review"', 15, 1),
-    ("Remark", "coalesce(\"remark\", '')", 23, 1),
+    ("Remark", _REMARK, 23, 1),
 )
 _CELL_MARGIN = 0.7
+_ROW = 4.1  # height of a row of one line at the most, mm; with DejaVu it is 3.9
+_LINE_LEAST, _LINE = 10, 12  # letters that a line of a remark holds at the least, and of several, which break between words
 _TABLE_WIDTH = sum(column[2] + 2 * _CELL_MARGIN for column in _COLUMNS)
 
 
@@ -61,6 +68,11 @@ def strip_scale(extent: Extent, *, table: bool) -> int:
     room = _FOOT - _TOP - (_TABLE_LEAST if table else 0.0) - 8.0
     height = extent.ymax - extent.ymin
     return next((scale for scale in _SCALES if height * 1000.0 / scale <= room), _SCALES[-1])
+
+
+def table_rows(top: float) -> int:
+    """Return how many rows of one line a sheet's table has room for, which begins on its first page at ``top``, mm."""
+    return sum(2 * (int((_FOOT - 1 - y) / _ROW) - 1) for y in (top, *(PAGES - 1) * [_TOP]))
 
 
 def layouts(survey: Survey, extent: Extent, coverage: tuple[str, str], leaks: tuple[str, str]) -> ET.Element:
@@ -84,12 +96,13 @@ def layouts(survey: Survey, extent: Extent, coverage: tuple[str, str], leaks: tu
         collection.append(_item(_PAGE, f"page {page + 1}", (0.0, 0.0, *PAGE), page, background="true"))
     scale = strip_scale(extent, table=sought)
     strip = _strip(scale, extent)
-    bottom = _TOP + (extent.ymax - extent.ymin) * 1000.0 / scale + 1.0
+    top = _TOP + (extent.ymax - extent.ymin) * 1000.0 / scale + 8.0  # of the table
     layout.append(strip)
     layout.extend(_texts(survey, scale, pages))
     layout.append(_scale_bar(strip.attrib["uuid"]))
     if sought:
-        layout.extend(_table(leaks, bottom + 7.0))
+        layout.extend(_table(leaks, top))
+        layout.append(_more(table_rows(top)))
     ET.SubElement(
         layout, "Atlas", enabled="1", coverageLayer=coverage[0], coverageLayerSource=coverage[1],
         coverageLayerProvider="postgres", coverageLayerName=SHEETS, hideCoverage="1", sortFeatures="1", sortAscending="1",
@@ -198,6 +211,13 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
     return texts
 
 
+def _more(rows: int) -> ET.Element:
+    """What the last page says where there are more leaks than rows."""
+    count = _SHEET.format("leaks")
+    text = f"[% if({count} > {rows}, '… and ' || ({count} - {rows}) || ' more leaks: table of the report', '') %]"
+    return _label("more", text, (_MARGIN, _FOOT + 1, 150, 6), 11, page=PAGES - 1, bold=True)
+
+
 def _label(
     name: str, text: str, box: tuple[float, float, float, float], size: float, *, page: int = 0, bold: bool = False,
     align: str = "left",
@@ -224,7 +244,13 @@ def _scale_bar(strip: str) -> ET.Element:
 
 
 def _table(leaks: tuple[str, str], top: float) -> list[ET.Element]:
-    """The table of leaks and its frames, two abreast on each page; a page whose first frame is empty is not printed."""
+    """The table of leaks and its frames, two abreast on each page; a page whose first frame is empty is not printed.
+
+    The more leaks there are on a sheet, the less there is room for of their remarks; what is left out of one is marked.
+    """
+    rows = table_rows(top)
+    lines = f"floor({rows} / max({_SHEET.format('leaks')}, 1))"
+    letters = f"if({lines} > 1, {_LINE} * {lines}, {_LINE_LEAST})"
     key = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, f'{SHEETS} table')}}}"
     frames = []
     for page in range(PAGES):
@@ -239,7 +265,7 @@ def _table(leaks: tuple[str, str], top: float) -> list[ET.Element]:
             )  # fmt: skip
     table = ET.Element(
         "LayoutMultiFrame", type=str(_TABLE), uuid=key, templateUuid=key, source="0", vectorLayer=leaks[0],
-        vectorLayerName="Leaks", vectorLayerSource=leaks[1], vectorLayerProvider="postgres", maxFeatures="100000",
+        vectorLayerName="Leaks", vectorLayerSource=leaks[1], vectorLayerProvider="postgres", maxFeatures=str(rows),
         filterToAtlasIntersection="1", filterFeatures="false", featureFilter="", resizeMode="0", headerMode="1",
         headerHAlignment="0", emptyTableMode="0", emptyTableMessage="", showEmptyRows="1", showUniqueRowsOnly="0",
         showOnlyVisibleFeatures="0", useConditionalStyling="0", wrapBehavior="1", wrapString="",
@@ -252,7 +278,7 @@ def _table(leaks: tuple[str, str], top: float) -> list[ET.Element]:
     ET.SubElement(table, "contentTextFormat").append(_text_style(7.0))
     columns = ET.SubElement(table, "displayColumns")
     for heading, expression, width, align in _COLUMNS:
-        _column(columns, heading, expression, width, align)
+        _column(columns, heading, expression.format(letters), width, align)
     order = ET.SubElement(table, "sortColumns")
     _column(order, "", '"chainage_from" + "chainage_to"', 0, 1)
     return [*frames, table]
