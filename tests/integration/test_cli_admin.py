@@ -68,7 +68,7 @@ def test_where_nothing_compiled_can_be_kept_one_line_says_what_to_do(tmp_path: P
 
 
 def test_without_a_dsn_everything_starts_by_itself(home: Path) -> None:
-    environment = os.environ | {"TUNNELDB_HOME": str(home)}
+    environment = os.environ | {"TUNNELDB_HOME": str(home), "LESS": ""}
 
     def tunneldb(*arguments: str) -> str:
         result = subprocess.run([*TUNNELDB, *arguments], env=environment, capture_output=True, text=True, check=False)
@@ -79,6 +79,8 @@ def test_without_a_dsn_everything_starts_by_itself(home: Path) -> None:
     assert "schema tunnel created" in tunneldb("init")
     assert "is up to date" in tunneldb("init")
     assert tunneldb("psql", "-At", "-c", "SELECT tunnel_api.chainage_label(12345.678)") == "0 12+345.678\n"
+    del environment["LESS"]
+    assert tunneldb("psql", "-c", r"\! printenv LESS") == "0 FRX\n"  # a short answer does not wait for the pager's q
     assert "✓ disk" in tunneldb("check")
     assert tunneldb("server", "status").startswith("0 running")
     assert "stopped" in tunneldb("server", "stop")

@@ -67,7 +67,7 @@ def test_a_bar_shows_rate_and_time_left_and_leaves_the_pipe_to_results(survey: P
 
 
 def test_the_bar_of_simulate_shows_the_time_left(tmp_path: Path) -> None:
-    shown, output = on_a_terminal("simulate", tmp_path, "--preset", "small", "--density", 2500, "--no-truth")  # some blocks
+    shown, output = on_a_terminal("simulate", tmp_path, "--preset", "small", "--density", 1500, "--no-truth")  # some blocks
     assert re.search(r"scanning .*[0-9] (million )?points/s [0-9]+:[0-9]{2}:[0-9]{2} left", shown)
     assert re.search(r"^[0-9,]+ points, ", output)
 

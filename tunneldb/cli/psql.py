@@ -24,4 +24,5 @@ def psql(settings: Settings, arguments: tuple[str, ...]) -> None:
         if settings.dsn is not None:
             raise UserError("psql is not installed: sudo apt install postgresql-client")
         program = find_binaries()["psql"]
+    os.environ.setdefault("LESS", "FRX")  # as git does: the pager, often less, waits for its q only where a page is full
     os.execv(program, ["psql", "--dbname", dsn, *arguments])

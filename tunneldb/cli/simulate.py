@@ -240,8 +240,10 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
         task = progress.add_task(f"scanning {parameters.name}", total=None)
 
         def scanned(share: float, points: int) -> None:
-            # how many there will be is known only from how many there are
-            progress.update(task, completed=points, total=points / share if share > 0.0 else None)
+            if share > 0.0:
+                # how many there will be is guessed from the first ones, once: with another total rich forgets the rate
+                total = progress.tasks[0].total or points / share
+                progress.update(task, completed=share * total, total=total)
 
         files = write(simulation, out, truth=not no_truth, progress=scanned)
     area = sum(leak.area for leak in simulation.leaks)

@@ -317,7 +317,7 @@
       <editWidget type="TextEdit">
         <config>
           <Option type="Map">
-            <Option type="bool" name="IsMultiline" value="true"/>
+            <Option type="bool" name="IsMultiline" value="false"/>
             <Option type="bool" name="UseHtml" value="false"/>
           </Option>
         </config>
@@ -447,13 +447,31 @@
   </attributeEditorForm>
   <previewExpression>"label"</previewExpression>
   <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% format_number("clock", 1) %] h&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "found" %]&lt;br&gt;drop [% format_number("drop_mean", 1) %] dB, [% "review" %]</mapTip>
-  <renderer-3d type="vector">
+  <renderer-3d type="rulebased">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
-    <symbol type="polygon">
-      <data alt-clamping="absolute" alt-binding="vertex" offset="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-      <material ambient="0,60,115" diffuse="0,92,175" specular="200,220,255" shininess="10"/>
-      <edges enabled="1" width="2" color="255,255,255"/>
-    </symbol>
+    <rules key="{tunneldb-leaks}">
+      <rule key="{tunneldb-open}" filter="&quot;review&quot; = 'open'" description="Open">
+        <symbol type="polygon" material_type="phong">
+          <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
+          <material ambient="200,140,60,255" diffuse="230,126,0,255" specular="0,0,0,255" shininess="0"/>
+          <edges enabled="1" width="2" color="140,70,0,255"/>
+        </symbol>
+      </rule>
+      <rule key="{tunneldb-confirmed}" filter="&quot;review&quot; = 'confirmed'" description="Confirmed">
+        <symbol type="polygon" material_type="phong">
+          <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
+          <material ambient="60,120,200,255" diffuse="0,92,175,255" specular="0,0,0,255" shininess="0"/>
+          <edges enabled="1" width="2" color="0,45,95,255"/>
+        </symbol>
+      </rule>
+      <rule key="{tunneldb-rejected}" filter="&quot;review&quot; = 'rejected'" description="Rejected">
+        <symbol type="polygon" material_type="phong">
+          <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
+          <material ambient="150,150,150,255" diffuse="150,150,150,255" specular="0,0,0,255" shininess="0"/>
+          <edges enabled="1" width="2" color="110,110,110,255"/>
+        </symbol>
+      </rule>
+    </rules>
   </renderer-3d>
   <layerGeometryType>2</layerGeometryType>
 </qgis>
