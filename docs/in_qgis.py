@@ -78,13 +78,13 @@ def sheets(picture: str) -> Iterator[None]:
 
 
 def tidy() -> Iterator[None]:
-    """Lay the window out as a user would: no browser, layers wide enough to read, half of it for the unrolled lining."""
+    """Lay the window out as a user would: no browser, no 3D, layers wide enough to read, half of it for the unrolled lining."""
     window = iface.mainWindow()
     window.setGeometry(0, 0, *WINDOW)
     docks = {dock.objectName(): dock for dock in window.findChildren(QDockWidget)}
-    for name in ("Browser", "Browser2"):
-        if name in docks:
-            docks[name].hide()
+    for name, dock in docks.items():
+        if name in ("Browser", "Browser2") or dock.windowTitle() == "3D":
+            dock.hide()
     yield
     unrolled = next(dock for dock in docks.values() if dock.windowTitle() == "Unrolled")
     window.resizeDocks([docks["Layers"]], [330], Qt.Horizontal)

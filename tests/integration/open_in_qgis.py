@@ -2,7 +2,7 @@
 
 Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK [LAYER [KIND]]
        | draw KIND | add VIEW | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG
-       | atlas PDF | where CHAINAGE ARC | labels LAYER
+       | atlas PDF | preview | where CHAINAGE ARC | labels LAYER | space [PNG]
 """
 
 from __future__ import annotations
@@ -11,10 +11,12 @@ import json
 import os
 import sys
 import types
+import zipfile
+from pathlib import Path
 from typing import Any
 
 import qgis.utils
-from qgis._3d import Qgs3D
+from qgis._3d import Qgs3D, Qgs3DMapSettings, QgsCameraPose, QgsLayoutItem3DMap
 from qgis.core import (
     QgsApplication,
     QgsDataSourceUri,
@@ -25,27 +27,34 @@ from qgis.core import (
     QgsFeature,
     QgsGeometry,
     QgsLayoutExporter,
+    QgsLayoutItemPage,
+    QgsLayoutPoint,
+    QgsLayoutSize,
     QgsMapLayer,
     QgsMapRendererParallelJob,
     QgsMapSettings,
     QgsPalettedRasterRenderer,
     QgsPointXY,
+    QgsPrintLayout,
     QgsProject,
     QgsReadWriteContext,
     QgsRectangle,
     QgsRenderContext,
     QgsRunProcess,
+    QgsVector3D,
     QgsVectorLayer,
     QgsVectorLayerUtils,
     QgsWkbTypes,
 )
 from qgis.gui import QgsMapCanvas
 from qgis.PyQt.QtCore import QSize
-from qgis.PyQt.QtGui import QColor
+from qgis.PyQt.QtGui import QColor, QOpenGLContext, QSurfaceFormat
 from qgis.PyQt.QtXml import QDomDocument
 
 PREFIX = "tunneldb_layer_"
 WIDTH, HEIGHT = 1600, 640
+SPACE_SIZE, SPACE_DPI = (297.0, 210.0), 60.0
+"""Picture of the 3D view, mm and dots per inch."""
 
 
 def describe(project: QgsProject, canvas: QgsMapCanvas) -> dict[str, Any]:
@@ -120,6 +129,75 @@ def atlas(project: QgsProject, path: str) -> dict[str, Any]:
     settings.textRenderFormat = QgsRenderContext.TextRenderFormat(wanted)
     result, error = QgsLayoutExporter.exportToPdf(sheets, path, settings)
     return {"saved": result == QgsLayoutExporter.Success, "error": error, "sheets": sheets.count()}
+
+
+def preview(project: QgsProject) -> dict[str, Any]:
+    """Scale of the strip of each sheet as the layout designer previews them: it has scales to choose from."""
+    layout = project.layoutManager().layoutByName("Inspection sheets")
+    layout.renderContext().setPredefinedScales([500.0, 1000.0, 2500.0])
+    sheets, strip = layout.atlas(), layout.itemById("strip")
+    sheets.beginRender()
+    scales = []
+    while sheets.next():
+        layout.reportContext().setLayer(sheets.coverageLayer())
+        scales.append(round(strip.scale()))
+    return {"scales": scales}
+
+
+def space(project: QgsProject, path: str = "") -> dict[str, Any]:
+    """What QGIS reads of the 3D view, drawn into a picture if a path is given."""
+    file = Path(project.fileName())
+    with zipfile.ZipFile(file) as archive:
+        text = archive.read(archive.namelist()[0]).decode()
+    document = QDomDocument()
+    assert document.setContent(text)[0]
+    view = document.documentElement().firstChildElement("mapViewDocks3D").firstChildElement("view")
+    settings = Qgs3DMapSettings()
+    settings.readXml(view.firstChildElement("qgis3d"), QgsReadWriteContext())
+    settings.resolveReferences(project)
+    at = view.firstChildElement("camera")
+    camera = {name: float(at.attribute(name)) for name in ("x", "y", "elev", "xMap", "yMap", "zMap", "dist", "pitch", "yaw")}
+    seen = {
+        "name": view.attribute("name"),
+        "open": view.attribute("isOpen"),
+        "crs": settings.crs().authid(),
+        "layers": [layer.id().removeprefix(PREFIX) for layer in settings.layers()],
+        "origin": [settings.origin().x(), settings.origin().y(), settings.origin().z()],
+        "terrain": settings.terrainRenderingEnabled(),
+        "offset": settings.terrainElevationOffset(),
+        "lights": len(settings.directionalLights()) + len(settings.pointLights()),
+        "camera": camera,
+    }
+    return seen | _draw_space(project, settings, camera, path) if path else seen
+
+
+def _draw_space(project: QgsProject, settings: Qgs3DMapSettings, camera: dict[str, float], path: str) -> dict[str, Any]:
+    wanted = QSurfaceFormat()
+    wanted.setVersion(3, 3)
+    wanted.setProfile(QSurfaceFormat.CoreProfile)
+    context = QOpenGLContext()
+    context.setFormat(wanted)
+    if not context.create() or context.format().version() < (3, 3):
+        return {"drawn": "needs OpenGL 3.3"}
+    layout = QgsPrintLayout(project)
+    page = QgsLayoutItemPage(layout)
+    page.setPageSize(QgsLayoutSize(*SPACE_SIZE))
+    layout.pageCollection().addPage(page)
+    item = QgsLayoutItem3DMap(layout)
+    item.setBackgroundColor(QColor("white"))
+    item.attemptMove(QgsLayoutPoint(0, 0))
+    item.attemptResize(QgsLayoutSize(*SPACE_SIZE))
+    pose = QgsCameraPose()
+    pose.setCenterPoint(QgsVector3D(camera["x"], camera["elev"], camera["y"]))
+    pose.setDistanceFromCenterPoint(camera["dist"])
+    pose.setPitchAngle(camera["pitch"])
+    pose.setHeadingAngle(camera["yaw"])
+    item.setMapSettings(settings)
+    item.setCameraPose(pose)
+    layout.addLayoutItem(item)
+    export = QgsLayoutExporter.ImageExportSettings()
+    export.dpi = SPACE_DPI
+    return {"drawn": QgsLayoutExporter(layout).exportToImage(path, export) == QgsLayoutExporter.Success}
 
 
 def where(project: QgsProject, chainage: str, arc: str) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import unicodedata
 import warnings
@@ -75,12 +76,12 @@ def write(output: Path | None, *options: str, dsn: str | None = None) -> Result:
     return CliRunner().invoke(main, [*where, "qgis", "demo-2024", *file, *options])
 
 
-def act(project: Path | str, *arguments: str, **environment: str) -> dict[str, Any]:
-    """Run an action on a project in QGIS."""
+def act(project: Path | str, *arguments: str, before: tuple[str, ...] = (), **environment: str) -> dict[str, Any]:
+    """Run an action on a project in QGIS, by a command if one is to stand before it."""
     if not has_qgis():
         pytest.skip("QGIS is not installed")
     done = subprocess.run(
-        [PYTHON, str(SCRIPT), str(project), *arguments],
+        [*before, PYTHON, str(SCRIPT), str(project), *arguments],
         env=ENVIRONMENT | environment,
         capture_output=True,
         text=True,
@@ -282,6 +283,10 @@ def sheets(shared: Path) -> Path:
 def words(path: Path) -> list[str]:
     """The text of each page."""
     return [" ".join(unicodedata.normalize("NFKC", page.extract_text()).split()) for page in pypdf.PdfReader(path).pages]
+
+
+def test_sheets_keep_their_scale_in_the_preview(shared: Path) -> None:
+    assert act(shared, "preview") == {"scales": [200] * 4}
 
 
 def test_a_sheet_is_printed_for_each_50_m(sheets: Path) -> None:

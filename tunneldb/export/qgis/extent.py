@@ -98,6 +98,15 @@ def sheet_extent(conn: psycopg.Connection, survey: str) -> Extent | None:
     return None if row is None else Extent(*row)
 
 
+def largest_leak(conn: psycopg.Connection, survey: str) -> float | None:
+    """Return the chainage of a survey's largest leak, m, None if it has none."""
+    row = conn.execute(
+        "SELECT (chainage_from + chainage_to) / 2 FROM tunnel_api.leak WHERE survey = %s ORDER BY area DESC, id LIMIT 1",
+        (survey,),
+    ).fetchone()
+    return None if row is None else row[0]
+
+
 def first_window(conn: psycopg.Connection, survey: str, kilometres: list[tuple[int, Extent]]) -> Extent:
     """Return a stretch of lining in which one can see something: around the largest leak, or at the start.
 
@@ -110,13 +119,10 @@ def first_window(conn: psycopg.Connection, survey: str, kilometres: list[tuple[i
     kilometres : list of (int, Extent)
         As :func:`unrolled_extents` returns them, at least one.
     """
-    row = conn.execute(
-        "SELECT (chainage_from + chainage_to) / 2 FROM tunnel_api.leak WHERE survey = %s ORDER BY area DESC, id LIMIT 1",
-        (survey,),
-    ).fetchone()
+    leak = largest_leak(conn, survey)
     low, high = kilometres[0][1].xmin, kilometres[-1][1].xmax
     bottom, top = min(extent.ymin for _, extent in kilometres), max(extent.ymax for _, extent in kilometres)
     length = max(WINDOW, PANEL * (top - bottom))
-    middle = row[0] if row is not None else low + length / 2
+    middle = low + length / 2 if leak is None else leak
     start = max(low, min(middle - length / 2, high - length))
     return Extent(start, bottom, min(start + length, high), top).grown()

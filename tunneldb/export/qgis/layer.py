@@ -66,19 +66,19 @@ _DRY = "\"kind\" <> 'leak'"
 # In drawing order within a group, from the top.
 LAYERS = (
     VectorLayer("axis_vertex", "Axis vertices (editable)", "axis_vertex", "PointZ", "axis_vertex", MAP, (MAP,), True),
-    VectorLayer("leak_map", "Leaks beside the axis (review)", "leak_map", "Polygon", "leak", MAP, (MAP,), True),
+    VectorLayer("leak_map", "Leaks on the map (review)", "leak_map", "Polygon", "leak", MAP, (MAP,), True),
     VectorLayer(
-        "anomaly_map", "Joints and dark spots beside the axis (review)", "anomaly_map", "Polygon", "anomaly", MAP, (), True,
+        "anomaly_map", "Dark but dry, map (review)", "anomaly_map", "Polygon", "anomaly", MAP, (), True,
         where=_DRY,
     ),
     VectorLayer("target_sphere", "Target spheres", "target_sphere", "PointZ", "target_sphere", MAP, (MAP, SPACE)),
     VectorLayer("axis", "Axis", "axis", "LineStringZ", "axis", MAP, (MAP, SPACE)),
     VectorLayer("segment", "Segments", "segment", "LineStringZ", "segment", MAP, (MAP,)),
     VectorLayer("section", "Sections", "section", "LineStringZ", "section", MAP, (MAP, SPACE)),
-    VectorLayer("cluster", "Objects, rails and appendages", "cluster", "Polygon", "cluster", MAP, (MAP,)),
+    VectorLayer("cluster", "Objects, rails, appendages", "cluster", "Polygon", "cluster", MAP, (MAP,)),
     VectorLayer("leak_unrolled", "Leaks (review)", "leak_unrolled", "Polygon", "leak", UNROLLED, (UNROLLED,), True),
     VectorLayer(
-        "anomaly_unrolled", "Joints and dark spots (review)", "anomaly_unrolled", "Polygon", "anomaly", UNROLLED, (), True,
+        "anomaly_unrolled", "Dark but dry (review)", "anomaly_unrolled", "Polygon", "anomaly", UNROLLED, (), True,
         where=_DRY,
     ),
     VectorLayer("region", "Regions drawn by hand", "region", "Polygon", "region", UNROLLED, (UNROLLED,), True),
@@ -86,7 +86,7 @@ LAYERS = (
         "section_unrolled", "Sections, unrolled", "section_unrolled", "LineString", "section_unrolled", UNROLLED,
         (UNROLLED,),
     ),
-    VectorLayer("sheet", "Sheets of 50 m (identify: chainage, arc)", "sheet", "Polygon", "sheet", UNROLLED, (UNROLLED,)),
+    VectorLayer("sheet", "Sheets of 50 m", "sheet", "Polygon", "sheet", UNROLLED, (UNROLLED,)),
     VectorLayer(
         "leak_sheet", "Leaks, numbered (sheets)", "leak_unrolled", "Polygon", "leak_sheet", UNROLLED, (SHEETS,),
         where="\"review\" <> 'rejected' AND \"detected\"",

@@ -19,11 +19,12 @@ from tunneldb.database import Survey
 from tunneldb.export.atomic import replacing
 from tunneldb.export.qgis.action import RECOMPUTED_FROM, recompute
 from tunneldb.export.qgis.crs import crs_element, no_crs
-from tunneldb.export.qgis.extent import Extent, View, first_window, map_extent, sheet_extent, unrolled_extents
+from tunneldb.export.qgis.extent import Extent, View, first_window, largest_leak, map_extent, sheet_extent, unrolled_extents
 from tunneldb.export.qgis.layer import LAYERS, MAP, SHEETS, SPACE, UNROLLED, VectorLayer
 from tunneldb.export.qgis.raster import FILLED, KINDS, image_kind, pipe
 from tunneldb.export.qgis.sheet import layouts
 from tunneldb.export.qgis.source import Source
+from tunneldb.export.qgis.space import docks, filled_layers, scene, viewpoint
 from tunneldb.export.qgis.styles import require_table, style_elements
 
 QGIS_VERSION = "3.22.0-Białowieża"
@@ -124,7 +125,9 @@ def _project(
     """The project's root; with paths relative to its folder, or absolute if it is in none."""
     crs = crs_element(conn, survey.srid)
     source = Source.of_connection(conn) if service is None else Source.of_service(service)
-    entries = [_vector(layer, source, survey, crs) for layer in LAYERS] + _rasters(images, folder)
+    filled = filled_layers(conn, survey.name)
+    entries = [_vector(layer, source, survey, crs, in_space=layer.id in filled) for layer in LAYERS]
+    entries += _rasters(images, folder)
     views = _views(conn, survey.name)
     root = ET.Element("qgis", version=QGIS_VERSION, projectname=survey.name, saveUser="", saveUserFull="")
     ET.SubElement(root, "homePath", path="")
@@ -135,6 +138,9 @@ def _project(
     ET.SubElement(root, "projectCrs").append(deepcopy(crs))
     root.append(_tree(entries))
     _canvases(root, views, crs)
+    view = viewpoint(conn, survey.name, largest_leak(conn, survey.name))
+    shown = [layer_id(layer.id) for layer in LAYERS if layer.id in filled]
+    root.append(docks(view, scene(view, views[0].extent, crs, shown)))
     layers = ET.SubElement(root, "projectlayers")
     layers.extend(entry.element for entry in entries)
     root.append(_themes(entries))
@@ -159,7 +165,8 @@ def layer_id(name: str) -> str:
     return f"tunneldb_layer_{name}"
 
 
-def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element) -> _Entry:
+def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element, *, in_space: bool) -> _Entry:
+    """A layer on a view; a 3D view draws it only if it is in space."""
     element = ET.Element(
         "maplayer", type="vector", geometry=layer.geometry, wkbType=layer.wkb, readOnly=str(int(not layer.edited)),
         autoRefreshEnabled="0", refreshOnNotifyEnabled="0", hasScaleBasedVisibilityFlag="0",
@@ -170,7 +177,7 @@ def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element)
     ET.SubElement(element, "layername").text = layer.title
     ET.SubElement(element, "srs").append(deepcopy(crs) if layer.on_map else no_crs())
     ET.SubElement(element, "provider", encoding="UTF-8").text = "postgres"
-    element.extend(style_elements(layer.style))
+    element.extend(part for part in style_elements(layer.style) if in_space or part.tag != "renderer-3d")
     if layer.id in RECOMPUTED_FROM:
         element.append(recompute(survey, source))
     if layer.view == "region":

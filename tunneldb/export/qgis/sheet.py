@@ -141,7 +141,8 @@ def _strip(scale: int, extent: Extent) -> ET.Element:
     ET.SubElement(element, "Extent", {side: repr(value) for side, value in sides.items()})
     element.append(_grid("chainage", "10", "0", _CHAINAGE_LABEL, bottom=True))
     element.append(_grid("arc", "0", "2", _ARC_LABEL, bottom=False))
-    ET.SubElement(element, "AtlasMap", atlasDriven="1", scalingMode="1", margin="0")
+    # Scaling 0 keeps the strip's scale; 1 would choose among those of the designer, from 1:500, as soon as it is open.
+    ET.SubElement(element, "AtlasMap", atlasDriven="1", scalingMode="0", margin="0")
     return element
 
 

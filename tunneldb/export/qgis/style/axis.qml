@@ -156,9 +156,9 @@
   <mapTip>&lt;b&gt;[% "survey" %]&lt;/b&gt;&lt;br&gt;[% "label_from" %] – [% "label_to" %]</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
-    <symbol type="line">
+    <symbol type="line" material_type="simpleline">
       <data alt-clamping="absolute" alt-binding="vertex" offset="0" extrusion-height="0" simple-lines="1" width="4"/>
-      <material ambient="40,52,64" diffuse="40,52,64" specular="40,52,64" shininess="0"/>
+      <material ambient="40,52,64,255"/>
     </symbol>
   </renderer-3d>
   <layerGeometryType>1</layerGeometryType>

@@ -143,9 +143,9 @@
   <mapTip>&lt;b&gt;Ground at [% "label" %]&lt;/b&gt;</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
-    <symbol type="line">
+    <symbol type="line" material_type="simpleline">
       <data alt-clamping="absolute" alt-binding="vertex" offset="0" extrusion-height="0" simple-lines="1" width="2"/>
-      <material ambient="166,129,76" diffuse="166,129,76" specular="166,129,76" shininess="0"/>
+      <material ambient="166,129,76,255"/>
     </symbol>
   </renderer-3d>
   <layerGeometryType>1</layerGeometryType>

@@ -150,9 +150,9 @@
   <mapTip>&lt;b&gt;Section [% "label" %]&lt;/b&gt;&lt;br&gt;[% "interpolated" %] classes interpolated</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
-    <symbol type="line">
+    <symbol type="line" material_type="simpleline">
       <data alt-clamping="absolute" alt-binding="vertex" offset="0" extrusion-height="0" simple-lines="1" width="2"/>
-      <material ambient="120,140,155" diffuse="120,140,155" specular="120,140,155" shininess="0"/>
+      <material ambient="120,140,155,255"/>
     </symbol>
   </renderer-3d>
   <layerGeometryType>1</layerGeometryType>

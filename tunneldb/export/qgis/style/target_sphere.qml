@@ -264,7 +264,7 @@
       <material ambient="15,80,36,255" diffuse="31,166,74,255" specular="220,255,230,255" shininess="20"/>
       <shape-properties>
         <Option type="Map">
-          <Option type="double" name="radius" value="0.1"/>
+          <Option type="double" name="radius" value="0.3"/>
         </Option>
       </shape-properties>
       <transform matrix="1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"/>
