@@ -344,6 +344,74 @@ def test_a_table_that_is_too_long_says_how_many_leaks_it_lacks(conn: psycopg.Con
     assert "leaks 600, " in pages[1]
 
 
+def test_3d_view_looks_at_the_largest_leak(shared: Path) -> None:
+    seen = act(shared, "space")
+    assert (seen["name"], seen["crs"]) == ("3D", "EPSG:25830")
+    assert seen["open"] == "0", "QGIS 3.24 and later open it when asked to"
+    assert set(seen["layers"]) == {"axis", "section", "leak_3d", "target_sphere", "ground"}
+    # a terrain would hide what lies below it, and its height shift all layers in QGIS 3.22
+    assert (seen["terrain"], seen["offset"], seen["lights"]) == (False, 0, 1)
+    place = example_surface()[0].roll(np.array([12402.5]), np.array([0.0]), np.zeros(1))[0]
+    camera = seen["camera"]
+    assert [*seen["origin"][:2], camera["elev"]] == pytest.approx([place[0], place[1], place[2] - 4.0], abs=0.1)
+    assert seen["origin"] == [camera["xMap"], camera["yMap"], 0]
+    assert (camera["x"], camera["y"], camera["zMap"]) == (0, 0, camera["elev"])
+
+
+def in_picture(camera: dict[str, float], centre: np.ndarray, point: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Row and column at which a camera with a field of view of 45° upright sees a point (east, north, up)."""
+    pitch, yaw = np.radians([camera["pitch"], camera["yaw"]])
+    tilt = np.array([[1, 0, 0], [0, np.cos(pitch), -np.sin(pitch)], [0, np.sin(pitch), np.cos(pitch)]])
+    turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+    right, up, back = (turn @ tilt).T
+    across, upward, behind = np.stack([right, up, back]) @ (point - centre) - [0, 0, camera["dist"]]
+    half = shape[0] / 2
+    return half * np.array([1 + upward / behind / np.tan(np.pi / 8), shape[1] / shape[0] - across / behind / np.tan(np.pi / 8)])
+
+
+def test_layer_without_rows_is_not_in_3d(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    """It would leave the whole view blank; its style is in the database."""
+    conn.execute("DELETE FROM tunnel.image")
+    conn.execute("DELETE FROM tunnel.target_sphere")
+    conn.commit()
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    assert set(act(tmp_path / "demo.qgz", "space")["layers"]) == {"axis", "section", "leak_3d", "ground"}
+    after = {name: qgs(tmp_path / "demo.qgz").split(f"<id>tunneldb_layer_{name}</id>")[1] for name in ("target_sphere", "axis")}
+    assert "<renderer-3d" not in after["target_sphere"].split("</maplayer>")[0]
+    assert "<renderer-3d" in after["axis"].split("</maplayer>")[0]
+
+
+def test_3d_view_shows_leaks_on_the_lining_in_their_colours(shared: Path, tmp_path: Path) -> None:
+    """Real rendering: each leak in view has its colour at the pixel where its place in space is seen."""
+    screen = shutil.which("xvfb-run")
+    if screen is None:
+        pytest.skip("needs xvfb-run, for OpenGL without a screen")
+    software = {"QT_QPA_PLATFORM": "xcb", "LIBGL_ALWAYS_SOFTWARE": "1"}
+    picture = tmp_path / "space.png"
+    seen = act(shared, "space", str(picture), before=(screen, "-a", "-s", "-screen 0 1280x1024x24 +extension GLX"), **software)
+    if seen["drawn"] is not True:
+        pytest.skip(seen["drawn"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        image = rasterio.open(picture)
+    with image:
+        pixels = image.read([1, 2, 3]).astype(int)
+    camera = seen["camera"]
+    centre = np.array([camera["xMap"], camera["yMap"], camera["zMap"]])
+    found = []
+    for chainage, arc, _, review in LEAKS:
+        place = example_surface()[0].roll(np.array([chainage]), np.array([arc]), np.zeros(1))[0]
+        row, column = in_picture(camera, centre, place, pixels.shape[1:]).round().astype(int)
+        if review == "rejected" or np.linalg.norm(place - centre) > 40 or not (0 <= column < pixels.shape[2]):
+            continue
+        red, green, blue = pixels[:, row - 2 : row + 3, column - 2 : column + 3].reshape(3, -1)
+        own = (red > green + 50) & (green > blue + 30) if review == "open" else (blue > green + 50) & (green >= red)
+        found.append((chainage, bool(own.any())))
+    assert found == [(12402.5, True), (12428.0, True), (12436.0, True)]
+    for colour in ((40, 52, 64), (120, 140, 155), (166, 129, 76)):
+        assert (pixels == np.array(colour)[:, None, None]).all(axis=0).sum() > 500, "axis, sections and ground"
+
+
 def test_place_on_the_image_is_told(rows: psycopg.Connection, shared: Path) -> None:
     seen = act(shared, "where", "12367.891", "-3.456")
     title, text = seen["told"]
