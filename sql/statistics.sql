@@ -284,13 +284,13 @@ BEGIN
             (SELECT array_agg(l.id) FROM leak l) AS leaks
         FROM found t JOIN tunnel_api.waterproof_limit c ON t.wet_ratio > c.wet_ratio
         UNION ALL
-        SELECT p.class, 2, format('patch of %s m² at %s > %s m²%s', round(p.area[1]::numeric, 3),
-                (SELECT s.label FROM tunnel_api.stationing(tunnel_key, p.chainage[1]) s), p.patch_area,
+        SELECT p.class, 2, format('patch of %s m² at %s > %s m²%s', round(p.area::numeric, 3),
+                (SELECT s.label FROM tunnel_api.stationing(tunnel_key, p.chainage) s), p.patch_area,
                 CASE WHEN cardinality(p.leaks) > 1 THEN format(', the largest of %s', cardinality(p.leaks)) END),
             p.leaks
-        FROM (SELECT c.id AS class, c.patch_area, array_agg(l.area) AS area, array_agg(l.chainage) AS chainage,
-                  array_agg(l.id) AS leaks
-              FROM (SELECT * FROM leak ORDER BY area DESC, id) l
+        FROM (SELECT c.id AS class, c.patch_area, max(l.area) AS area, array_agg(l.id) AS leaks,
+                  (array_agg(l.chainage ORDER BY l.area DESC, l.id))[1] AS chainage
+              FROM leak l
               JOIN tunnel_api.waterproof_limit c ON l.area > c.patch_area
               GROUP BY c.id, c.patch_area) p
         UNION ALL

@@ -200,13 +200,13 @@ def test_status_of_all_surveys_counts_kilometres_by_stage(example: str) -> None:
     assert result.exit_code == 0
     lines = [line.split() for line in result.output.splitlines()]
     assert lines[0][-7:] == ["km", "load", "axis", "segments", "sections", "ground", "detect"]
-    assert lines[1] == [example, "demo", "2024-05-04", "1", "60", "12+300.100", "12+499.900", *"1111111"]
+    assert lines[1] == [example, "demo", "2024-05-04", "1", "60", "12+300.000", "12+500.000", *"1111111"]
     assert len(lines) == 2
 
 
 def test_status_of_a_survey(example: str) -> None:
     lines = [line.split() for line in run("status", example).output.splitlines()]
-    assert [example, "demo", "2024-05-04", "1", "60", "12+300.100", "12+499.900"] in lines
+    assert [example, "demo", "2024-05-04", "1", "60", "12+300.000", "12+500.000"] in lines
     assert lines[-1] == ["12", *["done"] * 6]
     unknown = run("status", "other")
     assert unknown.exit_code == 2

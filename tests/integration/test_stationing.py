@@ -273,8 +273,8 @@ def test_the_commands_show_and_take_stations(conn: psycopg.Connection, example: 
         ["12400.000", "12430.000", "0+580.000", "0+610.000", "up"],
     ]
     assert "0+500.000" in run("tunnel", "list").stdout
-    assert "0+500.100" in run("status", example).stdout  # the files reach from 12+300.1 to 12+499.9
-    assert "2+930.100" in run("survey", "list").stdout
+    assert "0+500.000" in run("status", example).stdout
+    assert "2+930.000" in run("survey", "list").stdout
 
     def listed(*options: str) -> list[str]:
         result = run("leaks", example, "--format", "csv", *options)
