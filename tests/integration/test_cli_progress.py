@@ -20,12 +20,16 @@ from tunneldb.cli.main import main
 TUNNELDB = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
 
 
-def on_a_terminal(*words: object, program: Sequence[str] = TUNNELDB) -> tuple[str, str]:
-    """Run a verb whose standard error is a terminal of 100 columns, and standard output a pipe; returns both."""
+def on_a_terminal(*words: object, program: Sequence[str] = TUNNELDB, output_too: bool = False) -> tuple[str, str]:
+    """Run a verb whose standard error is a terminal of 100 columns, and standard output a pipe unless it is there, too."""
     ours, theirs = pty.openpty()
     environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "100"}
     with subprocess.Popen(
-        [*program, *map(str, words)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=theirs, env=environment
+        [*program, *map(str, words)],
+        stdin=subprocess.DEVNULL,
+        stdout=theirs if output_too else subprocess.PIPE,
+        stderr=theirs,
+        env=environment,
     ) as process:
         os.close(theirs)
         shown = bytearray()
@@ -37,8 +41,7 @@ def on_a_terminal(*words: object, program: Sequence[str] = TUNNELDB) -> tuple[st
             if not read:
                 break
             shown += read
-        assert process.stdout is not None
-        output = process.stdout.read()
+        output = b"" if process.stdout is None else process.stdout.read()
         assert process.wait() == 0, shown.decode()
     os.close(ours)
     return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode()), output.decode()
@@ -64,6 +67,14 @@ def test_a_bar_shows_rate_and_time_left_and_leaves_the_pipe_to_results(survey: P
     shown, output = on_a_terminal("spheres", SURVEY, "--radius", 0.07, "--json")
     assert "points/s" in shown
     assert output.startswith("{")
+
+
+def test_lines_are_printed_above_the_bar_and_not_into_it(survey: Path) -> None:
+    on_a_terminal("load", SURVEY, survey)
+    shown, _ = on_a_terminal("run", SURVEY, "--to", "segments", output_too=True)
+    for line in (r"\[1/2\] axis km 1: iterations", r"\[2/2\] segments km 1: segments"):
+        assert re.search(rf"(^|[\r\n]){line}", shown)
+    assert not re.search(r"left\[", shown)
 
 
 def test_the_bar_of_simulate_shows_the_time_left(tmp_path: Path) -> None:
@@ -100,6 +111,11 @@ def test_what_is_written_and_compared_shows_it_too(
         assert re.search(r"[0-9]+:[0-9]{2}:[0-9]{2} left", shown), (verb, shown)
         assert not re.search(r"\x1b|━|left", output)
     assert "printing" in shown
+    scan = write(tmp_path / "t.laz", tube(1000, 1005, 1000, seed=1))
+    how = ("--intensity", "Amplitude", "--intensity-kind", "amplitude", "--scanner", 500032.5, 4500000, 100)
+    shown, output = on_a_terminal("intensity", scan, *how)
+    assert re.search(r"t\.laz [^%]*100% [0-9 ]+(\.[0-9] million )?points/s 0:00:00 left", shown)
+    assert not re.search(r"\x1b|━|left", output)
 
 
 COMPILES = """
