@@ -162,7 +162,8 @@ def compare(
         error[members] = abs(other.area - one.area) / one.area
         edges.append(_edges(one, shapely.union_all(outlines[parts]), small, stretch))
         progress(len(members) + len(parts))
-    progress(len(true) + len(found) - np.count_nonzero(true_group >= 0) - np.count_nonzero(found_group >= 0))
+    touching = int(np.count_nonzero(true_group >= 0) + np.count_nonzero(found_group >= 0))
+    progress(len(true) + len(found) - touching)
     return Comparison(
         demanded, counted, shown, clear, areas[demanded], shapely.area(clear),
         _shares(shown, clear, t, f), _shares(clear, shown, f, t), true_group, found_group, iou, error, edges,
