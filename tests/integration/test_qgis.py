@@ -308,7 +308,7 @@ def test_a_sheet_lists_its_leaks_and_no_others(sheets: Path) -> None:
 
 
 def crowd(conn: psycopg.Connection, count: int, apart: float, remark: str) -> None:
-    """Put so many leaks on the second sheet, some metres apart, each with a remark; in the database the last ones come first."""
+    """Put so many leaks on the second sheet, some metres apart, each with a remark; the database has the last first."""
     conn.execute("DELETE FROM tunnel.anomaly WHERE kind <> 'leak'")
     conn.execute(
         "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, area, "
