@@ -12,7 +12,7 @@ import psycopg
 from tunneldb.cli.classes import print_classes
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.progress import bar, step
+from tunneldb.cli.progress import bar, say, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
@@ -101,7 +101,7 @@ def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Pat
         for file in export_classified(conn, survey, output, wanted, step(progress)):
             points = int(file.counts.sum())
             rate = points / file.seconds / 1e6
-            click.echo(f"{file.path}: {points} points, {rate:.1f} million/s", err=True)
+            say(f"{file.path}: {points} points, {rate:.1f} million/s", err=True)
             files.append({"file": file.path, "points": points, "seconds": file.seconds})
             total += file.counts
     print_classes(total)

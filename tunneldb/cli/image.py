@@ -8,7 +8,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.progress import bar, step
+from tunneldb.cli.progress import bar, say, step
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
 from tunneldb.export.atomic import make_folder
@@ -50,5 +50,5 @@ def image(settings: Settings, survey: str, output: Path, km: str | None) -> None
             for number, kilometre in enumerate(wanted, start=1):
                 for path in export_kilometre(conn, found, kilometre, output):
                     files.append(path)
-                    click.echo(f"[{number}|{len(wanted)}] {path}", err=True)
+                    say(f"[{number}|{len(wanted)}] {path}", err=True)
                 advance(1)

@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
+import click
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.progress import Progress
@@ -24,7 +26,16 @@ def bar(unit: str) -> Progress:
         What is counted, in the plural: ``points``, ``km``.
     """
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        ProgressColumn,
+        SpinnerColumn,
+        Task,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
     from rich.text import Text
 
     class Rate(ProgressColumn):
@@ -50,7 +61,7 @@ def bar(unit: str) -> Progress:
             yield from super().get_renderables()
 
     columns = (
-        TextColumn("{task.description}"), BarColumn(bar_width=24), TaskProgressColumn(), Rate(), Left(),
+        SpinnerColumn("line"), TextColumn("{task.description}"), BarColumn(bar_width=24), TaskProgressColumn(), Rate(), Left(),
     )  # fmt: skip
     console = Console(stderr=True)
     notice = _Notice(console.print)
@@ -110,6 +121,11 @@ def step(progress: Progress) -> Callable[[str, float | None], Callable[[float], 
         return lambda count: progress.advance(task, count)
 
     return begin
+
+
+def say(text: str, *, err: bool = False) -> None:
+    """Print a line while a bar is shown: above it. By itself click goes past what rich has put before the terminal."""
+    click.echo(text, file=sys.stderr if err else sys.stdout)
 
 
 def rate(speed: float | None, unit: str) -> str:

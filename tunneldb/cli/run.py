@@ -9,7 +9,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.progress import bar
+from tunneldb.cli.progress import bar, say
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
 from tunneldb.job.ledger import Run
@@ -102,7 +102,7 @@ class _Shown:
         done = len(self.stages)
         self.progress.update(self.task, completed=done)
         counts = ", ".join(f"{name} {_short(value)}" for name, value in run.counts.items())
-        click.echo(f"[{done}/{self.total}] {stage.name} km {km}: {counts}")
+        say(f"[{done}/{self.total}] {stage.name} km {km}: {counts}")
 
 
 def _short(value: object) -> str:
