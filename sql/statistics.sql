@@ -205,7 +205,8 @@ BEGIN
         GROUP BY p.n
     ), result AS (
         SELECT s.n, s.low, s.high, nullif(s.b - s.a, 0) AS lining, s.seen,
-            coalesce(s.seen / nullif(s.b - s.a, 0) * least(s.looked_at / nullif(s.high - s.low, 0), 1), 0) AS seen_share,
+            CASE WHEN coalesce(s.looked_at, 0) > 0 THEN s.seen / nullif(s.b - s.a, 0) * least(s.looked_at / (s.high - s.low), 1)
+                 ELSE 0 END AS seen_share,
             coalesce(t.area, 0) AS wet, coalesce(t.area, 0) / nullif(s.seen, 0) AS ratio,
             coalesce(t.patches, 0) AS patches, t.largest, l.id,
             -- where there are no more than 100 m², they are the window; where no lining is known, there is none

@@ -43,8 +43,8 @@ COMMENT ON COLUMN tunnel_api.km_waterproof.window_wet_area IS 'Greatest wet area
 COMMENT ON COLUMN tunnel_api.km_waterproof.class IS 'Best class that the lining seen keeps; NULL if none was seen';
 
 -- Works out a kilometre anew and keeps it, in place of what was noted and kept. What goes wrong is said, but is no reason to
--- refuse the change that brought it about. One whose segments reach beyond the kilometre's ends is not kept: leaks out there
--- are noted elsewhere.
+-- refuse the change that brought it about. One that has no segments, or whose segments reach beyond the kilometre's ends (leaks
+-- out there are noted elsewhere), is not kept: a row of no stretch stands for it (NaN is nobody's end), in place of its notes.
 CREATE OR REPLACE FUNCTION tunnel_api.keep_waterproof(survey_id int, km int) RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
 AS $$
@@ -53,26 +53,30 @@ DECLARE
     survey_key constant int := survey_id;
     kilometre constant int := km;
 BEGIN
-    WITH stretch AS MATERIALIZED (
-        SELECT k.chainage_from, k.chainage_to
-          FROM tunnel_api.km_ends k
-         WHERE k.survey_id = survey_key AND k.km = kilometre
-           AND k.chainage_from > kilometre * 1000 - 0.01 AND k.chainage_to < (kilometre + 1) * 1000 + 0.01
-    ), gone AS (
+    WITH gone AS (
         DELETE FROM tunnel.waterproof w
-         WHERE EXISTS (SELECT FROM stretch) AND w.id IN (
-               SELECT o.id FROM tunnel.waterproof o WHERE o.survey_id = survey_key AND o.km = kilometre
-                  FOR UPDATE SKIP LOCKED)
+         WHERE w.id IN (SELECT o.id FROM tunnel.waterproof o WHERE o.survey_id = survey_key AND o.km = kilometre
+                           FOR UPDATE SKIP LOCKED)
     )
     INSERT INTO tunnel.waterproof (survey_id, km, chainage_from, chainage_to, lining_area, seen_share, wet_area, wet_ratio,
         patches, largest_area, largest_leak, window_patches, window_from, window_to, window_wet_area, class)
-    SELECT survey_key, kilometre, s.chainage_from, s.chainage_to, f.lining_area, f.seen_share, f.wet_area, f.wet_ratio,
-        f.patches, f.largest_area, f.largest_leak, f.window_patches, f.window_from, f.window_to, f.window_wet_area, f.class
-      FROM stretch s
-     CROSS JOIN LATERAL tunnel_api.stretch_statistics(survey_key, ARRAY[s.chainage_from], ARRAY[s.chainage_to]) f;
+    SELECT survey_key, kilometre, coalesce(f.chainage_from, 'NaN'), coalesce(f.chainage_to, 'NaN'), f.lining_area, f.seen_share,
+        f.wet_area, f.wet_ratio, f.patches, f.largest_area, f.largest_leak, f.window_patches, f.window_from, f.window_to,
+        f.window_wet_area, f.class
+      FROM (SELECT) one
+      LEFT JOIN (
+        SELECT t.*
+          FROM tunnel_api.km_ends k
+         CROSS JOIN LATERAL tunnel_api.stretch_statistics(survey_key, ARRAY[k.chainage_from], ARRAY[k.chainage_to]) t
+         WHERE k.survey_id = survey_key AND k.km = kilometre
+           AND k.chainage_from > kilometre * 1000 - 0.01 AND k.chainage_to < (kilometre + 1) * 1000 + 0.01) f ON true;
 EXCEPTION
     WHEN OTHERS THEN
         RAISE WARNING 'the waterproofing of kilometre % of survey % is not kept: %', kilometre, survey_key, SQLERRM;
+        DELETE FROM tunnel.waterproof w
+         WHERE w.id IN (SELECT o.id FROM tunnel.waterproof o WHERE o.survey_id = survey_key AND o.km = kilometre
+                           FOR UPDATE SKIP LOCKED);
+        INSERT INTO tunnel.waterproof (survey_id, km, chainage_from, chainage_to) VALUES (survey_key, kilometre, 'NaN', 'NaN');
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.keep_waterproof(int, int) IS
@@ -98,9 +102,10 @@ DROP TRIGGER IF EXISTS keep ON tunnel.waterproof;
 CREATE CONSTRAINT TRIGGER keep AFTER INSERT ON tunnel.waterproof DEFERRABLE INITIALLY DEFERRED
     FOR EACH ROW WHEN (NEW.chainage_from IS NULL) EXECUTE FUNCTION tunnel_api.keep_at_commit();
 
--- What an earlier version kept may be of other limits.
+-- What an earlier version kept may be of other limits. Nobody is at it: making the trigger has waited for all.
 DO $$
 BEGIN
+    DELETE FROM tunnel.waterproof;
     PERFORM tunnel_api.keep_waterproof(k.survey_id, k.km) FROM tunnel_api.km_ends k;
 END
 $$;

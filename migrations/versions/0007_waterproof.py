@@ -72,7 +72,8 @@ def _waterproof() -> None:
         ),
         schema="tunnel",
         comment="Statistics of waterproofing of kilometres, and notes that something changed there: the statistics hold "
-        "while their row is the only one of its kilometre",
+        "while their row is the only one of its kilometre. Deleting rows may make others hold that do not: tunneldb init "
+        "works all out anew",
     )  # fmt: skip
     op.create_index("waterproof_survey_id_km_idx", "waterproof", ["survey_id", "km"], schema="tunnel")
 
@@ -131,7 +132,12 @@ CREATE FUNCTION tunnel.forget_waterproof() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp
 AS $$
 BEGIN
-    TRUNCATE tunnel.waterproof;
+    BEGIN
+        TRUNCATE tunnel.waterproof;
+    EXCEPTION
+        WHEN object_in_use THEN  -- it is being emptied with the others, or changes in them are still to be worked out
+            DELETE FROM tunnel.waterproof;
+    END;
     RETURN NULL;
 END
 $$;

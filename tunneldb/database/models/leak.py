@@ -81,7 +81,8 @@ class Waterproof(Base):
         Index(None, "survey_id", "km"),
         {
             "comment": "Statistics of waterproofing of kilometres, and notes that something changed there: the statistics hold "
-            "while their row is the only one of its kilometre"
+            "while their row is the only one of its kilometre. Deleting rows may make others hold that do not: tunneldb init "
+            "works all out anew"
         },
     )
 
