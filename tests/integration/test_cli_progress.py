@@ -111,6 +111,11 @@ def test_what_is_written_and_compared_shows_it_too(
         assert re.search(r"[0-9]+:[0-9]{2}:[0-9]{2} left", shown), (verb, shown)
         assert not re.search(r"\x1b|━|left", output)
     assert "printing" in shown
+    scan = write(tmp_path / "t.laz", tube(1000, 1005, 1000, seed=1))
+    how = ("--intensity", "Amplitude", "--intensity-kind", "amplitude", "--scanner", 500032.5, 4500000, 100)
+    shown, output = on_a_terminal("intensity", scan, *how)
+    assert re.search(r"t\.laz [^%]*100% [0-9 ]+(\.[0-9] million )?points/s 0:00:00 left", shown)
+    assert not re.search(r"\x1b|━|left", output)
 
 
 COMPILES = """
