@@ -329,3 +329,41 @@ def test_what_operators_put_on_the_tables_gets_at_the_audit_and_is_reported(
     for mend in [line.strip() for line in result.output.splitlines() if line.strip().startswith(("ALTER ", "DROP "))]:
         person.execute(mend.encode())
     assert "✓ expressions" in CliRunner().invoke(main, ["check"]).output
+
+
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
+def test_a_table_is_not_made_part_of_another_unseen(person: psycopg.Connection, conn: psycopg.Connection) -> None:
+    """A partition takes the triggers, checks and indexes of its parent, which may lie anywhere."""
+    conn.execute("CREATE SCHEMA elsewhere; GRANT ALL ON SCHEMA elsewhere TO tunnel_operator")
+    conn.commit()
+    person.execute(FORGE)
+    person.execute("""
+        CREATE FUNCTION elsewhere.fire() RETURNS trigger LANGUAGE plpgsql AS 'BEGIN RETURN NEW; END';
+        ALTER TABLE tunnel.region ADD CONSTRAINT mine CHECK (tunnel.mine(kind));
+        CREATE TABLE elsewhere.parent (LIKE tunnel.region, CONSTRAINT mine CHECK (tunnel.mine(kind)))
+            PARTITION BY LIST (survey_id);
+        CREATE INDEX mine ON elsewhere.parent (tunnel.mine(kind));
+        CREATE TRIGGER mine BEFORE INSERT ON elsewhere.parent FOR EACH ROW EXECUTE FUNCTION elsewhere.fire();
+        ALTER TABLE elsewhere.parent ATTACH PARTITION tunnel.region DEFAULT;
+    """)
+    output = CliRunner().invoke(main, ["check"]).output
+    for what in ("mine on elsewhere.parent", "check mine of elsewhere.parent", "index elsewhere.mine of elsewhere.parent"):
+        assert f"{what} is not tunneldb's: it runs" in output
+
+
+def test_own_triggers_that_do_not_fire_are_reported(conn: psycopg.Connection) -> None:
+    conn.execute("ALTER TABLE tunnel.anomaly DISABLE TRIGGER note_update_new; DROP TRIGGER drop_points ON tunnel.survey")
+    conn.commit()
+    output = CliRunner().invoke(main, ["check"]).output
+    assert "note_update_new on tunnel.anomaly is switched off" in output
+    assert "ALTER TABLE tunnel.anomaly ENABLE TRIGGER note_update_new; then tunneldb init" in output
+    assert "drop_points on tunnel.survey is missing" in output
+
+
+def test_without_functions_check_looks_no_further(conn: psycopg.Connection) -> None:
+    conn.execute("DROP SCHEMA tunnel_api CASCADE")
+    conn.commit()
+    result = CliRunner().invoke(main, ["check"])
+    assert result.exit_code == 1
+    assert "schema tunnel_api: missing" in result.output
+    assert "tunneldb init" in result.output

@@ -24,12 +24,14 @@ _TRUSTED = """
 # PostGIS may belong to another role, as on managed servers.
 _OF_EXTENSION = "EXISTS (SELECT FROM pg_depend e WHERE e.deptype = 'e' AND e.classid = {} AND e.objid = {})"
 
-# Tables of the schema, and all that inherit from them, wherever they are.
+# Tables of the schema, and all that inherit from them or that they inherit from, wherever they are: a table that is made a
+# partition of another takes its triggers, checks and indexes.
 _HELD = """
     SELECT c.oid FROM pg_class c
      WHERE c.relnamespace = 'tunnel'::regnamespace AND c.relkind IN ('r', 'p', 'v')
     UNION
-    SELECT i.inhrelid FROM held JOIN pg_inherits i ON i.inhparent = held.oid
+    SELECT CASE WHEN i.inhparent = held.oid THEN i.inhrelid ELSE i.inhparent END
+      FROM held JOIN pg_inherits i ON held.oid IN (i.inhparent, i.inhrelid)
 """
 
 # Table, trigger, schema and name of its function.
@@ -53,6 +55,17 @@ SELECT format('%s on %s is not tunneldb''s: it runs what %s wrote', quote_ident(
             AND (t.tgrelid, t.tgname, p.pronamespace, p.proname) IN (
                 SELECT to_regclass('tunnel.' || o.held), o.trigger, o.namespace::regnamespace, o.function
                   FROM (VALUES {_OURS}) AS o (held, trigger, namespace, function)))
+ ORDER BY 1
+"""
+
+# Those of tunneldb that are not there to fire.
+_SILENT = f"""
+SELECT format('%s on tunnel.%s %s', o.trigger, o.held, CASE WHEN t.oid IS NULL THEN 'is missing' ELSE 'is switched off' END),
+       CASE WHEN t.oid IS NULL THEN 'restore schema tunnel from a backup, then tunneldb init'
+            ELSE format('ALTER TABLE tunnel.%I ENABLE TRIGGER %I; then tunneldb init', o.held, o.trigger) END
+  FROM (VALUES {_OURS}) AS o (held, trigger, namespace, function)
+  LEFT JOIN pg_trigger t ON t.tgrelid = to_regclass('tunnel.' || o.held) AND t.tgname = o.trigger
+ WHERE t.tgenabled IS NULL OR t.tgenabled NOT IN ('O', 'A')
  ORDER BY 1
 """
 
@@ -131,3 +144,11 @@ def foreign_objects(connection: psycopg.Connection[Any]) -> Iterator[tuple[str, 
     for subject, query in (("triggers", _TRIGGERS), ("expressions", _RULES), ("expressions", _EXPRESSIONS)):
         for text, mend in connection.execute(query.encode()).fetchall():
             yield subject, text, mend
+
+
+def silent_triggers(connection: psycopg.Connection[Any]) -> list[tuple[str, str]]:
+    """Return which of tunneldb's own triggers are missing or switched off, each with what mends it.
+
+    Without them partitions stay behind, or what is kept of a kilometre is believed although it has changed.
+    """
+    return connection.execute(_SILENT.encode()).fetchall()

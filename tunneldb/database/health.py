@@ -10,7 +10,7 @@ from typing import Any, Literal
 import psycopg
 
 from tunneldb.database.connection import MINIMUM_POSTGIS, open_connection
-from tunneldb.database.foreign import SUBJECTS, foreign_objects
+from tunneldb.database.foreign import SUBJECTS, foreign_objects, silent_triggers
 from tunneldb.database.schema import (
     HEAD,
     api_version,
@@ -68,6 +68,8 @@ def examine(dsn: str | None) -> Iterator[Finding]:
         if schema.level == "wrong":
             return
         yield _api(connection)
+        if installed_api_version(connection) is None:
+            return
         yield from _roles(connection)
         yield _audit(connection)
         yield from _foreign(connection)
@@ -155,11 +157,15 @@ def _audit(connection: psycopg.Connection[Any]) -> Finding:
 
 def _foreign(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
     """What is not the project's own on the tables: it runs with the rights of whoever writes there."""
-    found = list(foreign_objects(connection))
+    silent = silent_triggers(connection)
+    for text, mend in silent:
+        yield Finding("wrong", "triggers", text, mend)
+    rights = "with the rights of whoever writes there"
+    found = [(subject, f"{text} {rights}", mend) for subject, text, mend in foreign_objects(connection)]
     for subject, text, mend in found:
-        yield Finding("wrong", subject, f"{text} with the rights of whoever writes there", mend)
+        yield Finding("wrong", subject, text, mend)
     for subject in SUBJECTS:
-        if not any(subject == other for other, *_ in found):
+        if not any(subject == other for other, *_ in found) and not (silent and subject == "triggers"):
             yield Finding("ok", subject, "none but tunneldb's own")
 
 
