@@ -36,6 +36,7 @@ collect() {
                 need python3-qgis '/usr/lib/python3/dist-packages/qgis/core/__init__.py'
                 need qgis-providers '/usr/lib/qgis/plugins/libprovider_postgres.so'
                 need iproute2 '/usr/*bin/ip'
+                need xvfb '/usr/bin/xvfb-run'
                 if on_offer chromium; then need chromium '/usr/bin/chromium'; fi
                 ;;
             bench)
