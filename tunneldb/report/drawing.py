@@ -24,7 +24,8 @@ def step_for(length: float, most: int) -> float:
 
 
 def ticks(low: float, high: float, step: float) -> list[float]:
-    """Multiples of a step from low to high."""
+    """Multiples of a step from low to high, both to the millimetre."""
+    low, high = round(low, 3), round(high, 3)
     return [float(n * step) for n in range(int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9)) + 1)]
 
 
