@@ -10,7 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find tunneldb sql migrations -type f -not -name '*.py[co]' -not -name '*.nb[ic]') pyproject.toml README.md LICENSE
 
-.PHONY: install demo test faults docs bench lint clean
+.PHONY: install demo test tests faults docs bench lint clean
 .DELETE_ON_ERROR:
 
 install: $(VENV)/wheel
@@ -45,14 +45,12 @@ lint: install
 	$(BIN)/ruff check
 	$(BIN)/mypy
 
-$(VENV)/compiled: $(VENV)/wheel
-	scripts/compile.sh $(abspath $(BIN))/tunneldb
-	touch $@
-
-# Linting takes one core, compiling another. Not `python -m pytest`: that would put the source tree before the wheel.
-test: $(VENV)/wheel $(VENV)/tests
-	$(MAKE) -j 2 lint $(VENV)/compiled
+# Not `python -m pytest`: that would put the source tree before the wheel. Linting takes a core for a minute, beside the tests.
+tests: $(VENV)/wheel $(VENV)/tests
 	$(BIN)/pytest -n 2 --dist loadscope -rs
+
+test: $(VENV)/wheel $(VENV)/tests
+	$(MAKE) -j 2 lint tests
 
 faults: install $(VENV)/tests
 	KILLS=$${KILLS:-100} $(BIN)/pytest -n 0 -s tests/faults/test_kills.py
