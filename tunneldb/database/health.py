@@ -156,16 +156,14 @@ def _audit(connection: psycopg.Connection[Any]) -> Finding:
 
 
 def _foreign(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
-    """What is not the project's own on the tables: it runs with the rights of whoever writes there."""
-    silent = silent_triggers(connection)
-    for text, mend in silent:
-        yield Finding("wrong", "triggers", text, mend)
+    """What is not the project's own on the tables, and triggers of its own that do not fire."""
     rights = "with the rights of whoever writes there"
-    found = [(subject, f"{text} {rights}", mend) for subject, text, mend in foreign_objects(connection)]
+    found = [("triggers", text, mend) for text, mend in silent_triggers(connection)]
+    found += [(subject, f"{text} {rights}", mend) for subject, text, mend in foreign_objects(connection)]
     for subject, text, mend in found:
         yield Finding("wrong", subject, text, mend)
     for subject in SUBJECTS:
-        if not any(subject == other for other, *_ in found) and not (silent and subject == "triggers"):
+        if not any(subject == other for other, *_ in found):
             yield Finding("ok", subject, "none but tunneldb's own")
 
 
