@@ -30,15 +30,18 @@ from benchmarks.leaks import HEADER, Outcome, chosen, plain, row, values
 from benchmarks.scene import Scene
 from tunneldb.cli.main import main as command
 from tunneldb.database import connect
-from tunneldb.intensity.dry import robust_statistics
-from tunneldb.job import detect as stage
-from tunneldb.leak import detection, gather, lining, region
-from tunneldb.leak.dry_map import DryMap, map_dry
-from tunneldb.leak.image import Accumulator
-from tunneldb.leak.judge import Verdict
-from tunneldb.leak.lining import State
-from tunneldb.leak.picture import Picture
-from tunneldb.leak.raster import STEP
+from tunneldb.radiometry.robust_statistics import robust_statistics
+from tunneldb.pipeline import detect as stage
+from tunneldb.anomalies import detect as detection
+from tunneldb.raster import rasterize as gather
+from tunneldb.raster import pixel_state as lining
+from tunneldb.anomalies import regions as region
+from tunneldb.anomalies.background.level_map import DryMap, map_dry
+from tunneldb.raster.accumulator import Accumulator
+from tunneldb.anomalies.verdict import Verdict
+from tunneldb.raster.pixel_state import State
+from tunneldb.raster.image import Picture
+from tunneldb.raster.geotiff import STEP
 
 Replacement = tuple[Any, str, Any]
 

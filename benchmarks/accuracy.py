@@ -20,7 +20,7 @@ import psycopg
 from benchmarks.common import print_table, progress, save, scratch_database
 from benchmarks.scene import LINING, Scene
 from tunneldb.database import connect, get_survey
-from tunneldb.geometry.store import load_surface
+from tunneldb.store.surface import load_surface
 from tunneldb.geometry.surface import Surface
 
 Figures = dict[str, Any]

@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common import print_table, progress, save
-from tunneldb.ground.classes import Klass
-from tunneldb.ground.classify import find_bare_scene, find_scene
-from tunneldb.ground.filter import GroundSettings, find_ground
-from tunneldb.ground.line import Line
-from tunneldb.ground.scene import Scene
-from tunneldb.ground.voxels import Voxels
-from tunneldb.scan.thin import thin, voxel_edge
+from tunneldb.classification.classes import Klass
+from tunneldb.classification.classify import find_bare_scene, find_scene
+from tunneldb.classification.ground.extraction import GroundSettings, find_ground
+from tunneldb.geometry.plan_line import Line
+from tunneldb.classification.scene import Scene
+from tunneldb.pointcloud.voxels import Voxels
+from tunneldb.pointcloud.thinning import thin, voxel_edge
 from tunneldb.simulate.parameters import Parameters
 
 sys.path.append(str(Path(__file__).parent.parent / "tests"))

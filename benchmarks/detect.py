@@ -28,12 +28,12 @@ from typing import Any
 from benchmarks.common import print_table, progress, save, scratch_database
 from benchmarks.memory import POINTS_PER_METRE, WATCH
 from benchmarks.scene import Scene
-from tunneldb.job.threads import use_threads
+from tunneldb.threads import use_threads
 
 NAME, BORDER = "dense", 13_000.0
 PARTS = 2_000_000  # points whose parts are timed
 COMMAND = (
-    "from tunneldb.job.threads import use_threads\n"
+    "from tunneldb.threads import use_threads\n"
     "use_threads({threads})\n"
     "from tunneldb.cli.main import main\n"
     "main({arguments})"
@@ -106,15 +106,15 @@ def parts(dsn: str, path: Path, count: int) -> dict[str, float]:
     """Seconds of one core for each part of what is done with a point, per point, from the end of a file."""
     use_threads(1)  # before Numba is imported
     from tunneldb.database import connect, get_survey
-    from tunneldb.geometry.store import load_surface
-    from tunneldb.job.detect import load_floor
-    from tunneldb.leak.gather import CHUNK, Lens
-    from tunneldb.leak.image import Accumulator, Grid
-    from tunneldb.leak.seen import Eye, Radiometer
-    from tunneldb.leak.store import load_reference
-    from tunneldb.scan.points import Points
-    from tunneldb.scan.pose import load_poses
-    from tunneldb.scan.raw import read_raw
+    from tunneldb.store.surface import load_surface
+    from tunneldb.pipeline.detect import load_floor
+    from tunneldb.raster.rasterize import CHUNK, Lens
+    from tunneldb.raster.accumulator import Accumulator, Grid
+    from tunneldb.raster.observation import Eye, Radiometer
+    from tunneldb.store.images import load_reference
+    from tunneldb.pointcloud.points import Points
+    from tunneldb.pointcloud.poses import load_poses
+    from tunneldb.pointcloud.formats.raw import read_raw
 
     km = int(BORDER) // 1000
     spent: dict[str, float] = {}

@@ -24,11 +24,11 @@ import numpy as np
 import open3d as o3d  # needs the system's libusb-1.0-0
 from numpy.typing import NDArray
 
-from tunneldb.ground.agreement import Agreement
-from tunneldb.ground.filter import GroundSettings, find_ground
-from tunneldb.ground.line import Line
-from tunneldb.ground.plane import planes
-from tunneldb.ground.voxels import Voxels
+from tunneldb.classification.ground.accuracy import Agreement
+from tunneldb.classification.ground.extraction import GroundSettings, find_ground
+from tunneldb.geometry.plan_line import Line
+from tunneldb.classification.ground.ransac import planes
+from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate import Parameters, simulate
 
 Float = NDArray[np.float64]

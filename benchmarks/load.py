@@ -24,9 +24,9 @@ from benchmarks import pipeline
 from benchmarks.common import print_table, progress, save, scratch_database, tunneldb
 from benchmarks.scene import Scene
 from tunneldb.database import connect, get_survey
-from tunneldb.job.load import load_files
-from tunneldb.job.threads import threads, use_threads
-from tunneldb.scan.filter import FilterSettings
+from tunneldb.pipeline.load import load_files
+from tunneldb.threads import threads, use_threads
+from tunneldb.pointcloud.selection import FilterSettings
 
 CHUNK = 1_000_000
 POINTS_PER_METRE = 100_000  # of the simulated profiler

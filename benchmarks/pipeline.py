@@ -12,7 +12,7 @@ from psycopg import sql
 
 from benchmarks.scene import Scene
 from tunneldb.database import connect, get_survey
-from tunneldb.scan.thin import thin, voxel_edge
+from tunneldb.pointcloud.thinning import thin, voxel_edge
 
 SURVEY_DENSITY = 100.0  # points/m²
 STAGES = ("axis", "segments", "sections")

@@ -17,11 +17,11 @@ import numpy as np
 
 from benchmarks.common import print_table, progress, save
 from tunneldb.errors import UserError
-from tunneldb.intensity.cells import Sight
-from tunneldb.intensity.range_curve import estimate_range_curve
-from tunneldb.scan.thin import thin, voxel_edge
+from tunneldb.radiometry.cells import Sight
+from tunneldb.radiometry.range_curve import estimate_range_curve
+from tunneldb.pointcloud.thinning import thin, voxel_edge
 from tunneldb.simulate.generate import Cloud, simulate
-from tunneldb.simulate.intensity import range_term
+from tunneldb.simulate.radiometry import range_term
 from tunneldb.simulate.parameters import Parameters
 
 LINING, NEAR = 0, 0.05  # class of the truth; farther off the surface points say nothing, m

@@ -26,10 +26,10 @@ from rasterio.features import rasterize
 from benchmarks.common import COMMAND, print_table, progress, save, scratch_database
 from benchmarks.synthetic import CORNER, Size, make
 from tunneldb.database import connect
-from tunneldb.leak.image import Grid
-from tunneldb.leak.lining import State
-from tunneldb.leak.raster import Raster, encode
-from tunneldb.leak.store import DARK
+from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.pixel_state import State
+from tunneldb.raster.geotiff import Raster, encode
+from tunneldb.store.images import DARK
 from tunneldb.report.pdf import find_browser
 
 SURVEY = "demo-2024"

@@ -23,10 +23,10 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import pdist
 
 from benchmarks.common import print_table, progress, save
-from tunneldb.ground.curved import Curved
-from tunneldb.ground.dbscan import dbscan
-from tunneldb.ground.sphere import LEAST_POINTS, Sphere, confirmed, find_spheres, join
-from tunneldb.ground.sphere_fit import coverage, distance_error, fit_ratio
+from tunneldb.classification.targets.curvature import Curved
+from tunneldb.classification.objects.dbscan import dbscan
+from tunneldb.classification.targets.detection import LEAST_POINTS, Sphere, confirmed, find_spheres, join
+from tunneldb.classification.targets.fit import coverage, distance_error, fit_ratio
 from tunneldb.simulate import Parameters, Simulation
 
 RADIUS, TOLERANCE = 0.0725, 0.005

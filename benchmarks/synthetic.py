@@ -21,8 +21,8 @@ from psycopg import sql
 
 from benchmarks.common import progress
 from tunneldb.database import PointZ, Survey, connect, copy_binary, get_survey, pack, resolve_dsn
-from tunneldb.geometry.store import load_surface
-from tunneldb.ground.classes import Klass
+from tunneldb.store.surface import load_surface
+from tunneldb.classification.classes import Klass
 
 Connection = psycopg.Connection[Any]
 

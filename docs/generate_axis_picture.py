@@ -14,7 +14,7 @@ import numpy as np
 from tunneldb.alignment.design import Design
 from tunneldb.alignment.deviation import Deviation, Part
 from tunneldb.alignment.given import read_given
-from tunneldb.export.deviation import write_deviation
+from tunneldb.export.figures.axis_deviation import write_deviation
 from tunneldb.geometry.stationing import Equation, Stationing
 
 ROOT = Path(__file__).parents[1]

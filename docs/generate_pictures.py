@@ -30,11 +30,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks.common import scratch_database
 from benchmarks.scene import Scene
 from tunneldb.database import connect, get_survey
-from tunneldb.job import detect as stage
-from tunneldb.job.parameters import settings
-from tunneldb.leak.detection import Found
-from tunneldb.leak.lining import State
-from tunneldb.leak.raster import NODATA, STEP
+from tunneldb.pipeline import detect as stage
+from tunneldb.pipeline.parameters import settings
+from tunneldb.anomalies.detect import Found
+from tunneldb.raster.pixel_state import State
+from tunneldb.raster.geotiff import NODATA, STEP
 
 IMAGE = Path(__file__).parent / "images" / "leak-steps.png"
 TUNNEL = (

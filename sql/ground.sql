@@ -1,4 +1,4 @@
--- Stage ground: the class of each point. The models themselves are made outside the database (tunneldb.ground).
+-- Stage ground: the class of each point. The models themselves are made outside the database (tunneldb.classification).
 
 -- Gives the points of a kilometre their classes: the partition is rewritten, its rows in the order that they have, and swapped
 -- in. An UPDATE of as many rows takes four times as long and leaves the old ones behind.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import psycopg
 
-from tunneldb.ground.classes import Klass
+from tunneldb.classification.classes import Klass
 
 NICHE = (12399.0, 12401.0, 3.3, 4.3)
 """From chainage to chainage, and how far right of the axis from and to, m."""

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.surface import Surface
-from tunneldb.ground.classes import Klass
-from tunneldb.ground.line import Line
+from tunneldb.classification.classes import Klass
+from tunneldb.geometry.plan_line import Line
 from tunneldb.simulate.generate import Cloud, Simulation
 from tunneldb.simulate.parameters import Parameters
 

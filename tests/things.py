@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tunneldb.geometry.surface import Surface
-from tunneldb.ground.classes import Klass
+from tunneldb.classification.classes import Klass
 
 FLOOR, HALF_FLOOR = 2.5, float(np.sqrt(4.0**2 - 2.5**2))
 """Depth of the floor below the axis, and half its width, m."""

@@ -28,7 +28,7 @@ PATIENCE = 900.0
 
 def workers(project: Project) -> list[psutil.Process]:
     """Worker processes of a project's commands."""
-    return [p for p in _own(project) if "tunneldb.job.worker" in _line(p)]
+    return [p for p in _own(project) if "tunneldb.queue.worker" in _line(p)]
 
 
 def postmaster(project: Project) -> psutil.Process | None:

@@ -21,7 +21,7 @@ from psycopg.conninfo import make_conninfo
 from tunneldb.database import connect, get_survey
 from tunneldb.database.fetch import fetch_array
 from tunneldb.database.server import DATABASE, Server
-from tunneldb.job import batch as job
+from tunneldb.queue import batch as job
 
 COMMAND = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
 PREPARED = "prepared"

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from tunneldb.simulate import Parameters, Simulation
-from tunneldb.simulate.leaks import Leak
+from tunneldb.simulate.lining.leaks import Leak
 from tunneldb.simulate.scanner import BlockPlan
-from tunneldb.simulate.scene import scene
+from tunneldb.simulate.rays.scene import scene
 
 SRID = 25830
 NAME = "long"

@@ -16,11 +16,11 @@ from things import CORNER, HALF_FLOOR, SPHERES, THINGS, beside, boxed, relief
 from tunneldb.database import install, open_connection
 from tunneldb.geometry.frame import frame_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
-from tunneldb.leak.geometries import shapes
-from tunneldb.leak.image import BLOCK, Grid
-from tunneldb.leak.lining import State
-from tunneldb.leak.raster import KINDS, Raster, decode, encode
-from tunneldb.leak.store import DARK
+from tunneldb.anomalies.geometries import shapes
+from tunneldb.raster.accumulator import BLOCK, Grid
+from tunneldb.raster.pixel_state import State
+from tunneldb.raster.geotiff import KINDS, Raster, decode, encode
+from tunneldb.store.images import DARK
 
 DATABASE = "tunneldb_example"
 NAME, SRID, SPACING = "demo-2024", 25830, 10.0

@@ -14,7 +14,7 @@ from psycopg import sql
 from things import CORNER, FLOOR, HALF_FLOOR, THINGS
 
 from tunneldb.cli.main import main
-from tunneldb.ground.classes import Klass
+from tunneldb.classification.classes import Klass
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 
 from tunneldb.cli.main import main
 from tunneldb.simulate import Parameters, Simulation, generate, write
-from tunneldb.simulate.leaks import Leak
+from tunneldb.simulate.lining.leaks import Leak
 
 NAME = "wet"
 START = 12_310.0

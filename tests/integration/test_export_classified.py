@@ -12,8 +12,8 @@ from click.testing import CliRunner
 
 from tunneldb.cli.main import main
 from tunneldb.database import get_survey
-from tunneldb.ground.classes import Klass
-from tunneldb.job.scene import load_scene
+from tunneldb.classification.classes import Klass
+from tunneldb.store.scene import load_scene
 from tunneldb.simulate import Parameters, Simulation, write
 
 NAME = "s"

@@ -22,7 +22,7 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
 from tunneldb.cli.main import main
-from tunneldb.export.plain.dxf import LAYERS
+from tunneldb.export.exchange.dxf import LAYERS
 
 RADIUS, HEIGHT = 4.0, 2.5  # of the example's tunnel: a circle, and its floor below the axis, m
 CURVE, CENTRE = 300.0, np.array([500_300.0, 4_640_000.0])  # of its axis, in plan

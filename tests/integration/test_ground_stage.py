@@ -14,11 +14,11 @@ from scipy.spatial import cKDTree
 
 from tests.integration.test_detect import NAME, command, parameters, prepare
 from tunneldb.database import get_survey
-from tunneldb.geometry.store import load_surface
-from tunneldb.ground.classes import Klass
-from tunneldb.job import ground as stage
-from tunneldb.job.parameters import settings
-from tunneldb.job.scene import line_of, load_ground, load_scene
+from tunneldb.store.surface import load_surface
+from tunneldb.classification.classes import Klass
+from tunneldb.pipeline import ground as stage
+from tunneldb.pipeline.parameters import settings
+from tunneldb.store.scene import line_of, load_ground, load_scene
 from tunneldb.simulate import Simulation, write
 
 PLANE = 13_000.0

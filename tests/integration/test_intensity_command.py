@@ -7,9 +7,9 @@ import pytest
 from click.testing import CliRunner
 
 from tunneldb.cli.main import main
-from tunneldb.intensity.range_curve import MOST_UNCERTAIN
+from tunneldb.radiometry.range_curve import MOST_UNCERTAIN
 from tunneldb.simulate import Parameters, Simulation, write
-from tunneldb.simulate.intensity import range_term
+from tunneldb.simulate.radiometry import range_term
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from loading import LENGTH, ORIGIN, RADIUS, START, SURVEY, add_survey, files, lo
 
 from tunneldb.cli.main import main
 from tunneldb.errors import UserError
-from tunneldb.scan.filter import FilterSettings
+from tunneldb.pointcloud.selection import FilterSettings
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 

@@ -139,8 +139,8 @@ KILLED = """
 import os, sys
 from pathlib import Path
 from tunneldb.database import connect, get_survey
-from tunneldb.job.load import load_files
-from tunneldb.scan.filter import FilterSettings
+from tunneldb.pipeline.load import load_files
+from tunneldb.pointcloud.selection import FilterSettings
 
 def begin(text, total):
     return lambda done: os.kill(os.getpid(), 9) if text == sys.argv[2] else None

@@ -12,7 +12,7 @@ import pytest
 from loading import SURVEY, add_survey, load, tube, write
 
 from tunneldb.database import get_survey
-from tunneldb.job.sources import sample
+from tunneldb.store.sources import sample
 
 COUNT = "SELECT count(*) FROM tunnel.point WHERE survey_id = 1 AND km = 1"
 

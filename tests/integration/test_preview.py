@@ -16,8 +16,8 @@ from queued import add_file, add_run
 
 from tunneldb.cli.main import main
 from tunneldb.database import get_survey
-from tunneldb.job.batch import give_up_file, plan
-from tunneldb.job.preview import FRAGMENT_BYTES, KILOMETRE_BYTES, PIXEL_BYTES, ROW_BYTES, preview
+from tunneldb.queue.batch import give_up_file, plan
+from tunneldb.queue.preview import FRAGMENT_BYTES, KILOMETRE_BYTES, PIXEL_BYTES, ROW_BYTES, preview
 
 COUNT = 2000
 

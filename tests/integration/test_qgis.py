@@ -27,8 +27,8 @@ from rasterio.errors import NotGeoreferencedWarning
 
 from tests.integration.conftest import LEAKS, example_surface, without_intensity
 from tunneldb.cli.main import main
-from tunneldb.export.palette import COLOURS, PALETTES, hexadecimal
-from tunneldb.ground.classes import Klass
+from tunneldb.export.images.palette import COLOURS, PALETTES, hexadecimal
+from tunneldb.classification.classes import Klass
 
 SCRIPT = Path(__file__).with_name("open_in_qgis.py")
 PYTHON = "/usr/bin/python3"

@@ -9,11 +9,11 @@ import shapely
 
 from tests.integration.conftest import NAME, example_surface
 from tunneldb.database import Survey, get_survey
-from tunneldb.ground.classes import Klass
-from tunneldb.ground.cluster import Cluster
-from tunneldb.ground.lining import Relief
-from tunneldb.ground.model import COLUMN, Ground
-from tunneldb.job.scene import (
+from tunneldb.classification.classes import Klass
+from tunneldb.classification.objects.clusters import Cluster
+from tunneldb.classification.lining_relief import Relief
+from tunneldb.classification.ground.model import COLUMN, Ground
+from tunneldb.store.scene import (
     line_of,
     load_arcs,
     load_clusters,

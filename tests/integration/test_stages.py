@@ -14,8 +14,8 @@ from click.testing import CliRunner, Result
 from tunneldb.cli.main import main
 from tunneldb.database import Survey, get_survey
 from tunneldb.errors import UserError
-from tunneldb.geometry.store import load_surface
-from tunneldb.job.run import parse_km
+from tunneldb.store.surface import load_surface
+from tunneldb.pipeline.run import parse_km
 from tunneldb.simulate import Parameters, Simulation, write
 
 NAME = "curve"

@@ -13,7 +13,7 @@ from psycopg import sql
 
 from tests.integration.test_qgis import act
 from tunneldb.cli.main import main
-from tunneldb.database.stationing import load_stationing, save_equations
+from tunneldb.store.stationing import load_stationing, save_equations
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import Equation, Stationing, chainage_label
 

@@ -20,8 +20,8 @@ from rich.console import Console
 from tunneldb.cli.main import main
 from tunneldb.cli.overview import render
 from tunneldb.cli.watch import Watch
-from tunneldb.job.order import STAGES
-from tunneldb.job.overview import Overview, overview
+from tunneldb.pipeline.order import STAGES
+from tunneldb.queue.progress import Overview, overview
 
 TUNNELDB = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
 DAMAGED = "/scans/km-6.laz is damaged after point 1000 of 2000: copy it again"

@@ -13,7 +13,7 @@ import shapely
 from psycopg import sql
 from queued import add_file, add_goal, add_job, add_worker
 
-from tunneldb.ground.classes import Klass
+from tunneldb.classification.classes import Klass
 
 GEOMETRIES = {
     "axis": "LineStringZ",

@@ -17,7 +17,7 @@ from click.testing import CliRunner
 
 from tunneldb.cli.main import main
 from tunneldb.errors import UserError
-from tunneldb.job.ledger import BusyError, Job, LostError, describe, retry_at, stage_run
+from tunneldb.store.ledger import BusyError, Job, LostError, describe, retry_at, stage_run
 from tunneldb.simulate import Parameters, Simulation, write
 
 KM = 12

@@ -45,7 +45,7 @@ PRINT = """
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from tunneldb.export.atomic import replacing, told_to_end
+from tunneldb.files import replacing, told_to_end
 from tunneldb.report.pdf import print_pdf
 with told_to_end(), replacing(Path(sys.argv[2])) as temporary:
     print_pdf(sys.argv[1], Path(sys.argv[2]), temporary)

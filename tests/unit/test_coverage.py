@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from tunneldb.leak.coverage import cover
-from tunneldb.leak.image import Grid
-from tunneldb.leak.lining import State
+from tunneldb.anomalies.coverage import cover
+from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.pixel_state import State
 
 
 def picture(rng, grid):

@@ -10,8 +10,8 @@ import click
 import pytest
 
 from tunneldb.cli.main import main
-from tunneldb.ground.classes import Klass
-from tunneldb.job.parameters import PARAMETERS
+from tunneldb.classification.classes import Klass
+from tunneldb.pipeline.parameters import PARAMETERS
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").glob("*.md")])

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from tunneldb.leak.dry_map import map_dry
-from tunneldb.leak.image import Grid
-from tunneldb.leak.lining import State
-from tunneldb.leak.picture import Picture
-from tunneldb.leak.raster import NODATA
-from tunneldb.leak.relative import relative
-from tunneldb.leak.threshold import dark_pixels
+from tunneldb.anomalies.background.level_map import map_dry
+from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.pixel_state import State
+from tunneldb.raster.image import Picture
+from tunneldb.raster.geotiff import NODATA
+from tunneldb.anomalies.background.contrast import relative
+from tunneldb.anomalies.threshold import dark_pixels
 
 PIXEL = 0.02
 NOISE = 0.35

@@ -13,7 +13,7 @@ from shapely.geometry import MultiPolygon, Point, Polygon, box
 from tunneldb.evaluate.measure import compare, figures
 from tunneldb.evaluate.report import as_csv, as_json, make_report
 from tunneldb.evaluate.survey import distance_from_scanner
-from tunneldb.scan.pose import PoseModel
+from tunneldb.pointcloud.poses import PoseModel
 
 
 def test_circle_in_a_circle():

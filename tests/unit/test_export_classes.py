@@ -11,15 +11,15 @@ from affine import Affine
 from numpy.typing import NDArray
 from PIL import Image
 
-from tunneldb.export import preview
-from tunneldb.export.classes import ClassPainter
-from tunneldb.export.cog import Extent, write_cog
-from tunneldb.export.palette import COLOURS
+from tunneldb.export.images import preview
+from tunneldb.export.images.class_raster import ClassPainter
+from tunneldb.export.images.cog import Extent, write_cog
+from tunneldb.export.images.palette import COLOURS
 from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.stationing import Stationing
 from tunneldb.geometry.surface import Surface
-from tunneldb.ground.classes import Klass
-from tunneldb.leak.raster import Raster
+from tunneldb.classification.classes import Klass
+from tunneldb.raster.geotiff import Raster
 
 RADIUS = 4.0
 

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from scenes import exact, scan, share
 
-from tunneldb.ground.classes import Klass
-from tunneldb.ground.classify import find_bare_scene, find_scene
-from tunneldb.ground.cluster import CELL, NEAR, Cluster, Lookup, look_up, pieces
-from tunneldb.ground.filter import GroundSettings, find_ground
-from tunneldb.ground.line import Line
-from tunneldb.ground.scene import Scene
-from tunneldb.ground.spacing import Spacing
-from tunneldb.ground.things import ClusterSettings, bars
-from tunneldb.ground.voxels import Voxels
-from tunneldb.job.parameters import settings
-from tunneldb.scan.thin import thin, voxel_edge
+from tunneldb.classification.classes import Klass
+from tunneldb.classification.classify import find_bare_scene, find_scene
+from tunneldb.classification.objects.clusters import CELL, NEAR, Cluster, Lookup, look_up, pieces
+from tunneldb.classification.ground.extraction import GroundSettings, find_ground
+from tunneldb.geometry.plan_line import Line
+from tunneldb.classification.scene import Scene
+from tunneldb.classification.objects.spacing import Spacing
+from tunneldb.classification.objects.objects import ClusterSettings, bars
+from tunneldb.pointcloud.voxels import Voxels
+from tunneldb.pipeline.parameters import settings
+from tunneldb.pointcloud.thinning import thin, voxel_edge
 from tunneldb.simulate.parameters import Parameters
 
 THINGS = {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tunneldb.ground.dbscan import dbscan
+from tunneldb.classification.objects.dbscan import dbscan
 
 
 def cloud(seed: int) -> np.ndarray:

@@ -14,8 +14,8 @@ import pytest
 from click.testing import CliRunner
 
 from tunneldb.cli.main import main
-from tunneldb.export import bare
-from tunneldb.ground.classes import Klass
+from tunneldb.export.pointcloud import single_file as bare
+from tunneldb.classification.classes import Klass
 from tunneldb.simulate import Parameters, Simulation, write
 
 FLOOR, LINING = 1, 0  # of the truth
@@ -152,7 +152,7 @@ import time
 from types import SimpleNamespace
 import numpy as np
 from tunneldb.cli.main import main
-from tunneldb.export import bare
+from tunneldb.export.pointcloud import single_file as bare
 
 scene = SimpleNamespace(ground=0, clusters=[], relief=None, classes=lambda xyz: np.full(len(xyz), 2, np.uint8))
 bare.find_scene_of = lambda *_: (scene, 0.0)

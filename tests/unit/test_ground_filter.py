@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tunneldb.ground.agreement import Agreement
-from tunneldb.ground.filter import MARGIN, GroundSettings, find_ground
-from tunneldb.ground.line import Line
-from tunneldb.ground.plane import planes
-from tunneldb.ground.voxels import Voxels
+from tunneldb.classification.ground.accuracy import Agreement
+from tunneldb.classification.ground.extraction import MARGIN, GroundSettings, find_ground
+from tunneldb.geometry.plan_line import Line
+from tunneldb.classification.ground.ransac import planes
+from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate import Cloud, Parameters, rise, simulate
 
 FLOOR, NICHE, RAIL = 1, 3, 5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tunneldb.ground.line import Line
+from tunneldb.geometry.plan_line import Line
 from tunneldb.simulate import Parameters, simulate
 
 CORNER = (500_000.0, 4_700_000.0)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tunneldb.ground.lining import CELL, Relief, Wall
-from tunneldb.leak.appendage import DELTA
+from tunneldb.classification.lining_relief import CELL, Relief, Wall
+from tunneldb.raster.appendages import DELTA
 
 LENGTH, HALF = 40.0, 6.0
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tunneldb.ground.agreement import Agreement
-from tunneldb.ground.model import Ground
+from tunneldb.classification.ground.accuracy import Agreement
+from tunneldb.classification.ground.model import Ground
 
 
 def _sloping(gamma: float = 0.05, foot: tuple[float, float] = (-2.0, 2.0), lean: tuple[float, float] = (0.0, 0.0)) -> Ground:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tunneldb.ground.plane import planes
+from tunneldb.classification.ground.ransac import planes
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tunneldb.ground.voxels import Voxels
+from tunneldb.pointcloud.voxels import Voxels
 
 
 def _cloud(n: int = 50_000) -> np.ndarray:

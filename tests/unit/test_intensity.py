@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tunneldb.errors import UserError
-from tunneldb.intensity.correct import observe, range_span, to_decibel
-from tunneldb.intensity.oren_nayar import coefficients, incidence_db
-from tunneldb.intensity.reference import ReferenceCurve
-from tunneldb.intensity.roughness import Regions, automatic_regions, drawn_regions, find_roughness, objective
+from tunneldb.radiometry.correction import observe, range_span, to_decibel
+from tunneldb.radiometry.oren_nayar import coefficients, incidence_db
+from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.radiometry.roughness import Regions, automatic_regions, drawn_regions, find_roughness, objective
 
 CURVE = ReferenceCurve(np.array([1.0, 4.0, 10.0, 30.0]), np.array([20.0, 26.0, 25.0, 15.5]))
 

@@ -7,16 +7,16 @@ import shapely.affinity
 from shapely.geometry import Polygon, box
 
 from tunneldb.errors import UserError
-from tunneldb.leak.appendage import distance_from_plane, off_plane, reach, recessed
-from tunneldb.leak.detection import _columns, _filled
-from tunneldb.leak.image import LEVEL, OFFSET, Accumulator, Grid
-from tunneldb.leak.kernel import WEIGHT, Pixels
-from tunneldb.leak.lining import State
-from tunneldb.leak.match import match, match_parts
-from tunneldb.leak.raster import NODATA, Raster, decode, encode
-from tunneldb.leak.region import regions
-from tunneldb.leak.relative import Relative
-from tunneldb.leak.threshold import dark_pixels, filter_size
+from tunneldb.raster.appendages import distance_from_plane, off_plane, reach, recessed
+from tunneldb.anomalies.detect import _columns, _filled
+from tunneldb.raster.accumulator import LEVEL, OFFSET, Accumulator, Grid
+from tunneldb.raster.projection import WEIGHT, Pixels
+from tunneldb.raster.pixel_state import State
+from tunneldb.anomalies.matching import match, match_parts
+from tunneldb.raster.geotiff import NODATA, Raster, decode, encode
+from tunneldb.anomalies.regions import regions
+from tunneldb.anomalies.background.contrast import Relative
+from tunneldb.anomalies.threshold import dark_pixels, filter_size
 
 PIXEL = 0.02
 

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tunneldb.leak.detection import Found
-from tunneldb.leak.image import Grid
-from tunneldb.leak.raster import NODATA
-from tunneldb.leak.region import Region, Traits, regions, together, unite
-from tunneldb.leak.relative import Relative
+from tunneldb.anomalies.detect import Found
+from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.geotiff import NODATA
+from tunneldb.anomalies.regions import Region, Traits, regions, together, unite
+from tunneldb.anomalies.background.contrast import Relative
 
 PIXEL = 0.5  # 2000 columns a kilometre
 DRY = 1.25

@@ -6,7 +6,7 @@ import shapely
 from scenes import exact
 from shapely.geometry import box
 
-from tunneldb.leak.geometries import shapes
+from tunneldb.anomalies.geometries import shapes
 from tunneldb.simulate.generate import Simulation
 from tunneldb.simulate.parameters import Parameters
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from tunneldb.errors import UserError
-from tunneldb.intensity.cells import Sight
-from tunneldb.intensity.dependence import Dependence, course
-from tunneldb.intensity.oren_nayar import incidence_db
-from tunneldb.intensity.range_curve import estimate_range_curve
-from tunneldb.intensity.spline import RangeSpline, one_maximum
+from tunneldb.radiometry.cells import Sight
+from tunneldb.radiometry.dependence import Dependence, course
+from tunneldb.radiometry.oren_nayar import incidence_db
+from tunneldb.radiometry.range_curve import estimate_range_curve
+from tunneldb.radiometry.range_spline import RangeSpline, one_maximum
 from tunneldb.simulate import Parameters, simulate
-from tunneldb.simulate.intensity import range_term
+from tunneldb.simulate.radiometry import range_term
 
 
 def _inverse_square(range_m):

@@ -10,9 +10,9 @@ from pyproj import CRS
 from scipy.spatial.transform import Rotation
 
 from tunneldb.errors import UserError
-from tunneldb.scan.e57 import read_e57_scans, scan_number
-from tunneldb.scan.reader import check_header, read_chunks, read_header
-from tunneldb.scan.stations import read_stations
+from tunneldb.pointcloud.formats.e57 import read_e57_scans, scan_number
+from tunneldb.pointcloud.reader import check_header, read_chunks, read_header
+from tunneldb.pointcloud.stations import read_stations
 
 pytest.importorskip("pye57")
 import e57

@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tunneldb.geometry.alignment import Alignment
-from tunneldb.scan import filter as scan_filter
-from tunneldb.scan.ahead import in_order, prefetch
-from tunneldb.scan.filter import FilterCounts, FilterSettings, filter_file
-from tunneldb.scan.noise import noise_filter
-from tunneldb.scan.pose import PoseModel
-from tunneldb.scan.spool import BINS_PER_KM, BINS_PER_METRE, ROW, Rows, Spool, windows
-from tunneldb.scan.thin import thin, voxel_edge
+from tunneldb.pointcloud import selection as scan_filter
+from tunneldb.pointcloud.prefetch import in_order, prefetch
+from tunneldb.pointcloud.selection import FilterCounts, FilterSettings, filter_file
+from tunneldb.pointcloud.noise import noise_filter
+from tunneldb.pointcloud.poses import PoseModel
+from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, ROW, Rows, Spool, windows
+from tunneldb.pointcloud.thinning import thin, voxel_edge
 
 ORIGIN = np.array([500_000.0, 4_500_000.0, 100.0])
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from tunneldb.errors import UserError
-from tunneldb.scan.pose import PoseFaults, PoseModel
-from tunneldb.scan.reader import Points
+from tunneldb.pointcloud.poses import PoseFaults, PoseModel
+from tunneldb.pointcloud.reader import Points
 
 
 def points(time: list[float], scan_id: list[int] | None = None) -> Points:

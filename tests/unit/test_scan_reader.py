@@ -10,9 +10,9 @@ from pyproj import CRS
 from pyproj.crs import CompoundCRS
 
 from tunneldb.errors import UserError
-from tunneldb.scan.envelope import header_box
-from tunneldb.scan.raw import read_raw
-from tunneldb.scan.reader import check_header, read_chunks, read_header
+from tunneldb.pointcloud.formats.las_bounds import header_box
+from tunneldb.pointcloud.formats.raw import read_raw
+from tunneldb.pointcloud.reader import check_header, read_chunks, read_header
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
@@ -82,7 +82,7 @@ def test_chunks_of_varying_size_as_in_copc(tmp_path: Path) -> None:
 
 @pytest.fixture(params=[1, 2], ids=["one thread", "threads"])
 def decoding_threads(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
-    monkeypatch.setattr("tunneldb.scan.las.threads", lambda: request.param)
+    monkeypatch.setattr("tunneldb.pointcloud.formats.las.threads", lambda: request.param)
     return request.param
 
 

@@ -11,9 +11,9 @@ import pytest
 from pyproj import CRS
 
 from tunneldb.errors import UserError
-from tunneldb.scan import laz
-from tunneldb.scan.reader import read_header
-from tunneldb.scan.rewrite import read_coordinates, rewrite
+from tunneldb.pointcloud.formats import laz
+from tunneldb.pointcloud.reader import read_header
+from tunneldb.pointcloud.rewrite import read_coordinates, rewrite
 
 NAMES = {2: "ground", 64: "lining"}
 DATA = Path(__file__).parents[3] / "shared" / "data"

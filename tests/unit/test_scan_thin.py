@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tunneldb.scan.spool import ROW
-from tunneldb.scan.thin import first_of_voxels, pick, thin, voxel_edge
+from tunneldb.pointcloud.spool import ROW
+from tunneldb.pointcloud.thinning import first_of_voxels, pick, thin, voxel_edge
 
 ORIGIN = np.array([500_000.0, 4_500_000.0, 100.0])
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tunneldb.simulate import Cloud, Parameters, Simulation, simulate
-from tunneldb.simulate.intensity import counts, oren_nayar, range_term, reference_curve
+from tunneldb.simulate.radiometry import counts, oren_nayar, range_term, reference_curve
 
 
 def test_without_roughness_oren_nayar_is_lambert() -> None:

@@ -13,8 +13,8 @@ import shapely
 
 from tunneldb.errors import UserError
 from tunneldb.simulate import Cloud, Parameters, Simulation, simulate, write
-from tunneldb.simulate.coat import level as level_at
-from tunneldb.simulate.intensity import oren_nayar
+from tunneldb.simulate.lining.reflectance import level as level_at
+from tunneldb.simulate.radiometry import oren_nayar
 from tunneldb.simulate.truth import dry_features
 
 BARE: dict[str, Any] = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tunneldb.simulate import Cloud, Parameters, Simulation, simulate
-from tunneldb.simulate.furniture import appendage_table, distance
+from tunneldb.simulate.objects.fixtures import appendage_table, distance
 
 FEW: dict[str, Any] = {
     "length": 40.0,

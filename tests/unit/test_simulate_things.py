@@ -7,7 +7,7 @@ import pytest
 
 from tunneldb.errors import UserError
 from tunneldb.simulate import Cloud, Parameters, Simulation, TargetSphere, simulate
-from tunneldb.simulate.things import BALL, BEAM, ROD
+from tunneldb.simulate.objects.primitives import BALL, BEAM, ROD
 
 FEW: dict[str, Any] = {
     "length": 30.0,

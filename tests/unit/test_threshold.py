@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from tunneldb.intensity.dry import plain_statistics, robust_statistics
-from tunneldb.leak.image import Grid
-from tunneldb.leak.lining import State
-from tunneldb.leak.raster import NODATA
-from tunneldb.leak.relative import Relative
-from tunneldb.leak.threshold import dark_pixels, filter_size
+from tunneldb.radiometry.robust_statistics import plain_statistics, robust_statistics
+from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.pixel_state import State
+from tunneldb.raster.geotiff import NODATA
+from tunneldb.anomalies.background.contrast import Relative
+from tunneldb.anomalies.threshold import dark_pixels, filter_size
 
 TILE = 25
 

@@ -16,7 +16,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb, wants_json
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.job.parameters import PARAMETERS, settings
+from tunneldb.pipeline.parameters import PARAMETERS, settings
 
 if TYPE_CHECKING:
     import psycopg
@@ -68,8 +68,8 @@ def batch(
 
     Ctrl-C ends the stages that are under way, and stops; a second one stops at once.
     """
-    from tunneldb.job.batch import STEPS, plan, register
-    from tunneldb.job.run import km_range
+    from tunneldb.queue.batch import STEPS, plan, register
+    from tunneldb.pipeline.run import km_range
 
     if last is not None and last not in STEPS:
         raise UserError(f"there is no stage {last!r}; the stages are {', '.join(STEPS)}")
@@ -86,7 +86,7 @@ def batch(
         count = workers or os.cpu_count() or 1
         if preview:
             from tunneldb.cli.preview import show
-            from tunneldb.job.preview import preview as look_ahead
+            from tunneldb.queue.preview import preview as look_ahead
 
             seen = look_ahead(conn, found, asked, kilometres, settings_.dsn is None, count)
             show(seen)
@@ -103,8 +103,8 @@ def batch(
 def _work(survey: Survey, dsn: str | None, count: int) -> Watch:
     """Let workers do what is to be done, and show what becomes of it."""
     from tunneldb.cli.watch import Watch
-    from tunneldb.job.team import Team, interrupts
-    from tunneldb.job.worker import Orders
+    from tunneldb.queue.pool import Team, interrupts
+    from tunneldb.queue.worker import Orders
 
     team = Team(Orders(dsn, 1, survey.id), count)
     # the picture is drawn on stdout, which JSON has for itself
@@ -127,7 +127,7 @@ def _busy(conn: psycopg.Connection[Any], survey: Survey) -> bool:
 def _summary(conn: psycopg.Connection[Any], survey: Survey, watch: Watch, seconds: float) -> int:
     """Say what became of it; returns the exit code."""
     from tunneldb.cli.overview import advise, duration, number, spans
-    from tunneldb.job.batch import failed_files, results
+    from tunneldb.queue.batch import failed_files, results
 
     found = results(conn, survey)
     files = failed_files(conn, survey)

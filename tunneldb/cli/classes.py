@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tunneldb.cli.output import tell
 from tunneldb.cli.tables import print_table
-from tunneldb.ground.classes import Klass
+from tunneldb.classification.classes import Klass
 
 
 def print_classes(counts: NDArray[np.int64]) -> None:

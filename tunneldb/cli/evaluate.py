@@ -55,7 +55,7 @@ def evaluate(
     from tunneldb.evaluate.measure import compare
     from tunneldb.evaluate.survey import read_findings, scanner_distance
     from tunneldb.evaluate.truth import read_truth
-    from tunneldb.export.atomic import replacing
+    from tunneldb.files import replacing
 
     form = output.suffix.lower() if output else ""
     if output and form not in (".json", ".csv"):

@@ -16,8 +16,8 @@ from tunneldb.cli.progress import bar, say, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.export.atomic import make_folder, replacing, told_to_end
-from tunneldb.job.run import loaded_kilometres, parse_km
+from tunneldb.files import make_folder, replacing, told_to_end
+from tunneldb.pipeline.run import loaded_kilometres, parse_km
 
 _PLAIN = (".gpkg", ".dxf")
 
@@ -75,7 +75,7 @@ def export(
 
 
 def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, stretch: Stretch) -> None:
-    from tunneldb.export.plain import write_survey
+    from tunneldb.export.exchange import write_survey
 
     with told_to_end(), replacing(output) as temporary, bar("parts") as progress:
         counts = write_survey(conn, survey, stretch.low, stretch.high, temporary, step(progress))
@@ -84,7 +84,7 @@ def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, st
 
 
 def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Path, km: str | None) -> None:
-    from tunneldb.export.classified import export_classified
+    from tunneldb.export.pointcloud.survey import export_classified
 
     if output.exists() and not output.is_dir():
         raise UserError(f"{output}: --classified writes a file for each scan file: name a folder")

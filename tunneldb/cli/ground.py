@@ -11,8 +11,8 @@ from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.run import parameter_table
 from tunneldb.errors import UserError
-from tunneldb.export.atomic import told_to_end
-from tunneldb.job.parameters import PARAMETERS, settings
+from tunneldb.files import told_to_end
+from tunneldb.pipeline.parameters import PARAMETERS, settings
 
 _PREFIXES = ("ground.", "cluster.")
 _NAMES = [name for name in PARAMETERS if name.startswith(_PREFIXES)]
@@ -38,7 +38,7 @@ def ground(file: Path, output: Path, assignments: tuple[str, ...]) -> None:
         if not assignment.startswith(_PREFIXES):
             raise UserError(f"{assignment.partition('=')[0]!r} is no parameter of this verb; there are {', '.join(_NAMES)}")
     values = settings(assignments)
-    from tunneldb.export.bare import classify_file
+    from tunneldb.export.pointcloud.single_file import classify_file
 
     with told_to_end(), bar("points") as progress:
         found = classify_file(file, output, values, step(progress))

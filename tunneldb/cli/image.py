@@ -11,9 +11,9 @@ from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.export.atomic import make_folder
-from tunneldb.export.image import export_kilometre, image_kilometres
-from tunneldb.job.run import parse_km
+from tunneldb.files import make_folder
+from tunneldb.export.images.image import export_kilometre, image_kilometres
+from tunneldb.pipeline.run import parse_km
 
 
 @verb(examples=["tunneldb image ringo-2024 -o images --km 511-512"])

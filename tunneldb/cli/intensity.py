@@ -13,9 +13,9 @@ from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.export.dependence import check_format, write_figure
-from tunneldb.intensity.correct import Kind
-from tunneldb.intensity.look import Look
+from tunneldb.export.figures.intensity_dependence import check_format, write_figure
+from tunneldb.radiometry.correction import Kind
+from tunneldb.radiometry.diagnosis import Look
 
 _FILES = (".las", ".laz", ".e57")
 
@@ -71,7 +71,7 @@ def intensity(
 
 
 def _look_at_file(path: Path, dimension: str | None, kind: str | None, scanner: tuple[float, float, float] | None) -> Look:
-    from tunneldb.job.intensity import look_at_file
+    from tunneldb.pipeline.intensity_diagnosis import look_at_file
 
     if dimension is None:
         raise UserError(f"{path}: say which dimension holds the intensity: --intensity DIMENSION")
@@ -82,9 +82,9 @@ def _look_at_file(path: Path, dimension: str | None, kind: str | None, scanner: 
 
 
 def _look_at_survey(settings: Settings, name: str, km: str | None) -> Look:
-    from tunneldb.job.intensity import look_at_survey
-    from tunneldb.job.parameters import settings as defaults
-    from tunneldb.job.run import loaded_kilometres, parse_km
+    from tunneldb.pipeline.intensity_diagnosis import look_at_survey
+    from tunneldb.pipeline.parameters import settings as defaults
+    from tunneldb.pipeline.run import loaded_kilometres, parse_km
 
     with connect(settings.dsn) as conn:
         survey = get_survey(conn, name)

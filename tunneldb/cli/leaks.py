@@ -16,8 +16,8 @@ from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.export.atomic import replacing
-from tunneldb.export.leaks import (
+from tunneldb.files import replacing
+from tunneldb.export.tables.leaks import (
     Anomaly,
     Geometry,
     Kind,
@@ -28,7 +28,7 @@ from tunneldb.export.leaks import (
     total,
     write_gpkg,
 )
-from tunneldb.job.run import loaded_kilometres, parse_km
+from tunneldb.pipeline.run import loaded_kilometres, parse_km
 
 _BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
 _WIDTH = 1000  # a pipe or a file has no width: nothing is to be cut there

@@ -15,7 +15,7 @@ from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
 
 if TYPE_CHECKING:
-    from tunneldb.job.files import Loaded
+    from tunneldb.store.scan_files import Loaded
 
 
 @verb(
@@ -70,8 +70,8 @@ def load(
     Noise is dropped, the rest thinned to the survey's density and stored in the order of chainage. A file that is
     loaded already is left alone; a file of the same name with other content takes its place.
     """
-    from tunneldb.job.load import load_files
-    from tunneldb.scan.filter import FilterSettings
+    from tunneldb.pipeline.load import load_files
+    from tunneldb.pointcloud.selection import FilterSettings
 
     chosen = FilterSettings(density_of(density), noise_points, noise_diameter, max_distance)
     done: list[Loaded] = []

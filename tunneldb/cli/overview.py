@@ -11,8 +11,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from tunneldb.job.order import STAGES
-from tunneldb.job.overview import TO_DO, Cell, File, Overview, Worker
+from tunneldb.pipeline.order import STAGES
+from tunneldb.queue.progress import TO_DO, Cell, File, Overview, Worker
 
 STYLES = {
     "done": "green",

@@ -8,8 +8,8 @@ from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
 from tunneldb.cli.overview import FittedTable, duration, number, spans
-from tunneldb.job.batch import Incoming
-from tunneldb.job.preview import Preview, kilometres_of
+from tunneldb.queue.batch import Incoming
+from tunneldb.queue.preview import Preview, kilometres_of
 
 
 def show(seen: Preview) -> None:

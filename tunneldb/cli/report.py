@@ -15,7 +15,7 @@ from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.export.atomic import replacing, told_to_end
+from tunneldb.files import replacing, told_to_end
 from tunneldb.report.page import CARDS, write_html
 from tunneldb.report.pdf import find_browser, print_pdf
 

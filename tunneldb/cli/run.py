@@ -12,11 +12,11 @@ from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.job.ledger import Run
-from tunneldb.job.parameters import PARAMETERS, settings
+from tunneldb.store.ledger import Run
+from tunneldb.pipeline.parameters import PARAMETERS, settings
 
 if TYPE_CHECKING:
-    from tunneldb.job.stages import Stage
+    from tunneldb.pipeline.stages import Stage
 
 
 def parameter_table(names: Iterable[str] = PARAMETERS) -> str:
@@ -59,7 +59,7 @@ def run(
     Each stage of each kilometre is one transaction that replaces what the stage made there before, so a run may be
     stopped at any moment and repeated. Axis vertices moved by hand and reviews of leaks stay.
     """
-    from tunneldb.job.run import choose_stages, loaded_kilometres, parse_km, run_tasks, stage_tasks, stale_tasks
+    from tunneldb.pipeline.run import choose_stages, loaded_kilometres, parse_km, run_tasks, stage_tasks, stale_tasks
 
     values = settings(assignments)
     stages = choose_stages(first, last)

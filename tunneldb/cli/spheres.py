@@ -67,9 +67,9 @@ def spheres(
     and the best rigid motion onto the control points are reported, never applied. Stages need not have been run; after
     sections the spheres have a chainage, and after ground the search leaves out the ground.
     """
-    from tunneldb.database.stationing import load_stationing
-    from tunneldb.export.atomic import replacing
-    from tunneldb.export.spheres import (
+    from tunneldb.store.stationing import load_stationing
+    from tunneldb.files import replacing
+    from tunneldb.export.tables.targets import (
         CONTROL_HEADER,
         HEADER,
         control_rows,
@@ -78,9 +78,9 @@ def spheres(
         sphere_rows,
         unmatched_lines,
     )
-    from tunneldb.export.spheres import report as as_report
-    from tunneldb.job.control import compare, read_control
-    from tunneldb.job.spheres import search
+    from tunneldb.export.tables.targets import report as as_report
+    from tunneldb.pipeline.target_control import compare, read_control
+    from tunneldb.pipeline.targets import search
 
     if tolerance >= radius / 4.0:
         raise UserError(f"--tolerance {tolerance:g} is too much for a radius of {radius:g} m: give less than a quarter of it")

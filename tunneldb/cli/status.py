@@ -15,7 +15,7 @@ from tunneldb.cli.output import records, tell, verb, wants_json
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.job.order import STAGES
+from tunneldb.pipeline.order import STAGES
 
 
 @verb(examples=["tunneldb status", "tunneldb status pajares-2026 --watch", "tunneldb status pajares-2026 --json"])
@@ -89,7 +89,7 @@ def _all(connection: psycopg.Connection[Any]) -> None:
 
 def _one(connection: psycopg.Connection[Any], survey: str) -> None:
     from tunneldb.cli.overview import render
-    from tunneldb.job.overview import overview
+    from tunneldb.queue.progress import overview
 
     seen = overview(connection, survey)
     tell(**{field.name: getattr(seen, field.name) for field in dataclasses.fields(seen)})

@@ -71,7 +71,7 @@ def add(
     intensity_kind: str,
 ) -> None:
     """Add the survey NAME."""
-    from tunneldb.database.catalog import Intensity, add_survey
+    from tunneldb.store.catalog import Intensity, add_survey
 
     if (trajectory is None) == (not stations):
         raise UserError("say where the scanner was: exactly one of --trajectory and --stations")
@@ -123,7 +123,7 @@ def list_(settings: Settings) -> None:
 @click.pass_obj
 def remove(settings: Settings, name: str, yes: bool) -> None:
     """Remove the survey NAME with its points, sections, images, leaks and their reviews."""
-    from tunneldb.database.catalog import remove_survey
+    from tunneldb.store.catalog import remove_survey
 
     with connect(settings.dsn) as connection:
         found = get_survey(connection, name)

@@ -31,8 +31,8 @@ def unroll(settings: Settings, survey: str, points: Path, output: Path | None, i
     added are empty where a point lies off the tunnel. x,y,z are in the tunnel's SRID; all are metres: chainage in plan
     along the axis, arc from the crown, positive right looking up-chainage, offset from the surface, positive inwards.
     """
-    from tunneldb.export.atomic import replacing
-    from tunneldb.geometry.store import load_surface
+    from tunneldb.files import replacing
+    from tunneldb.store.surface import load_surface
 
     given, added = (_PLANE, _SPACE) if inverse else (_SPACE, _PLANE)
     header, rows, coordinates = _read(points, given, optional="offset" if inverse else None)

@@ -15,7 +15,7 @@ from rich.text import Text
 from tunneldb.cli.overview import duration, render, summary
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.job.overview import Overview, overview
+from tunneldb.queue.progress import Overview, overview
 
 
 class Watch:

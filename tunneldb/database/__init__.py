@@ -4,7 +4,7 @@ from tunneldb.database.connection import connect, open_connection, resolve_dsn, 
 from tunneldb.database.copy import PointZ, copy_binary, pack
 from tunneldb.database.resources import resource_dir
 from tunneldb.database.schema import install
-from tunneldb.database.survey import Survey, get_survey
+from tunneldb.store.survey import Survey, get_survey
 
 __all__ = [
     "PointZ",

@@ -14,11 +14,11 @@ from scipy.spatial import cKDTree
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from tunneldb.database.survey import Survey
+from tunneldb.store.survey import Survey
 from tunneldb.errors import UserError
-from tunneldb.geometry.store import load_surface
-from tunneldb.job.run import loaded_kilometres, parse_km
-from tunneldb.scan.pose import PoseModel, load_poses
+from tunneldb.store.surface import load_surface
+from tunneldb.pipeline.run import loaded_kilometres, parse_km
+from tunneldb.pointcloud.poses import PoseModel, load_poses
 
 KILOMETRE = 1000.0
 WIDE = 1e4  # m of arc, more than any section has

@@ -18,7 +18,7 @@ from pyogrio.errors import DataLayerError, DataSourceError
 from pyproj.exceptions import CRSError
 from shapely.geometry import MultiPolygon, Polygon
 
-from tunneldb.database.survey import Survey
+from tunneldb.store.survey import Survey
 from tunneldb.errors import UserError
 
 LAYER = "leak"

@@ -9,7 +9,7 @@ import rasterio.features
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from tunneldb.leak.image import Grid
+from tunneldb.raster.accumulator import Grid
 
 
 def inside(grid: Grid, polygons: Sequence[Polygon]) -> Iterator[tuple[slice, NDArray[np.bool_]]]:

@@ -17,7 +17,7 @@ from shapely.geometry import Polygon
 
 from tunneldb.database import Survey
 from tunneldb.errors import UserError
-from tunneldb.job.order import STAGES
+from tunneldb.pipeline.order import STAGES
 
 Float = NDArray[np.float64]
 Row = dict[str, Any]

@@ -16,11 +16,11 @@ from PIL import Image
 from scipy import ndimage
 
 from tunneldb.database import Survey
-from tunneldb.export.gaps import FILL, fill_gaps
-from tunneldb.leak.image import BLOCK
-from tunneldb.leak.lining import State
-from tunneldb.leak.raster import Raster, decode
-from tunneldb.leak.store import DARK
+from tunneldb.export.images.gap_fill import FILL, fill_gaps
+from tunneldb.raster.accumulator import BLOCK
+from tunneldb.raster.pixel_state import State
+from tunneldb.raster.geotiff import Raster, decode
+from tunneldb.store.images import DARK
 
 Single = NDArray[np.float32]
 Bytes = NDArray[np.uint8]

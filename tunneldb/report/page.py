@@ -14,7 +14,7 @@ from markupsafe import Markup
 
 from tunneldb import __version__
 from tunneldb.database import Survey, snapshot
-from tunneldb.export.plain.places import crs_text
+from tunneldb.export.exchange.places import crs_text
 from tunneldb.report import data, text
 from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, without_detection
 from tunneldb.report.lining import Form

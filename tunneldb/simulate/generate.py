@@ -11,26 +11,26 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tunneldb.simulate import ground
-from tunneldb.simulate.beam import blur
-from tunneldb.simulate.clutter import clutter
-from tunneldb.simulate.coat import coat
-from tunneldb.simulate.furniture import FLOOR, RAIL, Appendage, Niche, furnish, refuges
-from tunneldb.simulate.intensity import counts, reference_curve
-from tunneldb.simulate.leaks import Leak, Room, place
-from tunneldb.simulate.marks import Mark, place_marks
-from tunneldb.simulate.overhead import overhead, sleepers
+from tunneldb.simulate.lining import ballast as ground
+from tunneldb.simulate.rays.beam import blur
+from tunneldb.simulate.objects.wall_clutter import clutter
+from tunneldb.simulate.lining.reflectance import coat
+from tunneldb.simulate.objects.fixtures import FLOOR, RAIL, Appendage, Niche, furnish, refuges
+from tunneldb.simulate.radiometry import counts, reference_curve
+from tunneldb.simulate.lining.leaks import Leak, Room, place
+from tunneldb.simulate.lining.marks import Mark, place_marks
+from tunneldb.simulate.objects.overhead import overhead, sleepers
 from tunneldb.simulate.parameters import Parameters
-from tunneldb.simulate.placing import stand
-from tunneldb.simulate.profile import slabs
-from tunneldb.simulate.ray import trace
-from tunneldb.simulate.rings import build
+from tunneldb.simulate.placement import stand
+from tunneldb.simulate.floor_profile import slabs
+from tunneldb.simulate.rays.trace import trace
+from tunneldb.simulate.lining.rings import build
 from tunneldb.simulate.scanner import BlockPlan, Rays, Scanner
-from tunneldb.simulate.scene import scene
-from tunneldb.simulate.skin import skin
-from tunneldb.simulate.things import TargetSphere, Thing, parts_table
-from tunneldb.simulate.tunnel import Tunnel
-from tunneldb.simulate.wet import joint_leaks, niche_leaks, with_drips
+from tunneldb.simulate.rays.scene import scene
+from tunneldb.simulate.lining.relief import skin
+from tunneldb.simulate.objects.primitives import TargetSphere, Thing, parts_table
+from tunneldb.simulate.tunnel.tunnel import Tunnel
+from tunneldb.simulate.lining.seepage import joint_leaks, niche_leaks, with_drips
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ import pyproj
 from pyproj.exceptions import CRSError
 
 from tunneldb.errors import UserError
-from tunneldb.simulate import section
-from tunneldb.simulate.centreline import CentreLine
-from tunneldb.simulate.intensity import Radiometry
-from tunneldb.simulate.tunnel import Tunnel
+from tunneldb.simulate.tunnel import section
+from tunneldb.simulate.tunnel.centreline import CentreLine
+from tunneldb.simulate.radiometry import Radiometry
+from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 # Allowed values: low, high, unit.
 LIMITS: dict[str, tuple[float, float, str]] = {

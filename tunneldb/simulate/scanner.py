@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunneldb.simulate.parameters import Parameters
-from tunneldb.simulate.tunnel import Tunnel
+from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 Array = NDArray[np.float64]
 

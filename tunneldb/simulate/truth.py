@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from tunneldb.simulate.coat import GRIME_RISE, Coat, soot_amount
-from tunneldb.simulate.leaks import Leak
-from tunneldb.simulate.rings import POCKET, POCKET_FROM_JOINT, POCKETS, Rings
-from tunneldb.simulate.skin import wider_from
+from tunneldb.simulate.lining.reflectance import GRIME_RISE, Coat, soot_amount
+from tunneldb.simulate.lining.leaks import Leak
+from tunneldb.simulate.lining.rings import POCKET, POCKET_FROM_JOINT, POCKETS, Rings
+from tunneldb.simulate.lining.relief import wider_from
 
 if TYPE_CHECKING:
     from tunneldb.simulate.generate import Simulation

@@ -16,7 +16,7 @@ import psycopg
 
 from tunneldb import __version__
 from tunneldb.database import Survey
-from tunneldb.export.atomic import replacing
+from tunneldb.files import replacing
 from tunneldb.export.qgis.action import RECOMPUTED_FROM, recompute
 from tunneldb.export.qgis.crs import crs_element, no_crs
 from tunneldb.export.qgis.extent import Extent, View, first_window, largest_leak, map_extent, sheet_extent, unrolled_extents
@@ -68,7 +68,7 @@ def write_project(
     output : Path
         File to write, ``.qgz`` or ``.qgs``; it appears whole or not at all.
     images : sequence of Path
-        Unrolled images (GeoTIFF), named by kind as :func:`tunneldb.export.image.export_kilometre` does; the project
+        Unrolled images (GeoTIFF), named by kind as :func:`tunneldb.export.images.image.export_kilometre` does; the project
         holds their paths relative to itself.
     service : str, optional
         Entry of ``pg_service.conf`` by which QGIS connects, instead of this connection's host and database.

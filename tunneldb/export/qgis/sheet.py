@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 
 from tunneldb import __version__
 from tunneldb.database import Survey
-from tunneldb.export.gaps import TOLD
+from tunneldb.export.images.gap_fill import TOLD
 from tunneldb.export.qgis.extent import Extent
 from tunneldb.export.qgis.layer import SHEETS
 

@@ -1,0 +1,54 @@
+"""The picture of a kilometre relative to dry lining: by how much each pixel is darker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from tunneldb.anomalies.background.level_map import DryMap
+from tunneldb.anomalies.background.histogram import take_levels
+from tunneldb.raster.accumulator import Grid
+from tunneldb.anomalies.inside import inside
+from tunneldb.raster.image import Picture
+
+
+@dataclass(frozen=True)
+class Relative:
+    """State of all pixels of a picture, and how much darker than dry lining they are.
+
+    Attributes
+    ----------
+    grid : Grid
+        The pixels.
+    state : (rows, columns) uint8 array
+        Values of :class:`tunneldb.raster.pixel_state.State`.
+    drop : (rows, columns) int16 array
+        Level of dry lining there less that of the pixel, in steps of 0.01 dB, positive where it is darker; NODATA where
+        there is no point. What lies in drawn dry regions is at most 0.
+    tile : int
+        Side of the tiles of ``sigma``, pixels.
+    sigma : (tiles down, tiles along) float32 array
+        Standard deviation of dry lining, dB; of pixel (i, j) in tile (i // tile, j // tile).
+    drawn : tuple of Polygon
+        Dry regions that the user drew, in the unrolled plane, m.
+    """
+
+    grid: Grid
+    state: NDArray[np.uint8]
+    drop: NDArray[np.int16]
+    tile: int
+    sigma: NDArray[np.float32]
+    drawn: tuple[Polygon, ...] = ()
+
+
+def relative(picture: Picture, dry: DryMap) -> Relative:
+    """Take the level of dry lining from that of all pixels, in the memory of ``picture.level``, which is lost."""
+    drop = picture.level
+    take_levels(dry.base, dry.rings, dry.bands, dry.smooth, dry.tile, drop)
+    for block, mask in inside(picture.grid, dry.drawn):
+        here = drop[:, block]
+        here[mask] = np.minimum(here[mask], 0)
+    return Relative(picture.grid, picture.state, drop, dry.tile, dry.sigma, dry.drawn)

@@ -1,0 +1,134 @@
+"""Level and standard deviation of dry lining everywhere in the picture of a kilometre."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from tunneldb.anomalies.background.model import Fit
+from tunneldb.anomalies.background.histogram import fill_levels
+from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.image import Picture
+
+Single = NDArray[np.float32]
+
+TILE = 0.5
+"""Side of a tile, about, m."""
+
+PASSES = 2
+"""How often bands, rings and what changes slowly are told apart anew, each from what the others leave."""
+
+SHOWN = 2_000_000
+"""Pixels, about, that mean and spread of the kilometre are told from."""
+
+
+@dataclass(frozen=True)
+class DryMap:
+    """Level and standard deviation of dry lining, locally.
+
+    The level is a sum: that of the kilometre, of each column (rings of other concrete), of each row by blocks of 50 m
+    (soot, grime, stripes), and what changes slowly, by tiles; the last two are interpolated.
+
+    Attributes
+    ----------
+    grid : Grid
+        The pixels.
+    tile : int
+        Side of a tile, pixels; divides a block.
+    sigma : (tiles down, tiles along) float32 array
+        Standard deviation, dB, above 0; of pixel (i, j) in tile (i // tile, j // tile).
+    mean, spread : float
+        Medians over the lining of level and standard deviation, dB; NaN without lining.
+    count : int
+        Pixels that it rests on; 0: there is no lining.
+    base : float
+        Level of the kilometre, dB.
+    rings : (columns,) float32 array
+        Level of each column beyond it, dB.
+    bands : (rows, blocks) float32 array
+        Level of each row beyond those at the middle of each block, dB.
+    smooth : (tiles down, tiles along) float32 array
+        Level at the middle of each tile beyond those, dB.
+    drawn : tuple of Polygon
+        Dry regions that the user drew, in the unrolled plane, m.
+    """
+
+    grid: Grid
+    tile: int
+    sigma: Single
+    mean: float
+    spread: float
+    count: int
+    base: float
+    rings: Single
+    bands: Single
+    smooth: Single
+    drawn: tuple[Polygon, ...] = ()
+
+    def levels(self, rows: slice, columns: slice) -> Single:
+        """Level of dry lining in some rows and columns, dB."""
+        out = np.empty((rows.stop - rows.start, columns.stop - columns.start), np.float32)
+        fill_levels(self.base, self.rings, self.bands, self.smooth, self.tile, rows.start, columns.start, out)
+        return out
+
+
+def map_dry(picture: Picture, dry_regions: Sequence[Polygon] = ()) -> DryMap:
+    """Map the dry lining of a picture.
+
+    Level and standard deviation are those of the dry part of the lining (:func:`tunneldb.radiometry.robust_statistics.robust_statistics`):
+    of a column, of a row along 150 m, of windows of tiles. As long as no more than half of each is wet, leaks don't count.
+    Lining set back behind the wall doesn't count either.
+
+    Parameters
+    ----------
+    picture : Picture
+        State and level of the pixels.
+    dry_regions : sequence of Polygon
+        Dry lining that the user drew, in the unrolled plane, m. Tiles that lie in it for the larger part take plain mean
+        and standard deviation (Xu et al., 2018, eq. 19) of the pixels in it, however dark these are; others are left alone.
+    """
+    grid, state = picture.grid, picture.state
+    tile, count = _tile_side(grid), int(np.count_nonzero(state == 1))
+    if count == 0:
+        return _nothing(grid, tile, tuple(dry_regions))
+    fit = Fit(picture, tile, count, dry_regions)
+    for _ in range(PASSES):
+        fit.add_bands()
+        fit.add_rings()
+        fit.add_smooth()
+    sigma = fit.sigma()
+    dry = DryMap(grid, tile, sigma, 0.0, 0.0, count, *fit.parts[:4], tuple(dry_regions))
+    return replace(dry, mean=_mean_level(dry, state), spread=_weighted_median(sigma, fit.lining))
+
+
+def _tile_side(grid: Grid) -> int:
+    """Side of a tile, pixels: what divides a block and is nearest to TILE, so that tiles always lie at the same chainages."""
+    sides = np.arange(1, grid.block_columns + 1)
+    sides = sides[grid.block_columns % sides == 0]
+    return int(sides[np.argmin(np.abs(sides * grid.pixel - TILE))])
+
+
+def _nothing(grid: Grid, tile: int, drawn: tuple[Polygon, ...]) -> DryMap:
+    """Map of a picture without lining."""
+    shape = -(-grid.rows // tile), grid.columns // tile
+    flat = np.zeros(grid.columns, np.float32), np.zeros((grid.rows, grid.blocks), np.float32), np.zeros(shape, np.float32)
+    return DryMap(grid, tile, np.ones(shape, np.float32), np.nan, np.nan, 0, 0.0, *flat, drawn)
+
+
+def _mean_level(dry: DryMap, state: NDArray[np.uint8]) -> float:
+    """Median over the lining of the level of dry lining, from some of its rows, dB."""
+    rows, columns = state.shape
+    every = max(1, rows * columns // SHOWN)
+    levels = [dry.levels(slice(row, row + 1), slice(0, columns))[0, state[row] == 1] for row in range(every // 2, rows, every)]
+    return float(np.median(np.concatenate(levels)))
+
+
+def _weighted_median(values: Single, weights: NDArray[np.int32]) -> float:
+    """Median of values that count so often."""
+    order = np.argsort(values, axis=None)
+    until = np.cumsum(weights.ravel()[order])
+    return float(values.ravel()[order][np.searchsorted(until, 0.5 * until[-1])])

@@ -1,0 +1,246 @@
+"""Model of dry lining, fitted to a picture step by step: base, rings, bands and what changes slowly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy import ndimage
+from shapely.geometry import Polygon
+
+from tunneldb.radiometry.robust_statistics import robust_statistics
+from tunneldb.anomalies.background.histogram import column_modes, fill_levels, row_modes, settle_windows, tile_histograms
+from tunneldb.anomalies.inside import inside
+from tunneldb.raster.image import Picture
+from tunneldb.raster.geotiff import STEP
+from tunneldb.anomalies.background.smooth import fill, slow
+
+Float = NDArray[np.float64]
+Single = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+SAMPLE, LINES = 15_000_000, 6_000_000
+"""Pixels, about, that are looked at for tiles, and for rows and columns, which hold far more each."""
+
+BESIDE = 1
+"""Blocks to either side by which a band is told: with the block itself 150 m, of which a leak is a small part."""
+
+ROW = 0.1
+"""Length of the running median across bands, m: joints along the tunnel are narrower than half of it."""
+
+RING = 0.3
+"""Length of the running median along rings, m: joints are narrower than half of it, steps stay sharp."""
+
+NARROW = 0.6
+"""Rings are longer, m: a darker one is a joint that leaks all round."""
+
+ENOUGH = 100
+"""Values that tell the level of dry lining to a tenth of their standard deviation, about."""
+
+FEW = 10
+"""From fewer values no level is told."""
+
+PART = 0.15
+"""Part of what a row or a column holds on average from which its level is told."""
+
+AROUND = 2.0
+"""Half the side of the windows for the standard deviation, m: they hold a few segments of a ring."""
+
+LEAST = 10.0
+"""Percentile of the standard deviations of the kilometre below which none falls."""
+
+DRAWN = 0.5
+"""Part of a tile's lining that must lie in drawn dry regions for them to rule it."""
+
+
+class Fit:
+    """Model of dry lining of a picture that holds lining; see :class:`tunneldb.anomalies.background.level_map.DryMap` for its parts.
+
+    Parameters
+    ----------
+    picture : Picture
+        State and level of the pixels.
+    tile : int
+        Side of a tile, pixels.
+    count : int
+        Its lining pixels.
+    drawn : sequence of Polygon
+        Drawn dry regions.
+    """
+
+    def __init__(self, picture: Picture, tile: int, count: int, drawn: Sequence[Polygon]) -> None:
+        grid = self.grid = picture.grid
+        self.picture, self.tile, self.drawn = picture, tile, drawn
+        self.every, self.apart = max(1, count // SAMPLE), max(1, count // LINES)
+        shape = -(-grid.rows // tile), grid.columns // tile
+        total = robust_statistics(_sample(picture.state, picture.level, max(1, count // 500_000)) * STEP["corrected"])
+        self.base, self.spread = total.mean, max(total.sigma, STEP["corrected"])
+        self.rings = np.zeros(grid.columns, np.float32)
+        self.bands = np.zeros((grid.rows, grid.blocks), np.float32)
+        self.smooth = np.zeros(shape, np.float32)
+        self.odd = np.zeros(shape, np.bool_)
+        self.lining = _lining(picture.state, tile, np.zeros(shape, np.int32))
+        scanned = self.lining[:, self.lining.any(axis=0)]
+        self.per_tile = float(scanned.mean())
+        self.pinned = np.zeros(shape, np.bool_)
+        if drawn:
+            number = self._drawn_moments(self.smooth)[0]
+            self.pinned = (number >= DRAWN * self.lining) & (number > 0)
+
+    @property
+    def parts(self) -> tuple[float, Single, Single, Single, int]:
+        """The model as compiled functions take it."""
+        return self.base, self.rings, self.bands, self.smooth, self.tile
+
+    def add_bands(self) -> None:
+        """Add what each row shows: about each block, or where too little is seen of it, in the whole kilometre."""
+        scanned, per_block = int(self.lining.any(axis=0).sum()), self.smooth.shape[1] // self.bands.shape[1]
+        along = min(scanned, (2 * BESIDE + 1) * per_block)
+        enough = max(FEW, round(PART * along * self.per_tile / self.tile / self.apart))
+        found, whole = row_modes(*self._plain, *self.parts, self.apart, BESIDE, enough)
+        found = np.where(np.isfinite(found), found, whole[:, None])
+        rows = np.flatnonzero(np.isfinite(whole))
+        if not len(rows):
+            return
+        for b in range(found.shape[1]):
+            found[:, b] = np.interp(np.arange(len(found)), rows, found[rows, b])
+        size = _odd(ROW / self.grid.pixel)
+        self.bands += ndimage.median_filter(found, (size, 1), mode="nearest")
+
+    def add_rings(self) -> None:
+        """Add what each column shows, without joints."""
+        pixel = self.grid.pixel
+        per_column = self.per_tile * self.lining.shape[0] / self.tile
+        found = column_modes(*self._plain, *self.parts, self.apart, max(FEW, round(PART * per_column / self.apart)))
+        # Where columns hold little, more of them are taken together.
+        size = _odd(max(RING / pixel, 10.0 * ENOUGH / max(per_column, 1.0)))
+        found = _running_median(found, size // 2)
+        columns = np.flatnonzero(np.isfinite(found))
+        if not len(columns):
+            return
+        rings = self.rings + np.interp(np.arange(len(found)), columns, found[columns])
+        closed = ndimage.grey_closing(rings, _odd(NARROW / pixel), mode="nearest")
+        self.rings = np.where(closed - rings > 0.5 * self.spread, closed, rings).astype(np.float32)
+
+    def add_smooth(self) -> None:
+        """Add what changes slowly."""
+        held = max(self.per_tile / self.every, 1e-3)
+        half = int(np.ceil((np.sqrt(ENOUGH / held) - 1) / 2)) if held < ENOUGH else 0
+        histograms = self._histograms()
+        used = np.ones(self.smooth.shape, np.bool_)
+        mean, sigma, count = settle_windows(histograms, used, half)
+        mean[(count == 0) | (self.lining == 0)] = np.nan
+        level = self.smooth + mean
+        if self.pinned.any():
+            number, total, _ = self._drawn_moments(np.zeros_like(self.smooth))
+            level[self.pinned] = (total / np.maximum(number, 1))[self.pinned]
+        if np.isfinite(sigma).any():
+            self.spread = max(float(np.nanmedian(sigma)), STEP["corrected"])
+        self.smooth, self.odd = slow(level, self.smooth, self.spread, self.pinned)
+
+    def sigma(self) -> Single:
+        """Standard deviation about the model, by tiles, dB: of pixels, and of what whole tiles differ by beyond it."""
+        half = max(1, round(AROUND / (self.tile * self.grid.pixel)))
+        while (2 * half + 1) ** 2 * self.per_tile / self.every < 4 * ENOUGH and half < 10:
+            half += 1
+        histograms = self._histograms()
+        _, sigma, count = settle_windows(histograms, ~self.odd, half)
+        sigma[count < ENOUGH] = np.nan
+        known = np.isfinite(sigma) & (sigma > 0)
+        seen = known & (self.lining > 0)
+        if not seen.any():
+            return np.full_like(sigma, self.spread)
+        sigma = fill(np.where(known, np.maximum(sigma, np.percentile(sigma[seen], LEAST)), np.nan).astype(np.float32))
+        sigma = np.hypot(sigma, self._between(histograms))
+        if self.pinned.any():
+            number, total, squares = (
+                ndimage.uniform_filter(m * self.pinned, 2 * half + 1) for m in self._drawn_moments(self.smooth)
+            )
+            number = np.maximum(number, 1e-9)
+            plain = np.sqrt(np.maximum(squares / number - (total / number) ** 2, STEP["corrected"] ** 2))
+            sigma[self.pinned] = plain[self.pinned]
+        return sigma
+
+    def _between(self, histograms: NDArray[np.uint16]) -> np.float32:
+        """Standard deviation of whole tiles about the model, dB: segments and blocks differ, towards bright as towards dark.
+
+        Wet ones don't count, for the bright half alone is looked at: 95 % of half a normal distribution lie within 1.96 σ.
+        """
+        level, _, count = settle_windows(histograms, np.ones(self.smooth.shape, np.bool_), 0)
+        bright = level[(count >= ENOUGH) & (level > 0.0) & ~self.pinned]
+        return np.float32(np.percentile(bright, 95.0) / 1.96 if len(bright) >= ENOUGH else 0.0)
+
+    def _histograms(self) -> NDArray[np.uint16]:
+        return tile_histograms(self.picture.state, self.picture.level, self.lining > 0, *self.parts, self.every)
+
+    @property
+    def _plain(self) -> tuple[NDArray[np.uint8], NDArray[np.int16], Mask]:
+        """State, level and the tiles that nothing sets off."""
+        return self.picture.state, self.picture.level, (self.lining > 0) & ~self.odd
+
+    def _drawn_moments(self, smooth: Single) -> tuple[Float, Float, Float]:
+        """Of the lining pixels in drawn regions, by tiles: number, sum and squares of what they show beyond the model.
+
+        With ``smooth`` in the place of the model's.
+        """
+        tile, shape = self.tile, self.smooth.shape
+        moments = np.zeros((3, *shape))
+        for columns, mask in inside(self.grid, self.drawn):
+            row, column = np.nonzero(mask & (self.picture.state[:, columns] == 1))
+            level = np.empty(mask.shape, np.float32)
+            fill_levels(self.base, self.rings, self.bands, smooth, self.tile, 0, columns.start, level)
+            beyond = self.picture.level[:, columns][row, column] * STEP["corrected"] - level[row, column]
+            where = row // tile * shape[1] + (column + columns.start) // tile
+            for k in range(3):
+                moments[k] += np.bincount(where, beyond**k, shape[0] * shape[1]).reshape(shape)
+        return moments[0], moments[1], moments[2]
+
+
+def _odd(length: float) -> int:
+    """Odd number of pixels next to a length in pixels."""
+    return 2 * int(length / 2) + 1
+
+
+@njit(cache=True, nogil=True)
+def _sample(state: NDArray[np.uint8], level: NDArray[np.int16], every: int) -> NDArray[np.int16]:  # pragma: no cover - compiled
+    """Level of every n-th lining pixel."""
+    count = 0
+    for i in range(state.shape[0]):
+        for j in range(state.shape[1]):
+            count += state[i, j] == 1
+    kept = np.empty(count // every + 1, np.int16)
+    seen, held = 0, 0
+    for i in range(state.shape[0]):
+        for j in range(state.shape[1]):
+            if state[i, j] == 1:
+                if seen % every == 0:
+                    kept[held] = level[i, j]
+                    held += 1
+                seen += 1
+    return kept[:held]
+
+
+@njit(cache=True, nogil=True)
+def _lining(state: NDArray[np.uint8], tile: int, out: NDArray[np.int32]) -> NDArray[np.int32]:  # pragma: no cover - compiled
+    """Lining pixels of each tile."""
+    for i in range(state.shape[0]):
+        for t in range(out.shape[1]):
+            held = np.int32(0)
+            for j in range(t * tile, (t + 1) * tile):
+                held += np.int32(state[i, j] == 1)
+            out[i // tile, t] += held
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _running_median(values: Single, half: int) -> Single:  # pragma: no cover - compiled
+    """Median of the known values (not NaN) within so many places; NaN where there are none."""
+    out = np.full(len(values), np.float32(np.nan))
+    for j in range(len(values)):
+        about = values[max(j - half, 0) : j + half + 1]
+        known = about[~np.isnan(about)]
+        if len(known):
+            out[j] = np.median(known)
+    return out

@@ -1,0 +1,148 @@
+"""What a dark region is: a leak, a joint, or something else that is dark but dry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from tunneldb.anomalies.regions import Region
+from tunneldb.anomalies.region_shape import Shape, measure
+
+STRONG_CONTRAST, STRONG_DROP = 8.0, 3.0
+"""Standard deviations and dB from which a patch with straight sides may be water after all, that fills a panel between joints:
+of shades of concrete and mortar neither is expected, water takes away half of the light and more."""
+
+DARKEST_JOINT = 3.0
+"""A joint of up to 1 cm takes no more than half of the light from a pixel of 2 cm, dB; what is darker is wet."""
+
+Kind = Literal["leak", "joint", "dark"]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a region is taken for.
+
+    Attributes
+    ----------
+    kind : {'leak', 'joint', 'dark'}
+        A leak; a joint; or dark but dry.
+    reasons : tuple of str
+        What speaks against a leak, the strongest first; of a leak what makes it doubtful.
+    confidence : float
+        That it is of its kind, 0 to 1.
+    """
+
+    kind: Kind
+    reasons: tuple[str, ...]
+    confidence: float
+
+
+def judge(region: Region) -> Verdict:
+    """Tell what a region is, by its shape and its sums.
+
+    Each reason why it may be dry gets a degree between 0 and 1; the region is a leak unless one is above 1/2.
+    """
+    shape = measure(region.mask, region.pixel)
+    degrees = {
+        "faint": _ramp(region.contrast, 3.4, 3.0),
+        "thin": _thin(region, shape),
+        "recess": _recess(region),
+        "gradual": _gradual(region, shape),
+        "rectangular": _rectangular(region, shape),
+        "stripe": _stripe(shape, region.pixel),
+        "shadow": _shadow(region, shape),
+    }
+    against = sorted((name for name in degrees if degrees[name] > 0.0), key=lambda name: -degrees[name])
+    worst = max(degrees.values())
+    if worst <= 0.5:
+        return Verdict("leak", tuple(against), evidence(region) * (1.0 - worst))
+    reasons = tuple(name for name in against if degrees[name] > 0.5)
+    return Verdict("joint" if "thin" in reasons else "dark", reasons, worst)
+
+
+def evidence(region: Region) -> float:
+    """How sure it is that a region is darker than dry lining, 0 to 1: by contrast, size and support."""
+    area = region.area
+    share = region.filled * region.pixel**2 / area
+    contrast = 1.0 - np.exp(-((region.contrast / 4.0) ** 2))
+    return float(contrast * area / (area + 0.02) * (1.0 - np.exp(-share / 0.15)))
+
+
+def _thin(region: Region, shape: Shape) -> float:
+    """Joints are at most 2 cm wide, which the beam, the pixels and the median filter widen, straight, not as dark as water."""
+    pixel = region.pixel
+    wander = shape.wander_along if shape.along > shape.across else shape.wander_across
+    return min(
+        _ramp(shape.mean_width, 0.10, 0.07),
+        _ramp(shape.length / max(shape.mean_width, pixel), 4.0, 8.0),
+        _ramp(wander, 2.0 * pixel, pixel),
+        _ramp(region.drop_mean, DARKEST_JOINT + 0.5, DARKEST_JOINT),
+    )
+
+
+def _recess(region: Region) -> float:
+    """A bolt pocket is dark as a whole, and small: it is set back, and what is about it is not."""
+    traits, pixels = region.traits, np.count_nonzero(region.mask)
+    about = traits.rim_recess / traits.rim if traits.rim else 0.0
+    return min(_ramp(traits.recess / pixels, 0.3, 0.7), _ramp(about, 0.4, 0.2), _ramp(region.area, 0.12, 0.08))
+
+
+def _gradual(region: Region, shape: Shape) -> float:
+    """Soot and grime fade out; of the darkness of a wet patch most is reached within some centimetres of its edge.
+
+    Grime beneath a cable lies in a band along the tunnel, which water does not: there less softness is enough.
+    """
+    traits = region.traits
+    if traits.steps < 10 or region.drop_sum <= 0:
+        return 0.0
+    step = (traits.inside - traits.outside) / traits.steps / region.drop_mean
+    band = _ramp(shape.along / shape.across, 4.0, 8.0)
+    return _ramp(step, 0.6 + 0.25 * band, 0.3 + 0.25 * band)
+
+
+def _rectangular(region: Region, shape: Shape) -> float:
+    """What was built, a repaired patch or a segment of another shade: its sharp sides lie along the tunnel and around it.
+
+    However joints and appendages cut it up. Of a small blob or a narrow band along a joint more sides do by chance.
+    """
+    traits = region.traits
+    shown = traits.rim - traits.rim_off
+    if not traits.sharp or not shown:
+        return 0.0
+    width, pixels = shape.mean_width / region.pixel, region.area / region.pixel**2
+    most = 0.71 + 0.15 * _ramp(width, 17.5, 10.0) + 0.12 * _ramp(pixels, 750.0, 250.0)
+    lines = _ramp(traits.straight / traits.sharp, most, most + 0.08)
+    # Water that fills a panel between joints is rectangular too, and darker than repairs are, and so are small blobs.
+    panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), _ramp(width, 22.5, 15.0))
+    return min(lines, _ramp(traits.sharp / shown, 0.15, 0.25), _ramp(width, 8.0, 11.0), 1.0 - panel)
+
+
+def _strong(region: Region) -> float:
+    """Whether a region is as dark as water, and no shade of concrete is."""
+    return _ramp(min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP), 0.8, 1.0)
+
+
+def _stripe(shape: Shape, pixel: float) -> float:
+    """A painted stripe: a band along the tunnel, straight and as wide at its ends; water along a joint keeps to no edge."""
+    neat = min(
+        _ramp(shape.wander_box, pixel, 0.6 * pixel),
+        _ramp(shape.fill, 0.85, 0.93),
+        _ramp(shape.corners, 0.4, 0.7),
+    )
+    # Ragged ones are as long as no leak along the tunnel.
+    long = min(_ramp(shape.along, 2.0, 2.5), _ramp(shape.wander_along, 2.0 * pixel, pixel))
+    return min(_ramp(shape.slender, 6.0, 10.0), max(neat, long))
+
+
+def _shadow(region: Region, shape: Shape) -> float:
+    """A narrow band beside a cable or a pipe; or what shows between appendages and ends nowhere on dry lining."""
+    traits = region.traits
+    beside = traits.rim_off / traits.rim if traits.rim else 0.0
+    return max(min(_ramp(beside, 0.25, 0.45), _ramp(shape.width, 0.14, 0.08)), _ramp(beside, 0.8, 0.9))
+
+
+def _ramp(value: float, none: float, full: float) -> float:
+    """From 0 at ``none`` to 1 at ``full``, whichever is the greater."""
+    return min(max((float(value) - none) / (full - none), 0.0), 1.0)

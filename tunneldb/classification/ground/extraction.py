@@ -1,0 +1,213 @@
+"""The ground of a tunnel, found from its points (Li et al. 2023, section 2.1, segment by segment)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from tunneldb.classification.ground.height_field import below, blended, carried_on, filled, refined
+from tunneldb.classification.ground.wall_foot import steady, walls
+from tunneldb.geometry.plan_line import Line
+from tunneldb.classification.ground.model import COLUMN, Ground
+from tunneldb.classification.ground.ransac import planes
+from tunneldb.classification.ground.level_profile import is_round, level_ground, profiles
+from tunneldb.pointcloud.voxels import Voxels
+
+Float = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+MARGIN = 32
+"""Rows depend on no points farther than this along the line, m: what is found of two stretches agrees where they overlap."""
+
+_STEP = 4  # of the segments along, m
+_LEAST_VOXELS = 12
+_SPREADS = 3.5  # γ in standard deviations of the ground
+_LEAST_GAMMA = 0.01  # m
+_PASSES = 3
+_TOUCHED = 2  # columns at the walls
+
+
+@dataclass(frozen=True)
+class GroundSettings:
+    """How the ground is looked for.
+
+    Attributes
+    ----------
+    voxel : float
+        Edge of the voxels that the points are thinned to, m.
+    distance : float
+        τ: points nearer to a plane lie on it, m.
+    angle : float
+        δ: normals of the ground depart less from the vertical, degrees.
+    gamma : float
+        The largest γ: ground is not thicker above its height, m.
+    radius : float
+        R: points so near make a normal, m.
+    """
+
+    voxel: float = 0.1
+    distance: float = 0.05
+    angle: float = 15.0
+    gamma: float = 0.1
+    radius: float = 0.3
+
+    @classmethod
+    def of(cls, values: Mapping[str, float]) -> GroundSettings:
+        """Settings of the parameters ``ground.*``."""
+        return cls(*(values[f"ground.{name}"] for name in ("voxel", "distance", "angle", "gamma", "radius")))
+
+
+@dataclass(frozen=True)
+class _Points:
+    """Points of the tunnel's lower part, by rows of 1 m and columns of 0.1 m."""
+
+    along: Float
+    across: Float
+    z: Float
+    spread: Float
+    cells: Index
+    start: int
+    first: int
+    rows: int
+    columns: int
+
+
+def find_ground(
+    points: Float, line: Line, settings: GroundSettings, seed: int = 0, spread: Float | None = None
+) -> Ground | None:
+    """Find the ground of a tunnel.
+
+    Points are thinned to voxels (step 1). Each 4 m a plane is found in the lower 40 % of the tunnel by RANSAC with
+    checked normals (steps 2, 3). About it, column by column, the level is sought that is seen along the segment:
+    carriageways, walkways and camber, but not what stands on them. Levels pass evenly from segment to segment and
+    follow the points about them; γ (step 4) is 3.5 times their spread. Walls are fitted just above.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        m; those not finite are left out.
+    line : Line
+        What the tunnel follows.
+    settings : GroundSettings
+        Parameters.
+    seed : int
+        Start of the random numbers; the result depends on it alone, not on the order of the points.
+    spread : (n,) float array, optional
+        Standard deviation of the heights that each point stands for, m, where it is the centroid of others.
+
+    Returns
+    -------
+    Ground or None
+        None where there is no ground: too few points, or a tunnel without a floor.
+    """
+    held = _lower(points, line, settings, spread)
+    if held is None:
+        return None
+    centres, coefficients = _segments(held, settings, seed)
+    level = _levels(held, centres, coefficients, settings)
+    rows = held.start + np.arange(held.rows + 1, dtype=np.float64)
+    columns = (held.first + np.arange(held.columns, dtype=np.float64)) * COLUMN
+    height = filled(blended(rows, columns, centres, coefficients, level, _STEP))
+    if not np.isfinite(height).any():
+        return None
+    height, gamma = _refine(held, height, settings)
+    foot, lean = walls(
+        held.along, held.across, held.z, held.cells, held.start, held.first, height, np.maximum(gamma, settings.distance), seed
+    )
+    foot, lean = steady(foot, lean)
+    height = _to_walls(height, columns, foot, gamma)
+    return Ground(held.start, held.first, height, gamma, foot, lean)
+
+
+def _lower(points: Float, line: Line, settings: GroundSettings, spread: Float | None) -> _Points | None:
+    """Keep the lower part of each segment's points, thin them, place them and sort them."""
+    points = np.asarray(points, dtype=np.float64)
+    kept = below(*line.place(points), points[:, 2], float(_STEP))
+    points = points[kept]
+    voxels = Voxels(settings.voxel)
+    voxels.add(points)
+    if len(voxels) < _LEAST_VOXELS:
+        return None
+    xyz, within = voxels.centroids(), voxels.spread()
+    if spread is not None:
+        number = voxels.index(points)
+        mean = np.bincount(number, np.asarray(spread)[kept] ** 2, minlength=len(voxels)) / voxels.counts()
+        within = np.sqrt(within**2 + mean)
+    along, across = line.place(xyz)
+    start, stop = math.floor(along.min()), math.floor(along.max()) + 1
+    first = math.floor(across.min() / COLUMN + 0.5) - 1
+    columns = math.floor(across.max() / COLUMN + 0.5) + 2 - first
+    cell = (np.floor(along).astype(np.int64) - start) * columns + np.floor(across / COLUMN + 0.5).astype(np.int64) - first
+    # In an order that is the points' own: sums and random draws don't depend on how they came.
+    order = np.lexsort((xyz[:, 2], along, cell))
+    cells = np.zeros((stop - start) * columns + 1, np.int64)
+    np.cumsum(np.bincount(cell, minlength=len(cells) - 1), out=cells[1:])
+    return _Points(
+        along[order], across[order], xyz[order, 2], within[order], cells, start, first, stop - start, columns
+    )  # fmt: skip
+
+
+def _segments(held: _Points, settings: GroundSettings, seed: int) -> tuple[Float, Float]:
+    """Middle of each segment, at multiples of 4 m, and its plane."""
+    number = np.arange(held.start // _STEP, (held.start + held.rows - 1) // _STEP + 1)
+    metre = np.clip(np.stack([number * _STEP, (number + 1) * _STEP], axis=1) - held.start, 0, held.rows)
+    bounds = held.cells[metre * held.columns]
+    centres = (number + 0.5) * _STEP
+    middle = np.repeat(centres, np.diff(bounds, axis=1)[:, 0])
+    local = np.column_stack([held.along - middle, held.across, held.z])
+    starts = (np.int64(seed) << 32) + number.astype(np.int64) + 1_000_000
+    found = planes(local, bounds, settings.distance, settings.angle, settings.radius, starts)
+    return np.asarray(centres, dtype=np.float64), found.coefficients
+
+
+def _levels(held: _Points, centres: Float, coefficients: Float, settings: GroundSettings) -> Float:
+    """Levels of the ground about each segment's plane, column by column."""
+    found = profiles(
+        held.along, held.across, held.z, held.cells, held.start, held.first, held.columns,
+        centres, coefficients, float(_STEP), settings.distance,
+    )  # fmt: skip
+    slope = math.tan(math.radians(settings.angle))
+    columns = (held.first + np.arange(held.columns)) * COLUMN
+    # A floor that ends for a few metres only is not a tunnel without floor: two of three segments say it.
+    bare = np.array([is_round(plane[2] * columns + level, slope) for plane, level in zip(coefficients, found, strict=True)])
+    bare = ndimage.median_filter(bare.astype(np.uint8), 3, mode="nearest") > 0
+    for k, level in enumerate(found):
+        found[k] = np.nan if bare[k] else level_ground(level, slope)
+    return found
+
+
+def _refine(held: _Points, height: Float, settings: GroundSettings) -> tuple[Float, Float]:
+    """Heights that follow the points, and γ."""
+    gamma = np.full(len(height), min(settings.gamma, settings.distance))
+    for _ in range(_PASSES):
+        # What stands on the ground spoils both less and less.
+        height, number, square = refined(
+            held.along, held.across, held.z, held.spread, held.cells, held.start, held.first, height, gamma
+        )
+        height = carried_on(height, _TOUCHED)
+        spread = np.sqrt(square / np.maximum(number, 1.0))
+        gamma = np.where(number > 0, np.clip(_SPREADS * spread, _LEAST_GAMMA, settings.gamma), settings.gamma)
+    return height, gamma
+
+
+def _to_walls(height: Float, columns: Float, foot: Float, gamma: Float) -> Float:
+    """Carry the heights on to the walls, or end them there."""
+    out = height.copy()
+    for i, row in enumerate(out):
+        known = np.flatnonzero(np.isfinite(row))
+        if not len(known):
+            continue
+        low, high = known[0], known[-1]
+        beyond = gamma[i] + COLUMN
+        if np.isfinite(foot[i, 0]):
+            row[:low] = np.where(columns[:low] > foot[i, 0] - beyond, row[low], np.nan)
+            row[columns < foot[i, 0] - beyond] = np.nan
+        if np.isfinite(foot[i, 1]):
+            row[high + 1 :] = np.where(columns[high + 1 :] < foot[i, 1] + beyond, row[high], np.nan)
+            row[columns > foot[i, 1] + beyond] = np.nan
+    return out

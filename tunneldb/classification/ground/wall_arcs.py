@@ -1,0 +1,56 @@
+"""Where the ground begins in the unrolled plane: the feet of the walls, unrolled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.geometry.surface import Surface
+from tunneldb.geometry.plan_line import Line
+from tunneldb.classification.ground.model import COLUMN, Ground
+
+Float = NDArray[np.float64]
+
+
+def foot_arcs(ground: Ground | None, line: Line, surface: Surface) -> Float:
+    """Arcs at which the ground begins on the left and on the right, at each of its whole metres of chainage.
+
+    The feet are lines in space; both their coordinates change when they are unrolled, so that the arcs at whole metres are
+    laid between them. Where a wall is missing for a stretch, as at a niche, it is thought on from its neighbours; if it is
+    missing everywhere, the ground begins where it is last seen.
+
+    Returns
+    -------
+    (rows, 2) float array
+        m; NaN where there is no ground, or no surface.
+    """
+    if ground is None:
+        return np.empty((0, 2))
+    metres = ground.start + np.arange(len(ground.height), dtype=np.float64)
+    arcs = np.full((len(metres), 2), np.nan)
+    seen = np.isfinite(ground.height)
+    there = seen.any(axis=1)
+    if not there.any():
+        return arcs
+    last = np.column_stack([seen.argmax(axis=1), seen.shape[1] - 1 - seen[:, ::-1].argmax(axis=1)])
+    for side in range(2):
+        across = ground.foot[:, side]
+        if not np.isfinite(across[there]).any():
+            across = (ground.first + last[:, side]) * COLUMN
+        rows = np.flatnonzero(there & np.isfinite(across))
+        # the ground reaches to the foot or a cell less far
+        column = np.clip(np.rint(across[rows] / COLUMN).astype(np.intp) - ground.first, last[rows, 0], last[rows, 1])
+        height = _nearest_height(ground.height[rows], column)
+        unrolled = surface.unroll(np.column_stack([line.point(metres[rows], across[rows]), height]))
+        known = np.isfinite(unrolled.arc)
+        if known.any():
+            order = np.argsort(unrolled.chainage[known])
+            arcs[there, side] = np.interp(metres[there], unrolled.chainage[known][order], unrolled.arc[known][order])
+    return arcs
+
+
+def _nearest_height(height: Float, column: NDArray[np.intp]) -> Float:
+    """Height in each row at the column, or at the nearest one that has any."""
+    away = np.abs(np.arange(height.shape[1])[None, :] - column[:, None]).astype(np.float64)
+    away[np.isnan(height)] = np.inf
+    return np.asarray(height[np.arange(len(height)), away.argmin(axis=1)])

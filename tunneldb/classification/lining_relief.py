@@ -1,0 +1,389 @@
+"""The lining's relief: where it really lies off the surface of the sections, cell by cell of the unrolled plane.
+
+Sections stand metres apart and are smooth; between them a lining, of rock above all, departs from the surface. A plane
+is fitted to the points about each cell (Xu et al., 2018, eq. 21), so robustly that what hangs on the lining and what is
+let into it don't draw it to themselves. Where it has no ground to stand on, in the mouth of a niche or behind something
+large, it is laid across from the cells about it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from tunneldb.geometry.surface import Surface
+from tunneldb.classification.ground.wall_arcs import foot_arcs
+from tunneldb.geometry.plan_line import Line
+from tunneldb.classification.ground.model import Ground
+from tunneldb.raster.appendages import DELTA
+
+Float = NDArray[np.float64]
+Single = NDArray[np.float32]
+Int = NDArray[np.int64]
+
+CELL = 0.25
+"""Edge of a cell, m."""
+
+REACH = 0.5
+"""Points farther off the surface than this are not looked at, m."""
+
+SIGMAS = 3.0
+"""So many standard deviations of the lining about its plane belong to it."""
+
+APART = 0.06
+"""Cells that depart from those about them by more are not lining, m, unless the lining's own relief is as rough."""
+
+_PART = 2  # cells to each side whose points the plane is fitted to
+_MIN_POINTS = 6
+_BIN, _BINS, _SMOOTH = 0.02, 25, 2  # of the histogram that finds the level: 2 cm to ±0.5 m, over five bins
+_FINE, _FINES = 0.002, 128  # of the histogram that finds the spread
+_TUKEY = 4.685  # Tukey's weights end at so many standard deviations
+_FIRST, _FITS = 0.12, 5  # width of the first fit's weights, m
+_REST = 2e-4  # the fit rests when a cell moves by less, m
+_ALONG, _ROUND = 12, 4  # cells to each side that a cell's offset is compared with: 6 m by 2 m
+
+
+@dataclass(frozen=True)
+class Relief:
+    """Offset of the lining from the section surface and its spread, on a grid of the unrolled plane.
+
+    Attributes
+    ----------
+    cell : float
+        Edge of a cell, m.
+    column, row : int
+        The first cell stands at chainage ``column * cell`` and arc ``row * cell``.
+    offset : (rows, columns) float32 array
+        Offset of the lining at the cells' middles, m, positive into the tunnel; NaN where there is no lining.
+    spread : (rows, columns) float32 array
+        Standard deviation of the lining's points about it, m; NaN at the same places.
+    """
+
+    cell: float
+    column: int
+    row: int
+    offset: Single
+    spread: Single
+
+    @classmethod
+    def of(cls, chainage: Float, arc: Float, offset: Float, wall: Wall | None = None, prior: Prior | None = None) -> Relief:
+        """Find the relief of a lining from points of survey density.
+
+        Parameters
+        ----------
+        chainage, arc, offset : (n,) float arrays
+            Points that are not ground, in the unrolled plane, m; those with NaN are left out.
+        wall : Wall, optional
+            Where the lining ends above the ground; without it all of the surface is lining.
+        prior : Prior, optional
+            Where the surface is known to have left the lining.
+
+        Returns
+        -------
+        Relief
+            Of no cells where there are no points near the surface.
+        """
+        with np.errstate(invalid="ignore"):
+            kept = np.isfinite(chainage) & (np.abs(offset) <= 2.0 * REACH)
+        chainage, arc, offset = chainage[kept], arc[kept], offset[kept]
+        if len(chainage) == 0:
+            return cls.none()
+        i, j = np.floor(arc / CELL).astype(np.int64), np.floor(chainage / CELL).astype(np.int64)
+        row, column = int(i.min()), int(j.min())
+        shape = int(i.max()) - row + 1, int(j.max()) - column + 1
+        columns = np.asarray((np.arange(shape[1]) + column + 0.5) * CELL, np.float64)
+        rows = np.asarray((np.arange(shape[0]) + row + 0.5) * CELL, np.float64)
+        expected = np.zeros(shape) if prior is None else prior.at(columns, rows)
+        place = (i - row) * shape[1] + j - column
+        order = np.argsort(place, kind="stable")
+        starts = np.searchsorted(place[order], np.arange(shape[0] * shape[1] + 1))
+        found, spread = _fit(chainage[order] / CELL - column, arc[order] / CELL - row, offset[order], starts, expected, *shape)
+        found[_apart(found, expected)] = np.nan
+        spread[np.isnan(found)] = np.nan
+        inside = np.ones(shape, np.bool_) if wall is None else wall.holds(columns, rows)
+        return cls(CELL, column, row, *_whole(found, _calm(spread), expected, inside))
+
+    @classmethod
+    def none(cls) -> Relief:
+        """Make the relief of a scene without lining."""
+        return cls(CELL, 0, 0, np.empty((0, 0), np.float32), np.empty((0, 0), np.float32))
+
+    def level(self, chainage: Float, arc: Float) -> tuple[Float, Float]:
+        """Offset of the lining at places (n,) of the unrolled plane and its tolerance, m; NaN where there is none.
+
+        The tolerance is Xu's δ (3 cm), or three standard deviations of the lining there when that is more.
+        """
+        level = _levels(chainage, arc, self.cell, self.column, self.row, self.offset, self.spread)
+        return level[0], level[1]
+
+
+@dataclass(frozen=True)
+class Wall:
+    """Where the lining ends above the ground, on both sides.
+
+    Attributes
+    ----------
+    chainage : (k,) float array
+        Places along the tunnel, m, growing, one at least.
+    left, right : (k,) float arrays
+        Arc of the left and the right wall's foot, m.
+    """
+
+    chainage: Float
+    left: Float
+    right: Float
+
+    @classmethod
+    def of(cls, ground: Ground | None, line: Line, surface: Surface) -> Wall | None:
+        """Find it by the feet of the walls; None without ground."""
+        if ground is None:
+            return None
+        arcs = foot_arcs(ground, line, surface)
+        metres = ground.start + np.arange(len(arcs), dtype=np.float64)
+        known = np.isfinite(arcs).all(axis=1)
+        return cls(metres[known], arcs[known, 0], arcs[known, 1]) if known.any() else None
+
+    def holds(self, chainage: Float, arc: Float) -> NDArray[np.bool_]:
+        """Tell which places lie above the ground; (rows,) arcs by (columns,) chainages."""
+        left, right = np.interp(chainage, self.chainage, self.left), np.interp(chainage, self.chainage, self.right)
+        # Half a cell farther, so that the last of the wall lies in a cell, too.
+        return np.asarray((arc[:, None] > left - CELL / 2) & (arc[:, None] < right + CELL / 2))
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Where the surface left the lining, because a section was measured in a niche or on something hung on the wall.
+
+    Attributes
+    ----------
+    surface : Surface
+        The tunnel.
+    apart : (k, 361) float array
+        Offset of the lining from each section at each whole degree, m; 0 where the section is on it.
+    """
+
+    surface: Surface
+    apart: Float
+
+    @classmethod
+    def of(cls, surface: Surface) -> Prior:
+        """Take the sections that stand apart from those beside them (:meth:`Surface.astray`)."""
+        return cls(surface, surface.astray())
+
+    def at(self, chainage: Float, arc: Float) -> Float:
+        """Offset of the lining where the surface left it; (rows,) arcs by (columns,) chainages, m."""
+        out = np.zeros((len(arc), len(chainage)))
+        at = self.surface.chainages
+        if len(at) < 2 or not self.apart.any():
+            return out
+        after = np.clip(np.searchsorted(at, chainage, side="right"), 1, len(at) - 1)
+        share = np.clip((chainage - at[after - 1]) / (at[after] - at[after - 1]), 0.0, 1.0)
+        for column in np.flatnonzero(self.apart[after].any(axis=1) | self.apart[after - 1].any(axis=1)):
+            a, b, g = after[column] - 1, after[column], share[column]
+            nodes = (1 - g) * self.surface.arcs[a] + g * self.surface.arcs[b]
+            out[:, column] = np.interp(arc, nodes, (1 - g) * self.apart[a] + g * self.apart[b])
+        return out
+
+
+def _apart(found: Float, expected: Float) -> NDArray[np.bool_]:
+    """Cells whose plane lies apart from those about them: the floor of a shallow niche, the front of a large box."""
+    level = _median(found - expected, _ALONG, _ROUND)
+    off = np.abs(found - expected - level)
+    usual = 5.0 * 1.4826 * _median(off, _ALONG, _ROUND)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(off > np.maximum(usual, APART))
+
+
+def _calm(spread: Float) -> Float:
+    """Spread of the lining about each cell: the median of its neighbours', so that no single box or niche makes it wide."""
+    return np.asarray(_median(spread, 4, 4))
+
+
+def _whole(found: Float, spread: Float, expected: Float, inside: NDArray[np.bool_]) -> tuple[Single, Single]:
+    """Lay the relief across cells without one, from those before and after them along the tunnel."""
+    offset, missing = found - expected, np.isnan(found)
+    if missing.all():
+        return np.full(found.shape, np.nan, np.float32), np.full(found.shape, np.nan, np.float32)
+    columns = np.arange(found.shape[1])
+    for row in np.flatnonzero(missing.any(axis=1)):
+        known = columns[~missing[row]]
+        if len(known):
+            offset[row] = np.interp(columns, known, offset[row, known])
+    empty = np.isnan(offset).any(axis=1)
+    if empty.any():  # a whole line of the wall is hidden: it takes the nearest one
+        nearest = ndimage.distance_transform_edt(empty, return_distances=False, return_indices=True)[0]
+        offset = offset[nearest]
+    usual = float(np.nanmedian(spread))
+    spread = np.where(np.isnan(spread), usual, spread)
+    offset = np.where(inside, offset + expected, np.nan)
+    return offset.astype(np.float32), np.where(inside, spread, np.nan).astype(np.float32)
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _median(grid: Float, along: int, across: int) -> Float:  # pragma: no cover - compiled
+    """Median of the cells about each, NaN left out; of some of them, evenly chosen, which is enough."""
+    rows, columns = grid.shape
+    out = np.full(grid.shape, np.nan)
+    step = max(2, along // 3)
+    for j in prange(columns):
+        values = np.empty((2 * along // step + 1) * (across + 1))
+        for i in range(rows):
+            count = 0
+            for m in range(i - across, i + across + 1, 2):
+                for n in range(j - along, j + along + 1, step):
+                    if 0 <= m < rows and 0 <= n < columns and not np.isnan(grid[m, n]):
+                        values[count] = grid[m, n]
+                        count += 1
+            if count > 0:
+                out[i, j] = np.median(values[:count])
+    return out
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _fit(
+    x: Float, y: Float, z: Float, starts: Int, expected: Float, rows: int, columns: int
+) -> tuple[Float, Float]:  # pragma: no cover - compiled
+    """Offset and spread of each cell; x and y in cells, z and the results in m, NaN where there are too few points."""
+    offset, spread = np.full((rows, columns), np.nan), np.full((rows, columns), np.nan)
+    for j in prange(columns):
+        part = np.empty((1024, 3))
+        counts = np.empty(2 * _BINS + 1)
+        fine = np.empty(_FINES, np.int64)
+        for i in range(rows):
+            total = 0
+            for m in range(max(i - _PART, 0), min(i + _PART + 1, rows)):
+                left, right = max(j - _PART, 0), min(j + _PART, columns - 1)
+                total += starts[m * columns + right + 1] - starts[m * columns + left]
+            if total < _MIN_POINTS:
+                continue
+            every = 1 + total // part.shape[0]  # survey density fills a part with 150 points, but voxels may with more
+            count, seen = 0, 0
+            for m in range(max(i - _PART, 0), min(i + _PART + 1, rows)):
+                left, right = max(j - _PART, 0), min(j + _PART, columns - 1)
+                for k in range(starts[m * columns + left], starts[m * columns + right + 1]):
+                    if seen % every == 0:
+                        part[count, 0], part[count, 1] = x[k] - j - 0.5, y[k] - i - 0.5
+                        part[count, 2] = z[k] - expected[i, j]
+                        count += 1
+                    seen += 1
+            level = _level(part[:count], counts)
+            a, sigma = _plane(part[:count], level, fine)
+            offset[i, j], spread[i, j] = a + expected[i, j], sigma
+    return offset, spread
+
+
+@njit(cache=True, nogil=True)
+def _level(part: Float, counts: Float) -> float:  # pragma: no cover - compiled
+    """Offset near which most points lie, those near the surface counting more."""
+    counts[:] = 0.0
+    for k in range(part.shape[0]):
+        b = int(np.floor(part[k, 2] / _BIN + 0.5)) + _BINS
+        if 0 <= b <= 2 * _BINS:
+            counts[b] += 1.0
+    best, level = 0.0, np.nan
+    for b in range(2 * _BINS + 1):
+        score = 0.0
+        for m in range(max(b - _SMOOTH, 0), min(b + _SMOOTH, 2 * _BINS) + 1):
+            score += counts[m]
+        score *= 1.0 - abs(b - _BINS) / (2.0 * _BINS)
+        if score > best:
+            best, level = score, (b - _BINS) * _BIN
+    return level
+
+
+@njit(cache=True, nogil=True)
+def _plane(part: Float, level: float, fine: NDArray[np.int64]) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Height in the middle of the plane through points, fitted from a level on, and their spread about it; NaN: none."""
+    a, b, c, scale, sigma = level, 0.0, 0.0, _FIRST, np.nan
+    for _ in range(_FITS):
+        used, s0, sx, sy, sxx, sxy, syy, sz, sxz, syz = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(part.shape[0]):
+            u = (part[k, 2] - a - b * part[k, 0] - c * part[k, 1]) / scale
+            if abs(u) < 1.0:
+                used += 1
+                w = (1.0 - u * u) ** 2
+                wx, wy = w * part[k, 0], w * part[k, 1]
+                s0 += w
+                sx += wx
+                sy += wy
+                sxx += wx * part[k, 0]
+                sxy += wx * part[k, 1]
+                syy += wy * part[k, 1]
+                sz += w * part[k, 2]
+                sxz += wx * part[k, 2]
+                syz += wy * part[k, 2]
+        if used < _MIN_POINTS:
+            return np.nan, np.nan
+        xx, xy, yy = sxx - sx * sx / s0, sxy - sx * sy / s0, syy - sy * sy / s0
+        xz, yz = sxz - sx * sz / s0, syz - sy * sz / s0
+        determinant = xx * yy - xy * xy
+        before, lean, slant = a, b, c
+        b, c = 0.0, 0.0
+        if determinant > 0.05 * s0 * s0:  # spread in both directions: that of a full part is 4.3
+            b = (xz * yy - yz * xy) / determinant
+            c = (yz * xx - xz * xy) / determinant
+        a = (sz - b * sx - c * sy) / s0
+        rests = max(abs(a - before), abs(b - lean), abs(c - slant)) < _REST
+        sigma = _spread(part, a, b, c, fine)
+        if rests:
+            break
+        scale = min(max(_TUKEY * sigma, DELTA), 2.0 * _FIRST)
+    return a, sigma
+
+
+@njit(cache=True, nogil=True)
+def _spread(part: Float, a: float, b: float, c: float, fine: NDArray[np.int64]) -> float:  # pragma: no cover - compiled
+    """Standard deviation of the points about a plane, from the median of their distances."""
+    fine[:] = 0
+    total = 0
+    for k in range(part.shape[0]):
+        f = int(abs(part[k, 2] - a - b * part[k, 0] - c * part[k, 1]) / _FINE)
+        if f < _FINES:
+            fine[f] += 1
+            total += 1
+    below = 0
+    for f in range(_FINES):
+        if 2 * (below + fine[f]) >= total and fine[f] > 0:
+            return 1.4826 * (f + (0.5 * total - below) / fine[f]) * _FINE
+        below += fine[f]
+    return np.nan
+
+
+@njit(cache=True, nogil=True)
+def level_at(
+    chainage: float, arc: float, cell: float, column: int, row: int, relief: Single, spread: Single
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Offset of the lining at one place, between the cells' middles, and its tolerance; NaN where there is none."""
+    rows, columns = relief.shape
+    y, x = arc / cell - row - 0.5, chainage / cell - column - 0.5
+    if not (-0.5 <= y <= rows - 0.5 and -0.5 <= x <= columns - 0.5):
+        return np.nan, np.nan
+    y, x = min(max(y, 0.0), rows - 1.0), min(max(x, 0.0), columns - 1.0)
+    i, j = int(y), int(x)
+    fy, fx = y - i, x - j
+    total, plane, sigma = 0.0, 0.0, 0.0
+    for m in range(2):
+        for n in range(2):
+            p, q = i + m, j + n
+            if 0 <= p < rows and 0 <= q < columns and not np.isnan(relief[p, q]):
+                weight = (fy if m else 1.0 - fy) * (fx if n else 1.0 - fx)
+                total += weight
+                plane += weight * relief[p, q]
+                sigma += weight * spread[p, q]
+    if total < 0.5:  # past the end of the lining by half a cell
+        return np.nan, np.nan
+    return plane / total, max(DELTA, SIGMAS * sigma / total)
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _levels(
+    chainage: Float, arc: Float, cell: float, column: int, row: int, relief: Single, spread: Single
+) -> Float:  # pragma: no cover - compiled
+    out = np.empty((2, chainage.shape[0]))
+    for i in prange(chainage.shape[0]):
+        out[0, i], out[1, i] = level_at(chainage[i], arc[i], cell, column, row, relief, spread)
+    return out

@@ -1,0 +1,197 @@
+"""Clusters: what stands in the tunnel or hangs on its lining, and the cells that it fills."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+from numba import njit
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Cells = NDArray[np.int32]
+
+CELL = 0.1
+"""Edge of a cell, m."""
+
+PIECE = 10.0
+"""What is longer along the tunnel is kept in pieces of this length, m, at whole multiples of it: they divide a kilometre."""
+
+NEAR = 2
+"""A point belongs to the cell within so many cells: points of survey density leave cells of a surface empty."""
+
+_SQUARE = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Something in the tunnel, or a piece of it.
+
+    Attributes
+    ----------
+    klass : int
+        Class of its points, see :class:`tunneldb.classification.classes.Klass`.
+    cells : (m, 3) int32 array
+        Cells that its points fill: floor(xyz / 0.1 m), each once, sorted.
+    points : int
+        How many points it was found from.
+    along_from, along_to : float
+        First and last place along the tunnel, m.
+    height_from, height_to : float or None
+        Lowest and highest point above the ground, m; None where there is no ground.
+    hull : (k, 2) float array
+        Convex hull of the cells in plan, x and y of its corners counter-clockwise, not closed, m.
+    """
+
+    klass: int
+    cells: Cells
+    points: int
+    along_from: float
+    along_to: float
+    height_from: float | None
+    height_to: float | None
+    hull: Float = field(repr=False)
+
+    @classmethod
+    def of(cls, klass: int, xyz: Float, along: Float, height: Float) -> Cluster:
+        """Make one of its points (n, 3), n ≥ 1, their places along the tunnel and heights above the ground (n,; NaN: none)."""
+        cells = _distinct(np.floor(xyz / CELL).astype(np.int32))
+        known = height[np.isfinite(height)]
+        low, high = (float(known.min()), float(known.max())) if len(known) else (None, None)
+        return cls(int(klass), cells, len(xyz), float(along.min()), float(along.max()), low, high, _hull(cells))
+
+
+def pieces(klass: int, xyz: Float, along: Float, height: Float) -> list[Cluster]:
+    """Make a cluster, or the pieces of one that is longer than ``PIECE``; arguments as for :meth:`Cluster.of`."""
+    if along.max() - along.min() <= PIECE:
+        return [Cluster.of(klass, xyz, along, height)]
+    piece = np.floor(along / PIECE)
+    return [Cluster.of(klass, xyz[m], along[m], height[m]) for m in (piece == p for p in np.unique(piece))]
+
+
+def _distinct(cells: Cells) -> Cells:
+    """Cells (n, 3) once each, sorted: as whole numbers, for rows of an array are compared slowly."""
+    low = cells.min(axis=0)
+    width = (cells.max(axis=0) - low).astype(np.int64) + 1
+    number = (cells[:, 0] - low[0]).astype(np.int64)
+    for axis in range(1, cells.shape[1]):
+        number = number * width[axis] + (cells[:, axis] - low[axis])
+    number = np.sort(number)
+    number = number[np.diff(number, prepend=-1) > 0]
+    columns = []
+    for axis in range(cells.shape[1] - 1, -1, -1):
+        number, rest = np.divmod(number, width[axis])
+        columns.append(rest + low[axis])
+    return np.column_stack(columns[::-1]).astype(np.int32)
+
+
+def _hull(cells: Cells) -> Float:
+    """Convex hull in plan of cells, each a square, so that it always has an area."""
+    flat = cells[np.r_[True, (np.diff(cells[:, :2], axis=0) != 0).any(axis=1)], :2]  # sorted by x and y
+    # From a corner on: millions of metres would cost the hull its digits.
+    corners = (flat - flat[0] + _SQUARE[:, None]).reshape(-1, 2)
+    ring = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(corners)))[:-1]
+    x, y = ring.T
+    if np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) < 0.0:
+        ring = ring[::-1]
+    return np.asarray((ring + flat[0]) * CELL)
+
+
+@dataclass(frozen=True)
+class Lookup:
+    """Cells of clusters in a hash table, so that a point finds the class of the cluster that it lies in.
+
+    Attributes
+    ----------
+    first, last : (3,) int arrays
+        The box that holds all cells.
+    keys : (slots,) int array
+        Number of the cell in the box, -1 for an empty slot; slots are a power of two.
+    klass : (slots,) uint8 array
+        Its class.
+    """
+
+    first: Int
+    last: Int
+    keys: Int
+    klass: NDArray[np.uint8]
+
+    @classmethod
+    def of(cls, clusters: list[Cluster]) -> Lookup:
+        """Fill the table with the cells of clusters and those within ``NEAR`` of them, each with the nearest's class.
+
+        Of two classes equally near the lower one is taken, so the order of the clusters does not matter.
+        """
+        ordered = sorted(clusters, key=lambda cluster: cluster.klass)
+        cells = np.concatenate([np.empty((0, 3), np.int64), *(cluster.cells.astype(np.int64) for cluster in ordered)])
+        klass = np.repeat(
+            np.array([cluster.klass for cluster in ordered], np.uint8), [len(cluster.cells) for cluster in ordered]
+        )
+        if len(cells) == 0:
+            return cls(np.zeros(3, np.int64), np.full(3, -1, np.int64), np.full(1, -1, np.int64), np.zeros(1, np.uint8))
+        first, last = cells.min(axis=0) - NEAR, cells.max(axis=0) + NEAR
+        keys, found = _filled(cells, klass, _steps(), first, last - first + 1)
+        return cls(first, last, keys, found)
+
+
+def _steps() -> Int:
+    """Steps to the cells within ``NEAR``, the shortest first."""
+    side = np.arange(-NEAR, NEAR + 1)
+    steps = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
+    length = (steps**2).sum(axis=1)
+    order = np.argsort(length, kind="stable")
+    return np.ascontiguousarray(steps[order][length[order] <= NEAR**2])
+
+
+@njit(cache=True, nogil=True)
+def _slot(keys: Int, key: int) -> int:  # pragma: no cover - compiled
+    """Slot that holds a key, or the empty one where it belongs."""
+    mask = keys.shape[0] - 1
+    mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
+    slot = np.int64(mixed >> np.uint64(32)) & mask
+    while keys[slot] >= 0 and keys[slot] != key:
+        slot = (slot + 1) & mask
+    return slot
+
+
+@njit(cache=True, nogil=True)
+def _filled(
+    cells: Int, klass: NDArray[np.uint8], steps: Int, first: Int, shape: Int
+) -> tuple[Int, NDArray[np.uint8]]:  # pragma: no cover - compiled
+    slots = 1024
+    keys, found, used = np.full(slots, -1, np.int64), np.zeros(slots, np.uint8), 0
+    for s in range(steps.shape[0]):
+        for i in range(cells.shape[0]):
+            x, y, z = cells[i, 0] + steps[s, 0], cells[i, 1] + steps[s, 1], cells[i, 2] + steps[s, 2]
+            key = ((x - first[0]) * shape[1] + y - first[1]) * shape[2] + z - first[2]
+            slot = _slot(keys, key)
+            if keys[slot] >= 0:
+                continue
+            keys[slot], found[slot] = key, klass[i]
+            used += 1
+            if 2 * used > slots:
+                slots *= 2
+                wider, classes = np.full(slots, -1, np.int64), np.zeros(slots, np.uint8)
+                for old in range(keys.shape[0]):
+                    if keys[old] >= 0:
+                        new = _slot(wider, keys[old])
+                        wider[new], classes[new] = keys[old], found[old]
+                keys, found = wider, classes
+    return keys, found
+
+
+@njit(cache=True, nogil=True)
+def look_up(
+    x: float, y: float, z: float, first: Int, last: Int, keys: Int, klass: NDArray[np.uint8]
+) -> int:  # pragma: no cover - compiled
+    """Class of the cluster that a point lies in; 0 for none."""
+    cx, cy, cz = np.floor(x / CELL), np.floor(y / CELL), np.floor(z / CELL)
+    inside = first[0] <= cx <= last[0] and first[1] <= cy <= last[1] and first[2] <= cz <= last[2]
+    if not inside:
+        return 0
+    wide, tall = last[1] - first[1] + 1, last[2] - first[2] + 1
+    key = ((np.int64(cx) - first[0]) * wide + np.int64(cy) - first[1]) * tall + np.int64(cz) - first[2]
+    slot = _slot(keys, key)
+    return int(klass[slot]) if keys[slot] >= 0 else 0

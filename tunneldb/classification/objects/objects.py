@@ -1,0 +1,235 @@
+"""What is neither ground nor lining: rails, niches, and clusters that stand in the tunnel or hang on its lining."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from tunneldb.classification.classes import Klass
+from tunneldb.classification.objects.clusters import Cluster, pieces
+from tunneldb.classification.objects.dbscan import dbscan
+from tunneldb.classification.ground.model import Ground
+from tunneldb.classification.objects.spacing import Spacing
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+RAIL_TOP = 0.35
+"""Bars along the ground are no higher than this above it, m: a rail of 0.17 m on a sleeper, with a guard rail's play."""
+
+RAIL_WIDTH = 0.35
+"""And no wider, m, seen in columns of 0.1 m."""
+
+RAIL_LENGTH = 5.0
+"""And no shorter, m."""
+
+FLAT = 0.35
+"""What hangs on the wall lies within this of it, m; what reaches farther out and stands on the ground is an object."""
+
+RECESS = 0.3
+"""A recess behind the lining is no smaller than this, m, in two directions: less is the lining's own roughness."""
+
+_COLUMN = 0.1
+_FILLED = 0.7  # share of the metres of a bar that hold points of it
+
+
+@dataclass(frozen=True)
+class ClusterSettings:
+    """How clusters are found.
+
+    Attributes
+    ----------
+    radius : float
+        R of eq. 2, in spacings of the points.
+    min_points : int
+        P_min of eq. 2.
+    region : float
+        t of eq. 1: the region of interest reaches up to this share of the tunnel's height.
+    """
+
+    radius: float = 3.0
+    min_points: int = 4
+    region: float = 0.4
+
+    @classmethod
+    def of(cls, values: Mapping[str, float]) -> ClusterSettings:
+        """Settings of the parameters ``cluster.*``."""
+        return cls(values["cluster.radius"], int(values["cluster.min_points"]), values["cluster.region"])
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Points that are neither ground nor lining.
+
+    Attributes
+    ----------
+    xyz : (n, 3) float array
+        m.
+    along, across : (n,) float arrays
+        In the frame of the line, m.
+    height : (n,) float array
+        Above the ground, m; above the lowest point of the tunnel there where there is no ground.
+    depth : (n,) float array
+        Distance from the lining's plane, m, positive into the tunnel; NaN where there is no lining.
+    top : (n,) float array
+        Height of the region of interest there (H of eq. 1), m.
+    """
+
+    xyz: Float
+    along: Float
+    across: Float
+    height: Float
+    depth: Float
+    top: Float
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    def __getitem__(self, chosen: Bool | Int) -> Rest:
+        parts = (self.xyz, self.along, self.across, self.height, self.depth, self.top)
+        return Rest(*(part[chosen] for part in parts))
+
+    def clusters(self, klass: int, known: bool) -> list[Cluster]:
+        """One cluster, or pieces of it, of all these points; ``known``: the heights are those above a ground."""
+        return pieces(klass, self.xyz, self.along, self.height if known else np.full(len(self), np.nan))
+
+
+def find_clusters(rest: Rest, spacing: Spacing, settings: ClusterSettings, ground: Ground | None) -> list[Cluster]:
+    """Clusters of the points that are neither ground nor lining, each with its class; noise is left out.
+
+    Behind the lining's plane a cluster wide enough is a niche. Before it bars along the ground are taken out first, for
+    whatever stands on rails is no rail. DBSCAN (eq. 2–4) does the rest: what does not touch the ground and either touches
+    the wall or lies above the region of interest (eq. 1) is an appendage, what stands on the ground or is free in the
+    region is an object. What touches both the ground and the wall is an appendage if it is flat; else it is parted into
+    what is on the wall and what is off it.
+    """
+    with np.errstate(invalid="ignore"):
+        behind = rest.depth < 0.0
+    found = [
+        cluster
+        for recess in _groups(rest[behind], spacing, settings)
+        if _is_wide(recess)
+        for cluster in recess.clusters(Klass.NICHE, ground is not None)
+    ]
+    return found + sort_clusters(rest[~behind], spacing, settings, ground)
+
+
+def sort_clusters(rest: Rest, spacing: Spacing, settings: ClusterSettings, ground: Ground | None) -> list[Cluster]:
+    """Clusters of points that are neither ground nor behind the lining: rails, objects and appendages."""
+    known = ground is not None
+    found: list[Cluster] = []
+    rails = bars(rest.along, rest.across, rest.height) if known else np.zeros(len(rest), np.bool_)
+    if rails.any():
+        found += rest[rails].clusters(Klass.RAIL, known)
+    radius = settings.radius * spacing.across
+    for group in _groups(rest[~rails], spacing, settings):
+        found += _sorted(group, radius, spacing, settings, known)
+    return found
+
+
+def bars(along: Float, across: Float, height: Float) -> Bool:
+    """Tell which points belong to rails and other long, thin, low bars along the ground.
+
+    Columns of 0.1 m are looked at, metre by metre: a bar fills a column, or its neighbours, for most of 5 m, and it is thin.
+
+    Parameters
+    ----------
+    along, across : (n,) float arrays
+        In the frame of the line, m.
+    height : (n,) float array
+        Above the ground, m.
+    """
+    with np.errstate(invalid="ignore"):
+        low = (height > 0.0) & (height <= RAIL_TOP)
+    out = np.zeros(len(along), np.bool_)
+    if not low.any():
+        return out
+    i, j = np.floor(along).astype(np.int64), np.floor(across / _COLUMN).astype(np.int64)
+    row, column = int(i[low].min()), int(j[low].min())
+    shape = int(i[low].max()) - row + 1, int(j[low].max()) - column + 1
+    if shape[0] < RAIL_LENGTH:
+        return out
+    filled = np.zeros(shape, np.bool_)
+    filled[i[low] - row, j[low] - column] = True
+    metres = round(RAIL_LENGTH)
+    wide = ndimage.maximum_filter1d(filled, 3, axis=1)
+    share = ndimage.uniform_filter1d(wide.astype(np.float64), metres, axis=0, mode="constant")
+    reach = ndimage.uniform_filter1d(np.ones(shape), metres, axis=0, mode="constant")
+    # A bar shows in its column and in those beside it; the run of such columns is three wider than it at the most.
+    steady = share / reach >= _FILLED
+    runs = ndimage.label(steady, structure=[[0, 0, 0], [1, 1, 1], [0, 0, 0]])[0]
+    widths = np.bincount(runs.ravel())
+    widths[0] = 0
+    thin = (runs > 0) & (widths[runs] <= round(RAIL_WIDTH / _COLUMN) + 2)
+    bar = _long(thin, metres)[i[low] - row, j[low] - column]
+    # What stands on a bar or beside it is higher than the bar is elsewhere.
+    top = ndimage.labeled_comprehension(height[low], bar, np.arange(bar.max() + 1), _highest, np.float64, 0.0)
+    top[0] = 0.0
+    out[low] = height[low] <= top[bar]
+    return out
+
+
+def _highest(height: Float) -> float:
+    """Height of most points of a bar, and a little more."""
+    return float(np.quantile(height, 0.9)) + 0.02
+
+
+def _long(thin: Bool, metres: int) -> Int:
+    """Number of each bar that is long enough, 0 for none; it may shift by a column from one metre to the next."""
+    labels, count = ndimage.label(thin, structure=np.ones((3, 3)))
+    lengths = np.array([0, *(rows.stop - rows.start for rows, _ in ndimage.find_objects(labels, count))])
+    return np.where(lengths[labels] >= metres, labels, 0).astype(np.int64)
+
+
+def _groups(rest: Rest, spacing: Spacing, settings: ClusterSettings) -> list[Rest]:
+    """Clusters by DBSCAN, distances along shrunk to the spacing across."""
+    if len(rest) == 0:
+        return []
+    places = np.column_stack([rest.along * spacing.shrink, rest.across, rest.xyz[:, 2]])
+    labels = dbscan(places, settings.radius * spacing.across, settings.min_points)
+    order = np.argsort(labels, kind="stable")
+    bounds = np.searchsorted(labels[order], np.arange(labels.max() + 2))
+    return [rest[order[first:last]] for first, last in itertools.pairwise(bounds)]
+
+
+def _is_wide(group: Rest) -> bool:
+    """Tell whether a cluster is larger than ``RECESS`` in two directions."""
+    extent = np.ptp(np.column_stack([group.along, group.across, group.xyz[:, 2]]), axis=0)
+    return int((extent >= RECESS).sum()) >= 2
+
+
+def _sorted(group: Rest, radius: float, spacing: Spacing, settings: ClusterSettings, known: bool) -> list[Cluster]:
+    """Classed clusters of one group of points before the lining."""
+    depth = np.where(np.isnan(group.depth), np.inf, group.depth)
+    on_wall = float(depth.min()) <= radius
+    if not _stands(group, radius):
+        free = not on_wall and bool((group.height < group.top).any())
+        return group.clusters(Klass.OBJECT if free else Klass.APPENDAGE, known)
+    if not on_wall:
+        return group.clusters(Klass.OBJECT, known)
+    if (depth <= FLAT).mean() >= 0.95:
+        return group.clusters(Klass.APPENDAGE, known)
+    off = depth > radius
+    parted = group[off]
+    found: list[Cluster] = []
+    rest = np.ones(len(parted), np.bool_)
+    places = np.column_stack([parted.along * spacing.shrink, parted.across, parted.xyz[:, 2]])
+    labels = dbscan(places, radius, settings.min_points)
+    for label in range(int(labels.max(initial=-1)) + 1):
+        part = parted[labels == label]
+        rest[labels == label] = False
+        found += part.clusters(Klass.OBJECT if _stands(part, radius) else Klass.APPENDAGE, known)
+    hanging = np.concatenate([np.flatnonzero(~off), np.flatnonzero(off)[rest]])
+    return found + group[hanging].clusters(Klass.APPENDAGE, known)
+
+
+def _stands(group: Rest, radius: float) -> bool:
+    """Tell whether a cluster reaches down to the ground."""
+    with np.errstate(invalid="ignore"):
+        return bool((group.height <= radius).any())

@@ -1,0 +1,211 @@
+"""A scene without an axis: lining, told by clusters and their normals, and a surface of sections laid through it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from tunneldb.geometry.frame import frame_of, locate, nearest_segment, segment_rows, tangents
+from tunneldb.geometry.surface import Surface
+from tunneldb.geometry.unrolling import CROWN, NODES
+from tunneldb.classification.objects.dbscan import dbscan
+from tunneldb.geometry.plan_line import Line
+from tunneldb.classification.objects.spacing import Spacing
+from tunneldb.classification.objects.objects import ClusterSettings, Rest
+from tunneldb.raster.appendages import DELTA
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+COHERENT = 0.8
+"""Cosine of the angle between neighbouring normals that the clusters of a lining reach on the average."""
+
+TALL = 0.5
+"""And the share of the height of the region of interest."""
+
+LARGE = 0.02
+"""And the share of its points."""
+
+CLOSED = 0.6
+"""Share of the directions above the ground that a tunnel's lining closes, seen from its middle."""
+
+VERTICES, SECTIONS = 10.0, 2.5
+"""Distance of the vertices of the axis and of the sections, m."""
+
+_DEGREES = 2  # width of an angular class of a section
+_CLASSES = 360 // _DEGREES
+_NOTCH = 5  # classes: 10 degrees, of which what hangs on the wall takes less
+_LEAST = 3  # points that fill a class
+_NEIGHBOURS = 16  # of a normal
+
+
+def lining(rest: Rest, spacing: Spacing, settings: ClusterSettings) -> Bool:
+    """Tell which points are lining: clusters of the region by their size and normals, and all above it."""
+    kept = rest.height >= rest.top
+    region = np.flatnonzero(~kept)
+    places = np.column_stack([rest.along * spacing.shrink, rest.across, rest.xyz[:, 2]])[region]
+    if len(region) < settings.min_points:
+        return kept
+    radius = settings.radius * spacing.across
+    labels = dbscan(places, radius, settings.min_points)
+    count = int(labels.max()) + 1
+    if count == 0:
+        return kept
+    order = np.argsort(labels, kind="stable")
+    bounds = np.searchsorted(labels[order], np.arange(count + 1))
+    good = np.zeros(count, np.bool_)
+    for k in range(count):
+        group = order[bounds[k] : bounds[k + 1]]
+        size = len(group) >= LARGE * len(region)
+        share = rest.height[region[group]] / np.maximum(rest.top[region[group]], 1e-9)
+        if size and np.ptp(share) >= TALL:
+            good[k] = coherence(places[group]) >= COHERENT
+    kept[region] = (labels >= 0) & good[labels]
+    return kept
+
+
+def coherence(points: Float) -> float:
+    """Mean cosine of the angle between the normals of neighbouring points (n, 3): 1 on a plane, 0.5 where they are random."""
+    points = points[:: 1 + len(points) // 20_000] if len(points) > 40_000 else points
+    near = min(_NEIGHBOURS, len(points))
+    if near < 4:
+        return 0.0
+    _, index = cKDTree(points).query(points, k=near)
+    return float(_coherence(points, index.astype(np.int64)))
+
+
+@njit(cache=True, nogil=True)
+def _coherence(points: Float, index: Int) -> float:  # pragma: no cover - compiled
+    count, near = index.shape
+    normals = np.empty((count, 3))
+    for i in range(count):
+        centre = np.zeros(3)
+        for k in index[i]:
+            centre += points[k] / near
+        scatter = np.zeros((3, 3))
+        for k in index[i]:
+            d = points[k] - centre
+            for a in range(3):
+                for b in range(3):
+                    scatter[a, b] += d[a] * d[b]
+        normals[i] = np.linalg.eigh(scatter)[1][:, 0]
+    total = 0.0
+    for i in range(count):
+        for k in index[i, 1:]:
+            total += abs(normals[i, 0] * normals[k, 0] + normals[i, 1] * normals[k, 1] + normals[i, 2] * normals[k, 2])
+    return total / (count * (near - 1))
+
+
+def surface_through(line: Line, along: Float, across: Float, z: Float, wall: Bool) -> Surface | None:
+    """Sections through points in the frame of a line; None where walls and roof (``wall``) don't close around the middle."""
+    if wall.sum() < _LEAST:
+        return None
+    first, last = float(along[wall].min()) - 0.5, float(along[wall].max()) + 0.5
+    segments = max(1, round((last - first) / VERTICES))
+    at = np.linspace(first, last, segments + 1)
+    middle = _middles(at, along, across, z, wall)
+    vertices = np.column_stack([line.point(at, middle[:, 0]), middle[:, 1]])
+    rows = segment_rows(vertices, tangents(vertices))
+    ends = np.column_stack([at[:-1], at[1:]])
+    count = max(1, round((last - first) / SECTIONS))
+    sections = first + (np.arange(count) + 0.5) * (last - first) / count
+    places = _placed(rows, np.arange(segments), ends, np.column_stack([line.point(along, across), z]))
+    held = np.isfinite(places[:, 0])
+    (along, u, w), wall = places[held].T, wall[held]
+    angle = np.mod(np.degrees(np.arctan2(u, w)) + 180.0, 360.0)
+    bins = np.minimum((angle / _DEGREES).astype(np.int64), _CLASSES - 1)
+    slab = np.clip(((along - first) * count / (last - first)).astype(np.int64), 0, count - 1)
+    key = slab * _CLASSES + bins
+    radius = _medians(key, np.hypot(u, w), count * _CLASSES).reshape(count, _CLASSES)
+    radius = _without_notches(radius)
+    walls = np.bincount(key[wall], minlength=count * _CLASSES).reshape(count, _CLASSES) >= _LEAST
+    floor = np.isfinite(radius) & ~walls
+    closed = walls.sum(axis=1) / np.maximum(_CLASSES - floor.sum(axis=1), 1)
+    roof = walls[:, _CLASSES // 4 : 3 * _CLASSES // 4].mean(axis=1)
+    if np.median(np.minimum(closed, roof)) < CLOSED:
+        return None
+    nodes = _nodes(radius)
+    arcs = _arcs(nodes)
+    return Surface(np.arange(segments), rows, ends, sections, nodes, arcs, 2.0 * VERTICES)
+
+
+def _middles(at: Float, along: Float, across: Float, z: Float, wall: Bool) -> Float:
+    """Middle between the walls and between floor and roof at each vertex: across and z, m.
+
+    That of each stretch as long as a section's is taken, and a line laid through those about a vertex.
+    """
+    stretch = np.floor((along - at[0]) / SECTIONS).astype(np.int64)
+    order = np.argsort(stretch, kind="stable")
+    found = []
+    for part in np.split(order, np.flatnonzero(np.diff(stretch[order])) + 1):
+        sides = part[wall[part]]
+        if len(sides) >= _LEAST:
+            middle = np.mean(np.quantile(across[sides], (0.02, 0.98)))
+            height = 0.5 * (np.quantile(z[part], 0.02) + np.quantile(z[sides], 0.98))
+            found.append((float(along[part].mean()), float(middle), float(height)))
+    where, *middles = np.array(found or [(at[0], across[wall].mean(), z[wall].mean())]).T
+    out = np.empty((len(at), 2))
+    for k, a in enumerate(at):
+        near = np.abs(where - a) <= max(VERTICES, float(np.abs(where - a).min()) + 2.0 * SECTIONS)
+        for c, values in enumerate(middles):
+            _, level = np.polyfit(where[near] - a, values[near], 1) if near.sum() > 2 else (0.0, values[near].mean())
+            out[k, c] = level
+    return out
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _placed(segments: Float, number: Int, ends: Float, points: Float) -> Float:  # pragma: no cover - compiled
+    """Chainage of points (n, 3) and their place right and up of the axis, (n, 3), m; NaN beyond its ends."""
+    out = np.full((points.shape[0], 3), np.nan)
+    for i in prange(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        k, f = locate(segments, number, nearest_segment(segments, x, y, z), x, y, z)
+        if k >= 0:
+            ox, oy, oz, tx, ty, tz, rx, ry = frame_of(segments, k, f)
+            out[i, 0] = ends[k, 0] + f * (ends[k, 1] - ends[k, 0])
+            out[i, 1] = (x - ox) * rx + (y - oy) * ry
+            out[i, 2] = (x - ox) * ry * tz - (y - oy) * rx * tz + (z - oz) * (rx * ty - ry * tx)
+    return out
+
+
+def _medians(key: Int, value: Float, count: int) -> Float:
+    """Median of the values of each key below a count; NaN for fewer than ``_LEAST``."""
+    order = np.lexsort((value, key))
+    bounds = np.searchsorted(key[order], np.arange(count + 1))
+    size = np.diff(bounds)
+    at = np.minimum(bounds[:-1] + size // 2, max(len(value) - 1, 0))
+    return np.where(size >= _LEAST, value[order][at], np.nan)
+
+
+def _without_notches(radius: Float) -> Float:
+    """Sections freed of what stands in from both its sides by more than δ: a cable or a box on the wall, not the wall."""
+    filled = np.where(np.isnan(radius), 0.0, radius)
+    closed = ndimage.grey_closing(filled, size=(1, _NOTCH), mode="wrap")
+    return np.where(closed - radius > DELTA, closed, radius)
+
+
+def _nodes(radius: Float) -> Float:
+    """Radius at each whole degree from those of the classes; gaps are bridged, along the tunnel where they are wide."""
+    centres = (np.arange(_CLASSES) + 0.5) * _DEGREES
+    known = np.isfinite(radius).any(axis=0)
+    typical = np.interp(centres, centres[known], np.nanmedian(radius[:, known], axis=0), period=360.0)
+    out = np.empty((len(radius), NODES))
+    for row, classes in zip(out, radius, strict=True):
+        apart = classes - typical
+        full = np.isfinite(apart)
+        if full.any():
+            apart = np.interp(centres, centres[full], apart[full], period=360.0)
+        row[:] = np.interp(np.arange(NODES), centres, typical + np.where(np.isfinite(apart), apart, 0.0), period=360.0)
+    return out
+
+
+def _arcs(radius: Float) -> Float:
+    """Length along each section from the crown at each whole degree, m."""
+    angle = np.radians(np.arange(NODES) - 180.0)
+    u, w = radius * np.sin(angle), radius * np.cos(angle)
+    length = np.concatenate([np.zeros((len(radius), 1)), np.cumsum(np.hypot(np.diff(u), np.diff(w)), axis=1)], axis=1)
+    return np.asarray(length - length[:, CROWN : CROWN + 1])

@@ -1,0 +1,51 @@
+"""Sessions of workers: they end soon when the other side is cut off, and leave the other cores to other workers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, LiteralString
+
+import psycopg
+
+from tunneldb.database.connection import resolve_dsn
+from tunneldb.database.schema import require_current_schema
+from tunneldb.threads import threads
+
+APPLICATION = "tunneldb worker"
+CONNECT: dict[str, Any] = {
+    "application_name": APPLICATION,
+    "client_encoding": "UTF8",
+    "connect_timeout": 15,
+    "keepalives_idle": 10,
+    "keepalives_interval": 5,
+    "keepalives_count": 3,
+    "tcp_user_timeout": 25_000,
+}
+"""For libpq: a server that is cut off is noticed within 25 s."""
+
+SETTINGS: LiteralString = """
+    SELECT set_config('tcp_keepalives_idle', '10', false), set_config('tcp_keepalives_interval', '5', false),
+           set_config('tcp_keepalives_count', '3', false), set_config('tcp_user_timeout', '25s', false),
+           set_config('client_connection_check_interval', '10s', false)
+"""
+"""The same for the server: a session whose worker is cut off ends, and its locks are free."""
+
+
+@contextmanager
+def worker_session(dsn: str | None) -> Iterator[psycopg.Connection[Any]]:
+    """Connect for one job; None means the embedded server, which is started if need be.
+
+    Raises
+    ------
+    psycopg.OperationalError
+        If the server can't be reached.
+    UserError
+        If its schema is not this program's.
+    """
+    with psycopg.connect(resolve_dsn(dsn), **CONNECT) as conn:
+        require_current_schema(conn)
+        conn.execute(SETTINGS)
+        conn.execute("SELECT set_config('max_parallel_workers_per_gather', %s, false)", [str(threads() - 1)])
+        conn.commit()
+        yield conn

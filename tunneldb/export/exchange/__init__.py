@@ -1,0 +1,62 @@
+"""A survey for programs that don't reach the database: GeoPackage and DXF."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import psycopg
+
+from tunneldb.database import Survey
+from tunneldb.errors import UserError
+from tunneldb.store.surface import load_surface
+
+
+def write_survey(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    low: float,
+    high: float,
+    path: Path,
+    begin: Callable[[str, float | None], Callable[[float], None]] = lambda text, total: lambda count: None,
+) -> dict[str, int]:
+    """Write a stretch of a survey as a file of the kind that its ending says, and return how much of each layer.
+
+    Parameters
+    ----------
+    conn, survey
+        What is read.
+    low, high : float
+        Chainage, m; infinite for the whole survey.
+    path : Path
+        File that isn't there yet, ``.gpkg`` or ``.dxf``.
+    begin : callable
+        Called with a text and the number of parts that are written; returns what takes those that are done.
+
+    Raises
+    ------
+    UserError
+        The survey has no sections yet, or no axis between the two chainages.
+    """
+    row = conn.execute("SELECT chainage_from, chainage_to FROM tunnel_api.survey_ends(%s)", [survey.id]).fetchone()
+    if row is not None and row[0] is not None and (row[0] >= high or row[1] <= low):
+        raise UserError(f"survey {survey.name} has nothing there: it lies between chainages {row[0]:.3f} and {row[1]:.3f} m")
+    held = conn.execute(
+        "SELECT bool_or(chainage_to > %s AND chainage_from < %s) FROM tunnel.segment WHERE survey_id = %s",
+        [low, high, survey.id],
+    ).fetchone()
+    if held is not None and held[0] is False:
+        raise UserError(
+            f"survey {survey.name} has no axis between chainages {low:.3f} and {high:.3f} m: they lie in a gap of it"
+        )
+    surface = load_surface(conn, survey, low, high)
+    if path.suffix.lower() == ".gpkg":
+        from tunneldb.export.exchange import gpkg
+
+        return gpkg.write_survey_gpkg(conn, survey, surface, low, high, path, begin(survey.name, gpkg.parts()))
+    from tunneldb.export.exchange import dxf
+
+    if row is not None and row[0] is not None:  # what is drawn ends with the scan, not at the next vertex of the axis
+        low, high = max(low, row[0]), min(high, row[1])
+    return dxf.write_survey_dxf(conn, survey, surface, low, high, path, begin(survey.name, dxf.PARTS))

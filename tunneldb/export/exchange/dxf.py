@@ -1,0 +1,207 @@
+"""A survey as a DXF drawing: the tunnel in its true place, and below it the unrolled lining and a sheet of profiles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+import shapely
+from ezdxf import filemanagement
+from ezdxf.enums import TextEntityAlignment as Align
+from ezdxf.units import M
+from shapely.geometry import Polygon
+
+from tunneldb import __version__
+from tunneldb.database import Survey
+from tunneldb.export.exchange.entity import APPLICATION, Spot, draw_spot, write
+from tunneldb.export.exchange.lines import (
+    axis_line,
+    edges,
+    in_space,
+    is_hundred,
+    on_map,
+    profiles,
+    stretches,
+    tick_chainages,
+    ticks,
+)  # fmt: skip
+from tunneldb.export.exchange.places import crs_text, labels
+from tunneldb.export.exchange.sheet import draw_profiles, draw_unrolled
+from tunneldb.export.exchange.table import Table, read_table
+from tunneldb.geometry.surface import Surface
+
+MARGIN = 50.0
+"""Between the map, the unrolled lining and the profiles, m."""
+
+TEXT = 1.0
+"""Height of text on the map, m: 2 mm at 1:500."""
+
+PARTS = 7
+"""It is made in: map, leaks on it and in space, unrolled lining, profiles, sections in space, the file."""
+
+FEW = 20
+"""Fewer ticks than this all bear their station, not only those of whole hundreds."""
+
+_BLACK, _RED, _GREEN, _CYAN, _BLUE, _MAGENTA, _GREY = 7, 1, 94, 4, 150, 6, 8
+
+LAYERS = {
+    "AXIS": (_RED, "Axis through the middle of the tunnel, 3D"),
+    "AXIS_VERTEX": (_RED, "Vertices of the axis, 3D"),
+    "CHAINAGE": (_BLACK, "Ticks every 10 m, stations every 100 m, on the map"),
+    "LINING_MAP": (_GREY, "Edges of the lining unrolled beside the axis, on the map"),
+    "SECTION_3D": (_CYAN, "Cross-sections in space"),
+    **{
+        f"{kind}_{place}": (colour, f"{text} {where}")
+        for kind, colour, text in (
+            ("LEAK", _BLUE, "Leaks"), ("JOINT", _GREEN, "Joints"), ("DARK", _MAGENTA, "Dark but dry"),
+        )
+        for place, where in (
+            ("MAP", "beside the axis, on the map"), ("3D", "on the lining, in space"), ("UNROLLED", "in the unrolled lining"),
+        )
+    },
+    "LEAK_TEXT": (_BLUE, "Number and area of leaks"),
+    "LEAK_PROFILE": (_BLUE, "Leaks on the profiles"),
+    "UNROLLED": (_GREY, "Unrolled lining: edges and crown"),
+    "UNROLLED_CHAINAGE": (_GREY, "Unrolled lining: lines every 10 m, with stations"),
+    "PROFILE": (_BLACK, "Profiles, looking up-chainage"),
+    "PROFILE_AXIS": (_RED, "Profiles: the axis, level and plumb"),
+    "PROFILE_TEXT": (_BLACK, "Profiles: station, width and height, m"),
+}  # fmt: skip
+"""Colour (ACI) and description of each layer."""
+
+
+def write_survey_dxf(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    surface: Surface,
+    low: float,
+    high: float,
+    path: Path,
+    progress: Callable[[float], None] = lambda count: None,
+) -> dict[str, int]:
+    """Write a stretch of a survey as a DXF drawing (2010, metres), and return the number of entities on each layer.
+
+    The tunnel lies in its SRID, lines in space at their height, what is flat at height 0. Below the map lies the unrolled
+    lining, arc upwards and chainage to the right, and below that the profiles side by side, as seen looking up-chainage.
+    What an inspector rejected isn't drawn.
+
+    Parameters
+    ----------
+    conn, survey
+        What is read.
+    surface : Surface
+        The survey's surface, which holds the stretch.
+    low, high : float
+        Chainage, m.
+    path : Path
+        File that isn't there yet.
+    progress : callable
+        Given 1 after each of the PARTS.
+    """
+    document = _document(conn, survey)
+    space = document.modelspace()
+    parts = stretches(surface, low, high)
+    box = _draw_map(conn, survey, surface, parts, space)
+    progress(1)
+    for place, view in (("MAP", "anomaly_map"), ("3D", "anomaly_3d")):
+        for spot in read_spots(conn, survey, view, low, high):
+            draw_spot(space, spot, place)
+        progress(1)
+    unrolled = read_spots(conn, survey, "anomaly_unrolled", low, high)
+    sides = [side for side in (edges(surface, part) for part in parts) if len(side[0]) > 1]
+    ticked = tick_chainages(surface, low, high)
+    stations = list(zip(ticked.tolist(), labels(conn, survey, ticked), strict=True))
+    strip = draw_unrolled(space, (box[0], box[1] - MARGIN), sides, stations, unrolled)
+    progress(1)
+    found = profiles(surface, low, high)
+    named = list(zip(found, labels(conn, survey, np.array([profile.chainage for profile in found])), strict=True))
+    sheet = draw_profiles(space, (box[0], strip[1] - MARGIN), surface, named, unrolled)
+    progress(1)
+    for profile in found:
+        space.add_polyline3d(in_space(surface, profile), close=True, dxfattribs={"layer": "SECTION_3D"})
+    progress(1)
+    for name, (west, south, east, north) in (("MAP", box), ("UNROLLED", strip), ("PROFILES", sheet)):
+        document.views.new(
+            name,
+            dxfattribs={"center": ((west + east) / 2, (south + north) / 2), "width": east - west, "height": north - south},
+        )
+    whole = min(b[0] for b in (box, strip, sheet)), sheet[1], max(b[2] for b in (box, strip, sheet)), box[3]
+    document.set_modelspace_vport(whole[3] - whole[1], ((whole[0] + whole[2]) / 2, (whole[1] + whole[3]) / 2))
+    document.header["$EXTMIN"], document.header["$EXTMAX"] = (*whole[:2], 0.0), (*whole[2:], 0.0)
+    document.saveas(path)
+    progress(1)
+    counts = dict.fromkeys(LAYERS, 0)
+    for entity in space:
+        counts[entity.dxf.layer] += 1
+    return counts
+
+
+def read_spots(conn: psycopg.Connection[Any], survey: Survey, view: str, low: float, high: float) -> list[Spot]:
+    """Read leaks, joints and dark spots that were found or confirmed and not rejected, in one of their geometries."""
+    table = read_table(conn, survey, view, low, high, "review <> 'rejected' AND (detected OR review = 'confirmed')")
+    shapes = shapely.from_wkb(table.geometry)
+    return [_spot(row, shape) for row, shape in zip(_rows(table), shapes, strict=True)]
+
+
+def _rows(table: Table) -> Iterator[dict[str, Any]]:
+    names = [column.name for column in table.columns]
+    for values in zip(*(column.values for column in table.columns), strict=True):
+        yield dict(zip(names, values, strict=True))
+
+
+def _spot(row: dict[str, Any], shape: Polygon) -> Spot:
+    facts = [
+        f"id={row['id']}", f"kind={row['kind']}", f"station={row['label']}", f"chainage_from={row['chainage_from']:.3f}",
+        f"chainage_to={row['chainage_to']:.3f}", f"area_m2={row['area']:.3f}", f"confidence={row['confidence']:.2f}",
+        f"review={row['review']}", f"reviewed_by={row['reviewed_by'] or ''}",
+    ]  # fmt: skip
+    return Spot(int(row["id"]), row["kind"], row["review"], f"{row['id']}: {row['area']:.2f} m²", facts, shape)
+
+
+def _document(conn: psycopg.Connection[Any], survey: Survey) -> Any:
+    document = filemanagement.new("R2010", units=M)
+    document.header["$MEASUREMENT"] = 1
+    document.header["$LUNITS"], document.header["$LUPREC"] = 2, 3
+    about = {"Survey": survey.name, "Tunnel": survey.tunnel, "Scanned": survey.date.isoformat(), "Unit": "metre"}
+    for name, text in {**about, "CRS": crs_text(conn, survey.srid), "Writer": f"tunneldb {__version__}"}.items():
+        document.header.custom_vars.append(name, " ".join(text.split()))  # a value is a line of the file; WKT may have many
+    document.appids.new(APPLICATION)
+    document.styles.new(APPLICATION, dxfattribs={"font": "arial.ttf"})
+    for name, (colour, text) in LAYERS.items():
+        document.layers.add(name, color=colour).description = text
+    return document
+
+
+def _draw_map(
+    conn: psycopg.Connection[Any], survey: Survey, surface: Surface, parts: list[np.ndarray[Any, Any]], space: Any
+) -> tuple[float, float, float, float]:
+    """Draw axis, vertices, ticks and the edges of the strip, and return west, south, east and north of them, m."""
+    corners = []
+    for part in parts:
+        line = axis_line(surface, part)
+        space.add_polyline3d(line, dxfattribs={"layer": "AXIS"})
+        corners.append(line[:, :2])
+        for edge in edges(surface, part):
+            if len(edge) > 1:
+                beside = on_map(surface, edge)
+                space.add_lwpolyline(beside, format="xy", dxfattribs={"layer": "LINING_MAP"})
+                corners.append(beside)
+    low, high = parts[0][0], parts[-1][-1]
+    vertices = read_table(conn, survey, "axis_vertex", low, high)
+    for point in shapely.get_coordinates(shapely.from_wkb(vertices.geometry), include_z=True):
+        space.add_point(point, dxfattribs={"layer": "AXIS_VERTEX"})
+    chainages = tick_chainages(surface, low, high)
+    for (left, right), long, label in zip(
+        ticks(surface, chainages)[:, :, :2], is_hundred(chainages), labels(conn, survey, chainages), strict=True
+    ):
+        space.add_line(left, right, dxfattribs={"layer": "CHAINAGE"})
+        if long or len(chainages) < FEW:
+            away = right - left
+            turned = away[0] < 0  # text that would stand on its head is written towards the tick instead
+            align = Align.MIDDLE_RIGHT if turned else Align.MIDDLE_LEFT
+            write(space, label.partition(".")[0], right, TEXT, "CHAINAGE", align, -away if turned else away)
+    at = np.concatenate(corners)
+    return (*at.min(axis=0).tolist(), *at.max(axis=0).tolist())

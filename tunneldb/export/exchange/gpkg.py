@@ -1,0 +1,205 @@
+"""A survey as a GeoPackage: the layers of the QGIS project with their styles, chainage ticks and the lining laid flat."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+import pyogrio.raw
+import shapely
+
+from tunneldb import __version__
+from tunneldb.database import Survey
+from tunneldb.export.tables.leaks import UNDEFINED_CARTESIAN
+from tunneldb.export.exchange.lines import edges, is_hundred, on_map, outline, stretches, tick_chainages, ticks
+from tunneldb.export.exchange.places import crs_text, labels
+from tunneldb.export.exchange.table import Column, Table, read_table
+from tunneldb.export.qgis.layer import LAYERS, VectorLayer
+from tunneldb.export.qgis.styles import STYLE_NAME, style_text
+from tunneldb.geometry.surface import Surface
+
+VERSION = {"VERSION": "1.2"}
+"""Of the GeoPackage: one that QGIS and others of some years ago read without a warning."""
+
+_TICK = "Chainage: a tick across the axis every 10 m, longer every 100 m"
+_GRID = "Chainage in the unrolled plane: a line across the lining every 10 m"
+_LINING = "Lining of each segment, unrolled and laid on the map beside the axis"
+_FLAT = "Lining of each segment in the unrolled plane (chainage, arc)"
+
+_DRAWN = (
+    ("chainage", "LineStringZ", "chainage", True, _TICK),
+    ("chainage_unrolled", "LineString", "chainage", False, _GRID),
+    ("lining_map", "Polygon", "lining", True, _LINING),
+    ("lining_unrolled", "Polygon", "lining", False, _FLAT),
+)
+"""Layers that are drawn from the surface: name, geometry, style, whether on the map, what they hold."""
+
+
+def layers() -> list[VectorLayer]:
+    """Layers of the QGIS project that have rows of their own; of those on the same view the first."""
+    seen: dict[str, VectorLayer] = {}
+    for layer in LAYERS:
+        seen.setdefault(layer.view, layer)
+    return list(seen.values())
+
+
+def parts() -> int:
+    """Number of layers that a survey is written in."""
+    return len(layers()) + len(_DRAWN)
+
+
+def write_survey_gpkg(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    surface: Surface,
+    low: float,
+    high: float,
+    path: Path,
+    progress: Callable[[float], None] = lambda count: None,
+) -> dict[str, int]:
+    """Write a stretch of a survey as a GeoPackage, and return the number of rows of each layer.
+
+    Layers on the map and in space are in the tunnel's SRID; those of the unrolled plane (chainage, arc; m) in an undefined
+    Cartesian system. QGIS finds the styles in the table ``layer_styles``.
+
+    Parameters
+    ----------
+    conn, survey
+        What is read.
+    surface : Surface
+        The survey's surface, which holds the stretch.
+    low, high : float
+        Chainage, m. What reaches into the stretch is written whole, only the axis is cut.
+    path : Path
+        File that isn't there yet.
+    progress : callable
+        Given 1 after each layer.
+
+    Raises
+    ------
+    UserError
+        The tunnel's coordinate system isn't known.
+    """
+    crs = crs_text(conn, survey.srid)
+    counts: dict[str, int] = {}
+    styled: list[tuple[str, str, str]] = []
+    for layer in layers():
+        table = read_table(conn, survey, layer.view, low, high, layer.where)
+        if layer.view == "axis":
+            table = _cut_axis(conn, survey, table, low, high)
+        _write(path, layer.id, table, layer.wkb, crs if layer.on_map else None)
+        counts[layer.id] = len(table.geometry)
+        styled.append((layer.id, layer.style, layer.title))
+        progress(1)
+    made = _drawn(conn, survey, surface, low, high)
+    for (name, wkb, style, with_crs, text), table in zip(_DRAWN, made, strict=True):
+        _write(path, name, replace(table, description=text), wkb, crs if with_crs else None)
+        counts[name] = len(table.geometry)
+        styled.append((name, style, text))
+        progress(1)
+    _write_styles(path, styled)
+    return counts
+
+
+def _write(path: Path, name: str, table: Table, wkb: str, crs: str | None) -> None:
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "'crs' was not provided")  # the unrolled plane has none
+        pyogrio.raw.write(
+            str(path),
+            table.geometry,
+            [column.values for column in table.columns],
+            np.array([column.name for column in table.columns]),
+            field_mask=[column.missing if column.missing.any() else None for column in table.columns],
+            geometry_type=wkb.replace("Z", " Z"),
+            crs=crs,
+            driver="GPKG",
+            layer=name,
+            DESCRIPTION=table.description,
+            **({} if crs else UNDEFINED_CARTESIAN),
+            **VERSION,
+        )
+
+
+def _write_styles(path: Path, styled: list[tuple[str, str, str]]) -> None:
+    """Fill the table in which QGIS looks for the style of a layer, laid out as QGIS makes it."""
+    count = len(styled)
+    table: dict[str, list[Any]] = {
+        "f_table_catalog": [""] * count,
+        "f_table_schema": [""] * count,
+        "f_table_name": [name for name, _, _ in styled],
+        "f_geometry_column": ["geom"] * count,
+        "styleName": [STYLE_NAME] * count,
+        "styleQML": [style_text(style) for _, style, _ in styled],
+        "styleSLD": [""] * count,
+        "useAsDefault": [True] * count,
+        "description": [title for _, _, title in styled],
+        "owner": [f"tunneldb {__version__}"] * count,
+        "ui": [""] * count,
+        "update_time": [np.datetime64("now", "ms")] * count,
+    }
+    data = [np.array(values, dtype=object if isinstance(values[0], str) else None) for values in table.values()]
+    pyogrio.raw.write(str(path), None, data, np.array(list(table)), geometry_type=None, driver="GPKG", layer="layer_styles")
+
+
+def _cut_axis(conn: psycopg.Connection[Any], survey: Survey, table: Table, low: float, high: float) -> Table:
+    """The axis as one row, between two chainages (m)."""
+    rows = conn.execute(
+        "SELECT chainage, public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom) FROM tunnel_api.axis_vertex"
+        " WHERE survey_id = %s ORDER BY chainage",
+        [survey.id],
+    ).fetchall()
+    if len(rows) < 2 or not len(table.geometry):
+        return table
+    vertex = np.array(rows)
+    start, end = max(low, vertex[0, 0]), min(high, vertex[-1, 0])
+    at = np.unique(np.concatenate([[start, end], vertex[(vertex[:, 0] > start) & (vertex[:, 0] < end), 0]]))
+    line = shapely.LineString(np.column_stack([np.interp(at, vertex[:, 0], vertex[:, k]) for k in (1, 2, 3)]))
+    ends = dict(zip(("label_from", "label_to"), labels(conn, survey, np.array([start, end])), strict=True))
+    told: dict[str, Any] = {"chainage_from": start, "chainage_to": end, **ends}
+    columns = [
+        replace(column, values=np.array([told[column.name]], dtype=column.values.dtype)) if column.name in told else column
+        for column in table.columns
+    ]
+    return replace(table, columns=columns, geometry=np.array([shapely.to_wkb(line, flavor="iso")], dtype=object))
+
+
+def _drawn(conn: psycopg.Connection[Any], survey: Survey, surface: Surface, low: float, high: float) -> Iterator[Table]:
+    """Ticks and grid lines of chainage, then the lining on the map and in the unrolled plane."""
+    chainages = tick_chainages(surface, low, high)
+    named = _columns(
+        chainage=chainages, label=np.array(labels(conn, survey, chainages), dtype=object), hundred=is_hundred(chainages)
+    )
+    yield _table(named, [shapely.LineString(line) for line in ticks(surface, chainages)])
+    left, right = edges(surface, chainages)
+    there = np.isin(chainages, left[:, 0])
+    grid = [Column(column.name, column.values[there], column.missing[there]) for column in named]
+    yield _table(grid, [shapely.LineString(line) for line in np.stack([left, right], axis=1)])
+
+    number, flat = [], []
+    for n, (first, second) in zip(surface.number.tolist(), surface.ends, strict=True):
+        for part in stretches(surface, max(low, first), min(high, second)):
+            shape = outline(surface, part)
+            if shape is not None:
+                number.append(n)
+                flat.append(shape)
+    ends = np.array([shape.bounds for shape in flat]).reshape(-1, 4)
+    segments = _columns(
+        n=np.array(number, dtype=np.int64), chainage_from=ends[:, 0], chainage_to=ends[:, 2],
+        label_from=np.array(labels(conn, survey, ends[:, 0]), dtype=object),
+        label_to=np.array(labels(conn, survey, ends[:, 2]), dtype=object),
+    )  # fmt: skip
+    yield _table(segments, [shapely.transform(shape, lambda at: on_map(surface, at)) for shape in flat])
+    yield _table(segments, flat)
+
+
+def _columns(**values: np.ndarray[Any, Any]) -> list[Column]:
+    return [Column(name, held, np.zeros(len(held), dtype=bool)) for name, held in values.items()]
+
+
+def _table(columns: list[Column], shapes: list[Any]) -> Table:
+    return Table(columns, np.array(shapely.to_wkb(shapes, flavor="iso"), dtype=object).reshape(-1), "")

@@ -1,0 +1,74 @@
+"""Blocks of an unrolled image, side by side in a Cloud Optimized GeoTIFF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rasterio
+import rasterio.shutil
+from affine import Affine
+from numpy.typing import NDArray
+from rasterio.windows import Window
+
+from tunneldb.export.images.palette import PALETTES
+from tunneldb.raster.geotiff import UNIT
+
+
+@dataclass(frozen=True)
+class Extent:
+    """The pixels that the blocks of one image cover together.
+
+    Attributes
+    ----------
+    transform : Affine
+        From (column, row) to (chainage, arc), m.
+    rows, columns : int
+        Size.
+    """
+
+    transform: Affine
+    rows: int
+    columns: int
+
+
+def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int, NDArray[Any]]], name: str = "") -> None:
+    """Write an image; where no block lies it holds nothing (GDAL fills what is never written with the nodata value).
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    kind : str
+        Intensities and offset are written in single precision, NaN for nothing; classes and states in 8 bits with a
+        colour table.
+    extent : Extent
+        Place and size of the image.
+    blocks : iterable of (int, (rows, columns) array)
+        First column and pixels of each block.
+    name : str
+        What the band is called, if not by its kind.
+    """
+    plain = path.with_name(f"plain-{path.name}")
+    palette = PALETTES.get(kind)
+    with rasterio.open(
+        plain, "w", driver="GTiff", height=extent.rows, width=extent.columns, count=1, transform=extent.transform,
+        dtype="uint8" if palette else "float32", nodata=palette.nodata if palette else np.nan,
+        tiled=True, blockxsize=256, blockysize=256, bigtiff="if_safer",
+    ) as image:  # fmt: skip
+        image.set_band_description(1, name or kind)
+        if palette:
+            image.write_colormap(1, {code: (*colour, 255) for code, (_, colour) in palette.entries.items()})
+            image.update_tags(1, **{f"{kind.upper()}_{code}": name for code, (name, _) in palette.entries.items()})
+        else:
+            image.units = (UNIT[kind],)
+        for column, pixels in blocks:
+            image.write(pixels, 1, window=Window(column, 0, pixels.shape[1], extent.rows))
+    rasterio.shutil.copy(
+        str(plain), str(path), driver="COG", compress="DEFLATE", predictor="NO" if palette else "YES",
+        overview_resampling="MODE" if palette else "AVERAGE", bigtiff="IF_SAFER",
+    )  # fmt: skip
+    plain.unlink()

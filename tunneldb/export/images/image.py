@@ -1,0 +1,218 @@
+"""Images of the unrolled lining: Cloud Optimized GeoTIFFs and previews, of each kind one a kilometre."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+import shapely
+from affine import Affine
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from tunneldb.database import Survey, snapshot
+from tunneldb.store.stationing import load_stationing
+from tunneldb.export.images import preview
+from tunneldb.files import replacing
+from tunneldb.export.images.class_raster import ClassPainter
+from tunneldb.export.images.cog import Extent, write_cog
+from tunneldb.export.images.gap_fill import FILL, TOLD, fill_blocks
+from tunneldb.export.images.palette import PALETTES
+from tunneldb.raster.accumulator import BLOCK
+from tunneldb.raster.geotiff import KINDS, Raster, decode
+
+
+def image_kilometres(conn: psycopg.Connection, survey: Survey) -> list[int]:
+    """Kilometres of a survey that have images."""
+    rows = conn.execute("SELECT DISTINCT km FROM tunnel.image WHERE survey_id = %s ORDER BY km", (survey.id,))
+    return [km for (km,) in rows]
+
+
+def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> list[Path]:
+    """Write the images of a kilometre: ``SURVEY-kmNNN-KIND.tif`` and ``.png`` for each kind that it has.
+
+    All are of one moment; the connection must be idle.
+
+    The GeoTIFFs hold dB or m as single-precision numbers, NaN where no point fell, the state of a pixel, or the code of a
+    class, 0 where no point fell; x is the chainage and y the arc, m. Each file appears whole. Classes are there when stage
+    ground has run: they are computed from the offset image and what that stage has stored.
+
+    Returns
+    -------
+    list of Path
+        Files written.
+    """
+    with snapshot(conn):
+        return [path for kind in (*KINDS, *PALETTES) for path in _export_kind(conn, survey, km, kind, folder)]
+
+
+def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> Path:
+    """Write the offset image of a kilometre with its gaps filled, ``SURVEY-kmNNN-offset-filled.tif``, and return its path.
+
+    Its pixels are those of a preview: it is there to be looked at, under the offset that was measured. Its band's name and
+    metadata say what it is. A profile beyond the end of the kilometre fills, too. The connection must be idle.
+    """
+    with snapshot(conn):
+        blocks = _blocks(conn, survey, km, "offset")
+        first = _read(conn, survey, km, "offset", blocks[0])
+        factor = preview_factor(first.transform.a)
+        rows, columns = (-(-n // factor) for n in first.values.shape)
+        extent = Extent(first.transform @ Affine.scale(factor), rows, columns * (blocks[-1] - blocks[0] + 1))
+        around = [
+            *_beside(conn, survey, blocks[0] - 1),
+            *((km, block) for block in blocks),
+            *_beside(conn, survey, blocks[-1] + 1),
+        ]
+
+        def shrunk() -> Iterator[tuple[int, preview.Single]]:
+            for other, block in around:
+                raster = _read(conn, survey, other, "offset", block)
+                if raster.transform.a == first.transform.a:
+                    pixels = raster.values if other == km else _laid(raster, first)
+                    yield (block - blocks[0]) * columns, preview.shrink(pixels, factor)
+
+        path = folder / f"{survey.name}-km{km:03d}-offset-filled.tif"
+        filled = fill_blocks(shrunk(), FILL / extent.transform.a)
+        with replacing(path) as temporary:
+            write_cog(temporary, "offset", extent, (b for b in filled if 0 <= b[0] < extent.columns), f"offset, {TOLD}")
+    return path
+
+
+def _beside(conn: psycopg.Connection, survey: Survey, block: int) -> list[tuple[int, int]]:
+    """Kilometre and number of a block of offset, if there is one."""
+    query = "SELECT km, block FROM tunnel.image WHERE survey_id = %s AND kind = 'offset' AND block = %s"
+    return conn.execute(query, (survey.id, block)).fetchall()
+
+
+def _laid(raster: Raster, like: Raster) -> preview.Single:
+    """Values of a block in the rows of another one."""
+    down = round((like.transform.f - raster.transform.f) / like.transform.a)
+    values = np.full(like.values.shape, np.nan, np.float32)
+    rows = slice(max(down, 0), min(down + len(raster.values), len(values)))
+    values[rows] = raster.values[rows.start - down : rows.stop - down]
+    return values
+
+
+def _export_kind(conn: psycopg.Connection, survey: Survey, km: int, kind: str, folder: Path) -> list[Path]:
+    """Write the image of one kind and its preview, if there are any; returns their paths."""
+    stored = "offset" if kind == "class" else kind
+    blocks = _blocks(conn, survey, km, stored)
+    painter = ClassPainter.load(conn, survey, km) if kind == "class" and blocks else None
+    if not blocks or (kind == "class" and painter is None):
+        return []
+    first = _read(conn, survey, km, stored, blocks[0])
+    rows, width = first.values.shape
+    extent = Extent(first.transform, rows, width * (blocks[-1] - blocks[0] + 1))
+    stem = f"{survey.name}-km{km:03d}-{kind}"
+    tiff, png = folder / f"{stem}.tif", folder / f"{stem}.png"
+    sheet = _Sheet(extent.transform.a)
+    with replacing(tiff) as temporary:
+        write_cog(temporary, kind, extent, _pixels(conn, survey, km, stored, blocks, painter, sheet))
+    leaks = _leaks(conn, survey, km) if kind == "corrected" else []
+    with replacing(png) as temporary:
+        title = f"{survey.name}  km {km}  {_TITLES[kind]}"
+        stationing = load_stationing(conn, survey.tunnel_id)
+        preview.draw(temporary, title, kind, list(sheet.strips()), stationing, extent.transform.f, sheet.pixel, leaks)
+    return [tiff, png]
+
+
+_TITLES = {
+    "raw": "raw intensity",
+    "corrected": "corrected intensity",
+    "offset": "offset from the section surface",
+    "state": "states",
+    "class": "classes",
+}
+
+
+class _Sheet:
+    """Shrinks the blocks that pass through it to what the preview shows.
+
+    Parameters
+    ----------
+    pixel : float
+        Side of the image's pixels, m.
+    """
+
+    def __init__(self, pixel: float) -> None:
+        self._factor = preview_factor(pixel)
+        self.pixel = pixel * self._factor
+        self._blocks: list[tuple[float, preview.Single]] = []
+
+    def note(self, west: float, pixels: NDArray[Any]) -> None:
+        """Take a block that begins at a chainage, m."""
+        shrink: Callable[[NDArray[Any], int], preview.Single] = (
+            preview.shrink_codes if pixels.dtype == np.uint8 else preview.shrink
+        )
+        self._blocks.append((west, shrink(pixels, self._factor)))
+
+    def strips(self) -> Iterator[preview.Strip]:
+        """Lay the blocks into strips of a hectometre."""
+        width = round(preview.STRIP / self.pixel)
+        by_start: dict[float, preview.Single] = {}
+        for west, values in self._blocks:
+            start = np.floor(west / preview.STRIP + 1e-9) * preview.STRIP
+            strip = by_start.setdefault(start, np.full((values.shape[0], width), np.nan, np.float32))
+            column = round((west - start) / self.pixel)
+            strip[:, column : column + values.shape[1]] = values[:, : width - column]
+        for start in sorted(by_start):
+            yield preview.Strip(float(start), by_start[start])
+
+
+def _pixels(
+    conn: psycopg.Connection,
+    survey: Survey,
+    km: int,
+    kind: str,
+    blocks: Sequence[int],
+    painter: ClassPainter | None,
+    sheet: _Sheet,
+) -> Iterator[tuple[int, NDArray[Any]]]:
+    """First column and pixels of each stored block, codes in 8 bits, or their classes; the sheet takes note of them."""
+    for block in blocks:
+        raster = _read(conn, survey, km, kind, block)
+        pixels: NDArray[Any] = raster.values if painter is None else painter.paint(raster)
+        if kind in PALETTES:
+            pixels = pixels.astype(np.uint8, copy=False)
+        sheet.note(raster.transform.c, pixels)
+        yield (block - blocks[0]) * pixels.shape[1], pixels
+
+
+def preview_factor(pixel: float) -> int:
+    """How many pixels of the image make one of the preview."""
+    factor = max(1, round(preview.PIXEL / pixel))
+    # A block must be a whole number of pixels.
+    while abs(BLOCK / (pixel * factor) - round(BLOCK / (pixel * factor))) > 1e-6:
+        factor -= 1
+    return factor
+
+
+def _blocks(conn: psycopg.Connection, survey: Survey, km: int, kind: str) -> Sequence[int]:
+    rows = conn.execute(
+        "SELECT block FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s ORDER BY block",
+        (survey.id, km, kind),
+    )
+    return [block for (block,) in rows]
+
+
+def _read(conn: psycopg.Connection, survey: Survey, km: int, kind: str, block: int) -> Raster:
+    row = conn.execute(
+        "SELECT tiff FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s AND block = %s",
+        (survey.id, km, kind, block),
+        binary=True,
+    ).fetchone()
+    assert row is not None
+    return decode(row[0])
+
+
+def _leaks(conn: psycopg.Connection, survey: Survey, km: int) -> list[Polygon]:
+    rows = conn.execute(
+        "SELECT public.ST_AsBinary(unrolled) FROM tunnel.anomaly"
+        " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected'"
+        " AND coalesce(judged, kind) = 'leak' ORDER BY id",
+        (survey.id, km * 1000.0, (km + 1) * 1000.0),
+    )
+    return [shapely.from_wkb(bytes(wkb)) for (wkb,) in rows]

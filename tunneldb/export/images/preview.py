@@ -1,0 +1,221 @@
+"""PNG previews of a kilometre's image: one strip a hectometre, with a grid, ticks and a scale.
+
+Gaps between profiles are filled in it, see :mod:`tunneldb.export.images.gap_fill`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+from shapely.geometry import Polygon
+
+from tunneldb.export.images.gap_fill import FILL, fill_gaps
+from tunneldb.export.images.palette import PALETTES
+from tunneldb.geometry.stationing import Stationing
+from tunneldb.classification.classes import Klass
+
+Single = NDArray[np.float32]
+
+STRIP = 100.0
+"""Length of a strip, m."""
+
+PIXEL = 0.05
+"""Side of a preview's pixel, m; that of the image where it is larger."""
+
+OFFSET_SPANS = (0.02, 0.05, 0.1, 0.2, 0.5)
+"""Offsets beyond one of these are shown in the full colour, m: the first that nine tenths of the image stay within."""
+
+_MARGIN, _HEAD, _GAP = 64, 40, 26
+_BACK, _INK, _GRID, _EMPTY, _LEAK = (255, 255, 255), (40, 40, 40), (150, 170, 200), (226, 229, 233), (0, 200, 255)
+_BLUE, _WHITE, _RED = np.array([33, 102, 172.0]), np.array([247, 247, 247.0]), np.array([178, 24, 43.0])
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A hectometre of an image at the preview's pixel.
+
+    Attributes
+    ----------
+    start : float
+        Chainage of its beginning, m.
+    values : (rows, columns) float32 array
+        From the greatest arc downwards, NaN where there is none.
+    """
+
+    start: float
+    values: Single
+
+
+def shrink(values: Single, factor: int) -> Single:
+    """Average blocks of ``factor`` × ``factor`` pixels, passing over NaNs; the image is filled up to whole blocks."""
+    rows, columns = (-(-n // factor) * factor for n in values.shape)
+    padded = np.full((rows, columns), np.nan, np.float32)
+    padded[: values.shape[0], : values.shape[1]] = values
+    blocks = padded.reshape(rows // factor, factor, columns // factor, factor)
+    held = np.isfinite(blocks)
+    count = held.sum(axis=(1, 3))
+    total = np.where(held, blocks, 0.0).sum(axis=(1, 3))
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan).astype(np.float32)
+
+
+def shrink_codes(values: NDArray[np.uint8], factor: int) -> Single:
+    """Take the commonest code of ``factor`` × ``factor`` pixels, the greater of two; without 0, which becomes NaN."""
+    rows, columns = (-(-n // factor) * factor for n in values.shape)
+    padded = np.zeros((rows, columns), np.uint8)
+    padded[: values.shape[0], : values.shape[1]] = values
+    blocks = padded.reshape(rows // factor, factor, columns // factor, factor)
+    out = np.full((rows // factor, columns // factor), np.nan, np.float32)
+    most = np.ones(out.shape, np.int64)
+    for code in np.flatnonzero(np.bincount(values.ravel(), minlength=256)[1:]) + 1:
+        count = (blocks == code).sum(axis=(1, 3))
+        out[count >= most] = code
+        most = np.maximum(most, count)
+    return out
+
+
+def _filled(kind: str, values: Single, reach: float) -> Single:
+    """Fill the gaps of an image; what floats in them is no colour for its surroundings. Gaps between states are shown."""
+    if kind == "state":
+        return values
+    if kind != "class":
+        return fill_gaps(values, reach)
+    floating = values == Klass.NOISE
+    return np.where(floating, values, fill_gaps(np.where(floating, np.float32(np.nan), values), reach))
+
+
+def draw(
+    path: Path,
+    title: str,
+    kind: str,
+    strips: Sequence[Strip],
+    stationing: Stationing,
+    top: float,
+    pixel: float,
+    leaks: Sequence[Polygon] = (),
+) -> None:
+    """Draw strips below one another and write them as PNG.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    title : str
+        Heading.
+    kind : {'raw', 'corrected', 'offset', 'state', 'class'}
+        Intensities are drawn in grey between their 2nd and 98th percentile, offsets in blue (outside the
+        surface) to red (inside), states and classes in their colours.
+    strips : sequence of Strip
+        In order of chainage.
+    stationing : Stationing
+        What is written at their ticks, which stand every 10 m of chainage.
+    top : float
+        Arc of the upper edge, m.
+    pixel : float
+        Side of a pixel, m.
+    leaks : sequence of Polygon
+        Outlines to draw, (chainage, arc), m.
+    """
+    width, height = round(STRIP / pixel), max(s.values.shape[0] for s in strips)
+    sheet = Image.new("RGB", (width + _MARGIN + 20, _HEAD + len(strips) * (height + _GAP) + 10), _BACK)
+    pen = ImageDraw.Draw(sheet)
+    low, high = _span(kind, strips)
+    large, small = ImageFont.load_default(18), ImageFont.load_default(13)
+    if kind in PALETTES:
+        pen.text((_MARGIN, 8), f"{title}:", _INK, large)
+        _legend(pen, _MARGIN + int(pen.textlength(f"{title}:  ", large)), kind, strips, large)
+    else:
+        scale = (
+            f"blue {low:+.2f} m (outside) to red {high:+.2f} m (inside)"
+            if kind == "offset"
+            else f"black {low:.2f} dB to white {high:.2f} dB"
+        )
+        pen.text((_MARGIN, 8), f"{title}:  {scale}", _INK, large)
+    for number, strip in enumerate(strips):
+        y = _HEAD + number * (height + _GAP)
+        colours = _colours(kind, _filled(kind, strip.values, FILL / pixel), low, high)
+        sheet.paste(Image.fromarray(colours), (_MARGIN, y))
+        _ticks(pen, strip, stationing, (_MARGIN, y), (width, height), top, pixel, small)
+        for leak in leaks:
+            if leak.bounds[0] < strip.start + STRIP and leak.bounds[2] > strip.start:
+                for ring in (leak.exterior, *leak.interiors):
+                    line = [(_MARGIN + (c - strip.start) / pixel, y + (top - a) / pixel) for c, a in ring.coords]
+                    pen.line(_clip(line, _MARGIN, _MARGIN + width), _LEAK, 2)
+    sheet.save(path, "PNG")
+
+
+def _clip(line: list[tuple[float, float]], left: float, right: float) -> list[tuple[float, float]]:
+    return [(min(max(x, left), right), y) for x, y in line]
+
+
+def _legend(
+    pen: ImageDraw.ImageDraw,
+    x: int,
+    kind: str,
+    strips: Sequence[Strip],
+    font: ImageFont.ImageFont | ImageFont.FreeTypeFont,
+) -> None:
+    """Colour and name of each code that is there."""
+    there = np.unique(np.concatenate([np.nan_to_num(s.values) for s in strips]))
+    for code, (name, colour) in PALETTES[kind].entries.items():
+        if code in there:
+            pen.rectangle([(x, 11), (x + 14, 25)], colour, _INK)
+            pen.text((x + 20, 8), name, _INK, font)
+            x += 40 + int(pen.textlength(name, font))
+
+
+def _span(kind: str, strips: Sequence[Strip]) -> tuple[float, float]:
+    held = np.concatenate([s.values[np.isfinite(s.values)] for s in strips])
+    if len(held) == 0 or kind in PALETTES:
+        return 0.0, 1.0
+    if kind == "offset":
+        usual = float(np.percentile(np.abs(held), 90))
+        span = next((s for s in OFFSET_SPANS if s >= usual), OFFSET_SPANS[-1])
+        return -span, span
+    low, high = (float(v) for v in np.percentile(held, [2, 98]))
+    return low, max(high, low + 0.1)
+
+
+def _colours(kind: str, values: Single, low: float, high: float) -> NDArray[np.uint8]:
+    """Colours (rows, columns, 3) of values; places without one in a pale grey."""
+    if kind in PALETTES:
+        table = np.full((256, 3), _EMPTY, np.uint8)
+        for code, (_, colour_of_code) in PALETTES[kind].entries.items():
+            table[code] = colour_of_code
+        return np.asarray(table[np.nan_to_num(values).astype(np.uint8)])
+    with np.errstate(invalid="ignore"):
+        share = np.clip((values - low) / (high - low), 0.0, 1.0)[..., None]
+    if kind == "offset":
+        colour = np.where(share < 0.5, _BLUE + (_WHITE - _BLUE) * 2 * share, _WHITE + (_RED - _WHITE) * (2 * share - 1))
+    else:
+        colour = np.repeat(255.0 * share, 3, axis=2)
+    colour[np.isnan(values)] = _EMPTY
+    return np.asarray(colour, dtype=np.uint8)
+
+
+def _ticks(
+    pen: ImageDraw.ImageDraw,
+    strip: Strip,
+    stationing: Stationing,
+    corner: tuple[int, int],
+    size: tuple[int, int],
+    top: float,
+    pixel: float,
+    font: ImageFont.ImageFont | ImageFont.FreeTypeFont,
+) -> None:
+    """Grid every 10 m along the tunnel and every 5 m across, with labels."""
+    (x0, y0), (width, height) = corner, size
+    for metre in range(0, round(STRIP) + 1, 10):
+        x = x0 + round(metre / pixel)
+        pen.line([(x, y0), (x, y0 + height)], _GRID, 1)
+        if metre < STRIP:
+            pen.text((x + 2, y0 + height + 4), stationing.label(strip.start + metre, 0), _INK, font)
+    bottom = top - height * pixel
+    for arc in range(int(np.ceil(bottom / 5)) * 5, int(np.floor(top)) + 1, 5):
+        y = y0 + round((top - arc) / pixel)
+        pen.line([(x0, y), (x0 + width, y)], _GRID, 1)
+        pen.text((6, y - 8), f"{arc:+d} m" if arc else "crown", _INK, font)

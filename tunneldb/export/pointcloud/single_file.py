@@ -1,0 +1,116 @@
+"""Classes for a scan file by itself, without a survey: its ground, its lining and what stands before it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.errors import UserError
+from tunneldb.files import replacing
+from tunneldb.export.pointcloud.survey import CLASS_NAMES, same_file
+from tunneldb.classification.classes import Klass
+from tunneldb.classification.classify import find_bare_scene
+from tunneldb.classification.ground.extraction import GroundSettings, find_ground
+from tunneldb.geometry.plan_line import Line
+from tunneldb.classification.scene import Scene
+from tunneldb.classification.objects.objects import ClusterSettings
+from tunneldb.pointcloud.voxels import Voxels
+from tunneldb.pointcloud.reader import read_header
+from tunneldb.pointcloud.rewrite import read_coordinates, rewrite
+
+Begin = Callable[[str, int], Callable[[int], None]]
+
+
+@dataclass(frozen=True)
+class Classified:
+    """What a file's points were found to be.
+
+    Attributes
+    ----------
+    counts : (256,) int64 array
+        Points by class.
+    ground, lining : bool
+        Whether there is any.
+    """
+
+    counts: NDArray[np.int64]
+    ground: bool
+    lining: bool
+
+
+def classify_file(source: Path, target: Path, values: Mapping[str, float], begin: Begin) -> Classified:
+    """Write a scan file again with the classes that are found from its points alone.
+
+    It is read twice: into voxels, from which the models are made, and once more to be written. Memory grows with the
+    surface that was scanned, not with the points.
+
+    Parameters
+    ----------
+    source : Path
+        LAS, LAZ or E57 file.
+    target : Path
+        ``.laz`` file to write; it appears when it is complete.
+    values : mapping of str to float
+        Parameters ``ground.…`` and ``cluster.…``.
+    begin : callable
+        Called with a text and the number of points before each pass; returns what takes the points that are done.
+
+    Raises
+    ------
+    UserError
+        If the source cannot be read, holds neither ground nor lining, or is the target; if the target is no ``.laz``, or
+        cannot be written.
+    """
+    if target.suffix.lower() != ".laz":
+        raise UserError(f"{target}: what is written is LAZ: let its name end in .laz")
+    if same_file(source, target):
+        raise UserError(f"{target} is the file that is read, never to be written over: choose another name with -o")
+    if not target.parent.is_dir():
+        raise UserError(f"{target.parent}: no such folder")
+    count = read_header(source).points
+    scene, origin = find_scene_of(source, values, begin("points", count))
+    lining = any(cluster.klass == Klass.LINING for cluster in scene.clusters) or scene.relief is not None
+    if scene.ground is None and not lining:
+        raise UserError(f"{source}: neither ground nor lining is found in its {count} points: is it the scan of a tunnel?")
+    with replacing(target) as temporary:
+        counts = rewrite(source, temporary, lambda xyz: scene.classes(xyz - origin), CLASS_NAMES, begin("classes", count))
+    return Classified(counts, scene.ground is not None, lining)
+
+
+def find_scene_of(
+    source: Path, values: Mapping[str, float], progress: Callable[[int], None]
+) -> tuple[Scene, NDArray[np.float64]]:
+    """Make the models of a file in one pass over its points.
+
+    Returns
+    -------
+    scene : Scene
+    origin : (3,) float64 array
+        Whole kilometres near the points, m. The scene is for coordinates less these: cells are numbered from there, however
+        far away the file's own origin is.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, or its points lie too far apart.
+    """
+    settings = GroundSettings.of(values)
+    voxels = Voxels(settings.voxel)
+    origin = np.zeros(3)
+    for xyz in read_coordinates(source):
+        if not len(voxels):
+            origin = np.round(xyz[0], -3)
+        try:
+            voxels.add(xyz - origin)
+        except ValueError as error:
+            raise UserError(f"{source}: {error}") from error
+        progress(len(xyz))
+    thinned, spread = voxels.centroids(), voxels.spread()
+    del voxels  # room for the models
+    line = Line.through(thinned)
+    ground = find_ground(thinned, line, settings, spread=spread)
+    return find_bare_scene(thinned, line, ground, ClusterSettings.of(values)), origin

@@ -1,0 +1,178 @@
+"""Scan files of a survey, written again at full density with the classes that stage ``ground`` has found."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import psycopg
+from numpy.typing import NDArray
+
+from tunneldb.database import Survey, snapshot
+from tunneldb.errors import UserError
+from tunneldb.files import replacing
+from tunneldb.classification.classes import Klass
+from tunneldb.pipeline.run import loaded_kilometres
+from tunneldb.store.scene import load_scene
+from tunneldb.store.sources import unchanged_file
+from tunneldb.pointcloud.rewrite import rewrite
+
+CLASS_NAMES = {int(klass): klass.name.lower() for klass in Klass}
+"""Names of the classes, as they are written into the files."""
+
+_STAGE = "ground"
+
+
+@dataclass(frozen=True)
+class ScanFile:
+    """A file of a survey that is to be written again.
+
+    Attributes
+    ----------
+    name, path, checksum : str
+    bytes, points : int
+        As they were loaded.
+    kilometres : tuple of int
+        Those with points of it that are in the database.
+    """
+
+    name: str
+    path: str
+    checksum: str
+    bytes: int
+    points: int
+    kilometres: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Written:
+    """A file that was written: its points by class (256,), and how long it took, s."""
+
+    path: Path
+    counts: NDArray[np.int64]
+    seconds: float
+
+
+def export_classified(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    folder: Path,
+    kilometres: Collection[int],
+    begin: Callable[[str, int], Callable[[int], None]],
+) -> Iterator[Written]:
+    """Write the files that touch some kilometres into a folder, each whole and once, under its own name as ``.laz``.
+
+    Whether all can be written is looked at before the first one is. A file appears when it is complete.
+
+    Parameters
+    ----------
+    conn : Connection
+        Idle; no transaction is open while files are written.
+    folder : Path
+        It exists.
+    kilometres : collection of int
+    begin : callable
+        Called with a text and the number of points before each file; returns what takes the points written.
+
+    Raises
+    ------
+    UserError
+        If a kilometre that a file touches has no ground, or one that is out of date; if a file is gone or was changed; if
+        one would be written over a file of the survey; if one cannot be written.
+    """
+    every = _files(conn, survey)
+    wanted = [file for file in every if set(file.kilometres) & set(kilometres)]
+    targets = _targets(conn, wanted, every, folder)
+    _require_ground(conn, survey, {km for file in wanted for km in file.kilometres})
+    conn.rollback()
+    for number, (file, target) in enumerate(zip(wanted, targets, strict=True), start=1):
+        started = perf_counter()
+        source = unchanged_file(file.path, file.bytes, file.checksum)
+        with snapshot(conn):
+            _require_ground(conn, survey, file.kilometres)
+            scene = load_scene(conn, survey, min(file.kilometres), max(file.kilometres))
+        progress = begin(f"[{number}|{len(wanted)}] {file.name}", file.points)
+        with replacing(target) as temporary:
+            counts = rewrite(source, temporary, scene.classes, CLASS_NAMES, progress)
+        yield Written(target, counts, perf_counter() - started)
+
+
+def _files(conn: psycopg.Connection[Any], survey: Survey) -> list[ScanFile]:
+    """Files of a survey in the order of chainage."""
+    there = set(loaded_kilometres(conn, survey))
+    rows = conn.execute(
+        "SELECT f.name, f.path, f.checksum, f.bytes, f.points,"
+        " array(SELECT k.km FROM tunnel.file_km k WHERE k.file_id = f.id AND NOT isempty(k.points) ORDER BY k.km)"
+        " FROM tunnel.scan_file f WHERE f.survey_id = %s ORDER BY f.chainage_from, f.name",
+        [survey.id],
+    ).fetchall()
+    return [
+        ScanFile(name, path, checksum, size, points, tuple(km for km in touched if km in there))
+        for name, path, checksum, size, points, touched in rows
+    ]
+
+
+def _targets(conn: psycopg.Connection[Any], files: Sequence[ScanFile], every: Sequence[ScanFile], folder: Path) -> list[Path]:
+    """Where the files go; those that differ in their endings alone keep them."""
+    stems = Counter(Path(file.name).stem for file in every)
+    rows = conn.execute("SELECT DISTINCT path FROM tunnel.scan_file").fetchall()
+    scans = {_identity(Path(path)) for (path,) in rows} - {None}
+    targets = []
+    for file in files:
+        stem = Path(file.name).stem
+        target = folder / f"{stem if stems[stem] == 1 else file.name}.laz"
+        if _identity(target) in scans:
+            raise UserError(f"{target} is a scan file that was loaded, never to be written over: choose another folder with -o")
+        targets.append(target)
+    return targets
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """What tells a file from all others, whichever way leads there; None if there is none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
+
+
+def same_file(one: Path, other: Path) -> bool:
+    """Whether two paths lead to one file that exists."""
+    return _identity(one) is not None and _identity(one) == _identity(other)
+
+
+def _require_ground(conn: psycopg.Connection[Any], survey: Survey, kilometres: Collection[int]) -> None:
+    """Refuse kilometres whose ground never was found, or is out of date: its models don't fit what is there now."""
+    rows = conn.execute(
+        "SELECT s.km, s.stage, s.done_at IS NULL, s.reason FROM tunnel_api.stage_status s"
+        " WHERE s.survey_id = %(survey)s AND s.km = ANY (%(km)s) AND (s.done_at IS NULL OR s.stale)"
+        "   AND s.step <= (SELECT g.step FROM tunnel_api.stage_status g"
+        "                   WHERE g.survey_id = s.survey_id AND g.km = s.km AND g.stage = %(stage)s)"
+        " ORDER BY s.step, s.km",
+        {"survey": survey.id, "km": list(kilometres), "stage": _STAGE},
+    ).fetchall()
+    if not rows:
+        return
+    missing = sorted({km for km, stage, never, _ in rows if never and stage == _STAGE})
+    stale = sorted({km for km, *_ in rows} - set(missing))
+    parts = [f"{_kilometres(missing)} without ground" if missing else ""]
+    if stale:
+        reason = next(reason for km, _, _, reason in rows if km in stale)
+        parts.append(f"{_kilometres(stale)} with one that is out of date ({reason})")
+    first, last = min(missing + stale), max(missing + stale)
+    stages = [stage for _, stage, _, _ in rows if stage != "load"]
+    begin = stages[0] if stages else _STAGE
+    raise UserError(
+        f"survey {survey.name} has {' and '.join(filter(None, parts))}: tunneldb run {survey.name}"
+        f" --km {first if first == last else f'{first}-{last}'} --from {begin} --to {_STAGE}"
+    )
+
+
+def _kilometres(numbers: Sequence[int]) -> str:
+    word = "kilometre" if len(numbers) == 1 else "kilometres"
+    return f"{word} {', '.join(map(str, numbers))}"

@@ -1,0 +1,191 @@
+"""The course of a tunnel in plan, found from the points alone."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import cKDTree
+
+Float = NDArray[np.float64]
+
+_CELL = 1.0  # m in plan
+_REACH = 3.0  # cells closer than this are neighbours, m: profiles may lie apart
+_SHORT = 40.0  # m; below, a tunnel may be wider than long, and the way it looks from its end tells its direction
+_STEP = 5.0  # m between vertices
+_SAMPLE = 10_000  # points that are looked at from all sides
+_PICTURE = 0.2  # edge of a cell of the picture, m
+_SLICE = 1.0  # m, across the line
+_HELD = 10  # cells that make a slice
+_ASTRAY = 0.02  # of a slice's cells may lie beyond each wall
+_FAR = 1 << 24  # cells; more than any tunnel is long
+
+
+def course(points: Float) -> Float:
+    """Vertices (k, 2) of a line along a tunnel, from the end that lies farther west.
+
+    A long tunnel's points are strung out by the way to one of its ends, through neighbouring cells of the plan. A
+    short piece is looked at from all sides: seen along the tunnel, its points hide one another the most. The line
+    is then moved to the middle between the walls and smoothed.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        m; those that are not finite are ignored.
+
+    Raises
+    ------
+    ValueError
+        No points.
+    """
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        raise ValueError("there are no points to lay a line through")
+    origin = np.floor(points.mean(axis=0))
+    local = points - origin
+    cells = _cells(local[:, :2])
+    way = _way(cells)
+    vertices = _strung(cells, way) if way.max() > _SHORT else _seen(local)
+    if vertices[-1, 0] < vertices[0, 0]:
+        vertices = vertices[::-1]
+    # Spread evenly: a scanner's own surroundings would outweigh the walls.
+    spaced = _filled_cells(local[:, :2], _PICTURE)
+    for _ in range(3):
+        vertices = _centred(vertices, spaced)
+    return np.asarray(vertices + origin[:2])
+
+
+def _cells(plan: Float) -> Float:
+    """Middles (m, 2) of the plan's cells that hold points and hang together; single stray points don't count."""
+    middle = _filled_cells(plan, _CELL)
+    _, label = connected_components(_graph(middle), directed=False)
+    return np.asarray(middle[label == np.argmax(np.bincount(label))], dtype=np.float64)
+
+
+def _filled_cells(plan: Float, edge: float) -> Float:
+    """Middles (m, 2) of the cells of the plan that hold points, but for those that hold far fewer than most."""
+    key = np.floor(plan / edge).astype(np.int64)
+    key, count = np.unique(key[:, 0] * _FAR + key[:, 1] + _FAR // 2, return_counts=True)
+    cells = np.column_stack([key // _FAR, key % _FAR - _FAR // 2])[count >= 0.1 * np.median(count)]
+    return np.asarray((cells + 0.5) * edge, dtype=np.float64)
+
+
+def _graph(middle: Float) -> coo_array:
+    pairs = cKDTree(middle).query_pairs(_REACH, output_type="ndarray")
+    length = np.hypot(*(middle[pairs[:, 0]] - middle[pairs[:, 1]]).T) if len(pairs) else np.empty(0)
+    return coo_array((length, (pairs[:, 0], pairs[:, 1])), shape=(len(middle), len(middle)))
+
+
+def _way(cells: Float) -> Float:
+    """Length of the way from one end of the cells to each of them, m."""
+    graph = _graph(cells).tocsr()
+    start = 0
+    for _ in range(2):
+        start = int(np.argmax(dijkstra(graph, directed=False, indices=start)))
+    return np.asarray(dijkstra(graph, directed=False, indices=start))
+
+
+def _strung(cells: Float, way: Float) -> Float:
+    """Mean of the cells of every 5 m of the way; the fronts of the first and last ones are skew."""
+    count = max(2, int(way.max() / (2 * _STEP)))
+    piece = np.minimum((way / way.max() * count).astype(int), count - 1)
+    number = np.bincount(piece, minlength=count)
+    mean = np.column_stack([np.bincount(piece, cells[:, k], minlength=count) / number for k in range(2)])
+    mean = mean[1:-1] if count > 4 else mean
+    step = np.diff(mean, axis=0)
+    unit = step / np.hypot(*step.T)[:, None]
+    ends = [_end(cells, mean[0], -unit[0]), _end(cells, mean[-1], unit[-1])]
+    return np.vstack([ends[0], mean, ends[1]])
+
+
+def _end(cells: Float, at: Float, unit: Float) -> Float:
+    """Where the cells end, straight on from a place."""
+    near = cells - at
+    near = near[np.hypot(*near.T) < 6 * _STEP]
+    return np.asarray(at + max(float((near @ unit).max()), 0.5) * unit)
+
+
+def _seen(local: Float) -> Float:
+    """Both ends of a short piece: along the direction in which its points fill the fewest cells of the picture."""
+    local = local[np.abs(local - np.median(local, axis=0)).max(axis=1) < _SHORT]
+    sample = local[:: max(1, len(local) // _SAMPLE)]
+    sample = sample - sample.mean(axis=0)
+    best, step = 0.0, np.pi / 90
+    angles = np.arange(0.0, np.pi, step)
+    for _ in range(3):
+        filled = [_filled(sample, angle) for angle in angles.tolist()]
+        best = float(angles[int(np.argmin(filled))])
+        angles, step = best + step * np.linspace(-1.0, 1.0, 11), step / 5
+    unit = np.array([np.cos(best), np.sin(best)])
+    ahead = local[:, :2] @ unit
+    middle = np.median(local[:, :2], axis=0)
+    middle = middle - (middle @ unit) * unit
+    low, high = float(ahead.min()), float(ahead.max())
+    if high - low < 1.0:
+        low, high = 0.5 * (low + high) - 0.5, 0.5 * (low + high) + 0.5
+    return np.vstack([middle + low * unit, middle + high * unit])
+
+
+def _filled(sample: Float, angle: float) -> int:
+    """How many cells of 0.2 m the points fill, seen in a direction of the plan."""
+    across = sample[:, 0] * np.sin(angle) - sample[:, 1] * np.cos(angle)
+    column, row = (np.floor((v - v.min()) / _PICTURE).astype(np.int64) for v in (across, sample[:, 2]))
+    return int(np.count_nonzero(np.bincount(column * (row.max() + 1) + row)))
+
+
+def _centred(vertices: Float, plan: Float) -> Float:
+    """The line again, with vertices every 5 m, in the middle between the walls, and smooth."""
+    from tunneldb.geometry.plan_line import Line
+
+    step = np.hypot(*np.diff(vertices, axis=0).T)
+    line = Line.of(vertices, np.concatenate([[0.0], np.cumsum(step)]))
+    length = float(line.distance[-1])
+    if length < 4 * _STEP:
+        return vertices
+    count = round(length / _STEP)
+    at = np.linspace(0.0, length, count + 1)
+    walls = _walls(*line.place(plan), math.ceil(length / _SLICE))
+    slices = (np.arange(len(walls)) + 0.5) * _SLICE
+    # The median of the slices about a vertex: a niche widens some of them only.
+    near = [walls[np.abs(slices - place) <= _STEP] for place in at]
+    middle = np.array([np.nanmedian(w, axis=0).mean() if np.isfinite(w).any() else np.nan for w in near])
+    seen = np.isfinite(middle)
+    return _smooth(line.point(at, np.where(seen, middle, 0.0)), seen)
+
+
+def _walls(along: Float, across: Float, count: int) -> Float:
+    """Where the walls stand (count, 2), m to the right of the line, in slices across it; NaN where there are no points."""
+    number = np.floor(along / _SLICE).astype(np.int64)
+    order = np.lexsort((across, number))
+    number, across = number[order], across[order]
+    first, stop = (np.searchsorted(number, np.arange(count), side=side) for side in ("left", "right"))
+    walls = np.full((count, 2), np.nan)
+    held = stop - first >= _HELD
+    spare = np.floor(_ASTRAY * (stop - first - 1)).astype(np.int64)
+    walls[held, 0] = across[(first + spare)[held]]
+    walls[held, 1] = across[(stop - 1 - spare)[held]]
+    return walls
+
+
+def _smooth(places: Float, seen: NDArray[np.bool_]) -> Float:
+    """Smooth places (k, 2) at even distances, those of niches and gaps after their neighbours (Whittaker, 1923).
+
+    Third differences are kept small: neither a straight line nor a circle is bent.
+    """
+    count = len(places)
+    if count < 6 or np.count_nonzero(seen) < 4:
+        return places
+    third = np.diff(np.eye(count), n=3, axis=0)
+    bend = 10.0 * third.T @ third
+    weight = seen.astype(np.float64)
+    out = places
+    for _ in range(5):
+        out = solve(np.diag(weight) + bend + 1e-9 * np.eye(count), (weight + 1e-9)[:, None] * places, assume_a="pos")
+        away = np.hypot(*(places - out).T)
+        usual = max(3.0 * 1.4826 * float(np.median(away[seen])), 0.02)
+        weight = np.where(seen, 1.0 / (1.0 + (away / usual) ** 2), 0.0)
+    return np.asarray(out)

@@ -1,0 +1,160 @@
+"""A line in plan that a tunnel follows: distance along it and to its right of any point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from tunneldb.geometry.centreline import course
+
+Float = NDArray[np.float64]
+
+_APRON = 30.0  # m around the line in which the search begins at the nearest segment
+_MOST_CELLS = 1 << 20
+
+
+@dataclass(frozen=True)
+class Line:
+    """A polyline in plan whose points are told by the distance along it and to its right.
+
+    Neighbouring segments meet in the bisector of their angle, where both distances agree: along and across are
+    continuous on both sides of a bend. Before the first vertex and beyond the last the line runs straight on.
+
+    Attributes
+    ----------
+    vertices : (k, 2) float array
+        m.
+    distance : (k,) float array
+        Distance along the line at each vertex, growing, m.
+    """
+
+    vertices: Float
+    distance: Float
+    _segments: Float = field(repr=False)  # x, y, direction (2), length, shear at both ends, along at both ends
+    _grid: NDArray[np.int32] = field(repr=False)  # segment nearest to each cell's middle
+    _corner: Float = field(repr=False)  # x, y of the grid and the edge of a cell
+
+    @classmethod
+    def of(cls, vertices: ArrayLike, along: ArrayLike) -> Line:
+        """Line through given vertices.
+
+        Parameters
+        ----------
+        vertices : (k, 2 or 3) array
+            At least two, m; heights are ignored.
+        along : (k,) array
+            Distance along the line at each of them (in a survey the chainage), growing, m.
+
+        Raises
+        ------
+        ValueError
+            Fewer than two vertices, two in the same place, or distances that don't grow.
+        """
+        at = np.array(vertices, dtype=np.float64)[:, :2]
+        distance = np.array(along, dtype=np.float64)
+        if len(at) < 2 or at.shape[0] != distance.shape[0] or not (np.isfinite(at).all() and np.isfinite(distance).all()):
+            raise ValueError("a line needs two vertices or more, each with a distance along it")
+        step = np.diff(at, axis=0)
+        length = np.hypot(step[:, 0], step[:, 1])
+        if length.min() < 1e-9 or np.diff(distance).min() <= 0.0:
+            raise ValueError("vertices of a line must lie apart and their distances grow")
+        segments = np.zeros((len(step), 9))
+        segments[:, 0:2] = at[:-1]
+        segments[:, 2:4] = t = step / length[:, None]
+        segments[:, 4] = length
+        # tan of half the bend: how far the bisector runs ahead for each metre to the right.
+        shear = (t[:-1, 0] * t[1:, 1] - t[:-1, 1] * t[1:, 0]) / (1.0 + (t[:-1] * t[1:]).sum(axis=1))
+        segments[1:, 5] = -shear
+        segments[:-1, 6] = shear
+        segments[:, 7], segments[:, 8] = distance[:-1], distance[1:]
+        grid, corner = _nearest_segments(at, length)
+        return cls(at, distance, segments, grid, corner)
+
+    @classmethod
+    def through(cls, points: ArrayLike) -> Line:
+        """Line that a bare cloud of a tunnel follows, of any direction, straight or curved; from 0.
+
+        Parameters
+        ----------
+        points : (n, 3) array
+            m, the tunnel's surface without other things farther off; thinned evenly serves best.
+
+        Raises
+        ------
+        ValueError
+            No points.
+        """
+        vertices = course(np.asarray(points, dtype=np.float64))
+        steps = np.hypot(*np.diff(vertices, axis=0).T)
+        return cls.of(vertices, np.concatenate([[0.0], np.cumsum(steps)]))
+
+    def place(self, xyz: Float) -> tuple[Float, Float]:
+        """Distance along the line and to its right, (n,) each, of points (n, 2 or 3), m."""
+        points = np.asarray(xyz, dtype=np.float64)
+        along, across = np.empty(len(points)), np.empty(len(points))
+        _place_all(self._segments, self._grid, self._corner, points, along, across)
+        return along, across
+
+    def point(self, along: ArrayLike, across: ArrayLike) -> Float:
+        """Coordinates (n, 2) of places on or beside the line, m: the inverse of :meth:`place`."""
+        a, x = (np.atleast_1d(v).astype(np.float64) for v in np.broadcast_arrays(along, across))
+        s = self._segments
+        i = np.clip(np.searchsorted(self.distance, a, side="right") - 1, 0, len(s) - 1)
+        share = (a - s[i, 7]) / (s[i, 8] - s[i, 7])
+        first, last = x * s[i, 5], s[i, 4] + x * s[i, 6]
+        ahead = first + share * (last - first)
+        return np.column_stack([s[i, 0] + ahead * s[i, 2] + x * s[i, 3], s[i, 1] + ahead * s[i, 3] - x * s[i, 2]])
+
+
+def _nearest_segments(vertices: Float, length: Float) -> tuple[NDArray[np.int32], Float]:
+    """Which segment is the nearest to the middle of each cell of a grid around the line, and where the grid lies."""
+    low, high = vertices.min(axis=0) - _APRON, vertices.max(axis=0) + _APRON
+    edge = max(5.0, float(np.sqrt((high - low).prod() / _MOST_CELLS)))
+    shape = np.ceil((high - low) / edge).astype(int)
+    x, y = (low[k] + edge * (np.arange(shape[k]) + 0.5) for k in range(2))
+    cells = np.column_stack([g.ravel() for g in np.meshgrid(x, y, indexing="xy")])
+    parts = np.ceil(length / edge).astype(int)
+    which = np.repeat(np.arange(len(length)), parts)
+    share = (np.arange(len(which)) - np.repeat(np.cumsum(parts) - parts, parts) + 0.5) / np.repeat(parts, parts)
+    samples = vertices[which] + share[:, None] * (vertices[which + 1] - vertices[which])
+    nearest = cKDTree(samples).query(cells)[1]
+    grid = which[nearest].reshape(shape[1], shape[0]).astype(np.int32)
+    return grid, np.array([low[0], low[1], edge])
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _place(s: Float, grid: NDArray[np.int32], corner: Float, x: float, y: float) -> tuple[float, float]:
+    """Along and across of a point: from the segment nearest to its cell to the one between whose ends it lies."""
+    column = min(max(int((x - corner[0]) / corner[2]), 0), grid.shape[1] - 1)
+    row = min(max(int((y - corner[1]) / corner[2]), 0), grid.shape[0] - 1)
+    i = grid[row, column]
+    last = s.shape[0] - 1
+    way = 0
+    while True:
+        dx, dy = x - s[i, 0], y - s[i, 1]
+        ahead = dx * s[i, 2] + dy * s[i, 3]
+        across = dx * s[i, 3] - dy * s[i, 2]
+        begin, end = across * s[i, 5], s[i, 4] + across * s[i, 6]
+        if end - begin < 0.1 * s[i, 4]:  # beyond the centre of the bend
+            begin, end = 0.0, s[i, 4]
+        share = (ahead - begin) / (end - begin)
+        if share < 0.0 and i > 0 and way <= 0:
+            i -= 1
+            way = -1
+        elif share > 1.0 and i < last and way >= 0:
+            i += 1
+            way = 1
+        else:
+            return s[i, 7] + share * (s[i, 8] - s[i, 7]), across
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _place_all(
+    s: Float, grid: NDArray[np.int32], corner: Float, points: Float, along: Float, across: Float
+) -> None:  # pragma: no cover - compiled
+    for k in prange(points.shape[0]):
+        along[k], across[k] = _place(s, grid, corner, points[k, 0], points[k, 1])

@@ -1,0 +1,261 @@
+"""What the intensity of a kilometre is corrected with: scanner positions, range curve, roughness, found on a sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+import psycopg
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from tunneldb.store.survey import Survey
+from tunneldb.errors import UserError
+from tunneldb.radiometry.cells import Sight
+from tunneldb.radiometry.correction import Kind, Views, needs_reference, range_span
+from tunneldb.radiometry.robust_statistics import Dry, plain_statistics
+from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
+from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.radiometry.roughness import (
+    STEEPEST,
+    TELLING,
+    Roughness,
+    automatic_regions,
+    drawn_regions,
+    find_roughness,
+)
+from tunneldb.store.sources import sample
+from tunneldb.anomalies.detect import Detection, dry_places
+from tunneldb.anomalies.background.contrast import Relative
+from tunneldb.raster.observation import Eye, Radiometer, Seen, Span
+from tunneldb.store.images import load_reference
+from tunneldb.pointcloud.poses import load_poses
+
+CORNER = 0.1
+"""Points that serve for the roughness lie farther above the foot of the wall, m: there sections are rounded, and the incidence
+angles wrong."""
+
+NEAR_SURFACE = 0.05
+"""Points that serve for the roughness lie no farther from the surface, m."""
+
+UNKNOWN = ReferenceCurve(np.array([1e-3, 1e4]), np.zeros(2))
+"""Stands for a range curve that is yet to be found: changes nothing."""
+
+BORROW = (
+    "or, where the curve of a neighbouring kilometre was found, export its range_m and intensity_db"
+    " (tunnel_api.range_curve) and run this one in a survey with that file as its --reference"
+)
+"""What else helps where no range curve could be found."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Points of survey density, as seen.
+
+    Attributes
+    ----------
+    seen : Seen
+        Where they lie and what they show.
+    scan_id : (n,) int array
+        Scan that each is of.
+    clear : (n,) bool array
+        Those on the lining, clear of its foot.
+    """
+
+    seen: Seen
+    scan_id: NDArray[np.int32]
+    clear: NDArray[np.bool_]
+
+    @property
+    def views(self) -> Views:
+        """How the scanner saw the points."""
+        assert self.seen.views is not None
+        return self.seen.views
+
+    @property
+    def telling(self) -> NDArray[np.bool_]:
+        """Points that say something of range and incidence: clear of the lining's foot and near the surface."""
+        return self.clear & (np.abs(self.seen.offset) <= NEAR_SURFACE)
+
+    def along(self, curve: ReferenceCurve) -> Sample:
+        """Correct for distance by a curve what was seen with an UNKNOWN one."""
+        views = self.views
+        level = (views.raw_db - curve(views.range_m.astype(np.float64))).astype(np.float32)
+        return replace(self, seen=replace(self.seen, views=replace(views, distance_db=level)))
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What a kilometre's intensity is corrected with.
+
+    Attributes
+    ----------
+    eye : Eye
+        Sees points with the range curve that holds here.
+    view : Sample
+        What it sees at survey density.
+    roughness : Roughness
+        Of the lining.
+    found : RangeCurve or None
+        Range curve found on this kilometre's lining; None where it was measured, or isn't needed.
+    """
+
+    eye: Eye
+    view: Sample
+    roughness: Roughness
+    found: RangeCurve | None
+
+    @property
+    def note(self) -> str | None:
+        """What the ledger is to say about it."""
+        if self.found is None or not self.found.hardly_overlaps:
+            return None
+        return "hardly any lining was seen by two scans: the range curve rests on its being alike along the tunnel, within 5 m"
+
+
+def find_radiometer(conn: psycopg.Connection[Any], survey: Survey, max_incidence: float, max_range: float) -> Radiometer | None:
+    """Gather what a survey's intensity is corrected with; None when it has none.
+
+    A range curve that is to be found on the lining is UNKNOWN at first: see :func:`calibrate`.
+    """
+    if survey.intensity_kind == "none":
+        return None
+    kind = cast(Kind, survey.intensity_kind)
+    reference = None
+    if needs_reference(kind):
+        reference = UNKNOWN if survey.reference == "auto" else load_reference(conn, survey)
+    if needs_reference(kind) and reference is None:
+        raise UserError(
+            f"survey {survey.name} has no reference curve, without which intensity of kind {kind} can't be corrected for"
+            " distance: add the survey with --reference CSV (range_m,intensity_db), or with --reference auto to have it"
+            " found on the lining, or take a reflectance dimension"
+        )
+    return Radiometer(kind, load_poses(conn, survey), reference, max_incidence, max_range)
+
+
+def take_sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye) -> Sample:
+    """Look at points of survey density, and check their ranges against the reference curve before files are read."""
+    points = sample(conn, survey, eye.km)
+    seen = eye.see(points, f"survey {survey.name}")
+    if not seen.lining.any():
+        raise UserError(
+            f"no point of kilometre {eye.km} lies on the lining: within {eye.tolerance:g} m of the sections and seen at"
+            f" less than intensity.max_incidence from nearer than intensity.max_range"
+        )
+    assert eye.radiometer is not None
+    if eye.radiometer.reference:
+        span = Span()
+        assert seen.views is not None
+        span.add(*range_span(seen.views, seen.lining, eye.radiometer.reference))
+        span.require(eye.radiometer.reference)
+    return Sample(seen, points.scan_id, seen.lining & ~eye.floor.covers(seen.chainage, seen.arc, CORNER))
+
+
+def calibrate(conn: psycopg.Connection[Any], survey: Survey, eye: Eye, drawn: list[Polygon]) -> Calibration:
+    """Find range curve and roughness of a kilometre on points of survey density.
+
+    Parameters
+    ----------
+    conn, survey
+        Where.
+    eye : Eye
+        Of :func:`find_radiometer`'s radiometer.
+    drawn : list of Polygon
+        Homogeneous regions that the user drew, if any: they decide about the roughness.
+
+    Raises
+    ------
+    UserError
+        If nothing is seen of the lining, it lies outside the reference curve, or its own curve can't be found on it.
+    """
+    view = take_sample(conn, survey, eye)
+    if survey.reference != "auto":
+        return Calibration(eye, view, roughness_of(view, drawn), None)
+    assert eye.radiometer is not None
+    try:
+        found = find_range_curve(view, eye)
+        found.require()
+    except UserError as error:
+        raise UserError(f"survey {survey.name}, kilometre {eye.km}: {error}; {BORROW}") from None
+    eye = replace(eye, radiometer=replace(eye.radiometer, reference=found.curve))
+    view = view.along(found.curve)
+    return Calibration(eye, view, roughness_of(view, drawn) if drawn else _roughness_found(view, found), found)
+
+
+def find_range_curve(view: Sample, eye: Eye) -> RangeCurve:
+    """Range curve and roughness from the lining itself; see :func:`estimate_range_curve`.
+
+    It spans the ranges of all that full density may hold as lining: what stands out from it or back behind it too.
+    """
+    seen, views, near = view.seen, view.views, view.telling
+    ranges = views.range_m[seen.lining].astype(np.float64)
+    return estimate_range_curve(
+        Sight(
+            np.column_stack([seen.chainage[near], seen.arc[near]]),
+            view.scan_id[near],
+            views.range_m[near].astype(np.float64),
+            views.cosine[near].astype(np.float64),
+            views.raw_db[near].astype(np.float64),
+        ),
+        reach=(max(float(ranges.min()) - eye.tolerance, 0.1), float(ranges.max()) + max(eye.tolerance, eye.recess)),
+    )
+
+
+def _roughness_found(view: Sample, found: RangeCurve) -> Roughness:
+    """The roughness that was found with the range curve, as founded as its deviation says."""
+    angle = np.degrees(np.arccos(view.views.cosine[view.telling]))
+    return Roughness(
+        found.roughness,
+        found.roughness_sigma < TELLING,
+        False,
+        float("nan"),
+        float("nan"),
+        found.cells,
+        *(float(a) for a in np.quantile(angle[angle <= STEEPEST], (0.001, 0.999))),
+    )
+
+
+def roughness_of(view: Sample, drawn: list[Polygon]) -> Roughness:
+    """Roughness from the regions that the user drew, or from automatic ones."""
+    seen, views = view.seen, view.views
+    if drawn:
+        regions = drawn_regions(_polygon_of(seen, drawn), view.scan_id, views.cosine, views.distance_db)
+        if len(regions) < 2:
+            raise UserError(f"the {len(drawn)} homogeneous regions drawn hold too few points: draw larger ones, or none")
+        return find_roughness(regions)
+    near = view.telling
+    regions = automatic_regions(
+        seen.chainage[near], seen.arc[near], view.scan_id[near], views.cosine[near], views.distance_db[near]
+    )
+    return find_roughness(regions)
+
+
+def _polygon_of(seen: Seen, polygons: list[Polygon]) -> NDArray[np.int64]:
+    """Number of the polygon that holds each point, -1 for none."""
+    number = np.full(len(seen.chainage), -1, np.int64)
+    usable = np.flatnonzero(seen.use)
+    for k, polygon in enumerate(polygons):
+        number[usable[shapely.contains_xy(polygon, seen.chainage[usable], seen.arc[usable])]] = k
+    return number
+
+
+def dry_sigma(
+    view: Sample,
+    darker: Relative,
+    found: Detection,
+    roughness: Roughness,
+    dry_regions: list[Polygon],
+) -> tuple[Dry, Dry, Dry]:
+    """Standard deviation of dry lining points, raw and corrected by Lambert's law and Oren–Nayar (Table 1)."""
+    seen, views = view.seen, view.views
+    if dry_regions:
+        dry = seen.lining & (_polygon_of(seen, dry_regions) >= 0)
+    else:
+        dry = view.clear & dry_places(darker, found, seen.chainage, seen.arc)
+    return (
+        plain_statistics(views.raw_db[dry]),
+        plain_statistics(views.corrected(0.0)[dry]),
+        plain_statistics(views.corrected(roughness.sigma)[dry]),
+    )

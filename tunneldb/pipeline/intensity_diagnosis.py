@@ -1,0 +1,294 @@
+"""Whether intensity depends on range or incidence: looks at a survey, or at a scan file by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import psycopg
+from numpy.typing import NDArray
+
+from tunneldb.store.survey import Survey
+from tunneldb.errors import UserError
+from tunneldb.store.surface import load_surface
+from tunneldb.radiometry.incidence import incidence_cosine
+from tunneldb.radiometry.cells import Sight
+from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
+from tunneldb.radiometry.diagnosis import Look, pool
+from tunneldb.radiometry.oren_nayar import incidence_db
+from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
+from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.pipeline.detect import ASIDE, load_floor
+from tunneldb.pipeline.calibration import UNKNOWN, find_radiometer, find_range_curve, roughness_of, take_sample
+from tunneldb.store.sources import SAMPLE
+from tunneldb.raster.accumulator import KILOMETRE
+from tunneldb.raster.observation import Eye
+from tunneldb.store.images import load_reference, load_regions
+from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_scans
+from tunneldb.pointcloud.reader import Points, read_chunks, read_header
+from tunneldb.pointcloud.thinning import thin
+
+Float = NDArray[np.float64]
+
+THINNEST = 0.05
+"""Edge of the voxels to which a scan is thinned before planes are fitted, m; more where it would hold too many points."""
+
+MOST_POINTS = 2_000_000
+"""Points of a thinned scan, at the most."""
+
+
+def look_at_survey(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    kilometres: Sequence[int],
+    values: Mapping[str, float],
+    progress: Callable[[float], None] = lambda count: None,
+) -> Look:
+    """Look at lining points of survey density of some kilometres; nothing is changed.
+
+    Parameters
+    ----------
+    conn, survey, kilometres
+        Where.
+    values : mapping
+        Parameters of the stages.
+    progress : callable
+        Given 1 after each kilometre.
+
+    Raises
+    ------
+    UserError
+        If the survey has no intensity, or a kilometre no sections or ground yet.
+    """
+    if survey.intensity_kind == "none":
+        raise UserError(f"survey {survey.name} has no intensity: it was added with --intensity-kind none")
+    share = max(1, SAMPLE // len(kilometres))
+    looks = []
+    for km in kilometres:
+        looks.append(_look_at_kilometre(conn, survey, km, values, share))
+        progress(1)
+    numbers = ", ".join(map(str, kilometres))
+    return pool(f"{survey.name}, kilometre {numbers}: {survey.intensity_kind}", looks)
+
+
+def _look_at_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], most: int) -> Look:
+    kind = cast(Kind, survey.intensity_kind)
+    measured = load_reference(conn, survey) if needs_reference(kind) else None
+    surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
+    # Without a curve the lining itself is asked, whether or not detection is to go by it.
+    radiometer = find_radiometer(
+        conn,
+        survey if measured else replace(survey, reference="auto"),
+        values["intensity.max_incidence"],
+        values["intensity.max_range"],
+    )
+    depth = values["lining.tolerance"], values["lining.recess"]
+    eye = Eye.of(surface, km, depth, radiometer, load_floor(conn, survey, km, 0.0))
+    view = take_sample(conn, survey, eye)
+    found, refused = _attempt(lambda: find_range_curve(view, eye), view.views.raw_db[view.telling])
+    if needs_reference(kind) and measured is None:
+        roughness, note = found.roughness if found else None, None
+        view = view.along(found.curve if found else UNKNOWN)
+    else:
+        known = roughness_of(view, load_regions(conn, survey, km, "homogeneous"))
+        roughness, note = known.sigma, known.note
+    near = np.flatnonzero(view.telling)
+    near = near[:: max(1, len(near) // most)]
+    seen = view.views
+    return _look(
+        f"kilometre {km}",
+        kind,
+        _Points(*(v[near].astype(np.float64) for v in (seen.range_m, seen.cosine, seen.raw_db, seen.distance_db))),
+        roughness,
+        found,
+        measured,
+        [note, refused],
+    )
+
+
+def look_at_file(
+    path: Path,
+    dimension: str,
+    kind: Kind,
+    scanner: tuple[float, float, float] | None,
+    begin: Callable[[str, float | None], Callable[[float], None]] = lambda text, total: lambda count: None,
+) -> Look:
+    """Look at a scan file by itself: normals are those of planes through neighbouring points.
+
+    Parameters
+    ----------
+    path : Path
+        LAS, LAZ or E57.
+    dimension : str
+        Dimension that holds the intensity.
+    kind : {'amplitude', 'reflectance', 'linear'}
+        What it is.
+    scanner : three floats or None
+        Where the scanner stood, in the file's coordinates, m; None to take the poses of an E57 file.
+    begin : callable
+        Called with a text and a number of points, None if unknown, before each step; returns what takes the points done.
+
+    Raises
+    ------
+    UserError
+        If the file can't be read, or it isn't known where the scanner stood.
+    """
+    stations = _stations(path, scanner)
+    xyz, scan_id, raw = _thinned(path, dimension, begin(path.name, read_header(path).points))
+    scans = np.unique(scan_id)
+    if scanner is not None and len(scans) > 1:
+        raise UserError(
+            f"{path} holds {len(scans)} scans ({_some(scans)}), and --scanner is the place of one: split the file by"
+            " point_source_id, or load it into a survey with --stations"
+        )
+    begin("fitting", None)
+    at = (
+        np.tile(np.asarray(scanner), (len(xyz), 1))
+        if scanner is not None
+        else np.array([stations[s] for s in scan_id.tolist()])
+    )
+    cosine = incidence_cosine(xyz, at)
+    range_m = np.linalg.norm(xyz - at, axis=1)
+    level = to_decibel(raw, kind)
+    flat = np.isfinite(cosine) & np.isfinite(level)
+    if not flat.any():
+        raise UserError(f"{path}: no surface is flat enough for its normal, and so for incidence angles, to be known")
+    sight = Sight(xyz, scan_id, range_m, cosine, level).some(flat)
+    range_m, cosine, level = sight.range_m, sight.cosine, sight.level
+    found, refused = _attempt(lambda: estimate_range_curve(sight, unrolled=False), level)
+    distance = level
+    if found and needs_reference(kind):
+        distance = level - found.curve(range_m)
+    roughness = found.roughness if found else None
+    return _look(path.name, kind, _Points(range_m, cosine, level, distance), roughness, found, None, [refused])
+
+
+@dataclass(frozen=True)
+class _Points:
+    """Range, m, cosine of incidence, intensity as measured and corrected for distance, dB; (n,) each."""
+
+    range_m: Float
+    cosine: Float
+    raw: Float
+    distance: Float
+
+
+def _look(
+    title: str,
+    kind: Kind,
+    points: _Points,
+    roughness: float | None,
+    found: RangeCurve | None,
+    measured: ReferenceCurve | None,
+    remarks: list[str | None],
+) -> Look:
+    """Correct points by what is known, and say by what."""
+    nothing = roughness is None or (needs_reference(kind) and found is None and measured is None)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        corrected = (
+            np.full(len(points.raw), np.nan) if nothing else points.distance - incidence_db(points.cosine, roughness or 0.0)
+        )
+    notes = []
+    if nothing:
+        notes.append(f"{title}: not corrected")
+    else:
+        by = "the maker" if not needs_reference(kind) else "the measured curve" if measured else "the curve found here"
+        notes.append(f"{title}: distance corrected by {by}, incidence by roughness {roughness:.1f}°")
+    if found:
+        sigma, where = found.worst
+        notes.append(
+            f"{title}: found on {found.cells:,} cells, {found.overlapping:,} of them seen by several scans: range curve known"
+            f" to {sigma:.2f} dB between {found.nearest:.1f} and {found.farthest:.1f} m (worst at {where:.1f} m),"
+            f" roughness {found.roughness:.1f}° ± {found.roughness_sigma:.1f}°"
+        )
+        if found.hardly_overlaps:
+            notes.append(f"{title}: hardly any of it was seen by two scans, so it is taken to be alike within a few metres")
+    notes += [f"{title}: {remark}" for remark in remarks if remark]
+    return Look(
+        f"{title}: {kind}",
+        points.range_m,
+        np.degrees(np.arccos(np.clip(points.cosine, -1.0, 1.0))),
+        points.raw,
+        corrected,
+        () if nothing or roughness is None else (roughness,),
+        (found,) if found else (),
+        measured,
+        tuple(notes),
+    )
+
+
+def _attempt(find: Callable[[], RangeCurve], raw: NDArray[np.floating]) -> tuple[RangeCurve | None, str | None]:
+    """A range curve if one could be found, and why detection would refuse it, if it would.
+
+    One less certain than that intensity, dB, is within so much of its mean anywhere, says nothing and is not shown.
+    """
+    try:
+        found = find()
+    except UserError as error:
+        return None, str(error)
+    try:
+        found.require()
+    except UserError as error:
+        return found if found.worst[0] < float(np.std(raw)) else None, str(error)
+    return found, None
+
+
+def _stations(path: Path, scanner: tuple[float, float, float] | None) -> dict[int, Float]:
+    """Positions of a file's scans by their numbers; none where ``scanner`` says it."""
+    if not is_e57(path):
+        if scanner is None:
+            raise UserError(f"{path}: where the scanner stood isn't in a LAS file: give --scanner X Y Z in its coordinates")
+        return {}
+    scans = read_e57_scans(path)
+    posed = {scan.number: scan.position for scan in scans if scan.position is not None}
+    if scanner is not None:
+        if posed:
+            raise UserError(f"{path}: its scans bring their poses, so --scanner isn't needed: leave it out")
+        return {}
+    for scan in scans:
+        if scan.number not in posed:
+            raise UserError(
+                f"{path}: scan {scan.name!r} has no pose, so where the scanner stood isn't known: give --scanner X Y Z"
+            )
+    return posed
+
+
+def _thinned(
+    path: Path, dimension: str, progress: Callable[[float], None]
+) -> tuple[Float, NDArray[np.int32], NDArray[np.float32]]:
+    """Coordinates, scan and raw intensity of a scan's points, each scan thinned to a point a voxel."""
+    kept: list[Points] = []
+    edge, count = THINNEST, 0
+    for chunk in read_chunks(path, dimension):
+        kept.append(_thin(chunk, edge))
+        count += len(kept[-1])
+        while count > 2 * MOST_POINTS:
+            kept = [_thin(_joined(kept), edge)]
+            count = len(kept[0])
+            edge *= 1.0 if count <= MOST_POINTS else 2.0**0.5
+        progress(len(chunk))
+    if not count:
+        raise UserError(f"{path}: the file holds no points")
+    points = _thin(_joined(kept), edge)
+    return points.xyz, points.scan_id, points.intensity
+
+
+def _thin(points: Points, edge: float) -> Points:
+    chosen = np.zeros(len(points), np.bool_)
+    for scan in np.unique(points.scan_id):
+        of = np.flatnonzero(points.scan_id == scan)
+        chosen[of[thin(points.xyz[of], edge)]] = True
+    return points.some(chosen)
+
+
+def _joined(parts: list[Points]) -> Points:
+    names = ("xyz", "time", "scan_id", "intensity", "classification")
+    return Points(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def _some(numbers: NDArray[np.int32]) -> str:
+    shown = ", ".join(map(str, numbers[:5].tolist()))
+    return shown if len(numbers) <= 5 else f"{shown}, …"

@@ -1,0 +1,301 @@
+"""Loading what was read of scan files into a survey's kilometres: thinned as a whole, in chainage order."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+from numpy.typing import NDArray
+
+from tunneldb.store.survey import Survey
+from tunneldb.errors import UserError
+from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.store.surface import load_alignment
+from tunneldb.store.scan_files import COUNTED, Loaded, change_counts, outcome, recorded_files, unchanged
+from tunneldb.store.fragment import drop_fragments, read_fragment
+from tunneldb.store.ledger import Run, lock, stage_run
+from tunneldb.store.partition import partition_exists, read_partition, rows_in, swap_partition, write_partition
+from tunneldb.pipeline.read import Begin, Counts, Reading, silent
+from tunneldb.pipeline.load_settings import parameters_of, require_same_density, settings_of
+from tunneldb.pointcloud.selection import MEMORY, FilterSettings
+from tunneldb.pointcloud.reader import ScanHeader, read_header
+from tunneldb.pointcloud.spool import Spool
+
+__all__ = ["chainages_near", "header_kilometres", "load_files", "load_kilometre", "parameters_of", "settings_of"]
+
+BATCH = 20_000_000  # points of files of the same kilometre that are loaded in one go
+
+
+def load_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, settings: FilterSettings) -> Counts:
+    """Load what waits for a kilometre, in the caller's transaction.
+
+    The rows that were read of files and wait there, and those that it has of other files, are thinned as a whole,
+    written aside and swapped in. Which rows a kilometre has in the end does not depend on the order in which its files
+    are read or loaded.
+
+    Returns
+    -------
+    dict
+        ``files``, those that waited, and ``kept``, the rows that the kilometre has now.
+
+    Raises
+    ------
+    UserError
+        If another process is at work on the kilometre, or the survey is loaded with another density.
+    """
+    require_same_density(conn, survey, settings)
+    merged = merge(conn, survey, km, settings)
+    finish(conn, survey, [merged])
+    return {"files": merged.files, "kept": merged.kept}
+
+
+@dataclass(frozen=True)
+class Merged:
+    """A kilometre built aside.
+
+    Attributes
+    ----------
+    km, files, kept : int
+        Number of the kilometre; files that waited for it; rows that it has now.
+    changes : dict of int to (int, int)
+        By how much the rows kept and thinned of files (by id) change.
+    """
+
+    km: int
+    files: int
+    kept: int
+    changes: dict[int, tuple[int, int]]
+
+
+def merge(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    km: int,
+    settings: FilterSettings,
+    begin: Begin = silent,
+    memory: int = MEMORY,
+    held: Mapping[int, Spool] | None = None,
+) -> Merged:
+    """Build a kilometre aside with what waits for it; `finish` puts it in place.
+
+    What was read of the files in `held`, by id, is there and not in fragments.
+    """
+    held = held or {}
+    lock(conn, survey.id, km)
+    waiting = dict(
+        conn.execute(
+            "SELECT k.file_id, k.rows FROM tunnel.file_km k JOIN tunnel.scan_file f ON f.id = k.file_id"
+            " WHERE f.survey_id = %s AND k.km = %s AND k.loaded_at IS NULL ORDER BY k.file_id FOR UPDATE OF k",
+            [survey.id, km],
+        ).fetchall()
+    )
+    files = sorted(recorded_files(conn, survey).values(), key=lambda file: file.name)
+    file_ids = np.array([file.id for file in files], np.int32)
+    tags = {file.id: tag for tag, file in enumerate(files)}
+    before = np.zeros(len(files), np.int64)
+    with Spool(memory) as spool:
+        if waiting and len(waiting) < len(files) and partition_exists(conn, survey, km):
+            order = np.argsort(file_ids)
+            for rows in read_partition(conn, survey, km, load_alignment(conn, survey)):
+                rows = rows[~np.isin(rows["tag"], list(waiting))]
+                rows["tag"] = order[np.searchsorted(file_ids, rows["tag"], sorter=order)]
+                before += np.bincount(rows["tag"], minlength=len(files))
+                spool.add(rows)
+        total = int(before.sum()) + sum(waiting.values())
+        advance = begin(f"kilometre {km}", max(total, 1))
+        if not waiting:
+            advance(1)
+            return Merged(km, 0, rows_in(conn, survey, km), {})
+        stored = [file_id for file_id, count in waiting.items() if count and file_id not in held]
+        for file_id in stored:
+            for rows in read_fragment(conn, survey, file_id, km, tags[file_id]):
+                spool.add(rows)
+        parts: list[tuple[Spool, int | None]] = [(spool, None)]
+        parts += [(held[file_id], tags[file_id]) for file_id in waiting if file_id in held]
+        # A file by itself is thinned already.
+        edge = None if len(waiting) == 1 and not before.any() else settings.edge
+        written = write_partition(conn, survey, km, parts, edge, file_ids, advance)
+    drop_fragments(conn, survey, stored, [km])
+    _settle(conn, km, list(waiting))
+    changes = {}
+    for file_id, tag in tags.items():
+        change = int(written[tag] - before[tag])
+        # of a file that waited all points were counted as neither kept nor thinned there
+        changes[file_id] = (change, waiting.get(file_id, 0) - change)
+    return Merged(km, len(waiting), int(written.sum()), changes)
+
+
+def finish(conn: psycopg.Connection[Any], survey: Survey, merged: Sequence[Merged]) -> None:
+    """Put kilometres in place, and enter what their files have come to: last in a transaction, for others wait then."""
+    changes: dict[int, tuple[int, int]] = {}
+    for one in merged:
+        if one.files:
+            swap_partition(conn, survey, one.km, one.kept)
+        for file_id, change in one.changes.items():
+            kept, thinned = changes.get(file_id, (0, 0))
+            changes[file_id] = (kept + change[0], thinned + change[1])
+    change_counts(conn, changes)
+
+
+def _settle(conn: psycopg.Connection[Any], km: int, file_ids: list[int]) -> None:
+    """Enter that files are loaded into a kilometre; those that have left it are forgotten there."""
+    conn.execute(
+        "DELETE FROM tunnel.file_km WHERE file_id = ANY (%s) AND km = %s AND isempty(points) AND rows = 0", [file_ids, km]
+    )
+    conn.execute("UPDATE tunnel.file_km SET loaded_at = clock_timestamp() WHERE file_id = ANY (%s) AND km = %s", [file_ids, km])
+
+
+def load_files(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    paths: Sequence[Path],
+    settings: FilterSettings,
+    begin: Begin = silent,
+    memory: int = MEMORY,
+) -> Iterator[Loaded]:
+    """Read scan files and load the kilometres that they touch.
+
+    Files of the same kilometre are loaded together, as long as they have no more than BATCH points; each such batch is
+    one transaction. Which points a survey holds does not depend on the order in which its files are loaded.
+
+    Parameters
+    ----------
+    conn : Connection
+        Idle.
+    survey : Survey
+    paths : sequence of Path
+        Scan files. A file is known by its name without the folder; one of the same name and other content that was
+        loaded before is replaced, one of the same content is left as it is.
+    settings : FilterSettings
+    begin : callable
+        Told of each step that begins; returns what is told of its progress.
+    memory : int
+        Bytes of points held in memory by each of two spools.
+
+    Yields
+    ------
+    Loaded
+        One a file, as soon as it is committed.
+
+    Raises
+    ------
+    UserError
+        For a file that is unreadable or does not fit the survey. All are looked at before the first one is read; files
+        that were yielded stay loaded, of the others nothing is.
+    """
+    require_same_density(conn, survey, settings)
+    reading = Reading.of(conn, survey, settings, memory)
+    conn.rollback()
+    headers = _headers(reading, paths)
+    for batch in _batches(headers, reading.alignment, settings.max_distance):
+        recorded = recorded_files(conn, survey)
+        there = {header.path: unchanged(conn, header.path, recorded.get(header.path.name)) for header in batch}
+        conn.commit()
+        yield from (loaded for loaded in there.values() if loaded is not None)
+        changed = [header for header in batch if there[header.path] is None]
+        if changed:
+            yield from _load_batch(reading, changed, paths, begin)
+
+
+def _headers(reading: Reading, paths: Sequence[Path]) -> list[ScanHeader]:
+    names: dict[str, Path] = {}
+    for path in paths:
+        if path.name in names:
+            raise UserError(f"{path} and {names[path.name]} have the same name: a survey's files are known by their names")
+        names[path.name] = path
+    headers = [read_header(path) for path in paths]
+    for header in headers:
+        reading.check(header)
+    return headers
+
+
+def _batches(headers: Sequence[ScanHeader], alignment: Alignment, reach: float) -> Iterator[list[ScanHeader]]:
+    """Consecutive files that share a kilometre, judged by the boxes in their headers."""
+    batch: list[ScanHeader] = []
+    kilometres: set[int] = set()
+    for header in headers:
+        touched = set(header_kilometres(header, alignment, reach))
+        points = header.points + sum(other.points for other in batch)
+        if batch and (points > BATCH or not kilometres & touched):
+            yield batch
+            batch, kilometres = [], set()
+        batch.append(header)
+        kilometres |= touched
+    if batch:
+        yield batch
+
+
+def header_kilometres(header: ScanHeader, alignment: Alignment, reach: float) -> range:
+    """Kilometres that a file may touch by the box in its header, from the first to the last; empty if none.
+
+    Parameters
+    ----------
+    header : ScanHeader
+    alignment : Alignment
+        The given axis.
+    reach : float
+        How far from the axis the tunnel reaches, m.
+    """
+    touched = np.floor(chainages_near(header, alignment, reach) / KILOMETRE).astype(int)
+    return range(int(touched.min()), int(touched.max()) + 1) if len(touched) else range(0)
+
+
+def chainages_near(header: ScanHeader, alignment: Alignment, reach: float) -> NDArray[np.float64]:
+    """Chainages of the given axis' stations within the reach of the box in a file's header, in plan, m."""
+    low, high = header.low[:2] - reach, header.high[:2] + reach
+    inside = np.all((alignment.vertices[:, :2] >= low) & (alignment.vertices[:, :2] <= high), axis=1)
+    return np.asarray(alignment.number[inside] * alignment.spacing, dtype=np.float64)
+
+
+def _load_batch(reading: Reading, headers: Sequence[ScanHeader], given: Sequence[Path], begin: Begin) -> list[Loaded]:
+    """Read files and load their kilometres in one transaction."""
+    conn, survey, settings = reading.conn, reading.survey, reading.settings
+    parameters = {**parameters_of(settings), "files": [header.path.name for header in headers]}
+    held: dict[int, Spool] = {}
+    reading = replace(reading, held=held, share=len(headers))
+    with ExitStack() as stack, stage_run(conn, survey.id, None, "load", parameters) as run:
+        stack.callback(_close, held)
+        read = reading.read(headers, given, begin)
+        started = time.monotonic()
+        waiting = _waiting(conn, [file.id for file in read])
+        merged = [merge(conn, survey, km, settings, begin, reading.memory, held) for km in waiting]
+        finish(conn, survey, merged)
+        for one in merged:
+            _enter(conn, run, one.km, one.kept)
+        share = (time.monotonic() - started) / len(read)
+        loaded = [outcome(conn, file.id, file.state, file.seconds + share) for file in read]
+        for name in COUNTED:
+            run.counts[name] = sum(getattr(file, name) for file in loaded)
+    return loaded
+
+
+def _close(held: Mapping[int, Spool]) -> None:
+    for spool in held.values():
+        spool.close()
+
+
+def _waiting(conn: psycopg.Connection[Any], file_ids: list[int]) -> list[int]:
+    rows = conn.execute(
+        "SELECT DISTINCT km FROM tunnel.file_km WHERE file_id = ANY (%s) AND loaded_at IS NULL ORDER BY km", [file_ids]
+    )
+    return [row[0] for row in rows.fetchall()]
+
+
+def _enter(conn: psycopg.Connection[Any], run: Run, km: int, kept: int) -> None:
+    """Enter the kilometre into the ledger, for what rests on its points."""
+    conn.execute(
+        """
+        INSERT INTO tunnel.run (survey_id, km, stage, parameters, versions, counts, backend_pid, backend_start,
+                                started_at, finished_at, outcome)
+        SELECT survey_id, %s, stage, parameters, versions, jsonb_build_object('kept', %s::int8), backend_pid,
+               backend_start, started_at, clock_timestamp(), 'done'
+          FROM tunnel.run WHERE id = %s
+        """,
+        [km, kept, run.id],
+    )

@@ -1,0 +1,62 @@
+"""How a survey's files are read and loaded, as the ledger records it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import psycopg
+
+from tunneldb.store.survey import Survey
+from tunneldb.errors import UserError
+from tunneldb.pointcloud.selection import FilterSettings
+
+
+def settings_of(parameters: Mapping[str, Any]) -> FilterSettings:
+    """Settings that parameters state; those that they leave out have their defaults."""
+    default = parameters_of(FilterSettings())
+    value = {name: parameters.get(name, default[name]) for name in default}
+    return FilterSettings(
+        None if value["load.density"] == "all" else float(value["load.density"]),
+        int(value["load.noise_points"]),
+        float(value["load.noise_diameter"]),
+        float(value["load.max_distance"]),
+    )
+
+
+def parameters_of(settings: FilterSettings) -> dict[str, Any]:
+    """Parameters that state settings: ``load.density`` (points per m², or ``all``), ``load.noise_points``, …."""
+    return {
+        "load.density": "all" if settings.density is None else settings.density,
+        "load.noise_points": settings.noise_points,
+        "load.noise_diameter": settings.noise_diameter,
+        "load.max_distance": settings.max_distance,
+    }
+
+
+def require_same_density(conn: psycopg.Connection[Any], survey: Survey, settings: FilterSettings) -> None:
+    """Keep to a survey's one density: another one would thin what is there, or leave it thinner than what comes.
+
+    Raises
+    ------
+    UserError
+        If the survey holds files that were loaded with another one.
+    """
+    row = conn.execute(
+        """
+        SELECT r.parameters -> 'load.density' FROM tunnel.run r
+         WHERE r.survey_id = %(survey)s AND r.stage = 'load' AND r.outcome = 'done' AND r.parameters ? 'load.density'
+           AND EXISTS (SELECT FROM tunnel.scan_file f WHERE f.survey_id = %(survey)s)
+         ORDER BY r.id DESC LIMIT 1
+        """,
+        {"survey": survey.id},
+    ).fetchone()
+    if row is None:
+        return
+    there = settings_of({"load.density": row[0]}).density
+    if there != settings.density:
+        text = "all" if there is None else f"{there:g}"
+        raise UserError(
+            f"survey {survey.name} is loaded with density {text}: load with --density {text}, or remove the survey "
+            "and load all its files anew"
+        )

@@ -1,0 +1,213 @@
+"""Reading a scan file: filtered, thinned, set aside by kilometre, whole or not at all."""
+
+from __future__ import annotations
+
+import math
+import time
+import zlib
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import psycopg
+
+from tunneldb.store.survey import Survey
+from tunneldb.errors import UserError
+from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.store.surface import load_alignment
+from tunneldb.store.scan_files import (
+    Content,
+    Recorded,
+    checksum,
+    kilometres_of,
+    record_file,
+    record_kilometres,
+    recorded_files,
+    unchanged,
+)
+from tunneldb.store.fragment import drop_fragments, write_fragments
+from tunneldb.pipeline.load_settings import require_same_density
+from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
+from tunneldb.pointcloud.poses import PoseModel, load_poses
+from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
+from tunneldb.pointcloud.spool import Spool
+
+Counts = dict[str, Any]
+Begin = Callable[[str, int], Callable[[int], None]]
+"""Takes what begins and how much it is; returns what takes how much of it is done."""
+
+
+def silent(text: str, total: int) -> Callable[[int], None]:
+    """Begin something of which nobody is told."""
+    return lambda done: None
+
+
+def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, settings: FilterSettings) -> Counts:
+    """Read a scan file and set its points aside for the kilometres that it touches, in the caller's transaction.
+
+    A file is known by its name without the folder. One that was read before and is unchanged is left as it is, whether
+    its kilometres are loaded yet or wait. One that replaces another of its name also has those read again that overlap
+    the former one, and waits for runs of the kilometres that they touch.
+
+    Returns
+    -------
+    dict
+        ``file``, ``state`` (see `tunneldb.store.scan_files.Loaded`), ``points``, ``noise``, ``outside``, and ``kilometres``,
+        those that wait to be loaded with it.
+
+    Raises
+    ------
+    UserError
+        If the file is unreadable or does not fit the survey, another process reads it, or a file that has to be read
+        again is gone.
+    """
+    require_same_density(conn, survey, settings)
+    header = read_header(path)
+    reading = Reading.of(conn, survey, settings)
+    reading.check(header)
+    recorded = recorded_files(conn, survey).get(path.name)
+    known = unchanged(conn, path, recorded)
+    if recorded is not None and known is not None:
+        files, state = [recorded.id], known.state
+    else:
+        read = reading.read([header], [])
+        files, state = [file.id for file in read], read[0].state
+    row = conn.execute(
+        "SELECT points, noise, outside, ARRAY(SELECT DISTINCT km FROM tunnel.file_km"
+        " WHERE file_id = ANY (%s) AND loaded_at IS NULL ORDER BY km) FROM tunnel.scan_file WHERE id = %s",
+        [files, files[0]],
+    ).fetchone()
+    assert row is not None
+    return {"file": path.name, "state": state, "points": row[0], "noise": row[1], "outside": row[2], "kilometres": row[3]}
+
+
+@dataclass(frozen=True)
+class Read:
+    """A file that was read: its row, what became of it (see `tunneldb.store.scan_files.Loaded`), and seconds it took."""
+
+    id: int
+    state: str
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What reading files needs of their survey.
+
+    Attributes
+    ----------
+    held : dict of int to Spool, or None
+        Gets the rows of each file by its id, for who loads them in the same transaction; None writes them as fragments.
+    share : int
+        Number of files that share the memory for these rows.
+    """
+
+    conn: psycopg.Connection[Any]
+    survey: Survey
+    settings: FilterSettings
+    alignment: Alignment
+    poses: PoseModel
+    memory: int
+    held: dict[int, Spool] | None = None
+    share: int = 1
+
+    @classmethod
+    def of(cls, conn: psycopg.Connection[Any], survey: Survey, settings: FilterSettings, memory: int = MEMORY) -> Reading:
+        """Read axis and scanner positions of the survey."""
+        return cls(conn, survey, settings, load_alignment(conn, survey), load_poses(conn, survey), memory)
+
+    def check(self, header: ScanHeader) -> None:
+        """Check a file against its survey."""
+        check_header(header, self.survey.intensity_dimension, self.survey.srid, needs_time=self.poses.mobile)
+
+    def read(self, headers: Sequence[ScanHeader], given: Sequence[Path], begin: Begin = silent) -> list[Read]:
+        """Read files, none of which is there unchanged, then those that have to be read again because of them.
+
+        Parameters
+        ----------
+        headers : sequence of ScanHeader
+            At least one.
+        given : sequence of Path
+            Where files may lie now that have to be read again.
+        begin : callable
+            Told of each file that begins; returns what is told of its progress.
+        """
+        for header in headers:
+            self._claim(header.path.name)
+        recorded = recorded_files(self.conn, self.survey)
+        names = {header.path.name for header in headers}
+        former = [recorded[name] for name in names if name in recorded]
+        again = self._overlapped(former, [file for file in recorded.values() if file.name not in names])
+        others = [self._find(former, file, given) for file in again]
+        # Their kilometres change under nobody's hands; in this order, so that two never wait for each other.
+        for km in kilometres_of(self.conn, [file.id for file in [*former, *again]]):
+            self.conn.execute("SELECT pg_advisory_xact_lock(%s, %s)", [self.survey.id, km])
+        found = []
+        for header, again_ in [*((header, False) for header in headers), *((header, True) for header in others)]:
+            old = recorded.get(header.path.name)
+            state = "reread" if again_ else "loaded" if old is None else "replaced"
+            found.append(self._one(header, old, state, begin))
+        return found
+
+    def _claim(self, name: str) -> None:
+        """Keep others from reading a file of the same name; numbers far below those of kilometres stand for names."""
+        key = -(1 << 30) - (zlib.crc32(name.encode()) >> 2)
+        row = self.conn.execute("SELECT pg_try_advisory_xact_lock(%s, %s)", [self.survey.id, key]).fetchone()
+        if row is None or not row[0]:
+            raise UserError(f"another process is reading {name}: wait until it has finished (tunneldb status)")
+
+    def _overlapped(self, former: Sequence[Recorded], rest: Iterable[Recorded]) -> list[Recorded]:
+        """Files that overlap one that is replaced: points of theirs may come back where it was nearer to the centre."""
+        if self.settings.edge is None:
+            return []
+        reach = voxel_reach(self.settings.edge)
+        return [file for file in rest if any(file.low <= old.high + reach and file.high >= old.low - reach for old in former)]
+
+    def _find(self, former: Sequence[Recorded], file: Recorded, given: Sequence[Path]) -> ScanHeader:
+        path = next((path for path in given if path.name == file.name), Path(file.path))
+        if not path.is_file() or checksum(path) != file.checksum:
+            raise UserError(
+                f"{', '.join(old.name for old in former)} replaces a file that overlaps {file.name}, which has to be read"
+                f" again and is not at {path} as it was loaded: give its place in the same command"
+            )
+        header = read_header(path)
+        self.check(header)
+        return header
+
+    def _one(self, header: ScanHeader, former: Recorded | None, state: str, begin: Begin) -> Read:
+        path, started = header.path, time.monotonic()
+        survivors = Spool(self.memory // self.share)
+        try:
+            counts, digest = self._filter(header, survivors, begin(path.name, 2 * header.points))
+            stated = None if header.crs is None else self.survey.srid
+            left = [] if former is None else self._leave(former)
+            content = Content(path, digest, path.stat().st_size, stated, counts)
+            file_id = record_file(self.conn, self.survey, content)
+            record_kilometres(self.conn, file_id, survivors.kilometres(), counts.ranges, left)
+            if self.held is None:
+                write_fragments(self.conn, self.survey, file_id, survivors)
+            else:
+                self.held[file_id] = survivors
+        finally:
+            if self.held is None or survivors not in self.held.values():
+                survivors.close()
+        return Read(file_id, state, time.monotonic() - started)
+
+    def _filter(self, header: ScanHeader, survivors: Spool, progress: Callable[[int], None]) -> tuple[FilterCounts, str]:
+        """Filter a file; returns its counts and its checksum, which another thread makes meanwhile."""
+        with ThreadPoolExecutor(1, "checksum") as pool:
+            digest = pool.submit(checksum, header.path)
+            dimension = self.survey.intensity_dimension
+            counts = filter_file(
+                header.path, dimension, self.alignment, self.poses, self.settings, survivors, 0, progress, self.memory
+            )
+            return counts, digest.result()
+
+    def _leave(self, former: Recorded) -> list[int]:
+        """Drop what waits of a file's former content; returns the kilometres that may hold rows of it."""
+        drop_fragments(self.conn, self.survey, [former.id], kilometres_of(self.conn, [former.id]))
+        waiting = self.conn.execute("SELECT km FROM tunnel.file_km WHERE file_id = %s AND loaded_at IS NULL", [former.id])
+        held = range(math.floor(former.low / KILOMETRE), math.floor(former.high / KILOMETRE) + 1)
+        return sorted({*held, *(row[0] for row in waiting.fetchall())})

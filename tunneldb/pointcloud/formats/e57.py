@@ -1,0 +1,416 @@
+"""E57 files: their scans, with pose, read in chunks of constant memory.
+
+Needs pye57 (the extra ``e57``), of which only the binding to libE57Format is used: its own reading takes a scan whole.
+
+Source: ASTM E2807-11, Standard Specification for 3D Imaging Data Exchange, Version 1.0.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from tunneldb.errors import UserError
+from tunneldb.pointcloud.formats.faults import check_finite, check_ranges, decoding, require_dimension
+from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
+
+KIND = "an E57"
+CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
+SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
+FIRST_NUMBER = 65536  # scan numbers of LAS lie below
+FARTHEST = 1e8  # m; bounds beyond are those of an exporter that had none
+
+
+@dataclass(frozen=True)
+class Scan:
+    """One scan of an E57 file, as its header has it.
+
+    Attributes
+    ----------
+    index : int
+        Place in the file, from 0.
+    name : str
+        As the exporter called it.
+    number : int
+        `scan_number`.
+    records : int
+        Points, invalid ones included.
+    fields : frozenset of str
+        What a point has.
+    rotation : (3, 3) float64 array
+        Of the scan's own frame to the file's.
+    position : (3,) float64 array or None
+        Origin of the scan's own frame, where the scanner stood, in the file's, m; None where the scan has no pose.
+    start : float or None
+        When it began, s of GPS time; None where it is not said.
+    """
+
+    index: int
+    name: str
+    number: int
+    records: int
+    fields: frozenset[str]
+    rotation: NDArray[np.float64]
+    position: NDArray[np.float64] | None
+    start: float | None
+
+    @property
+    def has_time(self) -> bool:
+        """Whether its points have a GPS time."""
+        return "timeStamp" in self.fields and self.start is not None
+
+    def flags(self, dimension: str | None) -> list[str]:
+        """Fields that are 0 for the points that are good."""
+        names = ["cartesianInvalidState" if self._cartesian else "sphericalInvalidState"]
+        if dimension is not None:
+            names.append("isIntensityInvalid")
+        return [name for name in names if name in self.fields]
+
+    @property
+    def coordinates(self) -> tuple[str, str, str]:
+        """Fields of the coordinates."""
+        return CARTESIAN if self._cartesian else SPHERICAL
+
+    @property
+    def _cartesian(self) -> bool:
+        return self.fields.issuperset(CARTESIAN)
+
+
+def is_e57(path: Path) -> bool:
+    """Whether a file is one by its name."""
+    return path.suffix.lower() == ".e57"
+
+
+def scan_number(guid: str, position: NDArray[np.float64] | None) -> int:
+    """Number of a scan, the same in whichever file and place among the scans: a hash of its GUID and position.
+
+    From 65536 to 2³¹ − 1, so never one of a LAS file. A scan that was registered anew has another number.
+    """
+    place = b"" if position is None else struct.pack("<3d", *(position + 0.0))
+    digest = hashlib.blake2b(guid.strip().lower().encode() + place, digest_size=8).digest()
+    return FIRST_NUMBER + int.from_bytes(digest, "big") % ((1 << 31) - FIRST_NUMBER)
+
+
+def read_e57_scans(path: Path) -> list[Scan]:
+    """Scans of an E57 file that hold points.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read or holds no points, or pye57 is missing.
+    """
+    with open_e57(path) as image, decoding(path, KIND):
+        return scans_of(path, image)
+
+
+def read_e57_header(path: Path) -> ScanHeader:
+    """Read the header of an E57 file; see `tunneldb.pointcloud.reader.read_header`.
+
+    Its dimensions are ``intensity`` and ``gps_time``, where every scan has them. Where a scan's bounds are missing,
+    its points are read.
+    """
+    with open_e57(path) as image, decoding(path, KIND):
+        scans = scans_of(path, image)
+        boxes = [_box(image, scan) for scan in scans]
+        crs = _crs(image)
+    dimensions = [name for name, has in _DIMENSIONS if all(map(has, scans))]
+    return ScanHeader(
+        path,
+        sum(scan.records for scan in scans),
+        tuple(dimensions),
+        crs,
+        np.min([low for low, _ in boxes], axis=0),
+        np.max([high for _, high in boxes], axis=0),
+    )
+
+
+_DIMENSIONS = (
+    ("intensity", lambda scan: "intensity" in scan.fields),
+    ("gps_time", lambda scan: scan.has_time),
+)
+
+
+def read_e57(path: Path, dimension: str | None, size: int, ranges: Ranges | None = None) -> Iterator[Raw]:
+    """Read the valid points of an E57 file chunk by chunk; see `tunneldb.pointcloud.formats.raw.read_raw`.
+
+    Points are numbered through all scans, invalid ones left out. A scan before a range is passed over, for libE57Format
+    cannot seek a point inside a scan: what lies before it there is decoded.
+    """
+    with open_e57(path) as image:
+        with decoding(path, KIND):
+            scans = scans_of(path, image)
+        names = [name for name, has in _DIMENSIONS if all(map(has, scans))]
+        require_dimension(path, dimension, names)
+        if dimension == "gps_time":
+            raise UserError(f"{path}: gps_time is no intensity; the file has {', '.join(names)}")
+        records = sum(scan.records for scan in scans)
+        wanted = check_ranges(path, ranges, records)
+        cursor = _Cursor(path, image, scans, dimension, size)
+        if ranges is None:
+            yield from cursor.all()
+            return
+        for begin, end in wanted:
+            yield from cursor.read(begin, end)
+
+
+class _Cursor:
+    """Reads good points by their number, going on from the last one where it can."""
+
+    def __init__(self, path: Path, image: Any, scans: Sequence[Scan], dimension: str | None, size: int) -> None:
+        self.path, self.image, self.scans, self.dimension, self.size = path, image, scans, dimension, size
+        self.stream: Iterator[Raw] = iter(())
+        self.piece: Raw | None = None
+        self.at = self.stop = 0  # numbers of the points of the piece
+
+    def all(self) -> Iterator[Raw]:
+        """Whole file."""
+        good = 0
+        for raw in self._from(0):
+            check_finite(self.path, raw, self.dimension, good)
+            good += len(raw)
+            yield raw
+        require_good(self.path, self.scans, good)
+
+    def read(self, begin: int, end: int) -> Iterator[Raw]:
+        """Points begin to end, half-open."""
+        if begin < end:
+            self._go_to(begin)
+        while begin < end:
+            if begin < self.stop and self.piece is not None:
+                raw = self.piece.part(begin - self.at, min(end, self.stop) - self.at)
+                check_finite(self.path, raw, self.dimension, begin)
+                begin += len(raw)
+                yield raw
+                continue
+            self.at = self.stop
+            self.piece = next(self.stream, None)
+            if self.piece is None:
+                raise UserError(f"{self.path}: changed: it has {self.at} valid points, points up to {end} are wanted")
+            self.stop = self.at + len(self.piece)
+
+    def _go_to(self, number: int) -> None:
+        first, scan = 0, 0
+        while scan + 1 < len(self.scans) and first + (good := self._good(scan)) <= number:
+            first, scan = first + good, scan + 1
+        if number < self.at or first >= self.stop:
+            self.stream, self.piece, self.at, self.stop = self._from(scan), None, first, first
+
+    def _good(self, scan: int) -> int:
+        flags = tuple(self.scans[scan].flags(self.dimension))
+        if not flags:
+            return self.scans[scan].records
+        status = self.path.stat()
+        return _count_good(self.path, (status.st_size, status.st_mtime_ns), scan, flags)
+
+    def _from(self, scan: int) -> Iterator[Raw]:
+        for one in self.scans[scan:]:
+            with decoding(self.path, KIND):
+                yield from _read_scan(self.image, one, self.dimension, self.size)
+
+
+@cache
+def _count_good(path: Path, version: tuple[int, int], scan: int, flags: tuple[str, ...]) -> int:
+    """Good points of a scan; `version` tells contents of the file apart."""
+    with open_e57(path) as image, decoding(path, KIND):
+        one = scans_of(path, image)[scan]
+        return sum(int(good_of(fields, flags).sum()) for fields in read_fields(image, one, flags, CHUNK))
+
+
+def good_of(fields: dict[str, NDArray[Any]], flags: Sequence[str]) -> NDArray[np.bool_]:
+    """Tell which points are good: those that no flag speaks against."""
+    return np.logical_and.reduce([fields[flag] == 0 for flag in flags])
+
+
+def require_good(path: Path, scans: Sequence[Scan], good: int) -> None:
+    """Refuse a file of whose points, read to the end, none was good."""
+    if not good:
+        raise UserError(f"{path}: all {sum(scan.records for scan in scans)} points are marked as invalid")
+
+
+def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int) -> Iterator[Raw]:
+    """Points of a scan, turned into the file's frame; their position is added by the offsets."""
+    flags = scan.flags(dimension)
+    names = [*scan.coordinates, *flags]
+    names += ["intensity"] if dimension is not None else []
+    names += ["timeStamp"] if scan.has_time else []
+    offsets = np.zeros(3) if scan.position is None else scan.position
+    for fields in read_fields(image, scan, names, size):
+        if flags:
+            good = good_of(fields, flags)
+            fields = {name: values[good] for name, values in fields.items() if name not in flags}
+        turned = own_coordinates(scan, fields) @ scan.rotation.T
+        if len(turned):
+            yield Raw(
+                turned[:, 0],
+                turned[:, 1],
+                turned[:, 2],
+                np.ones(3),
+                offsets,
+                fields["timeStamp"] + scan.start if scan.has_time else None,
+                np.full(len(turned), scan.number, np.int32),
+                None if dimension is None else fields["intensity"].copy(),
+                None,
+            )
+
+
+def own_coordinates(scan: Scan, fields: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
+    """Coordinates (n, 3) in the scan's own frame, m."""
+    own = np.column_stack([fields[name] for name in scan.coordinates])
+    return _to_cartesian(own) if scan.coordinates is SPHERICAL else own
+
+
+def _to_cartesian(rae: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Range, azimuth and elevation (m, rad) to x, y, z (m)."""
+    distance, azimuth, elevation = rae.T
+    plan = distance * np.cos(elevation)
+    return np.column_stack([plan * np.cos(azimuth), plan * np.sin(azimuth), distance * np.sin(elevation)])
+
+
+def read_fields(image: Any, scan: Scan, names: Sequence[str], size: int) -> Iterator[dict[str, NDArray[Any]]]:
+    """Fields of a scan's points, as views of buffers that the next chunk overwrites."""
+    libe57 = _libe57()
+    count = min(size, scan.records)
+    arrays = {name: np.empty(count) for name in names}
+    buffers = libe57.VectorSourceDestBuffer()
+    for name, array in arrays.items():
+        buffers.append(libe57.SourceDestBuffer(image, name, array, count, True, True))
+    reader = image.root()["data3D"][scan.index]["points"].reader(buffers)
+    done = 0
+    try:
+        while done < scan.records:
+            read = reader.read()
+            if read == 0:
+                raise ValueError(f"scan {scan.name!r} ends after {done} of {scan.records} points")
+            done += read
+            yield {name: array[:read] for name, array in arrays.items()}
+    finally:
+        reader.close()
+
+
+@contextmanager
+def open_e57(path: Path) -> Iterator[Any]:
+    """Open a file with libE57Format, for the length of a with block."""
+    libe57 = _libe57()
+    with decoding(path, KIND):
+        with path.open("rb") as file:
+            if file.read(8) != b"ASTM-E57":
+                raise ValueError("it does not begin with ASTM-E57")
+        image = libe57.ImageFile(str(path), "r")
+    try:
+        yield image
+    finally:
+        image.close()
+
+
+def _libe57() -> Any:
+    try:
+        from pye57 import libe57
+    except ImportError as error:
+        raise UserError('E57 files are read by pye57, which is not installed: pip install "tunneldb[e57]"') from error
+    return libe57
+
+
+def scans_of(path: Path, image: Any) -> list[Scan]:
+    """Scans of an open file that hold points."""
+    root = image.root()
+    nodes = root["data3D"] if root.isDefined("data3D") else []
+    if len(nodes) == 0:
+        raise UserError(f"{path}: the file holds no scan")
+    scans = [scan for scan in (_scan(index, nodes[index]) for index in range(len(nodes))) if scan.records]
+    if not scans:
+        raise UserError(f"{path}: the file holds no points")
+    for scan in scans:
+        if not (scan.fields.issuperset(CARTESIAN) or scan.fields.issuperset(SPHERICAL)):
+            raise UserError(
+                f"{path}: the points of scan {scan.name!r} have no coordinates, only {', '.join(sorted(scan.fields))}"
+            )
+        if scan.position is not None and not np.isfinite([*scan.position, *scan.rotation.ravel()]).all():
+            raise UserError(f"{path}: the pose of scan {scan.name!r} is no pose; mend the file")
+    return scans
+
+
+def _scan(index: int, node: Any) -> Scan:
+    points = node["points"]
+    prototype = _libe57().StructureNode(points.prototype())
+    fields = frozenset(prototype.get(i).elementName() for i in range(prototype.childCount()))
+    name = node["name"].value() if node.isDefined("name") else f"{index + 1}"
+    guid = node["guid"].value() if node.isDefined("guid") else f"{name} {index}"
+    rotation, position = _pose(node)
+    start = value_of(node, "acquisitionStart/dateTimeValue")
+    return Scan(index, name, scan_number(guid, position), points.childCount(), fields, rotation, position, start)
+
+
+def _pose(node: Any) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    if not node.isDefined("pose"):
+        return np.eye(3), None
+    position = np.array([value_of(node, f"pose/translation/{name}", 0.0) for name in "xyz"], np.float64)
+    quaternion = [value_of(node, f"pose/rotation/{name}", float(name == "w")) for name in "wxyz"]
+    return _rotation(np.array(quaternion, np.float64)), position
+
+
+def _rotation(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Matrix of a quaternion w, x, y, z; NaN of one without length."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        w, x, y, z = quaternion / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def value_of(node: Any, name: str, missing: float | None = None) -> float | None:
+    """Number at a path below a node."""
+    if not node.isDefined(name):
+        return missing
+    for part in name.split("/"):
+        node = node[part]
+    return float(node.scaledValue() if hasattr(node, "scaledValue") else node.value())
+
+
+def _box(image: Any, scan: Scan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Box of a scan in the file's frame."""
+    node = image.root()["data3D"][scan.index]
+    limits = [[value_of(node, f"cartesianBounds/{axis}{end}", np.nan) for axis in "xyz"] for end in ("Minimum", "Maximum")]
+    low, high = np.array(limits, np.float64)
+    if not np.all(np.abs([low, high]) < FARTHEST):
+        boxes = [(xyz.min(axis=0), xyz.max(axis=0)) for xyz in map(_xyz, _read_scan(image, scan, None, CHUNK))]
+        if not boxes:
+            return np.full(3, np.inf), np.full(3, -np.inf)
+        return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+    position = np.zeros(3) if scan.position is None else scan.position
+    # The standard's bounds are in the scan's own frame; some exporters (pye57) write them in the file's.
+    if np.all((low <= position) & (position <= high)) and not np.all((low <= 0) & (high >= 0)):
+        return low, high
+    corners = np.array(list(product(*zip(low, high, strict=True)))) @ scan.rotation.T + position
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def _xyz(raw: Raw) -> NDArray[np.float64]:
+    return np.column_stack([raw.x, raw.y, raw.z]) * raw.scales + raw.offsets
+
+
+def _crs(image: Any) -> CRS | None:
+    """Coordinate system that the file names, where that can be understood; exporters write all sorts of things there."""
+    root = image.root()
+    text = root["coordinateMetadata"].value().strip() if root.isDefined("coordinateMetadata") else ""
+    if not text:
+        return None
+    try:
+        return CRS.from_user_input(text)
+    except CRSError:
+        return None

@@ -1,0 +1,88 @@
+"""Faults of scan files, each told in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from tunneldb.errors import UserError
+from tunneldb.pointcloud.points import Ranges, Raw
+
+
+@contextmanager
+def decoding(path: Path, kind: str) -> Iterator[None]:
+    """Turn whatever the decoder raises on the file's bytes into one line; `kind` is what the file should be."""
+    try:
+        yield
+    except UserError:
+        raise
+    except FileNotFoundError as error:
+        raise UserError(f"{path}: no such file") from error
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror or line_of(error)}") from error
+    except Exception as error:
+        raise UserError(f"{path}: truncated, corrupt or not {kind} file: {line_of(error)}") from error
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":  # how a panic of the LAZ decoder's Rust arrives
+            raise
+        raise UserError(f"{path}: truncated or corrupt: {line_of(error)}") from error
+
+
+def line_of(error: BaseException) -> str:
+    """First line of an error's text, or its name."""
+    return str(error).strip().split("\n", 1)[0] or type(error).__name__
+
+
+def require_dimension(path: Path, dimension: str | None, dimensions: Collection[str], use: str | None = None) -> None:
+    """Raise a UserError that lists the file's dimensions, unless `dimension`, needed for `use`, is one of them."""
+    if dimension is None or dimension in dimensions:
+        return
+    alike = next((name for name in dimensions if name.lower() == dimension.lower()), None)
+    needed = f", which {use} needs" if use else ""
+    meant = f" (did you mean {alike!r}? capitals matter)" if alike else ""
+    raise UserError(f"{path}: no dimension {dimension!r}{needed}{meant}; the file has {', '.join(dimensions) or 'none'}")
+
+
+def check_ranges(path: Path, ranges: Ranges | None, count: int) -> Ranges:
+    """Ranges to read: the whole file when none are given.
+
+    Raises
+    ------
+    UserError
+        If a range reaches beyond the file's points.
+    """
+    if ranges is None:
+        return [(0, count)]
+    for begin, end in ranges:
+        if not 0 <= begin <= end:
+            raise ValueError(f"({begin}, {end}) is no range of point numbers")
+        if end > count:
+            raise UserError(f"{path}: truncated or changed: it announces {count} points, points up to {end} are wanted")
+    return ranges
+
+
+def check_finite(path: Path, raw: Raw, dimension: str | None, before: int) -> None:
+    """Check a chunk's numbers; `before` points of the file lie before it.
+
+    Raises
+    ------
+    UserError
+        If a time, an intensity or a coordinate is NaN or infinite.
+    """
+    arrays = [(name, values) for name, values in (("gps_time", raw.time), (dimension, raw.intensity)) if values is not None]
+    arrays += [("coordinates", values) for values in (raw.x, raw.y, raw.z)]
+    for name, values in arrays:
+        if not np.issubdtype(values.dtype, np.floating):
+            continue
+        with np.errstate(over="ignore", invalid="ignore"):
+            if np.isfinite(values.sum()):
+                continue
+        bad = ~np.isfinite(values)
+        if bad.any():
+            raise UserError(
+                f"{path}: {name} is NaN or infinite at point {before + int(np.argmax(bad)) + 1} "
+                f"and at {int(bad.sum()) - 1} more of the same chunk; mend the file"
+            )

@@ -1,0 +1,210 @@
+"""LAS and LAZ files, read in chunks of constant memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+from laspy import DecompressionSelection, LazBackend
+from numpy.typing import NDArray
+from pyproj.exceptions import CRSError
+
+from tunneldb.errors import UserError
+from tunneldb.threads import threads
+from tunneldb.pointcloud.formats.las_bounds import check_envelope
+from tunneldb.pointcloud.formats.faults import check_finite, check_ranges, decoding, line_of, require_dimension
+from tunneldb.pointcloud.points import Ranges, Raw, ScanHeader
+from tunneldb.pointcloud.formats.laz_chunks import VariedChunks
+
+KIND = "a LAS or LAZ"
+
+
+@dataclass(frozen=True)
+class ExtraBytes:
+    """A dimension in the extra bytes of a point.
+
+    laspy looks at the first record of extra bytes only, and files of some makers have a record for each dimension;
+    so the records are read here.
+
+    Attributes
+    ----------
+    name : str
+    dtype : dtype
+        As stored; several values a point make a subarray.
+    at : int
+        Place in the extra bytes of a point, bytes.
+    scale, offset : float
+        Value = stored × scale + offset.
+    no_data : number or None
+        Stored value that stands for none.
+    """
+
+    name: str
+    dtype: np.dtype[Any]
+    at: int
+    scale: float = 1.0
+    offset: float = 0.0
+    no_data: Any = None
+
+    def stored(self, array: NDArray[Any], before: int) -> NDArray[Any]:
+        """View of the dimension in an array of records with this many bytes before the extra ones."""
+        return np.ndarray(array.shape, self.dtype, array.data, before + self.at, array.strides)
+
+
+def read_las_header(path: Path) -> ScanHeader:
+    """Read the header of a LAS or LAZ file; see `tunneldb.pointcloud.reader.read_header`."""
+    with decoding(path, KIND):
+        check_envelope(path)
+        las = laspy.open(path)
+    with decoding(path, KIND), las:
+        header = las.header
+        dimensions = _dimensions(header)
+        scales, offsets, count = header.scales, header.offsets, int(header.point_count)
+        try:
+            crs = header.parse_crs()
+        except CRSError as error:
+            raise UserError(
+                f"{path}: its coordinate system cannot be read ({line_of(error)}); mend the file's header"
+            ) from error
+    if count == 0:
+        raise UserError(f"{path}: the file holds no points")
+    _check_scales(path, scales, offsets)
+    return ScanHeader(path, count, dimensions, crs, np.array(header.mins), np.array(header.maxs))
+
+
+def read_las(path: Path, dimension: str | None, size: int, ranges: Ranges | None = None) -> Iterator[Raw]:
+    """Read a LAS or LAZ file chunk by chunk; see `tunneldb.pointcloud.formats.raw.read_raw`.
+
+    Of compressed points, only what is wanted of them is decoded where the point format allows it, in one thread or in
+    several as `tunneldb.threads.threads` says.
+    """
+    with decoding(path, KIND):
+        check_envelope(path)
+        las = laspy.open(path, laz_backend=_backends())
+    with las, path.open("rb") as source:
+        with decoding(path, KIND):
+            header = las.header
+            require_dimension(path, dimension, _dimensions(header))
+            _check_scales(path, header.scales, header.offsets)
+            take = _Taker(path, header, dimension)
+            las.decompression_selection = take.selection()
+            varied = VariedChunks(source, header, take.selection()) if VariedChunks.has(header) else None
+        for begin, end in check_ranges(path, ranges, int(header.point_count)):
+            records = varied.read(begin, end, size) if varied else _read(las, begin, end, size)
+            done = begin
+            while done < end:
+                with decoding(path, KIND):
+                    raw = take(next(records))
+                if len(raw) == 0:
+                    raise UserError(
+                        f"{path}: truncated: {done} points read of the {header.point_count} that its header announces"
+                    )
+                check_finite(path, raw, dimension, done)
+                done += len(raw)
+                yield raw
+
+
+def _read(las: laspy.LasReader, begin: int, end: int, size: int) -> Iterator[laspy.ScaleAwarePointRecord]:
+    if las.points_read != begin:
+        las.seek(begin)
+    for at in range(begin, end, size):
+        yield las.read_points(min(size, end - at))
+
+
+class _Taker:
+    """Takes the wanted dimensions out of records."""
+
+    def __init__(self, path: Path, header: laspy.LasHeader, dimension: str | None) -> None:
+        self.path = path
+        self.dimension = dimension
+        self.has_time = "gps_time" in header.point_format.dimension_names
+        self.before = header.point_format.size - header.point_format.num_extra_bytes
+        self.extra = next((extra for extra in _extra_bytes(header) if extra.name == dimension), None)
+        if self.extra is not None and self.extra.dtype.subdtype is not None:
+            raise UserError(f"{path}: {dimension} has several values a point; an intensity is one number")
+
+    def selection(self) -> DecompressionSelection:
+        """What of a point is decompressed; the extra bytes come all or none."""
+        every = DecompressionSelection
+        wanted = every.base() | every.Z | every.CLASSIFICATION | every.POINT_SOURCE_ID | every.GPS_TIME
+        if self.dimension is None:
+            return wanted
+        if self.extra is not None:
+            return wanted | every.ALL_EXTRA_BYTES
+        return wanted | every.INTENSITY if self.dimension == "intensity" else every.all()
+
+    def __call__(self, record: Any) -> Raw:
+        array = record.array
+        return Raw(
+            array["X"],
+            array["Y"],
+            array["Z"],
+            np.array(record.scales, np.float64),
+            np.array(record.offsets, np.float64),
+            array["gps_time"] if self.has_time else None,
+            array["point_source_id"],
+            self._intensity(record),
+            np.asarray(record["classification"]),
+        )
+
+    def _intensity(self, record: Any) -> NDArray[Any] | None:
+        if self.dimension is None:
+            return None
+        if self.extra is None:
+            return np.asarray(record[self.dimension])
+        stored = self.extra.stored(record.array, self.before)
+        if self.extra.no_data is not None:
+            missing = int(np.count_nonzero(stored == self.extra.no_data))
+            if missing:
+                raise UserError(
+                    f"{self.path}: {missing} points of a chunk have no {self.dimension}: their value is {self.extra.no_data}, "
+                    "which the file's header says stands for none; remove these points, or that entry of the header"
+                )
+        if self.extra.scale == 1.0 and self.extra.offset == 0.0:
+            return stored
+        return stored * self.extra.scale + self.extra.offset
+
+
+def _extra_bytes(header: laspy.LasHeader) -> list[ExtraBytes]:
+    """Dimensions in the extra bytes, in the order of the bytes, as far as the header describes them."""
+    found: list[ExtraBytes] = []
+    at = 0
+    for record in (record for record in header.vlrs if isinstance(record, laspy.vlrs.known.ExtraBytesVlr)):
+        for struct in record.extra_bytes_structs:
+            dtype = np.dtype(struct.dtype())
+            if at + dtype.itemsize > header.point_format.num_extra_bytes:
+                return found
+            scalar = dtype.subdtype is None and struct.data_type != 0
+            scale = float(struct.scale[0]) if scalar and struct.scale is not None else 1.0
+            offset = float(struct.offset[0]) if scalar and struct.offset is not None else 0.0
+            no_data = struct.no_data[0] if scalar and struct.no_data is not None else None
+            found.append(ExtraBytes(struct.format_name(), dtype, at, scale, offset, no_data))
+            at += dtype.itemsize
+    return found
+
+
+def _dimensions(header: laspy.LasHeader) -> tuple[str, ...]:
+    standard = tuple(header.point_format.standard_dimension_names)
+    return standard + tuple(extra.name for extra in _extra_bytes(header))
+
+
+def _backends() -> tuple[LazBackend, ...]:
+    return (LazBackend.Lazrs,) if threads() == 1 else (LazBackend.LazrsParallel, LazBackend.Lazrs)
+
+
+def _check_scales(path: Path, scales: NDArray[np.float64], offsets: NDArray[np.float64]) -> None:
+    with np.errstate(over="ignore", invalid="ignore"):
+        farthest = np.abs(scales) * 2.0**31 + np.abs(offsets)
+    if not (np.all(np.isfinite(farthest)) and np.all(scales > 0)):
+        raise UserError(
+            f"{path}: the header's scale {_row(scales)} or offset {_row(offsets)} is not a usable number, "
+            "so its coordinates would not be either"
+        )
+
+
+def _row(values: NDArray[np.float64]) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in values) + ")"

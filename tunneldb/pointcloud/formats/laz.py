@@ -1,0 +1,89 @@
+"""LAZ files, written chunk by chunk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+import lazrs
+import numpy as np
+
+from tunneldb.threads import threads
+from tunneldb.pointcloud.formats.las_header import Head
+from tunneldb.pointcloud.formats.las_records import Bytes, record_size
+
+
+class LazWriter:
+    """Writes the points of one file.
+
+    Parameters
+    ----------
+    file : binary file
+        Empty, open for writing.
+    head : Head
+        What comes around the points; its point format is the one that they have.
+    """
+
+    def __init__(self, file: BinaryIO, head: Head) -> None:
+        self.file = file
+        self.head = head
+        vlr = lazrs.LazVlr.new_for_compression(head.point_format, head.record_size - record_size(head.point_format))
+        file.write(head.before_points(vlr.record_data()))
+        self.compressor = (lazrs.LasZipCompressor if threads() == 1 else lazrs.ParLasZipCompressor)(file, vlr)
+
+    def write(self, records: Bytes) -> None:
+        """Add points (n, size)."""
+        self.compressor.compress_many(np.ascontiguousarray(records).reshape(-1))
+
+    def close(self, patch: tuple[int, bytes] | None = None) -> None:
+        """End the points, write what comes behind them, and put into the header what is known only now."""
+        self.compressor.done()
+        self.file.seek(0, 2)
+        at, packed = self.head.place_of_extended(self.file.tell())
+        for record in self.head.extended:
+            self.file.write(record.pack(extended=True))
+        for place, data in [patch, (at, packed)] if patch else [(at, packed)]:
+            self.file.seek(place)
+            self.file.write(data)
+
+
+@contextmanager
+def writing(path: Path, head: Head) -> Iterator[LazWriter]:
+    """Write a new file, which is complete once the writer is closed.
+
+    Raises
+    ------
+    OSError
+        If the disk is full, or fails.
+    """
+    with path.open("xb") as plain:
+        file = _Told(plain)
+        try:
+            yield LazWriter(file, head)  # type: ignore[arg-type]  # all that is needed of a file
+        except lazrs.LazrsError as error:
+            raise file.error or error from error
+
+
+class _Told:
+    """A file that remembers why it could not be written to: the compressor only says that it could not."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self.file = file
+        self.error: OSError | None = None
+        self.seek, self.tell = file.seek, file.tell
+
+    def write(self, data: bytes) -> int:
+        try:
+            return self.file.write(data)
+        except OSError as error:
+            self.error = error
+            raise
+
+    def flush(self) -> None:
+        try:
+            self.file.flush()
+        except OSError as error:
+            self.error = error
+            raise

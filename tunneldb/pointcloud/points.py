@@ -1,0 +1,143 @@
+"""Scanned points, and what a scan file says of itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pyproj import CRS
+
+CHUNK = 1_000_000
+
+Ranges = Sequence[tuple[int, int]]
+"""Half-open ranges of point numbers, from 0, in the order in which they are to be read."""
+
+
+@dataclass(frozen=True)
+class Raw:
+    """A chunk of points as the file stores them, mostly as views of its records.
+
+    The arrays may have any stride and alignment; they are only good to read from.
+
+    Attributes
+    ----------
+    x, y, z : (n,) int32 or float64 arrays
+        Stored coordinates: `xyz` = stored × `scales` + `offsets`. int32 of LAS, float64 of E57.
+    scales, offsets : (3,) float64 arrays
+        m.
+    time : (n,) float64 array or None
+        ``gps_time``, s; None where the file has none.
+    scan_id : (n,) integer array
+        Number of the scan: ``point_source_id`` of LAS, `tunneldb.pointcloud.formats.e57.scan_number` of E57.
+    intensity : (n,) array of any number type, or None
+        The chosen dimension in its own unit, with the scale and offset that the file gives it; None when none was chosen.
+    classification : (n,) uint8 array or None
+        Class code; None where the file has none.
+    """
+
+    x: NDArray[Any]
+    y: NDArray[Any]
+    z: NDArray[Any]
+    scales: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+    time: NDArray[np.float64] | None
+    scan_id: NDArray[Any]
+    intensity: NDArray[Any] | None
+    classification: NDArray[np.uint8] | None
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    def part(self, begin: int, end: int) -> Raw:
+        """Points begin to end, half-open, of the chunk."""
+        chosen = slice(begin, end)
+        return replace(
+            self,
+            x=self.x[chosen],
+            y=self.y[chosen],
+            z=self.z[chosen],
+            time=None if self.time is None else self.time[chosen],
+            scan_id=self.scan_id[chosen],
+            intensity=None if self.intensity is None else self.intensity[chosen],
+            classification=None if self.classification is None else self.classification[chosen],
+        )
+
+
+@dataclass(frozen=True)
+class Points:
+    """A chunk of scanned points, in file order.
+
+    Attributes
+    ----------
+    xyz : (n, 3) float64 array
+        Coordinates in the file's frame, m.
+    time : (n,) float64 array
+        ``gps_time``, s; 0 where the file has none.
+    scan_id : (n,) int32 array
+        Number of the scan: ``point_source_id`` of LAS, `tunneldb.pointcloud.formats.e57.scan_number` of E57.
+    intensity : (n,) float32 array
+        The raw values of the chosen dimension, in its own unit; 0 when none was chosen.
+    classification : (n,) uint8 array
+        Class code of the file; 0 where it has none.
+    """
+
+    xyz: NDArray[np.float64]
+    time: NDArray[np.float64]
+    scan_id: NDArray[np.int32]
+    intensity: NDArray[np.float32]
+    classification: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    def some(self, chosen: NDArray[Any]) -> Points:
+        """The chosen points, by number or by mask."""
+        return Points(
+            self.xyz[chosen], self.time[chosen], self.scan_id[chosen], self.intensity[chosen], self.classification[chosen]
+        )
+
+    @classmethod
+    def of(cls, raw: Raw) -> Points:
+        """Scaled coordinates, and each array in its own memory."""
+        count = len(raw)
+        xyz = np.empty((count, 3))
+        for column, stored in enumerate((raw.x, raw.y, raw.z)):
+            np.multiply(stored, raw.scales[column], out=xyz[:, column])
+        xyz += raw.offsets
+        return cls(
+            xyz,
+            np.zeros(count) if raw.time is None else np.array(raw.time, np.float64),
+            np.array(raw.scan_id, np.int32),
+            np.zeros(count, np.float32) if raw.intensity is None else np.array(raw.intensity, np.float32),
+            np.zeros(count, np.uint8) if raw.classification is None else np.array(raw.classification, np.uint8),
+        )
+
+
+@dataclass(frozen=True)
+class ScanHeader:
+    """What a scan file says of itself.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    points : int
+        Number of points that the header announces; an E57 file may mark some of them invalid, which are left out.
+    dimensions : tuple of str
+        Names of the dimensions of a point.
+    crs : CRS or None
+        Coordinate reference system, None when the file states none.
+    low, high : (3,) float64 array
+        Box of the coordinates by the header, m; not checked.
+    """
+
+    path: Path
+    points: int
+    dimensions: tuple[str, ...]
+    crs: CRS | None
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]

@@ -1,0 +1,225 @@
+"""Where the scanner stood when it measured a point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import psycopg
+from numba import njit
+from numpy.typing import NDArray
+from psycopg import sql
+
+from tunneldb.database.fetch import fetch_array
+from tunneldb.errors import UserError
+from tunneldb.pointcloud.reader import Points
+
+if TYPE_CHECKING:
+    from tunneldb.database import Survey
+
+# Times in a CSV are rounded; beyond the ends of the trajectory they may be off by this much, s.
+TIME_TOLERANCE = 0.001
+
+
+@dataclass
+class PoseFaults:
+    """Points whose scanner position is unknown; add those of several chunks with `+`.
+
+    Attributes
+    ----------
+    outside : int
+        Number of points whose time lies outside the trajectory.
+    before, after : float
+        How far the worst of them lie before its start and after its end, s.
+    unknown : dict of int to int
+        Number of points of each scan_id that has no station.
+    """
+
+    outside: int = 0
+    before: float = 0.0
+    after: float = 0.0
+    unknown: dict[int, int] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return self.outside > 0 or bool(self.unknown)
+
+    def __add__(self, other: PoseFaults) -> PoseFaults:
+        unknown = dict(self.unknown)
+        for scan_id, count in other.unknown.items():
+            unknown[scan_id] = unknown.get(scan_id, 0) + count
+        return PoseFaults(
+            self.outside + other.outside,
+            max(self.before, other.before),
+            max(self.after, other.after),
+            unknown,
+        )
+
+    def error(self, name: str) -> UserError:
+        """One line for the user; `name` is the file."""
+        if self.unknown:
+            scans = ", ".join(f"{scan} ({count} points)" for scan, count in sorted(self.unknown.items())[:10])
+            more = f" and {len(self.unknown) - 10} more" if len(self.unknown) > 10 else ""
+            return UserError(
+                f"{name}: no station for scan_id {scans}{more}; add them to the stations of the survey "
+                "(scan_id is a LAS file's point_source_id; an E57 file brings its own: survey add … --stations FILE.e57)"
+            )
+        where = [
+            f"up to {seconds:.3f} s {side}"
+            for seconds, side in ((self.before, "before its start"), (self.after, "after its end"))
+            if seconds > 0
+        ]
+        return UserError(
+            f"{name}: gps_time of {self.outside} points is outside the trajectory, {' and '.join(where)}; "
+            "give the whole trajectory, in the time that the file uses"
+        )
+
+
+@dataclass(frozen=True)
+class PoseModel:
+    """Scanner positions: one station a scan, or a trajectory interpolated linearly at ``gps_time``.
+
+    Attributes
+    ----------
+    scan_id, station : (k,) int64 and (k, 3) float64 arrays
+        Stations in growing scan_id, m; empty for a mobile scanner.
+    time, track : (m,) and (m, 3) float64 arrays
+        Trajectory in growing time, s and m; empty for a static scanner.
+    """
+
+    scan_id: NDArray[np.int64]
+    station: NDArray[np.float64]
+    time: NDArray[np.float64]
+    track: NDArray[np.float64]
+
+    @classmethod
+    def from_stations(cls, scan_id: NDArray[np.int64], station: NDArray[np.float64]) -> PoseModel:
+        """Static scanner: stations (k, 3) of the scans with these numbers (k,)."""
+        order = np.argsort(scan_id)
+        return cls(np.asarray(scan_id, np.int64)[order], np.asarray(station, np.float64)[order], np.empty(0), np.empty((0, 3)))
+
+    @classmethod
+    def from_trajectory(cls, time: NDArray[np.float64], track: NDArray[np.float64]) -> PoseModel:
+        """Mobile scanner: positions (m, 3) at these times (m,)."""
+        order = np.argsort(time)
+        return cls(
+            np.empty(0, np.int64), np.empty((0, 3)), np.asarray(time, np.float64)[order], np.asarray(track, float)[order]
+        )
+
+    @property
+    def mobile(self) -> bool:
+        """Whether positions come from a trajectory."""
+        return len(self.time) > 0
+
+    def faults(self, points: Points) -> PoseFaults:
+        """Count the points whose scanner position is unknown."""
+        if len(points) == 0:
+            return PoseFaults()
+        if self.mobile:
+            before = float(self.time[0] - points.time.min())
+            after = float(points.time.max() - self.time[-1])
+            if before <= TIME_TOLERANCE and after <= TIME_TOLERANCE:
+                return PoseFaults()
+            early = points.time < self.time[0] - TIME_TOLERANCE
+            late = points.time > self.time[-1] + TIME_TOLERANCE
+            return PoseFaults(int(early.sum() + late.sum()), max(before, 0.0), max(after, 0.0))
+        scans, counts = _count_scans(points.scan_id)
+        known = np.isin(scans, self.scan_id)
+        return PoseFaults(unknown=dict(zip(scans[~known].tolist(), counts[~known].tolist(), strict=True)))
+
+    def positions(self, points: Points, name: str = "scan") -> NDArray[np.float64]:
+        """Scanner position of each point.
+
+        Parameters
+        ----------
+        points : Points
+            A chunk of n points.
+        name : str
+            The file, for the error's message.
+
+        Returns
+        -------
+        (n, 3) float64 array
+            In the tunnel's SRID, m.
+
+        Raises
+        ------
+        UserError
+            If a time lies outside the trajectory (says by how much) or a scan_id has no station (says which).
+        """
+        faults = self.faults(points)
+        if faults:
+            raise faults.error(name)
+        if self.mobile:
+            return _interpolate(self.time, self.track, points.time)
+        return self.station[np.searchsorted(self.scan_id, points.scan_id)]
+
+
+def load_poses(conn: psycopg.Connection[Any], survey: Survey) -> PoseModel:
+    """Read the trajectory of a mobile survey, or the stations of a static one.
+
+    Raises
+    ------
+    UserError
+        If the survey has none.
+    """
+    table, key = ("pose", "time") if survey.platform == "mobile" else ("station", "scan_id")
+    fields: list[tuple[str, str, sql.Composable]] = [(key, "f8", sql.SQL("{}::float8").format(sql.Identifier(key)))]
+    fields += [("x", "f8", sql.SQL("ST_X(geom)")), ("y", "f8", sql.SQL("ST_Y(geom)")), ("z", "f8", sql.SQL("ST_Z(geom)"))]
+    source = sql.SQL("FROM {} WHERE survey_id = %(survey)s").format(sql.Identifier("tunnel", table))
+    rows = fetch_array(conn, fields, source, {"survey": survey.id})
+    if len(rows) == 0:
+        kind = "trajectory" if survey.platform == "mobile" else "stations"
+        raise UserError(f"survey {survey.name} has no {kind}: add the survey again with --{kind}")
+    xyz = np.column_stack([rows["x"], rows["y"], rows["z"]])
+    if survey.platform == "mobile":
+        return PoseModel.from_trajectory(rows["time"], xyz)
+    return PoseModel.from_stations(rows["scan_id"].astype(np.int64), xyz)
+
+
+def _count_scans(scan_id: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    low, high = int(scan_id.min()), int(scan_id.max())
+    if high - low > 1_000_000:
+        scans, counts = np.unique(scan_id, return_counts=True)
+        return scans.astype(np.int64), counts
+    counts = np.bincount(scan_id - low)
+    present = np.flatnonzero(counts)
+    return present + low, counts[present]
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def interval(time: NDArray[np.float64], wanted: float, hint: int) -> int:
+    """Number of the last of growing times that is not later than the one wanted, or 0; looked for from a hint on."""
+    last = len(time) - 1
+    k = hint
+    # Points come nearly in order of time, so the last interval, or the next, is mostly the right one.
+    if time[k] <= wanted and (k == last or wanted < time[k + 1]):
+        return k
+    if k + 2 <= last and time[k + 1] <= wanted < time[k + 2]:
+        return k + 1
+    return max(int(np.searchsorted(time, wanted, side="right")) - 1, 0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def position_at(time: NDArray[np.float64], track: NDArray[np.float64], wanted: float, k: int) -> tuple[float, float, float]:
+    """Place of the trajectory at a time in its interval ``k``."""
+    j = min(k + 1, len(time) - 1)
+    share = (wanted - time[k]) / (time[j] - time[k]) if j > k else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return (
+        track[k, 0] + share * (track[j, 0] - track[k, 0]),
+        track[k, 1] + share * (track[j, 1] - track[k, 1]),
+        track[k, 2] + share * (track[j, 2] - track[k, 2]),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _interpolate(
+    time: NDArray[np.float64], track: NDArray[np.float64], wanted: NDArray[np.float64]
+) -> NDArray[np.float64]:  # pragma: no cover - compiled
+    out = np.empty((len(wanted), 3))
+    k = 0
+    for i in range(len(wanted)):
+        k = interval(time, wanted[i], k)
+        out[i, 0], out[i, 1], out[i, 2] = position_at(time, track, wanted[i], k)
+    return out

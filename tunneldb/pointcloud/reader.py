@@ -1,0 +1,93 @@
+"""Scan files, read in chunks of constant memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from pyproj import CRS
+
+from tunneldb.errors import UserError
+from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_header
+from tunneldb.pointcloud.formats.faults import require_dimension
+from tunneldb.pointcloud.formats.las import read_las_header
+from tunneldb.pointcloud.points import CHUNK, Points, Ranges, ScanHeader
+from tunneldb.pointcloud.formats.raw import read_raw
+
+__all__ = ["CHUNK", "Points", "ScanHeader", "check_header", "read_chunks", "read_header"]
+
+
+def read_header(path: Path) -> ScanHeader:
+    """Read the header of a LAS, LAZ or E57 file.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, is none of its kind, holds no points, or (LAS) its coordinate system cannot be read.
+    """
+    return read_e57_header(path) if is_e57(path) else read_las_header(path)
+
+
+def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_time: bool) -> None:
+    """Check a file against its survey, before any of its points is read.
+
+    Parameters
+    ----------
+    header : ScanHeader
+        From `read_header`.
+    dimension : str or None
+        The survey's intensity dimension.
+    srid : int
+        EPSG code of the tunnel.
+    needs_time : bool
+        Whether scanner positions come from a trajectory, by ``gps_time``.
+
+    Raises
+    ------
+    UserError
+        If the dimension or ``gps_time`` is missing, or the horizontal coordinate system is another one.
+    """
+    require_dimension(header.path, dimension, header.dimensions, "the survey's intensity")
+    require_dimension(header.path, "gps_time" if needs_time else None, header.dimensions, "the trajectory")
+    if header.crs is not None and not same_horizontally(header.crs, CRS.from_epsg(srid)):
+        raise UserError(
+            f"{header.path}: its coordinate system is {describe_crs(header.crs)}, the tunnel's is "
+            f"{describe_crs(CRS.from_epsg(srid))}; transform the file or add the tunnel with the file's SRID"
+        )
+
+
+def read_chunks(path: Path, dimension: str | None, size: int = CHUNK, ranges: Ranges | None = None) -> Iterator[Points]:
+    """Read a scan file chunk by chunk.
+
+    Parameters, order and errors are those of `tunneldb.pointcloud.formats.raw.read_raw`; without a dimension the intensity is 0.
+
+    Yields
+    ------
+    Points
+        In file order within a range.
+    """
+    return map(Points.of, read_raw(path, dimension, size, ranges))
+
+
+def same_horizontally(one: CRS, other: CRS) -> bool:
+    """Tell whether two coordinate systems agree in the plane, whatever their heights refer to."""
+    a, b = horizontal(one), horizontal(other)
+    if a.equals(b, ignore_axis_order=True):
+        return True
+    code = a.to_epsg()
+    return code is not None and code == b.to_epsg()
+
+
+def horizontal(crs: CRS) -> CRS:
+    """Horizontal part of a coordinate system that may be compound, bound or three-dimensional."""
+    if crs.is_bound and crs.source_crs is not None:
+        crs = crs.source_crs
+    if crs.is_compound:
+        crs = crs.sub_crs_list[0]
+    return crs.to_2d()
+
+
+def describe_crs(crs: CRS) -> str:
+    """Name of a coordinate system with its EPSG code, where it has one."""
+    code = horizontal(crs).to_epsg()
+    return f"EPSG:{code} ({crs.name})" if code is not None else crs.name

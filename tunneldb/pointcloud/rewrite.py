@@ -1,0 +1,148 @@
+"""Scan files written again with other classes, as LAZ 1.4, in chunks of constant memory.
+
+Nothing but the class of a point changes: coordinates, scales and offsets, all other dimensions, extra bytes, coordinate
+system, records and dates are the input's. Where its point format has no room for classes over 31, the next one that holds
+the same takes its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import laspy
+import numpy as np
+from laspy import DecompressionSelection, LazBackend
+from numpy.typing import NDArray
+
+from tunneldb.errors import UserError
+from tunneldb.threads import threads
+from tunneldb.pointcloud.formats.e57 import is_e57
+from tunneldb.pointcloud.formats.e57_records import E57Records
+from tunneldb.pointcloud.formats.faults import decoding
+from tunneldb.pointcloud.formats.las_header import Head, read_head
+from tunneldb.pointcloud.formats.las import KIND, read_las_header
+from tunneldb.pointcloud.formats.laz import writing
+from tunneldb.pointcloud.points import CHUNK
+from tunneldb.pointcloud.formats.las_records import FORMAT_OF, Bytes, coordinates, fields, record_size, upgraded
+
+Classes = Callable[[NDArray[np.float64]], NDArray[np.uint8]]
+"""Gives points (n, 3) their classes (n,)."""
+
+
+_EVERYTHING = DecompressionSelection.all()
+
+
+@dataclass(frozen=True)
+class _Source:
+    """What is to be written: what surrounds the points, the points, and what of the header is known only afterwards."""
+
+    head: Head
+    chunks: Iterator[Bytes]
+    patches: Callable[[], tuple[int, bytes] | None]
+
+
+def rewrite(
+    source: Path,
+    target: Path,
+    classes: Classes,
+    names: Mapping[int, str],
+    progress: Callable[[int], None] = lambda count: None,
+    size: int = CHUNK,
+) -> NDArray[np.int64]:
+    """Write a scan file again, each point with the class that it is given.
+
+    Parameters
+    ----------
+    source : Path
+        LAS, LAZ or E57 file. Of E57, what `tunneldb.pointcloud.formats.e57_records.E57Records` says.
+    target : Path
+        LAZ file to write; it must not exist.
+    classes : callable
+        Called with each chunk's coordinates (n, 3), m, in the order of the file.
+    names : mapping of int to str
+        Names of the classes, for whoever opens the file.
+    progress : callable
+        Takes the number of points of each chunk that is written.
+    size : int
+        Greatest number of points of a chunk.
+
+    Returns
+    -------
+    (256,) int64 array
+        How many points each class has.
+
+    Raises
+    ------
+    UserError
+        If the source cannot be read, holds no points, or holds waveforms.
+    OSError
+        If the target cannot be written.
+    """
+    what = _of_e57(source, size) if is_e57(source) else _of_las(source, size)
+    head = what.head.with_classes(names)
+    counts = np.zeros(256, np.int64)
+    with writing(target, head) as writer:
+        for records in what.chunks:
+            found = classes(coordinates(records, head.scales, head.offsets))
+            fields(records, head.point_format)["classification"] = found
+            writer.write(records)
+            counts += np.bincount(found, minlength=256)
+            progress(len(records))
+        writer.close(what.patches())
+    return counts
+
+
+def read_coordinates(path: Path, size: int = CHUNK) -> Iterator[NDArray[np.float64]]:
+    """Read the coordinates (n, 3) of a scan file's points, m, chunk by chunk, and nothing else of them.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, or holds no points.
+    """
+    if is_e57(path):
+        source = E57Records(path)
+        for records in source.read(size):
+            yield coordinates(records, source.head.scales, source.head.offsets)
+        return
+    count = read_las_header(path).points
+    with decoding(path, KIND):
+        head = read_head(path)
+    for records in _read(path, count, size, DecompressionSelection.base() | DecompressionSelection.Z):
+        yield coordinates(records, head.scales, head.offsets)
+
+
+def _of_las(path: Path, size: int) -> _Source:
+    header = read_las_header(path)
+    with decoding(path, KIND):
+        head = read_head(path)
+    if head.holds_waveforms:
+        raise UserError(f"{path}: it holds waveforms, which would be lost; write it without them, or with them in a file aside")
+    if head.points != header.points:
+        raise UserError(f"{path}: its header announces {head.points} and {header.points} points; mend the file")
+    before = head.point_format
+    after = FORMAT_OF[before]
+    head = head.with_points(after, record_size(after) + head.record_size - record_size(before)).with_crs(header.crs)
+    return _Source(head, (upgraded(records, before) for records in _read(path, header.points, size)), lambda: None)
+
+
+def _read(path: Path, count: int, size: int, selection: DecompressionSelection = _EVERYTHING) -> Iterator[Bytes]:
+    backends = (LazBackend.Lazrs,) if threads() == 1 else (LazBackend.LazrsParallel, LazBackend.Lazrs)
+    with decoding(path, KIND):
+        las = laspy.open(path, laz_backend=backends, read_evlrs=False, decompression_selection=selection)
+    with las:
+        done = 0
+        while done < count:
+            with decoding(path, KIND):
+                array = las.read_points(size).array
+            if len(array) == 0:
+                raise UserError(f"{path}: truncated: {done} points read of the {count} that its header announces")
+            done += len(array)
+            yield array.view(np.uint8).reshape(len(array), -1)
+
+
+def _of_e57(path: Path, size: int) -> _Source:
+    source = E57Records(path)
+    return _Source(source.head, source.read(size), source.patches)

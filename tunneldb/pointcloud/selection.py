@@ -1,0 +1,328 @@
+"""One scan file, from its points to those that go into the database.
+
+A point is looked at closely only where it may get a row. Of each voxel of thinning and each chunk of the file the point
+nearest to the voxel's centre is a candidate; on a dense wall enough of the chunk's points lie around it to tell that
+it is no noise, and the others of the voxel can be left out at once. Where that is not so they all stay candidates until
+the whole file is read; then those nearer to the centre than the nearest certain one are judged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tunneldb.errors import UserError
+from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.threads import threads
+from tunneldb.pointcloud.prefetch import in_order, prefetch
+from tunneldb.pointcloud.noise import DIAMETER, POINTS, CellCounts, is_noise, search_radii
+from tunneldb.pointcloud.chainage_lookup import STRETCHING, Places
+from tunneldb.pointcloud.points import CHUNK, Points
+from tunneldb.pointcloud.poses import PoseFaults, PoseModel
+from tunneldb.pointcloud.reader import read_chunks
+from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, PLACE, Rows, Spool, bin_of, rows_xyz, windows
+from tunneldb.pointcloud.thinning import first_of_voxels, pick, voxel_edge
+
+Progress = Callable[[int], None]
+
+MEMORY = 192 << 20  # bytes of rows that each spool holds before it goes to disk
+WINDOW = 1_000_000  # points whose neighbourhoods are looked at at a time by each thread
+CROWDED = 4_000_000  # from this many points in one window on, one thread, for the sake of memory
+BLOCK = 50_000  # points of a LAZ file that can be decoded by themselves
+MARGIN = 10.0  # m beyond its ends that a kilometre is looked up in a file for what happens at its end
+FEW = 150  # points in a cell up to which hardly any has enough around it to be certain to be no noise
+STRETCH = 5.0  # m of tunnel for which the noise filter's widest radius is found
+CERTAIN = -1  # tag of a candidate that is certain to be no noise; the others have the number of their cell
+
+
+@dataclass(frozen=True)
+class FilterSettings:
+    """How the points of a file are chosen.
+
+    Attributes
+    ----------
+    density : float or None
+        Survey density, points per m²; None keeps every point.
+    noise_points : int
+        A point with fewer points than this in its neighbourhood, itself included, is noise.
+    noise_diameter : float
+        Diameter of the neighbourhood at full density, m.
+    max_distance : float
+        Points farther than this from the given axis are outside, m.
+    """
+
+    density: float | None = 100.0
+    noise_points: int = POINTS
+    noise_diameter: float = DIAMETER
+    max_distance: float = 25.0
+
+    @property
+    def edge(self) -> float | None:
+        """Voxel edge of thinning, m; None when every point is kept."""
+        return None if self.density is None else voxel_edge(self.density)
+
+
+@dataclass
+class FilterCounts:
+    """What became of the points of a file: points = noise + outside + thinned + kept.
+
+    Attributes
+    ----------
+    points, outside, noise, kept : int
+        Points read; beyond the ends of the axis or too far from it; noise; kept after thinning.
+    chainage : (float, float)
+        Least and greatest chainage of the points kept, m.
+    extent : (6,) float64 array
+        Least and greatest x, y, z of the points kept: x0, y0, z0, x1, y1, z1, m.
+    ranges : dict of int to list of (int, int)
+        Where in the file the points of each kilometre and MARGIN beyond are: ranges of point numbers from 0.
+    """
+
+    points: int = 0
+    outside: int = 0
+    noise: int = 0
+    kept: int = 0
+    chainage: tuple[float, float] = (math.inf, -math.inf)
+    extent: NDArray[np.float64] = field(default_factory=lambda: np.array([np.inf] * 3 + [-np.inf] * 3))
+    ranges: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
+
+    @property
+    def thinned(self) -> int:
+        """Points that thinning left out."""
+        return self.points - self.outside - self.noise - self.kept
+
+    def locate(self, blocks: NDArray[np.int64], low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
+        """Note where in the file kilometres are: blocks of BLOCK points, with the chainage from and to of each, m."""
+        lowest, highest = (np.floor(ends / KILOMETRE).astype(int).tolist() for ends in (low - MARGIN, high + MARGIN))
+        for block, first, last in zip(blocks.tolist(), lowest, highest, strict=True):
+            for km in range(first, last + 1):
+                ranges = self.ranges.setdefault(km, [])
+                if ranges and ranges[-1][1] >= block * BLOCK:
+                    ranges[-1] = (ranges[-1][0], (block + 1) * BLOCK)
+                else:
+                    ranges.append((block * BLOCK, (block + 1) * BLOCK))
+
+    def keep(self, rows: Rows) -> None:
+        """Count rows that are kept."""
+        self.kept += len(rows)
+        if len(rows):
+            low, high = float(rows["chainage"].min()), float(rows["chainage"].max())
+            self.chainage = (min(self.chainage[0], low), max(self.chainage[1], high))
+            for column, name in enumerate("xyz"):
+                self.extent[column] = min(self.extent[column], rows[name].min())
+                self.extent[column + 3] = max(self.extent[column + 3], rows[name].max())
+
+
+def filter_file(
+    path: Path,
+    dimension: str | None,
+    alignment: Alignment,
+    poses: PoseModel,
+    settings: FilterSettings,
+    survivors: Spool,
+    tag: int,
+    progress: Progress = lambda points: None,
+    memory: int = MEMORY,
+    chunk: int = CHUNK,
+) -> FilterCounts:
+    """Read a scan file at full density and set aside the points worth a row.
+
+    The whole file is read before the first point is judged, so the result does not depend on the order of its points.
+
+    Parameters
+    ----------
+    path, dimension : Path and str or None
+        The file and its intensity dimension.
+    alignment : Alignment
+        The given axis, which gives the chainage.
+    poses : PoseModel
+        Scanner positions, which must cover every point near the axis.
+    settings : FilterSettings
+        Noise filter, thinning, and how far from the axis the tunnel reaches.
+    survivors : Spool
+        Gets the points that stay, with `tag`; thinned within the file up to the borders of its parts, so they have
+        to be thinned once more as a whole.
+    tag : int
+        Number of the file.
+    progress : callable
+        Called with a number of points; the whole comes to twice the number of points of the file.
+    memory, chunk : int
+        Bytes of rows held in memory; points read at a time.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, no point lies near the axis (says how far they are), all near it are noise, or the
+        scanner position of any point near the axis is unknown.
+    """
+    with _Filter(path, dimension, alignment, poses, settings, memory) as work:
+        work.read(progress, chunk)
+        for rows in work.judge(progress):
+            rows["tag"] = tag
+            survivors.add(rows)
+    if work.counts.kept == 0:
+        raise UserError(
+            f"{path}: all {work.counts.noise} points near the axis are noise: none has {settings.noise_points} points around it"
+        )
+    return work.counts
+
+
+def voxel_reach(edge: float) -> float:
+    """Greatest difference of chainage between two points of one voxel, m."""
+    return edge * math.sqrt(3.0) * STRETCHING
+
+
+class _Filter:
+    """A file under way: its candidates for a row, and the places of all its points, by chainage."""
+
+    def __init__(
+        self,
+        path: Path,
+        dimension: str | None,
+        alignment: Alignment,
+        poses: PoseModel,
+        settings: FilterSettings,
+        memory: int,
+    ) -> None:
+        self.path, self.dimension = path, dimension
+        self.poses, self.settings = poses, settings
+        self.counts, self.cells = FilterCounts(), CellCounts()
+        self.places = Places(alignment, settings.max_distance, self.cells.edge)
+        self.rows, self.cloud = Spool(memory // 2), Spool(memory // 2, PLACE)
+
+    def __enter__(self) -> _Filter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.rows.close()
+        self.cloud.close()
+
+    def read(self, progress: Progress, chunk: int) -> None:
+        """Read the file, and set aside what the noise filter has to look at."""
+        faults, nearest = PoseFaults(), math.inf
+        with closing(prefetch(read_chunks(self.path, self.dimension, chunk))) as chunks:
+            for points in chunks:
+                faults += self.poses.faults(self._near(points))
+                if self.counts.outside == self.counts.points:
+                    vertices = self.places.alignment.vertices
+                    nearest = min(nearest, float(cKDTree(vertices).query(points.xyz[::100])[0].min()))
+                progress(len(points))
+        for ranges in self.counts.ranges.values():
+            ranges[-1] = (ranges[-1][0], min(ranges[-1][1], self.counts.points))
+        if self.counts.outside == self.counts.points:
+            raise UserError(
+                f"{self.path}: no points near the axis: the nearest is about {nearest:.0f} m from it and the limit is "
+                f"{self.settings.max_distance:g} m; check the axis, the file's coordinates and the tunnel's SRID"
+            )
+        if faults:
+            raise faults.error(str(self.path))
+
+    def _near(self, points: Points) -> Points:
+        """Set the points of a chunk aside; returns those near the axis."""
+        cell = self.cells.add(points.xyz)
+        self.places.update(self.cells)
+        outside = self.places.outside(points, cell)
+        number = np.arange(self.counts.points, self.counts.points + len(points))
+        self.counts.points += len(points)
+        self.counts.outside += len(outside)
+        if len(outside):
+            self.cells.remove(cell[outside])
+            kept = np.delete(np.arange(len(points)), outside)
+            number, cell, points = number[kept], cell[kept], points.some(kept)
+        if len(points):
+            self.counts.locate(*self.places.span(number, cell, BLOCK))
+            picked, certain = self._pick(points, cell)
+            tag = np.where(certain, np.int32(CERTAIN), cell[picked])
+            self.rows.add(self.places.rows(points, cell, picked, tag))
+            self.cloud.add(points.xyz.view(PLACE).ravel(), self.places.bin[cell])
+        return points
+
+    def _pick(self, points: Points, cell: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+        if self.settings.edge is None or self.cells.counts[cell].mean() < FEW:
+            return np.arange(len(points), dtype=np.int32), np.zeros(len(points), np.bool_)
+        return pick(
+            points.xyz, points.time, points.intensity, points.scan_id, points.classification, self.places.whole[cell],
+            self.settings.edge, (self.settings.noise_diameter / 2) ** 2, self.settings.noise_points,
+            1 << max(8, math.ceil(math.log2(2 * len(points) + 1))),
+        )  # fmt: skip
+
+    def judge(self, progress: Progress) -> Iterator[Rows]:
+        """Rows that stay, thinned within the file, a window of chainage after the other."""
+        counts, cells, settings = self.counts, self.cells, self.settings
+        stretch = np.floor(self.places.chainage / STRETCH).astype(np.int64)
+        radii = search_radii(cells.counts, cells.edge, settings.noise_points, settings.noise_diameter, stretch)
+        widest = _widest(stretch, radii)
+        first, bins = self.cloud.counts()
+        # A point's bin may be some farther than its cell's.
+        bins, first = np.pad(bins, self.places.bins_off), first - self.places.bins_off
+        parts = list(windows(first, bins, WINDOW))
+        crowded = max(int(bins[low - first : high - first].sum()) for low, high in parts) > CROWDED
+
+        def work(low: int, high: int) -> tuple[int, Rows]:
+            return self._judge(low, high, _reach(low, high, widest), radii)
+
+        for (low, high), (noise, rows) in zip(parts, in_order(1 if crowded else threads(), work, parts), strict=True):
+            counts.noise += noise
+            counts.keep(rows)
+            progress(int(bins[low - first : high - first].sum()))
+            yield rows
+        progress(counts.outside)
+
+    def _judge(self, low: int, high: int, reach: int, radii: NDArray[np.float64]) -> tuple[int, Rows]:
+        """Noise of a window, counted, and the rows that stay."""
+        edge = self.settings.edge
+        margin = 0 if edge is None else math.ceil(voxel_reach(edge) * BINS_PER_METRE)
+        begin = math.floor(low / BINS_PER_KM) * BINS_PER_KM  # each kilometre is thinned by itself
+        rows = self.rows.read(max(low - margin, begin), min(high + margin, begin + BINS_PER_KM))
+        wide = margin + reach + self.places.bins_off
+        good = rows["tag"] == CERTAIN
+
+        def judge(doubtful: NDArray[np.bool_]) -> None:
+            chosen = np.flatnonzero(doubtful)
+            if len(chosen):
+                cloud = self.cloud.read(low - wide, high + wide)["xyz"]
+                radius = radii[rows["tag"][chosen]]
+                good[chosen] = ~is_noise(cloud, rows_xyz(rows, chosen), radius, self.settings.noise_points)
+
+        if edge is None:
+            judge(~good)
+            stays, noise = good, ~good
+        else:
+            # The first of each voxel is mostly good, and the others need not be looked at.
+            front, _ = first_of_voxels(rows, edge, np.ones(len(rows), np.bool_))
+            judge(front & ~good)
+            stays, noise = first_of_voxels(rows, edge, good)
+            rest = noise & ~front
+            if rest.any():
+                judge(rest)
+                part = np.flatnonzero(stays | noise)
+                stays[part], noise[part] = first_of_voxels(rows[part], edge, good[part])
+        bins = bin_of(rows["chainage"])
+        inside = (bins >= low) & (bins < high)
+        return int((noise & inside).sum()), rows[stays & inside]
+
+
+def _widest(stretch: NDArray[np.int64], radii: NDArray[np.float64]) -> tuple[int, NDArray[np.float64]]:
+    """Widest radius in each stretch from the first on."""
+    first = int(stretch.min())
+    widest = np.zeros(int(stretch.max()) - first + 1)
+    np.maximum.at(widest, stretch - first, radii)
+    return first, widest
+
+
+def _reach(low: int, high: int, widest: tuple[int, NDArray[np.float64]]) -> int:
+    """Bins beyond a window in which its points may have neighbours."""
+    first, radii = widest
+    # A point's cell may have its centre in the next stretch.
+    begin = math.floor(low / BINS_PER_METRE / STRETCH) - 1 - first
+    end = math.floor(high / BINS_PER_METRE / STRETCH) + 2 - first
+    near = radii[max(begin, 0) : max(end, 1)]
+    radius = float(near.max()) if len(near) else float(radii.max())
+    return math.ceil(radius * STRETCHING * BINS_PER_METRE)

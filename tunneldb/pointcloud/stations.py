@@ -1,0 +1,105 @@
+"""Stations of a static scanner, from CSV files and from the poses of E57 files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.csvfile import read_csv
+from tunneldb.errors import UserError
+from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_scans
+
+SCAN_ID_LIMIT = 1 << 31  # point_source_id of LAS has 16 bits, the numbers of E57 scans have 31
+SAME_PLACE = 0.001  # m; one station that comes from two files
+
+
+@dataclass(frozen=True)
+class Stations:
+    """Positions of a static scanner.
+
+    Attributes
+    ----------
+    scan_id : (n,) int32 array
+        Number of the scan, each once.
+    xyz : (n, 3) float64 array
+        Position, m.
+    """
+
+    scan_id: NDArray[np.int32]
+    xyz: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Station:
+    scan_id: int
+    place: NDArray[np.float64] | None
+    origin: str
+
+
+def read_stations(paths: Sequence[Path]) -> Stations:
+    """Read the stations of a survey.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        CSV files with scan_id,x,y,z; E57 files, whose scans are stations where their poses say; folders, for all E57
+        files in them. A scan of an E57 file that has no pose must be in a CSV file, by its number.
+
+    Raises
+    ------
+    UserError
+        If a file cannot be read or holds no station, a number is none, a scan has no position, or one number has two.
+    """
+    known: dict[int, _Station] = {}
+    placeless = []
+    for path in _files(paths):
+        for station in _of_e57(path) if is_e57(path) else _of_csv(path):
+            if station.place is None:
+                placeless.append(station)
+                continue
+            other = known.setdefault(station.scan_id, station)
+            if other.place is not None and np.linalg.norm(other.place - station.place) > SAME_PLACE:
+                raise UserError(f"scan_id {station.scan_id} has two positions: by {other.origin} and by {station.origin}")
+    for station in placeless:
+        if station.scan_id not in known:
+            raise UserError(
+                f"{station.origin} has no pose, so it is not known where the scanner stood; "
+                f"give it in a CSV file: --stations FILE, scan_id {station.scan_id}"
+            )
+    return Stations(np.array(list(known), np.int32), np.array([station.place for station in known.values()], np.float64))
+
+
+def _files(paths: Sequence[Path]) -> Iterator[Path]:
+    for path in paths:
+        if not path.is_dir():
+            yield path
+            continue
+        found = sorted(file for file in path.iterdir() if is_e57(file))
+        if not found:
+            raise UserError(f"{path}: no E57 file in this folder")
+        yield from found
+
+
+def _of_e57(path: Path) -> Iterator[_Station]:
+    for scan in read_e57_scans(path):
+        yield _Station(scan.number, scan.position, f"{path}, scan {scan.index + 1} ({scan.name})")
+
+
+def _of_csv(path: Path) -> Iterator[_Station]:
+    table = read_csv(path, ("scan_id", "x", "y", "z"))
+    if not len(table):
+        raise UserError(f"{path} holds no station")
+    ids = table["scan_id"]
+    wrong = np.flatnonzero((ids != np.floor(ids)) | (ids < 0) | (ids >= SCAN_ID_LIMIT))
+    if len(wrong):
+        raise table.error(int(wrong[0]), f"scan_id {ids[wrong[0]]:g} is not a whole number from 0 to {SCAN_ID_LIMIT - 1}")
+    _, first = np.unique(ids, return_index=True)
+    repeated = np.setdiff1d(np.arange(len(ids)), first)
+    if len(repeated):
+        raise table.error(int(repeated[0]), f"scan_id {ids[repeated[0]]:g} stands above already; each station once")
+    for row, place in enumerate(table.columns(("x", "y", "z"))):
+        yield _Station(int(ids[row]), place, f"{path}, line {table.lines[row]}")

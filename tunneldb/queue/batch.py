@@ -1,0 +1,402 @@
+"""What a batch asks for: files to be read, kilometres and the stage up to which each is to be brought."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+from psycopg.rows import class_row
+from psycopg.types.json import Jsonb
+
+from tunneldb.store.survey import Survey
+from tunneldb.errors import UserError
+from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.store.surface import load_alignment
+from tunneldb.pipeline.load import chainages_near, header_kilometres, parameters_of, settings_of
+from tunneldb.pipeline.run import loaded_kilometres
+from tunneldb.pipeline.stages import STAGES
+from tunneldb.pointcloud.formats.e57 import is_e57
+from tunneldb.pointcloud.formats.las_bounds import header_box
+from tunneldb.pointcloud.poses import load_poses
+from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
+
+STEPS = ("load", *(stage.name for stage in STAGES))
+"""Stages of a kilometre, in their order."""
+
+
+@dataclass(frozen=True)
+class Incoming:
+    """A file that a batch names, as its header has it.
+
+    Attributes
+    ----------
+    name : str
+        Its name without the folder, by which the survey knows it.
+    path : Path
+        Where it lies, absolute.
+    bytes, points : int
+        Its size, and how many points its header announces; 0 points if that is unreadable.
+    km_from, km_to : int or None
+        First and last kilometre that it may touch; None if not even its box is readable, or it touches none.
+    error : str or None
+        Why it can't be read.
+    there : bool
+        Whether it was read already and has not been touched since, by its path, size and times.
+    """
+
+    name: str
+    path: Path
+    bytes: int
+    points: int
+    km_from: int | None = None
+    km_to: int | None = None
+    error: str | None = None
+    there: bool = False
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a batch asks for, before anything is done.
+
+    Attributes
+    ----------
+    files : tuple of Incoming
+        All files that it names, within its kilometres.
+    kilometres : tuple of int
+        Kilometres that are wanted.
+    stage : str or None
+        Stage up to which they are to be brought; None where it stays as it was asked for before.
+    parameters : dict
+        Parameters that differ from the defaults, by name, those of reading and loading included.
+    reading : dict
+        Parameters of reading and loading, all of them.
+    """
+
+    files: tuple[Incoming, ...]
+    kilometres: tuple[int, ...]
+    stage: str | None
+    parameters: dict[str, Any] = field(default_factory=dict)
+    reading: dict[str, Any] = field(default_factory=dict)
+
+
+def plan(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    paths: Sequence[Path] = (),
+    *,
+    kilometres: range | None = None,
+    stage: str | None = None,
+    reading: Mapping[str, Any] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    retry: bool = False,
+) -> Plan:
+    """Look at the headers of files, and see which kilometres they and the options ask for; changes nothing.
+
+    Parameters
+    ----------
+    conn : Connection
+    survey : Survey
+    paths : sequence of Path
+        Scan files; none to go on with what is wanted and with what is loaded.
+    kilometres : range, optional
+        Only these.
+    stage : str, optional
+        Stage up to which they are to be brought; the last one by default.
+    reading : mapping, optional
+        Parameters of reading and loading (``load.density`` and so on) that differ from their defaults. The density is the
+        one that the survey has, if it has one.
+    parameters : mapping, optional
+        Those of the stages that are set.
+    retry : bool
+        Whether to look again at files that have failed before; one that is gone stays failed.
+
+    Raises
+    ------
+    UserError
+        If a file is missing, two have the same name, or there is nothing to be done.
+    """
+    named = [path.resolve() for path in paths]
+    _require_files(named)
+    again = _failed_paths(conn, survey, {path.name for path in named}) if retry else []
+    how = parameters_of(settings_of({**_present_density(conn, survey), **(reading or {})}))
+    files = _headers(conn, survey, [*named, *again], float(how["load.max_distance"]))
+    if kilometres is not None:
+        files = [file for file in files if file.error or _touches(file, kilometres)]
+    wanted = {km for file in files for km in _kilometres(file)}
+    wanted |= _near_damaged(conn, survey, files, float(how["load.max_distance"]))
+    if not named:
+        goals = _goals(conn, survey)
+        options = kilometres is not None or stage is not None or parameters
+        wanted |= goals if goals and not options else goals | set(loaded_kilometres(conn, survey))
+    chosen = {km for km in wanted if kilometres is None or km in kilometres}
+    if not chosen and not any(file.error for file in files) and not _awaits(conn, survey):
+        where = "" if kilometres is None else f" in kilometres {kilometres[0]}-{kilometres[-1]}"
+        raise UserError(f"survey {survey.name} has nothing to be done{where}: tunneldb batch {survey.name} FILES")
+    return Plan(tuple(files), tuple(sorted(chosen)), stage, dict(parameters or {}), how)
+
+
+def _require_files(paths: Sequence[Path]) -> None:
+    names: dict[str, Path] = {}
+    for path in paths:
+        if not path.is_file():
+            what = "is a folder: give the files in it" if path.is_dir() else "there is no such file"
+            raise UserError(f"{path}: {what}; nothing was registered")
+        if path.name in names:
+            raise UserError(f"{path} and {names[path.name]} have the same name: a survey's files are known by their names")
+        names[path.name] = path
+
+
+def _failed_paths(conn: psycopg.Connection[Any], survey: Survey, others: set[str]) -> list[Path]:
+    rows = conn.execute(
+        "SELECT name, path FROM tunnel.incoming WHERE survey_id = %s AND failed_at IS NOT NULL ORDER BY km_from, name",
+        [survey.id],
+    ).fetchall()
+    return [Path(path) for name, path in rows if name not in others and Path(path).is_file()]
+
+
+def _present_density(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, Any]:
+    row = conn.execute(
+        "SELECT r.parameters -> 'load.density' FROM tunnel.run r WHERE r.survey_id = %s AND r.stage IN ('read', 'load')"
+        " AND r.outcome = 'done' AND r.parameters ? 'load.density' ORDER BY r.id DESC LIMIT 1",
+        [survey.id],
+    ).fetchone()
+    return {} if row is None else {"load.density": row[0]}
+
+
+def _headers(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path], reach: float) -> list[Incoming]:
+    if not paths:
+        return []
+    alignment, poses = load_alignment(conn, survey), load_poses(conn, survey)
+    read = {
+        row[0]: row[1:]
+        for row in conn.execute(
+            "SELECT name, path, bytes, loaded_at FROM tunnel.scan_file WHERE survey_id = %s", [survey.id]
+        ).fetchall()
+    }
+    files = []
+    for path in paths:
+        size = path.stat().st_size
+        points = 0
+        try:
+            header = read_header(path)
+            points = header.points
+            check_header(header, survey.intensity_dimension, survey.srid, needs_time=poses.mobile)
+        except UserError as error:
+            touched = _damaged_kilometres(path, alignment, reach)
+            first, last = (touched[0], touched[-1]) if touched else (None, None)
+            files.append(Incoming(path.name, path, size, points, first, last, str(error)))
+            continue
+        touched = header_kilometres(header, alignment, reach)
+        if not touched:
+            off = f"{path}: its points lie off the given axis of tunnel {survey.tunnel}: is it a file of this tunnel?"
+            files.append(Incoming(path.name, path, size, points, error=off))
+            continue
+        there = path.name in read and _untouched(path, size, *read[path.name])
+        files.append(Incoming(path.name, path, size, points, touched[0], touched[-1], None, there))
+    return files
+
+
+def _near_damaged(conn: psycopg.Connection[Any], survey: Survey, files: Sequence[Incoming], reach: float) -> set[int]:
+    """Kilometres that files that can't be read may touch: wanted as those of good ones, for when they are put right."""
+    damaged = [header for file in files if file.error and (header := _damaged_header(file.path)) is not None]
+    if not damaged:
+        return set()
+    alignment = load_alignment(conn, survey)
+    return {km for header in damaged for km in header_kilometres(header, alignment, reach)}
+
+
+def _damaged_header(path: Path) -> ScanHeader | None:
+    """What is known of a file that can't be read: its box, if that is there."""
+    box = None if is_e57(path) else header_box(path)
+    return None if box is None else ScanHeader(path, 0, (), None, np.array(box[0]), np.array(box[1]))
+
+
+def _damaged_kilometres(path: Path, alignment: Alignment, reach: float) -> range:
+    """Kilometres that fail with a file that can't be read: those of its box, if that is there."""
+    header = _damaged_header(path)
+    return range(0) if header is None else _inner_kilometres(header, alignment, reach)
+
+
+def _inner_kilometres(header: ScanHeader, alignment: Alignment, reach: float) -> range:
+    """Kilometres in which the axis runs through the box of a file, not just past its ends; empty if none."""
+    ends = extent(header, alignment, reach)
+    return range(0) if ends is None else range(int(ends[0] // KILOMETRE), int(ends[1] // KILOMETRE) + 1)
+
+
+def extent(header: ScanHeader, alignment: Alignment, reach: float) -> tuple[float, float] | None:
+    """From where to where a file goes along the axis, by its box; rather too short than too long.
+
+    Of where the axis is within the reach of the box, the reach is taken off at both ends, half as much again since the
+    box may stand askew to the axis, and a step of the axis.
+
+    Parameters
+    ----------
+    header : ScanHeader
+    alignment : Alignment
+        The given axis.
+    reach : float
+        How far from the axis the tunnel reaches, m.
+
+    Returns
+    -------
+    tuple or None
+        Two chainages, m; None if the file is not at the axis.
+    """
+    chainage = chainages_near(header, alignment, reach)
+    if not len(chainage):
+        return None
+    margin = min(1.5 * reach + alignment.spacing, float(np.ptp(chainage)) / 2.0)
+    return float(chainage.min()) + margin, float(chainage.max()) - margin
+
+
+def give_up_file(conn: psycopg.Connection[Any], survey: Survey, name: str) -> None:
+    """Let a file that has failed fail only the kilometres that hold its points, not those that it just touches.
+
+    Does nothing for a file that has not failed for good, or of which not even the box can be read.
+    """
+    with conn.transaction():
+        conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey.id])
+        row = conn.execute(
+            "SELECT path, parameters FROM tunnel.incoming WHERE survey_id = %s AND name = %s AND failed_at IS NOT NULL",
+            [survey.id, name],
+        ).fetchone()
+        if row is None or not Path(row[0]).is_file():
+            return
+        reach = settings_of(row[1]).max_distance
+        held = _damaged_kilometres(Path(row[0]), load_alignment(conn, survey), reach)
+        if held:
+            conn.execute(
+                "UPDATE tunnel.incoming SET km_from = %s, km_to = %s WHERE survey_id = %s AND name = %s",
+                [held[0], held[-1], survey.id, name],
+            )
+            conn.execute("SELECT tunnel_api.queue_plan(%s)", [survey.id])
+
+
+def _untouched(path: Path, size: int, known_path: str, known_size: int, read_at: dt.datetime) -> bool:
+    """Whether a file is the one that was read: its checksum is looked at only if path, size or times say otherwise."""
+    stat = path.stat()
+    return str(path) == known_path and size == known_size and max(stat.st_mtime, stat.st_ctime) < read_at.timestamp()
+
+
+def _kilometres(file: Incoming) -> range:
+    return range(0) if file.km_from is None or file.km_to is None else range(file.km_from, file.km_to + 1)
+
+
+def _touches(file: Incoming, kilometres: range) -> bool:
+    return any(km in kilometres for km in _kilometres(file))
+
+
+def _goals(conn: psycopg.Connection[Any], survey: Survey) -> set[int]:
+    return {row[0] for row in conn.execute("SELECT km FROM tunnel.goal WHERE survey_id = %s", [survey.id]).fetchall()}
+
+
+def _awaits(conn: psycopg.Connection[Any], survey: Survey) -> bool:
+    return conn.execute("SELECT FROM tunnel.incoming WHERE survey_id = %s LIMIT 1", [survey.id]).fetchone() is not None
+
+
+def register(conn: psycopg.Connection[Any], survey: Survey, asked: Plan, *, retry: bool = False) -> int:
+    """Put on record what a batch asks for, and defer the jobs that are ready, in one transaction; returns how many.
+
+    What was asked for before stays: a kilometre is brought to the later one of two stages, and parameters that are not
+    set keep their values.
+
+    Parameters
+    ----------
+    retry : bool
+        Whether stages that have failed are to be tried again; files that have are those of the plan.
+    """
+    with conn.transaction():
+        conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey.id])
+        with conn.cursor() as cursor:
+            cursor.executemany(_INCOMING, [_row(survey, file, asked) for file in asked.files if not file.there])
+            cursor.executemany(_GOAL, [_goal(survey, km, asked) for km in asked.kilometres])
+        if retry:
+            conn.execute("UPDATE tunnel.goal SET retry_after = clock_timestamp() WHERE survey_id = %s", [survey.id])
+        row = conn.execute("SELECT tunnel_api.queue_plan(%s)", [survey.id]).fetchone()
+    assert row is not None
+    return int(row[0])
+
+
+_INCOMING = """
+INSERT INTO tunnel.incoming AS i (survey_id, name, path, bytes, points, km_from, km_to, parameters, failed_at, message)
+VALUES (%(survey)s, %(name)s, %(path)s, %(bytes)s, %(points)s, %(km_from)s, %(km_to)s, %(parameters)s,
+        CASE WHEN %(error)s::text IS NOT NULL THEN clock_timestamp() END, %(error)s)
+ON CONFLICT (survey_id, name) DO UPDATE
+   SET path = excluded.path, bytes = excluded.bytes, points = excluded.points, km_from = excluded.km_from,
+       km_to = excluded.km_to, parameters = excluded.parameters, requested_at = excluded.requested_at,
+       failed_at = excluded.failed_at, message = excluded.message
+ WHERE i.failed_at IS NOT NULL OR excluded.failed_at IS NOT NULL
+    OR (i.path, i.bytes, i.parameters) IS DISTINCT FROM (excluded.path, excluded.bytes, excluded.parameters)
+"""
+
+_GOAL = """
+INSERT INTO tunnel.goal AS g (survey_id, km, stage, parameters)
+VALUES (%(survey)s, %(km)s, coalesce(%(stage)s, 'detect'), %(reading)s || %(parameters)s)
+ON CONFLICT (survey_id, km) DO UPDATE
+   SET stage = CASE WHEN (%(stage)s IS NOT NULL OR %(new)s)
+                     AND array_position(%(steps)s, excluded.stage) > array_position(%(steps)s, g.stage)
+                    THEN excluded.stage ELSE g.stage END,
+       parameters = g.parameters || %(parameters)s, requested_at = excluded.requested_at
+"""
+
+
+def _row(survey: Survey, file: Incoming, asked: Plan) -> dict[str, Any]:
+    return {
+        "survey": survey.id,
+        "name": file.name,
+        "path": str(file.path),
+        "bytes": file.bytes,
+        "points": file.points,
+        "km_from": file.km_from,
+        "km_to": file.km_to,
+        "parameters": Jsonb(asked.reading),
+        "error": file.error,
+    }
+
+
+def _goal(survey: Survey, km: int, asked: Plan) -> dict[str, Any]:
+    return {
+        "survey": survey.id,
+        "km": km,
+        "stage": asked.stage,
+        "steps": list(STEPS),
+        "reading": Jsonb(asked.reading),
+        "parameters": Jsonb(asked.parameters),
+        "new": bool(asked.files),
+    }
+
+
+@dataclass(frozen=True)
+class Result:
+    """What became of a kilometre: ``state`` is that of its first stage that is not done, or ``done``."""
+
+    km: int
+    stage: str
+    state: str
+    message: str | None
+
+
+def results(conn: psycopg.Connection[Any], survey: Survey) -> list[Result]:
+    """What became of each kilometre that is wanted, from the first on; those that hold no points are left out."""
+    with conn.cursor(row_factory=class_row(Result)) as cursor:
+        cursor.execute(
+            """
+            SELECT DISTINCT ON (km) km, stage, state, message FROM tunnel_api.queue_state(%s)
+             WHERE state <> 'empty' ORDER BY km, state = 'done', CASE WHEN state = 'done' THEN -step ELSE step END
+            """,
+            [survey.id],
+        )
+        return list(cursor)
+
+
+def failed_files(conn: psycopg.Connection[Any], survey: Survey) -> list[tuple[str, str]]:
+    """Files that could not be read, and why."""
+    return conn.execute(
+        "SELECT name, message FROM tunnel.incoming WHERE survey_id = %s AND failed_at IS NOT NULL ORDER BY km_from, name",
+        [survey.id],
+    ).fetchall()

@@ -1,0 +1,122 @@
+"""Worker processes of one command: started, started again when they die, asked to leave."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from types import FrameType
+
+from tunneldb.errors import UserError
+from tunneldb.queue.worker import Orders
+
+_PATIENCE = 30.0  # a worker that dies sooner is started again after a while only
+
+
+@dataclass
+class _Member:
+    process: subprocess.Popen[bytes]
+    started: float
+    falls: int = 0
+
+
+@dataclass
+class Team:
+    """Worker processes.
+
+    Parameters
+    ----------
+    orders : Orders
+        What each is told.
+    size : int
+        How many there are.
+    """
+
+    orders: Orders
+    size: int
+    members: list[_Member] = field(default_factory=list)
+    leaving: bool = False
+
+    def start(self) -> None:
+        """Start the workers."""
+        self.members = [_Member(self._launch(), time.monotonic()) for _ in range(self.size)]
+
+    def tend(self) -> bool:
+        """Start those again that died; returns whether any is still there.
+
+        Raises
+        ------
+        UserError
+            When a worker gave up, for a reason that it has said.
+        """
+        for member in list(self.members):
+            code = member.process.poll()
+            if code is None:
+                continue
+            if code in (0, 2) or self.leaving:
+                self.members.remove(member)
+                if code == 2:
+                    self.leave()
+                    raise UserError("a worker gave up, see above")
+                continue
+            lived = time.monotonic() - member.started
+            if lived > min(2.0**member.falls, _PATIENCE):
+                falls = 0 if lived > _PATIENCE else member.falls + 1
+                self.members[self.members.index(member)] = _Member(self._launch(), time.monotonic(), falls)
+        return bool(self.members)
+
+    def leave(self) -> None:
+        """Ask the workers to end what they are at, and leave; asked again, they leave at once."""
+        for member in self.members:
+            if member.process.poll() is None:
+                member.process.send_signal(signal.SIGKILL if self.leaving else signal.SIGTERM)
+        self.leaving = True
+
+    def _launch(self) -> subprocess.Popen[bytes]:
+        told = json.dumps({"threads": self.orders.threads, "survey": self.orders.survey})
+        environment = dict(os.environ)
+        environment["TUNNELDB_DSN"] = self.orders.dsn or ""
+        # The pipe stays open as long as this process lives; a session of its own keeps the terminal's Ctrl-C off.
+        process = subprocess.Popen(
+            [sys.executable, "-m", "tunneldb.queue.worker", told],
+            stdin=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=environment,
+            start_new_session=True,
+        )
+        threading.Thread(target=_pass_on, args=(process,), daemon=True).start()
+        return process
+
+
+def _pass_on(process: subprocess.Popen[bytes]) -> None:
+    """Say what a worker says, by this process' own stderr, which a table on the terminal gives way to."""
+    assert process.stderr is not None
+    for line in process.stderr:
+        print(line.decode(errors="replace"), end="", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def interrupts(team: Team) -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM ask the team to leave, the second time at once."""
+
+    def ask(number: int, frame: FrameType | None) -> None:
+        team.leave()
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        while team.members:
+            if not team.leaving:
+                team.leave()
+            team.tend()
+            time.sleep(0.05)

@@ -1,0 +1,277 @@
+"""What a batch would do, before it begins: where files leave gaps, room that it needs, time that it takes.
+
+The constants are measured; docs/howto-operate.md (Before it starts) says with what.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import psycopg
+
+from tunneldb.database.server import Server
+from tunneldb.store.survey import Survey
+from tunneldb.store.surface import load_alignment
+from tunneldb.queue.batch import STEPS, Plan, extent
+from tunneldb.pipeline.parameters import PARAMETERS
+from tunneldb.pointcloud.reader import read_header
+
+ROW_BYTES = 118.0
+"""Of the points' table with its index, per row."""
+
+FRAGMENT_BYTES = 51.0
+"""Of what was read and waits to be loaded, per row."""
+
+PIXEL_BYTES = 3.5
+"""Of the three images, per pixel of lining."""
+
+KILOMETRE_BYTES = 17e6
+"""Of axis, segments, sections, ground, lining, clusters and leaks, per kilometre."""
+
+GIRTH = 25.0
+"""Length around a cross-section that is taken for a tunnel of which nothing is known yet, m: 8 m in diameter."""
+
+SMALLEST_GAP = 100.0
+"""Stretches without a file that are shorter are not told, m: ends of files are known to some 30 m by their boxes."""
+
+
+@dataclass(frozen=True)
+class Disk:
+    """Bytes that a batch needs.
+
+    Attributes
+    ----------
+    points, images, others : float
+        What stays: rows of points, images, and axis, segments, sections, ground, lining, clusters and leaks.
+    passing : float
+        What goes again: points that were read and wait to be loaded, and the kilometres that are being rewritten.
+    wal : float
+        The write-ahead log, at its greatest.
+    """
+
+    points: float
+    passing: float
+    images: float
+    others: float
+    wal: float
+
+    @property
+    def total(self) -> float:
+        """All of them, at the worst moment."""
+        return self.points + self.passing + self.images + self.others + self.wal
+
+
+@dataclass(frozen=True)
+class Speed:
+    """How fast a stage went in this database: mean time of a kilometre, or of a point of a file (``read``), s."""
+
+    stage: str
+    seconds: float
+    runs: int
+
+
+@dataclass(frozen=True)
+class Preview:
+    """What a batch would do.
+
+    Attributes
+    ----------
+    plan : Plan
+    stretches : dict
+        Of each readable file, by its name, from where to where it goes along the axis, m.
+    covered : tuple of int
+        Kilometres in which files hold points.
+    missing : tuple of int
+        Those between the first and the last, or asked for, of which no file holds any.
+    gaps : tuple of (float, float)
+        Stretches of covered kilometres that no file covers, chainages, m.
+    points : int
+        Points of the files that are to be read.
+    rows : float
+        Rows expected in the database of them; at most so many where ``kept`` is None.
+    kept : float or None
+        Share of points that this survey, or another of the same density, has kept so far; None if there is none.
+    disk : Disk
+    free : int or None
+        Bytes that are free where the database lies; None where it can't be seen.
+    folder : Path or None
+        Where that is.
+    speeds : tuple of Speed
+        Of the stages that were ever measured in this database.
+    seconds : float or None
+        Time expected with ``workers`` workers; None if a stage was never measured.
+    workers : int
+    """
+
+    plan: Plan
+    stretches: dict[str, tuple[float, float]]
+    covered: tuple[int, ...]
+    missing: tuple[int, ...]
+    gaps: tuple[tuple[float, float], ...]
+    points: int
+    rows: float
+    kept: float | None
+    disk: Disk
+    free: int | None
+    folder: Path | None
+    speeds: tuple[Speed, ...]
+    seconds: float | None
+    workers: int
+
+    @property
+    def fits(self) -> bool:
+        """Whether there is room, as far as can be seen."""
+        return self.free is None or self.disk.total <= self.free
+
+
+def preview(
+    conn: psycopg.Connection[Any], survey: Survey, plan: Plan, kilometres: range | None, embedded: bool, workers: int
+) -> Preview:
+    """Look at what a batch would do; changes nothing.
+
+    Parameters
+    ----------
+    plan : Plan
+        What it asks for.
+    kilometres : range or None
+        Kilometres that were asked for by number.
+    embedded : bool
+        Whether the database is the embedded server's.
+    workers : int
+        How many are to be started.
+    """
+    of_files = _stretches(conn, survey, plan)
+    stretches = sorted(of_files.values())
+    covered = sorted({km for stretch in stretches for km in kilometres_of(stretch)})
+    wanted: Sequence[int] = kilometres or (range(covered[0], covered[-1] + 1) if covered else ())
+    missing = tuple(km for km in wanted if km not in covered) if stretches else ()
+    new = [file for file in plan.files if not file.there and file.error is None]
+    points = sum(file.points for file in new)
+    length = sum(high - low for low, high in _union(sorted(of_files[file.name] for file in new if file.name in of_files)))
+    kept = _kept(conn, survey, plan)
+    rows = _rows(points, length, kept, plan)
+    disk = _disk(conn, plan, rows, length or 1000.0 * len(plan.kilometres), workers)
+    folder = Server().home().cluster if embedded else None
+    speeds = _speeds(conn)
+    return Preview(
+        plan,
+        of_files,
+        tuple(covered),
+        missing,
+        tuple(gap for gap in _gaps(stretches) if not _whole(gap, missing)),
+        points,
+        rows,
+        kept,
+        disk,
+        shutil.disk_usage(folder).free if folder is not None else None,
+        folder,
+        speeds,
+        _time(speeds, plan, points, workers),
+        workers,
+    )
+
+
+def kilometres_of(stretch: tuple[float, float]) -> range:
+    """Kilometres that a stretch from one chainage to another, m, lies in."""
+    return range(int(stretch[0] // 1000.0), math.ceil(stretch[1] / 1000.0))
+
+
+def _stretches(conn: psycopg.Connection[Any], survey: Survey, plan: Plan) -> dict[str, tuple[float, float]]:
+    alignment = load_alignment(conn, survey)
+    reach = float(plan.reading["load.max_distance"])
+    found = {file.name: extent(read_header(file.path), alignment, reach) for file in plan.files if file.error is None}
+    return {name: stretch for name, stretch in found.items() if stretch is not None}
+
+
+def _union(stretches: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    joined: list[tuple[float, float]] = []
+    for low, high in stretches:
+        if joined and low <= joined[-1][1] + SMALLEST_GAP:
+            joined[-1] = (joined[-1][0], max(joined[-1][1], high))
+        else:
+            joined.append((low, high))
+    return joined
+
+
+def _gaps(stretches: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    joined = _union(stretches)
+    return [(before[1], after[0]) for before, after in pairwise(joined)]
+
+
+def _whole(gap: tuple[float, float], missing: Sequence[int]) -> bool:
+    """Whether a gap is told already as missing kilometres: it reaches little beyond them."""
+    inside = [km for km in missing if gap[0] <= 1000 * km + SMALLEST_GAP and gap[1] >= 1000 * (km + 1) - SMALLEST_GAP]
+    return bool(inside) and gap[1] - gap[0] <= 1000 * len(inside) + 2 * SMALLEST_GAP
+
+
+def _kept(conn: psycopg.Connection[Any], survey: Survey, plan: Plan) -> float | None:
+    """Share of points kept of files that were loaded at this density: of this survey, or else of all."""
+    row = conn.execute(
+        """
+        WITH file AS (
+            SELECT f.survey_id, f.kept, f.points
+              FROM tunnel.scan_file f
+             WHERE f.kept > 0 AND (SELECT r.parameters -> 'load.density' FROM tunnel.run r
+                                    WHERE r.survey_id = f.survey_id AND r.outcome = 'done' AND r.stage IN ('read', 'load')
+                                      AND r.parameters ? 'load.density' ORDER BY r.id DESC LIMIT 1) = to_jsonb(%(density)s)
+        )
+        SELECT coalesce(sum(kept) FILTER (WHERE survey_id = %(survey)s) / sum(points) FILTER (WHERE survey_id = %(survey)s),
+                        sum(kept) / sum(points))::float8
+          FROM file
+        """,
+        {"survey": survey.id, "density": plan.reading["load.density"]},
+    ).fetchone()
+    return None if row is None else row[0]
+
+
+def _rows(points: int, length: float, kept: float | None, plan: Plan) -> float:
+    if kept is not None:
+        return kept * points
+    density = plan.reading["load.density"]
+    return float(points) if density == "all" else min(float(points), float(density) * GIRTH * length)
+
+
+def _disk(conn: psycopg.Connection[Any], plan: Plan, rows: float, length: float, workers: int) -> Disk:
+    row = conn.execute("SELECT pg_size_bytes(current_setting('max_wal_size'))").fetchone()
+    assert row is not None
+    pixel = float(plan.parameters.get("image.pixel", PARAMETERS["image.pixel"].default))
+    detects = plan.stage in (None, STEPS[-1])
+    return Disk(
+        ROW_BYTES * rows,
+        FRAGMENT_BYTES * rows + ROW_BYTES * rows * min(workers / max(len(plan.kilometres), 1), 1.0),
+        PIXEL_BYTES * GIRTH * length / pixel**2 if detects else 0.0,
+        KILOMETRE_BYTES * length / 1000.0,
+        float(row[0]),
+    )
+
+
+def _speeds(conn: psycopg.Connection[Any]) -> tuple[Speed, ...]:
+    """Mean times of the stages, of all surveys of the database."""
+    rows = conn.execute(
+        """
+        SELECT stage,
+               (CASE stage WHEN 'read' THEN sum(s.seconds) / nullif(sum((s.counts ->> 'points')::bigint), 0)
+                           ELSE avg(s.seconds) END)::float8, count(*)
+          FROM (SELECT r.stage, r.counts, extract(epoch FROM r.finished_at - r.started_at) AS seconds
+                  FROM tunnel.run r
+                 WHERE r.outcome = 'done' AND r.job_id IS NOT NULL) s
+         GROUP BY stage
+        """
+    ).fetchall()
+    found = {stage: Speed(stage, seconds, runs) for stage, seconds, runs in rows if seconds is not None}
+    return tuple(found[stage] for stage in ("read", *STEPS) if stage in found)
+
+
+def _time(speeds: Sequence[Speed], plan: Plan, points: int, workers: int) -> float | None:
+    """Time of all work, shared by the workers; None if one of the stages was never measured."""
+    steps = STEPS[: STEPS.index(plan.stage or STEPS[-1]) + 1]
+    mean = {speed.stage: speed.seconds for speed in speeds}
+    if not {*steps, *(("read",) if points else ())} <= mean.keys():
+        return None
+    return (points * mean.get("read", 0.0) + len(plan.kilometres) * sum(mean[step] for step in steps)) / workers

@@ -1,0 +1,250 @@
+"""A worker: one process that takes jobs from the queue, one after the other, until it is told to leave.
+
+``python -m tunneldb.queue.worker`` is what `tunneldb.queue.pool` starts; it ends with its parent.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import os
+import platform
+import random
+import signal
+import sys
+import threading
+import time
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import psycopg
+
+from tunneldb.errors import UserError
+from tunneldb.threads import use_threads
+
+if TYPE_CHECKING:
+    from procrastinate.worker import Worker
+
+HEARTBEAT = 5.0
+"""Seconds between two heartbeats, and between two looks for lost workers."""
+
+STALLED = 25.0
+"""A worker without a heartbeat for so many seconds is lost."""
+
+GIVE_UP = 900.0
+"""Seconds for which a worker waits for a server that is away."""
+
+log = logging.getLogger("tunneldb.worker")
+
+
+@dataclass(frozen=True)
+class Orders:
+    """What a worker is told.
+
+    Attributes
+    ----------
+    dsn : str or None
+        None for the embedded server.
+    threads : int
+        How many threads it computes with.
+    survey : int or None
+        Leave when there is nothing left to be done of this survey.
+    """
+
+    dsn: str | None
+    threads: int = 1
+    survey: int | None = None
+
+
+class _Leave:
+    """Whether to leave, and what is to be told of it."""
+
+    def __init__(self) -> None:
+        self._wanted = asyncio.Event()
+        self.worker: Worker | None = None
+
+    def wanted(self) -> bool:
+        return self._wanted.is_set()
+
+    def now(self) -> None:
+        self._wanted.set()
+        self.pause()
+
+    async def wait(self, seconds: float) -> None:
+        """Wait, but not if it is time to leave."""
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._wanted.wait(), seconds)
+
+    def pause(self) -> None:
+        """End the present connection to the queue after the job that is under way."""
+        if self.worker is not None:
+            self.worker.stop()  # type: ignore[no-untyped-call]
+
+
+def work(orders: Orders) -> None:
+    """Serve the queue until told to leave; a server that is away is waited for.
+
+    Raises
+    ------
+    UserError
+        If the server stays away, or its schema is not this program's.
+    """
+    use_threads(orders.threads)
+    asyncio.run(_work(orders))
+
+
+async def _work(orders: Orders) -> None:
+    leave = _Leave()
+    loop = asyncio.get_running_loop()
+    for name in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(name, leave.now)
+    away_since: float | None = None
+    wait = 0.5
+    while not leave.wanted():
+        try:
+            async with _connected(orders) as (dsn, presence):
+                if away_since is not None:
+                    log.warning("the database is back")
+                away_since, wait = None, 0.5
+                await _serve(orders, leave, dsn, presence)
+        except _AWAY as error:
+            if leave.wanted():
+                return
+            if away_since is None:
+                away_since = time.monotonic()
+                log.warning("the database is away, waiting for it: %s", _line(error))
+            if time.monotonic() - away_since > GIVE_UP:
+                raise UserError(f"the database has been away for {GIVE_UP / 60:.0f} minutes: {_line(error)}") from None
+        await leave.wait(wait * random.uniform(0.7, 1.3))
+        wait = min(2 * wait, 15.0)
+
+
+@contextlib.asynccontextmanager
+async def _connected(orders: Orders) -> AsyncIterator[tuple[str, psycopg.AsyncConnection[Any]]]:
+    """The session that shows that the worker lives, and the DSN of the queue."""
+    from tunneldb.database.connection import resolve_dsn
+    from tunneldb.database.schema import require_current_schema
+    from tunneldb.database.session import CONNECT, SETTINGS
+
+    def prepare() -> str:
+        try:
+            dsn = resolve_dsn(orders.dsn)
+        except UserError as error:  # the embedded server does not start, perhaps not yet
+            raise psycopg.OperationalError(str(error)) from error
+        with psycopg.connect(dsn, **CONNECT) as conn:
+            require_current_schema(conn)
+        return dsn
+
+    dsn = await asyncio.to_thread(prepare)
+    async with await psycopg.AsyncConnection.connect(dsn, autocommit=True, **CONNECT) as presence:
+        await presence.execute(SETTINGS)
+        yield dsn, presence
+
+
+async def _serve(orders: Orders, leave: _Leave, dsn: str, presence: psycopg.AsyncConnection[Any]) -> None:
+    """Take jobs until told to leave, or the connection to the queue is lost."""
+    from procrastinate.worker import Worker
+
+    from tunneldb.queue.jobs import QUEUE, make_app
+
+    tending: list[asyncio.Task[None]] = []
+
+    async def registered(worker: int) -> None:
+        await presence.execute("SELECT tunnel_api.queue_register(%s, %s, %s)", [worker, platform.node(), os.getpid()])
+        tending.append(asyncio.create_task(_tend(orders, leave, worker, presence)))
+
+    app = make_app(dsn, orders.dsn, registered, leave.pause)
+    async with app.open_async():
+        leave.worker = Worker(
+            app,
+            queues=[QUEUE],
+            fetch_job_polling_interval=2.0,
+            abort_job_polling_interval=60.0,
+            install_signal_handlers=False,
+            update_heartbeat_interval=HEARTBEAT,
+            stalled_worker_timeout=STALLED,
+        )
+        try:
+            if not leave.wanted():
+                await leave.worker.run()  # type: ignore[no-untyped-call]
+        finally:
+            leave.worker = None
+            for task in tending:
+                task.cancel()
+            await asyncio.gather(*tending, return_exceptions=True)
+            with contextlib.suppress(psycopg.OperationalError):
+                await presence.execute("SELECT tunnel_api.queue_rescue()")
+
+
+async def _tend(orders: Orders, leave: _Leave, worker: int, presence: psycopg.AsyncConnection[Any]) -> None:
+    """Show that the worker lives, also while it ends its last job; take over what others have lost; look whether to leave."""
+    beat = 0.0
+    try:
+        while True:
+            if time.monotonic() - beat >= HEARTBEAT:
+                beat = time.monotonic()
+                await presence.execute("SELECT tunnel_queue.procrastinate_update_heartbeat_v1(%s)", [worker])
+                await presence.execute("SELECT tunnel_api.queue_rescue()")
+            row = await (
+                await presence.execute(
+                    "SELECT coalesce((SELECT w.stop FROM tunnel.worker w WHERE w.id = %(worker)s), false),"
+                    "       coalesce(NOT tunnel_api.queue_busy(%(survey)s), false),"
+                    "       NOT EXISTS (SELECT FROM tunnel_queue.procrastinate_workers w WHERE w.id = %(worker)s)",
+                    {"worker": worker, "survey": orders.survey},
+                )
+            ).fetchone()
+            assert row is not None
+            stopped, idle, forgotten = row
+            if stopped or idle:
+                leave.now()
+            elif forgotten:  # it was silent for too long: register anew
+                leave.pause()
+            await asyncio.sleep(1.0)
+    except psycopg.OperationalError:
+        leave.pause()
+
+
+def _line(error: BaseException) -> str:
+    return str(error).strip().split("\n", 1)[0] or type(error).__name__
+
+
+def _away() -> tuple[type[Exception], ...]:
+    from procrastinate.exceptions import ConnectorException
+
+    return (psycopg.OperationalError, ConnectorException)
+
+
+_AWAY = _away()
+
+
+def _end_with_parent() -> None:
+    """End at once when the parent does: its end of the pipe on our standard input is closed then."""
+
+    def watch() -> None:
+        while os.read(0, 1):
+            pass
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def main() -> int:
+    """Run as a process of its own; orders come as JSON in the first argument, the DSN in TUNNELDB_DSN."""
+    told = json.loads(sys.argv[1])
+    _end_with_parent()
+    logging.basicConfig(format="%(asctime)s worker %(process)d: %(message)s", datefmt="%H:%M:%S", level=logging.WARNING)
+    logging.getLogger("procrastinate").setLevel(logging.CRITICAL + 1)
+    logging.getLogger("psycopg.pool").setLevel(logging.CRITICAL + 1)
+    try:
+        work(Orders(os.environ.get("TUNNELDB_DSN") or None, told["threads"], told["survey"]))
+    except UserError as error:
+        log.error("%s", error)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,157 @@
+"""Cells of the lining as they are seen: the units of which a range curve is made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.radiometry.oren_nayar import incidence_db
+from tunneldb.radiometry.range_spline import RangeSpline
+
+Float = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+CELL = 0.5
+"""Side of a cell, m: the lining in it is of one reflectance."""
+
+RING = 2.0
+"""Length of the rings within which what is left of views may hang together in any way, m."""
+
+STRETCH = 5.0
+"""Length of the stretches that may differ in reflectance in any way, m: at most half a block of in-situ lining."""
+
+ENOUGH = 4
+"""Points of a view beyond so many don't make it surer: what is left is the surface's texture."""
+
+
+ROUGHNESS = np.arange(0.0, 60.1, 2.5)
+"""Roughnesses that are tried, degrees; between two of them the effect of incidence follows from the nearest three."""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Cells of the lining, each seen by one scan or several; arrays (n, …) have an element for each view.
+
+    Attributes
+    ----------
+    cell : (n,) int array
+        Number of its cell, 0 to count - 1.
+    basis : (n, p) float array
+        Means of the functions of range.
+    incidence : (n, s) float array
+        Means of the effect of incidence, dB, for each of ROUGHNESS.
+    level : (n,) float array
+        Mean intensity, dB.
+    aside : (n,) float array
+        How far from the middle of its cell a view's points lie around the section, on average, m; 0 without an unrolled plane.
+    weight : (n,) float array
+        Points, at most ENOUGH.
+    stretch, ring, alike : (count,) int arrays
+        Numbers from 0 of the stretch that holds each cell, of the ring (a stretch where there is no unrolled plane), and of
+        the strip of its stretch, one cell wide, in which cells are compared with each other (likewise).
+    row, column : (count,) int arrays
+        Place of each cell in the unrolled plane, in cells from the first along and across; -1 without one.
+    """
+
+    cell: Index
+    basis: Float
+    incidence: Float
+    level: Float
+    aside: Float
+    weight: Float
+    stretch: Index
+    ring: Index
+    alike: Index
+    row: Index
+    column: Index
+
+    @property
+    def count(self) -> int:
+        """Number of cells."""
+        return len(self.stretch)
+
+    @property
+    def overlapping(self) -> int:
+        """Number of cells that several scans saw."""
+        return int(np.count_nonzero(np.bincount(self.cell) > 1))
+
+    def incidence_at(self, roughness: float) -> Float:
+        """Means (n,) of the effect of incidence, dB, for a roughness, degrees."""
+        k = int(np.clip(np.rint((roughness - ROUGHNESS[0]) / (ROUGHNESS[1] - ROUGHNESS[0])), 1, len(ROUGHNESS) - 2))
+        x = (roughness - ROUGHNESS[k]) / (ROUGHNESS[1] - ROUGHNESS[0])
+        return np.asarray(self.incidence[:, k - 1 : k + 2] @ np.array([0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)]))
+
+
+@dataclass(frozen=True)
+class Sight:
+    """Points as seen.
+
+    Attributes
+    ----------
+    place : (n, 2) or (n, 3) float array
+        Chainage and arc, or coordinates in space, m.
+    scan : (n,) int array
+        Number of the scan that each is of.
+    range_m, cosine : (n,) float arrays
+        Range, m, and cosine of the incidence angle.
+    level : (n,) float array
+        Intensity, dB.
+    """
+
+    place: Float
+    scan: NDArray[np.integer]
+    range_m: Float
+    cosine: Float
+    level: Float
+
+    def some(self, chosen: NDArray[np.bool_]) -> Sight:
+        """The chosen points."""
+        return Sight(self.place[chosen], self.scan[chosen], self.range_m[chosen], self.cosine[chosen], self.level[chosen])
+
+
+def group(sight: Sight, spline: RangeSpline, *, unrolled: bool) -> Cells:
+    """Gather points into cells; ``unrolled`` says that places are in the unrolled plane of a tunnel."""
+    at = np.floor(sight.place / CELL).astype(np.int64)
+    number, first = _number(np.column_stack([at, sight.scan.astype(np.int64)]))
+    points = np.bincount(number)
+    cell, some = _number(at[first])
+
+    def mean(values: Float) -> Float:
+        return np.asarray(np.bincount(number, values) / points)
+
+    where = sight.place[first[some]]
+    stretch = _number(np.floor(where[:, :1] / STRETCH if unrolled else where / STRETCH).astype(np.int64))[0]
+    row, column = (_places(where[:, axis]) if unrolled else np.full(len(where), -1) for axis in (0, 1))
+    return Cells(
+        cell,
+        np.column_stack([mean(column) for column in spline(sight.range_m).T]),
+        np.column_stack([mean(incidence_db(sight.cosine, roughness)) for roughness in ROUGHNESS]),
+        mean(sight.level),
+        mean(sight.place[:, 1] - (at[:, 1] + 0.5) * CELL) if unrolled else np.zeros(len(points)),
+        np.minimum(points, ENOUGH).astype(np.float64),
+        stretch,
+        _number(np.floor(where[:, :1] / RING).astype(np.int64))[0] if unrolled else stretch,
+        _number(np.column_stack([stretch, column]))[0] if unrolled else stretch,
+        row,
+        column,
+    )
+
+
+def _places(along: Float) -> Index:
+    at: Index = np.floor(along / CELL).astype(np.int64)
+    return at - at.min() if len(at) else at
+
+
+def _number(keys: Index) -> tuple[Index, Index]:
+    """Number of each row's (n, m) like among all different ones, from 0, and one row of each."""
+    if len(keys) == 0:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    # All columns in one integer: sorting rows is slow.
+    low = keys.min(axis=0)
+    packed = np.zeros(len(keys), np.int64)
+    for column, least, most in zip(keys.T, low, keys.max(axis=0), strict=True):
+        packed = packed * (most - least + 1) + (column - least)
+    _, first, number = np.unique(packed, return_index=True, return_inverse=True)
+    return number.reshape(-1), first

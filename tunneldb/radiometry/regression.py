@@ -1,0 +1,398 @@
+"""Regression of intensity on range and incidence, over cells whose own reflectance is unknown.
+
+Views of one cell are compared with each other (fixed effects), and so are the cells of one strip along the tunnel within a
+stretch, as far as their reflectance is alike (fixed effects of strips, random ones of cells: Swamy and Arora, 1972). Cells
+side by side around the section are never compared: there soot and grime go with range and incidence. Outliers – leaks,
+joints, what hangs on the lining – lose their weight (Tukey's biweight). The covariance is a sandwich (Liang and Zeger,
+1986): of views clustered by rings of the lining, of cells by the covariance of what all of the section has in common at
+some distance along the tunnel, as rings and blocks have, and of neighbours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+from scipy.interpolate import CubicSpline
+
+from tunneldb.radiometry.cells import CELL, ROUGHNESS, STRETCH, Cells, Index
+from tunneldb.radiometry.range_spline import RangeSpline, one_maximum
+
+Float = NDArray[np.float64]
+
+TUKEY = 4.685
+"""Residuals of so many standard deviations have no weight: 95 % efficient on normal ones (Holland and Welsch, 1977)."""
+
+ROUNDS = 8
+"""Rounds of weighting."""
+
+NEAR = 6.0
+"""Distance beyond which cells are no longer taken for neighbours, m."""
+
+APART = 2.0 * STRETCH
+"""Distance along the tunnel up to which what all of the section has in common may go on, m: as long as blocks of in-situ
+lining are."""
+
+
+NOTHING = 1e6
+"""Design effect of a comparison that is to decide about nothing."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What was found.
+
+    Attributes
+    ----------
+    coefficients : (p,) float array
+        Of the range spline, dB.
+    covariance : (p, p) float array
+        Theirs, of which only what is left without a constant means anything.
+    level : float
+        Median of what is left of the cells, dB.
+    roughness, roughness_sigma : float
+        σ and its standard deviation, degrees.
+    noise, lining : float
+        Standard deviation of a view of ENOUGH points, and of cells, dB.
+    weight : (n,) float array
+        Weights of the views, 0 of outliers.
+    """
+
+    coefficients: Float
+    covariance: Float
+    level: float
+    roughness: float
+    roughness_sigma: float
+    noise: float
+    lining: float
+    weight: Float
+
+
+@dataclass(frozen=True)
+class _Weights:
+    """Weights of the regression.
+
+    Attributes
+    ----------
+    view, cell : (n,), (count,) float arrays
+        Of each view, in points, and robust ones of each cell.
+    noise, lining : float
+        Variance of a view of one point, and of cells, dB².
+    design : float
+        By how much less cells compared with each other say than if each stood for itself.
+    """
+
+    view: Float
+    cell: Float
+    noise: float
+    lining: float
+    design: float
+
+
+def fit(cells: Cells, spline: RangeSpline, *, among: bool) -> Fit:
+    """Fit range spline and roughness.
+
+    Parameters
+    ----------
+    cells : Cells
+        Views of cells.
+    spline : RangeSpline
+        Functions of range.
+    among : bool
+        Whether cells are compared with each other too, not only the views of each.
+    """
+    problem = _Problem(cells, spline)
+    weights = _Weights(cells.weight, np.ones(cells.count), 1.0, 1.0, 1.0 if among else NOTHING)
+    solution = problem.solve(weights)
+    for k in range(ROUNDS):
+        weights = problem.reweighted(solution, weights)
+        if among and k >= ROUNDS // 2:
+            weights = replace(weights, design=problem.design_effect(solution, weights))
+        solution = problem.solve(weights)
+    covariance, roughness_sigma = problem.covariance(solution, weights)
+    left = problem.cell_means(problem.residuals(solution), weights.view)
+    return Fit(
+        solution.coefficients,
+        covariance,
+        float(np.median(left)),
+        solution.roughness,
+        roughness_sigma,
+        float(np.sqrt(weights.noise / cells.weight.max())),
+        float(np.sqrt(weights.lining)),
+        weights.view * weights.cell[cells.cell],
+    )
+
+
+@dataclass(frozen=True)
+class _Solution:
+    """Coefficients (p,) at the best roughness, degrees, and at all (s, p) that are tried, with the loss (s,) of each."""
+
+    coefficients: Float
+    roughness: float
+    tried: Float
+    loss: Float
+
+
+class _Problem:
+    """Columns of the regression, in the order of cells: range functions, F₂ for each roughness, intensity."""
+
+    def __init__(self, cells: Cells, spline: RangeSpline) -> None:
+        self.cells = cells
+        self.basis = cells.basis
+        self.bending = spline.bending()
+        self.columns = np.column_stack([cells.basis, cells.incidence, cells.level])
+        self.terms = len(spline)
+        self.unrolled = bool(cells.column.min() >= 0)
+        self.views = np.bincount(cells.cell, minlength=cells.count)
+
+    def cell_means(self, values: Float, weight: Float) -> Float:
+        """Weighted means (count, …) over the views of each cell of values (n, …)."""
+        return _sums(self.cells.cell, values, weight, self.cells.count) / _per(
+            np.maximum(_sums(self.cells.cell, np.ones(len(weight)), weight, self.cells.count), 1e-9), values
+        )
+
+    def _parts(self, weights: _Weights, columns: Float) -> tuple[Float, Float, Float, Float]:
+        """Columns less their cell's mean, means, and the weights of both in the loss."""
+        total = _sums(self.cells.cell, np.ones(len(weights.view)), weights.view, self.cells.count)
+        means = self.cell_means(columns, weights.view)
+        between = weights.cell / (weights.lining + weights.noise / np.maximum(total, 1e-9)) / weights.design
+        between = np.where(total > 0, between, 0.0)
+        aside = self.cell_means(self.cells.aside, weights.view)
+        return (
+            columns - means[self.cells.cell],
+            _within(self.cells.alike, means, aside, between),
+            weights.view / weights.noise,
+            between,
+        )
+
+    def solve(self, weights: _Weights) -> _Solution:
+        """Find the roughness and the coefficients of the least loss."""
+        within, means, one, other = self._parts(weights, self.columns)
+        products = within.T @ (within * one[:, None]) + means.T @ (means * other[:, None])
+        p = self.terms
+        matrix = products[:p, :p] + self.bending + self._tie(products[:p, :p])
+        losses, tried = [], []
+        for k in range(len(ROUGHNESS)):
+            mixed = np.zeros(len(products))
+            mixed[-1], mixed[p + k] = 1.0, -1.0
+            along = products @ mixed
+            b = one_maximum(matrix, along[:p])
+            tried.append(b)
+            losses.append(float(mixed @ along - 2.0 * b @ along[:p] + b @ matrix @ b))
+        roughness = _lowest(ROUGHNESS, np.array(losses))
+        # Between two roughnesses coefficients are no straight line, so those at the best are solved for.
+        level = (self.cells.level - self.cells.incidence_at(roughness))[:, None]
+        rest, among, _, _ = self._parts(weights, level)
+        right = within[:, :p].T @ (rest[:, 0] * one) + means[:, :p].T @ (among[:, 0] * other)
+        return _Solution(one_maximum(matrix, right), roughness, np.array(tried), np.array(losses))
+
+    def _tie(self, products: Float) -> Float:
+        """Information that holds the curve's constant, which nothing tells, near 0."""
+        return 1e-7 * float(np.trace(products)) * np.full(products.shape, 1.0 / self.terms)
+
+    def residuals(self, solution: _Solution) -> Float:
+        """Intensity less range and incidence, (n,), dB."""
+        incidence = self.cells.incidence_at(solution.roughness)
+        return np.asarray(self.cells.level - self.basis @ solution.coefficients - incidence)
+
+    def reweighted(self, solution: _Solution, weights: _Weights) -> _Weights:
+        """Robust weights and variances of what is left."""
+        cells, residual = self.cells, self.residuals(solution)
+        means = self.cell_means(residual, weights.view)
+        several = self.views[cells.cell] > 1
+        scaled = (residual - means[cells.cell]) * np.sqrt(cells.weight)
+        # n views of a cell leave n - 1 differences.
+        lost = self.views[cells.cell] / np.maximum(self.views[cells.cell] - 1, 1)
+        away = means - _medians(self.cells.alike, means)
+        among = _deviation(away)
+        noise = _deviation(scaled[several] * np.sqrt(lost[several])) ** 2 if several.sum() >= 100 else among**2
+        noise = max(noise, 1e-6)
+        view = np.where(several, cells.weight * _tukey(scaled / np.sqrt(noise)), cells.weight)
+        typical = noise * float(np.median(1.0 / np.bincount(cells.cell, cells.weight)))
+        return _Weights(view, _tukey(away / max(among, 1e-3)), noise, max(among**2 - typical, 0.0), weights.design)
+
+    def design_effect(self, solution: _Solution, weights: _Weights) -> float:
+        """By how much the score of cells among each other varies more than if each stood for itself, on average."""
+        _, means, _, between = self._parts(replace(weights, design=1.0), self.basis)
+        information = means.T @ (means * between[:, None])
+        spread = self._spread(self._left(solution, weights), weights, means, between)
+        return max(1.0, float(np.trace(np.linalg.pinv(information, rcond=1e-6) @ spread)) / (self.terms - 1))
+
+    def covariance(self, solution: _Solution, weights: _Weights) -> tuple[Float, float]:
+        """Covariance (p, p) of the coefficients, that of the roughness in it, and the roughness's deviation."""
+        p = self.terms
+        step = ROUGHNESS[1] - ROUGHNESS[0]
+        sides = np.clip([solution.roughness - step, solution.roughness + step], ROUGHNESS[0], ROUGHNESS[-1])
+        slope = self.cells.incidence_at(sides[1]) - self.cells.incidence_at(sides[0])
+        columns = np.column_stack([self.basis, slope])
+        within, means, one, between = self._parts(weights, columns)
+        residual = self.residuals(solution)
+        scores = _sums(
+            self.cells.cell,
+            within * (residual - self.cell_means(residual, weights.view)[self.cells.cell])[:, None],
+            one,
+            self.cells.count,
+        )
+        # Joints run around the section, and a scan's rows of points cross them alike all around.
+        clusters = int(self.cells.ring.max()) + 1
+        spread = _outer(_sums(self.cells.ring, scores)) * clusters / max(clusters - p - 1, 1)
+        spread += self._spread(self._left(solution, weights), weights, means, between)
+        information = within.T @ (within * one[:, None]) + means.T @ (means * between[:, None])
+        information[:p, :p] += self.bending
+        spread[:p, :p] += self.bending
+        inverse = np.linalg.inv(information[:p, :p] + self._tie(information[:p, :p]))
+        whole = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
+        excess = (whole @ spread @ whole)[p, p] / max(whole[p, p], 1e-300)
+        # Loss and coefficients between the roughnesses tried: what is known may be finer than their steps.
+        fine = np.linspace(ROUGHNESS[0], ROUGHNESS[-1], 50 * (len(ROUGHNESS) - 1) + 1)
+        loss = CubicSpline(ROUGHNESS, solution.loss)(fine)
+        chance = np.exp(-0.5 * (loss - loss.min()) / max(excess, 1.0))
+        chance /= chance.sum()
+        off = CubicSpline(ROUGHNESS, solution.tried)(fine) - solution.coefficients
+        covariance = inverse @ spread[:p, :p] @ inverse + off.T @ (off * chance[:, None])
+        return covariance, float(np.sqrt(chance @ (fine - solution.roughness) ** 2))
+
+    def _left(self, solution: _Solution, weights: _Weights) -> Float:
+        """What is left of each cell within its strip, dB; 0 of outliers.
+
+        It is what differs from the strip as a whole, not from its stretch: few cells less their mean would seem more
+        alike than they are, and scores, which hold no more than differences within stretches, let the rest go.
+        """
+        means = self.cell_means(self.residuals(solution), weights.view)
+        strip = self.cells.column if self.unrolled else self.cells.stretch
+        middles = _sums(strip, means, weights.cell) / np.maximum(_sums(strip, weights.cell), 1e-9)
+        return np.asarray((means - middles[strip]) * weights.cell)
+
+    def _spread(self, left: Float, weights: _Weights, means: Float, between: Float) -> Float:
+        """Variance of the scores (Conley, 1999): what all of the section has in common, and neighbouring cells besides."""
+        cells = self.cells
+        scores = means * between[:, None]
+        if not self.unrolled:
+            return _outer(_sums(cells.stretch, scores * left[:, None]))
+        shape = int(cells.row.max()) + 1, int(cells.column.max()) + 1
+
+        def plane(values: Float) -> Float:
+            out = np.zeros(shape)
+            out[cells.row, cells.column] = values
+            return out
+
+        fields = np.array([plane(column) for column in scores.T])
+        ring, near = _covariances(plane(left), plane(weights.cell))
+        along = np.array([signal.fftconvolve(one, ring, mode="full") for one in fields.sum(axis=2)])
+        spread = along[:, len(ring) // 2 :][:, : shape[0]] @ fields.sum(axis=2).T
+        spread_out = [signal.oaconvolve(one, near, mode="same") for one in fields]
+        spread += np.array([[np.sum(one * other) for other in spread_out] for one in fields])
+        return _positive(spread)
+
+
+def _within(number: Index, values: Float, aside: Float, weight: Float) -> Float:
+    """Values (n, m) less what a constant and a slope over ``aside`` (n,) say of those of the same number.
+
+    So nothing is left of a reflectance that depends on the place in the section, constant along a strip: not even by where
+    in its cells the points of a strip happen to lie.
+    """
+    total = np.maximum(_sums(number, weight), 1e-12)
+
+    def centred(of: Float) -> Float:
+        return np.asarray(of - (_sums(number, of, weight) / _per(total, of))[number])
+
+    values, aside = centred(values), centred(aside)
+    slope = _sums(number, values * aside[:, None], weight) / np.maximum(_sums(number, aside**2, weight), 1e-12)[:, None]
+    return np.asarray(values - slope[number] * aside[:, None])
+
+
+def _positive(matrix: Float) -> Float:
+    """The nearest covariance: symmetric, of no negative variance."""
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return np.asarray(vectors * np.maximum(values, 0.0) @ vectors.T)
+
+
+def _covariances(left: Float, there: Float) -> tuple[Float, Float]:
+    """Covariance, dB², of cells of a plane: by their distance along the tunnel alone, and what neighbours have besides.
+
+    Parameters
+    ----------
+    left, there : (rows, columns) float arrays
+        What is left, times the weights, and the weights; 0 where there is no cell.
+
+    Returns
+    -------
+    along : (2m + 1,) float array
+        Of cells more than NEAR apart around the section, for each shift of up to m = APART / CELL rows. From what is left of
+        the farthest: the rest changes too slowly to say anything within a stretch.
+    near : (2k + 1, 2k + 1) float array
+        What neighbours have more, by their distance, up to k = NEAR / CELL and no farther than it is positive.
+    """
+    k, m = int(NEAR / CELL), int(APART / CELL)
+
+    def shifted(values: Float) -> Float:
+        padded = np.pad(values, ((m, m), (k, k)))
+        whole = signal.oaconvolve(padded, padded[::-1, ::-1], mode="full")
+        row, column = padded.shape[0] - 1, padded.shape[1] - 1
+        return np.asarray(whole[row - m : row + m + 1, column - k : column + k + 1])
+
+    def rows(values: Float) -> Float:
+        series = np.pad(values.sum(axis=1), m)
+        return np.asarray(np.correlate(series, series, mode="full")[len(series) - 1 - m : len(series) + m])
+
+    products, pairs = shifted(left), shifted(there)
+    others = np.maximum(rows(there) - pairs.sum(axis=1), 0.0)
+    along = np.where(others > 0.5, (rows(left) - products.sum(axis=1)) / np.maximum(others, 0.5), 0.0)
+    # Shares of noise among many lags: what is common doesn't grow with the distance.
+    half = np.minimum.accumulate(along[m:])
+    half = np.maximum(half - half[-1], 0.0)
+    along = np.concatenate([half[:0:-1], half])
+    shift = np.arange(-k, k + 1)
+    distance = np.rint(np.hypot(shift[:, None], shift)).astype(np.int64)
+    rest = (products - pairs * along[:, None])[m - k : m + k + 1]
+    of = np.bincount(distance.ravel(), rest.ravel()) / np.maximum(
+        np.bincount(distance.ravel(), pairs[m - k : m + k + 1].ravel()), 1e-9
+    )
+    end = np.flatnonzero(of[: k + 1] <= 0.0)
+    of[end[0] if len(end) else k + 1 :] = 0.0
+    return along, np.asarray(of[distance])
+
+
+def _sums(number: Index, values: Float, weight: Float | None = None, count: int = 0) -> Float:
+    """Sums (count, …) of values (n, …), times their weights (n,), of each number."""
+    if values.ndim == 1:
+        return np.asarray(np.bincount(number, values if weight is None else values * weight, minlength=count), np.float64)
+    return np.column_stack([_sums(number, column, weight, count) for column in values.T])
+
+
+def _per(values: Float, like: Float) -> Float:
+    return values if like.ndim == 1 else values[:, None]
+
+
+def _medians(number: Index, values: Float) -> Float:
+    """Median (n,) of the values of each one's number."""
+    order = np.argsort(number, kind="stable")
+    there, first = np.unique(number[order], return_index=True)
+    medians = np.zeros(int(there.max()) + 1)
+    medians[there] = [np.median(part) for part in np.split(values[order], first[1:])]
+    return np.asarray(medians[number])
+
+
+def _outer(rows: Float) -> Float:
+    return np.asarray(rows.T @ rows)
+
+
+def _deviation(values: Float) -> float:
+    """Standard deviation by the median deviation from 0."""
+    return 1.4826 * float(np.median(np.abs(values)))
+
+
+def _tukey(scaled: Float) -> Float:
+    return np.asarray(np.where(np.abs(scaled) < TUKEY, (1.0 - (scaled / TUKEY) ** 2) ** 2, 0.0))
+
+
+def _lowest(at: Float, values: Float) -> float:
+    """Where a parabola through the lowest value and its neighbours is lowest, within the given places."""
+    k = int(np.clip(np.argmin(values), 1, len(at) - 2))
+    before, middle, after = values[k - 1 : k + 2]
+    bend = before - 2.0 * middle + after
+    if bend <= 0:
+        return float(at[np.argmin(values)])
+    return float(np.clip(at[k] + 0.5 * (before - after) / bend * (at[1] - at[0]), at[0], at[-1]))

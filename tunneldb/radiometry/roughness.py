@@ -1,0 +1,254 @@
+"""Roughness of the lining from small homogeneous regions (Xu et al., 2018, eq. 17–18).
+
+Regions of the same material seen at different incidence angles must come out with the same corrected
+intensity: the roughness is the σ at which they differ least. Where all of the lining is seen at nearly the
+same incidence (a profiler near the middle of a round tunnel), no σ is better than another, and none matters;
+the result says so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.radiometry.robust_statistics import robust_statistics
+from tunneldb.radiometry.oren_nayar import incidence_db
+
+Float = NDArray[np.float64]
+
+CELL = 0.2
+"""Side of an automatic region, m."""
+
+CLASS_WIDTH = 2.5
+"""Width of an incidence class, degrees."""
+
+CLASS_CELLS = 40
+"""At most so many regions are taken from an incidence class."""
+
+MIN_CLASS_CELLS = 10
+"""A class with fewer regions is left out."""
+
+MIN_CELL_POINTS = 2
+"""A cell with fewer points is left out."""
+
+STEEPEST = 75.0
+"""Lining seen more slantingly, degrees, is left out: there an error of 1° in the normal is 0.3 dB."""
+
+TELLING = 3.0
+"""A roughness is determined when a change by so many degrees shows, by more than NOTICEABLE."""
+
+NOTICEABLE = 0.1
+"""Smallest change of the intensity's course over the incidence angles that is taken for real, dB."""
+
+TYPICAL = 9.0
+"""Roughness of a concrete lining (Xu et al., 2018, fig. 5), degrees: taken where the lining's own can't be told."""
+
+ROUGHEST = 60.0
+"""No lining is rougher, degrees: where more comes out, something else than incidence, soot or damp, makes intensity change."""
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Homogeneous regions, all (m,): mean cosine of incidence, mean distance-corrected dB, points."""
+
+    cosine: Float
+    distance_db: Float
+    points: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        """Return the number of regions."""
+        return len(self.cosine)
+
+
+@dataclass(frozen=True)
+class Roughness:
+    """A roughness and how well it is founded.
+
+    Attributes
+    ----------
+    sigma : float
+        σ at the objective's minimum, or TYPICAL, degrees.
+    determined : bool
+        False when the regions' incidence angles are too much alike to tell one σ from another; correcting
+        with ``sigma`` is then as good as with any other near it.
+    assumed : bool
+        Whether ``sigma`` is TYPICAL, since no roughness explains what the regions show, or there are none; not determined then.
+    objective : float
+        The objective for it, √dB.
+    contrast : float
+        By how much the correction at the steepest incidence would change against that at the flattest, if σ
+        were 3° less or more, dB: the objective's flatness.
+    regions : int
+        Regions used.
+    incidence_from, incidence_to : float
+        Smallest and largest incidence angle of the regions, degrees.
+    """
+
+    sigma: float
+    determined: bool
+    assumed: bool
+    objective: float
+    contrast: float
+    regions: int
+    incidence_from: float
+    incidence_to: float
+
+    @property
+    def note(self) -> str | None:
+        """What is to be said about it, if anything."""
+        if self.assumed:
+            return (
+                f"no roughness explains how intensity changes with incidence (something else changes along with it, soot"
+                f" perhaps): {self.sigma:g}° is taken, that of concrete"
+                if self.regions >= 2
+                else f"too little is seen of the lining to tell its roughness: {self.sigma:g}° is taken, that of concrete"
+            )
+        if not self.determined:
+            return (
+                "the lining is seen at too similar incidence angles to tell its roughness;"
+                " whichever is taken hardly changes the corrected intensity"
+            )
+        return None
+
+
+def objective(regions: Regions, roughness: float) -> float:
+    """Objective O(σ) of eq. 17: root of the mean absolute difference between regions corrected with σ, √dB.
+
+    Computed from the sorted values, so that M regions cost M lg M, not M².
+    """
+    corrected = np.sort(regions.distance_db - incidence_db(regions.cosine, roughness))
+    count = len(corrected)
+    weight = 2.0 * np.arange(count) - (count - 1)
+    return float(np.sqrt(max(float(weight @ corrected), 0.0) / (count * (count + 1) / 2)))
+
+
+def find_roughness(regions: Regions) -> Roughness:
+    """Find the σ of the least objective (eq. 18): 0° to 90° in steps of 1°, then of 0.02° about the best.
+
+    One above ROUGHEST is no roughness of a lining; TYPICAL is taken in its place, as it is where there are fewer than two
+    regions.
+    """
+    if len(regions) < 2:
+        return Roughness(TYPICAL, False, True, float("nan"), 0.0, len(regions), float("nan"), float("nan"))
+    coarse = np.arange(0.0, 91.0)
+    best = coarse[np.argmin([objective(regions, s) for s in coarse])]
+    fine = np.clip(best + np.arange(-50, 51) * 0.02, 0.0, 90.0)
+    values = [objective(regions, s) for s in fine]
+    sigma = float(fine[np.argmin(values)])
+    least = min(values)
+    if assumed := sigma > ROUGHEST:
+        sigma, least = TYPICAL, objective(regions, TYPICAL)
+    flattest, steepest = float(regions.cosine.max()), float(regions.cosine.min())
+    ends = np.array([flattest, steepest])
+    course = [float(np.diff(incidence_db(ends, float(np.clip(s, 0, 90))))[0]) for s in (sigma - TELLING, sigma + TELLING)]
+    contrast = abs(course[1] - course[0])
+    return Roughness(
+        sigma=sigma,
+        determined=contrast > NOTICEABLE and not assumed,
+        assumed=assumed,
+        objective=least,
+        contrast=contrast,
+        regions=len(regions),
+        incidence_from=float(np.degrees(np.arccos(min(flattest, 1.0)))),
+        incidence_to=float(np.degrees(np.arccos(steepest))),
+    )
+
+
+def automatic_regions(
+    chainage: Float,
+    arc: Float,
+    view: NDArray[np.integer],
+    cosine: NDArray[np.floating],
+    distance_db: NDArray[np.floating],
+) -> Regions:
+    """Choose small homogeneous regions of dry lining, spread over the incidence angles.
+
+    Cells of 0.2 m, one for each scanner position and incidence class. Cells whose points differ more than
+    usual (edges, joints) go; of each incidence class the cells nearest to its dry level stay, so that leaks,
+    dark or bright patches, which stand off from it, don't count, and no class outweighs the others.
+
+    Parameters
+    ----------
+    chainage, arc : (n,) float arrays
+        Where the lining points lie, m.
+    view : (n,) int array
+        Scanner position (scan id); points of different views don't share a cell.
+    cosine : (n,) float array
+        Cosine of the incidence angle.
+    distance_db : (n,) float array
+        Intensity corrected for distance, dB.
+
+    Returns
+    -------
+    Regions
+        Empty when there are no lining points that serve.
+    """
+    angle = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
+    usable = np.isfinite(distance_db) & (angle <= STEEPEST) & np.isfinite(chainage) & np.isfinite(arc)
+    incidence_class = np.floor(angle[usable] / CLASS_WIDTH).astype(np.int64)
+    cell = [np.floor(along[usable] / CELL).astype(np.int64) for along in (chainage, arc)]
+    keys = np.column_stack([incidence_class, view[usable].astype(np.int64), *cell])
+    first, regions, spread = _group(keys, cosine[usable], distance_db[usable])
+    enough = regions.points >= MIN_CELL_POINTS
+    if not enough.any():
+        return _take(regions, np.zeros(0, np.intp))
+    kept = enough & (spread <= 2.0 * np.median(spread[enough]))
+    class_of = incidence_class[first]
+    chosen = [
+        _nearest_to_dry_level(np.flatnonzero(kept & (class_of == c)), regions.distance_db) for c in np.unique(class_of[kept])
+    ]
+    return _take(regions, np.concatenate(chosen))
+
+
+def drawn_regions(
+    region: NDArray[np.integer],
+    view: NDArray[np.integer],
+    cosine: NDArray[np.floating],
+    distance_db: NDArray[np.floating],
+) -> Regions:
+    """Take the regions that the user drew, one for each scanner position and incidence class that sees one.
+
+    Parameters
+    ----------
+    region : (n,) int array
+        Number of the drawn polygon that holds the point, -1 for none.
+    view, cosine, distance_db : (n,) arrays
+        As in :func:`automatic_regions`.
+    """
+    angle = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
+    usable = np.isfinite(distance_db) & (cosine > 0) & (region >= 0)
+    incidence_class = np.floor(angle[usable] / CLASS_WIDTH).astype(np.int64)
+    keys = np.column_stack([incidence_class, view[usable].astype(np.int64), region[usable].astype(np.int64)])
+    _, regions, _ = _group(keys, cosine[usable], distance_db[usable])
+    return _take(regions, np.flatnonzero(regions.points >= MIN_CELL_POINTS))
+
+
+def _group(
+    keys: NDArray[np.int64], cosine: NDArray[np.floating], level: NDArray[np.floating]
+) -> tuple[NDArray[np.intp], Regions, Float]:
+    """Average points of the same key; return one point of each group, the groups, and each one's spread."""
+    count = len(keys)
+    order = np.lexsort(keys.T[::-1])
+    start = np.flatnonzero(np.concatenate([np.ones(min(count, 1), bool), np.any(np.diff(keys[order], axis=0) != 0, axis=1)]))
+    points = np.diff(np.append(start, count))
+    if count == 0:
+        return start, Regions(np.zeros(0), np.zeros(0), points), np.zeros(0)
+    ordered = level[order].astype(np.float64)
+    mean = np.add.reduceat(ordered, start) / points
+    mean_cosine = np.add.reduceat(cosine[order].astype(np.float64), start) / points
+    spread = np.sqrt(np.add.reduceat((ordered - np.repeat(mean, points)) ** 2, start) / np.maximum(points - 1, 1))
+    return order[start], Regions(mean_cosine, mean, points), spread
+
+
+def _take(regions: Regions, index: NDArray[np.intp]) -> Regions:
+    return Regions(regions.cosine[index], regions.distance_db[index], regions.points[index])
+
+
+def _nearest_to_dry_level(cells: NDArray[np.intp], level: Float) -> NDArray[np.intp]:
+    """Of the cells of one incidence class those nearest to its dry level."""
+    if len(cells) < MIN_CLASS_CELLS:
+        return cells[:0]
+    away = np.abs(level[cells] - robust_statistics(level[cells]).mean)
+    return cells[np.argsort(away, kind="stable")[:CLASS_CELLS]]

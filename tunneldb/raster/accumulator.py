@@ -1,0 +1,372 @@
+"""The unrolled image of a kilometre, gathered from points in any order in bounded memory.
+
+A pixel holds weighted sums over the points that fall into it: several stations are blended by the weights of their views
+(:func:`tunneldb.raster.projection.weight_of`). Only the blocks used last lie in memory; the others in a file of the temporary
+folder.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+from collections import OrderedDict
+from dataclasses import dataclass
+from types import TracebackType
+from typing import BinaryIO
+
+import numpy as np
+from affine import Affine
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from tunneldb.errors import UserError
+from tunneldb.threads import threads
+from tunneldb.raster.projection import WEIGHT, Pixels
+
+Float = NDArray[np.float64]
+Single = NDArray[np.float32]
+Whole = NDArray[np.int32] | NDArray[np.int64]
+
+KILOMETRE = 1000.0
+BLOCK = 50.0
+"""Length of a block of the image along the tunnel, m."""
+
+MEMORY = 400_000_000
+"""Bytes of memory for sums."""
+
+CHANNELS = 4
+"""Sums a pixel holds: weight and, weighted, offset, raw and corrected intensity."""
+
+OFFSET, LEVEL = 2.0**-11, 2.0**-7
+"""Offset (m) and intensity (dB) of a point are summed in whole multiples of these, half a millimetre and less than a stored
+step."""
+
+GREATEST = 2**14 - 1
+"""Multiples at most that a point adds for each unit of its weight: 8 m, 128 dB."""
+
+FULL = 2**17 - WEIGHT
+"""A pixel whose weights add up to more takes no more points: then no sum passes 2³¹. These are 2,047 points seen straight on
+from near by, 0.4 mm apart in a pixel of 2 cm. Pixels larger than that have sums of 64 bits and are never full."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Pixels of one kilometre in the unrolled plane: columns along the chainage, rows from the greatest arc.
+
+    With a halo the grid has a block more before the kilometre and one after it, so that pixels at its ends can be judged by
+    what lies about them. Rows and columns of the grids of all kilometres line up.
+
+    Attributes
+    ----------
+    km : int
+        Kilometre: chainage from 1000 km to 1000 (km + 1).
+    pixel : float
+        Side of a pixel, m; divides a block of 50 m.
+    bottom : int
+        Arc of the lower edge of the last row, in pixels.
+    rows : int
+        Number of rows.
+    halo : int
+        Columns beyond each end of the kilometre that take points, at most a block; 0 for the kilometre alone.
+    """
+
+    km: int
+    pixel: float
+    bottom: int
+    rows: int
+    halo: int = 0
+
+    @classmethod
+    def covering(cls, km: int, pixel: float, arc_min: float, arc_max: float, halo: int = 0) -> Grid:
+        """Make the grid that covers the given arcs, m, and a halo, pixels.
+
+        Raises
+        ------
+        UserError
+            If the pixel is smaller than 2 mm or doesn't divide 50 m.
+        """
+        if not pixel >= 0.002 or abs(BLOCK / pixel - round(BLOCK / pixel)) > 1e-6:
+            raise UserError(f"image.pixel must be at least 0.002 m and divide 50 m: {pixel:g} m does not")
+        bottom, top = int(np.floor(arc_min / pixel)), int(np.ceil(arc_max / pixel))
+        return cls(km, pixel, bottom, top - bottom, halo)
+
+    @property
+    def columns(self) -> int:
+        """Number of columns."""
+        return self.block_columns * self.blocks
+
+    @property
+    def block_columns(self) -> int:
+        """Number of columns in a block."""
+        return round(BLOCK / self.pixel)
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return round(KILOMETRE / BLOCK) + 2 * self._ahead
+
+    @property
+    def _ahead(self) -> int:
+        """Blocks before the kilometre."""
+        return 1 if self.halo else 0
+
+    @property
+    def inner(self) -> slice:
+        """Columns of the kilometre itself."""
+        return slice(self._ahead * self.block_columns, (self.blocks - self._ahead) * self.block_columns)
+
+    @property
+    def near(self) -> slice:
+        """Columns that take points: the kilometre's and those of the halo."""
+        return slice(self.inner.start - self.halo, self.inner.stop + self.halo)
+
+    @property
+    def first_block(self) -> int:
+        """Number of the first block, counted from chainage 0."""
+        return self.km * round(KILOMETRE / BLOCK) - self._ahead
+
+    @property
+    def first_column(self) -> int:
+        """Number of the first column, counted from chainage 0."""
+        return self.first_block * self.block_columns
+
+    @property
+    def west(self) -> float:
+        """Chainage at which the first column begins, m."""
+        return self.first_block * BLOCK
+
+    def transform(self, column: int = 0) -> Affine:
+        """Transform from pixels, counted from a column, to (chainage, arc)."""
+        return Affine(
+            self.pixel, 0.0, self.west + column * self.pixel, 0.0, -self.pixel, (self.bottom + self.rows) * self.pixel
+        )
+
+    def place(self, chainage: Float, arc: Float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Row and column of places (n,) in the unrolled plane, m; column -1 outside the grid."""
+        with np.errstate(invalid="ignore"):
+            column = np.floor((chainage - self.west) / self.pixel)
+            row = self.rows - 1 - (np.floor(arc / self.pixel) - self.bottom)
+            held = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
+        return np.where(held, row, 0).astype(np.int32), np.where(held, column, -1).astype(np.int32)
+
+    def pick(self, mask: NDArray[np.bool_], chainage: Float, arc: Float) -> NDArray[np.bool_]:
+        """Value of a mask (rows, columns) at places (n,) in the unrolled plane; False outside the grid."""
+        row, column = self.place(chainage, arc)
+        return np.asarray((column >= 0) & mask[row, column], dtype=np.bool_)
+
+    def chainages(self, columns: slice) -> Float:
+        """Chainage of the centres of columns, m."""
+        return np.asarray(self.west + (np.arange(columns.start, columns.stop) + 0.5) * self.pixel)
+
+    def arcs(self) -> Float:
+        """Arc of the centres of the rows, m."""
+        return np.asarray((self.bottom + self.rows - np.arange(self.rows) - 0.5) * self.pixel)
+
+
+@dataclass(frozen=True)
+class Window:
+    """Weighted means over a few columns of the image; (rows, columns) arrays, NaN where no point fell.
+
+    Attributes
+    ----------
+    columns : slice
+        Columns of the grid.
+    weight : int array
+        Weights of the points in the pixel, 0 where no point fell.
+    offset : float32 array
+        Mean offset from the section surface, m.
+    raw, corrected : float32 arrays
+        Mean raw and corrected intensity, dB.
+    """
+
+    columns: slice
+    weight: Whole
+    offset: Single
+    raw: Single
+    corrected: Single
+
+    def cut(self, columns: slice) -> Window:
+        """Those of the columns that lie in a slice of the grid's columns."""
+        here = slice(columns.start - self.columns.start, columns.stop - self.columns.start)
+        return Window(columns, self.weight[:, here], self.offset[:, here], self.raw[:, here], self.corrected[:, here])
+
+
+class Accumulator:
+    """Sums of all points of a kilometre by pixel.
+
+    Use it as a context manager: the file that holds what memory doesn't goes at the end.
+
+    Parameters
+    ----------
+    grid : Grid
+        The pixels.
+    memory : int
+        Bytes of memory for sums, at least one block's.
+    """
+
+    def __init__(self, grid: Grid, memory: int = MEMORY) -> None:
+        self.grid = grid
+        self._shape = (grid.rows, grid.block_columns, CHANNELS)
+        small = grid.pixel < 0.0201
+        self._type = np.dtype(np.int32 if small else np.int64)
+        self._full = FULL if small else np.iinfo(np.int64).max
+        self._bytes = self._type.itemsize * int(np.prod(self._shape))
+        self._room = max(1, memory // self._bytes)
+        self._blocks: OrderedDict[int, Whole] = OrderedDict()
+        """Blocks in memory, the one used last at the end."""
+        self._changed: set[int] = set()
+        self._spilled: set[int] = set()
+        self._file: BinaryIO | None = None
+
+    def __enter__(self) -> Accumulator:
+        """Return the accumulator."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """Give memory and file back."""
+        self._blocks.clear()
+        if self._file:
+            self._file.close()
+
+    def add(self, pixels: Pixels, count: int) -> None:
+        """Add points.
+
+        Offset and intensity are rounded to OFFSET and LEVEL and summed as whole numbers, so sums are exact, and the same in
+        whatever order points come, as long as no pixel is FULL.
+
+        Parameters
+        ----------
+        pixels : Pixels
+            Where the points fall and what they add; those with column -1 are passed over.
+        count : int
+            How many of its points to add.
+
+        Raises
+        ------
+        UserError
+            If the temporary folder has no room for what memory doesn't hold.
+        """
+        row, column, weight, *values = (array[:count] for array in pixels)
+        width = self.grid.block_columns
+        touched = np.flatnonzero(_touched(column, width, self.grid.columns // width)).tolist()
+        # Blocks in memory first, lest fetching another one puts them out.
+        for block in sorted(touched, key=lambda b: b not in self._blocks):
+            _add(self._fetch(block), row, column, block * width, weight, *values, self._full, threads())
+            self._changed.add(block)
+
+    def blocks(self) -> list[int]:
+        """Blocks, counted from 0, that hold points."""
+        return sorted(self._spilled | self._blocks.keys())
+
+    def inner_blocks(self) -> list[int]:
+        """Blocks of the kilometre itself that hold points."""
+        width, inner = self.grid.block_columns, self.grid.inner
+        return [block for block in self.blocks() if inner.start <= block * width < inner.stop]
+
+    def window(self, start: int, stop: int) -> Window:
+        """Means over the columns from ``start`` up to ``stop``; columns outside the grid are cut off."""
+        start, stop = max(start, 0), min(stop, self.grid.columns)
+        width = self.grid.block_columns
+        held = set(self.blocks())
+        weight = np.zeros((self.grid.rows, stop - start), self._type)
+        means = np.empty((CHANNELS - 1, *weight.shape), np.float32)
+        for block in range(start // width, (stop - 1) // width + 1):
+            first, last = max(block * width, start), min((block + 1) * width, stop)
+            if block in held:
+                _means(self._fetch(block), first - block * width, weight, means, first - start, last - start)
+            else:
+                means[:, :, first - start : last - start] = np.nan
+        return Window(slice(start, stop), weight, *means)
+
+    def _fetch(self, block: int) -> Whole:
+        """Sums of a block, brought into memory, from the file or new."""
+        if block in self._blocks:
+            self._blocks.move_to_end(block)
+            return self._blocks[block]
+        while len(self._blocks) >= self._room:
+            self._put_out(*self._blocks.popitem(last=False))
+        sums: Whole = np.zeros(self._shape, self._type)
+        if block in self._spilled:
+            assert self._file
+            self._file.seek(block * self._bytes)
+            self._file.readinto(sums.data.cast("B"))  # type: ignore[attr-defined]
+        self._blocks[block] = sums
+        return sums
+
+    def _put_out(self, block: int, sums: Whole) -> None:
+        """Write a block that leaves memory to the file, unless it is there already."""
+        if block not in self._changed:
+            return
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile(  # noqa: SIM115 - closed by __exit__
+                    prefix="tunneldb-image-", buffering=0
+                )
+            self._file.seek(block * self._bytes)
+            written = self._file.write(sums.data.cast("B"))
+            if written < self._bytes:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            raise UserError(
+                f"no room for the image of km {self.grid.km} in {tempfile.gettempdir()}: {error.strerror}; it may need"
+                f" {self._bytes * self.grid.blocks / 1e9:.1f} GB; set TMPDIR to a folder with more"
+            ) from error
+        self._changed.discard(block)
+        self._spilled.add(block)
+
+
+@njit(cache=True, nogil=True)
+def _touched(column: NDArray[np.int32], width: int, blocks: int) -> NDArray[np.bool_]:  # pragma: no cover - compiled
+    """Which blocks points fall into."""
+    touched = np.zeros(blocks, np.bool_)
+    first, stop = 0, 0  # columns of the block that the point before fell into
+    for i in range(column.shape[0]):
+        if column[i] >= 0 and not first <= column[i] < stop:
+            block = column[i] // width
+            touched[block] = True
+            first, stop = block * width, (block + 1) * width
+    return touched
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _add(
+    sums: Whole,
+    row: NDArray[np.int32],
+    column: NDArray[np.int32],
+    first: int,
+    weight: NDArray[np.int32],
+    offset: Single,
+    raw: Single,
+    corrected: Single,
+    full: int,
+    parts: int,
+) -> None:  # pragma: no cover - compiled
+    """Add the points that fall into a block; each thread has rows of its own."""
+    width = sums.shape[1]
+    for part in prange(parts):
+        for i in range(row.shape[0]):
+            r, c = row[i], column[i] - first
+            if 0 <= c < width and r % parts == part and sums[r, c, 0] <= full:
+                sums[r, c, 0] += weight[i]
+                sums[r, c, 1] += weight[i] * _multiple(offset[i] * np.float32(1.0 / OFFSET))
+                sums[r, c, 2] += weight[i] * _multiple(raw[i] * np.float32(1.0 / LEVEL))
+                sums[r, c, 3] += weight[i] * _multiple(corrected[i] * np.float32(1.0 / LEVEL))
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _multiple(value: np.float32) -> np.int32:
+    return np.int32(np.rint(min(max(value, np.float32(-GREATEST)), np.float32(GREATEST))))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _means(sums: Whole, skip: int, weight: Whole, means: Single, first: int, stop: int) -> None:  # pragma: no cover - compiled
+    """Divide the sums of a block, from column ``skip`` on, into columns ``first`` to ``stop`` of a window."""
+    for i in range(weight.shape[0]):
+        for j in range(first, stop):
+            pixel = sums[i, j - first + skip]
+            weight[i, j] = pixel[0]
+            per = 1.0 / pixel[0] if pixel[0] > 0 else np.nan
+            means[0, i, j] = pixel[1] * (per * OFFSET)
+            means[1, i, j] = pixel[2] * (per * LEVEL)
+            means[2, i, j] = pixel[3] * (per * LEVEL)

@@ -1,0 +1,89 @@
+"""What the image of a kilometre shows, pixel by pixel: state and corrected intensity, from its sums block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.geometry.surface import Surface
+from tunneldb.raster.accumulator import BLOCK, Accumulator, Grid, Window
+from tunneldb.raster.pixel_state import Astray, Floor, State, reach, states
+from tunneldb.raster.geotiff import NODATA, whole
+from tunneldb.anomalies.threshold import MAX_MEDIAN
+
+WET_EDGE = 3
+"""Pixels about a wet one that don't count as dry lining."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """State and intensity of all pixels of a kilometre and of those beyond its ends by which they are judged.
+
+    Attributes
+    ----------
+    grid : Grid
+        The pixels.
+    state : (rows, columns) uint8 array
+        Values of :class:`tunneldb.raster.pixel_state.State`.
+    level : (rows, columns) int16 array
+        Corrected intensity in steps of the stored image, NODATA where there is no point.
+    """
+
+    grid: Grid
+    state: NDArray[np.uint8]
+    level: NDArray[np.int16]
+
+
+def halo(pixel: float) -> int:
+    """Columns beyond the ends of a kilometre without whose points its own pixels would be judged otherwise."""
+    return _judged() + reach(pixel)
+
+
+def _judged() -> int:
+    """Columns beyond the ends whose state counts: half a median filter about the wet pixels next to the last dry one."""
+    return MAX_MEDIAN // 2 + WET_EDGE
+
+
+def develop(image: Accumulator, floor: Floor, astray: Astray, delta: float, keep: Callable[[Window], None]) -> Picture:
+    """Find the state of every pixel, block by block.
+
+    Parameters
+    ----------
+    image : Accumulator
+        The sums of all points.
+    floor : Floor
+        Where the floor begins.
+    astray : Astray
+        Where the surface leaves the wall.
+    delta : float
+        Distance from the lining's plane from which a pixel is an appendage, m.
+    keep : callable
+        Takes the means of each block of the kilometre itself.
+    """
+    grid = image.grid
+    state = np.full((grid.rows, grid.columns), State.OFF, np.uint8)
+    level = np.full((grid.rows, grid.columns), NODATA, np.int16)
+    judged = min(_judged(), grid.halo)
+    inner = set(image.inner_blocks())
+    for block in sorted({*image.blocks(), *_with_surface(grid, astray.surface)}):
+        first = max(block * grid.block_columns, grid.inner.start - judged)
+        columns = slice(first, min((block + 1) * grid.block_columns, grid.inner.stop + judged))
+        if columns.start >= columns.stop:
+            continue
+        window = image.window(columns.start - reach(grid.pixel), columns.stop + reach(grid.pixel))
+        state[:, columns] = states(window, columns, grid, floor, astray, delta)
+        here = window.cut(columns)
+        level[:, columns] = whole(here.corrected, "corrected")
+        if block in inner:
+            keep(here)
+    return Picture(grid, state, level)
+
+
+def _with_surface(grid: Grid, surface: Surface) -> range:
+    """Blocks in which the tunnel lies: what was not scanned there is unseen lining."""
+    west, east = surface.chainages[[0, -1]] + (-surface.reach, surface.reach)
+    first, last = np.floor((np.array([west, east]) - grid.west) / BLOCK).astype(int)
+    return range(max(int(first), 0), min(int(last), grid.blocks - 1) + 1)

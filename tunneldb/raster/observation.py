@@ -1,0 +1,206 @@
+"""Scanned points as the image takes them: unrolled, with corrected intensity."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunneldb.errors import UserError
+from tunneldb.geometry.surface import Surface
+from tunneldb.radiometry.correction import Kind, Views, observe
+from tunneldb.radiometry.edge_normals import Edges
+from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.raster.pixel_state import Floor
+from tunneldb.pointcloud.poses import PoseModel
+from tunneldb.pointcloud.reader import Points
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Radiometer:
+    """What intensity is corrected with.
+
+    Attributes
+    ----------
+    kind : {'amplitude', 'reflectance', 'linear'}
+        What the raw intensity is.
+    poses : PoseModel
+        Scanner positions.
+    reference : ReferenceCurve or None
+        Effect of distance; None for reflectance.
+    max_incidence, max_range : float
+        Points seen more slantingly (degrees) or from farther (m) are left out.
+    """
+
+    kind: Kind
+    poses: PoseModel
+    reference: ReferenceCurve | None
+    max_incidence: float
+    max_range: float
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Points near the surface; all arrays (n,).
+
+    Attributes
+    ----------
+    chainage, arc, offset : float arrays
+        Unrolled, m.
+    use : bool array
+        Points near the surface, in the kilometre, and whose intensity can be corrected.
+    lining : bool array
+        Those of them that don't lie on the floor.
+    views : Views or None
+        Range, incidence and intensity; None when the survey has no intensity.
+    """
+
+    chainage: Float
+    arc: Float
+    offset: Float
+    use: NDArray[np.bool_]
+    lining: NDArray[np.bool_]
+    views: Views | None
+
+
+@dataclass(frozen=True)
+class Eye:
+    """Turns points of a survey into what the image of one kilometre takes.
+
+    Attributes
+    ----------
+    surface : Surface
+        The tunnel.
+    km : int
+        Kilometre.
+    tolerance, recess : float
+        Points that stand in farther from the surface, or lie farther behind it, are not lining, m.
+    radiometer : Radiometer or None
+        None when the survey has no intensity.
+    floor : Floor
+        Where the floor begins.
+    edges : Edges
+        Where the surface bends sharply.
+    box : (2, 3) float array
+        Least and greatest coordinates of the kilometre's lining, m.
+    """
+
+    surface: Surface
+    km: int
+    tolerance: float
+    recess: float
+    radiometer: Radiometer | None
+    floor: Floor
+    edges: Edges
+    box: Float
+
+    @classmethod
+    def of(
+        cls,
+        surface: Surface,
+        km: int,
+        depth: tuple[float, float],
+        radiometer: Radiometer | None,
+        floor: Floor,
+        halo: float = 0.0,
+    ) -> Eye:
+        """Make the eye for a kilometre that the surface covers at least in part, and so many metres beyond its ends.
+
+        ``depth`` is how far in front of the surface and behind it lining is looked for, m: tolerance and recess.
+        """
+        start, stop = km * 1000.0, (km + 1) * 1000.0
+        touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)
+        if not touching.any():
+            raise UserError(f"kilometre {km} has no segments yet: run its stages segments and sections first")
+        # Whole metres, so that what is laid out each metre lies at the same places from either kilometre.
+        start, stop = start - math.ceil(halo), stop + math.ceil(halo)
+        touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)
+        vertices = surface.segments[touching, :6].reshape(-1, 3)
+        margin = float(surface.radius.max()) + max(depth)
+        return cls(
+            surface,
+            km,
+            *depth,
+            radiometer,
+            floor,
+            Edges.of(surface, start, stop),
+            np.array([vertices.min(0) - margin, vertices.max(0) + margin]),
+        )
+
+    def near(self, points: Points) -> Points:
+        """Points in the kilometre's bounding box."""
+        if not len(points) or np.all((points.xyz.min(0) >= self.box[0]) & (points.xyz.max(0) <= self.box[1])):
+            return points
+        inside = np.all((points.xyz >= self.box[0]) & (points.xyz <= self.box[1]), axis=1)
+        return Points(
+            points.xyz[inside],
+            points.time[inside],
+            points.scan_id[inside],
+            points.intensity[inside],
+            points.classification[inside],
+        )
+
+    def see(self, points: Points, name: str) -> Seen:
+        """Unroll points and look up their intensity.
+
+        Parameters
+        ----------
+        points : Points
+            A chunk.
+        name : str
+            The file, for messages.
+
+        Raises
+        ------
+        UserError
+            If a point's scanner position is unknown.
+        """
+        unrolled = self.surface.unroll(points.xyz)
+        start = self.km * 1000.0
+        with np.errstate(invalid="ignore"):
+            use = (unrolled.offset <= self.tolerance) & (unrolled.offset >= -self.recess)
+            use &= (unrolled.chainage >= start) & (unrolled.chainage < start + 1000.0)
+        views = None
+        if self.radiometer:
+            radiometer = self.radiometer
+            scanner = radiometer.poses.positions(points, name)
+            normals = self.edges.normals_of(points.xyz, unrolled)
+            views = observe(points.xyz, scanner, normals, points.intensity, radiometer.kind, radiometer.reference)
+            with np.errstate(invalid="ignore"):
+                use &= views.cosine >= np.cos(np.radians(radiometer.max_incidence))
+                use &= views.range_m <= radiometer.max_range
+            use &= np.isfinite(views.raw_db)
+        lining = use & ~self.floor.covers(unrolled.chainage, unrolled.arc)
+        return Seen(unrolled.chainage, unrolled.arc, unrolled.offset, use, lining, views)
+
+
+@dataclass
+class Span:
+    """Ranges of the lining points so far, against those of the reference curve.
+
+    Attributes
+    ----------
+    nearest, farthest : float
+        m.
+    outside, count : int
+        How many lie outside the curve's span, and how many there are.
+    """
+
+    nearest: float = np.inf
+    farthest: float = -np.inf
+    outside: int = 0
+    count: int = 0
+
+    def add(self, nearest: float, farthest: float, outside: int, count: int) -> None:
+        """Count the points of a chunk."""
+        self.nearest, self.farthest = min(self.nearest, nearest), max(self.farthest, farthest)
+        self.outside += outside
+        self.count += count
+
+    def require(self, reference: ReferenceCurve) -> None:
+        """Raise UserError if points lie outside the curve's span."""
+        reference.require_span(self.nearest, self.farthest, self.outside, self.count)

@@ -1,0 +1,165 @@
+"""Unevenness: camber and ballast, a field of stones, over the flat floor of the section; relief of the lining.
+
+Ballast is a height over plan coordinates, so that a ray meets the same stones from wherever it comes. A stone is a dome
+in each cell of a grid, displaced, its size and its height by chance (Worley, 1996, with paraboloids).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tunneldb.simulate.parameters import Parameters
+from tunneldb.simulate.tunnel.section import Section
+from tunneldb.simulate.noise_field import mix
+
+Array = NDArray[np.float64]
+
+CELL = 0.045  # m: one stone a cell
+STONE = (0.015, 0.030)  # radii of stones, m: stones of 3 to 6 cm
+GAP = -1.0  # between stones, in heights of a dome
+HIGHEST = 1.5
+
+
+class Ground(NamedTuple):
+    """Heights over the section's floor for the kernels.
+
+    ``scale`` and ``level`` turn the field of stones into metres (0: none), ``camber`` is the fall of the floor from its
+    middle to both walls (m/m), ``low`` and ``high`` bound the height, ``floor`` is the section's.
+    """
+
+    scale: float
+    level: float
+    salt: int
+    camber: float
+    half_width: float
+    floor: float
+    low: float
+    high: float
+
+
+@njit(cache=True, nogil=True)
+def stones(x: float, y: float, salt: int) -> float:
+    """Height of the stones at a place, in heights of a dome: -1 to 1.5."""
+    fx, fy = math.floor(x / CELL), math.floor(y / CELL)
+    best = GAP
+    part = 1.0 / 65535.0
+    mask = np.uint64(0xFFFF)
+    for i in range(-1, 2):
+        for j in range(-1, 2):
+            h = mix(int(fx) + i, int(fy) + j, salt)
+            cx = (fx + i + 0.1 + 0.8 * part * float(h & mask)) * CELL
+            cy = (fy + j + 0.1 + 0.8 * part * float((h >> np.uint64(16)) & mask)) * CELL
+            radius = STONE[0] + (STONE[1] - STONE[0]) * part * float((h >> np.uint64(32)) & mask)
+            lift = part * float((h >> np.uint64(48)) & mask) - 0.5
+            square = ((x - cx) ** 2 + (y - cy) ** 2) / (radius * radius)
+            best = max(best, lift + 1.0 - square)
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _many(x: Array, y: Array, salt: int, out: Array) -> None:
+    for i in range(x.shape[0]):
+        out[i] = stones(x[i], y[i], salt)
+
+
+@lru_cache(maxsize=1)
+def _moments() -> tuple[float, float]:
+    """Mean and standard deviation of the field of stones, from a million places."""
+    x, y = np.random.default_rng(0).uniform(0.0, 1000.0, (2, 1_000_000))
+    out = np.empty(x.size)
+    _many(x, y, 0, out)
+    return float(out.mean()), float(out.std())
+
+
+def lay(parameters: Parameters, section: Section, salt: int) -> Ground | None:
+    """Camber and ballast as asked; ballast's mean height is 0 and its standard deviation ``parameters.ballast``."""
+    if parameters.ballast == 0.0 and parameters.camber == 0.0:
+        return None
+    mean, spread = _moments() if parameters.ballast > 0.0 else (0.0, 1.0)
+    scale = parameters.ballast / spread
+    camber = parameters.camber / 100.0
+    rise = camber * section.half_width
+    return Ground(
+        scale,
+        -mean * scale,
+        salt,
+        camber,
+        section.half_width,
+        section.floor,
+        (GAP - mean) * scale,
+        (HIGHEST - mean) * scale + rise,
+    )
+
+
+@njit(cache=True, nogil=True, inline="always")
+def height(ground: Ground, x: float, y: float, u: float) -> float:
+    """Height over the section's floor at plan coordinates from the line's origin, ``u`` m right of the axis."""
+    h = ground.camber * (ground.half_width - abs(u))
+    if ground.scale > 0.0:
+        h += ground.scale * stones(x, y, ground.salt) + ground.level
+    return h
+
+
+@njit(cache=True, nogil=True)
+def meet_ground(
+    ground: Ground, o: Array, d: Array, r: float, u: float, w: float, c: float, n: float, dw: float, on_floor: bool
+) -> tuple[float, float, bool]:
+    """Range at which a ray meets the ground, cosine there, and whether it is the ground (else the wall's foot).
+
+    The ray meets the section at range ``r``, at (``u``, ``w``) there, where the axis goes by (``c``, ``n``) in plan, and
+    moves by ``dw`` a metre; near its end the tunnel's frame hardly turns. NaN: it passes over the ground to the wall.
+    """
+    du = d[0] * n - d[1] * c
+    above = w - ground.floor
+    if dw > -1e-3 or (not on_floor and above > ground.high):
+        return np.nan, 0.0, False
+    flat = math.sqrt(max(1.0 - dw * dw, 1e-12))
+    step = min(0.005 / flat, 0.25 * (ground.high - ground.low) / -dw + 1e-6)
+    t = (ground.high - above) / dw
+    end = (ground.low - above) / dw + step if on_floor else 0.0
+    before = t
+    while t <= end:
+        v = u + t * du
+        if on_floor and abs(v) > ground.half_width and v * du > 0.0:
+            # Below the corner of the section the wall goes on.
+            return r + (math.copysign(ground.half_width, v) - u) / du, abs(du), False
+        if above + t * dw <= height(ground, o[0] + (r + t) * d[0], o[1] + (r + t) * d[1], v):
+            break
+        before = t
+        t += step
+    if t > end:
+        return np.nan, 0.0, False
+    for _ in range(16):
+        middle = 0.5 * (before + t)
+        if above + middle * dw > height(ground, o[0] + (r + middle) * d[0], o[1] + (r + middle) * d[1], u + middle * du):
+            before = middle
+        else:
+            t = middle
+    r += t
+    x, y, v = o[0] + r * d[0], o[1] + r * d[1], u + t * du
+    h = 0.001
+    gx = (height(ground, x + h, y, v + h * n) - height(ground, x - h, y, v - h * n)) / (2.0 * h)
+    gy = (height(ground, x, y + h, v - h * c) - height(ground, x, y - h, v + h * c)) / (2.0 * h)
+    return r, (gx * d[0] + gy * d[1] - dw) / math.sqrt(1.0 + gx * gx + gy * gy), True
+
+
+@njit(cache=True, nogil=True)
+def bump(s: float, arc: float, size: float) -> float:
+    """Smooth pseudo-random relief, -1 to 1, with a wavelength of about two ``size`` (value noise)."""
+    x, y = s / size, arc / size
+    fx, fy = math.floor(x), math.floor(y)
+    tx, ty = x - fx, y - fy
+    tx, ty = tx * tx * (3.0 - 2.0 * tx), ty * ty * (3.0 - 2.0 * ty)
+    total = 0.0
+    for i in range(2):
+        for j in range(2):
+            h = math.sin((fx + i) * 12.9898 + (fy + j) * 78.233) * 43758.5453
+            value = 2.0 * (h - math.floor(h)) - 1.0
+            total += value * (tx if i else 1.0 - tx) * (ty if j else 1.0 - ty)
+    return total

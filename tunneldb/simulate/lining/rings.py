@@ -1,0 +1,143 @@
+"""How a lining is put together along the tunnel: blocks cast in place, or rings of segments with bolt pockets."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tunneldb.simulate.parameters import Parameters
+from tunneldb.simulate.tunnel.tunnel import Tunnel
+
+Array = NDArray[np.float64]
+
+SEGMENTS = 6  # of a ring
+# Standard deviation of the level of a block, a ring and a segment, dB.
+BLOCK_LEVEL, RING_LEVEL, SEGMENT_LEVEL = 0.4, 0.8, 0.3
+# Least and greatest width (m) and drop (dB) of joints.
+CAST_WIDTH, CAST_DROP = (0.010, 0.020), (2.0, 4.0)
+SEAM_WIDTH, SEAM_DROP = (0.005, 0.012), (2.0, 5.0)
+# Bolt pockets: size along the tunnel and the arc, distance of the middle from the ring joint, m; shares of a
+# segment's length where they lie; limits of depth (m) and of drop (dB).
+POCKET = (0.15, 0.20)
+POCKET_FROM_JOINT = 0.25
+POCKETS = (0.25, 0.75)
+POCKET_DEPTH, POCKET_DROP = (0.05, 0.08), (1.0, 3.0)
+
+
+class Rings(NamedTuple):
+    """Rings (or blocks) of a lining, ring i from ``first + i * length`` on; n of them, of m segments each.
+
+    Segment k of ring i begins at arc ``shift[i] + k * period``, the arc's whole circle being ``m * period``; blocks
+    cast in one piece have m = 0. A lining without rings has ``length`` 0.
+
+    Attributes
+    ----------
+    first, length : float
+        Chainage of the first joint and distance between joints, m.
+    level : (n,)
+        dB added to the ring.
+    joint_width, joint_drop : (n + 1,)
+        Ring joints: m, dB.
+    period : float
+        Length of a segment along the arc, m.
+    shift : (n,)
+        Arc of a joint between segments, m.
+    segment_level, seam_width, seam_drop : (n, m)
+        Of a segment, dB, and of the joint at its beginning, m and dB.
+    pocket_drop : (n, m, 2)
+        Of the bolt pockets of a segment, dB.
+    pocket_depth : float
+        m; 0: there are none.
+    """
+
+    first: float
+    length: float
+    level: Array
+    joint_width: Array
+    joint_drop: Array
+    period: float
+    shift: Array
+    segment_level: Array
+    seam_width: Array
+    seam_drop: Array
+    pocket_drop: Array
+    pocket_depth: float
+
+
+def build(parameters: Parameters, tunnel: Tunnel, seed: np.random.SeedSequence) -> Rings:
+    """Rings of a lining as asked."""
+    p, line = parameters, tunnel.line
+    shape = np.random.default_rng(seed)
+    length = p.ring_length()
+    period = 2.0 * tunnel.section.half_perimeter / SEGMENTS
+    if length == 0.0:
+        none, wide = np.empty(0), np.empty((0, 0))
+        return Rings(0.0, 0.0, none, none, none, period, none, wide, wide, wide, np.empty((0, 0, 2)), 0.0)
+    first = line.start - float(shape.uniform(0.0, length))
+    n = math.ceil((line.end - first) / length) + 1
+    segmented = p.lining == "segments"
+    m = SEGMENTS if segmented else 0
+    width, drop = (SEAM_WIDTH, SEAM_DROP) if segmented else (CAST_WIDTH, CAST_DROP)
+    # Joints are staggered: every other ring is turned by about half a segment.
+    turned = 0.5 * (np.arange(n) % 2) + shape.uniform(-0.1, 0.1, n)
+    return Rings(
+        first,
+        length,
+        shape.normal(0.0, RING_LEVEL if segmented else BLOCK_LEVEL, n),
+        shape.uniform(*width, n + 1),
+        shape.uniform(*drop, n + 1),
+        period,
+        period * turned,
+        shape.normal(0.0, SEGMENT_LEVEL, (n, m)),
+        shape.uniform(*width, (n, m)),
+        shape.uniform(*drop, (n, m)),
+        shape.uniform(*POCKET_DROP, (n, m, 2)),
+        float(shape.uniform(*POCKET_DEPTH)) if segmented else 0.0,
+    )
+
+
+@njit(cache=True, nogil=True, inline="always")
+def ring_of(rings: Rings, s: float) -> int:
+    """Number of the ring at a chainage, the first or last one beyond the ends."""
+    return min(max(math.floor((s - rings.first) / rings.length), 0), rings.level.shape[0] - 1)
+
+
+@njit(cache=True, nogil=True)
+def pocket_drop(rings: Rings, s: float, arc: float) -> float:
+    """Drop of the bolt pocket at a place, dB; 0: there is none."""
+    if rings.pocket_depth == 0.0:
+        return 0.0
+    i = ring_of(rings, s)
+    if abs(s - rings.first - i * rings.length - POCKET_FROM_JOINT) > 0.5 * POCKET[0]:
+        return 0.0
+    x = (arc - rings.shift[i]) / rings.period
+    k = math.floor(x)
+    for j in range(2):
+        if abs(x - k - POCKETS[j]) * rings.period <= 0.5 * POCKET[1]:
+            return rings.pocket_drop[i, k % rings.pocket_drop.shape[1], j]
+    return 0.0
+
+
+@njit(cache=True, nogil=True)
+def ring_level(rings: Rings, s: float, arc: float) -> float:
+    """Level of rings, segments, joints and pockets at a place of the lining, dB."""
+    if rings.length == 0.0:
+        return 0.0
+    i = ring_of(rings, s)
+    total = rings.level[i]
+    m = rings.segment_level.shape[1]
+    x = (s - rings.first) / rings.length
+    j = min(max(math.floor(x + 0.5), 0), rings.level.shape[0])
+    drop = rings.joint_drop[j] if abs(x - j) * rings.length <= 0.5 * rings.joint_width[j] else 0.0
+    if m > 0:
+        y = (arc - rings.shift[i]) / rings.period
+        total += rings.segment_level[i, math.floor(y) % m]
+        k = math.floor(y + 0.5)
+        if abs(y - k) * rings.period <= 0.5 * rings.seam_width[i, k % m]:
+            drop = max(drop, rings.seam_drop[i, k % m])
+        drop = max(drop, pocket_drop(rings, s, arc))
+    return total - drop

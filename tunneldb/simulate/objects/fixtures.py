@@ -1,0 +1,204 @@
+"""What hangs on the lining or is let into it: cables, trays, boxes, lamps, rails, refuge niches.
+
+An appendage is a tube or a bar swept along the tunnel: its cross-section lies fixed in (u, w) between two
+chainages. A niche is a rectangular recess, straight (not bent with the tunnel), floor and all.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from shapely.geometry import Polygon, box
+
+from tunneldb.simulate.tunnel.tunnel import Tunnel
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+TUBE, BAR = 0.0, 1.0
+LINING, FLOOR, APPENDAGE, NICHE, OUTLIER, RAIL, OBJECT, SPHERE = 0, 1, 2, 3, 4, 5, 6, 7
+
+# Chainages are looked up in bins this long; what lies within REACH of a bin is listed in it.
+BIN = 2.0
+REACH = 1.0
+
+
+@dataclass(frozen=True)
+class Appendage:
+    """Something on the lining.
+
+    Attributes
+    ----------
+    kind : str
+        cable, pipe, tray, box, sign, lamp or rail; walkway, kerb or carriageway.
+    start, end : float
+        Chainage, m.
+    arc : float
+        Where on the section its middle is, m.
+    standoff : float
+        From the surface to its middle, m.
+    width, depth : float
+        Along the section and away from the surface, m; a tube's diameter is both.
+    drop : float
+        How much darker than the lining, dB.
+    """
+
+    kind: str
+    start: float
+    end: float
+    arc: float
+    standoff: float
+    width: float
+    depth: float
+    drop: float
+
+    @property
+    def is_tube(self) -> bool:
+        """Whether it is round."""
+        return self.kind in ("cable", "pipe")
+
+    @property
+    def klass(self) -> int:
+        """Class of its points: what one walks or drives on is floor."""
+        return {"rail": RAIL, "walkway": FLOOR, "kerb": FLOOR, "carriageway": FLOOR}.get(self.kind, APPENDAGE)
+
+    def footprint(self) -> Polygon:
+        """What it covers of the unrolled plane, seen along the normal."""
+        return box(self.start, self.arc - 0.5 * self.width, self.end, self.arc + 0.5 * self.width)
+
+
+@dataclass(frozen=True)
+class Niche:
+    """A refuge in the wall: middle chainage, side (+1 right), width, height above the floor, depth; m."""
+
+    chainage: float
+    side: int
+    width: float = 2.0
+    height: float = 2.2
+    depth: float = 0.9
+
+    def footprint(self, tunnel: Tunnel) -> Polygon:
+        """Its opening in the unrolled plane."""
+        section = tunnel.section
+        arcs = np.linspace(0.0, section.floor_arc, 2001)
+        w = section.point(arcs)[0][:, 1]
+        top = float(arcs[np.argmin(np.abs(w - (section.floor + self.height)))])
+        low, high = sorted((self.side * top, self.side * section.floor_arc))
+        half = 0.5 * self.width
+        return box(self.chainage - half, low, self.chainage + half, high)
+
+
+# Sill of a niche above the floor, so that its bottom and the floor are two surfaces.
+SILL = 0.05
+
+
+def appendage_table(tunnel: Tunnel, items: list[Appendage]) -> Array:
+    """Rows for the ray kernel: kind, chainage from/to, middle u/w, tangent u/w, half width/depth, class, drop."""
+    rows = np.zeros((len(items), 11))
+    for row, item in zip(rows, items, strict=True):
+        point, normal = tunnel.section.point(np.array([item.arc]))
+        (pu, pw), (nu, nw) = point[0], normal[0]
+        row[:] = [
+            TUBE if item.is_tube else BAR,
+            item.start,
+            item.end,
+            pu + item.standoff * nu,
+            pw + item.standoff * nw,
+            -nw,
+            nu,
+            0.5 * item.width,
+            0.5 * item.depth,
+            item.klass,
+            item.drop,
+        ]
+    return rows
+
+
+def niche_table(tunnel: Tunnel, niches: list[Niche]) -> Array:
+    """Rows: chainage from/to, origin (3, from the line's origin), t (3), outward (3), up (3), half width, height, depth.
+
+    The origin lies on the axis above the sill; depth is measured from the axis to the back wall.
+    """
+    rows = np.zeros((len(niches), 17))
+    for row, niche in zip(rows, niches, strict=True):
+        frame = tunnel.line.frame(np.array([niche.chainage]))
+        section = tunnel.section
+        arcs = np.linspace(0.0, section.floor_arc, 2001)
+        points = section.point(arcs)[0]
+        middle = section.floor + 0.5 * niche.height
+        wall = float(points[np.argmin(np.abs(points[:, 1] - middle) + 10 * (points[:, 0] < 0)), 0])
+        t, up = frame.t[0], frame.w[0]
+        origin = frame.position[0] - tunnel.line.origin + (section.floor + SILL) * up
+        half = 0.5 * niche.width
+        row[:2] = niche.chainage - half - REACH, niche.chainage + half + REACH
+        row[2:5], row[5:8], row[8:11], row[11:14] = origin, t, niche.side * frame.u[0], up
+        row[14:] = half, niche.height - SILL, wall + niche.depth
+    return rows
+
+
+def bins(low: Array, high: Array, start: float, end: float) -> tuple[Index, Index]:
+    """List by chainage bin which intervals [low, high] come within REACH: (offsets (b+1,), indices)."""
+    count = max(1, math.ceil((end - start) / BIN))
+    lists = []
+    for b in range(count):
+        left, right = start + b * BIN - REACH, start + (b + 1) * BIN + REACH
+        lists.append(np.flatnonzero((high >= left) & (low <= right)))
+    offsets = np.concatenate([[0], np.cumsum([len(x) for x in lists])]).astype(np.int64)
+    return offsets, (np.concatenate(lists) if lists else np.empty(0)).astype(np.int64)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def bin_of(s: float, start: float, offsets: Index) -> int:
+    """Bin of a chainage, the first or last one beyond the ends."""
+    return min(max(int((s - start) / BIN), 0), offsets.shape[0] - 2)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def distance(row: Array, s: float, u: float, w: float) -> float:
+    """Signed distance to an appendage, positive outside; m in (chainage, u, w)."""
+    half = 0.5 * (row[2] - row[1])
+    a = abs(s - row[1] - half) - half
+    du, dw = u - row[3], w - row[4]
+    if row[0] == TUBE:
+        b = math.sqrt(du * du + dw * dw) - row[7]
+        if a <= 0.0 or b <= 0.0:
+            return max(a, b)
+        return math.sqrt(a * a + b * b)
+    b = abs(du * row[5] + dw * row[6]) - row[7]
+    c = abs(-du * row[6] + dw * row[5]) - row[8]
+    if a <= 0.0 and b <= 0.0 and c <= 0.0:
+        return max(a, max(b, c))
+    a, b, c = max(a, 0.0), max(b, 0.0), max(c, 0.0)
+    return math.sqrt(a * a + b * b + c * c)
+
+
+def furnish(tunnel: Tunnel, rng: np.random.Generator) -> list[Appendage]:
+    """Cables, a tray, boxes and lamps as a railway tunnel has them, rails on the floor."""
+    line, section = tunnel.line, tunnel.section
+    start, end = line.start, line.end
+    lining = section.floor_arc
+    items = [Appendage("tray", start, end, -0.80 * lining, 0.13, 0.30, 0.10, 5.0)]
+    for arc in (0.72 * lining, 0.72 * lining + 0.25, -0.62 * lining):
+        off, thick, drop = rng.uniform((0.07, 0.04, 5.0), (0.15, 0.07, 7.0)).tolist()
+        items.append(Appendage("cable", start, end, arc, off, thick, thick, drop))
+    for s in np.arange(start + 12.0, end - 5.0, 30.0).tolist():
+        at, drop = s + float(rng.uniform(-3.0, 3.0)), float(rng.uniform(4.0, 6.0))
+        items.append(Appendage("box", at, at + 0.6, 0.55 * lining, 0.10, 0.45, 0.20, drop))
+    lamps = np.arange(start + 5.0, end - 2.0, 12.0).tolist()
+    items += [Appendage("lamp", s, s + 1.2, 0.22 * lining, 0.15, 0.16, 0.12, 5.0) for s in lamps]
+    rails = section.half_perimeter - 0.75, 0.75 - section.half_perimeter
+    items += [Appendage("rail", start, end, arc, 0.085, 0.07, 0.17, 3.0) for arc in rails]
+    return items
+
+
+def refuges(tunnel: Tunnel, spacing: float = 60.0) -> list[Niche]:
+    """Refuge niches on alternating sides; one at least, in the middle of a short tunnel."""
+    start, end = tunnel.line.start, tunnel.line.end
+    places = np.arange(start + 0.5 * spacing, end - 3.0, spacing)
+    if places.size == 0 and end - start > 10.0:
+        places = np.array([0.5 * (start + end)])
+    return [Niche(float(s), 1 if i % 2 == 0 else -1) for i, s in enumerate(places)]

@@ -1,0 +1,246 @@
+"""Things that stand free in the tunnel, of balls, rods and bricks: people, equipment, target spheres, loose cables.
+
+A ball is a sphere, a rod a straight tube with round ends, a brick an oriented box. They lie in space, not in the
+frame of the tunnel, so that a sphere is a sphere in a curve too, and rays meet them by closed formulas.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tunneldb.simulate.objects.fixtures import bin_of, bins
+from tunneldb.simulate.tunnel.tunnel import Tunnel
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+BALL, ROD, BRICK = 0.0, 1.0, 2.0
+# Columns of a part: kind; then
+#   ball:  centre (1:4), radius (7)
+#   rod:   one end (1:4), other end (4:7), radius (7)
+#   brick: centre (1:4), half sizes (4:7), unit axes (8:17)
+COLUMNS = 17
+# Half the width of the beam, m: nearer to the outline than this, part of it passes.
+BEAM = 0.004
+
+
+def ball(centre: Array, radius: float) -> Array:
+    """Part: a sphere; coordinates and radius, m."""
+    row = np.zeros(COLUMNS)
+    row[0], row[1:4], row[7] = BALL, centre, radius
+    return row
+
+
+def rod(one: Array, other: Array, radius: float) -> Array:
+    """Part: a tube with round ends from ``one`` to ``other``, m."""
+    row = np.zeros(COLUMNS)
+    row[0], row[1:4], row[4:7], row[7] = ROD, one, other, radius
+    return row
+
+
+def brick(centre: Array, size: Sequence[float], axes: Array) -> Array:
+    """Part: a box of whole ``size`` (3) along unit ``axes`` (3, 3; a row each), m."""
+    row = np.zeros(COLUMNS)
+    row[0], row[1:4], row[4:7], row[8:] = BRICK, centre, 0.5 * np.asarray(size), np.ravel(axes)
+    return row
+
+
+@dataclass(frozen=True)
+class Thing:
+    """Something that stands or hangs free.
+
+    Attributes
+    ----------
+    kind : str
+        person, case, trolley, tripod, bollard, globe, sphere, bracket, cable, catenary, sleeper.
+    klass : int
+        Class of its points.
+    drop : float
+        How much darker than the lining, dB.
+    parts : (n, 17) array
+        Balls, rods and bricks in coordinates of the tunnel.
+    number : int
+        Number of the thing in the truth, from 1; 0: it has none.
+    """
+
+    kind: str
+    klass: int
+    drop: float
+    parts: Array
+    number: int = 0
+
+    def extent(self) -> tuple[Array, Array]:
+        """Middles (n, 3) and radii (n,) of balls around its parts."""
+        p = self.parts
+        is_rod = p[:, :1] == ROD
+        middle = np.where(is_rod, 0.5 * (p[:, 1:4] + p[:, 4:7]), p[:, 1:4])
+        half = np.linalg.norm(np.where(is_rod, 0.5 * (p[:, 4:7] - p[:, 1:4]), p[:, 4:7]), axis=1)
+        return middle, half + p[:, 7]
+
+    def middle(self) -> Array:
+        """Middle of the box around it, (3,)."""
+        middle, radius = self.extent()
+        low, high = (middle - radius[:, None]).min(axis=0), (middle + radius[:, None]).max(axis=0)
+        return np.asarray(0.5 * (low + high))
+
+
+@dataclass(frozen=True)
+class TargetSphere:
+    """A target sphere: number of its points in the truth, centre (3,), radius, m, and how it stands."""
+
+    id: int
+    centre: Array
+    radius: float
+    kind: str
+
+
+class Parts(NamedTuple):
+    """Parts of all things for the kernels, from the line's origin, listed by chainage."""
+
+    rows: Array
+    hulls: Array  # middle (3) and radius of a ball around each part
+    labels: Array  # class, drop, number of each part
+    bins: Index
+    list: Index
+
+
+def parts_table(tunnel: Tunnel, things: Sequence[Thing]) -> Parts:
+    """Lay the parts of things out for the kernels."""
+    line = tunnel.line
+    rows = np.vstack([np.empty((0, COLUMNS)), *(t.parts for t in things)])
+    hulls = np.empty((len(rows), 4))
+    labels = np.empty((len(rows), 3))
+    first = 0
+    for thing in things:
+        middle, radius = thing.extent()
+        last = first + len(middle)
+        hulls[first:last, :3], hulls[first:last, 3] = middle - line.origin, radius
+        labels[first:last] = thing.klass, thing.drop, thing.number
+        first = last
+    rows[:, 1:4] -= line.origin
+    rows[:, 4:7] -= np.where(rows[:, :1] == ROD, line.origin, 0.0)
+    s = tunnel.unroll(hulls[:, :3] + line.origin).chainage if len(rows) else np.empty(0)
+    return Parts(rows, hulls, labels, *bins(s - hulls[:, 3], s + hulls[:, 3], line.start, line.end))
+
+
+@njit(cache=True, nogil=True)
+def _meet_ball(ox: float, oy: float, oz: float, d: Array, radius: float) -> tuple[float, float]:
+    """Range to a sphere about 0 from (ox, oy, oz) (1e300: missed), and distance of the ray inside its outline."""
+    b = ox * d[0] + oy * d[1] + oz * d[2]
+    past = ox * ox + oy * oy + oz * oz - b * b
+    root = radius * radius - past
+    if root < 0.0:
+        return 1e300, 0.0
+    return -b - math.sqrt(root), radius - math.sqrt(max(past, 0.0))
+
+
+@njit(cache=True, nogil=True)
+def _meet_rod(row: Array, o: Array, d: Array) -> tuple[float, float, float, float, float]:
+    """Range to a rod (1e300: missed), distance inside its outline, and the normal there."""
+    radius = row[7]
+    bx, by, bz = row[4] - row[1], row[5] - row[2], row[6] - row[3]
+    ax, ay, az = o[0] - row[1], o[1] - row[2], o[2] - row[3]
+    length2 = bx * bx + by * by + bz * bz
+    bd = bx * d[0] + by * d[1] + bz * d[2]
+    ba = bx * ax + by * ay + bz * az
+    best = 1e300
+    inside = 0.0
+    share = 0.0
+    # The tube: the ray's distance to its axis, both seen along the axis.
+    a = length2 - bd * bd
+    if a > 1e-12 * length2:
+        da = d[0] * ax + d[1] * ay + d[2] * az
+        b = length2 * da - ba * bd
+        c = length2 * (ax * ax + ay * ay + az * az - radius * radius) - ba * ba
+        root = b * b - a * c
+        if root > 0.0:
+            t = (-b - math.sqrt(root)) / a
+            y = (ba + t * bd) / length2
+            if 0.0 <= y <= 1.0:
+                best = t
+                share = y
+                inside = radius - math.sqrt(max(radius * radius - root / (a * length2), 0.0))
+    for end in range(2):
+        x, y, z = ax - end * bx, ay - end * by, az - end * bz
+        t, gap = _meet_ball(x, y, z, d, radius)
+        if t < best:
+            best = t
+            share = float(end)
+            inside = gap
+    if best > 1e299:
+        return best, 0.0, 0.0, 0.0, 0.0
+    nx = (ax + best * d[0] - share * bx) / radius
+    ny = (ay + best * d[1] - share * by) / radius
+    nz = (az + best * d[2] - share * bz) / radius
+    return best, inside, nx, ny, nz
+
+
+@njit(cache=True, nogil=True)
+def _meet_brick(row: Array, o: Array, d: Array) -> tuple[float, float, float]:
+    """Range to a brick (1e300: missed), distance inside its outline, cosine there."""
+    enter = -1e300
+    leave = 1e300
+    cosine = 0.0
+    for axis in range(3):
+        k = 8 + 3 * axis
+        at = (o[0] - row[1]) * row[k] + (o[1] - row[2]) * row[k + 1] + (o[2] - row[3]) * row[k + 2]
+        rate = d[0] * row[k] + d[1] * row[k + 1] + d[2] * row[k + 2]
+        half = row[4 + axis]
+        if abs(rate) < 1e-12:
+            if abs(at) > half:
+                return 1e300, 0.0, 0.0
+            continue
+        near, far = (-half - at) / rate, (half - at) / rate
+        if near > far:
+            near, far = far, near
+        if near > enter:
+            enter = near
+            cosine = abs(rate)
+        leave = min(leave, far)
+    if enter > leave:
+        return 1e300, 0.0, 0.0
+    # Near the outline a ray passes but little of it.
+    return enter, 0.5 * (leave - enter), cosine
+
+
+@njit(cache=True, nogil=True)
+def meet_parts(
+    parts: Parts, start: float, o: Array, d: Array, s0: float, s1: float, r: float
+) -> tuple[float, int, float, float]:
+    """First part that a ray meets before range ``r``: range, which (-1: none), cosine, distance inside its outline.
+
+    ``s0`` and ``s1`` are the chainages at the ray's start and at ``r``, ``start`` that of the tunnel's start.
+    """
+    best = r
+    which = -1
+    cosine = 0.0
+    inside = 0.0
+    one, other = bin_of(s0, start, parts.bins), bin_of(s1, start, parts.bins)
+    step = 1 if other >= one else -1
+    for b in range(one, other + step, step):
+        for j in range(parts.bins[b], parts.bins[b + 1]):
+            i = parts.list[j]
+            x, y, z = o[0] - parts.hulls[i, 0], o[1] - parts.hulls[i, 1], o[2] - parts.hulls[i, 2]
+            along = x * d[0] + y * d[1] + z * d[2]
+            radius = parts.hulls[i, 3]
+            if x * x + y * y + z * z - along * along > radius * radius or -along - radius > best or along > radius:
+                continue
+            row = parts.rows[i]
+            if row[0] == BALL:
+                t, gap = _meet_ball(x, y, z, d, row[7])
+                c = math.sqrt(max(0.0, 1.0 - ((row[7] - gap) / row[7]) ** 2)) if t < 1e299 else 0.0
+            elif row[0] == ROD:
+                t, gap, nx, ny, nz = _meet_rod(row, o, d)
+                c = -(nx * d[0] + ny * d[1] + nz * d[2])
+            else:
+                t, gap, c = _meet_brick(row, o, d)
+            if 0.0 < t < best:
+                best, which, cosine, inside = t, i, c, gap
+    return best, which, cosine, inside

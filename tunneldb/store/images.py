@@ -1,0 +1,165 @@
+"""Images, radiometry and coverage of a kilometre, to and from the database."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import psycopg
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from tunneldb.database import Survey
+from tunneldb.radiometry.robust_statistics import Dry
+from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.radiometry.roughness import Roughness
+from tunneldb.anomalies.coverage import Coverage
+from tunneldb.anomalies.detect import Detection
+from tunneldb.anomalies.background.level_map import DryMap
+from tunneldb.raster.accumulator import Grid, Window
+from tunneldb.raster.geotiff import Raster, encode
+
+DARK = 5
+"""Value of dark pixels in the image of states, beside those of :class:`tunneldb.raster.pixel_state.State`."""
+
+
+def load_reference(conn: psycopg.Connection[Any], survey: Survey) -> ReferenceCurve | None:
+    """Read the reference curve of a survey, None when it has none."""
+    rows = conn.execute(
+        "SELECT range_m, intensity_db FROM tunnel.reference WHERE survey_id = %s ORDER BY range_m", (survey.id,)
+    ).fetchall()
+    if not rows:
+        return None
+    table = np.array(rows, dtype=np.float64)
+    return ReferenceCurve.from_rows(table[:, 0], table[:, 1])
+
+
+def load_regions(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: str) -> list[Polygon]:
+    """Read the polygons of a kind (homogeneous or dry) that the user drew in a kilometre, in the unrolled plane."""
+    rows = conn.execute(
+        "SELECT public.ST_AsBinary(geom) FROM tunnel.region WHERE survey_id = %s AND kind = %s"
+        " AND public.ST_XMax(geom) > %s AND public.ST_XMin(geom) < %s ORDER BY id",
+        (survey.id, kind, km * 1000.0, (km + 1) * 1000.0),
+    ).fetchall()
+    return [shapely.from_wkb(bytes(wkb)) for (wkb,) in rows]
+
+
+class ImageStore:
+    """Replaces the images of a kilometre, block by block.
+
+    Parameters
+    ----------
+    conn, survey
+        Where.
+    grid : Grid
+        The pixels.
+    kinds : sequence of str
+        What images there are to be.
+
+    Attributes
+    ----------
+    pixels : int
+        How many pixels of what was saved hold points.
+    """
+
+    def __init__(self, conn: psycopg.Connection[Any], survey: Survey, grid: Grid, kinds: Sequence[str]) -> None:
+        self.conn, self.survey, self.grid, self.kinds = conn, survey, grid, kinds
+        self.pixels = 0
+        self._blocks: list[int] = []
+        conn.execute("DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s", (survey.id, grid.km))
+
+    def save(self, window: Window) -> None:
+        """Save a whole block as points fell into it."""
+        grid, columns = self.grid, window.columns
+        block = grid.first_block + columns.start // grid.block_columns
+        self.pixels += int(np.count_nonzero(window.weight))
+        self._blocks.append(block)
+        for kind in self.kinds:
+            self._insert(kind, block, Raster(_values(window, kind), grid.transform(columns.start)))
+
+    def save_states(self, state: NDArray[np.uint8], dark: NDArray[np.bool_]) -> None:
+        """Save what the pixels (rows, columns) of the kilometre show, in the blocks that were saved before; DARK where dark."""
+        grid = self.grid
+        for block in self._blocks:
+            first = (block - grid.first_block) * grid.block_columns
+            columns = slice(first, first + grid.block_columns)
+            values = np.where(dark[:, columns], np.float32(DARK), state[:, columns].astype(np.float32))
+            self._insert("state", block, Raster(values, grid.transform(first)))
+
+    def _insert(self, kind: str, block: int, raster: Raster) -> None:
+        self.conn.execute(
+            "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %b)",
+            (self.survey.id, self.grid.km, kind, block, encode(raster, kind)),
+        )
+
+
+def _values(window: Window, kind: str) -> NDArray[np.float32]:
+    values: NDArray[np.float32] = getattr(window, kind)
+    return values
+
+
+def save_radiometry(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    km: int,
+    roughness: Roughness,
+    dry: DryMap,
+    found: Detection,
+    sigma: tuple[Dry, Dry, Dry],
+) -> None:
+    """Replace the radiometry of a kilometre.
+
+    Parameters
+    ----------
+    conn, survey, km
+        Where.
+    roughness : Roughness
+        Stored as NULL where the incidence angles don't determine it.
+    dry : DryMap
+        Dry lining: the medians of its level and standard deviation, with the threshold by them.
+    found : Detection
+        Pixel counts.
+    sigma : three Dry
+        Dry lining points raw, corrected by Lambert's law and by Oren–Nayar (Table 1 of Xu et al., 2018).
+    """
+    drop_radiometry(conn, survey, km)
+    conn.execute(
+        "INSERT INTO tunnel.radiometry (survey_id, km, roughness, dry_mean, dry_sigma, threshold, sigma_raw,"
+        " sigma_lambert, sigma_oren_nayar, regions, pixels, wet_pixels)"
+        " VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s)",
+        (
+            survey.id,
+            km,
+            roughness.sigma if roughness.determined else None,
+            *(_null(v) for v in (dry.mean, dry.spread, dry.mean - 3.0 * dry.spread)),
+            *(_null(s.sigma) for s in sigma),
+            roughness.regions,
+            found.pixels,
+            found.wet_pixels,
+        ),
+    )
+
+
+def save_coverage(conn: psycopg.Connection[Any], survey: Survey, km: int, coverage: Coverage) -> None:
+    """Replace the coverage of a kilometre."""
+    drop_coverage(conn, survey, km)
+    conn.execute(
+        "INSERT INTO tunnel.coverage (survey_id, km, step, lining, seen, wet) VALUES (%s, %s, %s, %s, %s, %s)",
+        (survey.id, km, coverage.step, *(areas.tolist() for areas in (coverage.lining, coverage.seen, coverage.wet))),
+    )
+
+
+def drop_coverage(conn: psycopg.Connection[Any], survey: Survey, km: int) -> None:
+    """Take away the coverage of a kilometre."""
+    conn.execute("DELETE FROM tunnel.coverage WHERE survey_id = %s AND km = %s", (survey.id, km))
+
+
+def drop_radiometry(conn: psycopg.Connection[Any], survey: Survey, km: int) -> None:
+    """Take away the radiometry of a kilometre."""
+    conn.execute("DELETE FROM tunnel.radiometry WHERE survey_id = %s AND km = %s", (survey.id, km))
+
+
+def _null(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,172 @@
+"""Writing a kilometre's partition of tunnel.point: rows that are there and rows that come, as one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from typing import Any
+
+import numpy as np
+import psycopg
+from numpy.typing import NDArray
+from psycopg import sql
+
+from tunneldb.database.copy import copy_binary
+from tunneldb.database.fetch import fetch_array
+from tunneldb.store.survey import Survey
+from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.store.point_rows import COLUMNS, pack_rows
+from tunneldb.pointcloud.prefetch import prefetch
+from tunneldb.pointcloud.selection import voxel_reach
+from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, ROW, Rows, Spool, bin_of, windows
+from tunneldb.pointcloud.thinning import first_of_voxels
+
+WINDOW = 500_000  # rows read, thinned and packed at a time
+
+
+def partition(survey: Survey, km: int, suffix: str = "") -> sql.Identifier:
+    """Name of the partition of a survey's kilometre."""
+    return sql.Identifier("tunnel", f"point_s{survey.id}_km{km}{suffix}")
+
+
+def partition_exists(conn: psycopg.Connection[Any], survey: Survey, km: int) -> bool:
+    """Tell whether a survey's kilometre holds points."""
+    row = conn.execute("SELECT to_regclass(%s)", [partition(survey, km).as_string(conn)]).fetchone()
+    return row is not None and row[0] is not None
+
+
+def rows_in(conn: psycopg.Connection[Any], survey: Survey, km: int) -> int:
+    """Rows of a survey's kilometre, 0 if there is no partition for it."""
+    if not partition_exists(conn, survey, km):
+        return 0
+    row = conn.execute(sql.SQL("SELECT count(*) FROM {}").format(partition(survey, km))).fetchone()
+    assert row is not None
+    return int(row[0])
+
+
+def read_partition(conn: psycopg.Connection[Any], survey: Survey, km: int, alignment: Alignment) -> Iterator[Rows]:
+    """Rows of a kilometre, some at a time, with the file's id as tag.
+
+    Their chainage is that of the given axis again, as at loading, for the stage ``segments`` sets it by the axis found.
+    """
+    table = partition(survey, km)
+    counts = conn.execute(
+        sql.SQL("SELECT floor(chainage)::int AS metre, count(*) FROM {} GROUP BY metre ORDER BY metre").format(table)
+    ).fetchall()
+    fields: list[tuple[str, str, sql.Composable]] = [
+        ("x", "f8", sql.SQL("ST_X(geom)")),
+        ("y", "f8", sql.SQL("ST_Y(geom)")),
+        ("z", "f8", sql.SQL("ST_Z(geom)")),
+        *((name, kind, sql.Identifier(name)) for name, kind in (("gps_time", "f8"), ("intensity", "f4"), ("scan_id", "i4"))),
+        *((name, kind, sql.Identifier(name)) for name, kind in (("file_id", "i4"), ("classification", "i2"))),
+    ]
+    source = sql.SQL("FROM {} WHERE chainage >= %(low)s AND chainage < %(high)s").format(table)
+    for low, high in _ranges(counts):
+        found = fetch_array(conn, fields, source, {"low": low, "high": high})
+        rows: Rows = np.empty(len(found), ROW)
+        for name in ("x", "y", "z", "intensity", "scan_id", "classification"):
+            rows[name] = found[name]
+        rows["time"], rows["tag"] = found["gps_time"], found["file_id"]
+        chainage = alignment.chainage(np.column_stack([found["x"], found["y"], found["z"]]))
+        rows["chainage"] = np.clip(chainage, km * KILOMETRE, np.nextafter((km + 1) * KILOMETRE, -np.inf))
+        yield rows
+
+
+def _ranges(counts: list[tuple[int, int]]) -> Iterator[tuple[float, float]]:
+    """Ranges of whole metres with about WINDOW rows each."""
+    low, held = None, 0
+    for metre, count in counts:
+        low, held = metre if low is None else low, held + count
+        if held >= WINDOW:
+            yield float(low), metre + 1.0
+            low, held = None, 0
+    if low is not None:
+        yield float(low), counts[-1][0] + 1.0
+
+
+def write_partition(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    km: int,
+    parts: Sequence[tuple[Spool, int | None]],
+    edge: float | None,
+    file_ids: NDArray[np.int32],
+    progress: Callable[[int], None],
+) -> NDArray[np.int64]:
+    """Build a kilometre's partition aside from all its rows, thinned as a whole; `swap_partition` puts it in place.
+
+    The table is made and filled in the caller's transaction: the embedded server writes no WAL for its rows.
+
+    Parameters
+    ----------
+    parts : sequence of (Spool, int or None)
+        Rows of at least this kilometre, and the tag that those of a spool get; None leaves them theirs.
+    edge : float or None
+        Voxel edge of thinning, m; None keeps every row.
+    file_ids : (k,) int32 array
+        scan_file.id for each tag; tags are in the order of the files' names, which decides between points that are
+        equal in all else.
+    progress : callable
+        Called with the number of rows looked at.
+
+    Returns
+    -------
+    (k,) int64 array
+        Rows written of each tag.
+    """
+    begin, end = km * BINS_PER_KM, (km + 1) * BINS_PER_KM
+    counts = sum((spool.counts_of(begin, end) for spool, _ in parts), np.zeros(BINS_PER_KM, np.int64))
+    written = np.zeros(len(file_ids), np.int64)
+    reach = 0 if edge is None else math.ceil(voxel_reach(edge) * BINS_PER_METRE)
+
+    def chunks() -> Iterator[memoryview]:
+        for low, high in windows(begin, counts, WINDOW):
+            rows = _read(parts, max(low - reach, begin), min(high + reach, end))
+            if edge is not None:
+                stays, _ = first_of_voxels(rows, edge, np.ones(len(rows), np.bool_))
+                bins = bin_of(rows["chainage"])
+                rows = rows[stays & (bins >= low) & (bins < high)]
+            np.add(written, np.bincount(rows["tag"], minlength=len(written)), out=written)
+            yield pack_rows(survey, km, rows, file_ids).data
+            progress(int(counts[low - begin : high - begin].sum()))
+
+    new = partition(survey, km, "_new")
+    conn.execute(sql.SQL("DROP TABLE IF EXISTS {}").format(new))
+    conn.execute(
+        sql.SQL("CREATE TABLE {} (LIKE tunnel.point, CONSTRAINT part CHECK (survey_id = {} AND km = {}))").format(
+            new, sql.Literal(survey.id), sql.Literal(km)
+        )
+    )
+    with closing(prefetch(chunks())) as packed:
+        copy_binary(conn, new, COLUMNS, packed, fresh=True)
+    return written
+
+
+def _read(parts: Sequence[tuple[Spool, int | None]], low: int, high: int) -> Rows:
+    pieces = []
+    for spool, tag in parts:
+        rows = spool.read(low, high)
+        if tag is not None:
+            rows["tag"] = tag
+        pieces.append(rows)
+    return pieces[0] if len(pieces) == 1 else np.concatenate([*pieces, np.empty(0, ROW)])
+
+
+def swap_partition(conn: psycopg.Connection[Any], survey: Survey, km: int, rows: int) -> None:
+    """Put what `write_partition` has built, with so many rows, in the place of a kilometre; one without rows goes.
+
+    To be called late in a transaction: others see the old kilometre until its end, but wait for it from here on.
+
+    Raises
+    ------
+    psycopg.errors.LockNotAvailable
+        If others have read the survey for too long without a break.
+    """
+    if rows:
+        conn.execute("SELECT tunnel_api.partition_swap(%s, %s)", [survey.id, km])
+        return
+    conn.execute(sql.SQL("DROP TABLE {}").format(partition(survey, km, "_new")))
+    if partition_exists(conn, survey, km):
+        conn.execute("SELECT tunnel_api.partition_lock(%s, %s)", [survey.id, km])
+        conn.execute(sql.SQL("DROP TABLE {}").format(partition(survey, km)))

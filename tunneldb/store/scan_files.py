@@ -1,0 +1,201 @@
+"""The files of a survey, as tunnel.scan_file and tunnel.file_km record them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import psycopg
+from psycopg.types.multirange import Multirange
+from psycopg.types.range import Range
+
+from tunneldb.store.survey import Survey
+from tunneldb.errors import UserError
+from tunneldb.pointcloud.selection import FilterCounts
+
+COUNTED = ("points", "noise", "outside", "thinned", "kept")
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """What became of a file that was to be loaded.
+
+    Attributes
+    ----------
+    name : str
+    state : str
+        ``loaded``, ``replaced`` (there was a file of this name with other content), ``reread`` (because of a file that
+        was replaced), ``unchanged`` or ``moved`` (unchanged, but it lies elsewhere now, which was noted).
+    points, noise, outside, thinned, kept : int
+        Its points, and what they came to; points = noise + outside + thinned + kept once all its kilometres are loaded.
+    seconds : float
+        Time that it took, its share of what was done for several files at once included; 0 when unchanged.
+    """
+
+    name: str
+    state: str
+    points: int
+    noise: int
+    outside: int
+    thinned: int
+    kept: int
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A row of tunnel.scan_file; low and high are the ends of its chainage, m."""
+
+    id: int
+    name: str
+    path: str
+    checksum: str
+    bytes: int
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Content:
+    """A file that was read, as it is to be recorded; srid is that of the tunnel, if the file states one."""
+
+    path: Path
+    checksum: str
+    bytes: int
+    srid: int | None
+    counts: FilterCounts
+
+
+def checksum(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def recorded_files(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, Recorded]:
+    """Files that a survey holds, by name."""
+    rows = conn.execute(
+        "SELECT id, name, path, checksum, bytes, chainage_from, chainage_to FROM tunnel.scan_file WHERE survey_id = %s",
+        [survey.id],
+    ).fetchall()
+    return {row[1]: Recorded(*row) for row in rows}
+
+
+def unchanged(conn: psycopg.Connection[Any], path: Path, recorded: Recorded | None) -> Loaded | None:
+    """Leave a file of the same content as it is, but note where it lies now, for what reads it at full density."""
+    if recorded is None or path.stat().st_size != recorded.bytes or checksum(path) != recorded.checksum:
+        return None
+    place = str(path.resolve())
+    state = "unchanged" if recorded.path == place else "moved"
+    if state == "moved":
+        conn.execute("UPDATE tunnel.scan_file SET path = %s WHERE id = %s", [place, recorded.id])
+    return outcome(conn, recorded.id, state)
+
+
+def outcome(conn: psycopg.Connection[Any], file_id: int, state: str, seconds: float = 0.0) -> Loaded:
+    """What a file's points have come to so far."""
+    row = conn.execute(
+        "SELECT name, points, noise, outside, thinned, kept FROM tunnel.scan_file WHERE id = %s", [file_id]
+    ).fetchone()
+    assert row is not None
+    name, points, noise, outside, thinned, kept = row
+    return Loaded(name, state, points, noise, outside, thinned, kept, seconds)
+
+
+def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content) -> int:
+    """Enter a file, in the place of one of the same name, with none of its points loaded yet; returns its id."""
+    counts = content.counts
+    row = conn.execute(
+        """
+        INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, thinned, kept,
+                                      chainage_from, chainage_to, extent, srid)
+        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s)
+        ON CONFLICT (survey_id, name) DO UPDATE
+           SET path = excluded.path, checksum = excluded.checksum, bytes = excluded.bytes, points = excluded.points,
+               noise = excluded.noise, outside = excluded.outside, thinned = excluded.thinned, kept = 0,
+               chainage_from = excluded.chainage_from, chainage_to = excluded.chainage_to, extent = excluded.extent,
+               srid = excluded.srid
+        RETURNING id
+        """,
+        [
+            survey.id,
+            content.path.name,
+            str(content.path.resolve()),
+            content.checksum,
+            content.bytes,
+            counts.points,
+            counts.noise,
+            counts.outside,
+            counts.thinned,
+            *counts.chainage,
+            counts.extent.tolist(),
+            content.srid,
+        ],
+    ).fetchone()
+    assert row is not None
+    return int(row[0])
+
+
+def kilometres_of(conn: psycopg.Connection[Any], file_ids: Iterable[int]) -> list[int]:
+    """Kilometres that files touch, or touched before and have not been taken out of yet."""
+    rows = conn.execute("SELECT DISTINCT km FROM tunnel.file_km WHERE file_id = ANY (%s) ORDER BY km", [list(file_ids)])
+    return [row[0] for row in rows.fetchall()]
+
+
+def record_kilometres(
+    conn: psycopg.Connection[Any],
+    file_id: int,
+    held: Mapping[int, int],
+    ranges: Mapping[int, Sequence[tuple[int, int]]],
+    left: Iterable[int],
+) -> None:
+    """Enter which kilometres a file touches.
+
+    Parameters
+    ----------
+    held : mapping of int to int
+        Rows that wait to be loaded, by kilometre.
+    ranges : mapping of int to sequence of (int, int)
+        Where in the file the points of each kilometre and a little beyond are.
+    left : iterable of int
+        Kilometres that may hold rows of the file's former content, which have to go.
+    """
+    conn.execute("DELETE FROM tunnel.file_km WHERE file_id = %s", [file_id])
+    left = set(left)
+    with conn.cursor() as cursor:
+        cursor.executemany(
+            "INSERT INTO tunnel.file_km (file_id, km, rows, points, loaded_at)"
+            " VALUES (%s, %s, %s, %s, CASE WHEN %s THEN NULL ELSE clock_timestamp() END)",
+            [
+                (
+                    file_id,
+                    km,
+                    held.get(km, 0),
+                    Multirange([Range(begin, end) for begin, end in ranges.get(km, ())]),
+                    km in held or km in left,
+                )
+                for km in sorted({*held, *ranges, *left})
+            ],
+        )
+
+
+def change_counts(conn: psycopg.Connection[Any], changes: Mapping[int, tuple[int, int]]) -> None:
+    """Add to the rows that files have (by id) and to those thinned.
+
+    To be called last in a transaction: rows are locked in the order of their ids, so that two that load kilometres
+    with the same files wait for each other's end and never for each other.
+    """
+    for file_id in sorted(changes):
+        kept, thinned = changes[file_id]
+        if kept or thinned:
+            conn.execute(
+                "UPDATE tunnel.scan_file SET kept = kept + %s, thinned = thinned + %s, loaded_at = clock_timestamp()"
+                " WHERE id = %s",
+                [kept, thinned, file_id],
+            )

@@ -1,0 +1,130 @@
+"""What a stage reads: the scan files of a kilometre, and its points of survey density."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+from psycopg import sql
+
+from tunneldb.database.fetch import fetch_array
+from tunneldb.store.survey import Survey
+from tunneldb.errors import UserError
+from tunneldb.store.scan_files import checksum
+from tunneldb.store.partition import partition, rows_in
+from tunneldb.pointcloud.reader import Points
+
+SAMPLE = 500_000
+"""Points of survey density that are looked at, about."""
+
+_FIELDS = (
+    ("x", "f8", sql.SQL("public.ST_X(geom)")),
+    ("y", "f8", sql.SQL("public.ST_Y(geom)")),
+    ("z", "f8", sql.SQL("public.ST_Z(geom)")),
+    ("time", "f8", sql.Identifier("gps_time")),
+    ("scan", "i4", sql.Identifier("scan_id")),
+    ("intensity", "f4", sql.Identifier("intensity")),
+)
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a kilometre needs of a scan file that was read.
+
+    Attributes
+    ----------
+    path : Path
+        Where it lay then.
+    ranges : list of (int, int)
+        Point numbers, from 0, half-open, among which are all the file's points of the kilometre and 10 m to both sides.
+    dimension : str or None
+        The survey's intensity dimension.
+    """
+
+    path: Path
+    ranges: list[tuple[int, int]]
+    dimension: str | None
+
+    @property
+    def points(self) -> int:
+        """Points to read."""
+        return sum(end - begin for begin, end in self.ranges)
+
+
+def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Source]:
+    """Scan files of a survey that touch a kilometre, in order of chainage; each must be what was loaded.
+
+    A file's checksum is read once in the life of a process, and once more whenever its size or time of change is another.
+
+    Raises
+    ------
+    UserError
+        If there is none, or one is gone or has other contents than when it was loaded.
+    """
+    rows = conn.execute(
+        "SELECT f.path, f.bytes, f.checksum, k.points FROM tunnel.scan_file f JOIN tunnel.file_km k ON k.file_id = f.id"
+        " WHERE f.survey_id = %s AND k.km = %s AND k.loaded_at IS NOT NULL AND NOT isempty(k.points)"
+        " ORDER BY f.chainage_from, f.name",
+        (survey.id, km),
+    ).fetchall()
+    if not rows:
+        raise UserError(f"survey {survey.name} has no scan file in kilometre {km}: tunneldb load {survey.name} FILE")
+    found = []
+    for name, size, known, ranges in rows:
+        path = unchanged_file(name, size, known)
+        found.append(Source(path, [(part.lower, part.upper) for part in ranges], survey.intensity_dimension))
+    return found
+
+
+def unchanged_file(name: str, size: int, known: str) -> Path:
+    """Path of a scan file that has the size and the checksum with which it was loaded.
+
+    Raises
+    ------
+    UserError
+        If it is gone or has other contents.
+    """
+    path = Path(name)
+    if not path.is_file():
+        raise UserError(f"{path}: the scan file is gone since it was loaded; put it back or load it from elsewhere")
+    status = path.stat()
+    if status.st_size != size or _checksum(path, status.st_mtime_ns, size) != known:
+        raise UserError(f"{path}: the scan file was changed since it was loaded; load it again")
+    return path
+
+
+@cache
+def _checksum(path: Path, changed: int, size: int) -> str:
+    """Checksum of a file that was last changed then and has that size."""
+    return checksum(path)
+
+
+def sample(conn: psycopg.Connection[Any], survey: Survey, km: int, count: int = SAMPLE) -> Points:
+    """Read about ``count`` points of a kilometre at survey density, spread evenly; the same ones each time.
+
+    Raises
+    ------
+    UserError
+        If the kilometre holds no points.
+    """
+    # The partition by its name: no lock on its parent, whose other partitions may be swapped meanwhile.
+    count_there = rows_in(conn, survey, km)
+    if not count_there:
+        raise UserError(f"survey {survey.name} has no points in kilometre {km}")
+    rows = fetch_array(
+        conn,
+        _FIELDS,
+        sql.SQL("FROM {} TABLESAMPLE BERNOULLI (%(share)s) REPEATABLE (1)").format(partition(survey, km)),
+        {"share": min(100.0, 100.0 * count / count_there)},
+    )
+    return Points(
+        np.column_stack([rows[axis] for axis in "xyz"]),
+        rows["time"],
+        rows["scan"],
+        rows["intensity"],
+        np.zeros(len(rows), np.uint8),
+    )

@@ -1,0 +1,55 @@
+"""A survey's segments and sections, read from the database into arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import psycopg
+
+from tunneldb.store.survey import Survey
+from tunneldb.errors import UserError
+from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.surface import Surface
+
+
+def load_alignment(conn: psycopg.Connection[Any], survey: Survey) -> Alignment:
+    """Given axis of a survey's tunnel."""
+    vertices = conn.execute(
+        "SELECT ST_X(d.geom), ST_Y(d.geom), ST_Z(d.geom)"
+        " FROM tunnel.tunnel t, ST_DumpPoints(t.alignment) d WHERE t.id = %s ORDER BY d.path",
+        [survey.tunnel_id],
+    ).fetchall()
+    return Alignment.from_polyline(np.array(vertices), survey.start_chainage, survey.spacing)
+
+
+def load_surface(conn: psycopg.Connection[Any], survey: Survey, first: float = -np.inf, last: float = np.inf) -> Surface:
+    """Surface of a survey between two chainages (m), with one spacing more to both sides; the whole by default.
+
+    Raises
+    ------
+    UserError
+        When the stages ``segments`` and ``sections`` have not been run there.
+    """
+    low, high = first - survey.spacing, last + survey.spacing
+    segments = conn.execute(
+        "SELECT n, chainage_from, chainage_to, vertex_from || vertex_to || tangent_from || tangent_to FROM tunnel.segment"
+        " WHERE survey_id = %s AND chainage_to >= %s AND chainage_from <= %s ORDER BY n",
+        [survey.id, low, high],
+    ).fetchall()
+    sections = conn.execute(
+        "SELECT chainage, radius, arc FROM tunnel.section"
+        " WHERE survey_id = %s AND chainage BETWEEN %s AND %s ORDER BY chainage",
+        [survey.id, low, high],
+    ).fetchall()
+    if not segments or not sections:
+        raise UserError(f"survey {survey.name} has no sections yet: tunneldb run {survey.name} --to sections")
+    return Surface(
+        number=np.array([row[0] for row in segments]),
+        segments=np.array([row[3] for row in segments]),
+        ends=np.array([row[1:3] for row in segments]),
+        chainages=np.array([row[0] for row in sections]),
+        radius=np.array([row[1] for row in sections]),
+        arcs=np.array([row[2] for row in sections]),
+        reach=survey.spacing,
+    )
