@@ -28,20 +28,20 @@ from benchmarks.common import print_table, progress, save, scratch_database
 from benchmarks.leak_set import Case, prepare
 from benchmarks.leaks import HEADER, Outcome, chosen, plain, row, values
 from benchmarks.scene import Scene
-from tunneldb.cli.main import main as command
-from tunneldb.database import connect
-from tunneldb.radiometry.robust_statistics import robust_statistics
-from tunneldb.pipeline import detect as stage
 from tunneldb.anomalies import detect as detection
-from tunneldb.raster import rasterize as gather
-from tunneldb.raster import pixel_state as lining
 from tunneldb.anomalies import regions as region
 from tunneldb.anomalies.background.level_map import DryMap, map_dry
-from tunneldb.raster.accumulator import Accumulator
 from tunneldb.anomalies.verdict import Verdict
-from tunneldb.raster.pixel_state import State
-from tunneldb.raster.image import Picture
+from tunneldb.cli.main import main as command
+from tunneldb.database import connect
+from tunneldb.pipeline import detect as stage
+from tunneldb.radiometry.robust_statistics import robust_statistics
+from tunneldb.raster import pixel_state as lining
+from tunneldb.raster import rasterize as gather
+from tunneldb.raster.accumulator import Accumulator
 from tunneldb.raster.geotiff import STEP
+from tunneldb.raster.image import Picture
+from tunneldb.raster.pixel_state import State
 
 Replacement = tuple[Any, str, Any]
 

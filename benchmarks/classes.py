@@ -23,10 +23,10 @@ from benchmarks.common import print_table, progress, save
 from tunneldb.classification.classes import Klass
 from tunneldb.classification.classify import find_bare_scene, find_scene
 from tunneldb.classification.ground.extraction import GroundSettings, find_ground
-from tunneldb.geometry.plan_line import Line
 from tunneldb.classification.scene import Scene
-from tunneldb.pointcloud.voxels import Voxels
+from tunneldb.geometry.plan_line import Line
 from tunneldb.pointcloud.thinning import thin, voxel_edge
+from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate.parameters import Parameters
 
 sys.path.append(str(Path(__file__).parent.parent / "tests"))

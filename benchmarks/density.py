@@ -10,8 +10,8 @@ import laspy
 from benchmarks.common import print_table
 from benchmarks.scene import Scene
 from tunneldb.database import connect, get_survey
-from tunneldb.store.surface import load_surface
 from tunneldb.pointcloud.reader import read_chunks
+from tunneldb.store.surface import load_surface
 
 CHUNK = 1_000_000
 

@@ -106,15 +106,15 @@ def parts(dsn: str, path: Path, count: int) -> dict[str, float]:
     """Seconds of one core for each part of what is done with a point, per point, from the end of a file."""
     use_threads(1)  # before Numba is imported
     from tunneldb.database import connect, get_survey
-    from tunneldb.store.surface import load_surface
     from tunneldb.pipeline.detect import load_floor
-    from tunneldb.raster.rasterize import CHUNK, Lens
-    from tunneldb.raster.accumulator import Accumulator, Grid
-    from tunneldb.raster.observation import Eye, Radiometer
-    from tunneldb.store.images import load_reference
+    from tunneldb.pointcloud.formats.raw import read_raw
     from tunneldb.pointcloud.points import Points
     from tunneldb.pointcloud.poses import load_poses
-    from tunneldb.pointcloud.formats.raw import read_raw
+    from tunneldb.raster.accumulator import Accumulator, Grid
+    from tunneldb.raster.observation import Eye, Radiometer
+    from tunneldb.raster.rasterize import CHUNK, Lens
+    from tunneldb.store.images import load_reference
+    from tunneldb.store.surface import load_surface
 
     km = int(BORDER) // 1000
     spent: dict[str, float] = {}

@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from tunneldb.classification.ground.accuracy import Agreement
 from tunneldb.classification.ground.extraction import GroundSettings, find_ground
-from tunneldb.geometry.plan_line import Line
 from tunneldb.classification.ground.ransac import planes
+from tunneldb.geometry.plan_line import Line
 from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate import Parameters, simulate
 

@@ -25,8 +25,8 @@ from benchmarks.common import print_table, progress, save, scratch_database, tun
 from benchmarks.scene import Scene
 from tunneldb.database import connect, get_survey
 from tunneldb.pipeline.load import load_files
-from tunneldb.threads import threads, use_threads
 from tunneldb.pointcloud.selection import FilterSettings
+from tunneldb.threads import threads, use_threads
 
 CHUNK = 1_000_000
 POINTS_PER_METRE = 100_000  # of the simulated profiler

@@ -17,12 +17,12 @@ import numpy as np
 
 from benchmarks.common import print_table, progress, save
 from tunneldb.errors import UserError
+from tunneldb.pointcloud.thinning import thin, voxel_edge
 from tunneldb.radiometry.cells import Sight
 from tunneldb.radiometry.range_curve import estimate_range_curve
-from tunneldb.pointcloud.thinning import thin, voxel_edge
 from tunneldb.simulate.generate import Cloud, simulate
-from tunneldb.simulate.radiometry import range_term
 from tunneldb.simulate.parameters import Parameters
+from tunneldb.simulate.radiometry import range_term
 
 LINING, NEAR = 0, 0.05  # class of the truth; farther off the surface points say nothing, m
 LININGS = ("plain", "cast", "segments", "shotcrete", "tiles")

@@ -27,10 +27,10 @@ from benchmarks.common import COMMAND, print_table, progress, save, scratch_data
 from benchmarks.synthetic import CORNER, Size, make
 from tunneldb.database import connect
 from tunneldb.raster.accumulator import Grid
-from tunneldb.raster.pixel_state import State
 from tunneldb.raster.geotiff import Raster, encode
-from tunneldb.store.images import DARK
+from tunneldb.raster.pixel_state import State
 from tunneldb.report.pdf import find_browser
+from tunneldb.store.images import DARK
 
 SURVEY = "demo-2024"
 REACH = CORNER + 3.0

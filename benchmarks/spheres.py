@@ -23,8 +23,8 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import pdist
 
 from benchmarks.common import print_table, progress, save
-from tunneldb.classification.targets.curvature import Curved
 from tunneldb.classification.objects.dbscan import dbscan
+from tunneldb.classification.targets.curvature import Curved
 from tunneldb.classification.targets.detection import LEAST_POINTS, Sphere, confirmed, find_spheres, join
 from tunneldb.classification.targets.fit import coverage, distance_error, fit_ratio
 from tunneldb.simulate import Parameters, Simulation

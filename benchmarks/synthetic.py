@@ -20,9 +20,9 @@ import shapely
 from psycopg import sql
 
 from benchmarks.common import progress
+from tunneldb.classification.classes import Klass
 from tunneldb.database import PointZ, Survey, connect, copy_binary, get_survey, pack, resolve_dsn
 from tunneldb.store.surface import load_surface
-from tunneldb.classification.classes import Klass
 
 Connection = psycopg.Connection[Any]
 

@@ -7,10 +7,10 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from tunneldb.geometry.frame import segment_rows, tangents
-from tunneldb.geometry.surface import Surface
 from tunneldb.classification.classes import Klass
+from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.surface import Surface
 from tunneldb.simulate.generate import Cloud, Simulation
 from tunneldb.simulate.parameters import Parameters
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tunneldb.geometry.surface import Surface
 from tunneldb.classification.classes import Klass
+from tunneldb.geometry.surface import Surface
 
 FLOOR, HALF_FLOOR = 2.5, float(np.sqrt(4.0**2 - 2.5**2))
 """Depth of the floor below the axis, and half its width, m."""

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int64
 from tunneldb.errors import UserError
 
 if TYPE_CHECKING:
@@ -36,18 +36,18 @@ class CsvTable:
 
     path: Path
     names: tuple[str, ...]
-    values: NDArray[np.float64]
-    lines: NDArray[np.int64]
+    values: Float
+    lines: Int64
 
     def __len__(self) -> int:
         """Return the number of rows."""
         return len(self.values)
 
-    def __getitem__(self, name: str) -> NDArray[np.float64]:
+    def __getitem__(self, name: str) -> Float:
         """Return a column."""
         return self.values[:, self.names.index(name)]
 
-    def columns(self, names: Sequence[str]) -> NDArray[np.float64]:
+    def columns(self, names: Sequence[str]) -> Float:
         """Return several columns, (rows, len(names))."""
         return np.ascontiguousarray(self.values[:, [self.names.index(name) for name in names]])
 

@@ -17,8 +17,8 @@ from shapely.geometry import Polygon
 
 from tunneldb.simulate import Parameters, Simulation
 from tunneldb.simulate.lining.leaks import Leak
-from tunneldb.simulate.scanner import BlockPlan
 from tunneldb.simulate.rays.scene import scene
+from tunneldb.simulate.scanner import BlockPlan
 
 SRID = 25830
 NAME = "long"

@@ -13,13 +13,13 @@ from psycopg.conninfo import make_conninfo
 from shapely.geometry import Polygon, box
 from things import CORNER, HALF_FLOOR, SPHERES, THINGS, beside, boxed, relief
 
+from tunneldb.anomalies.geometries import shapes
 from tunneldb.database import install, open_connection
 from tunneldb.geometry.frame import frame_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
-from tunneldb.anomalies.geometries import shapes
 from tunneldb.raster.accumulator import BLOCK, Grid
-from tunneldb.raster.pixel_state import State
 from tunneldb.raster.geotiff import KINDS, Raster, decode, encode
+from tunneldb.raster.pixel_state import State
 from tunneldb.store.images import DARK
 
 DATABASE = "tunneldb_example"

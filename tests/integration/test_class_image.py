@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from psycopg import sql
 from things import CORNER, FLOOR, HALF_FLOOR, THINGS
 
-from tunneldb.cli.main import main
 from tunneldb.classification.classes import Klass
+from tunneldb.cli.main import main
 
 
 @pytest.fixture(scope="session")

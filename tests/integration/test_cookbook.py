@@ -20,8 +20,8 @@ from psycopg.rows import dict_row
 from things import FLOOR, HALF_FLOOR, SPHERES, THINGS, beside
 
 from tests.integration.conftest import GIRTH, NAME, SEEN_FROM, WET, example_surface
-from tunneldb.database import connect
 from tunneldb.classification.classes import Klass
+from tunneldb.database import connect
 
 PAGE = Path(__file__).parents[2] / "docs" / "cookbook.md"
 QUESTION = re.compile(r"^### (.+?)$(?:(?!^#).)*?^```sql\n(.*?)^```$", re.MULTILINE | re.DOTALL)

@@ -16,8 +16,8 @@ from psycopg.conninfo import make_conninfo
 
 from tunneldb.cli.main import _describe_database_error
 from tunneldb.database import connect, copy_binary, get_survey, pack
-from tunneldb.store.catalog import remove_survey
 from tunneldb.pipeline.ground import read_points
+from tunneldb.store.catalog import remove_survey
 from tunneldb.store.sources import sample
 
 DATABASE = "tunneldb_growth"

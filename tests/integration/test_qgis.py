@@ -26,9 +26,9 @@ from psycopg.conninfo import make_conninfo
 from rasterio.errors import NotGeoreferencedWarning
 
 from tests.integration.conftest import LEAKS, example_surface, without_intensity
+from tunneldb.classification.classes import Klass
 from tunneldb.cli.main import main
 from tunneldb.export.images.palette import COLOURS, PALETTES, hexadecimal
-from tunneldb.classification.classes import Klass
 
 SCRIPT = Path(__file__).with_name("open_in_qgis.py")
 PYTHON = "/usr/bin/python3"

@@ -8,11 +8,11 @@ import pytest
 import shapely
 
 from tests.integration.conftest import NAME, example_surface
-from tunneldb.database import Survey, get_survey
 from tunneldb.classification.classes import Klass
-from tunneldb.classification.objects.clusters import Cluster
-from tunneldb.classification.lining_relief import Relief
 from tunneldb.classification.ground.model import COLUMN, Ground
+from tunneldb.classification.lining_relief import Relief
+from tunneldb.classification.objects.clusters import Cluster
+from tunneldb.database import Survey, get_survey
 from tunneldb.store.scene import (
     line_of,
     load_arcs,

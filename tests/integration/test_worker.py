@@ -17,8 +17,8 @@ from click.testing import CliRunner
 
 from tunneldb.cli.main import main
 from tunneldb.errors import UserError
-from tunneldb.store.ledger import BusyError, Job, LostError, describe, retry_at, stage_run
 from tunneldb.simulate import Parameters, Simulation, write
+from tunneldb.store.ledger import BusyError, Job, LostError, describe, retry_at, stage_run
 
 KM = 12
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from straight import straight
 
-from tunneldb.radiometry.oren_nayar import incidence_db
-from tunneldb.raster.rasterize import Lens
-from tunneldb.raster.accumulator import Accumulator, Grid, Window
-from tunneldb.raster.projection import WEIGHT, weight_of
-from tunneldb.raster.pixel_state import Astray, Floor, State, reach, states
-from tunneldb.raster.observation import Eye, Radiometer
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.poses import PoseModel
+from tunneldb.radiometry.oren_nayar import incidence_db
+from tunneldb.raster.accumulator import Accumulator, Grid, Window
+from tunneldb.raster.observation import Eye, Radiometer
+from tunneldb.raster.pixel_state import Astray, Floor, State, reach, states
+from tunneldb.raster.projection import WEIGHT, weight_of
+from tunneldb.raster.rasterize import Lens
 
 PIXEL, RADIUS, ROUGHNESS = 0.05, 4.0, 12.0
 ROUND = straight(np.full(361, RADIUS))

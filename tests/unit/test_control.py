@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tunneldb.errors import UserError
-from tunneldb.registration.control import best_motion, match
 from tunneldb.pipeline.target_control import read_control
+from tunneldb.registration.control import best_motion, match
 
 ORIGIN = np.array([272_000.0, 4_765_000.0, 640.0])
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import click
 import pytest
 
-from tunneldb.cli.main import main
 from tunneldb.classification.classes import Klass
+from tunneldb.cli.main import main
 from tunneldb.pipeline.parameters import PARAMETERS
 
 ROOT = Path(__file__).parents[2]

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from tunneldb.anomalies.background.level_map import map_dry
-from tunneldb.raster.accumulator import Grid
-from tunneldb.raster.pixel_state import State
-from tunneldb.raster.image import Picture
-from tunneldb.raster.geotiff import NODATA
 from tunneldb.anomalies.background.contrast import relative
+from tunneldb.anomalies.background.level_map import map_dry
 from tunneldb.anomalies.threshold import dark_pixels
+from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.image import Picture
+from tunneldb.raster.pixel_state import State
 
 PIXEL = 0.02
 NOISE = 0.35

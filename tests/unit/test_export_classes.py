@@ -11,6 +11,7 @@ from affine import Affine
 from numpy.typing import NDArray
 from PIL import Image
 
+from tunneldb.classification.classes import Klass
 from tunneldb.export.images import preview
 from tunneldb.export.images.class_raster import ClassPainter
 from tunneldb.export.images.cog import Extent, write_cog
@@ -18,7 +19,6 @@ from tunneldb.export.images.palette import COLOURS
 from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.stationing import Stationing
 from tunneldb.geometry.surface import Surface
-from tunneldb.classification.classes import Klass
 from tunneldb.raster.geotiff import Raster
 
 RADIUS = 4.0

@@ -6,15 +6,15 @@ from scenes import exact, scan, share
 
 from tunneldb.classification.classes import Klass
 from tunneldb.classification.classify import find_bare_scene, find_scene
-from tunneldb.classification.objects.clusters import CELL, NEAR, Cluster, Lookup, look_up, pieces
 from tunneldb.classification.ground.extraction import GroundSettings, find_ground
-from tunneldb.geometry.plan_line import Line
-from tunneldb.classification.scene import Scene
-from tunneldb.classification.objects.spacing import Spacing
+from tunneldb.classification.objects.clusters import CELL, NEAR, Cluster, Lookup, look_up, pieces
 from tunneldb.classification.objects.objects import ClusterSettings, bars
-from tunneldb.pointcloud.voxels import Voxels
+from tunneldb.classification.objects.spacing import Spacing
+from tunneldb.classification.scene import Scene
+from tunneldb.geometry.plan_line import Line
 from tunneldb.pipeline.parameters import settings
 from tunneldb.pointcloud.thinning import thin, voxel_edge
+from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate.parameters import Parameters
 
 THINGS = {

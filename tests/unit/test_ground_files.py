@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from tunneldb.classification.classes import Klass
 from tunneldb.cli.main import main
 from tunneldb.export.pointcloud import single_file as bare
-from tunneldb.classification.classes import Klass
 from tunneldb.simulate import Parameters, Simulation, write
 
 FLOOR, LINING = 1, 0  # of the truth

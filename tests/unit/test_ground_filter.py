@@ -7,8 +7,8 @@ import pytest
 
 from tunneldb.classification.ground.accuracy import Agreement
 from tunneldb.classification.ground.extraction import MARGIN, GroundSettings, find_ground
-from tunneldb.geometry.plan_line import Line
 from tunneldb.classification.ground.ransac import planes
+from tunneldb.geometry.plan_line import Line
 from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate import Cloud, Parameters, rise, simulate
 

@@ -8,13 +8,13 @@ import shapely
 from scipy import ndimage
 from shapely.geometry import Polygon, box
 
-from tunneldb.anomalies.detect import Detection, Found, detect
-from tunneldb.raster.accumulator import Grid
-from tunneldb.anomalies.verdict import evidence, judge
-from tunneldb.raster.pixel_state import State
-from tunneldb.raster.geotiff import NODATA
-from tunneldb.anomalies.regions import Region, Traits
 from tunneldb.anomalies.background.contrast import Relative
+from tunneldb.anomalies.detect import Detection, Found, detect
+from tunneldb.anomalies.regions import Region, Traits
+from tunneldb.anomalies.verdict import evidence, judge
+from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.pixel_state import State
 
 PIXEL, SIGMA = 0.02, 0.3
 WIDTH, HALF = 14.0, 4.0  # of the canvas: from chainage 0, and from arc -HALF to HALF, m

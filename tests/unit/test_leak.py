@@ -6,17 +6,17 @@ import shapely
 import shapely.affinity
 from shapely.geometry import Polygon, box
 
-from tunneldb.errors import UserError
-from tunneldb.raster.appendages import distance_from_plane, off_plane, reach, recessed
-from tunneldb.anomalies.detect import _columns, _filled
-from tunneldb.raster.accumulator import LEVEL, OFFSET, Accumulator, Grid
-from tunneldb.raster.projection import WEIGHT, Pixels
-from tunneldb.raster.pixel_state import State
-from tunneldb.anomalies.matching import match, match_parts
-from tunneldb.raster.geotiff import NODATA, Raster, decode, encode
-from tunneldb.anomalies.regions import regions
 from tunneldb.anomalies.background.contrast import Relative
+from tunneldb.anomalies.detect import _columns, _filled
+from tunneldb.anomalies.matching import match, match_parts
+from tunneldb.anomalies.regions import regions
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
+from tunneldb.errors import UserError
+from tunneldb.raster.accumulator import LEVEL, OFFSET, Accumulator, Grid
+from tunneldb.raster.appendages import distance_from_plane, off_plane, reach, recessed
+from tunneldb.raster.geotiff import NODATA, Raster, decode, encode
+from tunneldb.raster.pixel_state import State
+from tunneldb.raster.projection import WEIGHT, Pixels
 
 PIXEL = 0.02
 

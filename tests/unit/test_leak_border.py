@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from tunneldb.anomalies.background.contrast import Relative
 from tunneldb.anomalies.detect import Found
+from tunneldb.anomalies.regions import Region, Traits, regions, together, unite
 from tunneldb.raster.accumulator import Grid
 from tunneldb.raster.geotiff import NODATA
-from tunneldb.anomalies.regions import Region, Traits, regions, together, unite
-from tunneldb.anomalies.background.contrast import Relative
 
 PIXEL = 0.5  # 2000 columns a kilometre
 DRY = 1.25

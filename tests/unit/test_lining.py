@@ -8,16 +8,16 @@ from scipy import ndimage
 from shapely.geometry import box as rectangle
 from straight import LENGTH, straight
 
+from tunneldb.anomalies.geometries import shapes
+from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.ground.wall_arcs import foot_arcs
 from tunneldb.geometry.plan_line import Line
-from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.radiometry.edge_normals import Edges
 from tunneldb.raster import appendages as appendage
 from tunneldb.raster import ring_steps as step
-from tunneldb.anomalies.geometries import shapes
 from tunneldb.raster.accumulator import Accumulator, Grid
-from tunneldb.raster.projection import Pixels
 from tunneldb.raster.pixel_state import FLOOR_EDGE, Astray, Floor, State, reach, states
+from tunneldb.raster.projection import Pixels
 
 
 def box(half_width: float, up: float, down: float) -> np.ndarray:

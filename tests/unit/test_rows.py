@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tunneldb.database.copy import PointZ, pack
-from tunneldb.store.survey import Survey
-from tunneldb.store.point_rows import by_chainage, pack_rows
 from tunneldb.pointcloud.spool import ROW
+from tunneldb.store.point_rows import by_chainage, pack_rows
+from tunneldb.store.survey import Survey
 
 SURVEY = Survey(7, "s", 1, "t", 25830, 0.0, 10.0, dt.date(2024, 5, 4), None, "none", "static", "none")
 

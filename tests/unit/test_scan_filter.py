@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.pointcloud import selection as scan_filter
-from tunneldb.pointcloud.prefetch import in_order, prefetch
-from tunneldb.pointcloud.selection import FilterCounts, FilterSettings, filter_file
 from tunneldb.pointcloud.noise import noise_filter
 from tunneldb.pointcloud.poses import PoseModel
+from tunneldb.pointcloud.prefetch import in_order, prefetch
+from tunneldb.pointcloud.selection import FilterCounts, FilterSettings, filter_file
 from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, ROW, Rows, Spool, windows
 from tunneldb.pointcloud.thinning import thin, voxel_edge
 

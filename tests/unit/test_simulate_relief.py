@@ -10,8 +10,8 @@ import pytest
 import shapely
 
 from tunneldb.simulate import Cloud, Parameters, Simulation, simulate
-from tunneldb.simulate.rays.beam import segment_share
 from tunneldb.simulate.radiometry import oren_nayar
+from tunneldb.simulate.rays.beam import segment_share
 from tunneldb.simulate.truth import as_built, dry_features
 
 BARE: dict[str, Any] = {

@@ -10,9 +10,9 @@ import pytest
 
 from tests.targets import Ball, Rod, Thing, Wall, scan
 from tunneldb.classification.targets.curvature import Curved
-from tunneldb.geometry.normals import eigenvalues, normal
 from tunneldb.classification.targets.detection import Refusal, Sphere, confirmed, find_spheres, join
 from tunneldb.classification.targets.fit import coverage, distance_error, fit_ratio, fit_sphere
+from tunneldb.geometry.normals import eigenvalues, normal
 
 R = 0.0725
 TOLERANCE = 0.005

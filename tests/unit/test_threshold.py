@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from tunneldb.radiometry.robust_statistics import plain_statistics, robust_statistics
-from tunneldb.raster.accumulator import Grid
-from tunneldb.raster.pixel_state import State
-from tunneldb.raster.geotiff import NODATA
 from tunneldb.anomalies.background.contrast import Relative
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
+from tunneldb.radiometry.robust_statistics import plain_statistics, robust_statistics
+from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.pixel_state import State
 
 TILE = 25
 

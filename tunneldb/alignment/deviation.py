@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tunneldb.alignment.elements import Float
+from tunneldb.arrays import Bool
 from tunneldb.geometry.stationing import Stationing
 
 KILOMETRE = 1000.0
@@ -92,7 +92,7 @@ class Deviation:
     stationing: Stationing
 
     @property
-    def known(self) -> NDArray[np.bool_]:
+    def known(self) -> Bool:
         """Which vertices were not merely carried along with their neighbours."""
         return np.array(self.source) != "interpolated"
 
@@ -116,7 +116,7 @@ class Deviation:
         whole = self._summary("all", np.ones(len(self.chainage), bool), self.label[0], self.label[-1])
         return [row for row in rows if row.vertices] + [whole]
 
-    def _summary(self, title: str, within: NDArray[np.bool_], label_from: str, label_to: str) -> Summary:
+    def _summary(self, title: str, within: Bool, label_from: str, label_to: str) -> Summary:
         rows = within & self.known
         if not rows.any():
             return Summary(title, label_from, label_to, 0, *[float("nan")] * 4)

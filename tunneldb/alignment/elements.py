@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from tunneldb.arrays import Float
 
 PlanKind = Literal["line", "arc", "clothoid"]
 ProfileKind = Literal["grade", "parabola", "circle"]

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from tunneldb.anomalies.background.contrast import Relative
 from tunneldb.anomalies.inside import inside
 from tunneldb.anomalies.joints import longer
+from tunneldb.arrays import Bool, Int16, Int32, UInt8
 from tunneldb.raster.geotiff import NODATA
-from tunneldb.anomalies.background.contrast import Relative
-
-Mask = NDArray[np.bool_]
 
 BAND = 2
 """Pixels to both sides of the rim that may change sides, each time."""
@@ -31,7 +29,7 @@ ENOUGH = 4
 RIM, LISTED = 1, 2
 
 
-def settle(dark: Mask, relative: Relative, size: int) -> Mask:
+def settle(dark: Bool, relative: Relative, size: int) -> Bool:
     """Move the rim of dark regions to where half of their contrast is reached.
 
     The threshold of three sigma lies at the outermost edge of a strongly wet patch and at the innermost of a weak one; a mean
@@ -61,8 +59,8 @@ def settle(dark: Mask, relative: Relative, size: int) -> Mask:
 
 @njit(cache=True, nogil=True)
 def _settled(
-    dark: Mask, drop: NDArray[np.int16], state: NDArray[np.uint8], most: int
-) -> tuple[NDArray[np.int32], NDArray[np.int32], Mask]:  # pragma: no cover - compiled
+    dark: Bool, drop: Int16, state: UInt8, most: int
+) -> tuple[Int32, Int32, Bool]:  # pragma: no cover - compiled
     """Pixels near the rim that change sides, and to which."""
     near, row, column = _near(dark)
     becomes = np.empty(len(row), np.bool_)
@@ -85,7 +83,7 @@ def _settled(
 
 
 @njit(cache=True, nogil=True)
-def _near(dark: Mask) -> tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]]:  # pragma: no cover - compiled
+def _near(dark: Bool) -> tuple[UInt8, Int32, Int32]:  # pragma: no cover - compiled
     """Which pixels lie within BAND of the rim (LISTED), which dark ones at it (RIM), and a list of the former."""
     rows, columns = dark.shape
     near = np.zeros((rows, columns), np.uint8)
@@ -113,7 +111,7 @@ def _near(dark: Mask) -> tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.
 
 @njit(cache=True, nogil=True)
 def _core(
-    dark: Mask, near: NDArray[np.uint8], drop: NDArray[np.int16], i: int, j: int
+    dark: Bool, near: UInt8, drop: Int16, i: int, j: int
 ) -> tuple[float, int]:  # pragma: no cover - compiled
     """Mean drop of dark pixels about one, every other one, but for those at the rim, and of how many it is."""
     rows, columns = dark.shape
@@ -128,7 +126,7 @@ def _core(
 
 @njit(cache=True, nogil=True)
 def _level(
-    drop: NDArray[np.int16], state: NDArray[np.uint8], i: int, j: int, half: int
+    drop: Int16, state: UInt8, i: int, j: int, half: int
 ) -> tuple[float, int]:  # pragma: no cover - compiled
     """Mean drop of the lining about a pixel, and of how many pixels it is."""
     total, seen = 0.0, 0

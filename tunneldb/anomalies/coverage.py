@@ -6,13 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from tunneldb.raster.accumulator import Grid
 from tunneldb.anomalies.threshold import MEDIAN_PIXELS
-
-Single = NDArray[np.float32]
-Mask = NDArray[np.bool_]
+from tunneldb.arrays import Bool, Int64, Single, UInt8
+from tunneldb.raster.accumulator import Grid
 
 STEP = 0.1
 """Least length of a step along the tunnel, m."""
@@ -36,7 +33,7 @@ class Coverage:
     wet: Single
 
 
-def cover(state: NDArray[np.uint8], dark: Mask, grid: Grid, size: int) -> Coverage:
+def cover(state: UInt8, dark: Bool, grid: Grid, size: int) -> Coverage:
     """Add up the lining of a kilometre, what was seen of it and what is wet.
 
     A pixel of lining was seen when it holds points, or when enough pixels about it do for the median filter to tell
@@ -71,8 +68,8 @@ def _wide(grid: Grid) -> int:
 
 @njit(cache=True, nogil=True)
 def _cover(
-    state: NDArray[np.uint8], dark: Mask, first: int, stop: int, half: int, enough: float
-) -> NDArray[np.int64]:  # pragma: no cover - compiled
+    state: UInt8, dark: Bool, first: int, stop: int, half: int, enough: float
+) -> Int64:  # pragma: no cover - compiled
     """Pixels of each column from ``first`` to ``stop`` that are lining, were seen, are wet."""
     rows, columns = state.shape
     out = np.zeros((3, stop - first), np.int64)

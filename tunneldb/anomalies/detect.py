@@ -7,21 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.level_map import DryMap
-from tunneldb.raster.accumulator import Grid
-from tunneldb.anomalies.verdict import Verdict, judge
-from tunneldb.anomalies.joints import lines
-from tunneldb.raster.image import WET_EDGE
-from tunneldb.anomalies.regions import Region, regions
 from tunneldb.anomalies.background.contrast import Relative
+from tunneldb.anomalies.background.level_map import DryMap
 from tunneldb.anomalies.boundary import settle
+from tunneldb.anomalies.joints import lines
+from tunneldb.anomalies.regions import Region, regions
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
-
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from tunneldb.anomalies.verdict import Verdict, judge
+from tunneldb.arrays import Bool, Float, Int32, Int64, UInt8
+from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.image import WET_EDGE
 
 GAP = 5.0
 """Lining that is seen nowhere along more of the tunnel was not scanned there, m; profiles lie closer."""
@@ -95,8 +92,8 @@ class Detection:
 
     found: list[Found]
     cut: list[Region]
-    dark: Mask
-    wet: Mask
+    dark: Bool
+    wet: Bool
     size: int
     pixels: int
     wet_pixels: int
@@ -137,7 +134,7 @@ def detect(relative: Relative, dry: DryMap, min_area: float) -> Detection:
     return Detection(found, cut, dark, wet, size, pixels, sum(region.filled for region in leaks))
 
 
-def _regions(dark: Mask, relative: Relative, min_area: float) -> list[Region]:
+def _regions(dark: Bool, relative: Relative, min_area: float) -> list[Region]:
     """Regions of the dark pixels, joints cut off from what they run through."""
     inner = relative.grid.inner
     joints = lines(dark, inner.start, inner.stop, relative.grid.pixel)
@@ -151,15 +148,15 @@ def _may_drip(region: Region) -> bool:
     return bool(region.filled) and judge(region).kind == "leak"
 
 
-def dry_places(relative: Relative, found: Detection, chainage: Float, arc: Float) -> Mask:
+def dry_places(relative: Relative, found: Detection, chainage: Float, arc: Float) -> Bool:
     """Tell which places (n,) in the unrolled plane, m, lie on lining of the kilometre that is neither dark nor next to it."""
     row, column = relative.grid.place(chainage, arc)
     inner = relative.grid.inner
-    dry: Mask = _dry(relative.state, found.dark, row, column, inner.start, inner.stop)
+    dry: Bool = _dry(relative.state, found.dark, row, column, inner.start, inner.stop)
     return dry
 
 
-def _draw(image: Mask, drawn: Iterable[Region], grid: Grid) -> None:
+def _draw(image: Bool, drawn: Iterable[Region], grid: Grid) -> None:
     """Draw the masks of regions."""
     for region in drawn:
         rows, columns = region.mask.shape
@@ -167,7 +164,7 @@ def _draw(image: Mask, drawn: Iterable[Region], grid: Grid) -> None:
         image[top : top + rows, left : left + columns] |= region.mask[::-1]
 
 
-def _filled(lining: NDArray[np.int64], could: NDArray[np.int64], gap: int) -> float:
+def _filled(lining: Int64, could: Int64, gap: int) -> float:
     """Share of the pixels that could show lining that do, where the tunnel was scanned: without gaps of more columns."""
     columns = np.flatnonzero(lining)
     if len(columns) == 0:
@@ -181,8 +178,8 @@ def _filled(lining: NDArray[np.int64], could: NDArray[np.int64], gap: int) -> fl
 
 @njit(cache=True, nogil=True)
 def _columns(
-    state: NDArray[np.uint8], first: int, stop: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:  # pragma: no cover - compiled
+    state: UInt8, first: int, stop: int
+) -> tuple[Int64, Int64]:  # pragma: no cover - compiled
     """Pixels of each column that show lining, and that could."""
     lining, could = np.zeros(stop - first, np.int64), np.zeros(stop - first, np.int64)
     for i in range(state.shape[0]):
@@ -194,13 +191,13 @@ def _columns(
 
 @njit(cache=True, nogil=True)
 def _dry(
-    state: NDArray[np.uint8],
-    dark: Mask,
-    row: NDArray[np.int32],
-    column: NDArray[np.int32],
+    state: UInt8,
+    dark: Bool,
+    row: Int32,
+    column: Int32,
     first: int,
     stop: int,
-) -> NDArray[np.bool_]:  # pragma: no cover - compiled
+) -> Bool:  # pragma: no cover - compiled
     dry = np.zeros(len(row), np.bool_)
     for k in range(len(row)):
         i, j = row[k], column[k]

@@ -6,12 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Int64
 from tunneldb.raster.accumulator import Grid
-
-Mask = NDArray[np.bool_]
-Int = NDArray[np.int64]
 
 GAP = 0.12
 """Water that runs down a wall leaves dry places no longer than this, m."""
@@ -34,14 +31,14 @@ class Dark:
         Pixels of each piece, the greater side of its box and that along the tunnel, pixels.
     """
 
-    runs: Int
-    label: Int
-    pixels: Int
-    extent: Int
-    width: Int
+    runs: Int64
+    label: Int64
+    pixels: Int64
+    extent: Int64
+    width: Int64
 
     @classmethod
-    def of(cls, runs: Int, label: Int, count: int) -> Dark:
+    def of(cls, runs: Int64, label: Int64, count: int) -> Dark:
         """Measure the pieces of runs that are labelled."""
         low, high = np.full((2, count), np.iinfo(np.int64).max), np.full((2, count), -1)
         for axis, (first, last) in enumerate(((runs[:, 0], runs[:, 0] + 1), (runs[:, 1], runs[:, 2]))):
@@ -50,14 +47,14 @@ class Dark:
         pixels = np.bincount(label, runs[:, 2] - runs[:, 1], count).astype(np.int64)
         return cls(runs, label, pixels, (high - low).max(axis=0), high[1] - low[1])
 
-    def touches(self, first: int, stop: int) -> Mask:
+    def touches(self, first: int, stop: int) -> Bool:
         """Tell which pieces reach the first of some columns or the last."""
         cut = np.zeros(len(self.pixels), np.bool_)
         cut[self.label[(self.runs[:, 1] == first) | (self.runs[:, 2] == stop)]] = True
         return cut
 
 
-def hang(pieces: Dark, wanted: Mask, cut: Mask, grid: Grid) -> tuple[Int, Int]:
+def hang(pieces: Dark, wanted: Bool, cut: Bool, grid: Grid) -> tuple[Int64, Int64]:
     """Find what each piece is a part of.
 
     A drip is narrower than WIDE, smaller than what it hangs below, and begins within GAP of it, towards the crown, or of
@@ -109,8 +106,8 @@ def hang(pieces: Dark, wanted: Mask, cut: Mask, grid: Grid) -> tuple[Int, Int]:
 
 @njit(cache=True, nogil=True)
 def _above(
-    runs: Int, label: Int, starts: Int, narrow: Mask, crown: int, gap: int
-) -> tuple[Int, Int, Int, Int]:  # pragma: no cover - compiled
+    runs: Int64, label: Int64, starts: Int64, narrow: Bool, crown: int, gap: int
+) -> tuple[Int64, Int64, Int64, Int64]:  # pragma: no cover - compiled
     """The nearest other piece within a gap above each narrow one, -1 for none, from which pixel it is seen, and how far."""
     count = len(narrow)
     above, row, column = np.full(count, -1, np.int64), np.zeros(count, np.int64), np.zeros(count, np.int64)

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from shapely.geometry import Polygon
 
+from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.surface import Surface
-
-Float = NDArray[np.float64]
 
 DENSIFY = 0.1
 """Longest straight edge of a polygon on the curved surface, m."""
@@ -81,7 +79,7 @@ def _within(outline: Polygon, surface: Surface) -> Polygon:
     return shapely.transform(outline, lambda _: at)
 
 
-def _off(unrolled: Float, surface: Surface) -> NDArray[np.bool_]:
+def _off(unrolled: Float, surface: Surface) -> Bool:
     """Which (chainage, arc) rows (n, 2) don't lie on the surface."""
     return np.isnan(surface.roll(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled)))[:, 0])
 

@@ -7,9 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy import sparse
 
-Mask = NDArray[np.bool_]
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from tunneldb.arrays import Bool, Float, Int64
 
 NARROW_AROUND, NARROW_ALONG = 0.08, 0.06
 """Joints are at most 2 cm wide; the beam, the pixels and grout widen them, but not to more, m. Along the tunnel there are
@@ -22,7 +20,7 @@ STRAIGHT = 0.015
 """Standard deviation of the middle of a joint about a straight line, m: it is built to millimetres, pixels are larger."""
 
 
-def lines(dark: Mask, first: int, stop: int, pixel: float) -> Mask:
+def lines(dark: Bool, first: int, stop: int, pixel: float) -> Bool:
     """Find the pixels of narrow straight lines around the tunnel or along it that are long enough.
 
     Parameters
@@ -47,7 +45,7 @@ def lines(dark: Mask, first: int, stop: int, pixel: float) -> Mask:
     return found
 
 
-def _straight(runs: Int, long: int, wander: float) -> Mask:
+def _straight(runs: Int64, long: int, wander: float) -> Bool:
     """Which runs, of a line and from a place up to another one each, are parts of a long straight line across these lines."""
     first, second = beside(runs)
     graph = sparse.coo_array((np.ones(len(first), np.int8), (first, second)), shape=(len(runs), len(runs)))
@@ -71,7 +69,7 @@ def _straight(runs: Int, long: int, wander: float) -> Mask:
 
 
 @njit(cache=True, nogil=True)
-def beside(runs: Int) -> tuple[Int, Int]:  # pragma: no cover - compiled
+def beside(runs: Int64) -> tuple[Int64, Int64]:  # pragma: no cover - compiled
     """Runs of neighbouring lines that share sides; of n runs in a line with m in the next, at most n + m - 1 do."""
     first, second = np.empty(2 * len(runs), np.int64), np.empty(2 * len(runs), np.int64)
     count, above = 0, 0
@@ -89,7 +87,7 @@ def beside(runs: Int) -> tuple[Int, Int]:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True)
-def short_runs(dark: Mask, first: int, stop: int, wide: int, high: int) -> tuple[Int, Int]:  # pragma: no cover - compiled
+def short_runs(dark: Bool, first: int, stop: int, wide: int, high: int) -> tuple[Int64, Int64]:  # pragma: no cover - compiled
     """Unbroken runs of dark pixels no wider or higher: (row, column, column behind) and (column, row, row behind), in order."""
     rows = dark.shape[0]
     across, along = np.empty((1024, 3), np.int64), np.empty((1024, 3), np.int64)
@@ -129,7 +127,7 @@ def longer(values: NDArray[np.integer]) -> NDArray[np.integer]:  # pragma: no co
 
 
 @njit(cache=True, nogil=True)
-def _draw(image: Mask, runs: Int, upright: bool) -> None:  # pragma: no cover - compiled
+def _draw(image: Bool, runs: Int64, upright: bool) -> None:  # pragma: no cover - compiled
     for k in range(runs.shape[0]):
         for m in range(runs[k, 1], runs[k, 2]):
             if upright:

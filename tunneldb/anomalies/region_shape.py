@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Mask = NDArray[np.bool_]
-Float = NDArray[np.float64]
+from tunneldb.arrays import Bool, Intp
 
 PIECE = 2.0
 """Sides are compared with straight lines piece by piece, so long at most, m: a tunnel's alignment is no straighter."""
@@ -66,7 +64,7 @@ class Shape:
         return self.area / self.length
 
 
-def measure(mask: Mask, pixel: float) -> Shape:
+def measure(mask: Bool, pixel: float) -> Shape:
     """Measure a region of pixels with a given side, m."""
     rows, columns = mask.shape
     piece = max(4, round(PIECE / pixel))
@@ -81,7 +79,7 @@ def measure(mask: Mask, pixel: float) -> Shape:
     )
 
 
-def _box(mask: Mask, pixel: float, piece: int) -> tuple[float, float, float, float]:
+def _box(mask: Bool, pixel: float, piece: int) -> tuple[float, float, float, float]:
     """Of the box without what sticks out: fill, corners, wander and slenderness."""
     full = np.ascontiguousarray(mask[np.ix_(_usual(np.count_nonzero(mask, axis=1)), _usual(np.count_nonzero(mask, axis=0)))])
     high, wide = (max(2, round(CORNER * side)) for side in full.shape)
@@ -90,7 +88,7 @@ def _box(mask: Mask, pixel: float, piece: int) -> tuple[float, float, float, flo
     return float(full.mean()), min(float(corner.mean()) for corner in corners), wander, full.shape[1] / full.shape[0]
 
 
-def _usual(counts: NDArray[np.intp]) -> Mask:
+def _usual(counts: Intp) -> Bool:
     """Which rows or columns hold at least half as many pixels as the one of the median pixel."""
     ordered = np.sort(counts)
     median = ordered[np.searchsorted(np.cumsum(ordered), 0.5 * ordered.sum())]
@@ -98,7 +96,7 @@ def _usual(counts: NDArray[np.intp]) -> Mask:
 
 
 @njit(cache=True, nogil=True)
-def _widest(mask: Mask) -> float:  # pragma: no cover - compiled
+def _widest(mask: Bool) -> float:  # pragma: no cover - compiled
     """Diameter of the largest inscribed circle, pixels: by chamfer distances (Borgefors, 1986: 3 to sides, 4 to corners)."""
     rows, columns = mask.shape
     far = np.zeros((rows + 2, columns + 2), np.uint16)
@@ -120,7 +118,7 @@ def _widest(mask: Mask) -> float:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True)
-def _wander(mask: Mask, piece: int) -> float:  # pragma: no cover - compiled
+def _wander(mask: Bool, piece: int) -> float:  # pragma: no cover - compiled
     """Standard deviation, pixels, of the first and the last pixel of the columns about straight lines, piece by piece."""
     rows, columns = mask.shape
     first, last = np.full(columns, -1.0), np.full(columns, -1.0)

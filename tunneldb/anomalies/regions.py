@@ -8,19 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy import sparse
 from shapely.geometry import Polygon
 
+from tunneldb.anomalies.background.contrast import Relative
 from tunneldb.anomalies.drips import Dark, hang
 from tunneldb.anomalies.joints import beside
-from tunneldb.raster.polygons import outline
-from tunneldb.raster.geotiff import NODATA, STEP
-from tunneldb.anomalies.background.contrast import Relative
 from tunneldb.anomalies.straight_edges import SHARP, straight
-
-Mask = NDArray[np.bool_]
-Int = NDArray[np.int64]
+from tunneldb.arrays import Bool, Float, Int16, Int64, Single, UInt8
+from tunneldb.raster.geotiff import NODATA, STEP
+from tunneldb.raster.polygons import outline
 
 ACROSS = 0.06
 """The step over a rim is measured so far inside and outside, m: a wet patch ends within it, soot doesn't."""
@@ -84,7 +81,7 @@ class Region:
     pixel: float
     column: int
     row: int
-    mask: Mask
+    mask: Bool
     filled: int
     drop_sum: float
     drop_max: float
@@ -116,7 +113,7 @@ class Region:
         return outline(self.mask, self.column, self.row, self.pixel)
 
 
-def regions(part: Mask, dark: Mask, relative: Relative, min_area: float, drips: Callable[[Region], bool]) -> list[Region]:
+def regions(part: Bool, dark: Bool, relative: Relative, min_area: float, drips: Callable[[Region], bool]) -> list[Region]:
     """Connected dark regions of a kilometre that are large or long enough, or are cut by its ends and may be a part of one.
 
     Drips that hang below a region are a part of it.
@@ -154,14 +151,14 @@ def regions(part: Mask, dark: Mask, relative: Relative, min_area: float, drips: 
     return sorted(found, key=lambda region: (region.column, region.row))
 
 
-def _by_label(runs: Int, label: Int, count: int) -> Callable[[int], Int]:
+def _by_label(runs: Int64, label: Int64, count: int) -> Callable[[int], Int64]:
     """What gives the runs of a label."""
     order = np.argsort(label, kind="stable")
     stops = np.concatenate([[0], np.cumsum(np.bincount(label, minlength=count))])
     return lambda k: runs[order[stops[k] : stops[k + 1]]]
 
 
-def _cut_out(runs: Int, dark: Mask, relative: Relative) -> Region:
+def _cut_out(runs: Int64, dark: Bool, relative: Relative) -> Region:
     grid = relative.grid
     top, bottom = int(runs[:, 0].min()), int(runs[:, 0].max())
     first = int(runs[:, 1].min())
@@ -233,14 +230,14 @@ def _touch(before: Region, after: Region) -> bool:
     )
 
 
-def _beside(runs: Int) -> sparse.coo_array:
+def _beside(runs: Int64) -> sparse.coo_array:
     """Pairs of runs of neighbouring rows that share sides."""
     first, second = beside(runs)
     return sparse.coo_array((np.ones(len(first), np.int8), (first, second)), shape=(len(runs), len(runs)))
 
 
 @njit(cache=True, nogil=True)
-def _runs(wet: Mask, first: int, stop: int) -> Int:  # pragma: no cover - compiled
+def _runs(wet: Bool, first: int, stop: int) -> Int64:  # pragma: no cover - compiled
     """Row, first column and column behind the last one of each unbroken run of wet pixels, row by row."""
     count = 0
     for i in range(wet.shape[0]):
@@ -264,18 +261,18 @@ def _runs(wet: Mask, first: int, stop: int) -> Int:  # pragma: no cover - compil
 
 @njit(cache=True, nogil=True)
 def _read(
-    runs: Int,
-    dark: Mask,
-    drop: NDArray[np.int16],
-    state: NDArray[np.uint8],
-    sigma: NDArray[np.float32],
+    runs: Int64,
+    dark: Bool,
+    drop: Int16,
+    state: UInt8,
+    sigma: Single,
     tile: int,
-    mask: Mask,
+    mask: Bool,
     top: int,
     left: int,
     across: int,
     step: float,
-) -> NDArray[np.float64]:  # pragma: no cover - compiled
+) -> Float:  # pragma: no cover - compiled
     """Draw a region's runs into its mask and sum up what they show: filled, drop's sum and maximum, and the traits."""
     sums = np.zeros(11)
     sums[2] = -np.inf

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from tunneldb.anomalies.joints import longer
+from tunneldb.arrays import Bool, Int16, Int64, UInt8
 from tunneldb.raster.geotiff import NODATA
-
-Mask = NDArray[np.bool_]
-Int = NDArray[np.int64]
 
 SHARP = 0.5
 """Part of the region's mean drop that is lost over a sharp side."""
@@ -21,7 +18,7 @@ some degrees, and so does the unrolled plane."""
 
 
 def straight(
-    runs: Int, dark: Mask, drop: NDArray[np.int16], state: NDArray[np.uint8], across: int, least: float
+    runs: Int64, dark: Bool, drop: Int16, state: UInt8, across: int, least: float
 ) -> tuple[int, int]:
     """Count the sharp sides of a region, and those of them that lie on one straight line for each of the four directions.
 
@@ -47,7 +44,7 @@ def straight(
     return len(sides), sum(_on_a_line(sides[sides[:, 0] == facing]) for facing in range(4))
 
 
-def _on_a_line(sides: Int) -> int:
+def _on_a_line(sides: Int64) -> int:
     """Most of the sides of a direction (any, place along them, place across them) that lie within a pixel of a line."""
     if not len(sides):
         return 0
@@ -61,8 +58,8 @@ def _on_a_line(sides: Int) -> int:
 
 @njit(cache=True, nogil=True)
 def _sharp(
-    runs: Int, dark: Mask, drop: NDArray[np.int16], state: NDArray[np.uint8], across: int, least: float
-) -> Int:  # pragma: no cover - compiled
+    runs: Int64, dark: Bool, drop: Int16, state: UInt8, across: int, least: float
+) -> Int64:  # pragma: no cover - compiled
     """Direction (0 to 3), place along and place across of the sharp sides."""
     rows, columns = dark.shape
     found = np.empty((1024, 3), np.int64)
@@ -87,7 +84,7 @@ def _sharp(
 
 @njit(cache=True, nogil=True)
 def _step(
-    dark: Mask, drop: NDArray[np.int16], state: NDArray[np.uint8], i: int, j: int, di: int, dj: int, across: int
+    dark: Bool, drop: Int16, state: UInt8, i: int, j: int, di: int, dj: int, across: int
 ) -> float:  # pragma: no cover - compiled
     """Mean drop of dark pixels inside a side less that of others outside; -inf where either is hidden."""
     rows, columns = dark.shape

@@ -6,15 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from tunneldb.anomalies.inside import inside
+from tunneldb.arrays import Bool, Int16, Int32, UInt8
 from tunneldb.raster.geotiff import STEP
 
 if TYPE_CHECKING:
     from tunneldb.anomalies.background.contrast import Relative
 
-Mask = NDArray[np.bool_]
 
 MEDIAN = 5
 """Side of the median filter where every pixel holds points, pixels."""
@@ -38,7 +37,7 @@ def filter_size(filled: float) -> int:
     return size
 
 
-def dark_pixels(relative: Relative, size: int) -> Mask:
+def dark_pixels(relative: Relative, size: int) -> Bool:
     """Mark dark pixels.
 
     A lining pixel that lies more than three local standard deviations below the local level of dry lining is dark
@@ -58,7 +57,7 @@ def dark_pixels(relative: Relative, size: int) -> Mask:
     """
     limit = np.minimum(np.floor(3.0 * relative.sigma / STEP["corrected"]), 32767).astype(np.int16)
     enough = 0.2 * min(size * size, MEDIAN_PIXELS)
-    dark: Mask = _dark(relative.state, relative.drop, limit, relative.tile, size // 2, enough)
+    dark: Bool = _dark(relative.state, relative.drop, limit, relative.tile, size // 2, enough)
     for columns, mask in inside(relative.grid, relative.drawn):
         dark[:, columns][mask] = False
     return dark
@@ -66,8 +65,8 @@ def dark_pixels(relative: Relative, size: int) -> Mask:
 
 @njit(cache=True, nogil=True)
 def _dark(
-    state: NDArray[np.uint8], drop: NDArray[np.int16], limit: NDArray[np.int16], tile: int, half: int, enough: float
-) -> Mask:  # pragma: no cover - compiled
+    state: UInt8, drop: Int16, limit: Int16, tile: int, half: int, enough: float
+) -> Bool:  # pragma: no cover - compiled
     rows, columns = state.shape
     out = np.zeros((rows, columns), np.bool_)
     # Lining and dark pixels of each column in the rows of the filter, with zeros beyond both ends.
@@ -94,13 +93,13 @@ def _dark(
 
 @njit(cache=True, nogil=True)
 def _vote(
-    state: NDArray[np.uint8],
-    drop: NDArray[np.int16],
-    limit: NDArray[np.int16],
+    state: UInt8,
+    drop: Int16,
+    limit: Int16,
     tile: int,
     sign: int,
-    lining: NDArray[np.int32],
-    dark: NDArray[np.int32],
+    lining: Int32,
+    dark: Int32,
     half: int,
 ) -> None:  # pragma: no cover - compiled
     """Add a row to the sums of columns, or take it away; of the limits of its tiles."""

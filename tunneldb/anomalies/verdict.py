@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from tunneldb.anomalies.regions import Region
 from tunneldb.anomalies.region_shape import Shape, measure
+from tunneldb.anomalies.regions import Region
 
 STRONG_CONTRAST, STRONG_DROP = 8.0, 3.0
 """Standard deviations and dB from which a patch with straight sides may be water after all, that fills a panel between joints:

@@ -6,21 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 from scipy import ndimage
 
-from tunneldb.geometry.surface import Surface
-from tunneldb.classification.sections import lining, surface_through
-from tunneldb.classification.objects.clusters import Cluster
-from tunneldb.geometry.plan_line import Line
-from tunneldb.classification.lining_relief import Prior, Relief, Wall
+from tunneldb.arrays import Float, Int64
 from tunneldb.classification.ground.model import COLUMN, Ground
-from tunneldb.classification.scene import Scene
-from tunneldb.classification.objects.spacing import Spacing
+from tunneldb.classification.lining_relief import Prior, Relief, Wall
+from tunneldb.classification.objects.clusters import Cluster
 from tunneldb.classification.objects.objects import ClusterSettings, Rest, find_clusters, sort_clusters
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
+from tunneldb.classification.objects.spacing import Spacing
+from tunneldb.classification.scene import Scene
+from tunneldb.classification.sections import lining, surface_through
+from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.surface import Surface
 
 
 def find_scene(
@@ -150,7 +147,7 @@ def _of_metre(along: Float, value: Float, share: float) -> Float:
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _quantiles(metre: Int, value: Float, first: Int, share: float) -> Float:  # pragma: no cover - compiled
+def _quantiles(metre: Int64, value: Float, first: Int64, share: float) -> Float:  # pragma: no cover - compiled
     """Quantile of the values of each metre, NaN where it has none; ``first`` tells how many come before it."""
     held = np.empty(len(value))
     end = first[:-1].copy()

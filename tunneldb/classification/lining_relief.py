@@ -12,18 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 from scipy import ndimage
 
-from tunneldb.geometry.surface import Surface
+from tunneldb.arrays import Bool, Float, Int64, Single
+from tunneldb.classification.ground.model import Ground
 from tunneldb.classification.ground.wall_arcs import foot_arcs
 from tunneldb.geometry.plan_line import Line
-from tunneldb.classification.ground.model import Ground
+from tunneldb.geometry.surface import Surface
 from tunneldb.raster.appendages import DELTA
-
-Float = NDArray[np.float64]
-Single = NDArray[np.float32]
-Int = NDArray[np.int64]
 
 CELL = 0.25
 """Edge of a cell, m."""
@@ -147,7 +143,7 @@ class Wall:
         known = np.isfinite(arcs).all(axis=1)
         return cls(metres[known], arcs[known, 0], arcs[known, 1]) if known.any() else None
 
-    def holds(self, chainage: Float, arc: Float) -> NDArray[np.bool_]:
+    def holds(self, chainage: Float, arc: Float) -> Bool:
         """Tell which places lie above the ground; (rows,) arcs by (columns,) chainages."""
         left, right = np.interp(chainage, self.chainage, self.left), np.interp(chainage, self.chainage, self.right)
         # Half a cell farther, so that the last of the wall lies in a cell, too.
@@ -189,7 +185,7 @@ class Prior:
         return out
 
 
-def _apart(found: Float, expected: Float) -> NDArray[np.bool_]:
+def _apart(found: Float, expected: Float) -> Bool:
     """Cells whose plane lies apart from those about them: the floor of a shallow niche, the front of a large box."""
     level = _median(found - expected, _ALONG, _ROUND)
     off = np.abs(found - expected - level)
@@ -203,7 +199,7 @@ def _calm(spread: Float) -> Float:
     return np.asarray(_median(spread, 4, 4))
 
 
-def _whole(found: Float, spread: Float, expected: Float, inside: NDArray[np.bool_]) -> tuple[Single, Single]:
+def _whole(found: Float, spread: Float, expected: Float, inside: Bool) -> tuple[Single, Single]:
     """Lay the relief across cells without one, from those before and after them along the tunnel."""
     offset, missing = found - expected, np.isnan(found)
     if missing.all():
@@ -245,7 +241,7 @@ def _median(grid: Float, along: int, across: int) -> Float:  # pragma: no cover 
 
 @njit(cache=True, nogil=True, parallel=True)
 def _fit(
-    x: Float, y: Float, z: Float, starts: Int, expected: Float, rows: int, columns: int
+    x: Float, y: Float, z: Float, starts: Int64, expected: Float, rows: int, columns: int
 ) -> tuple[Float, Float]:  # pragma: no cover - compiled
     """Offset and spread of each cell; x and y in cells, z and the results in m, NaN where there are too few points."""
     offset, spread = np.full((rows, columns), np.nan), np.full((rows, columns), np.nan)
@@ -296,7 +292,7 @@ def _level(part: Float, counts: Float) -> float:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True)
-def _plane(part: Float, level: float, fine: NDArray[np.int64]) -> tuple[float, float]:  # pragma: no cover - compiled
+def _plane(part: Float, level: float, fine: Int64) -> tuple[float, float]:  # pragma: no cover - compiled
     """Height in the middle of the plane through points, fitted from a level on, and their spread about it; NaN: none."""
     a, b, c, scale, sigma = level, 0.0, 0.0, _FIRST, np.nan
     for _ in range(_FITS):
@@ -336,7 +332,7 @@ def _plane(part: Float, level: float, fine: NDArray[np.int64]) -> tuple[float, f
 
 
 @njit(cache=True, nogil=True)
-def _spread(part: Float, a: float, b: float, c: float, fine: NDArray[np.int64]) -> float:  # pragma: no cover - compiled
+def _spread(part: Float, a: float, b: float, c: float, fine: Int64) -> float:  # pragma: no cover - compiled
     """Standard deviation of the points about a plane, from the median of their distances."""
     fine[:] = 0
     total = 0

@@ -8,19 +8,14 @@ from functools import cached_property
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-from tunneldb.geometry.surface import Surface
+from tunneldb.arrays import Bool, Float, Int64, Single, UInt8
 from tunneldb.classification.classes import Klass
+from tunneldb.classification.ground.model import Ground
+from tunneldb.classification.lining_relief import Relief, level_at
 from tunneldb.classification.objects.clusters import Cluster, Lookup, look_up
 from tunneldb.geometry.plan_line import Line
-from tunneldb.classification.lining_relief import Relief, level_at
-from tunneldb.classification.ground.model import Ground
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Bool = NDArray[np.bool_]
-Bytes = NDArray[np.uint8]
+from tunneldb.geometry.surface import Surface
 
 SPHERE_SKIN = 0.01
 """Points up to this far outside a target sphere are its own, m: three times a scanner's noise."""
@@ -60,7 +55,7 @@ class Scene:
     relief: Relief | None
     spheres: Float = field(default_factory=lambda: np.empty((0, 4)))
 
-    def classes(self, xyz: Float) -> Bytes:
+    def classes(self, xyz: Float) -> UInt8:
         """Class (:class:`tunneldb.classification.classes.Klass`) of each point (n, 3) in the tunnel's SRID.
 
         What is within a target sphere is a sphere; else what the ground model holds is ground; what is near enough to the
@@ -79,7 +74,7 @@ class Scene:
             out[ground & _in_spheres(xyz, spheres)] = _SPHERE
         return out
 
-    def _off_ground(self, xyz: Float, spheres: Float) -> Bytes:
+    def _off_ground(self, xyz: Float, spheres: Float) -> UInt8:
         """Class of points that are not ground; these alone need to be unrolled."""
         if self.surface is None or self.relief is None:
             unrolled, relief = np.zeros((3, len(xyz))), Relief.none()
@@ -106,10 +101,10 @@ class Scene:
 @njit(cache=True, nogil=True, parallel=True)
 def _classes(
     xyz: Float, unrolled: Float, cell: float, column: int, row: int,
-    relief: NDArray[np.float32], spread: NDArray[np.float32],
-    inner_first: Int, inner_last: Int, inner_keys: Int, inner_klass: Bytes,
-    outer_first: Int, outer_last: Int, outer_keys: Int, outer_klass: Bytes, spheres: Float,
-) -> Bytes:  # fmt: skip  # pragma: no cover - compiled
+    relief: Single, spread: Single,
+    inner_first: Int64, inner_last: Int64, inner_keys: Int64, inner_klass: UInt8,
+    outer_first: Int64, outer_last: Int64, outer_keys: Int64, outer_klass: UInt8, spheres: Float,
+) -> UInt8:  # fmt: skip  # pragma: no cover - compiled
     count = xyz.shape[0]
     out = np.empty(count, np.uint8)
     for block in prange((count + _BLOCK - 1) // _BLOCK):
@@ -153,7 +148,7 @@ def _in_spheres(xyz: Float, spheres: Float) -> Bool:  # pragma: no cover - compi
 
 
 @njit(cache=True, nogil=True)
-def _spheres_near(xyz: Float, first: int, last: int, spheres: Float) -> Int:  # pragma: no cover - compiled
+def _spheres_near(xyz: Float, first: int, last: int, spheres: Float) -> Int64:  # pragma: no cover - compiled
     """Numbers of the spheres that reach into the box of a block of points."""
     near = np.empty(spheres.shape[0], np.int64)
     if spheres.shape[0] == 0:
@@ -176,7 +171,7 @@ def _spheres_near(xyz: Float, first: int, last: int, spheres: Float) -> Int:  # 
 
 
 @njit(cache=True, nogil=True)
-def _in_sphere(x: float, y: float, z: float, spheres: Float, near: Int) -> bool:  # pragma: no cover - compiled
+def _in_sphere(x: float, y: float, z: float, spheres: Float, near: Int64) -> bool:  # pragma: no cover - compiled
     for k in near:
         dx, dy, dz = x - spheres[k, 0], y - spheres[k, 1], z - spheres[k, 2]
         reach = spheres[k, 3] + SPHERE_SKIN

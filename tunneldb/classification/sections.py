@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.classification.objects.dbscan import dbscan
+from tunneldb.classification.objects.objects import ClusterSettings, Rest
+from tunneldb.classification.objects.spacing import Spacing
 from tunneldb.geometry.frame import frame_of, locate, nearest_segment, segment_rows, tangents
+from tunneldb.geometry.plan_line import Line
 from tunneldb.geometry.surface import Surface
 from tunneldb.geometry.unrolling import CROWN, NODES
-from tunneldb.classification.objects.dbscan import dbscan
-from tunneldb.geometry.plan_line import Line
-from tunneldb.classification.objects.spacing import Spacing
-from tunneldb.classification.objects.objects import ClusterSettings, Rest
 from tunneldb.raster.appendages import DELTA
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Bool = NDArray[np.bool_]
 
 COHERENT = 0.8
 """Cosine of the angle between neighbouring normals that the clusters of a lining reach on the average."""
@@ -79,7 +75,7 @@ def coherence(points: Float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _coherence(points: Float, index: Int) -> float:  # pragma: no cover - compiled
+def _coherence(points: Float, index: Int64) -> float:  # pragma: no cover - compiled
     count, near = index.shape
     normals = np.empty((count, 3))
     for i in range(count):
@@ -158,7 +154,7 @@ def _middles(at: Float, along: Float, across: Float, z: Float, wall: Bool) -> Fl
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _placed(segments: Float, number: Int, ends: Float, points: Float) -> Float:  # pragma: no cover - compiled
+def _placed(segments: Float, number: Int64, ends: Float, points: Float) -> Float:  # pragma: no cover - compiled
     """Chainage of points (n, 3) and their place right and up of the axis, (n, 3), m; NaN beyond its ends."""
     out = np.full((points.shape[0], 3), np.nan)
     for i in prange(points.shape[0]):
@@ -172,7 +168,7 @@ def _placed(segments: Float, number: Int, ends: Float, points: Float) -> Float: 
     return out
 
 
-def _medians(key: Int, value: Float, count: int) -> Float:
+def _medians(key: Int64, value: Float, count: int) -> Float:
     """Median of the values of each key below a count; NaN for fewer than ``_LEAST``."""
     order = np.lexsort((value, key))
     bounds = np.searchsorted(key[order], np.arange(count + 1))

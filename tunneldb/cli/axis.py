@@ -28,8 +28,8 @@ def axis(settings: Settings, survey: str, start: str | None, end: str | None, ou
     (interpolated) are not counted. With -o, a figure of the deviation along the tunnel with the elements of the design
     marked, or a table (.csv, metres) of all vertices.
     """
-    from tunneldb.store.design import load_deviation
     from tunneldb.export.figures.axis_deviation import check_format, write_deviation
+    from tunneldb.store.design import load_deviation
 
     if output is not None:
         check_format(output)

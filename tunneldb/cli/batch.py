@@ -68,8 +68,8 @@ def batch(
 
     Ctrl-C ends the stages that are under way, and stops; a second one stops at once.
     """
-    from tunneldb.queue.batch import STEPS, plan, register
     from tunneldb.pipeline.run import km_range
+    from tunneldb.queue.batch import STEPS, plan, register
 
     if last is not None and last not in STEPS:
         raise UserError(f"there is no stage {last!r}; the stages are {', '.join(STEPS)}")

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tunneldb.arrays import Int64
+from tunneldb.classification.classes import Klass
 from tunneldb.cli.output import tell
 from tunneldb.cli.tables import print_table
-from tunneldb.classification.classes import Klass
 
 
-def print_classes(counts: NDArray[np.int64]) -> None:
+def print_classes(counts: Int64) -> None:
     """Print a table of the classes that points (256,) have, and tell of them."""
     total = int(counts.sum())
     tell(points=total, classes={klass.name.lower(): int(counts[klass]) for klass in Klass if counts[klass]})

@@ -11,8 +11,8 @@ from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.files import make_folder
 from tunneldb.export.images.image import export_kilometre, image_kilometres
+from tunneldb.files import make_folder
 from tunneldb.pipeline.run import parse_km
 
 

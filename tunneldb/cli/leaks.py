@@ -16,7 +16,6 @@ from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.files import replacing
 from tunneldb.export.tables.leaks import (
     Anomaly,
     Geometry,
@@ -28,6 +27,7 @@ from tunneldb.export.tables.leaks import (
     total,
     write_gpkg,
 )
+from tunneldb.files import replacing
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
 
 _BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}

@@ -12,9 +12,9 @@ from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, step
 from tunneldb.database import Survey, connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.files import make_folder
 from tunneldb.export.images.image import export_filled, export_kilometre, image_kilometres
 from tunneldb.export.qgis import store_project, store_styles, write_project
+from tunneldb.files import make_folder
 
 
 @verb(

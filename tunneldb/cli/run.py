@@ -12,8 +12,8 @@ from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say
 from tunneldb.database import connect, get_survey
 from tunneldb.errors import UserError
-from tunneldb.store.ledger import Run
 from tunneldb.pipeline.parameters import PARAMETERS, settings
+from tunneldb.store.ledger import Run
 
 if TYPE_CHECKING:
     from tunneldb.pipeline.stages import Stage

@@ -67,8 +67,6 @@ def spheres(
     and the best rigid motion onto the control points are reported, never applied. Stages need not have been run; after
     sections the spheres have a chainage, and after ground the search leaves out the ground.
     """
-    from tunneldb.store.stationing import load_stationing
-    from tunneldb.files import replacing
     from tunneldb.export.tables.targets import (
         CONTROL_HEADER,
         HEADER,
@@ -79,8 +77,10 @@ def spheres(
         unmatched_lines,
     )
     from tunneldb.export.tables.targets import report as as_report
+    from tunneldb.files import replacing
     from tunneldb.pipeline.target_control import compare, read_control
     from tunneldb.pipeline.targets import search
+    from tunneldb.store.stationing import load_stationing
 
     if tolerance >= radius / 4.0:
         raise UserError(f"--tolerance {tolerance:g} is too much for a radius of {radius:g} m: give less than a quarter of it")

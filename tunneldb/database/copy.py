@@ -16,6 +16,8 @@ import psycopg
 from numpy.typing import NDArray
 from psycopg import sql
 
+from tunneldb.arrays import Float, Int32
+
 _HEADER = b"PGCOPY\n\xff\r\n\0" + struct.pack(">ii", 0, 0)
 _TRAILER = struct.pack(">h", -1)
 _EWKB_POINT_Z = 0xA0000001  # point, with Z (0x80000000) and SRID (0x20000000)
@@ -34,7 +36,7 @@ class PointZ:
         Spatial reference of all of them.
     """
 
-    xyz: NDArray[np.float64]
+    xyz: Float
     srid: int
 
 
@@ -147,7 +149,7 @@ def pack_value(value: float | int | None, kind: str) -> bytes | None:
     return None if value is None else struct.pack(f">{kind}", value)
 
 
-def pack_array(values: NDArray[np.float64] | NDArray[np.int32]) -> bytes:
+def pack_array(values: Float | Int32) -> bytes:
     """One array of float8 or int4 as it is sent.
 
     Format: ``array_send`` of PostgreSQL: dimensions, whether there are NULLs, type, length, lower bound, elements.

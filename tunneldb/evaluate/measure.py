@@ -12,9 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from shapely.geometry.base import BaseGeometry
 
-Float = NDArray[np.float64]
-Index = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from tunneldb.arrays import Bool, Float, Int64
 
 HALF = 0.5
 """A true leak is found if so much of its area is, and a found one is right if so much of its area is true: the overlap that
@@ -49,16 +47,16 @@ class Comparison:
         For each group, distances between the outlines of its found and its true leaks, both ways, m.
     """
 
-    true: Index
-    found: Index
+    true: Int64
+    found: Int64
     true_shape: NDArray[np.object_]
     found_shape: NDArray[np.object_]
     true_area: Float
     found_area: Float
     covered: Float
     right: Float
-    true_group: Index
-    found_group: Index
+    true_group: Int64
+    found_group: Int64
     iou: Float
     area_error: Float
     edges: list[Float]
@@ -170,7 +168,7 @@ def compare(
     )  # fmt: skip
 
 
-def figures(comparison: Comparison, seen: float = np.nan, true: Mask | None = None, found: Mask | None = None) -> Figures:
+def figures(comparison: Comparison, seen: float = np.nan, true: Bool | None = None, found: Bool | None = None) -> Figures:
     """Sum a comparison up.
 
     Parameters
@@ -234,14 +232,14 @@ def _cut(shapes: Sequence[BaseGeometry], stretch: BaseGeometry | None) -> NDArra
     return out
 
 
-def _touching(one: NDArray[np.object_], other: NDArray[np.object_]) -> tuple[Index, Index]:
+def _touching(one: NDArray[np.object_], other: NDArray[np.object_]) -> tuple[Int64, Int64]:
     """Pairs that have some area in common: numbers in the first and in the second."""
     b, a = shapely.STRtree(one).query(other, predicate="intersects") if len(one) else np.empty((2, 0), np.int64)
     shared = shapely.area(shapely.intersection(one[a], other[b])) > 0.0
     return a[shared], b[shared]
 
 
-def _shares(shapes: NDArray[np.object_], others: NDArray[np.object_], a: Index, b: Index) -> Float:
+def _shares(shapes: NDArray[np.object_], others: NDArray[np.object_], a: Int64, b: Int64) -> Float:
     """Share of each polygon's area that the others of its pairs cover."""
     share = np.zeros(len(shapes))
     for k in np.unique(a):
@@ -250,7 +248,7 @@ def _shares(shapes: NDArray[np.object_], others: NDArray[np.object_], a: Index, 
     return share
 
 
-def _groups(true: int, found: int, t: Index, f: Index) -> tuple[int, Index, Index]:
+def _groups(true: int, found: int, t: Int64, f: Int64) -> tuple[int, Int64, Int64]:
     """How many groups of leaks that touch there are, and the number of each leak's, -1 for one that touches none."""
     _, label = connected_components(coo_array((np.ones(len(t)), (t, true + f)), shape=(true + found,) * 2), directed=False)
     kept = np.unique(label[t])

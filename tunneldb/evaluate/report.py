@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.evaluate.measure import HALF, Comparison, Figures, figures
 
 SIZES = (0.3, 1.0)
@@ -96,7 +96,7 @@ def make_report(
     comparison: Comparison,
     true_ids: Sequence[str],
     found_ids: Sequence[str],
-    distances: tuple[NDArray[np.float64], NDArray[np.float64]],
+    distances: tuple[Float, Float],
     min_area: float,
     seen: float,
 ) -> Report:

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import psycopg
 import shapely
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from tunneldb.store.survey import Survey
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.store.surface import load_surface
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
 from tunneldb.pointcloud.poses import PoseModel, load_poses
+from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey
 
 KILOMETRE = 1000.0
 WIDE = 1e4  # m of arc, more than any section has
@@ -108,7 +108,7 @@ def _seen(conn: psycopg.Connection[Any], survey: Survey, kilometres: Sequence[in
     return float("nan") if row is None or row[0] is None else float(row[0])
 
 
-def scanner_distance(conn: psycopg.Connection[Any], survey: Survey, shapes: Sequence[BaseGeometry]) -> NDArray[np.float64]:
+def scanner_distance(conn: psycopg.Connection[Any], survey: Survey, shapes: Sequence[BaseGeometry]) -> Float:
     """Distance of a point inside each leak (n,) from the nearest scanner position, m; NaN off the tunnel."""
     if not len(shapes):
         return np.zeros(0)
@@ -117,7 +117,7 @@ def scanner_distance(conn: psycopg.Connection[Any], survey: Survey, shapes: Sequ
     return distance_from_scanner(surface.roll(inside[:, 0], inside[:, 1], np.zeros(len(inside))), load_poses(conn, survey))
 
 
-def distance_from_scanner(points: NDArray[np.float64], poses: PoseModel) -> NDArray[np.float64]:
+def distance_from_scanner(points: Float, poses: PoseModel) -> Float:
     """Distance of points (n, 3) from the nearest station, or from the trajectory between its rows, m; NaN where they are."""
     track = poses.track if poses.mobile else poses.station
     known = np.isfinite(points).all(axis=1)
@@ -130,7 +130,7 @@ def distance_from_scanner(points: NDArray[np.float64], poses: PoseModel) -> NDAr
     return distance
 
 
-def _from_segment(points: NDArray[np.float64], a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _from_segment(points: Float, a: Float, b: Float) -> Float:
     """Distance of points from segments a-b, row by row, all (n, 3), m."""
     along = b - a
     square = (along**2).sum(axis=1)

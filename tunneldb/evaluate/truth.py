@@ -18,8 +18,8 @@ from pyogrio.errors import DataLayerError, DataSourceError
 from pyproj.exceptions import CRSError
 from shapely.geometry import MultiPolygon, Polygon
 
-from tunneldb.store.survey import Survey
 from tunneldb.errors import UserError
+from tunneldb.store.survey import Survey
 
 LAYER = "leak"
 """Layer that is read where a file has several."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from tunneldb.arrays import Int64
 from tunneldb.errors import UserError
 from tunneldb.geometry.frame import Float, frame_at, locate, nearest_segment, segment_rows, tangents
 
@@ -35,7 +35,7 @@ class Alignment:
     """
 
     spacing: float
-    number: NDArray[np.int64]
+    number: Int64
     vertices: Float
     start: float
     end: float
@@ -116,7 +116,7 @@ def _curve(xyz: Float, chord: Float) -> tuple[Float, Float, CubicSpline]:
 
 @njit(cache=True, nogil=True, parallel=True)
 def _locate_all(
-    segments: Float, number: NDArray[np.int64], spacing: float, points: Float
+    segments: Float, number: Int64, spacing: float, points: Float
 ) -> tuple[Float, Float]:  # pragma: no cover - compiled
     count = points.shape[0]
     chainage = np.empty(count)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
-Float = NDArray[np.float64]
+from tunneldb.arrays import Bool, Float
 
 _CELL = 1.0  # m in plan
 _REACH = 3.0  # cells closer than this are neighbours, m: profiles may lie apart
@@ -171,7 +170,7 @@ def _walls(along: Float, across: Float, count: int) -> Float:
     return walls
 
 
-def _smooth(places: Float, seen: NDArray[np.bool_]) -> Float:
+def _smooth(places: Float, seen: Bool) -> Float:
     """Smooth places (k, 2) at even distances, those of niches and gaps after their neighbours (Whittaker, 1923).
 
     Third differences are kept small: neither a straight line nor a circle is bent.

@@ -14,9 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from tunneldb.arrays import Float, Int64
 
 
 def tangents(vertices: Float) -> Float:
@@ -145,7 +144,7 @@ def nearest_segment(segments: Float, x: float, y: float, z: float) -> int:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def locate(segments: Float, number: NDArray[np.int64], start: int, x: float, y: float, z: float) -> tuple[int, float]:
+def locate(segments: Float, number: Int64, start: int, x: float, y: float, z: float) -> tuple[int, float]:
     """Segment that holds a point and the fraction in it, walking from the segment ``start``; (-1, 0) if none does.
 
     ``number`` are the segments' numbers, growing; the walk doesn't cross a gap in them.

@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from tunneldb.arrays import Float, Int32
 from tunneldb.geometry.centreline import course
-
-Float = NDArray[np.float64]
 
 _APRON = 30.0  # m around the line in which the search begins at the nearest segment
 _MOST_CELLS = 1 << 20
@@ -35,7 +34,7 @@ class Line:
     vertices: Float
     distance: Float
     _segments: Float = field(repr=False)  # x, y, direction (2), length, shear at both ends, along at both ends
-    _grid: NDArray[np.int32] = field(repr=False)  # segment nearest to each cell's middle
+    _grid: Int32 = field(repr=False)  # segment nearest to each cell's middle
     _corner: Float = field(repr=False)  # x, y of the grid and the edge of a cell
 
     @classmethod
@@ -110,7 +109,7 @@ class Line:
         return np.column_stack([s[i, 0] + ahead * s[i, 2] + x * s[i, 3], s[i, 1] + ahead * s[i, 3] - x * s[i, 2]])
 
 
-def _nearest_segments(vertices: Float, length: Float) -> tuple[NDArray[np.int32], Float]:
+def _nearest_segments(vertices: Float, length: Float) -> tuple[Int32, Float]:
     """Which segment is the nearest to the middle of each cell of a grid around the line, and where the grid lies."""
     low, high = vertices.min(axis=0) - _APRON, vertices.max(axis=0) + _APRON
     edge = max(5.0, float(np.sqrt((high - low).prod() / _MOST_CELLS)))
@@ -127,7 +126,7 @@ def _nearest_segments(vertices: Float, length: Float) -> tuple[NDArray[np.int32]
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _place(s: Float, grid: NDArray[np.int32], corner: Float, x: float, y: float) -> tuple[float, float]:
+def _place(s: Float, grid: Int32, corner: Float, x: float, y: float) -> tuple[float, float]:
     """Along and across of a point: from the segment nearest to its cell to the one between whose ends it lies."""
     column = min(max(int((x - corner[0]) / corner[2]), 0), grid.shape[1] - 1)
     row = min(max(int((y - corner[1]) / corner[2]), 0), grid.shape[0] - 1)
@@ -154,7 +153,7 @@ def _place(s: Float, grid: NDArray[np.int32], corner: Float, x: float, y: float)
 
 @njit(cache=True, nogil=True, parallel=True)
 def _place_all(
-    s: Float, grid: NDArray[np.int32], corner: Float, points: Float, along: Float, across: Float
+    s: Float, grid: Int32, corner: Float, points: Float, along: Float, across: Float
 ) -> None:  # pragma: no cover - compiled
     for k in prange(points.shape[0]):
         along[k], across[k] = _place(s, grid, corner, points[k, 0], points[k, 1])

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Int64
 from tunneldb.geometry.frame import Float, frame_at
 from tunneldb.geometry.unrolling import NODES, bracket, roll_all, unroll_all
 
@@ -55,7 +55,7 @@ class Surface:
         Sections farther apart than this leave a hole in the surface, m: one spacing of the axis' vertices.
     """
 
-    number: NDArray[np.int64]
+    number: Int64
     segments: Float
     ends: Float
     chainages: Float
@@ -83,7 +83,7 @@ class Surface:
             roll_all(self.segments, which, self.ends, self.chainages, self.radius, self.arcs, self.reach, unrolled)
         )
 
-    def segment_index(self, chainage: Float) -> NDArray[np.int64]:
+    def segment_index(self, chainage: Float) -> Int64:
         """Index of the segment at each chainage, -1 where there is none."""
         index = np.searchsorted(self.ends[:, 0], chainage, side="right") - 1
         held = (index >= 0) & (chainage <= self.ends[index, 1])

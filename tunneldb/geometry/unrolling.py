@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Int64
 from tunneldb.geometry.frame import Float, frame_at, frame_of, locate, nearest_segment
 
 NODES = 361
@@ -181,7 +181,7 @@ def _longitudinal(radius: Float, chainages: Float, a: int, b: int, k: int, s: fl
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def unroll_point(
     segments: Float,
-    number: NDArray[np.int64],
+    number: Int64,
     ends: Float,
     chainages: Float,
     radius: Float,
@@ -248,7 +248,7 @@ def unroll_point(
 @njit(cache=True, nogil=True, parallel=True)
 def unroll_all(
     segments: Float,
-    number: NDArray[np.int64],
+    number: Int64,
     ends: Float,
     chainages: Float,
     radius: Float,
@@ -319,7 +319,7 @@ def _roll_one(
 @njit(cache=True, nogil=True, parallel=True)
 def roll_all(
     segments: Float,
-    which: NDArray[np.int64],
+    which: Int64,
     ends: Float,
     chainages: Float,
     radius: Float,

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
 import rasterio.features
-from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
+from tunneldb.arrays import Bool
 from tunneldb.raster.accumulator import Grid
 
 
-def inside(grid: Grid, polygons: Sequence[Polygon]) -> Iterator[tuple[slice, NDArray[np.bool_]]]:
+def inside(grid: Grid, polygons: Sequence[Polygon]) -> Iterator[tuple[slice, Bool]]:
     """Columns of each block that a polygon reaches, with a mask (rows, columns) of the pixels whose centres lie in one."""
     for start in range(0, grid.columns, grid.block_columns):
         columns = slice(start, start + grid.block_columns)

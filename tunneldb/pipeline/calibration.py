@@ -8,16 +8,18 @@ from typing import Any, cast
 import numpy as np
 import psycopg
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from tunneldb.store.survey import Survey
+from tunneldb.anomalies.background.contrast import Relative
+from tunneldb.anomalies.detect import Detection, dry_places
+from tunneldb.arrays import Bool, Int32, Int64
 from tunneldb.errors import UserError
+from tunneldb.pointcloud.poses import load_poses
 from tunneldb.radiometry.cells import Sight
 from tunneldb.radiometry.correction import Kind, Views, needs_reference, range_span
-from tunneldb.radiometry.robust_statistics import Dry, plain_statistics
 from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.radiometry.robust_statistics import Dry, plain_statistics
 from tunneldb.radiometry.roughness import (
     STEEPEST,
     TELLING,
@@ -26,12 +28,10 @@ from tunneldb.radiometry.roughness import (
     drawn_regions,
     find_roughness,
 )
-from tunneldb.store.sources import sample
-from tunneldb.anomalies.detect import Detection, dry_places
-from tunneldb.anomalies.background.contrast import Relative
 from tunneldb.raster.observation import Eye, Radiometer, Seen, Span
 from tunneldb.store.images import load_reference
-from tunneldb.pointcloud.poses import load_poses
+from tunneldb.store.sources import sample
+from tunneldb.store.survey import Survey
 
 CORNER = 0.1
 """Points that serve for the roughness lie farther above the foot of the wall, m: there sections are rounded, and the incidence
@@ -65,8 +65,8 @@ class Sample:
     """
 
     seen: Seen
-    scan_id: NDArray[np.int32]
-    clear: NDArray[np.bool_]
+    scan_id: Int32
+    clear: Bool
 
     @property
     def views(self) -> Views:
@@ -75,7 +75,7 @@ class Sample:
         return self.seen.views
 
     @property
-    def telling(self) -> NDArray[np.bool_]:
+    def telling(self) -> Bool:
         """Points that say something of range and incidence: clear of the lining's foot and near the surface."""
         return self.clear & (np.abs(self.seen.offset) <= NEAR_SURFACE)
 
@@ -232,7 +232,7 @@ def roughness_of(view: Sample, drawn: list[Polygon]) -> Roughness:
     return find_roughness(regions)
 
 
-def _polygon_of(seen: Seen, polygons: list[Polygon]) -> NDArray[np.int64]:
+def _polygon_of(seen: Seen, polygons: list[Polygon]) -> Int64:
     """Number of the polygon that holds each point, -1 for none."""
     number = np.full(len(seen.chainage), -1, np.int64)
     usable = np.flatnonzero(seen.use)

@@ -8,26 +8,21 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from tunneldb.store.survey import Survey
-from tunneldb.errors import UserError
-from tunneldb.store.surface import load_surface
-from tunneldb.geometry.surface import Surface
-from tunneldb.radiometry.roughness import Roughness
-from tunneldb.store.range_curve import save_range_curve
-from tunneldb.pipeline.calibration import calibrate, dry_sigma, find_radiometer
-from tunneldb.store.scene import load_arcs
-from tunneldb.store.sources import Source, sources
+from tunneldb.anomalies.background.contrast import relative
+from tunneldb.anomalies.background.level_map import map_dry
 from tunneldb.anomalies.coverage import cover
 from tunneldb.anomalies.detect import detect as find_anomalies
-from tunneldb.anomalies.background.level_map import map_dry
-from tunneldb.raster.rasterize import Counts, gather
+from tunneldb.errors import UserError
+from tunneldb.geometry.surface import Surface
+from tunneldb.pipeline.calibration import calibrate, dry_sigma, find_radiometer
+from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.accumulator import KILOMETRE, Accumulator, Grid
-from tunneldb.store.anomalies import save_anomalies
-from tunneldb.raster.pixel_state import HIDDEN, Astray, Floor
-from tunneldb.raster.image import develop, halo
 from tunneldb.raster.geotiff import KINDS
-from tunneldb.anomalies.background.contrast import relative
+from tunneldb.raster.image import develop, halo
 from tunneldb.raster.observation import Eye
+from tunneldb.raster.pixel_state import HIDDEN, Astray, Floor
+from tunneldb.raster.rasterize import Counts, gather
+from tunneldb.store.anomalies import save_anomalies
 from tunneldb.store.images import (
     ImageStore,
     drop_coverage,
@@ -36,6 +31,11 @@ from tunneldb.store.images import (
     save_coverage,
     save_radiometry,
 )
+from tunneldb.store.range_curve import save_range_curve
+from tunneldb.store.scene import load_arcs
+from tunneldb.store.sources import Source, sources
+from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey
 
 ASIDE = 50.0
 """Length of the surface beyond the ends that is loaded too: sections are judged by the three before and after them, m."""

@@ -8,27 +8,26 @@ from typing import Any
 
 import numpy as np
 import psycopg
-from numpy.typing import NDArray
 from psycopg import sql
 
-from tunneldb.database.fetch import fetch_array
-from tunneldb.store.survey import Survey
-from tunneldb.errors import UserError
-from tunneldb.geometry.alignment import KILOMETRE
-from tunneldb.store.surface import load_surface
-from tunneldb.geometry.surface import Surface
-from tunneldb.classification.ground.wall_arcs import foot_arcs
+from tunneldb.arrays import Float
 from tunneldb.classification.classes import Klass
 from tunneldb.classification.classify import find_scene
 from tunneldb.classification.ground.extraction import MARGIN, GroundSettings, find_ground
-from tunneldb.geometry.plan_line import Line
-from tunneldb.classification.scene import Scene
+from tunneldb.classification.ground.wall_arcs import foot_arcs
 from tunneldb.classification.objects.objects import ClusterSettings
+from tunneldb.classification.scene import Scene
+from tunneldb.database.fetch import fetch_array
+from tunneldb.errors import UserError
+from tunneldb.geometry.alignment import KILOMETRE
+from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.surface import Surface
 from tunneldb.store.partition import partition, partition_exists
 from tunneldb.store.scene import line_of, load_spheres, save_clusters, save_ground, save_relief
+from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey
 
 Counts = dict[str, Any]
-Float = NDArray[np.float64]
 
 _XYZ: tuple[tuple[str, str, sql.Composable], ...] = tuple(
     (axis, "f8", sql.SQL("public.{}(geom)").format(sql.Identifier(f"st_{axis}"))) for axis in "xyz"

@@ -11,27 +11,26 @@ import numpy as np
 import psycopg
 from numpy.typing import NDArray
 
-from tunneldb.store.survey import Survey
+from tunneldb.arrays import Float, Int32, Single
 from tunneldb.errors import UserError
-from tunneldb.store.surface import load_surface
-from tunneldb.radiometry.incidence import incidence_cosine
-from tunneldb.radiometry.cells import Sight
-from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
-from tunneldb.radiometry.diagnosis import Look, pool
-from tunneldb.radiometry.oren_nayar import incidence_db
-from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
-from tunneldb.radiometry.reference_curve import ReferenceCurve
-from tunneldb.pipeline.detect import ASIDE, load_floor
 from tunneldb.pipeline.calibration import UNKNOWN, find_radiometer, find_range_curve, roughness_of, take_sample
-from tunneldb.store.sources import SAMPLE
-from tunneldb.raster.accumulator import KILOMETRE
-from tunneldb.raster.observation import Eye
-from tunneldb.store.images import load_reference, load_regions
+from tunneldb.pipeline.detect import ASIDE, load_floor
 from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_scans
 from tunneldb.pointcloud.reader import Points, read_chunks, read_header
 from tunneldb.pointcloud.thinning import thin
-
-Float = NDArray[np.float64]
+from tunneldb.radiometry.cells import Sight
+from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
+from tunneldb.radiometry.diagnosis import Look, pool
+from tunneldb.radiometry.incidence import incidence_cosine
+from tunneldb.radiometry.oren_nayar import incidence_db
+from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
+from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.raster.accumulator import KILOMETRE
+from tunneldb.raster.observation import Eye
+from tunneldb.store.images import load_reference, load_regions
+from tunneldb.store.sources import SAMPLE
+from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey
 
 THINNEST = 0.05
 """Edge of the voxels to which a scan is thinned before planes are fitted, m; more where it would hold too many points."""
@@ -258,7 +257,7 @@ def _stations(path: Path, scanner: tuple[float, float, float] | None) -> dict[in
 
 def _thinned(
     path: Path, dimension: str, progress: Callable[[float], None]
-) -> tuple[Float, NDArray[np.int32], NDArray[np.float32]]:
+) -> tuple[Float, Int32, Single]:
     """Coordinates, scan and raw intensity of a scan's points, each scan thinned to a point a voxel."""
     kept: list[Points] = []
     edge, count = THINNEST, 0
@@ -289,6 +288,6 @@ def _joined(parts: list[Points]) -> Points:
     return Points(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-def _some(numbers: NDArray[np.int32]) -> str:
+def _some(numbers: Int32) -> str:
     shown = ", ".join(map(str, numbers[:5].tolist()))
     return shown if len(numbers) <= 5 else f"{shown}, …"

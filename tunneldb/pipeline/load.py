@@ -11,21 +11,21 @@ from typing import Any
 
 import numpy as np
 import psycopg
-from numpy.typing import NDArray
 
-from tunneldb.store.survey import Survey
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import KILOMETRE, Alignment
-from tunneldb.store.surface import load_alignment
-from tunneldb.store.scan_files import COUNTED, Loaded, change_counts, outcome, recorded_files, unchanged
+from tunneldb.pipeline.load_settings import parameters_of, require_same_density, settings_of
+from tunneldb.pipeline.read import Begin, Counts, Reading, silent
+from tunneldb.pointcloud.reader import ScanHeader, read_header
+from tunneldb.pointcloud.selection import MEMORY, FilterSettings
+from tunneldb.pointcloud.spool import Spool
 from tunneldb.store.fragment import drop_fragments, read_fragment
 from tunneldb.store.ledger import Run, lock, stage_run
 from tunneldb.store.partition import partition_exists, read_partition, rows_in, swap_partition, write_partition
-from tunneldb.pipeline.read import Begin, Counts, Reading, silent
-from tunneldb.pipeline.load_settings import parameters_of, require_same_density, settings_of
-from tunneldb.pointcloud.selection import MEMORY, FilterSettings
-from tunneldb.pointcloud.reader import ScanHeader, read_header
-from tunneldb.pointcloud.spool import Spool
+from tunneldb.store.scan_files import COUNTED, Loaded, change_counts, outcome, recorded_files, unchanged
+from tunneldb.store.surface import load_alignment
+from tunneldb.store.survey import Survey
 
 __all__ = ["chainages_near", "header_kilometres", "load_files", "load_kilometre", "parameters_of", "settings_of"]
 
@@ -246,7 +246,7 @@ def header_kilometres(header: ScanHeader, alignment: Alignment, reach: float) ->
     return range(int(touched.min()), int(touched.max()) + 1) if len(touched) else range(0)
 
 
-def chainages_near(header: ScanHeader, alignment: Alignment, reach: float) -> NDArray[np.float64]:
+def chainages_near(header: ScanHeader, alignment: Alignment, reach: float) -> Float:
     """Chainages of the given axis' stations within the reach of the box in a file's header, in plan, m."""
     low, high = header.low[:2] - reach, header.high[:2] + reach
     inside = np.all((alignment.vertices[:, :2] >= low) & (alignment.vertices[:, :2] <= high), axis=1)

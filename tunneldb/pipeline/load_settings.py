@@ -7,9 +7,9 @@ from typing import Any
 
 import psycopg
 
-from tunneldb.store.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.selection import FilterSettings
+from tunneldb.store.survey import Survey
 
 
 def settings_of(parameters: Mapping[str, Any]) -> FilterSettings:

@@ -13,10 +13,14 @@ from typing import Any
 
 import psycopg
 
-from tunneldb.store.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import KILOMETRE, Alignment
-from tunneldb.store.surface import load_alignment
+from tunneldb.pipeline.load_settings import require_same_density
+from tunneldb.pointcloud.poses import PoseModel, load_poses
+from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
+from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
+from tunneldb.pointcloud.spool import Spool
+from tunneldb.store.fragment import drop_fragments, write_fragments
 from tunneldb.store.scan_files import (
     Content,
     Recorded,
@@ -27,12 +31,8 @@ from tunneldb.store.scan_files import (
     recorded_files,
     unchanged,
 )
-from tunneldb.store.fragment import drop_fragments, write_fragments
-from tunneldb.pipeline.load_settings import require_same_density
-from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
-from tunneldb.pointcloud.poses import PoseModel, load_poses
-from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
-from tunneldb.pointcloud.spool import Spool
+from tunneldb.store.surface import load_alignment
+from tunneldb.store.survey import Survey
 
 Counts = dict[str, Any]
 Begin = Callable[[str, int], Callable[[int], None]]

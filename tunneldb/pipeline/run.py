@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import psycopg
 
-from tunneldb.store.survey import Survey
 from tunneldb.errors import UserError
-from tunneldb.store.ledger import Run, stage_run
 from tunneldb.pipeline.parameters import check_together, of_stage, settings
 from tunneldb.pipeline.stages import STAGES, Progress, Stage
+from tunneldb.store.ledger import Run, stage_run
+from tunneldb.store.survey import Survey
 
 
 def km_range(text: str) -> range:

@@ -8,9 +8,9 @@ from typing import Any, LiteralString
 
 import psycopg
 
-from tunneldb.store.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.store.surface import load_alignment
+from tunneldb.store.survey import Survey
 
 FEW_POINTS = 10_000
 """A kilometre with fewer points than this, at the end of a tunnel, may be without a section of its own."""

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int64
 from tunneldb.csvfile import read_csv
 from tunneldb.errors import UserError
-from tunneldb.registration.control import Match, Motion, best_motion, match
 from tunneldb.pipeline.targets import Found
-
-Float = NDArray[np.float64]
-Int64 = NDArray[np.int64]
+from tunneldb.registration.control import Match, Motion, best_motion, match
 
 SAME_PLACE = 0.001  # m
 

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int32, Int64, Intp, Single, UInt8
 from tunneldb.geometry.alignment import KILOMETRE, Alignment
 from tunneldb.geometry.frame import frame_of, locate, nearest_segment, segment_rows, tangents
 from tunneldb.pointcloud.noise import CellCounts
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.spool import BINS_PER_METRE, ROW, Rows
-
-Float = NDArray[np.float64]
-Int32 = NDArray[np.int32]
-Int64 = NDArray[np.int64]
 
 # A distance in space is at most this many times as long in chainage: a point 25 m inside a curve of 75 m radius.
 STRETCHING = 1.5
@@ -63,7 +59,7 @@ class Places:
         first, last = ((chainage + slack) // KILOMETRE for slack in (-self.slack, self.slack))
         self.whole = np.concatenate([self.whole, first == last])
 
-    def outside(self, points: Points, cell: Int32) -> NDArray[np.intp]:
+    def outside(self, points: Points, cell: Int32) -> Intp:
         """Numbers of the points that lie beyond the ends of the axis or too far from it."""
         doubtful = np.flatnonzero(~self.near[cell])
         if len(doubtful) == 0:
@@ -140,8 +136,8 @@ def _span(number: Int64, cell: Int32, chainage: Float, block: int) -> tuple[Int6
 
 @njit(cache=True, nogil=True)
 def _fill(
-    rows: Rows, xyz: Float, time: Float, intensity: NDArray[np.float32], scan_id: Int32,
-    classification: NDArray[np.uint8], cell: Int32, picked: Int32, tag: Int32,
+    rows: Rows, xyz: Float, time: Float, intensity: Single, scan_id: Int32,
+    classification: UInt8, cell: Int32, picked: Int32, tag: Int32,
     segments: Float, number: Int64, spacing: float, segment: Int32,
 ) -> None:  # fmt: skip  # pragma: no cover - compiled
     for k in range(len(picked)):

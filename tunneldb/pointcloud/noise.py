@@ -25,12 +25,8 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Int32 = NDArray[np.int32]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
+from tunneldb.arrays import Bool, Float, Int32, Int64
 
 CELL = 0.5
 EXPECTED = 20

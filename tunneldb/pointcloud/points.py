@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pyproj import CRS
 
+from tunneldb.arrays import Float, Int32, Single, UInt8
+
 CHUNK = 1_000_000
 
 Ranges = Sequence[tuple[int, int]]
@@ -42,12 +44,12 @@ class Raw:
     x: NDArray[Any]
     y: NDArray[Any]
     z: NDArray[Any]
-    scales: NDArray[np.float64]
-    offsets: NDArray[np.float64]
-    time: NDArray[np.float64] | None
+    scales: Float
+    offsets: Float
+    time: Float | None
     scan_id: NDArray[Any]
     intensity: NDArray[Any] | None
-    classification: NDArray[np.uint8] | None
+    classification: UInt8 | None
 
     def __len__(self) -> int:
         return len(self.x)
@@ -85,11 +87,11 @@ class Points:
         Class code of the file; 0 where it has none.
     """
 
-    xyz: NDArray[np.float64]
-    time: NDArray[np.float64]
-    scan_id: NDArray[np.int32]
-    intensity: NDArray[np.float32]
-    classification: NDArray[np.uint8]
+    xyz: Float
+    time: Float
+    scan_id: Int32
+    intensity: Single
+    classification: UInt8
 
     def __len__(self) -> int:
         return len(self.xyz)
@@ -139,5 +141,5 @@ class ScanHeader:
     points: int
     dimensions: tuple[str, ...]
     crs: CRS | None
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    low: Float
+    high: Float

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import psycopg
 from numba import njit
-from numpy.typing import NDArray
 from psycopg import sql
 
+from tunneldb.arrays import Float, Int32, Int64
 from tunneldb.database.fetch import fetch_array
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.reader import Points
@@ -87,19 +87,19 @@ class PoseModel:
         Trajectory in growing time, s and m; empty for a static scanner.
     """
 
-    scan_id: NDArray[np.int64]
-    station: NDArray[np.float64]
-    time: NDArray[np.float64]
-    track: NDArray[np.float64]
+    scan_id: Int64
+    station: Float
+    time: Float
+    track: Float
 
     @classmethod
-    def from_stations(cls, scan_id: NDArray[np.int64], station: NDArray[np.float64]) -> PoseModel:
+    def from_stations(cls, scan_id: Int64, station: Float) -> PoseModel:
         """Static scanner: stations (k, 3) of the scans with these numbers (k,)."""
         order = np.argsort(scan_id)
         return cls(np.asarray(scan_id, np.int64)[order], np.asarray(station, np.float64)[order], np.empty(0), np.empty((0, 3)))
 
     @classmethod
-    def from_trajectory(cls, time: NDArray[np.float64], track: NDArray[np.float64]) -> PoseModel:
+    def from_trajectory(cls, time: Float, track: Float) -> PoseModel:
         """Mobile scanner: positions (m, 3) at these times (m,)."""
         order = np.argsort(time)
         return cls(
@@ -127,7 +127,7 @@ class PoseModel:
         known = np.isin(scans, self.scan_id)
         return PoseFaults(unknown=dict(zip(scans[~known].tolist(), counts[~known].tolist(), strict=True)))
 
-    def positions(self, points: Points, name: str = "scan") -> NDArray[np.float64]:
+    def positions(self, points: Points, name: str = "scan") -> Float:
         """Scanner position of each point.
 
         Parameters
@@ -177,7 +177,7 @@ def load_poses(conn: psycopg.Connection[Any], survey: Survey) -> PoseModel:
     return PoseModel.from_stations(rows["scan_id"].astype(np.int64), xyz)
 
 
-def _count_scans(scan_id: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _count_scans(scan_id: Int32) -> tuple[Int64, Int64]:
     low, high = int(scan_id.min()), int(scan_id.max())
     if high - low > 1_000_000:
         scans, counts = np.unique(scan_id, return_counts=True)
@@ -188,7 +188,7 @@ def _count_scans(scan_id: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def interval(time: NDArray[np.float64], wanted: float, hint: int) -> int:
+def interval(time: Float, wanted: float, hint: int) -> int:
     """Number of the last of growing times that is not later than the one wanted, or 0; looked for from a hint on."""
     last = len(time) - 1
     k = hint
@@ -201,7 +201,7 @@ def interval(time: NDArray[np.float64], wanted: float, hint: int) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def position_at(time: NDArray[np.float64], track: NDArray[np.float64], wanted: float, k: int) -> tuple[float, float, float]:
+def position_at(time: Float, track: Float, wanted: float, k: int) -> tuple[float, float, float]:
     """Place of the trajectory at a time in its interval ``k``."""
     j = min(k + 1, len(time) - 1)
     share = (wanted - time[k]) / (time[j] - time[k]) if j > k else 0.0
@@ -215,8 +215,8 @@ def position_at(time: NDArray[np.float64], track: NDArray[np.float64], wanted: f
 
 @njit(cache=True, nogil=True)
 def _interpolate(
-    time: NDArray[np.float64], track: NDArray[np.float64], wanted: NDArray[np.float64]
-) -> NDArray[np.float64]:  # pragma: no cover - compiled
+    time: Float, track: Float, wanted: Float
+) -> Float:  # pragma: no cover - compiled
     out = np.empty((len(wanted), 3))
     k = 0
     for i in range(len(wanted)):

@@ -11,8 +11,8 @@ from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_header
 from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.formats.las import read_las_header
-from tunneldb.pointcloud.points import CHUNK, Points, Ranges, ScanHeader
 from tunneldb.pointcloud.formats.raw import read_raw
+from tunneldb.pointcloud.points import CHUNK, Points, Ranges, ScanHeader
 
 __all__ = ["CHUNK", "Points", "ScanHeader", "check_header", "read_chunks", "read_header"]
 

@@ -14,20 +14,20 @@ from pathlib import Path
 import laspy
 import numpy as np
 from laspy import DecompressionSelection, LazBackend
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int64, UInt8
 from tunneldb.errors import UserError
-from tunneldb.threads import threads
 from tunneldb.pointcloud.formats.e57 import is_e57
 from tunneldb.pointcloud.formats.e57_records import E57Records
 from tunneldb.pointcloud.formats.faults import decoding
-from tunneldb.pointcloud.formats.las_header import Head, read_head
 from tunneldb.pointcloud.formats.las import KIND, read_las_header
+from tunneldb.pointcloud.formats.las_header import Head, read_head
+from tunneldb.pointcloud.formats.las_records import FORMAT_OF, Bytes, coordinates, fields, record_size, upgraded
 from tunneldb.pointcloud.formats.laz import writing
 from tunneldb.pointcloud.points import CHUNK
-from tunneldb.pointcloud.formats.las_records import FORMAT_OF, Bytes, coordinates, fields, record_size, upgraded
+from tunneldb.threads import threads
 
-Classes = Callable[[NDArray[np.float64]], NDArray[np.uint8]]
+Classes = Callable[[Float], UInt8]
 """Gives points (n, 3) their classes (n,)."""
 
 
@@ -50,7 +50,7 @@ def rewrite(
     names: Mapping[int, str],
     progress: Callable[[int], None] = lambda count: None,
     size: int = CHUNK,
-) -> NDArray[np.int64]:
+) -> Int64:
     """Write a scan file again, each point with the class that it is given.
 
     Parameters
@@ -94,7 +94,7 @@ def rewrite(
     return counts
 
 
-def read_coordinates(path: Path, size: int = CHUNK) -> Iterator[NDArray[np.float64]]:
+def read_coordinates(path: Path, size: int = CHUNK) -> Iterator[Float]:
     """Read the coordinates (n, 3) of a scan file's points, m, chunk by chunk, and nothing else of them.
 
     Raises

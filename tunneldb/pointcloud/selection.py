@@ -15,20 +15,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import KILOMETRE, Alignment
-from tunneldb.threads import threads
-from tunneldb.pointcloud.prefetch import in_order, prefetch
-from tunneldb.pointcloud.noise import DIAMETER, POINTS, CellCounts, is_noise, search_radii
 from tunneldb.pointcloud.chainage_lookup import STRETCHING, Places
+from tunneldb.pointcloud.noise import DIAMETER, POINTS, CellCounts, is_noise, search_radii
 from tunneldb.pointcloud.points import CHUNK, Points
 from tunneldb.pointcloud.poses import PoseFaults, PoseModel
+from tunneldb.pointcloud.prefetch import in_order, prefetch
 from tunneldb.pointcloud.reader import read_chunks
 from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, PLACE, Rows, Spool, bin_of, rows_xyz, windows
 from tunneldb.pointcloud.thinning import first_of_voxels, pick, voxel_edge
+from tunneldb.threads import threads
 
 Progress = Callable[[int], None]
 
@@ -90,7 +90,7 @@ class FilterCounts:
     noise: int = 0
     kept: int = 0
     chainage: tuple[float, float] = (math.inf, -math.inf)
-    extent: NDArray[np.float64] = field(default_factory=lambda: np.array([np.inf] * 3 + [-np.inf] * 3))
+    extent: Float = field(default_factory=lambda: np.array([np.inf] * 3 + [-np.inf] * 3))
     ranges: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
 
     @property
@@ -98,7 +98,7 @@ class FilterCounts:
         """Points that thinning left out."""
         return self.points - self.outside - self.noise - self.kept
 
-    def locate(self, blocks: NDArray[np.int64], low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
+    def locate(self, blocks: Int64, low: Float, high: Float) -> None:
         """Note where in the file kilometres are: blocks of BLOCK points, with the chainage from and to of each, m."""
         lowest, highest = (np.floor(ends / KILOMETRE).astype(int).tolist() for ends in (low - MARGIN, high + MARGIN))
         for block, first, last in zip(blocks.tolist(), lowest, highest, strict=True):
@@ -244,7 +244,7 @@ class _Filter:
             self.cloud.add(points.xyz.view(PLACE).ravel(), self.places.bin[cell])
         return points
 
-    def _pick(self, points: Points, cell: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    def _pick(self, points: Points, cell: Int32) -> tuple[Int32, Bool]:
         if self.settings.edge is None or self.cells.counts[cell].mean() < FEW:
             return np.arange(len(points), dtype=np.int32), np.zeros(len(points), np.bool_)
         return pick(
@@ -275,7 +275,7 @@ class _Filter:
             yield rows
         progress(counts.outside)
 
-    def _judge(self, low: int, high: int, reach: int, radii: NDArray[np.float64]) -> tuple[int, Rows]:
+    def _judge(self, low: int, high: int, reach: int, radii: Float) -> tuple[int, Rows]:
         """Noise of a window, counted, and the rows that stay."""
         edge = self.settings.edge
         margin = 0 if edge is None else math.ceil(voxel_reach(edge) * BINS_PER_METRE)
@@ -284,7 +284,7 @@ class _Filter:
         wide = margin + reach + self.places.bins_off
         good = rows["tag"] == CERTAIN
 
-        def judge(doubtful: NDArray[np.bool_]) -> None:
+        def judge(doubtful: Bool) -> None:
             chosen = np.flatnonzero(doubtful)
             if len(chosen):
                 cloud = self.cloud.read(low - wide, high + wide)["xyz"]
@@ -309,7 +309,7 @@ class _Filter:
         return int((noise & inside).sum()), rows[stays & inside]
 
 
-def _widest(stretch: NDArray[np.int64], radii: NDArray[np.float64]) -> tuple[int, NDArray[np.float64]]:
+def _widest(stretch: Int64, radii: Float) -> tuple[int, Float]:
     """Widest radius in each stretch from the first on."""
     first = int(stretch.min())
     widest = np.zeros(int(stretch.max()) - first + 1)
@@ -317,7 +317,7 @@ def _widest(stretch: NDArray[np.int64], radii: NDArray[np.float64]) -> tuple[int
     return first, widest
 
 
-def _reach(low: int, high: int, widest: tuple[int, NDArray[np.float64]]) -> int:
+def _reach(low: int, high: int, widest: tuple[int, Float]) -> int:
     """Bins beyond a window in which its points may have neighbours."""
     first, radii = widest
     # A point's cell may have its centre in the next stretch.

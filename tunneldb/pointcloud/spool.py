@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int64, Intp
 from tunneldb.errors import UserError
 
 # One row a point. `tag` is the noise filter's cell while a file is filtered, its file's number afterwards.
@@ -40,12 +41,12 @@ BINS_PER_METRE = 8
 BINS_PER_KM = 1000 * BINS_PER_METRE
 
 
-def bin_of(chainage: NDArray[np.float64]) -> NDArray[np.int64]:
+def bin_of(chainage: Float) -> Int64:
     """Bin of each chainage (m)."""
     return np.floor(chainage * BINS_PER_METRE).astype(np.int64)
 
 
-def rows_xyz(rows: Rows, chosen: NDArray[np.intp]) -> NDArray[np.float64]:
+def rows_xyz(rows: Rows, chosen: Intp) -> Float:
     """Coordinates (n, 3) of the chosen rows (n,)."""
     xyz = np.empty((len(chosen), 3))
     for column, name in enumerate("xyz"):
@@ -58,7 +59,7 @@ class _Run:
     """Rows in order of their bins: bin first + k begins at start[k]."""
 
     first: int
-    start: NDArray[np.int64]
+    start: Int64
     rows: Rows | None
     offset: int
 
@@ -97,7 +98,7 @@ class Spool:
             self._file.close()
         self._runs.clear()
 
-    def add(self, rows: Rows, bins: NDArray[np.int64] | None = None) -> None:
+    def add(self, rows: Rows, bins: Int64 | None = None) -> None:
         """Set rows aside, in these bins; without, in those of their chainage.
 
         Raises
@@ -117,7 +118,7 @@ class Spool:
             self._held += rows.nbytes
         self._runs.append(run)
 
-    def counts(self) -> tuple[int, NDArray[np.int64]]:
+    def counts(self) -> tuple[int, Int64]:
         """First bin, and the number of rows in each bin from it on."""
         if not self._runs:
             return 0, np.zeros(0, np.int64)
@@ -128,7 +129,7 @@ class Spool:
             total[run.first - first : run.first - first + len(run.start) - 1] += np.diff(run.start)
         return first, total
 
-    def counts_of(self, low: int, high: int) -> NDArray[np.int64]:
+    def counts_of(self, low: int, high: int) -> Int64:
         """Number of rows in each of the bins low ≤ bin < high."""
         first, counts = self.counts()
         found = np.zeros(high - low, np.int64)
@@ -180,7 +181,7 @@ class Spool:
         self._spilt += int(run.start[-1]) * self.dtype.itemsize
 
 
-def windows(first: int, counts: NDArray[np.int64], limit: int) -> Iterator[tuple[int, int]]:
+def windows(first: int, counts: Int64, limit: int) -> Iterator[tuple[int, int]]:
     """Cut a range of bins into windows.
 
     Parameters
@@ -230,8 +231,8 @@ def _write_all(file: IO[bytes], view: memoryview) -> None:
 
 @njit(cache=True, nogil=True)
 def _sort_by_bin(
-    rows: Rows, bins: NDArray[np.int64], first: int, count: int
-) -> tuple[Rows, NDArray[np.int64]]:  # pragma: no cover - compiled
+    rows: Rows, bins: Int64, first: int, count: int
+) -> tuple[Rows, Int64]:  # pragma: no cover - compiled
     start = np.zeros(count + 1, np.int64)
     for i in range(len(bins)):
         start[bins[i] - first + 1] += 1

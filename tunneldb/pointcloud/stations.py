@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int32
 from tunneldb.csvfile import read_csv
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_scans
@@ -29,14 +29,14 @@ class Stations:
         Position, m.
     """
 
-    scan_id: NDArray[np.int32]
-    xyz: NDArray[np.float64]
+    scan_id: Int32
+    xyz: Float
 
 
 @dataclass(frozen=True)
 class _Station:
     scan_id: int
-    place: NDArray[np.float64] | None
+    place: Float | None
     origin: str
 
 

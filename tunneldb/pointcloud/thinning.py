@@ -16,13 +16,9 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float, Int32, Single, UInt8
 from tunneldb.pointcloud.spool import ROW, Rows
-
-Float = NDArray[np.float64]
-Int32 = NDArray[np.int32]
-Bool = NDArray[np.bool_]
 
 CUTS = 1.5
 
@@ -142,7 +138,7 @@ def _before(rows: Rows, edge: float, i: int, j: int) -> bool:  # pragma: no cove
 
 @njit(cache=True, nogil=True)
 def pick(
-    rows_xyz: Float, time: Float, intensity: NDArray[np.float32], scan_id: Int32, classification: NDArray[np.uint8],
+    rows_xyz: Float, time: Float, intensity: Single, scan_id: Int32, classification: UInt8,
     whole: Bool, edge: float, limit: float, points: int, slots: int,
 ) -> tuple[Int32, Bool]:  # fmt: skip  # pragma: no cover - compiled
     """Of a chunk of points, those that may be the first good one of their voxel.

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Index = NDArray[np.int64]
-Count = NDArray[np.uint32]
+from tunneldb.arrays import Float, Int64, UInt32, UInt64
 
 _BITS = 21  # of a voxel's number along each axis
 _HALF = 1 << (_BITS - 1)
@@ -34,7 +31,7 @@ class Voxels:
         if not edge > 0.0:
             raise ValueError(f"edge of a voxel is {edge:g} m: it must be above 0")
         self.edge = edge
-        self._base: Index | None = None
+        self._base: Int64 | None = None
         self._size = 0
         self._key = np.empty(_ROOM, np.int64)
         self._count = np.zeros(_ROOM, np.uint32)
@@ -79,7 +76,7 @@ class Voxels:
         _centroids(self._key[:n], self._count[:n], self._sum[:n], self.edge, self._base, out)
         return out
 
-    def counts(self) -> Index:
+    def counts(self) -> Int64:
         """Number of points in each voxel, (n,)."""
         return self._count[: self._size].astype(np.int64)
 
@@ -91,7 +88,7 @@ class Voxels:
         variance = self._square[:n] / count - mean * mean
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)) * (self.edge / _FINE))
 
-    def index(self, xyz: Float) -> Index:
+    def index(self, xyz: Float) -> Int64:
         """Number of the voxel that holds each of the points (n, 3), -1 where there is none."""
         points = np.asarray(xyz, dtype=np.float64)
         out = np.full(len(points), -1, np.int64)
@@ -116,7 +113,7 @@ class Voxels:
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _key_of(x: float, y: float, z: float, edge: float, base: Index) -> int:
+def _key_of(x: float, y: float, z: float, edge: float, base: Int64) -> int:
     """Number of a point's voxel, -1 beyond what can be numbered, -2 where the point is not finite."""
     fx, fy, fz = np.floor(x / edge), np.floor(y / edge), np.floor(z / edge)
     if not (np.isfinite(fx) and np.isfinite(fy) and np.isfinite(fz)):
@@ -129,7 +126,7 @@ def _key_of(x: float, y: float, z: float, edge: float, base: Index) -> int:
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _slot(key: int, keys: Index, table: Count) -> int:
+def _slot(key: int, keys: Int64, table: UInt32) -> int:
     """Slot of the table that holds a key, or the empty one where it belongs."""
     mask = np.uint64(table.shape[0] - 1)
     h = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
@@ -141,8 +138,8 @@ def _slot(key: int, keys: Index, table: Count) -> int:
 
 @njit(cache=True, nogil=True)
 def _add(
-    points: Float, edge: float, base: Index, size: int, keys: Index, count: Count, total: Count,
-    square: NDArray[np.uint64], table: Count,
+    points: Float, edge: float, base: Int64, size: int, keys: Int64, count: UInt32, total: UInt32,
+    square: UInt64, table: UInt32,
 ) -> tuple[int, int]:  # pragma: no cover - compiled  # fmt: skip
     """Add points until there is no room for another voxel: how many, and the number of voxels; -1: out of bounds."""
     for n in range(points.shape[0]):
@@ -173,14 +170,14 @@ def _add(
 
 
 @njit(cache=True, nogil=True)
-def _rehash(keys: Index, size: int, table: Count) -> None:  # pragma: no cover - compiled
+def _rehash(keys: Int64, size: int, table: UInt32) -> None:  # pragma: no cover - compiled
     for i in range(size):
         table[_slot(keys[i], keys, table)] = np.uint32(i)
 
 
 @njit(cache=True, nogil=True, parallel=True)
 def _centroids(
-    keys: Index, count: Count, total: Count, edge: float, base: Index, out: Float
+    keys: Int64, count: UInt32, total: UInt32, edge: float, base: Int64, out: Float
 ) -> None:  # pragma: no cover - compiled
     mask = (1 << _BITS) - 1
     for n in prange(keys.shape[0]):
@@ -192,7 +189,7 @@ def _centroids(
 
 @njit(cache=True, nogil=True, parallel=True)
 def _index(
-    points: Float, edge: float, base: Index, keys: Index, table: Count, out: Index
+    points: Float, edge: float, base: Int64, keys: Int64, table: UInt32, out: Int64
 ) -> None:  # pragma: no cover - compiled
     for n in prange(points.shape[0]):
         key = _key_of(points[n, 0], points[n, 1], points[n, 2], edge, base)

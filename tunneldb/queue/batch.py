@@ -13,10 +13,8 @@ import psycopg
 from psycopg.rows import class_row
 from psycopg.types.json import Jsonb
 
-from tunneldb.store.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import KILOMETRE, Alignment
-from tunneldb.store.surface import load_alignment
 from tunneldb.pipeline.load import chainages_near, header_kilometres, parameters_of, settings_of
 from tunneldb.pipeline.run import loaded_kilometres
 from tunneldb.pipeline.stages import STAGES
@@ -24,6 +22,8 @@ from tunneldb.pointcloud.formats.e57 import is_e57
 from tunneldb.pointcloud.formats.las_bounds import header_box
 from tunneldb.pointcloud.poses import load_poses
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
+from tunneldb.store.surface import load_alignment
+from tunneldb.store.survey import Survey
 
 STEPS = ("load", *(stage.name for stage in STAGES))
 """Stages of a kilometre, in their order."""

@@ -15,12 +15,12 @@ from procrastinate.jobs import Job as QueueJob
 from procrastinate.jobs import Status
 from procrastinate.manager import JobManager
 
-from tunneldb.store.survey import Survey, get_survey
-from tunneldb.errors import UserError
-from tunneldb.store.ledger import Job, LostError, describe, stage_run
-from tunneldb.pipeline.parameters import of_stage, settings
 from tunneldb.database.session import CONNECT, SETTINGS, worker_session
+from tunneldb.errors import UserError
+from tunneldb.pipeline.parameters import of_stage, settings
 from tunneldb.pipeline.stages import STAGES
+from tunneldb.store.ledger import Job, LostError, describe, stage_run
+from tunneldb.store.survey import Survey, get_survey
 
 QUEUE = "tunneldb"
 log = logging.getLogger("tunneldb.worker")
@@ -145,9 +145,9 @@ def _survey(conn: psycopg.Connection[Any], survey_id: int) -> Survey:
 
 
 def _read(conn: psycopg.Connection[Any], job: Job, survey_id: int, name: str) -> None:
-    from tunneldb.queue.batch import give_up_file
     from tunneldb.pipeline.load import settings_of
     from tunneldb.pipeline.read import read_file
+    from tunneldb.queue.batch import give_up_file
 
     survey = _survey(conn, survey_id)
     row = conn.execute(

@@ -16,11 +16,11 @@ from typing import Any
 import psycopg
 
 from tunneldb.database.server import Server
-from tunneldb.store.survey import Survey
-from tunneldb.store.surface import load_alignment
-from tunneldb.queue.batch import STEPS, Plan, extent
 from tunneldb.pipeline.parameters import PARAMETERS
 from tunneldb.pointcloud.reader import read_header
+from tunneldb.queue.batch import STEPS, Plan, extent
+from tunneldb.store.surface import load_alignment
+from tunneldb.store.survey import Survey
 
 ROW_BYTES = 118.0
 """Of the points' table with its index, per row."""

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.radiometry.oren_nayar import incidence_db
 from tunneldb.radiometry.range_spline import RangeSpline
-
-Float = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 CELL = 0.5
 """Side of a cell, m: the lining in it is of one reflectance."""
@@ -55,17 +53,17 @@ class Cells:
         Place of each cell in the unrolled plane, in cells from the first along and across; -1 without one.
     """
 
-    cell: Index
+    cell: Int64
     basis: Float
     incidence: Float
     level: Float
     aside: Float
     weight: Float
-    stretch: Index
-    ring: Index
-    alike: Index
-    row: Index
-    column: Index
+    stretch: Int64
+    ring: Int64
+    alike: Int64
+    row: Int64
+    column: Int64
 
     @property
     def count(self) -> int:
@@ -106,7 +104,7 @@ class Sight:
     cosine: Float
     level: Float
 
-    def some(self, chosen: NDArray[np.bool_]) -> Sight:
+    def some(self, chosen: Bool) -> Sight:
         """The chosen points."""
         return Sight(self.place[chosen], self.scan[chosen], self.range_m[chosen], self.cosine[chosen], self.level[chosen])
 
@@ -139,12 +137,12 @@ def group(sight: Sight, spline: RangeSpline, *, unrolled: bool) -> Cells:
     )
 
 
-def _places(along: Float) -> Index:
-    at: Index = np.floor(along / CELL).astype(np.int64)
+def _places(along: Float) -> Int64:
+    at: Int64 = np.floor(along / CELL).astype(np.int64)
     return at - at.min() if len(at) else at
 
 
-def _number(keys: Index) -> tuple[Index, Index]:
+def _number(keys: Int64) -> tuple[Int64, Int64]:
     """Number of each row's (n, m) like among all different ones, from 0, and one row of each."""
     if len(keys) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)

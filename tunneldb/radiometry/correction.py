@@ -14,14 +14,11 @@ from typing import Literal, get_args
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float, Single
 from tunneldb.errors import UserError
 from tunneldb.radiometry.oren_nayar import coefficients
 from tunneldb.radiometry.reference_curve import SPAN_TOLERANCE, ReferenceCurve
-
-Float = NDArray[np.float64]
-Single = NDArray[np.float32]
 
 Kind = Literal["amplitude", "reflectance", "linear"]
 """What the raw intensity is: dB that fall with range, dB from which the maker removed range, or counts."""
@@ -112,7 +109,7 @@ def observe(points: Float, scanner: Float, normal: Float, raw: Single, kind: Kin
     return Views(*_observe(points, scanner, normal, raw.astype(np.float32, copy=False), kind == "linear", knots, values))
 
 
-def range_span(views: Views, use: NDArray[np.bool_], reference: ReferenceCurve) -> tuple[float, float, int, int]:
+def range_span(views: Views, use: Bool, reference: ReferenceCurve) -> tuple[float, float, int, int]:
     """Nearest and farthest range (m) of the points to use, how many are outside the curve's span, and all."""
     nearest, farthest, outside, count = _range_span(
         views.range_m, use, reference.range_m[0] - SPAN_TOLERANCE, reference.range_m[-1] + SPAN_TOLERANCE
@@ -186,7 +183,7 @@ def _corrected(distance_db: Single, cosine: Single, a: float, b: float) -> Singl
 
 @njit(cache=True, nogil=True)
 def _range_span(
-    range_m: Single, use: NDArray[np.bool_], low: float, high: float
+    range_m: Single, use: Bool, low: float, high: float
 ) -> tuple[float, float, int, int]:  # pragma: no cover - compiled
     nearest, farthest = np.inf, -np.inf
     outside, count = 0, 0

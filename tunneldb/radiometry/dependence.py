@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int64, Intp
 from tunneldb.radiometry.roughness import NOTICEABLE
-
-Float = NDArray[np.float64]
 
 CLASSES = 40
 """Classes over the range of values, at the most; each of at least FEWEST points."""
@@ -42,7 +40,7 @@ class Course:
     low: Float
     middle: Float
     high: Float
-    points: NDArray[np.int64]
+    points: Int64
 
     @property
     def slope(self) -> float:
@@ -83,7 +81,7 @@ def course(at: Float, level: Float) -> Course:
     return Course(table[:, 0], table[:, 1], table[:, 2], table[:, 3], table[:, 4].astype(np.int64))
 
 
-def _by_class(number: NDArray[np.intp], level: Float) -> list[tuple[int, Float]]:
+def _by_class(number: Intp, level: Float) -> list[tuple[int, Float]]:
     order = np.argsort(number, kind="stable")
     there, first = np.unique(number[order], return_index=True)
     return list(zip(there.tolist(), np.split(level[order], first[1:]), strict=True))

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.radiometry.dependence import Dependence
 from tunneldb.radiometry.range_curve import RangeCurve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

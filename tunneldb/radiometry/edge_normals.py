@@ -12,11 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.surface import Surface, Unrolled
-
-Float = NDArray[np.float64]
 
 BEND = np.cos(np.radians(25.0))
 """The surface bends sharply where its normals 0.3 m to the left and to the right differ by more than 25°."""
@@ -42,7 +40,7 @@ class Edges:
     first: float
     feet: Float
     normals: Float
-    sharp: NDArray[np.bool_]
+    sharp: Bool
 
     @classmethod
     def of(cls, surface: Surface, start: float, stop: float) -> Edges:
@@ -81,7 +79,7 @@ class Edges:
 
 @njit(cache=True, nogil=True, forceinline=True)
 def face_at(
-    start: float, first: float, sharp: NDArray[np.bool_], chainage: float, arc: float
+    start: float, first: float, sharp: Bool, chainage: float, arc: float
 ) -> tuple[int, int]:  # pragma: no cover - compiled
     """Node of the grid nearest to a place of the unrolled plane, (-1, -1) where the surface doesn't bend sharply."""
     k = int(np.floor((chainage - start) / _ALONG + 0.5))
@@ -115,7 +113,7 @@ def _normals(
     first: float,
     feet: Float,
     normals: Float,
-    sharp: NDArray[np.bool_],
+    sharp: Bool,
 ) -> Float:  # pragma: no cover - compiled
     out = normal.copy()
     for i in prange(points.shape[0]):

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-Float = NDArray[np.float64]
+from tunneldb.arrays import Float
 
 NEIGHBOURS = 20
 """Points to which a plane is fitted, itself included."""

@@ -7,9 +7,8 @@ formulas of this module.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from tunneldb.arrays import Float
 
 
 def coefficients(roughness: float) -> tuple[float, float]:

@@ -22,16 +22,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
 from tunneldb.radiometry.cells import CELL, Cells, Sight, group
-from tunneldb.radiometry.regression import Fit, fit
-from tunneldb.radiometry.reference_curve import ReferenceCurve
-from tunneldb.radiometry.roughness import STEEPEST
 from tunneldb.radiometry.range_spline import RangeSpline
-
-Float = NDArray[np.float64]
+from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.radiometry.regression import Fit, fit
+from tunneldb.radiometry.roughness import STEEPEST
 
 MOST_UNCERTAIN = 0.3
 """Largest standard deviation of a curve that is used, dB: less than one of dry lining (Xu et al., 2018, Table 1)."""
@@ -94,7 +92,7 @@ class RangeCurve:
         return float(sigma.max()), float(self.curve.range_m[np.argmax(sigma)])
 
     @property
-    def present(self) -> NDArray[np.bool_]:
+    def present(self) -> Bool:
         """Rows of the curve within the ranges present; beyond them it goes on by its slope."""
         return np.asarray((self.curve.range_m >= self.nearest) & (self.curve.range_m <= self.farthest))
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.optimize import nnls
 
-Float = NDArray[np.float64]
+from tunneldb.arrays import Float
 
 STEP = np.log(1.35)
 """Distance of knots over ln R: the course of a scanner's intensity (Xu et al., 2018, Fig. 3) bends over a factor of 5."""

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
-
-Float = NDArray[np.float64]
 
 SPAN_TOLERANCE = 0.05
 """By how much a range may lie outside the curve's span, m; there the curve is held at its end value."""
@@ -60,7 +58,7 @@ class ReferenceCurve:
         """Intensity of the target at the given ranges (m), dB (eq. 9); beyond the ends, the end values."""
         return np.interp(ranges, self.range_m, self.intensity_db)
 
-    def outside(self, ranges: Float) -> NDArray[np.bool_]:
+    def outside(self, ranges: Float) -> Bool:
         """Which ranges (m) lie outside the curve's span by more than SPAN_TOLERANCE."""
         low, high = self.range_m[0] - SPAN_TOLERANCE, self.range_m[-1] + SPAN_TOLERANCE
         return np.asarray((ranges < low) | (ranges > high), dtype=np.bool_)

@@ -13,14 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal
 from scipy.interpolate import CubicSpline
 
+from tunneldb.arrays import Float
 from tunneldb.radiometry.cells import CELL, ROUGHNESS, STRETCH, Cells, Index
 from tunneldb.radiometry.range_spline import RangeSpline, one_maximum
-
-Float = NDArray[np.float64]
 
 TUKEY = 4.685
 """Residuals of so many standard deviations have no weight: 95 % efficient on normal ones (Holland and Welsch, 1977)."""

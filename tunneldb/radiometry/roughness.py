@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tunneldb.radiometry.robust_statistics import robust_statistics
+from tunneldb.arrays import Float, Int64, Intp
 from tunneldb.radiometry.oren_nayar import incidence_db
-
-Float = NDArray[np.float64]
+from tunneldb.radiometry.robust_statistics import robust_statistics
 
 CELL = 0.2
 """Side of an automatic region, m."""
@@ -55,7 +54,7 @@ class Regions:
 
     cosine: Float
     distance_db: Float
-    points: NDArray[np.int64]
+    points: Int64
 
     def __len__(self) -> int:
         """Return the number of regions."""
@@ -226,8 +225,8 @@ def drawn_regions(
 
 
 def _group(
-    keys: NDArray[np.int64], cosine: NDArray[np.floating], level: NDArray[np.floating]
-) -> tuple[NDArray[np.intp], Regions, Float]:
+    keys: Int64, cosine: NDArray[np.floating], level: NDArray[np.floating]
+) -> tuple[Intp, Regions, Float]:
     """Average points of the same key; return one point of each group, the groups, and each one's spread."""
     count = len(keys)
     order = np.lexsort(keys.T[::-1])
@@ -242,11 +241,11 @@ def _group(
     return order[start], Regions(mean_cosine, mean, points), spread
 
 
-def _take(regions: Regions, index: NDArray[np.intp]) -> Regions:
+def _take(regions: Regions, index: Intp) -> Regions:
     return Regions(regions.cosine[index], regions.distance_db[index], regions.points[index])
 
 
-def _nearest_to_dry_level(cells: NDArray[np.intp], level: Float) -> NDArray[np.intp]:
+def _nearest_to_dry_level(cells: Intp, level: Float) -> Intp:
     """Of the cells of one incidence class those nearest to its dry level."""
     if len(cells) < MIN_CLASS_CELLS:
         return cells[:0]

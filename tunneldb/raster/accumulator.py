@@ -18,15 +18,11 @@ from typing import BinaryIO
 import numpy as np
 from affine import Affine
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float, Int32, Single, Whole
 from tunneldb.errors import UserError
-from tunneldb.threads import threads
 from tunneldb.raster.projection import WEIGHT, Pixels
-
-Float = NDArray[np.float64]
-Single = NDArray[np.float32]
-Whole = NDArray[np.int32] | NDArray[np.int64]
+from tunneldb.threads import threads
 
 KILOMETRE = 1000.0
 BLOCK = 50.0
@@ -142,7 +138,7 @@ class Grid:
             self.pixel, 0.0, self.west + column * self.pixel, 0.0, -self.pixel, (self.bottom + self.rows) * self.pixel
         )
 
-    def place(self, chainage: Float, arc: Float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    def place(self, chainage: Float, arc: Float) -> tuple[Int32, Int32]:
         """Row and column of places (n,) in the unrolled plane, m; column -1 outside the grid."""
         with np.errstate(invalid="ignore"):
             column = np.floor((chainage - self.west) / self.pixel)
@@ -150,7 +146,7 @@ class Grid:
             held = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
         return np.where(held, row, 0).astype(np.int32), np.where(held, column, -1).astype(np.int32)
 
-    def pick(self, mask: NDArray[np.bool_], chainage: Float, arc: Float) -> NDArray[np.bool_]:
+    def pick(self, mask: Bool, chainage: Float, arc: Float) -> Bool:
         """Value of a mask (rows, columns) at places (n,) in the unrolled plane; False outside the grid."""
         row, column = self.place(chainage, arc)
         return np.asarray((column >= 0) & mask[row, column], dtype=np.bool_)
@@ -317,7 +313,7 @@ class Accumulator:
 
 
 @njit(cache=True, nogil=True)
-def _touched(column: NDArray[np.int32], width: int, blocks: int) -> NDArray[np.bool_]:  # pragma: no cover - compiled
+def _touched(column: Int32, width: int, blocks: int) -> Bool:  # pragma: no cover - compiled
     """Which blocks points fall into."""
     touched = np.zeros(blocks, np.bool_)
     first, stop = 0, 0  # columns of the block that the point before fell into
@@ -332,10 +328,10 @@ def _touched(column: NDArray[np.int32], width: int, blocks: int) -> NDArray[np.b
 @njit(cache=True, nogil=True, parallel=True)
 def _add(
     sums: Whole,
-    row: NDArray[np.int32],
-    column: NDArray[np.int32],
+    row: Int32,
+    column: Int32,
     first: int,
-    weight: NDArray[np.int32],
+    weight: Int32,
     offset: Single,
     raw: Single,
     corrected: Single,

@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-Single = NDArray[np.float32]
-Mask = NDArray[np.bool_]
+from tunneldb.arrays import Bool, Int32, Single
 
 DELTA = 0.03
 """Distance from the plane from which a pixel is an appendage (eq. 23), m."""
@@ -62,7 +60,7 @@ def distance_from_plane(offset: Single, pixel: float, corner: tuple[int, int] = 
     return distance
 
 
-def recessed(offset: Single, distance: Single, pixel: float, delta: float = DELTA) -> Mask:
+def recessed(offset: Single, distance: Single, pixel: float, delta: float = DELTA) -> Bool:
     """Mark pixels behind their plane that lie on a surface there: the back of a niche or of a bolt pocket.
 
     About such a pixel, over 0.1 m, those with points lie on one slope of up to 45°, within δ; one may be an outlier. So
@@ -77,11 +75,11 @@ def recessed(offset: Single, distance: Single, pixel: float, delta: float = DELT
     delta : float
         δ, m.
     """
-    marked: Mask = _recessed(offset, distance, delta, _growth(pixel), pixel)
+    marked: Bool = _recessed(offset, distance, delta, _growth(pixel), pixel)
     return marked
 
 
-def off_plane(distance: Single, recess: Mask, pixel: float, delta: float = DELTA) -> Mask:
+def off_plane(distance: Single, recess: Bool, pixel: float, delta: float = DELTA) -> Bool:
     """Mark pixels that lie neither on their plane (eq. 23) nor in a recess, grown to swallow the mixed pixels of their edges.
 
     Parameters
@@ -95,7 +93,7 @@ def off_plane(distance: Single, recess: Mask, pixel: float, delta: float = DELTA
     delta : float
         δ, m.
     """
-    marked: Mask = _grown(distance, recess, delta, _growth(pixel), _look(pixel))
+    marked: Bool = _grown(distance, recess, delta, _growth(pixel), _look(pixel))
     return marked
 
 
@@ -220,7 +218,7 @@ def _bin(z: np.float32) -> int:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True)
-def _level(counts: NDArray[np.int32]) -> float:  # pragma: no cover - compiled
+def _level(counts: Int32) -> float:  # pragma: no cover - compiled
     """Offset near which most samples lie, those near the section surface counting more."""
     best, level = 0.0, 0.0
     for k in range(2 * _BINS + 1):
@@ -291,7 +289,7 @@ def _weighted(
 @njit(cache=True, nogil=True)
 def _recessed(
     offset: Single, distance: Single, delta: float, half: int, steepest: float
-) -> Mask:  # pragma: no cover - compiled
+) -> Bool:  # pragma: no cover - compiled
     rows, columns = offset.shape
     out = np.zeros((rows, columns), np.bool_)
     enough = _SUPPORT * (2 * half + 1) ** 2
@@ -333,7 +331,7 @@ def _goes_on(distance: Single, i: int, j: int, delta: float, look: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _grown(distance: Single, recess: Mask, delta: float, growth: int, look: int) -> Mask:  # pragma: no cover - compiled
+def _grown(distance: Single, recess: Bool, delta: float, growth: int, look: int) -> Bool:  # pragma: no cover - compiled
     """Pixels off the plane, and those about them; a pixel alone is an outlier, which has no edge."""
     rows, columns = distance.shape
     out = np.zeros((rows, columns), np.bool_)

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from affine import Affine
 from numba import njit
-from numpy.typing import NDArray
 from rasterio.errors import NotGeoreferencedWarning
 from rasterio.io import MemoryFile
 
-Single = NDArray[np.float32]
+from tunneldb.arrays import Int16, Single
 
 KINDS = ("raw", "corrected", "offset")
 """What the images of a kilometre show: raw and corrected intensity (dB), offset from the surface (m)."""
@@ -42,9 +41,9 @@ class Raster:
     transform: Affine
 
 
-def whole(values: Single, kind: str) -> NDArray[np.int16]:
+def whole(values: Single, kind: str) -> Int16:
     """Values (rows, columns) in steps of :data:`STEP`, NODATA for NaN."""
-    steps: NDArray[np.int16] = _whole(values, 1.0 / STEP[kind])
+    steps: Int16 = _whole(values, 1.0 / STEP[kind])
     return steps
 
 
@@ -87,7 +86,7 @@ def decode(tiff: bytes) -> Raster:
 
 
 @njit(cache=True, nogil=True)
-def _whole(values: Single, per_step: float) -> NDArray[np.int16]:  # pragma: no cover - compiled
+def _whole(values: Single, per_step: float) -> Int16:  # pragma: no cover - compiled
     steps = np.empty(values.shape, np.int16)
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.anomalies.threshold import MAX_MEDIAN
+from tunneldb.arrays import Int16, UInt8
 from tunneldb.geometry.surface import Surface
 from tunneldb.raster.accumulator import BLOCK, Accumulator, Grid, Window
-from tunneldb.raster.pixel_state import Astray, Floor, State, reach, states
 from tunneldb.raster.geotiff import NODATA, whole
-from tunneldb.anomalies.threshold import MAX_MEDIAN
+from tunneldb.raster.pixel_state import Astray, Floor, State, reach, states
 
 WET_EDGE = 3
 """Pixels about a wet one that don't count as dry lining."""
@@ -33,8 +33,8 @@ class Picture:
     """
 
     grid: Grid
-    state: NDArray[np.uint8]
-    level: NDArray[np.int16]
+    state: UInt8
+    level: Int16
 
 
 def halo(pixel: float) -> int:

@@ -6,18 +6,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
 from tunneldb.geometry.surface import Surface
+from tunneldb.pointcloud.poses import PoseModel
+from tunneldb.pointcloud.reader import Points
 from tunneldb.radiometry.correction import Kind, Views, observe
 from tunneldb.radiometry.edge_normals import Edges
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.raster.pixel_state import Floor
-from tunneldb.pointcloud.poses import PoseModel
-from tunneldb.pointcloud.reader import Points
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -62,8 +60,8 @@ class Seen:
     chainage: Float
     arc: Float
     offset: Float
-    use: NDArray[np.bool_]
-    lining: NDArray[np.bool_]
+    use: Bool
+    lining: Bool
     views: Views | None
 
 

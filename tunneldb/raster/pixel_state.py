@@ -8,17 +8,14 @@ from itertools import pairwise
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from tunneldb.arrays import Bool, Float, Single, UInt8
 from tunneldb.geometry.surface import Surface
 from tunneldb.geometry.unrolling import bracket
 from tunneldb.raster import appendages as appendage
 from tunneldb.raster import ring_steps as step
 from tunneldb.raster.accumulator import Grid, Whole, Window
-
-Float = NDArray[np.float64]
-Single = NDArray[np.float32]
 
 HIDDEN = 25
 """So many metres of ground may be hidden by what stands on it, and the floor goes on beneath."""
@@ -75,7 +72,7 @@ class Floor:
         row = np.clip(np.rint(place - self.start).astype(np.intp), 0, len(self.left) - 1)
         return self.left[row], self.right[row]
 
-    def covers(self, chainage: Float, arc: Float, above: float = 0.0) -> NDArray[np.bool_]:
+    def covers(self, chainage: Float, arc: Float, above: float = 0.0) -> Bool:
         """Tell which places in the unrolled plane are floor, or wall so far ``above`` it; arrays that broadcast, m."""
         left, right = self.bounds(chainage)
         with np.errstate(invalid="ignore"):
@@ -125,7 +122,7 @@ class Astray:
         apart[(apart != 0.0).mean(axis=1) > MOST] = 0.0
         return cls(surface, apart)
 
-    def level(self, chainage: Float, arc: Float) -> tuple[Single, NDArray[np.bool_]] | None:
+    def level(self, chainage: Float, arc: Float) -> tuple[Single, Bool] | None:
         """Offset of the wall from the surface, m, and where it bends; (rows,) arcs by (columns,) chainages; None: nowhere.
 
         Where it bends, at the edges of the niche, the surface's normals are not those of the wall.
@@ -154,7 +151,7 @@ def reach(pixel: float) -> int:
     return appendage.reach(pixel) + step.reach(pixel)
 
 
-def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Astray, delta: float) -> NDArray[np.uint8]:
+def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Astray, delta: float) -> UInt8:
     """State of the pixels of some columns.
 
     Parameters
@@ -198,7 +195,7 @@ def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Ast
     if bent is not None:
         off, recess = off | bent[:, inner], recess & ~bent[:, inner]
     surface = astray.surface
-    state: NDArray[np.uint8] = _states(
+    state: UInt8 = _states(
         window.weight[:, inner], off, recess, arc,
         left[inner], right[inner], *_ends(surface.chainages, surface.arcs, surface.reach, chainage[inner]),
     )  # fmt: skip
@@ -220,14 +217,14 @@ def _ends(at: Float, arcs: Float, reach: float, chainage: Float) -> tuple[Float,
 @njit(cache=True, nogil=True)
 def _states(
     weight: Whole,
-    off: NDArray[np.bool_],
-    recess: NDArray[np.bool_],
+    off: Bool,
+    recess: Bool,
     arc: Float,
     left: Float,
     right: Float,
     low: Float,
     high: Float,
-) -> NDArray[np.uint8]:  # pragma: no cover - compiled
+) -> UInt8:  # pragma: no cover - compiled
     state = np.empty(weight.shape, np.uint8)
     for i in range(weight.shape[0]):
         for j in range(weight.shape[1]):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import rasterio.features
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry import Polygon
+
+from tunneldb.arrays import Bool
 
 SIMPLIFY = 0.75
 """Tolerance of the simplification, pixels: enough to straighten the stairs of a slanting edge."""
@@ -15,7 +16,7 @@ LEAST_HOLE = 0.01
 """Smaller holes are closed, m²: noise makes some in weak leaks, and a patch of 10 cm is no place that stayed dry."""
 
 
-def outline(mask: NDArray[np.bool_], column: int, row: int, pixel: float) -> Polygon:
+def outline(mask: Bool, column: int, row: int, pixel: float) -> Polygon:
     """Outline a connected region, with its holes that are large enough.
 
     Parameters

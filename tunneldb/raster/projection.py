@@ -12,16 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float, Int32, Int64, Single
 from tunneldb.geometry.unrolling import NOWHERE, unroll_point
+from tunneldb.pointcloud.poses import TIME_TOLERANCE, interval, position_at
 from tunneldb.radiometry.correction import level_of, reference_at
 from tunneldb.radiometry.edge_normals import face_at, face_normal
-from tunneldb.pointcloud.poses import TIME_TOLERANCE, interval, position_at
-
-Float = NDArray[np.float64]
-Single = NDArray[np.float32]
-Int = NDArray[np.int64]
 
 BLOCK = 4096
 """Points that a thread takes at a time."""
@@ -37,7 +33,7 @@ class Shape(NamedTuple):
     """A surface, see `Surface`."""
 
     segments: Float
-    number: Int
+    number: Int64
     ends: Float
     chainages: Float
     radius: Float
@@ -53,13 +49,13 @@ class Faces(NamedTuple):
     first: float
     feet: Float
     normals: Float
-    sharp: NDArray[np.bool_]
+    sharp: Bool
 
 
 class Scanner(NamedTuple):
     """Scanner positions, see `PoseModel`."""
 
-    scan_id: Int
+    scan_id: Int64
     station: Float
     time: Float
     track: Float
@@ -117,9 +113,9 @@ class Pixels(NamedTuple):
     ``row``, ``column`` and ``weight`` are int32, ``offset`` (m), ``raw`` and ``corrected`` (dB) float32 arrays.
     """
 
-    row: NDArray[np.int32]
-    column: NDArray[np.int32]
-    weight: NDArray[np.int32]
+    row: Int32
+    column: Int32
+    weight: Int32
     offset: Single
     raw: Single
     corrected: Single
@@ -155,7 +151,7 @@ def look(
     target: Target,
     xyz: Float,
     time: Float,
-    scan_id: NDArray[np.int32],
+    scan_id: Int32,
     intensity: Single,
     pixels: Pixels,
 ) -> Tally:
@@ -214,10 +210,10 @@ def _look(
     target: Target,
     xyz: Float,
     time: Float,
-    scan_id: NDArray[np.int32],
+    scan_id: Int32,
     intensity: Single,
     pixels: Pixels,
-) -> tuple[Int, Float]:  # pragma: no cover - compiled
+) -> tuple[Int64, Float]:  # pragma: no cover - compiled
     points = xyz.shape[0]
     parts = (points + BLOCK - 1) // BLOCK
     counts = np.zeros((parts, 4), np.int64)

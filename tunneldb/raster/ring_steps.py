@@ -8,11 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Single = NDArray[np.float32]
-Int = NDArray[np.int32]
+from tunneldb.arrays import Float, Int32, Single
 
 LEAST = 0.01
 """Lower steps do no harm, m: they are a third of the distance from which a pixel is off its plane."""
@@ -81,7 +78,7 @@ def _half(pixel: float) -> int:
 @njit(cache=True, nogil=True)
 def _differences(
     offset: Single, every: int, row: int, half: int, arc: Float, left: Float, right: Float
-) -> tuple[Int, Int]:  # pragma: no cover - compiled
+) -> tuple[Int32, Int32]:  # pragma: no cover - compiled
     """How many rows show each difference (columns, 2 BINS + 1), and how many show any (columns,)."""
     rows, columns = offset.shape
     counts, shown = np.zeros((columns, 2 * _BINS + 1), np.int32), np.zeros(columns, np.int32)
@@ -103,7 +100,7 @@ def _differences(
 
 
 @njit(cache=True, nogil=True)
-def _found(counts: Int, shown: Int, half: int) -> Float:  # pragma: no cover - compiled
+def _found(counts: Int32, shown: Int32, half: int) -> Float:  # pragma: no cover - compiled
     """Step at each column, m, 0 where there is none."""
     columns = counts.shape[0]
     step, found = np.zeros(columns), np.zeros(columns)
@@ -122,7 +119,7 @@ def _found(counts: Int, shown: Int, half: int) -> Float:  # pragma: no cover - c
 
 
 @njit(cache=True, nogil=True)
-def _agreed(counts: Int, shown: int) -> float:  # pragma: no cover - compiled
+def _agreed(counts: Int32, shown: int) -> float:  # pragma: no cover - compiled
     """Median of the differences, 0 where it is no step or too few rows share it."""
     k, until = 0, counts[0]
     while 2 * until < shown and k < 2 * _BINS:

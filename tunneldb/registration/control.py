@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
-Float = NDArray[np.float64]
-Int64 = NDArray[np.int64]
+from tunneldb.arrays import Float, Int64
 
 WITHIN = 0.1
 """A control point belongs to the sphere within this distance of it, by default, m."""

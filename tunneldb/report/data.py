@@ -10,16 +10,15 @@ from typing import Any, LiteralString
 import numpy as np
 import psycopg
 import shapely
-from numpy.typing import NDArray
 from psycopg import sql
 from psycopg.rows import class_row, dict_row
 from shapely.geometry import Polygon
 
+from tunneldb.arrays import Float
 from tunneldb.database import Survey
 from tunneldb.errors import UserError
 from tunneldb.pipeline.order import STAGES
 
-Float = NDArray[np.float64]
 Row = dict[str, Any]
 
 HIDDEN_SHARE, HIDDEN_LENGTH = 0.5, 5.0

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
 
+from tunneldb.arrays import Float
 from tunneldb.report.data import Coverage, Leak
-
-Float = NDArray[np.float64]
 
 STEPS = (1.0, 2.0, 5.0, 10.0, 20.0, 25.0, 50.0, 100.0, 200.0, 250.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0)
 """Distances between ticks, and lengths of bins, m."""

@@ -11,20 +11,16 @@ from typing import Any, Literal
 import numpy as np
 import psycopg
 from numba import njit
-from numpy.typing import NDArray
 from PIL import Image
 from scipy import ndimage
 
+from tunneldb.arrays import Intp, Single, UInt8
 from tunneldb.database import Survey
 from tunneldb.export.images.gap_fill import FILL, fill_gaps
 from tunneldb.raster.accumulator import BLOCK
-from tunneldb.raster.pixel_state import State
 from tunneldb.raster.geotiff import Raster, decode
+from tunneldb.raster.pixel_state import State
 from tunneldb.store.images import DARK
-
-Single = NDArray[np.float32]
-Bytes = NDArray[np.uint8]
-Places = NDArray[np.intp]
 
 Form = Literal["WEBP", "JPEG"]
 """Format of pictures: WebP is smaller; JPEG goes into a PDF as it is, where browsers unpack others to many times the size."""
@@ -107,7 +103,7 @@ class _Block:
     """
 
     shown: Raster
-    state: Bytes
+    state: UInt8
 
     def lining(self) -> Single:
         """What is shown of its lining, thinned, dB or m."""
@@ -228,9 +224,9 @@ class _Place:
 
     there: tuple[slice, slice]
     values: Single
-    state: Bytes
-    row: Places
-    column: Places
+    state: UInt8
+    row: Intp
+    column: Intp
 
     @classmethod
     def of(cls, block: _Block, window: Window, side: float) -> _Place | None:
@@ -251,12 +247,12 @@ class _Place:
         return tally
 
 
-def _inside(place: Places, count: int) -> slice:
+def _inside(place: Intp, count: int) -> slice:
     """Those of growing places that lie from 0 to ``count`` - 1."""
     return slice(int(np.searchsorted(place, 0)), int(np.searchsorted(place, count)))
 
 
-def _grey(values: Single, kilometre: _Kilometre) -> Bytes:
+def _grey(values: Single, kilometre: _Kilometre) -> UInt8:
     """Values from black to white, and nothing where there is none."""
     shade = np.clip((values - kilometre.low) / (kilometre.high - kilometre.low), 0.0, 1.0)
     grey = np.repeat(255.0 * np.nan_to_num(shade), 3).reshape(*shade.shape, 3).astype(np.uint8)
@@ -264,7 +260,7 @@ def _grey(values: Single, kilometre: _Kilometre) -> Bytes:
     return grey
 
 
-def _seen(place: _Place, side: float, kilometre: _Kilometre) -> Bytes:
+def _seen(place: _Place, side: float, kilometre: _Kilometre) -> UInt8:
     """Colours of corrected intensity and of lining that was not seen, is hidden or no lining."""
     held, level, lining, empty, off, floor = place.gathered()
     about = 2 * round(FILLED / side / 2) + 1
@@ -283,7 +279,7 @@ def _seen(place: _Place, side: float, kilometre: _Kilometre) -> Bytes:
 
 
 @njit(cache=True, nogil=True)
-def _gathered(values: Single, state: Bytes, row: Places, column: Places) -> Single:  # pragma: no cover - compiled
+def _gathered(values: Single, state: UInt8, row: Intp, column: Intp) -> Single:  # pragma: no cover - compiled
     """Tally the pixels that fall into each coarser one.
 
     How many hold points, their intensities added up, how many are lining, lining without points, what hangs before it, floor.

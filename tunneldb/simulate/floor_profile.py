@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.simulate.objects.fixtures import Appendage
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.section import Section
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-
-Array = NDArray[np.float64]
 
 WALKWAY = 0.9  # width along the left wall, m
 KERB = 0.4  # width along the right wall, m
@@ -31,7 +29,7 @@ def _slabs(parameters: Parameters, section: Section) -> list[tuple[str, float, f
     return slabs
 
 
-def rise(parameters: Parameters, section: Section, across: Array) -> Array:
+def rise(parameters: Parameters, section: Section, across: Float) -> Float:
     """Height of the ground over the section's floor at (n,) m right of the axis, m; without ballast and sleepers.
 
     This is the truth of a ground model: the floor of the section lies at w = ``section.floor``.

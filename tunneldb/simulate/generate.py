@@ -9,30 +9,28 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int32, Int64, Single, UInt8, UInt16
+from tunneldb.simulate.floor_profile import slabs
 from tunneldb.simulate.lining import ballast as ground
-from tunneldb.simulate.rays.beam import blur
-from tunneldb.simulate.objects.wall_clutter import clutter
-from tunneldb.simulate.lining.reflectance import coat
-from tunneldb.simulate.objects.fixtures import FLOOR, RAIL, Appendage, Niche, furnish, refuges
-from tunneldb.simulate.radiometry import counts, reference_curve
 from tunneldb.simulate.lining.leaks import Leak, Room, place
 from tunneldb.simulate.lining.marks import Mark, place_marks
+from tunneldb.simulate.lining.reflectance import coat
+from tunneldb.simulate.lining.relief import skin
+from tunneldb.simulate.lining.rings import build
+from tunneldb.simulate.lining.seepage import joint_leaks, niche_leaks, with_drips
+from tunneldb.simulate.objects.fixtures import FLOOR, RAIL, Appendage, Niche, furnish, refuges
 from tunneldb.simulate.objects.overhead import overhead, sleepers
+from tunneldb.simulate.objects.primitives import TargetSphere, Thing, parts_table
+from tunneldb.simulate.objects.wall_clutter import clutter
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.placement import stand
-from tunneldb.simulate.floor_profile import slabs
-from tunneldb.simulate.rays.trace import trace
-from tunneldb.simulate.lining.rings import build
-from tunneldb.simulate.scanner import BlockPlan, Rays, Scanner
+from tunneldb.simulate.radiometry import counts, reference_curve
+from tunneldb.simulate.rays.beam import blur
 from tunneldb.simulate.rays.scene import scene
-from tunneldb.simulate.lining.relief import skin
-from tunneldb.simulate.objects.primitives import TargetSphere, Thing, parts_table
+from tunneldb.simulate.rays.trace import trace
+from tunneldb.simulate.scanner import BlockPlan, Rays, Scanner
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-from tunneldb.simulate.lining.seepage import joint_leaks, niche_leaks, with_drips
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -63,20 +61,20 @@ class Cloud:
         Distance from the scanner to the spot met, m, and angle to its normal, rad; without noise.
     """
 
-    xyz: Array
-    time: Array
-    scan_id: NDArray[np.uint16]
-    amplitude: NDArray[np.float32]
-    reflectance: NDArray[np.float32]
-    intensity: NDArray[np.uint16]
-    chainage: Array
-    arc: NDArray[np.float32]
-    offset: NDArray[np.float32]
-    klass: NDArray[np.uint8]
-    leak: NDArray[np.int32]
-    thing: NDArray[np.uint16]
-    range: NDArray[np.float32]
-    incidence: NDArray[np.float32]
+    xyz: Float
+    time: Float
+    scan_id: UInt16
+    amplitude: Single
+    reflectance: Single
+    intensity: UInt16
+    chainage: Float
+    arc: Single
+    offset: Single
+    klass: UInt8
+    leak: Int32
+    thing: UInt16
+    range: Single
+    incidence: Single
 
     def __len__(self) -> int:
         return len(self.time)
@@ -156,7 +154,7 @@ class Simulation:
         leaks = [replace(leak, id=i + 1) for i, leak in enumerate(leaks)]
         return with_drips(leaks, tunnel, room, drips) if p.drips else leaks
 
-    def _trace(self, rays: Rays, index: NDArray[np.int64] | slice, direction: Array, noise: Array, chance: Array) -> Array:
+    def _trace(self, rays: Rays, index: Int64 | slice, direction: Float, noise: Float, chance: Float) -> Float:
         """Shoot some of the rays in given directions; rows of :func:`trace`."""
         p = self.parameters
         out = np.empty((len(direction), 12 if self._parts is None else 13))
@@ -193,7 +191,7 @@ class Simulation:
         noise = rng.standard_normal(len(out)) * p.intensity_noise
         if p.beam > 0.0:
 
-            def again(index: NDArray[np.int64], direction: Array) -> Array:
+            def again(index: Int64, direction: Float) -> Float:
                 """Without noise, and with numbers that make no stray points."""
                 return self._trace(rays, index, direction, np.zeros(len(index)), np.ones((len(index), 2)))
 

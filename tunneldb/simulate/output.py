@@ -15,10 +15,10 @@ from typing import Any, BinaryIO
 
 import laspy
 import numpy as np
-from numpy.typing import NDArray
 from shapely.geometry import mapping
 
 import tunneldb
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.simulate.generate import Cloud, Simulation
 from tunneldb.simulate.truth import leaks_as_built, write_truth
@@ -142,7 +142,7 @@ def _record(header: laspy.LasHeader, cloud: Cloud) -> laspy.ScaleAwarePointRecor
     return record
 
 
-def _csv(path: Path, columns: str, rows: NDArray[np.float64], formats: list[str]) -> Path:
+def _csv(path: Path, columns: str, rows: Float, formats: list[str]) -> Path:
     np.savetxt(path, rows, fmt=formats, delimiter=",", header=columns, comments="")
     return path
 

@@ -11,9 +11,9 @@ import pyproj
 from pyproj.exceptions import CRSError
 
 from tunneldb.errors import UserError
+from tunneldb.simulate.radiometry import Radiometry
 from tunneldb.simulate.tunnel import section
 from tunneldb.simulate.tunnel.centreline import CentreLine
-from tunneldb.simulate.radiometry import Radiometry
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 # Allowed values: low, high, unit.

@@ -9,19 +9,17 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
+from tunneldb.simulate.floor_profile import rise
 from tunneldb.simulate.objects import equipment
 from tunneldb.simulate.objects.equipment import STANDING, UP, Place
 from tunneldb.simulate.objects.fixtures import APPENDAGE, Appendage, Niche
-from tunneldb.simulate.parameters import Parameters
-from tunneldb.simulate.floor_profile import rise
-from tunneldb.simulate.scanner import Scanner
 from tunneldb.simulate.objects.primitives import TargetSphere, Thing, rod
+from tunneldb.simulate.parameters import Parameters
+from tunneldb.simulate.scanner import Scanner
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-
-Array = NDArray[np.float64]
 
 # How much of the floor around its middle a thing takes, m.
 ROOM = {"person": 0.40, "case": 0.55, "trolley": 0.80, "tripod": 0.50, "bollard": 0.15, "globe": 0.25, "sphere": 0.45}
@@ -41,7 +39,7 @@ class _Floor:
     parameters: Parameters
     tunnel: Tunnel
     scanner: Scanner
-    taken: Array
+    taken: Float
 
     def place(self, chainage: float, across: float) -> Place:
         """Spot on the ground."""
@@ -112,7 +110,7 @@ def _wall_spot(
     raise UserError("no room on the walls for another target sphere or lamp: ask for fewer or a longer tunnel")
 
 
-def _hiding_cable(floor: _Floor, s: float, centre: Array, wall: Array, radius: float) -> Thing:
+def _hiding_cable(floor: _Floor, s: float, centre: Float, wall: Float, radius: float) -> Thing:
     """A cable along the tunnel that covers the upper half of a sphere from where the scanner stands."""
     p, scanner, line = floor.parameters, floor.scanner, floor.tunnel.line
     if p.scanner == "static":

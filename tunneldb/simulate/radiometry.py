@@ -11,9 +11,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tunneldb.arrays import Bool, Float, UInt16
 
 # Near-range loss 1 - exp(-(R / NEAR_RANGE)**NEAR_POWER): with the inverse square it peaks at 10 m and climbs by
 # 0.6 dB/m at 4 m, as the curve of the VZ-400i in Xu et al. (2018), Fig. 3.
@@ -25,7 +24,7 @@ SYSTEM_CONSTANT = 54.5
 FULL_SCALE = 50_000.0
 
 
-def range_term(distance: Array, near_loss: bool = True) -> Array:
+def range_term(distance: Float, near_loss: bool = True) -> Float:
     """F1: change of amplitude with range (m) of a fixed target, dB: the inverse square, with the loss of near ranges."""
     r = np.asarray(distance, dtype=float)
     if not near_loss:
@@ -40,7 +39,7 @@ def oren_nayar_coefficients(roughness: float) -> tuple[float, float]:
     return 1.0 - 0.5 * square / (square + 0.33), 0.45 * square / (square + 0.09)
 
 
-def oren_nayar(cosine: Array, roughness: float) -> Array:
+def oren_nayar(cosine: Float, roughness: float) -> Float:
     """F2 for the cosine of incidence, dB (Xu et al., 2018, eq. 15).
 
     cos * (A + B sin tan) is written A cos + B sin², which stands at grazing incidence too.
@@ -50,7 +49,7 @@ def oren_nayar(cosine: Array, roughness: float) -> Array:
     return 10.0 * np.log10(a * c + b * (1.0 - c * c))
 
 
-def counts(amplitude: Array, near_loss: bool = True) -> NDArray[np.uint16]:
+def counts(amplitude: Float, near_loss: bool = True) -> UInt16:
     """Linear intensity: power in counts, scaled so that a white target at the best range is at full scale."""
     best = np.linspace(5.0, 15.0, 101) if near_loss else np.array([1.0])
     peak = SYSTEM_CONSTANT + float(range_term(best, near_loss).max())
@@ -77,12 +76,12 @@ class Radiometry:
     floor: float = 0.15
     near_loss: bool = True
 
-    def reflectance(self, cosine: Array, floor: NDArray[np.bool_], drop: Array) -> Array:
+    def reflectance(self, cosine: Float, floor: Bool, drop: Float) -> Float:
         """Range-free part, dB: incidence, material and drop (dB, positive is darker)."""
         material = np.where(floor, 10.0 * math.log10(self.floor), 10.0 * math.log10(self.lining))
         return oren_nayar(cosine, self.roughness) + material - drop
 
-    def amplitude(self, distance: Array, reflectance: Array) -> Array:
+    def amplitude(self, distance: Float, reflectance: Float) -> Float:
         """Amplitude, dB, from range (m) and the range-free part (dB)."""
         return SYSTEM_CONSTANT + range_term(distance, self.near_loss) + reflectance
 
@@ -91,7 +90,7 @@ class Radiometry:
 TARGET_REFLECTANCE = 0.30
 
 
-def reference_curve(furthest: float, rng: np.random.Generator, near_loss: bool = True) -> Array:
+def reference_curve(furthest: float, rng: np.random.Generator, near_loss: bool = True) -> Float:
     """Amplitudes of the reference target every metre from 1 m beyond ``furthest`` m; (n, 2): range m, dB.
 
     Averages over a target, so their noise is small (0.02 dB).

@@ -13,12 +13,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, UInt16
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-
-Array = NDArray[np.float64]
 
 RAYS = 400_000  # a block
 START_TIME = 300_000.0  # GPS seconds of the week
@@ -31,11 +29,11 @@ LOWEST_ZENITH = 150.0
 class Rays(NamedTuple):
     """Rays from the line's origin: origins and unit directions (n, 3), chainage of the scanner, time (s), scan id."""
 
-    origin: Array
-    direction: Array
-    hint: Array
-    time: Array
-    scan_id: NDArray[np.uint16]
+    origin: Float
+    direction: Float
+    hint: Float
+    time: Float
+    scan_id: UInt16
 
 
 @dataclass(frozen=True)
@@ -64,25 +62,25 @@ class Scanner:
         self.height = tunnel.section.floor + p.scanner_height
         count = max(1, math.ceil((line.end - line.start) / p.station_spacing - 1e-9))
         gap = (line.end - line.start) / count
-        self.station_chainage: Array = line.start + gap * (np.arange(count, dtype=np.float64) + 0.5)
+        self.station_chainage: Float = line.start + gap * (np.arange(count, dtype=np.float64) + 0.5)
         # Tripods stand where there is room, not in the middle: alternately to both sides.
         self.station_offset = p.scanner_offset * np.where(np.arange(count) % 2 == 0, 1.0, -1.0)
 
-    def _at(self, chainage: Array, offset: Array | float) -> Array:
+    def _at(self, chainage: Float, offset: Float | float) -> Float:
         """Scanner positions from the line's origin, (n, 3)."""
         f = self.tunnel.line.frame(chainage)
         across = np.broadcast_to(offset, chainage.shape)[:, None]
         return f.position - self.tunnel.line.origin + across * f.u + self.height * f.w
 
-    def stations(self) -> Array:
+    def stations(self) -> Float:
         """Positions of static stations, (n, 3); station i has scan id i + 1."""
         return self._at(self.station_chainage, self.station_offset) + self.tunnel.line.origin
 
-    def time_at(self, chainage: Array) -> Array:
+    def time_at(self, chainage: Float) -> Float:
         """GPS time at which the trolley passes a chainage."""
         return START_TIME + (chainage - self.tunnel.line.start) / self.parameters.speed
 
-    def trajectory(self) -> Array:
+    def trajectory(self) -> Float:
         """Trolley poses from a second before the start to a second after the end; (n, 4): time, x, y, z."""
         line, speed = self.tunnel.line, self.parameters.speed
         duration = (line.end - line.start) / speed
@@ -117,7 +115,7 @@ class Scanner:
                     yield BlockPlan(index, float(s), 0, first * p.profile_points, last * p.profile_points, float(t))
                     index += 1
 
-    def _file_edges(self) -> Array:
+    def _file_edges(self) -> Float:
         """Start, kilometre marks, end."""
         line = self.tunnel.line
         marks = 1000.0 * np.arange(math.floor(line.start / 1000.0) + 1, math.ceil(line.end / 1000.0))
@@ -173,7 +171,7 @@ class Scanner:
         """Mirror turning evenly while the trolley moves: each profile is one turn of a helix."""
         p, line = self.parameters, self.tunnel.line
         shot = np.arange(plan.first, plan.last)
-        s: Array = line.start + shot * np.float64(p.profile_spacing / p.profile_points)
+        s: Float = line.start + shot * np.float64(p.profile_spacing / p.profile_points)
         f = line.frame(s)
         origin = f.position - line.origin + p.scanner_offset * f.u + self.height * f.w
         angle = 2.0 * np.pi / p.profile_points * ((shot % p.profile_points) + 0.5)

@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from tunneldb.simulate.lining.reflectance import GRIME_RISE, Coat, soot_amount
+from tunneldb.arrays import Float
 from tunneldb.simulate.lining.leaks import Leak
-from tunneldb.simulate.lining.rings import POCKET, POCKET_FROM_JOINT, POCKETS, Rings
+from tunneldb.simulate.lining.reflectance import GRIME_RISE, Coat, soot_amount
 from tunneldb.simulate.lining.relief import wider_from
+from tunneldb.simulate.lining.rings import POCKET, POCKET_FROM_JOINT, POCKETS, Rings
 
 if TYPE_CHECKING:
     from tunneldb.simulate.generate import Simulation
 
-Array = NDArray[np.float64]
 
 STEP = 1.0  # m between the vertices of soot
 FINE = 0.005  # m between the places by which arcs on a wider section are measured
@@ -46,14 +46,14 @@ def as_built(simulation: Simulation) -> Callable[[BaseGeometry], BaseGeometry]:
     wider = wider_from(tunnel)
     half = np.linspace(0.0, tunnel.section.floor_arc, math.ceil(tunnel.section.floor_arc / FINE) + 1)
 
-    def length(arc: Array) -> Array:
+    def length(arc: Float) -> Float:
         point, normal = tunnel.section.point(arc)
         pieces = np.diff(point - parameters.radius_step * normal, axis=0)
         return np.concatenate([[0.0], np.cumsum(np.linalg.norm(pieces, axis=1))])
 
     arcs, lengths = np.concatenate([-half[:0:-1], half]), np.concatenate([-length(-half)[:0:-1], length(half)])
 
-    def lay(places: Array) -> Array:
+    def lay(places: Float) -> Float:
         s, arc = places.T
         return np.column_stack([s, np.where(s > wider, np.interp(arc, arcs, lengths), arc)])
 

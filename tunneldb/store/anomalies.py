@@ -11,15 +11,15 @@ import psycopg
 import shapely
 from shapely.geometry import Polygon
 
-from tunneldb.store.survey import Survey
-from tunneldb.store.surface import load_surface
-from tunneldb.geometry.surface import Surface
-from tunneldb.store.anomaly_parts import Border, Cluster, link, replace_parts
 from tunneldb.anomalies.detect import Found
 from tunneldb.anomalies.geometries import shapes
-from tunneldb.raster.accumulator import KILOMETRE
 from tunneldb.anomalies.matching import match, match_parts
 from tunneldb.anomalies.regions import Region
+from tunneldb.geometry.surface import Surface
+from tunneldb.raster.accumulator import KILOMETRE
+from tunneldb.store.anomaly_parts import Border, Cluster, link, replace_parts
+from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey
 
 
 @dataclass(frozen=True)

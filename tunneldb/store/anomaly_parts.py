@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from tunneldb.store.survey import Survey
-from tunneldb.raster.accumulator import KILOMETRE
 from tunneldb.anomalies.regions import Region, Traits, together, unite
+from tunneldb.raster.accumulator import KILOMETRE
+from tunneldb.store.survey import Survey
 
 LOCK = -3
 """First key of the advisory lock, the survey being the second: anomalies over ends of kilometres are written one by one."""

@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 from psycopg import sql
 
 from tunneldb.alignment.given import XYZ, GivenAxis
+from tunneldb.arrays import Float
 from tunneldb.csvfile import CsvTable, read_csv
 from tunneldb.database.copy import PointZ, copy_binary, pack
-from tunneldb.store.design import save_design
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.pointcloud.stations import read_stations
+from tunneldb.store.design import save_design
 
 FARTHEST_SCANNER = 50.0  # m from the axis; a scanner that was never nearer stood in another tunnel
 
@@ -228,7 +229,7 @@ def _require_range(kind: str) -> None:
         raise UserError("--reference auto has nothing to find: from intensity of kind reflectance the maker removed the range")
 
 
-def _require_near(paths: Sequence[Path], xyz: NDArray[np.float64], alignment: Alignment, tunnel: str) -> None:
+def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunnel: str) -> None:
     """The scanner must have been near the axis at least once."""
     distance = alignment.distance(xyz)
     if np.isnan(distance).all() or np.nanmin(distance) > FARTHEST_SCANNER:

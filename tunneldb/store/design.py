@@ -10,10 +10,10 @@ import psycopg
 
 from tunneldb.alignment.design import Design
 from tunneldb.alignment.deviation import Deviation, Part
-from tunneldb.store.stationing import load_stationing, save_equations
-from tunneldb.store.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import Equation
+from tunneldb.store.stationing import load_stationing, save_equations
+from tunneldb.store.survey import Survey
 
 
 def save_design(connection: psycopg.Connection[Any], tunnel_id: int, design: Design) -> None:

@@ -14,8 +14,8 @@ import psycopg
 from psycopg import sql
 
 from tunneldb.database.copy import copy_binary
-from tunneldb.store.survey import Survey
 from tunneldb.pointcloud.spool import BINS_PER_KM, ROW, Rows, Spool, windows
+from tunneldb.store.survey import Survey
 
 BLOCK = 131_072  # rows in a block at most, so that none is larger than 8 MB
 

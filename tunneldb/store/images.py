@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import psycopg
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from tunneldb.database import Survey
-from tunneldb.radiometry.robust_statistics import Dry
-from tunneldb.radiometry.reference_curve import ReferenceCurve
-from tunneldb.radiometry.roughness import Roughness
+from tunneldb.anomalies.background.level_map import DryMap
 from tunneldb.anomalies.coverage import Coverage
 from tunneldb.anomalies.detect import Detection
-from tunneldb.anomalies.background.level_map import DryMap
+from tunneldb.arrays import Bool, Single, UInt8
+from tunneldb.database import Survey
+from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.radiometry.robust_statistics import Dry
+from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.accumulator import Grid, Window
 from tunneldb.raster.geotiff import Raster, encode
 
@@ -79,7 +79,7 @@ class ImageStore:
         for kind in self.kinds:
             self._insert(kind, block, Raster(_values(window, kind), grid.transform(columns.start)))
 
-    def save_states(self, state: NDArray[np.uint8], dark: NDArray[np.bool_]) -> None:
+    def save_states(self, state: UInt8, dark: Bool) -> None:
         """Save what the pixels (rows, columns) of the kilometre show, in the blocks that were saved before; DARK where dark."""
         grid = self.grid
         for block in self._blocks:
@@ -95,8 +95,8 @@ class ImageStore:
         )
 
 
-def _values(window: Window, kind: str) -> NDArray[np.float32]:
-    values: NDArray[np.float32] = getattr(window, kind)
+def _values(window: Window, kind: str) -> Single:
+    values: Single = getattr(window, kind)
     return values
 
 

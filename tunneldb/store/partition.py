@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 import psycopg
-from numpy.typing import NDArray
 from psycopg import sql
 
+from tunneldb.arrays import Int32, Int64
 from tunneldb.database.copy import copy_binary
 from tunneldb.database.fetch import fetch_array
-from tunneldb.store.survey import Survey
 from tunneldb.geometry.alignment import KILOMETRE, Alignment
-from tunneldb.store.point_rows import COLUMNS, pack_rows
 from tunneldb.pointcloud.prefetch import prefetch
 from tunneldb.pointcloud.selection import voxel_reach
 from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, ROW, Rows, Spool, bin_of, windows
 from tunneldb.pointcloud.thinning import first_of_voxels
+from tunneldb.store.point_rows import COLUMNS, pack_rows
+from tunneldb.store.survey import Survey
 
 WINDOW = 500_000  # rows read, thinned and packed at a time
 
@@ -91,9 +91,9 @@ def write_partition(
     km: int,
     parts: Sequence[tuple[Spool, int | None]],
     edge: float | None,
-    file_ids: NDArray[np.int32],
+    file_ids: Int32,
     progress: Callable[[int], None],
-) -> NDArray[np.int64]:
+) -> Int64:
     """Build a kilometre's partition aside from all its rows, thinned as a whole; `swap_partition` puts it in place.
 
     The table is made and filled in the caller's transaction: the embedded server writes no WAL for its rows.

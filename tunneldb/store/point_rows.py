@@ -6,9 +6,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int32, UInt8
 from tunneldb.database.copy import PointZ, pack
-from tunneldb.store.survey import Survey
 from tunneldb.pointcloud.spool import ROW, Rows
+from tunneldb.store.survey import Survey
 
 COLUMNS = (
     "survey_id",
@@ -22,7 +23,6 @@ COLUMNS = (
     "classification",
 )
 
-Bytes = NDArray[np.uint8]
 
 # Where values begin in a packed row: after the number of fields (2 bytes), each field has its length (4) before it.
 _CHAINAGE, _TIME, _XYZ, _SCAN, _FILE, _INTENSITY, _CLASS, _END = 22, 34, 55, 83, 91, 99, 107, 109
@@ -31,7 +31,7 @@ _FROM_X, _FROM_CHAINAGE, _FROM_TIME = _AT["x"], _AT["chainage"], _AT["time"]
 _FROM_INTENSITY, _FROM_SCAN, _FROM_TAG, _FROM_CLASS = _AT["intensity"], _AT["scan_id"], _AT["tag"], _AT["classification"]
 
 
-def pack_rows(survey: Survey, km: int, rows: Rows, file_ids: NDArray[np.int32]) -> Bytes:
+def pack_rows(survey: Survey, km: int, rows: Rows, file_ids: Int32) -> UInt8:
     """Pack rows of a kilometre for `tunneldb.database.copy.copy_binary`, in the order of chainage.
 
     Parameters
@@ -52,7 +52,7 @@ def pack_rows(survey: Survey, km: int, rows: Rows, file_ids: NDArray[np.int32]) 
     return packed.ravel()
 
 
-def _columns(survey: Survey, km: int, rows: Rows, file_ids: NDArray[np.int32]) -> list[NDArray[np.generic] | PointZ]:
+def _columns(survey: Survey, km: int, rows: Rows, file_ids: Int32) -> list[NDArray[np.generic] | PointZ]:
     count = len(rows)
     return [
         np.full(count, survey.id, np.int32),
@@ -67,12 +67,12 @@ def _columns(survey: Survey, km: int, rows: Rows, file_ids: NDArray[np.int32]) -
     ]
 
 
-def _swapped(file_ids: NDArray[np.int32]) -> Bytes:
+def _swapped(file_ids: Int32) -> UInt8:
     return np.ascontiguousarray(file_ids.astype(">i4")).view(np.uint8).reshape(-1, 4)
 
 
 @njit(cache=True, nogil=True)
-def by_chainage(chainage: NDArray[np.float64]) -> NDArray[np.int32]:  # pragma: no cover - compiled
+def by_chainage(chainage: Float) -> Int32:  # pragma: no cover - compiled
     """Order of growing values; equal ones stay as they come. Spread fairly evenly, they are binned and hardly compared."""
     n = len(chainage)
     order = np.empty(n, np.int32)
@@ -111,7 +111,7 @@ def by_chainage(chainage: NDArray[np.float64]) -> NDArray[np.int32]:  # pragma: 
 
 @njit(cache=True, nogil=True)
 def _fill(
-    packed: Bytes, rows: Bytes, order: NDArray[np.int32], template: Bytes, file_ids: Bytes
+    packed: UInt8, rows: UInt8, order: Int32, template: UInt8, file_ids: UInt8
 ) -> None:  # pragma: no cover - compiled
     for k in range(len(order)):
         row, out = rows[order[k]], packed[k]

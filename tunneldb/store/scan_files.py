@@ -12,9 +12,9 @@ import psycopg
 from psycopg.types.multirange import Multirange
 from psycopg.types.range import Range
 
-from tunneldb.store.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.selection import FilterCounts
+from tunneldb.store.survey import Survey
 
 COUNTED = ("points", "noise", "outside", "thinned", "kept")
 

@@ -8,21 +8,19 @@ from typing import Any
 import numpy as np
 import psycopg
 import shapely
-from numpy.typing import NDArray
 from psycopg import sql
 
-from tunneldb.database.copy import copy_binary, pack_array, pack_row, pack_value, unpack_array
-from tunneldb.store.survey import Survey
-from tunneldb.geometry.alignment import KILOMETRE
-from tunneldb.store.surface import load_surface
-from tunneldb.geometry.surface import Surface
-from tunneldb.classification.objects.clusters import CELL, Cluster
-from tunneldb.geometry.plan_line import Line
-from tunneldb.classification.lining_relief import Relief
+from tunneldb.arrays import Float
 from tunneldb.classification.ground.model import COLUMN, Ground
+from tunneldb.classification.lining_relief import Relief
+from tunneldb.classification.objects.clusters import CELL, Cluster
 from tunneldb.classification.scene import Scene
-
-Float = NDArray[np.float64]
+from tunneldb.database.copy import copy_binary, pack_array, pack_row, pack_value, unpack_array
+from tunneldb.geometry.alignment import KILOMETRE
+from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.surface import Surface
+from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey
 
 BESIDE = 20.0
 """What lies so far beyond the ends of a stretch is loaded too: heights are interpolated, things reach over the ends, m."""

@@ -12,11 +12,11 @@ import psycopg
 from psycopg import sql
 
 from tunneldb.database.fetch import fetch_array
-from tunneldb.store.survey import Survey
 from tunneldb.errors import UserError
-from tunneldb.store.scan_files import checksum
-from tunneldb.store.partition import partition, rows_in
 from tunneldb.pointcloud.reader import Points
+from tunneldb.store.partition import partition, rows_in
+from tunneldb.store.scan_files import checksum
+from tunneldb.store.survey import Survey
 
 SAMPLE = 500_000
 """Points of survey density that are looked at, about."""

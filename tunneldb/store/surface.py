@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from tunneldb.store.survey import Survey
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.surface import Surface
+from tunneldb.store.survey import Survey
 
 
 def load_alignment(conn: psycopg.Connection[Any], survey: Survey) -> Alignment:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.level_map import DryMap
 from tunneldb.anomalies.background.histogram import take_levels
-from tunneldb.raster.accumulator import Grid
+from tunneldb.anomalies.background.level_map import DryMap
 from tunneldb.anomalies.inside import inside
+from tunneldb.arrays import Int16, Single, UInt8
+from tunneldb.raster.accumulator import Grid
 from tunneldb.raster.image import Picture
 
 
@@ -37,10 +37,10 @@ class Relative:
     """
 
     grid: Grid
-    state: NDArray[np.uint8]
-    drop: NDArray[np.int16]
+    state: UInt8
+    drop: Int16
     tile: int
-    sigma: NDArray[np.float32]
+    sigma: Single
     drawn: tuple[Polygon, ...] = ()
 
 

@@ -8,17 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float, Int16, Int32, Single, UInt8, UInt16
 from tunneldb.radiometry.robust_statistics import CLIP, CLIPPED_SIGMA
 from tunneldb.raster.geotiff import NODATA, STEP
-
-Float = NDArray[np.float64]
-Single = NDArray[np.float32]
-Counts = NDArray[np.int32]
-State = NDArray[np.uint8]
-Level = NDArray[np.int16]
-Used = NDArray[np.bool_]
 
 BIN = 0.05
 """Width of a bin, dB: half the standard deviation of pixels that average many points; means come out far finer."""
@@ -44,7 +37,7 @@ CHUNK = 10
 
 
 @njit(cache=True, nogil=True)
-def settle(histogram: Counts) -> tuple[float, float, int]:  # pragma: no cover - compiled
+def settle(histogram: Int32) -> tuple[float, float, int]:  # pragma: no cover - compiled
     """Mean and standard deviation of the dry part of a histogram, as in :func:`tunneldb.radiometry.robust_statistics.robust_statistics`.
 
     Both in bins, the mean from the lower side of the first one, and the number of values; NaN where there are none. Values
@@ -104,7 +97,7 @@ def _shorth(until: Float, wanted: float) -> float:  # pragma: no cover - compile
 
 
 @njit(cache=True, nogil=True)
-def _until(bins: Counts, until: Float, x: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def _until(bins: Int32, until: Float, x: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Number, sum and sum of squares of the values up to a place."""
     if x <= 0.0:
         return 0.0, 0.0, 0.0
@@ -120,7 +113,7 @@ def _until(bins: Counts, until: Float, x: float) -> tuple[float, float, float]: 
 
 
 @njit(cache=True, nogil=True)
-def _quantile(bins: Counts, until: Float, number: float) -> float:  # pragma: no cover - compiled
+def _quantile(bins: Int32, until: Float, number: float) -> float:  # pragma: no cover - compiled
     """Place up to which so many values lie."""
     for k in range(bins.shape[0]):
         if until[k + 1, 0] >= number and bins[k] > 0:
@@ -174,7 +167,7 @@ def fill_levels(
 
 @njit(cache=True, nogil=True)
 def take_levels(
-    base: float, rings: Single, bands: Single, smooth: Single, tile: int, level: Level
+    base: float, rings: Single, bands: Single, smooth: Single, tile: int, level: Int16
 ) -> None:  # pragma: no cover - compiled
     """Put level of dry lining less level in the place of all levels (rows, columns), steps; NODATA stays."""
     line = np.zeros(smooth.shape[1], np.float32)
@@ -195,9 +188,9 @@ def _bin(level: int, expected: np.float32, per_bin: np.float32) -> int:  # pragm
 
 @njit(cache=True, nogil=True)
 def row_modes(
-    state: State,
-    level: Level,
-    used: Used,
+    state: UInt8,
+    level: Int16,
+    used: Bool,
     base: float,
     rings: Single,
     bands: Single,
@@ -245,9 +238,9 @@ def row_modes(
 
 @njit(cache=True, nogil=True)
 def column_modes(
-    state: State,
-    level: Level,
-    used: Used,
+    state: UInt8,
+    level: Int16,
+    used: Bool,
     base: float,
     rings: Single,
     bands: Single,
@@ -287,16 +280,16 @@ def column_modes(
 
 @njit(cache=True, nogil=True)
 def tile_histograms(
-    state: State,
-    level: Level,
-    used: Used,
+    state: UInt8,
+    level: Int16,
+    used: Bool,
     base: float,
     rings: Single,
     bands: Single,
     smooth: Single,
     tile: int,
     every: int,
-) -> NDArray[np.uint16]:  # pragma: no cover - compiled
+) -> UInt16:  # pragma: no cover - compiled
     """Histograms (tiles down, tiles along, bins) of what lining shows beyond the model; every n-th row of the tiles used."""
     rows = state.shape[0]
     down, along = smooth.shape
@@ -319,8 +312,8 @@ def tile_histograms(
 
 @njit(cache=True, nogil=True)
 def settle_windows(
-    histograms: NDArray[np.uint16], used: Used, half: int
-) -> tuple[Single, Single, Counts]:  # pragma: no cover - compiled
+    histograms: UInt16, used: Bool, half: int
+) -> tuple[Single, Single, Int32]:  # pragma: no cover - compiled
     """Mean and standard deviation of dry lining in windows of 2 ``half`` + 1 tiles to a side about each tile.
 
     Of the tiles that are used. (Tiles down, tiles along) each, dB, NaN where there is nothing; and the number of values.

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.model import Fit
 from tunneldb.anomalies.background.histogram import fill_levels
+from tunneldb.anomalies.background.model import Fit
+from tunneldb.arrays import Int32, Single, UInt8
 from tunneldb.raster.accumulator import Grid
 from tunneldb.raster.image import Picture
-
-Single = NDArray[np.float32]
 
 TILE = 0.5
 """Side of a tile, about, m."""
@@ -119,7 +117,7 @@ def _nothing(grid: Grid, tile: int, drawn: tuple[Polygon, ...]) -> DryMap:
     return DryMap(grid, tile, np.ones(shape, np.float32), np.nan, np.nan, 0, 0.0, *flat, drawn)
 
 
-def _mean_level(dry: DryMap, state: NDArray[np.uint8]) -> float:
+def _mean_level(dry: DryMap, state: UInt8) -> float:
     """Median over the lining of the level of dry lining, from some of its rows, dB."""
     rows, columns = state.shape
     every = max(1, rows * columns // SHOWN)
@@ -127,7 +125,7 @@ def _mean_level(dry: DryMap, state: NDArray[np.uint8]) -> float:
     return float(np.median(np.concatenate(levels)))
 
 
-def _weighted_median(values: Single, weights: NDArray[np.int32]) -> float:
+def _weighted_median(values: Single, weights: Int32) -> float:
     """Median of values that count so often."""
     order = np.argsort(values, axis=None)
     until = np.cumsum(weights.ravel()[order])

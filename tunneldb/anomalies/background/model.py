@@ -6,20 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy import ndimage
 from shapely.geometry import Polygon
 
-from tunneldb.radiometry.robust_statistics import robust_statistics
 from tunneldb.anomalies.background.histogram import column_modes, fill_levels, row_modes, settle_windows, tile_histograms
-from tunneldb.anomalies.inside import inside
-from tunneldb.raster.image import Picture
-from tunneldb.raster.geotiff import STEP
 from tunneldb.anomalies.background.smooth import fill, slow
-
-Float = NDArray[np.float64]
-Single = NDArray[np.float32]
-Mask = NDArray[np.bool_]
+from tunneldb.anomalies.inside import inside
+from tunneldb.arrays import Bool, Float, Int16, Int32, Single, UInt8, UInt16
+from tunneldb.radiometry.robust_statistics import robust_statistics
+from tunneldb.raster.geotiff import STEP
+from tunneldb.raster.image import Picture
 
 SAMPLE, LINES = 15_000_000, 6_000_000
 """Pixels, about, that are looked at for tiles, and for rows and columns, which hold far more each."""
@@ -163,7 +159,7 @@ class Fit:
             sigma[self.pinned] = plain[self.pinned]
         return sigma
 
-    def _between(self, histograms: NDArray[np.uint16]) -> np.float32:
+    def _between(self, histograms: UInt16) -> np.float32:
         """Standard deviation of whole tiles about the model, dB: segments and blocks differ, towards bright as towards dark.
 
         Wet ones don't count, for the bright half alone is looked at: 95 % of half a normal distribution lie within 1.96 σ.
@@ -172,11 +168,11 @@ class Fit:
         bright = level[(count >= ENOUGH) & (level > 0.0) & ~self.pinned]
         return np.float32(np.percentile(bright, 95.0) / 1.96 if len(bright) >= ENOUGH else 0.0)
 
-    def _histograms(self) -> NDArray[np.uint16]:
+    def _histograms(self) -> UInt16:
         return tile_histograms(self.picture.state, self.picture.level, self.lining > 0, *self.parts, self.every)
 
     @property
-    def _plain(self) -> tuple[NDArray[np.uint8], NDArray[np.int16], Mask]:
+    def _plain(self) -> tuple[UInt8, Int16, Bool]:
         """State, level and the tiles that nothing sets off."""
         return self.picture.state, self.picture.level, (self.lining > 0) & ~self.odd
 
@@ -204,7 +200,7 @@ def _odd(length: float) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _sample(state: NDArray[np.uint8], level: NDArray[np.int16], every: int) -> NDArray[np.int16]:  # pragma: no cover - compiled
+def _sample(state: UInt8, level: Int16, every: int) -> Int16:  # pragma: no cover - compiled
     """Level of every n-th lining pixel."""
     count = 0
     for i in range(state.shape[0]):
@@ -223,7 +219,7 @@ def _sample(state: NDArray[np.uint8], level: NDArray[np.int16], every: int) -> N
 
 
 @njit(cache=True, nogil=True)
-def _lining(state: NDArray[np.uint8], tile: int, out: NDArray[np.int32]) -> NDArray[np.int32]:  # pragma: no cover - compiled
+def _lining(state: UInt8, tile: int, out: Int32) -> Int32:  # pragma: no cover - compiled
     """Lining pixels of each tile."""
     for i in range(state.shape[0]):
         for t in range(out.shape[1]):

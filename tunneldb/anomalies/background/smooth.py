@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-Float = NDArray[np.float64]
-Single = NDArray[np.float32]
-Mask = NDArray[np.bool_]
+from tunneldb.arrays import Bool, Float, Single
 
 ASIDE = 3.0
 """A tile stands out when it differs by so many standard deviations of the tiles at like arcs."""
@@ -32,7 +29,7 @@ FEW = 20
 """So many tiles tell by how much they differ."""
 
 
-def slow(level: Single, before: Single, spread: float, pinned: Mask) -> tuple[Single, Mask]:
+def slow(level: Single, before: Single, spread: float, pinned: Bool) -> tuple[Single, Bool]:
     """Follow what changes slowly, and nothing that is set off by a sharp edge.
 
     Dry lining differs from place to place as much towards dark as towards bright, and wet lining is only ever darker. So
@@ -87,7 +84,7 @@ def fill(values: Single) -> Single:
     return out
 
 
-def _odd(level: Single, free: Mask, spread: float) -> Mask:
+def _odd(level: Single, free: Bool, spread: float) -> Bool:
     """Tiles that stand out in pieces with a sharp rim, and those that lie partly in them."""
     limit = _limits(level, free, spread)
     odd = np.zeros(level.shape, np.bool_)
@@ -95,11 +92,11 @@ def _odd(level: Single, free: Mask, spread: float) -> Mask:
         with np.errstate(invalid="ignore"):
             out = free & (sign * level > limit[:, None])
         odd |= _sharp(level, out)
-    grown: Mask = ndimage.binary_dilation(odd, np.ones((3, 3), np.bool_))
+    grown: Bool = ndimage.binary_dilation(odd, np.ones((3, 3), np.bool_))
     return grown
 
 
-def _limits(level: Single, used: Mask, spread: float) -> Float:
+def _limits(level: Single, used: Bool, spread: float) -> Float:
     """By how much a tile may differ, for each row of tiles, dB."""
     limit = np.full(len(level), np.nan)
     for row in range(len(level)):
@@ -112,7 +109,7 @@ def _limits(level: Single, used: Mask, spread: float) -> Float:
     return np.maximum(np.where(np.isfinite(limit), limit, rest), spread)
 
 
-def _sharp(level: Single, out: Mask) -> Mask:
+def _sharp(level: Single, out: Bool) -> Bool:
     """Of tiles that stand out from the level, those in pieces whose rim is sharp; pieces without a rim are."""
     pieces, count = ndimage.label(out)
     if not count:
@@ -120,7 +117,7 @@ def _sharp(level: Single, out: Mask) -> Mask:
     rim = out & ndimage.binary_dilation(np.isfinite(level) & ~out)
     steep = (_span(level, EDGE)[rim] / np.maximum(_span(level, ABOUT)[rim], 1e-6)).astype(np.float64)
     part = ndimage.labeled_comprehension(steep, pieces[rim], np.arange(1, count + 1), np.median, float, 1.0)
-    sharp: Mask = np.concatenate([[False], part > SHARP])[pieces]
+    sharp: Bool = np.concatenate([[False], part > SHARP])[pieces]
     return sharp
 
 

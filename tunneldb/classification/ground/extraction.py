@@ -7,19 +7,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from tunneldb.arrays import Float, Int64
 from tunneldb.classification.ground.height_field import below, blended, carried_on, filled, refined
-from tunneldb.classification.ground.wall_foot import steady, walls
-from tunneldb.geometry.plan_line import Line
+from tunneldb.classification.ground.level_profile import is_round, level_ground, profiles
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.ground.ransac import planes
-from tunneldb.classification.ground.level_profile import is_round, level_ground, profiles
+from tunneldb.classification.ground.wall_foot import steady, walls
+from tunneldb.geometry.plan_line import Line
 from tunneldb.pointcloud.voxels import Voxels
-
-Float = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 MARGIN = 32
 """Rows depend on no points farther than this along the line, m: what is found of two stretches agrees where they overlap."""
@@ -70,7 +67,7 @@ class _Points:
     across: Float
     z: Float
     spread: Float
-    cells: Index
+    cells: Int64
     start: int
     first: int
     rows: int

@@ -7,12 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.ground.model import COLUMN
-
-Float = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _LOWER = 0.4  # share of the height in which the ground lies
 _LEAST_LOWER = 1.0  # m
@@ -25,7 +22,7 @@ _STEP = 0.02  # between columns, m, that is no slope
 _GAP = 20  # columns across which a hidden floor is filled in
 
 
-def below(along: Float, across: Float, z: Float, step: float) -> NDArray[np.bool_]:
+def below(along: Float, across: Float, z: Float, step: float) -> Bool:
     """Tell which points lie in the lower 40 % of the heights of their segment (eq. 1), or its lowest metre.
 
     Parameters
@@ -46,7 +43,7 @@ def below(along: Float, across: Float, z: Float, step: float) -> NDArray[np.bool
 
 
 @njit(cache=True, nogil=True)
-def _below(segment: Index, z: Float, segments: int, kept: NDArray[np.bool_]) -> None:  # pragma: no cover - compiled
+def _below(segment: Int64, z: Float, segments: int, kept: Bool) -> None:  # pragma: no cover - compiled
     """Keep of the points those that lie low, by histograms of heights; the outermost 0.5 % of points don't count."""
     low, high = np.full(segments, np.inf), np.full(segments, -np.inf)
     number = np.zeros(segments, np.int64)
@@ -163,7 +160,7 @@ def carried_on(height: Float, count: int) -> Float:  # pragma: no cover - compil
 
 @njit(cache=True, nogil=True, parallel=True)
 def refined(
-    along: Float, across: Float, z: Float, spread: Float, cells: Index, start: int, first: int, height: Float, gate: Float
+    along: Float, across: Float, z: Float, spread: Float, cells: Int64, start: int, first: int, height: Float, gate: Float
 ) -> tuple[Float, Float, Float]:  # pragma: no cover - compiled
     """Heights moved to the mean of the points about them; of each row the number and sum of squares of what is left.
 

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.ground.model import COLUMN
-
-Float = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 LOW, HIGH = -0.8, 1.2
 """Ground lies between these heights about the plane of a segment, m: walkways, platforms, ditches."""
@@ -24,7 +21,7 @@ _GRADUAL = 0.15  # of the width of the widest stretch, over which the surface gr
 
 @njit(cache=True, nogil=True, parallel=True)
 def profiles(
-    along: Float, across: Float, z: Float, cells: Index, start: int, first: int, columns: int,
+    along: Float, across: Float, z: Float, cells: Int64, start: int, first: int, columns: int,
     centres: Float, planes: Float, half: float, distance: float,
 ) -> Float:  # pragma: no cover - compiled  # fmt: skip
     """Level of the ground about each segment's plane in each column, (g, columns), m; NaN where there is none.
@@ -95,7 +92,7 @@ def profiles(
 
 
 @njit(cache=True, nogil=True)
-def _cut(cells: Index, columns: int, low: int, high: int, most: int) -> int:
+def _cut(cells: Int64, columns: int, low: int, high: int, most: int) -> int:
     """How many pieces a segment is cut into: as many as hold two points of a usual column, but four at least."""
     number = np.zeros(columns)
     for c in range(columns):
@@ -110,7 +107,7 @@ def _cut(cells: Index, columns: int, low: int, high: int, most: int) -> int:
 
 @njit(cache=True, nogil=True)
 def _pieces(
-    along: Float, cells: Index, columns: int, low: int, high: int, begin: float, pieces: int, piece_length: float
+    along: Float, cells: Int64, columns: int, low: int, high: int, begin: float, pieces: int, piece_length: float
 ) -> int:
     """How many pieces of a segment hold points at all."""
     seen = np.zeros(pieces, np.bool_)
@@ -122,7 +119,7 @@ def _pieces(
 
 
 @njit(cache=True, nogil=True)
-def _lowest(count: Index, seen: NDArray[np.bool_], shown: int, reach: int, bins: int) -> float:
+def _lowest(count: Int64, seen: Bool, shown: int, reach: int, bins: int) -> float:
     """The lowest level: where most points lie within τ, of those places where enough pieces show something."""
     best, most = -1, 0
     for b in range(reach, bins - reach):

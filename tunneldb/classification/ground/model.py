@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from tunneldb.arrays import Bool, Float
 
 COLUMN = 0.1
 """Distance of the columns, m; rows stand 1 m apart."""

@@ -7,10 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Index = NDArray[np.int64]
+from tunneldb.arrays import Float, Int64, UInt64
 
 _TRIALS = 1000  # at the most
 _MISS = 1e-3  # accepted chance that no sample lies on the plane alone
@@ -31,11 +29,11 @@ class Planes(NamedTuple):
     """
 
     coefficients: Float
-    inliers: Index
+    inliers: Int64
 
 
 def planes(
-    points: Float, bounds: Index, distance: float, angle: float, radius: float, seed: Index, check: bool = True
+    points: Float, bounds: Int64, distance: float, angle: float, radius: float, seed: Int64, check: bool = True
 ) -> Planes:
     """Best plane of each group of points.
 
@@ -74,7 +72,7 @@ def planes(
 
 
 @njit(cache=True, nogil=True, inline="always")
-def draw(state: Index) -> float:
+def draw(state: Int64) -> float:
     """Next random number, from 0 to 1, of a state that is stepped (splitmix64; Steele et al., 2014)."""
     state[0] += np.uint64(0x9E3779B97F4A7C15)
     z = state[0]
@@ -177,8 +175,8 @@ def _fitted(points: Float, plane: Float, distance: float) -> int:
 
 @njit(cache=True, nogil=True, parallel=True)
 def _planes(
-    points: Float, bounds: Index, distance: float, slope: float, radius: float, seed: NDArray[np.uint64], check: bool,
-    out: Float, inliers: Index,
+    points: Float, bounds: Int64, distance: float, slope: float, radius: float, seed: UInt64, check: bool,
+    out: Float, inliers: Int64,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     for g in prange(bounds.shape[0]):
         group = points[bounds[g, 0] : bounds[g, 1]]

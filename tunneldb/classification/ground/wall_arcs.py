@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tunneldb.geometry.surface import Surface
-from tunneldb.geometry.plan_line import Line
+from tunneldb.arrays import Float, Intp
 from tunneldb.classification.ground.model import COLUMN, Ground
-
-Float = NDArray[np.float64]
+from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.surface import Surface
 
 
 def foot_arcs(ground: Ground | None, line: Line, surface: Surface) -> Float:
@@ -49,7 +47,7 @@ def foot_arcs(ground: Ground | None, line: Line, surface: Surface) -> Float:
     return arcs
 
 
-def _nearest_height(height: Float, column: NDArray[np.intp]) -> Float:
+def _nearest_height(height: Float, column: Intp) -> Float:
     """Height in each row at the column, or at the nearest one that has any."""
     away = np.abs(np.arange(height.shape[1])[None, :] - column[:, None]).astype(np.float64)
     away[np.isnan(height)] = np.inf

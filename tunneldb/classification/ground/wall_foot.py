@@ -6,14 +6,11 @@ import math
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from tunneldb.arrays import Float, Int64
 from tunneldb.classification.ground.model import COLUMN
 from tunneldb.classification.ground.ransac import draw, through
-
-Float = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _HIGH = 0.6  # points of the wall are looked for up to this height, m
 _INWARD, _OUTWARD = 0.35, 0.9  # and so far from where the ground ends, m
@@ -27,7 +24,7 @@ _APART = 0.05  # m
 
 @njit(cache=True, nogil=True, parallel=True)
 def walls(
-    along: Float, across: Float, z: Float, cells: Index, start: int, first: int, height: Float, low: Float, seed: int
+    along: Float, across: Float, z: Float, cells: Int64, start: int, first: int, height: Float, low: Float, seed: int
 ) -> tuple[Float, Float]:  # pragma: no cover - compiled
     """Foot and lean of the left and the right wall at each row, (rows, 2) each; NaN where no wall is seen.
 
@@ -86,7 +83,7 @@ def walls(
 
 
 @njit(cache=True, nogil=True)
-def _wall(points: Float, state: Index) -> tuple[float, float]:
+def _wall(points: Float, state: Int64) -> tuple[float, float]:
     """Foot and lean of the wall among points (along, up, across)."""
     count = points.shape[0]
     plane, best = np.empty(3), np.empty(3)

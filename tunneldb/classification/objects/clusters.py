@@ -7,11 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 from numba import njit
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Cells = NDArray[np.int32]
+from tunneldb.arrays import Float, Int32, Int64, UInt8
 
 CELL = 0.1
 """Edge of a cell, m."""
@@ -46,7 +43,7 @@ class Cluster:
     """
 
     klass: int
-    cells: Cells
+    cells: Int32
     points: int
     along_from: float
     along_to: float
@@ -71,7 +68,7 @@ def pieces(klass: int, xyz: Float, along: Float, height: Float) -> list[Cluster]
     return [Cluster.of(klass, xyz[m], along[m], height[m]) for m in (piece == p for p in np.unique(piece))]
 
 
-def _distinct(cells: Cells) -> Cells:
+def _distinct(cells: Int32) -> Int32:
     """Cells (n, 3) once each, sorted: as whole numbers, for rows of an array are compared slowly."""
     low = cells.min(axis=0)
     width = (cells.max(axis=0) - low).astype(np.int64) + 1
@@ -87,7 +84,7 @@ def _distinct(cells: Cells) -> Cells:
     return np.column_stack(columns[::-1]).astype(np.int32)
 
 
-def _hull(cells: Cells) -> Float:
+def _hull(cells: Int32) -> Float:
     """Convex hull in plan of cells, each a square, so that it always has an area."""
     flat = cells[np.r_[True, (np.diff(cells[:, :2], axis=0) != 0).any(axis=1)], :2]  # sorted by x and y
     # From a corner on: millions of metres would cost the hull its digits.
@@ -113,10 +110,10 @@ class Lookup:
         Its class.
     """
 
-    first: Int
-    last: Int
-    keys: Int
-    klass: NDArray[np.uint8]
+    first: Int64
+    last: Int64
+    keys: Int64
+    klass: UInt8
 
     @classmethod
     def of(cls, clusters: list[Cluster]) -> Lookup:
@@ -136,7 +133,7 @@ class Lookup:
         return cls(first, last, keys, found)
 
 
-def _steps() -> Int:
+def _steps() -> Int64:
     """Steps to the cells within ``NEAR``, the shortest first."""
     side = np.arange(-NEAR, NEAR + 1)
     steps = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -146,7 +143,7 @@ def _steps() -> Int:
 
 
 @njit(cache=True, nogil=True)
-def _slot(keys: Int, key: int) -> int:  # pragma: no cover - compiled
+def _slot(keys: Int64, key: int) -> int:  # pragma: no cover - compiled
     """Slot that holds a key, or the empty one where it belongs."""
     mask = keys.shape[0] - 1
     mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
@@ -158,8 +155,8 @@ def _slot(keys: Int, key: int) -> int:  # pragma: no cover - compiled
 
 @njit(cache=True, nogil=True)
 def _filled(
-    cells: Int, klass: NDArray[np.uint8], steps: Int, first: Int, shape: Int
-) -> tuple[Int, NDArray[np.uint8]]:  # pragma: no cover - compiled
+    cells: Int64, klass: UInt8, steps: Int64, first: Int64, shape: Int64
+) -> tuple[Int64, UInt8]:  # pragma: no cover - compiled
     slots = 1024
     keys, found, used = np.full(slots, -1, np.int64), np.zeros(slots, np.uint8), 0
     for s in range(steps.shape[0]):
@@ -184,7 +181,7 @@ def _filled(
 
 @njit(cache=True, nogil=True)
 def look_up(
-    x: float, y: float, z: float, first: Int, last: Int, keys: Int, klass: NDArray[np.uint8]
+    x: float, y: float, z: float, first: Int64, last: Int64, keys: Int64, klass: UInt8
 ) -> int:  # pragma: no cover - compiled
     """Class of the cluster that a point lies in; 0 for none."""
     cx, cy, cz = np.floor(x / CELL), np.floor(y / CELL), np.floor(z / CELL)

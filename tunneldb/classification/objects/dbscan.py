@@ -9,17 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Bool = NDArray[np.bool_]
+from tunneldb.arrays import Bool, Float, Int64
 
 _EDGE = 0.577  # of the radius: a little less than 1/√3, the edge of a cube whose diagonal is the radius
 _NEAR = 2  # cells to each side that can hold a neighbour
 
 
-def dbscan(points: Float, radius: float, min_points: int) -> Int:
+def dbscan(points: Float, radius: float, min_points: int) -> Int64:
     """Label the clusters of points.
 
     A core point has ``min_points`` points, itself included, within the radius (eq. 2). Core points within the radius of
@@ -70,7 +67,7 @@ def dbscan(points: Float, radius: float, min_points: int) -> Int:
 
 
 @njit(cache=True, nogil=True)
-def _keys(points: Float, low: Float, edge: float, shape: Int) -> Int:  # pragma: no cover - compiled
+def _keys(points: Float, low: Float, edge: float, shape: Int64) -> Int64:  # pragma: no cover - compiled
     keys = np.empty(points.shape[0], np.int64)
     for i in range(points.shape[0]):
         x = np.int64((points[i, 0] - low[0]) / edge) + _NEAR
@@ -87,7 +84,7 @@ def _near(placed: Float, i: int, j: int, limit: float) -> bool:  # pragma: no co
 
 
 @njit(cache=True, nogil=True)
-def _runs(cells: Int, shape: Int, c: int, out: Int) -> int:  # pragma: no cover - compiled
+def _runs(cells: Int64, shape: Int64, c: int, out: Int64) -> int:  # pragma: no cover - compiled
     """First and last + 1 of the runs of filled cells about a cell, itself included; how many runs there are."""
     count = 0
     for dz in range(-_NEAR, _NEAR + 1):
@@ -105,7 +102,7 @@ def _runs(cells: Int, shape: Int, c: int, out: Int) -> int:  # pragma: no cover 
 
 @njit(cache=True, nogil=True, parallel=True)
 def _cores(
-    placed: Float, starts: Int, cells: Int, shape: Int, radius: float, min_points: int
+    placed: Float, starts: Int64, cells: Int64, shape: Int64, radius: float, min_points: int
 ) -> Bool:  # pragma: no cover - compiled
     core = np.zeros(placed.shape[0], np.bool_)
     limit = radius * radius
@@ -130,7 +127,7 @@ def _cores(
 
 
 @njit(cache=True, nogil=True)
-def _root(parent: Int, c: int) -> int:  # pragma: no cover - compiled
+def _root(parent: Int64, c: int) -> int:  # pragma: no cover - compiled
     while parent[c] != c:
         parent[c] = parent[parent[c]]
         c = parent[c]
@@ -138,7 +135,7 @@ def _root(parent: Int, c: int) -> int:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True)
-def _touch(placed: Float, starts: Int, core: Bool, a: int, b: int, limit: float) -> bool:  # pragma: no cover - compiled
+def _touch(placed: Float, starts: Int64, core: Bool, a: int, b: int, limit: float) -> bool:  # pragma: no cover - compiled
     """Tell whether a core point of one cell lies within the radius of one of another."""
     for i in range(starts[a], starts[a + 1]):
         if core[i]:
@@ -149,7 +146,7 @@ def _touch(placed: Float, starts: Int, core: Bool, a: int, b: int, limit: float)
 
 
 @njit(cache=True, nogil=True)
-def _joined(placed: Float, starts: Int, cells: Int, shape: Int, radius: float, core: Bool) -> Int:  # pragma: no cover
+def _joined(placed: Float, starts: Int64, cells: Int64, shape: Int64, radius: float, core: Bool) -> Int64:  # pragma: no cover
     """First cell of the cluster of each cell's core points; -1 without one."""
     parent = np.full(cells.shape[0], -1, np.int64)
     for c in range(cells.shape[0]):
@@ -175,8 +172,8 @@ def _joined(placed: Float, starts: Int, cells: Int, shape: Int, radius: float, c
 
 @njit(cache=True, nogil=True, parallel=True)
 def _members(
-    placed: Float, order: Int, starts: Int, cells: Int, shape: Int, radius: float, core: Bool, roots: Int
-) -> Int:  # pragma: no cover - compiled
+    placed: Float, order: Int64, starts: Int64, cells: Int64, shape: Int64, radius: float, core: Bool, roots: Int64
+) -> Int64:  # pragma: no cover - compiled
     """Root of each point's cluster, -1 for noise."""
     found = np.full(placed.shape[0], -1, np.int64)
     for c in prange(cells.shape[0]):
@@ -203,7 +200,7 @@ def _members(
 
 
 @njit(cache=True, nogil=True)
-def _numbered(labels: Int, count: int) -> Int:  # pragma: no cover - compiled
+def _numbered(labels: Int64, count: int) -> Int64:  # pragma: no cover - compiled
     """Number the clusters in the order of their first points."""
     number = np.full(count, -1, np.int64)
     used = 0

@@ -7,18 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.classes import Klass
+from tunneldb.classification.ground.model import Ground
 from tunneldb.classification.objects.clusters import Cluster, pieces
 from tunneldb.classification.objects.dbscan import dbscan
-from tunneldb.classification.ground.model import Ground
 from tunneldb.classification.objects.spacing import Spacing
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Bool = NDArray[np.bool_]
 
 RAIL_TOP = 0.35
 """Bars along the ground are no higher than this above it, m: a rail of 0.17 m on a sleeper, with a guard rail's play."""
@@ -91,7 +87,7 @@ class Rest:
     def __len__(self) -> int:
         return len(self.xyz)
 
-    def __getitem__(self, chosen: Bool | Int) -> Rest:
+    def __getitem__(self, chosen: Bool | Int64) -> Rest:
         parts = (self.xyz, self.along, self.across, self.height, self.depth, self.top)
         return Rest(*(part[chosen] for part in parts))
 
@@ -180,7 +176,7 @@ def _highest(height: Float) -> float:
     return float(np.quantile(height, 0.9)) + 0.02
 
 
-def _long(thin: Bool, metres: int) -> Int:
+def _long(thin: Bool, metres: int) -> Int64:
     """Number of each bar that is long enough, 0 for none; it may shift by a column from one metre to the next."""
     labels, count = ndimage.label(thin, structure=np.ones((3, 3)))
     lengths = np.array([0, *(rows.stop - rows.start for rows, _ in ndimage.find_objects(labels, count))])

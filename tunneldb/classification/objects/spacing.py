@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-Float = NDArray[np.float64]
+from tunneldb.arrays import Float
 
 _SAMPLES, _NEIGHBOURS = 2000, 128
 

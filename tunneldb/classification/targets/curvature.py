@@ -12,16 +12,10 @@ import math
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Bool, Float, Int32, Int64, Single
 from tunneldb.geometry.normals import eigenvalues
 from tunneldb.pointcloud.noise import CellCounts
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int32 = NDArray[np.int32]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
 
 FLAT = 0.08
 """Windows whose points scatter less about their best plane, in radii, hold no sphere: a fifth of one scatters by 0.11."""
@@ -81,7 +75,7 @@ def _keys(place: Int64) -> Int64:
 
 
 @njit(cache=True, nogil=True)
-def _sum(xyz: Float, numbers: Int32, scale: float, sums: Float32) -> None:  # pragma: no cover - compiled
+def _sum(xyz: Float, numbers: Int32, scale: float, sums: Single) -> None:  # pragma: no cover - compiled
     for i in range(len(xyz)):
         k = numbers[i]
         if sums[k, 9] >= MOST:
@@ -102,7 +96,7 @@ def _sum(xyz: Float, numbers: Int32, scale: float, sums: Float32) -> None:  # pr
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _curved(place: Int64, key: Int64, sums: Float32, points: int, limit: float) -> Bool:  # pragma: no cover - compiled
+def _curved(place: Int64, key: Int64, sums: Single, points: int, limit: float) -> Bool:  # pragma: no cover - compiled
     n = len(place)
     kept = np.zeros(n, np.bool_)
     if n == 0:

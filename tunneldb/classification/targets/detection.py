@@ -12,15 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.targets.fit import Fit, cells_of, coverage, fit_sphere
-from tunneldb.classification.targets.refinement import settle
 from tunneldb.classification.targets.hough import NEAR, REACH, Scattered, candidates
-
-Float = NDArray[np.float64]
-Int64 = NDArray[np.int64]
+from tunneldb.classification.targets.refinement import settle
 
 LEAST_POINTS = 30
 """Points on a sphere; with fewer, its centre is known to 1 or 2 mm at best and its radius not at all."""
@@ -259,7 +256,7 @@ def _axes(count: int) -> Float:
 _AXES = _axes(400)  # 10° apart; posts stand upright
 
 
-def join(centres: Float, scans: NDArray[np.int64], radius: float) -> Int64:
+def join(centres: Float, scans: Int64, radius: float) -> Int64:
     """Tell which rows are the same sphere, seen from several scans.
 
     Spheres are solid, so the centres of two are two radii apart or more; rows nearer to each other than one radius are the
@@ -290,6 +287,6 @@ def join(centres: Float, scans: NDArray[np.int64], radius: float) -> Int64:
     return np.unique(group, return_inverse=True)[1].astype(np.int64)
 
 
-def confirmed(group: Int64, firm: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def confirmed(group: Int64, firm: Bool) -> Bool:
     """Whether each row (n,) is of a sphere that stands by itself in some row of its group, as `join` has them."""
     return np.isin(group, group[firm])

@@ -11,12 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-Float = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
+from tunneldb.arrays import Bool, Float, Int64
 
 GRAZING = 0.25
 """Cosine of incidence (75.5°) below which a point isn't used where the scanner's place is known: at the limb of a sphere

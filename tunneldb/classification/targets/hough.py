@@ -12,12 +12,9 @@ import math
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int64
 from tunneldb.geometry.normals import eigenvalues, normal
-
-Float = NDArray[np.float64]
-Int64 = NDArray[np.int64]
 
 # In radii of the spheres:
 REACH = 0.6  # of the neighbourhood that gives a normal

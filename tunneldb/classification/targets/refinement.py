@@ -7,13 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int64
 from tunneldb.classification.targets.fit import BANDS, SECTORS
 from tunneldb.classification.targets.hough import NEAR, Scattered, around
-
-Float = NDArray[np.float64]
-Int64 = NDArray[np.int64]
 
 # In radii of the spheres:
 WIDE = 0.25  # points so near the sphere draw at first,

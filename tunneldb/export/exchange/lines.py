@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
 
-from tunneldb.geometry.surface import Surface
 from tunneldb.anomalies.geometries import strip
-
-Float = NDArray[np.float64]
+from tunneldb.arrays import Bool, Float
+from tunneldb.geometry.surface import Surface
 
 STEP = 10.0
 """Between ticks, m of chainage."""
@@ -81,7 +79,7 @@ def ticks(surface: Surface, chainages: Float) -> Float:
     return np.stack([frames[:, 0] - across, frames[:, 0] + across], axis=1)
 
 
-def is_hundred(chainages: Float) -> NDArray[np.bool_]:
+def is_hundred(chainages: Float) -> Bool:
     """Whether each chainage (m) is a whole hundred."""
     return np.asarray(np.abs(chainages / HUNDRED - np.round(chainages / HUNDRED)) < 1e-6)
 

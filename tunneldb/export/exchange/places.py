@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import psycopg
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.database import Survey
 from tunneldb.errors import UserError
 
 
-def labels(conn: psycopg.Connection[Any], survey: Survey, chainages: NDArray[np.float64]) -> list[str]:
+def labels(conn: psycopg.Connection[Any], survey: Survey, chainages: Float) -> list[str]:
     """Stations at chainages (m) of a survey's tunnel, written 12+345.678."""
     rows = conn.execute(
         "SELECT tunnel_api.station_label(%s, c.chainage) FROM unnest(%s::float8[]) WITH ORDINALITY AS c (chainage, n)"

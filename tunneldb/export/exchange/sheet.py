@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 from ezdxf.enums import TextEntityAlignment as Align
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.export.exchange.entity import Spot, draw_spot, write
 from tunneldb.export.exchange.lines import Profile, wet_parts
 from tunneldb.geometry.surface import Surface
 
-Float = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 """West, south, east, north, m."""
 

@@ -14,6 +14,7 @@ import psycopg
 from numpy.typing import NDArray
 from psycopg import sql
 
+from tunneldb.arrays import Bool
 from tunneldb.database import Survey
 
 _ALONG = ("chainage_from", "chainage_to"), ("chainage", "chainage")
@@ -26,7 +27,7 @@ class Column:
 
     name: str
     values: NDArray[Any]
-    missing: NDArray[np.bool_]
+    missing: Bool
 
 
 @dataclass(frozen=True)

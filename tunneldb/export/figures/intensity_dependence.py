@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.files import replacing
 from tunneldb.radiometry.dependence import Course
@@ -17,7 +17,6 @@ from tunneldb.radiometry.oren_nayar import incidence_db
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Float = NDArray[np.float64]
 
 FORMATS = (".png", ".pdf", ".svg")
 _LINE, _BAND, _MEASURED = "#b2182b", "#2166ac", "#1b7837"

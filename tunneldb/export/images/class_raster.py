@@ -7,16 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import psycopg
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Intp, UInt8
+from tunneldb.classification.classes import Klass
 from tunneldb.database import Survey
 from tunneldb.export.images.palette import PALETTES
 from tunneldb.geometry.surface import Surface
-from tunneldb.classification.classes import Klass
-from tunneldb.store.scene import load_scene
 from tunneldb.raster.geotiff import Raster
-
-Float = NDArray[np.float64]
+from tunneldb.store.scene import load_scene
 
 NO_CLASS = PALETTES["class"].nodata
 """Value of a pixel without a class."""
@@ -41,7 +39,7 @@ class ClassPainter:
     """
 
     surface: Surface
-    classes: Callable[[Float], NDArray[np.uint8]]
+    classes: Callable[[Float], UInt8]
 
     @classmethod
     def load(cls, conn: psycopg.Connection, survey: Survey, km: int) -> ClassPainter | None:
@@ -58,7 +56,7 @@ class ClassPainter:
         assert scene.surface is not None
         return cls(scene.surface, scene.classes)
 
-    def paint(self, offset: Raster) -> NDArray[np.uint8]:
+    def paint(self, offset: Raster) -> UInt8:
         """Class of each pixel of an offset image (rows, columns), NO_CLASS where no point fell."""
         classes = np.full(offset.values.shape, NO_CLASS, np.uint8)
         rows, columns = np.nonzero(np.isfinite(offset.values))
@@ -67,7 +65,7 @@ class ClassPainter:
             classes[row, column] = self._classes(offset, row, column)
         return classes
 
-    def _classes(self, offset: Raster, row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.uint8]:
+    def _classes(self, offset: Raster, row: Intp, column: Intp) -> UInt8:
         """Class of pixels (n,) that hold points."""
         place = offset.transform
         chainage = np.asarray(place.c + (column + 0.5) * place.a, dtype=np.float64)

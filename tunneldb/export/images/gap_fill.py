@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-Single = NDArray[np.float32]
+from tunneldb.arrays import Single
 
 FILL = 0.3
 """Gaps are filled from values at most so far away, m."""

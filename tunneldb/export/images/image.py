@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from tunneldb.database import Survey, snapshot
-from tunneldb.store.stationing import load_stationing
 from tunneldb.export.images import preview
-from tunneldb.files import replacing
 from tunneldb.export.images.class_raster import ClassPainter
 from tunneldb.export.images.cog import Extent, write_cog
 from tunneldb.export.images.gap_fill import FILL, TOLD, fill_blocks
 from tunneldb.export.images.palette import PALETTES
+from tunneldb.files import replacing
 from tunneldb.raster.accumulator import BLOCK
 from tunneldb.raster.geotiff import KINDS, Raster, decode
+from tunneldb.store.stationing import load_stationing
 
 
 def image_kilometres(conn: psycopg.Connection, survey: Survey) -> list[int]:

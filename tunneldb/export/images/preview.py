@@ -10,16 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 from shapely.geometry import Polygon
 
+from tunneldb.arrays import Single, UInt8
+from tunneldb.classification.classes import Klass
 from tunneldb.export.images.gap_fill import FILL, fill_gaps
 from tunneldb.export.images.palette import PALETTES
 from tunneldb.geometry.stationing import Stationing
-from tunneldb.classification.classes import Klass
-
-Single = NDArray[np.float32]
 
 STRIP = 100.0
 """Length of a strip, m."""
@@ -63,7 +61,7 @@ def shrink(values: Single, factor: int) -> Single:
     return np.where(count > 0, total / np.maximum(count, 1), np.nan).astype(np.float32)
 
 
-def shrink_codes(values: NDArray[np.uint8], factor: int) -> Single:
+def shrink_codes(values: UInt8, factor: int) -> Single:
     """Take the commonest code of ``factor`` × ``factor`` pixels, the greater of two; without 0, which becomes NaN."""
     rows, columns = (-(-n // factor) * factor for n in values.shape)
     padded = np.zeros((rows, columns), np.uint8)
@@ -180,7 +178,7 @@ def _span(kind: str, strips: Sequence[Strip]) -> tuple[float, float]:
     return low, max(high, low + 0.1)
 
 
-def _colours(kind: str, values: Single, low: float, high: float) -> NDArray[np.uint8]:
+def _colours(kind: str, values: Single, low: float, high: float) -> UInt8:
     """Colours (rows, columns, 3) of values; places without one in a pale grey."""
     if kind in PALETTES:
         table = np.full((256, 3), _EMPTY, np.uint8)

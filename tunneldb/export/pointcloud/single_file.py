@@ -7,20 +7,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tunneldb.errors import UserError
-from tunneldb.files import replacing
-from tunneldb.export.pointcloud.survey import CLASS_NAMES, same_file
+from tunneldb.arrays import Float, Int64
 from tunneldb.classification.classes import Klass
 from tunneldb.classification.classify import find_bare_scene
 from tunneldb.classification.ground.extraction import GroundSettings, find_ground
-from tunneldb.geometry.plan_line import Line
-from tunneldb.classification.scene import Scene
 from tunneldb.classification.objects.objects import ClusterSettings
-from tunneldb.pointcloud.voxels import Voxels
+from tunneldb.classification.scene import Scene
+from tunneldb.errors import UserError
+from tunneldb.export.pointcloud.survey import CLASS_NAMES, same_file
+from tunneldb.files import replacing
+from tunneldb.geometry.plan_line import Line
 from tunneldb.pointcloud.reader import read_header
 from tunneldb.pointcloud.rewrite import read_coordinates, rewrite
+from tunneldb.pointcloud.voxels import Voxels
 
 Begin = Callable[[str, int], Callable[[int], None]]
 
@@ -37,7 +37,7 @@ class Classified:
         Whether there is any.
     """
 
-    counts: NDArray[np.int64]
+    counts: Int64
     ground: bool
     lining: bool
 
@@ -83,7 +83,7 @@ def classify_file(source: Path, target: Path, values: Mapping[str, float], begin
 
 def find_scene_of(
     source: Path, values: Mapping[str, float], progress: Callable[[int], None]
-) -> tuple[Scene, NDArray[np.float64]]:
+) -> tuple[Scene, Float]:
     """Make the models of a file in one pass over its points.
 
     Returns

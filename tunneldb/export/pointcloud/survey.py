@@ -9,18 +9,17 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import numpy as np
 import psycopg
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Int64
+from tunneldb.classification.classes import Klass
 from tunneldb.database import Survey, snapshot
 from tunneldb.errors import UserError
 from tunneldb.files import replacing
-from tunneldb.classification.classes import Klass
 from tunneldb.pipeline.run import loaded_kilometres
+from tunneldb.pointcloud.rewrite import rewrite
 from tunneldb.store.scene import load_scene
 from tunneldb.store.sources import unchanged_file
-from tunneldb.pointcloud.rewrite import rewrite
 
 CLASS_NAMES = {int(klass): klass.name.lower() for klass in Klass}
 """Names of the classes, as they are written into the files."""
@@ -54,7 +53,7 @@ class Written:
     """A file that was written: its points by class (256,), and how long it took, s."""
 
     path: Path
-    counts: NDArray[np.int64]
+    counts: Int64
     seconds: float
 
 

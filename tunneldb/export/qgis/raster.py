@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import rasterio
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.export.images.gap_fill import TOLD
 from tunneldb.export.images.palette import PALETTES, hexadecimal
 
@@ -59,7 +59,7 @@ def offset_range(paths: Sequence[Path]) -> float:
     return next((limit for limit in OFFSET_RANGES if limit >= usual), OFFSET_RANGES[-1])
 
 
-def _sample(paths: Sequence[Path]) -> NDArray[np.float64]:
+def _sample(paths: Sequence[Path]) -> Float:
     """Values of images, some from all over each."""
     samples = [np.empty(0)]
     for path in paths:

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from tunneldb.store.survey import Survey
 from tunneldb.geometry.stationing import Stationing
-from tunneldb.registration.control import Motion
 from tunneldb.pipeline.target_control import Comparison, mean_centres
 from tunneldb.pipeline.targets import Found, Search
+from tunneldb.registration.control import Motion
+from tunneldb.store.survey import Survey
 
 _HOW = {
     "place": "by their places",

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
+from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.faults import check_finite, check_ranges, decoding, require_dimension
 from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
@@ -62,8 +63,8 @@ class Scan:
     number: int
     records: int
     fields: frozenset[str]
-    rotation: NDArray[np.float64]
-    position: NDArray[np.float64] | None
+    rotation: Float
+    position: Float | None
     start: float | None
 
     @property
@@ -93,7 +94,7 @@ def is_e57(path: Path) -> bool:
     return path.suffix.lower() == ".e57"
 
 
-def scan_number(guid: str, position: NDArray[np.float64] | None) -> int:
+def scan_number(guid: str, position: Float | None) -> int:
     """Number of a scan, the same in whichever file and place among the scans: a hash of its GUID and position.
 
     From 65536 to 2³¹ − 1, so never one of a LAS file. A scan that was registered anew has another number.
@@ -228,7 +229,7 @@ def _count_good(path: Path, version: tuple[int, int], scan: int, flags: tuple[st
         return sum(int(good_of(fields, flags).sum()) for fields in read_fields(image, one, flags, CHUNK))
 
 
-def good_of(fields: dict[str, NDArray[Any]], flags: Sequence[str]) -> NDArray[np.bool_]:
+def good_of(fields: dict[str, NDArray[Any]], flags: Sequence[str]) -> Bool:
     """Tell which points are good: those that no flag speaks against."""
     return np.logical_and.reduce([fields[flag] == 0 for flag in flags])
 
@@ -265,13 +266,13 @@ def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int) -> Iter
             )
 
 
-def own_coordinates(scan: Scan, fields: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
+def own_coordinates(scan: Scan, fields: dict[str, NDArray[Any]]) -> Float:
     """Coordinates (n, 3) in the scan's own frame, m."""
     own = np.column_stack([fields[name] for name in scan.coordinates])
     return _to_cartesian(own) if scan.coordinates is SPHERICAL else own
 
 
-def _to_cartesian(rae: NDArray[np.float64]) -> NDArray[np.float64]:
+def _to_cartesian(rae: Float) -> Float:
     """Range, azimuth and elevation (m, rad) to x, y, z (m)."""
     distance, azimuth, elevation = rae.T
     plan = distance * np.cos(elevation)
@@ -352,7 +353,7 @@ def _scan(index: int, node: Any) -> Scan:
     return Scan(index, name, scan_number(guid, position), points.childCount(), fields, rotation, position, start)
 
 
-def _pose(node: Any) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+def _pose(node: Any) -> tuple[Float, Float | None]:
     if not node.isDefined("pose"):
         return np.eye(3), None
     position = np.array([value_of(node, f"pose/translation/{name}", 0.0) for name in "xyz"], np.float64)
@@ -360,7 +361,7 @@ def _pose(node: Any) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     return _rotation(np.array(quaternion, np.float64)), position
 
 
-def _rotation(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rotation(quaternion: Float) -> Float:
     """Matrix of a quaternion w, x, y, z; NaN of one without length."""
     with np.errstate(invalid="ignore", divide="ignore"):
         w, x, y, z = quaternion / np.linalg.norm(quaternion)
@@ -382,7 +383,7 @@ def value_of(node: Any, name: str, missing: float | None = None) -> float | None
     return float(node.scaledValue() if hasattr(node, "scaledValue") else node.value())
 
 
-def _box(image: Any, scan: Scan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _box(image: Any, scan: Scan) -> tuple[Float, Float]:
     """Box of a scan in the file's frame."""
     node = image.root()["data3D"][scan.index]
     limits = [[value_of(node, f"cartesianBounds/{axis}{end}", np.nan) for axis in "xyz"] for end in ("Minimum", "Maximum")]
@@ -400,7 +401,7 @@ def _box(image: Any, scan: Scan) -> tuple[NDArray[np.float64], NDArray[np.float6
     return corners.min(axis=0), corners.max(axis=0)
 
 
-def _xyz(raw: Raw) -> NDArray[np.float64]:
+def _xyz(raw: Raw) -> Float:
     return np.column_stack([raw.x, raw.y, raw.z]) * raw.scales + raw.offsets
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, UInt8, UInt16
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.e57 import (
     KIND,
@@ -143,7 +144,7 @@ class E57Records:
         self._count(stored, np.broadcast_to(number, len(out)))
         return out
 
-    def _count(self, stored: NDArray[np.float64], number: NDArray[np.uint8]) -> None:
+    def _count(self, stored: Float, number: UInt8) -> None:
         self.count += len(stored)
         self.low = np.minimum(self.low, stored.min(axis=0) * self.scale + self.offsets)
         self.high = np.maximum(self.high, stored.max(axis=0) * self.scale + self.offsets)
@@ -154,7 +155,7 @@ def _names() -> Iterator[str]:
     yield from ("returnIndex", "returnCount", *(name for name, _ in _COLOURS))
 
 
-def _limits(node: Any, name: str, values: NDArray[np.float64]) -> tuple[float, float]:
+def _limits(node: Any, name: str, values: Float) -> tuple[float, float]:
     """Least and greatest value by the header; without those 0 to 1, 8 or 16 bits, whichever holds them."""
     low, high = (value_of(node, f"{name}{end}") for end in ("Minimum", "Maximum"))
     if low is not None and high is not None and high > low:
@@ -163,13 +164,13 @@ def _limits(node: Any, name: str, values: NDArray[np.float64]) -> tuple[float, f
     return 0.0, next((float(end) for end in (1, 2**8 - 1, 2**16 - 1) if most <= end), most)
 
 
-def _spread(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.uint16]:
+def _spread(values: Float, low: float, high: float) -> UInt16:
     """Values from low to high over 16 bits; what is no number is 0."""
     share = np.nan_to_num((values - low) / (high - low), nan=0.0, posinf=1.0, neginf=0.0)
     return np.rint(np.clip(share, 0.0, 1.0) * (2**16 - 1)).astype(np.uint16)
 
 
-def _header(scale: float, offsets: NDArray[np.float64], date: dt.datetime | None, size: int, timed: bool) -> bytes:
+def _header(scale: float, offsets: Float, date: dt.datetime | None, size: int, timed: bool) -> bytes:
     header = bytearray(HEADER_SIZE)
     flags = _STANDARD_TIME_FLAG if timed else 0
     struct.pack_into("<4sHH16sBB32s32s", header, 0, b"LASF", 0, flags, bytes(16), 1, 4, b"OTHER", b"tunneldb")

@@ -13,12 +13,13 @@ from laspy import DecompressionSelection, LazBackend
 from numpy.typing import NDArray
 from pyproj.exceptions import CRSError
 
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.threads import threads
-from tunneldb.pointcloud.formats.las_bounds import check_envelope
 from tunneldb.pointcloud.formats.faults import check_finite, check_ranges, decoding, line_of, require_dimension
-from tunneldb.pointcloud.points import Ranges, Raw, ScanHeader
+from tunneldb.pointcloud.formats.las_bounds import check_envelope
 from tunneldb.pointcloud.formats.laz_chunks import VariedChunks
+from tunneldb.pointcloud.points import Ranges, Raw, ScanHeader
+from tunneldb.threads import threads
 
 KIND = "a LAS or LAZ"
 
@@ -196,7 +197,7 @@ def _backends() -> tuple[LazBackend, ...]:
     return (LazBackend.Lazrs,) if threads() == 1 else (LazBackend.LazrsParallel, LazBackend.Lazrs)
 
 
-def _check_scales(path: Path, scales: NDArray[np.float64], offsets: NDArray[np.float64]) -> None:
+def _check_scales(path: Path, scales: Float, offsets: Float) -> None:
     with np.errstate(over="ignore", invalid="ignore"):
         farthest = np.abs(scales) * 2.0**31 + np.abs(offsets)
     if not (np.all(np.isfinite(farthest)) and np.all(scales > 0)):
@@ -206,5 +207,5 @@ def _check_scales(path: Path, scales: NDArray[np.float64], offsets: NDArray[np.f
         )
 
 
-def _row(values: NDArray[np.float64]) -> str:
+def _row(values: Float) -> str:
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"

@@ -11,7 +11,7 @@ import numpy as np
 from laspy.point.dims import POINT_FORMATS_DTYPE
 from numpy.typing import NDArray
 
-Bytes = NDArray[np.uint8]
+from tunneldb.arrays import Float, UInt8
 
 FORMAT_OF = {0: 6, 1: 6, 2: 7, 3: 7, 4: 9, 5: 10, 6: 6, 7: 7, 8: 8, 9: 9, 10: 10}
 """Point format with 8 bits for the class that holds all that each format does."""
@@ -25,7 +25,7 @@ def record_size(point_format: int) -> int:
     return int(POINT_FORMATS_DTYPE[point_format].itemsize)
 
 
-def fields(records: Bytes, point_format: int) -> NDArray[np.void]:
+def fields(records: UInt8, point_format: int) -> NDArray[np.void]:
     """View of records (n, size) by the names of their standard fields; extra bytes are behind them."""
     standard: np.dtype[np.void] = POINT_FORMATS_DTYPE[point_format]
     layout = np.dtype(
@@ -39,7 +39,7 @@ def fields(records: Bytes, point_format: int) -> NDArray[np.void]:
     return records.view(layout)[:, 0]
 
 
-def coordinates(records: Bytes, scales: Sequence[float], offsets: Sequence[float]) -> NDArray[np.float64]:
+def coordinates(records: UInt8, scales: Sequence[float], offsets: Sequence[float]) -> Float:
     """Coordinates (n, 3) of records of any format, m, by the scales and offsets of the header."""
     stored = fields(records, 0)
     xyz = np.empty((len(records), 3))
@@ -49,7 +49,7 @@ def coordinates(records: Bytes, scales: Sequence[float], offsets: Sequence[float
     return xyz
 
 
-def upgraded(records: Bytes, point_format: int) -> Bytes:
+def upgraded(records: UInt8, point_format: int) -> UInt8:
     """Records in the format that `FORMAT_OF` names, with all that they held; the same array where that is their own.
 
     Parameters

@@ -10,9 +10,9 @@ from typing import BinaryIO
 import lazrs
 import numpy as np
 
-from tunneldb.threads import threads
 from tunneldb.pointcloud.formats.las_header import Head
 from tunneldb.pointcloud.formats.las_records import Bytes, record_size
+from tunneldb.threads import threads
 
 
 class LazWriter:

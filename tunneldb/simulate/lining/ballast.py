@@ -12,13 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
+from tunneldb.simulate.noise_field import mix
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.section import Section
-from tunneldb.simulate.noise_field import mix
-
-Array = NDArray[np.float64]
 
 CELL = 0.045  # m: one stone a cell
 STONE = (0.015, 0.030)  # radii of stones, m: stones of 3 to 6 cm
@@ -63,7 +61,7 @@ def stones(x: float, y: float, salt: int) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _many(x: Array, y: Array, salt: int, out: Array) -> None:
+def _many(x: Float, y: Float, salt: int, out: Float) -> None:
     for i in range(x.shape[0]):
         out[i] = stones(x[i], y[i], salt)
 
@@ -108,7 +106,7 @@ def height(ground: Ground, x: float, y: float, u: float) -> float:
 
 @njit(cache=True, nogil=True)
 def meet_ground(
-    ground: Ground, o: Array, d: Array, r: float, u: float, w: float, c: float, n: float, dw: float, on_floor: bool
+    ground: Ground, o: Float, d: Float, r: float, u: float, w: float, c: float, n: float, dw: float, on_floor: bool
 ) -> tuple[float, float, bool]:
     """Range at which a ray meets the ground, cosine there, and whether it is the ground (else the wall's foot).
 

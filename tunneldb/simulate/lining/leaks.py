@@ -7,17 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from shapely import affinity
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.prepared import prep
 
+from tunneldb.arrays import Float, Int64
 from tunneldb.errors import UserError
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 # Width of the edge over which a patch goes from dry to wet, m.
 EDGE = 0.008
@@ -142,7 +139,7 @@ def place(
     return [Leak(i + 1, *item) for i, item in enumerate(leaks)]
 
 
-def edge_table(leaks: list[Leak]) -> tuple[Array, Index, Array]:
+def edge_table(leaks: list[Leak]) -> tuple[Float, Int64, Float]:
     """Rows of edges (x1, y1, x2, y2), first edge of each leak (n+1,), and per leak: bounds (4) and drop."""
     edges, first, rows = [np.empty((0, 4))], [0], np.zeros((len(leaks), 5))
     for row, leak in zip(rows, leaks, strict=True):
@@ -158,7 +155,7 @@ def edge_table(leaks: list[Leak]) -> tuple[Array, Index, Array]:
 
 
 @njit(cache=True, nogil=True)
-def depth_inside(edges: Array, begin: int, end: int, x: float, y: float) -> float:
+def depth_inside(edges: Float, begin: int, end: int, x: float, y: float) -> float:
     """Distance of a point to the edges of a polygon, m, positive inside (holes are outside)."""
     best = 1e300
     inside = False

@@ -6,17 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import STRtree
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-
-Array = NDArray[np.float64]
 
 TRIES = 600
 CLEAR = 0.15  # between marks, and between a mark and a leak, m
@@ -47,7 +45,7 @@ class Mark:
         return LineString([self.one, self.other]).buffer(0.5 * self.width, cap_style="flat")
 
 
-def mark_table(marks: list[Mark]) -> Array:
+def mark_table(marks: list[Mark]) -> Float:
     """Rows for the kernel: chainage from, to; middle (2), unit direction (2), half length, half width, level."""
     rows = np.empty((len(marks), 9))
     for row, mark in zip(rows, marks, strict=True):

@@ -8,17 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from tunneldb.simulate.objects.fixtures import Appendage, bin_of, bins
+from tunneldb.arrays import Float, Int64
 from tunneldb.simulate.lining.marks import Mark, mark_table
-from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.lining.rings import Rings, ring_level
 from tunneldb.simulate.noise_field import clouds, normal
+from tunneldb.simulate.objects.fixtures import Appendage, bin_of, bins
+from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 # Clouds of formwork on cast lining: standard deviation, dB, and limits of their size, m.
 FORMWORK, FORMWORK_SIZE = 0.2, (1.0, 2.0)
@@ -58,13 +55,13 @@ class Coat(NamedTuple):
 
     rings: Rings
     salt: int
-    texture: Array
+    texture: Float
     tile: float
-    soot: Array
-    grime: Array
-    marks: Array
-    mark_bins: Index
-    mark_list: Index
+    soot: Float
+    grime: Float
+    marks: Float
+    mark_bins: Int64
+    mark_list: Int64
     start: float
 
 

@@ -11,15 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from tunneldb.simulate.parameters import Parameters
+from tunneldb.arrays import Float
 from tunneldb.simulate.lining.rings import Rings, pocket_drop, ring_of
-from tunneldb.simulate.tunnel.section import nearest
 from tunneldb.simulate.noise_field import clouds
+from tunneldb.simulate.parameters import Parameters
+from tunneldb.simulate.tunnel.section import nearest
 from tunneldb.simulate.tunnel.tunnel import Tunnel, gradient, newton_step
-
-Array = NDArray[np.float64]
 
 # Relief of shotcrete: wavelengths, m, and standard deviations, m; its fields lie within 2.4 standard deviations.
 ROUGH_SIZE, ROUGH = (0.25, 0.08), (0.006, 0.002)
@@ -53,8 +51,8 @@ class Skin(NamedTuple):
     """
 
     rings: Rings
-    step: Array
-    wider: Array
+    step: Float
+    wider: Float
     rough: float
     salt: int
     low: float
@@ -116,7 +114,7 @@ def height(skin: Skin, s: float, arc: float) -> float:
 
 @njit(cache=True, nogil=True)
 def meet_skin(
-    skin: Skin, plan: Array, profile: Array, parts: Array, o: Array, d: Array, r: float, s: float, cosine: float
+    skin: Skin, plan: Float, profile: Float, parts: Float, o: Float, d: Float, r: float, s: float, cosine: float
 ) -> tuple[float, float, float, float, bool]:
     """Range at which a ray that meets the nominal section at range r, chainage s, meets the lining.
 
@@ -179,7 +177,7 @@ def meet_skin(
 
 @njit(cache=True, nogil=True)
 def _gap(
-    skin: Skin, plan: Array, profile: Array, parts: Array, o: Array, d: Array, t: float, s: float
+    skin: Skin, plan: Float, profile: Float, parts: Float, o: Float, d: Float, t: float, s: float
 ) -> tuple[float, float, float, float, tuple[float, float, float, float, float, float, float, float, float]]:
     """At range t: chainage, arc, gap to the lining, height over the axis; what :func:`newton_step` found."""
     x, y, z = o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]

@@ -7,12 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-
-Array = NDArray[np.float64]
 
 SEGMENTS = 6  # of a ring
 # Standard deviation of the level of a block, a ring and a segment, dB.
@@ -56,15 +54,15 @@ class Rings(NamedTuple):
 
     first: float
     length: float
-    level: Array
-    joint_width: Array
-    joint_drop: Array
+    level: Float
+    joint_width: Float
+    joint_drop: Float
     period: float
-    shift: Array
-    segment_level: Array
-    seam_width: Array
-    seam_drop: Array
-    pocket_drop: Array
+    shift: Float
+    segment_level: Float
+    seam_width: Float
+    seam_drop: Float
+    pocket_drop: Float
     pocket_depth: float
 
 

@@ -6,19 +6,16 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import affinity
 from shapely.geometry import LineString, MultiPolygon, Polygon
 from shapely.ops import unary_union
 
 from tunneldb.errors import UserError
-from tunneldb.simulate.objects.fixtures import Niche, niche_table
 from tunneldb.simulate.lining.leaks import Leak, Room, star
-from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.lining.rings import Rings
+from tunneldb.simulate.objects.fixtures import Niche, niche_table
+from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-
-Array = NDArray[np.float64]
 
 TRIES = 600
 # Wet bands along joints: limits of width and length, m.

@@ -11,12 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.simulate.objects.fixtures import APPENDAGE, OBJECT, SPHERE
 from tunneldb.simulate.objects.primitives import Thing, ball, brick, rod
-
-Array = NDArray[np.float64]
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -25,17 +23,17 @@ UP = np.array([0.0, 0.0, 1.0])
 class Place:
     """A spot on the ground: coordinates (3,), unit vectors along, right and up of the floor there (3, 3)."""
 
-    spot: Array
-    axes: Array
+    spot: Float
+    axes: Float
 
-    def turned(self, angle: float) -> Array:
+    def turned(self, angle: float) -> Float:
         """The floor's axes, turned by ``angle`` (rad) about its normal."""
         c, s = math.cos(angle), math.sin(angle)
         t, u, w = self.axes
         return np.array([c * t + s * u, c * u - s * t, w])
 
 
-def _horizontal(angle: float) -> Array:
+def _horizontal(angle: float) -> Float:
     return np.array([math.cos(angle), math.sin(angle), 0.0])
 
 
@@ -46,7 +44,7 @@ def person(place: Place, rng: np.random.Generator) -> Thing:
     side = np.cross(UP, ahead)
     stride = rng.uniform(0.0, 0.2)
 
-    def at(across: float, up: float, forward: float = 0.0) -> Array:
+    def at(across: float, up: float, forward: float = 0.0) -> Float:
         return np.asarray(place.spot + size * (across * side + up * UP + forward * ahead))
 
     parts = [
@@ -86,7 +84,7 @@ def trolley(place: Place, rng: np.random.Generator) -> Thing:
     return Thing("trolley", OBJECT, 3.0, np.array(parts))
 
 
-def _legs(place: Place, top: Array, spread: float, turn: float) -> list[Array]:
+def _legs(place: Place, top: Float, spread: float, turn: float) -> list[Float]:
     """Three legs from the ground to ``top``, rods."""
     feet = [
         place.spot + spread * (math.cos(a) * place.axes[0] + math.sin(a) * place.axes[1]) for a in turn + np.arange(3) * 2.0944
@@ -116,18 +114,18 @@ def globe_on_post(place: Place, radius: float, rng: np.random.Generator) -> Thin
     return Thing("globe", OBJECT, -2.0, np.array([rod(place.spot - 0.1 * UP, top, 0.025), ball(top + radius * UP, radius)]))
 
 
-def globe_on_wall(wall: Array, normal: Array, radius: float) -> Thing:
+def globe_on_wall(wall: Float, normal: Float, radius: float) -> Thing:
     """A lamp: a globe on a stem out of the lining."""
     stem = wall + 0.1 * normal
     return Thing("globe", APPENDAGE, -2.0, np.array([rod(wall, stem, 0.02), ball(stem + radius * normal, radius)]))
 
 
-def sphere(centre: Array, radius: float) -> Thing:
+def sphere(centre: Float, radius: float) -> Thing:
     """A target sphere, white."""
     return Thing("sphere", SPHERE, -3.0, np.array([ball(centre, radius)]))
 
 
-def sphere_tripod(place: Place, centre: Array, radius: float, rng: np.random.Generator) -> Thing:
+def sphere_tripod(place: Place, centre: Float, radius: float, rng: np.random.Generator) -> Thing:
     """What carries a target sphere above the ground: three legs to a pin under it."""
     low = centre - radius * UP
     head = low - 0.05 * UP
@@ -135,7 +133,7 @@ def sphere_tripod(place: Place, centre: Array, radius: float, rng: np.random.Gen
     return Thing("tripod", OBJECT, 4.0, np.array(parts))
 
 
-def sphere_bracket(wall: Array, centre: Array, radius: float) -> Thing:
+def sphere_bracket(wall: Float, centre: Float, radius: float) -> Thing:
     """What carries a target sphere on the wall: an arm from the lining to its back."""
     arm = centre - wall
     length = float(np.linalg.norm(arm))

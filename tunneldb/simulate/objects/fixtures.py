@@ -11,13 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from shapely.geometry import Polygon, box
 
+from tunneldb.arrays import Float, Int64
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 TUBE, BAR = 0.0, 1.0
 LINING, FLOOR, APPENDAGE, NICHE, OUTLIER, RAIL, OBJECT, SPHERE = 0, 1, 2, 3, 4, 5, 6, 7
@@ -96,7 +93,7 @@ class Niche:
 SILL = 0.05
 
 
-def appendage_table(tunnel: Tunnel, items: list[Appendage]) -> Array:
+def appendage_table(tunnel: Tunnel, items: list[Appendage]) -> Float:
     """Rows for the ray kernel: kind, chainage from/to, middle u/w, tangent u/w, half width/depth, class, drop."""
     rows = np.zeros((len(items), 11))
     for row, item in zip(rows, items, strict=True):
@@ -118,7 +115,7 @@ def appendage_table(tunnel: Tunnel, items: list[Appendage]) -> Array:
     return rows
 
 
-def niche_table(tunnel: Tunnel, niches: list[Niche]) -> Array:
+def niche_table(tunnel: Tunnel, niches: list[Niche]) -> Float:
     """Rows: chainage from/to, origin (3, from the line's origin), t (3), outward (3), up (3), half width, height, depth.
 
     The origin lies on the axis above the sill; depth is measured from the axis to the back wall.
@@ -140,7 +137,7 @@ def niche_table(tunnel: Tunnel, niches: list[Niche]) -> Array:
     return rows
 
 
-def bins(low: Array, high: Array, start: float, end: float) -> tuple[Index, Index]:
+def bins(low: Float, high: Float, start: float, end: float) -> tuple[Int64, Int64]:
     """List by chainage bin which intervals [low, high] come within REACH: (offsets (b+1,), indices)."""
     count = max(1, math.ceil((end - start) / BIN))
     lists = []
@@ -152,13 +149,13 @@ def bins(low: Array, high: Array, start: float, end: float) -> tuple[Index, Inde
 
 
 @njit(cache=True, nogil=True, inline="always")
-def bin_of(s: float, start: float, offsets: Index) -> int:
+def bin_of(s: float, start: float, offsets: Int64) -> int:
     """Bin of a chainage, the first or last one beyond the ends."""
     return min(max(int((s - start) / BIN), 0), offsets.shape[0] - 2)
 
 
 @njit(cache=True, nogil=True, inline="always")
-def distance(row: Array, s: float, u: float, w: float) -> float:
+def distance(row: Float, s: float, u: float, w: float) -> float:
     """Signed distance to an appendage, positive outside; m in (chainage, u, w)."""
     half = 0.5 * (row[2] - row[1])
     a = abs(s - row[1] - half) - half

@@ -6,14 +6,12 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.simulate.objects.fixtures import APPENDAGE, FLOOR
-from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.objects.primitives import Thing, brick, rod
+from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-
-Array = NDArray[np.float64]
 
 HANGERS = 5.0  # m between the hangers of a cable
 MASTS = 40.0  # m between the arms of the contact line
@@ -24,7 +22,7 @@ SLEEPER = (0.26, 2.6, 0.25)  # along, across, up, m
 SLEEPER_TOP = 0.04  # above the floor, m
 
 
-def _wire(tunnel: Tunnel, chainage: Array, across: Array | float, up: Array | float, radius: float) -> list[Array]:
+def _wire(tunnel: Tunnel, chainage: Float, across: Float | float, up: Float | float, radius: float) -> list[Float]:
     """Rods through points (across, up) from the axis, m."""
     frame = tunnel.line.frame(chainage)
     u, w = np.broadcast_to(across, chainage.shape)[:, None], np.broadcast_to(up, chainage.shape)[:, None]
@@ -32,14 +30,14 @@ def _wire(tunnel: Tunnel, chainage: Array, across: Array | float, up: Array | fl
     return [rod(a, b, radius) for a, b in pairwise(points)]
 
 
-def _sag(chainage: Array, supports: Array, depth: float) -> Array:
+def _sag(chainage: Float, supports: Float, depth: float) -> Float:
     """How far a wire hangs below its supports, m: a parabola of ``depth`` between each two."""
     k = np.clip(np.searchsorted(supports, chainage, "right") - 1, 0, supports.size - 2)
     share = (chainage - supports[k]) / (supports[k + 1] - supports[k])
     return np.asarray(4.0 * depth * share * (1.0 - share))
 
 
-def _supports(start: float, end: float, spacing: float) -> Array:
+def _supports(start: float, end: float, spacing: float) -> Float:
     return np.linspace(start, end, max(1, round((end - start) / spacing)) + 1)
 
 

@@ -13,13 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int64
 from tunneldb.simulate.objects.fixtures import bin_of, bins
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 BALL, ROD, BRICK = 0.0, 1.0, 2.0
 # Columns of a part: kind; then
@@ -31,21 +28,21 @@ COLUMNS = 17
 BEAM = 0.004
 
 
-def ball(centre: Array, radius: float) -> Array:
+def ball(centre: Float, radius: float) -> Float:
     """Part: a sphere; coordinates and radius, m."""
     row = np.zeros(COLUMNS)
     row[0], row[1:4], row[7] = BALL, centre, radius
     return row
 
 
-def rod(one: Array, other: Array, radius: float) -> Array:
+def rod(one: Float, other: Float, radius: float) -> Float:
     """Part: a tube with round ends from ``one`` to ``other``, m."""
     row = np.zeros(COLUMNS)
     row[0], row[1:4], row[4:7], row[7] = ROD, one, other, radius
     return row
 
 
-def brick(centre: Array, size: Sequence[float], axes: Array) -> Array:
+def brick(centre: Float, size: Sequence[float], axes: Float) -> Float:
     """Part: a box of whole ``size`` (3) along unit ``axes`` (3, 3; a row each), m."""
     row = np.zeros(COLUMNS)
     row[0], row[1:4], row[4:7], row[8:] = BRICK, centre, 0.5 * np.asarray(size), np.ravel(axes)
@@ -73,10 +70,10 @@ class Thing:
     kind: str
     klass: int
     drop: float
-    parts: Array
+    parts: Float
     number: int = 0
 
-    def extent(self) -> tuple[Array, Array]:
+    def extent(self) -> tuple[Float, Float]:
         """Middles (n, 3) and radii (n,) of balls around its parts."""
         p = self.parts
         is_rod = p[:, :1] == ROD
@@ -84,7 +81,7 @@ class Thing:
         half = np.linalg.norm(np.where(is_rod, 0.5 * (p[:, 4:7] - p[:, 1:4]), p[:, 4:7]), axis=1)
         return middle, half + p[:, 7]
 
-    def middle(self) -> Array:
+    def middle(self) -> Float:
         """Middle of the box around it, (3,)."""
         middle, radius = self.extent()
         low, high = (middle - radius[:, None]).min(axis=0), (middle + radius[:, None]).max(axis=0)
@@ -96,7 +93,7 @@ class TargetSphere:
     """A target sphere: number of its points in the truth, centre (3,), radius, m, and how it stands."""
 
     id: int
-    centre: Array
+    centre: Float
     radius: float
     kind: str
 
@@ -104,11 +101,11 @@ class TargetSphere:
 class Parts(NamedTuple):
     """Parts of all things for the kernels, from the line's origin, listed by chainage."""
 
-    rows: Array
-    hulls: Array  # middle (3) and radius of a ball around each part
-    labels: Array  # class, drop, number of each part
-    bins: Index
-    list: Index
+    rows: Float
+    hulls: Float  # middle (3) and radius of a ball around each part
+    labels: Float  # class, drop, number of each part
+    bins: Int64
+    list: Int64
 
 
 def parts_table(tunnel: Tunnel, things: Sequence[Thing]) -> Parts:
@@ -131,7 +128,7 @@ def parts_table(tunnel: Tunnel, things: Sequence[Thing]) -> Parts:
 
 
 @njit(cache=True, nogil=True)
-def _meet_ball(ox: float, oy: float, oz: float, d: Array, radius: float) -> tuple[float, float]:
+def _meet_ball(ox: float, oy: float, oz: float, d: Float, radius: float) -> tuple[float, float]:
     """Range to a sphere about 0 from (ox, oy, oz) (1e300: missed), and distance of the ray inside its outline."""
     b = ox * d[0] + oy * d[1] + oz * d[2]
     past = ox * ox + oy * oy + oz * oz - b * b
@@ -142,7 +139,7 @@ def _meet_ball(ox: float, oy: float, oz: float, d: Array, radius: float) -> tupl
 
 
 @njit(cache=True, nogil=True)
-def _meet_rod(row: Array, o: Array, d: Array) -> tuple[float, float, float, float, float]:
+def _meet_rod(row: Float, o: Float, d: Float) -> tuple[float, float, float, float, float]:
     """Range to a rod (1e300: missed), distance inside its outline, and the normal there."""
     radius = row[7]
     bx, by, bz = row[4] - row[1], row[5] - row[2], row[6] - row[3]
@@ -183,7 +180,7 @@ def _meet_rod(row: Array, o: Array, d: Array) -> tuple[float, float, float, floa
 
 
 @njit(cache=True, nogil=True)
-def _meet_brick(row: Array, o: Array, d: Array) -> tuple[float, float, float]:
+def _meet_brick(row: Float, o: Float, d: Float) -> tuple[float, float, float]:
     """Range to a brick (1e300: missed), distance inside its outline, cosine there."""
     enter = -1e300
     leave = 1e300
@@ -212,7 +209,7 @@ def _meet_brick(row: Array, o: Array, d: Array) -> tuple[float, float, float]:
 
 @njit(cache=True, nogil=True)
 def meet_parts(
-    parts: Parts, start: float, o: Array, d: Array, s0: float, s1: float, r: float
+    parts: Parts, start: float, o: Float, d: Float, s0: float, s1: float, r: float
 ) -> tuple[float, int, float, float]:
     """First part that a ray meets before range ``r``: range, which (-1: none), cosine, distance inside its outline.
 

@@ -10,17 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float, Int64
 from tunneldb.simulate.objects.fixtures import FLOOR, OUTLIER, RAIL
 from tunneldb.simulate.radiometry import SYSTEM_CONSTANT, Radiometry, range_term
 from tunneldb.simulate.scanner import Rays
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 # Rows as of :func:`trace` for rays (by index) in other directions, without noise and stray points.
-Shoot = Callable[[Index, Array], Array]
+Shoot = Callable[[Int64, Float], Float]
 
 EXIT = 0.006  # diameter of the beam at the scanner, m
 STEP = 0.005  # least difference of range between two surfaces, m
@@ -28,7 +26,7 @@ LEAST = 0.02  # least share of the footprint that changes an echo
 HALVINGS = 5
 
 
-def aside(direction: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+def aside(direction: Float, rng: np.random.Generator) -> tuple[Float, Float]:
     """Places within footprints, even over the disc: vectors across the rays (n, 3), 1 at the rim, and their lengths (n,)."""
     other = np.where(np.abs(direction[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     one = np.cross(direction, other)
@@ -38,13 +36,13 @@ def aside(direction: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     return radius[:, None] * (np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two), radius
 
 
-def segment_share(distance: Array) -> Array:
+def segment_share(distance: Float) -> Float:
     """Share of a circle's area beyond a chord at a distance (in radii) from its centre."""
     x = np.clip(distance, 0.0, 1.0)
     return np.asarray((np.arccos(x) - x * np.sqrt(1.0 - x * x)) / np.pi)
 
 
-def _level(radiometry: Radiometry, rows: Array) -> tuple[Array, Array]:
+def _level(radiometry: Radiometry, rows: Float) -> tuple[Float, Float]:
     """Range-free part and amplitude of echoes, dB."""
     ground = (rows[:, 7] == FLOOR) | (rows[:, 7] == RAIL)
     level = radiometry.reflectance(rows[:, 10], ground, rows[:, 9])
@@ -52,9 +50,9 @@ def _level(radiometry: Radiometry, rows: Array) -> tuple[Array, Array]:
 
 
 def blur(
-    out: Array,
+    out: Float,
     rays: Rays,
-    index: Index,
+    index: Int64,
     divergence: float,
     shoot: Shoot,
     tunnel: Tunnel,
@@ -78,7 +76,7 @@ def blur(
     across, beside = aside(direction, rng)
     radius = 0.5 * (EXIT + 1e-3 * divergence * out[:, 11])
 
-    def at(rows: Index, share: Array | float) -> Array:
+    def at(rows: Int64, share: Float | float) -> Float:
         """Shoot towards a share of the way to the place beside the middle."""
         turned = direction[rows] * out[rows, 11:12] + np.reshape(share, (-1, 1)) * radius[rows, None] * across[rows]
         there = shoot(index[rows], turned / np.linalg.norm(turned, axis=1)[:, None])

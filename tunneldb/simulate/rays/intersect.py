@@ -11,16 +11,14 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from tunneldb.simulate.objects.fixtures import bin_of, distance
+from tunneldb.arrays import Float
 from tunneldb.simulate.lining.ballast import Ground, meet_ground
 from tunneldb.simulate.lining.leaks import depth_inside
+from tunneldb.simulate.objects.fixtures import bin_of, distance
 from tunneldb.simulate.rays.scene import Scene
 from tunneldb.simulate.tunnel.section import LINE, nearest
 from tunneldb.simulate.tunnel.tunnel import gradient, newton_step
-
-Array = NDArray[np.float64]
 
 # A Newton step for chainage leaves an error of its square times the curvature, in chainage, u and w: after a step
 # of this many metres the next iteration of the ray corrects what is left.
@@ -28,7 +26,7 @@ LOOSE = 0.05
 
 
 @njit(cache=True, nogil=True)
-def _straight(parts: Array, u: float, w: float, du: float, dw: float) -> float:
+def _straight(parts: Float, u: float, w: float, du: float, dw: float) -> float:
     """Range at which a ray of a section's plane leaves the section, as in a straight tunnel.
 
     A convex section lies inside all its lines; where their first crossing is outside, an arc is met before.
@@ -55,7 +53,7 @@ def _straight(parts: Array, u: float, w: float, du: float, dw: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def meet_lining(sc: Scene, o: Array, d: Array, s: float, furthest: float) -> tuple[float, float, float, float, float, float]:
+def meet_lining(sc: Scene, o: Float, d: Float, s: float, furthest: float) -> tuple[float, float, float, float, float, float]:
     """Range along a ray to the swept section, chainage, arc and cosine there, then at the start: offset, chainage.
 
     Range is NaN when nothing is met within ``furthest``.
@@ -106,7 +104,7 @@ def meet_lining(sc: Scene, o: Array, d: Array, s: float, furthest: float) -> tup
 
 
 @njit(cache=True, nogil=True)
-def meet_item(sc: Scene, o: Array, d: Array, s: float, r: float, wall: float) -> tuple[float, int, float]:
+def meet_item(sc: Scene, o: Float, d: Float, s: float, r: float, wall: float) -> tuple[float, int, float]:
     """March from range r to the lining at ``wall``: range to an appendage (NaN: none), which, cosine there."""
     r_begin = r
     for _ in range(200):
@@ -145,7 +143,7 @@ def meet_item(sc: Scene, o: Array, d: Array, s: float, r: float, wall: float) ->
 
 
 @njit(cache=True, nogil=True)
-def meet_niche(sc: Scene, o: Array, d: Array, s: float, r: float) -> tuple[float, float, bool]:
+def meet_niche(sc: Scene, o: Float, d: Float, s: float, r: float) -> tuple[float, float, bool]:
     """Range to the inside of a niche whose opening the ray passes at range r (NaN: none), cosine, whether its back wall."""
     b = bin_of(s, sc.ends[0], sc.niche_bins)
     for j in range(sc.niche_bins[b], sc.niche_bins[b + 1]):
@@ -178,7 +176,7 @@ def meet_niche(sc: Scene, o: Array, d: Array, s: float, r: float) -> tuple[float
 
 
 @njit(cache=True, nogil=True)
-def unrolled(sc: Scene, o: Array, d: Array, r: float, s: float) -> tuple[float, float]:
+def unrolled(sc: Scene, o: Float, d: Float, r: float, s: float) -> tuple[float, float]:
     """Chainage and arc of the place at range r, ``s`` a chainage near it."""
     x, y, z = o[0] + r * d[0], o[1] + r * d[1], o[2] + r * d[2]
     for _ in range(10):
@@ -190,7 +188,7 @@ def unrolled(sc: Scene, o: Array, d: Array, r: float, s: float) -> tuple[float, 
 
 
 @njit(cache=True, nogil=True)
-def meet_uneven(sc: Scene, ground: Ground, o: Array, d: Array, s: float, r: float, on_floor: bool) -> tuple[float, float, bool]:
+def meet_uneven(sc: Scene, ground: Ground, o: Float, d: Float, s: float, r: float, on_floor: bool) -> tuple[float, float, bool]:
     """Range to ballast or a cambered floor where a ray meets the section at range r, cosine, whether it is floor."""
     x, y, z = o[0] + r * d[0], o[1] + r * d[1], o[2] + r * d[2]
     _, u, w, c, n, k, g, q, det = newton_step(sc.plan, sc.profile, x, y, z, s)

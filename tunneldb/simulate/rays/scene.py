@@ -5,36 +5,33 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tunneldb.simulate.objects.fixtures import Appendage, Niche, appendage_table, bins, niche_table
+from tunneldb.arrays import Float, Int64
 from tunneldb.simulate.lining.leaks import EDGE, Leak, edge_table
+from tunneldb.simulate.objects.fixtures import Appendage, Niche, appendage_table, bins, niche_table
 from tunneldb.simulate.tunnel.tunnel import Tunnel
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 
 class Scene(NamedTuple):
     """A tunnel and what is in it, as flat arrays for the kernels."""
 
-    plan: Array
-    profile: Array
-    parts: Array
+    plan: Float
+    profile: Float
+    parts: Float
     # chainage of both ends, arc of the floor's corner, reach of the appendages off the lining, half a leak's edge,
     # number of leaks in niches
-    ends: Array
-    items: Array
-    item_bins: Index
-    item_list: Index
-    niches: Array
-    niche_bins: Index
-    niche_list: Index
-    edges: Array
-    edge_first: Index
-    leaks: Array
-    leak_bins: Index
-    leak_list: Index
+    ends: Float
+    items: Float
+    item_bins: Int64
+    item_list: Int64
+    niches: Float
+    niche_bins: Int64
+    niche_list: Int64
+    edges: Float
+    edge_first: Int64
+    leaks: Float
+    leak_bins: Int64
+    leak_list: Int64
 
 
 def scene(tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: list[Leak], edge: float = EDGE) -> Scene:

@@ -6,19 +6,17 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from tunneldb.simulate.lining.reflectance import Coat, level
-from tunneldb.simulate.objects.fixtures import APPENDAGE, FLOOR, LINING, NICHE, OUTLIER
+from tunneldb.arrays import Float
 from tunneldb.simulate.lining.ballast import Ground, bump
+from tunneldb.simulate.lining.reflectance import Coat, level
+from tunneldb.simulate.lining.relief import Skin, meet_skin
+from tunneldb.simulate.objects.fixtures import APPENDAGE, FLOOR, LINING, NICHE, OUTLIER
+from tunneldb.simulate.objects.primitives import BEAM, Parts, meet_parts
 from tunneldb.simulate.rays.intersect import meet_item, meet_lining, meet_niche, meet_uneven, unrolled, wetness
 from tunneldb.simulate.rays.scene import Scene
 from tunneldb.simulate.tunnel.section import nearest
-from tunneldb.simulate.lining.relief import Skin, meet_skin
-from tunneldb.simulate.objects.primitives import BEAM, Parts, meet_parts
 from tunneldb.simulate.tunnel.tunnel import newton_step
-
-Array = NDArray[np.float64]
 
 # Beyond this incidence the echo is lost, as scanners lose it.
 MINIMUM_COSINE = 0.087
@@ -35,16 +33,16 @@ def trace(
     ground: Ground | None,
     coat: Coat | None,
     skin: Skin | None,
-    origin: Array,
-    direction: Array,
-    hint: Array,
-    noise: Array,
-    chance: Array,
+    origin: Float,
+    direction: Float,
+    hint: Float,
+    noise: Float,
+    chance: Float,
     outliers: float,
     stray: float,
     relief: float,
     furthest: float,
-    out: Array,
+    out: Float,
 ) -> None:
     """Shoot rays.
 

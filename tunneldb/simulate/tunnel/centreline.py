@@ -13,11 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-
-Array = NDArray[np.float64]
 
 # 8-point Gauss-Legendre rule on [0, 1]; on the clothoids used here (turning by far less than 1 rad) it is exact
 # to rounding.
@@ -30,7 +28,7 @@ PROFILE_COLUMNS = 4  # chainage, z, grade, change of grade per m
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _plan_at(row: Array, sigma: float) -> tuple[float, float, float, float, float]:
+def _plan_at(row: Float, sigma: float) -> tuple[float, float, float, float, float]:
     """Advance x, y from the start of a plan element, cos and sin of the direction there, and curvature."""
     direction, curvature, change = row[3], row[4], row[5]
     if change == 0.0:
@@ -53,7 +51,7 @@ def _plan_at(row: Array, sigma: float) -> tuple[float, float, float, float, floa
 
 
 @njit(cache=True, nogil=True, inline="always")
-def axis_at(plan: Array, profile: Array, s: float) -> tuple[float, float, float, float, float, float, float, float]:
+def axis_at(plan: Float, profile: Float, s: float) -> tuple[float, float, float, float, float, float, float, float]:
     """Axis at chainage ``s``: x, y, z, cos and sin of direction, curvature, grade, change of grade.
 
     The first and last elements continue beyond the ends.
@@ -71,7 +69,7 @@ def axis_at(plan: Array, profile: Array, s: float) -> tuple[float, float, float,
 
 
 @njit(cache=True, nogil=True)
-def _axis_many(plan: Array, profile: Array, s: Array, out: Array) -> None:
+def _axis_many(plan: Float, profile: Float, s: Float, out: Float) -> None:
     for i in range(s.shape[0]):
         x, y, z, c, n, k, g, dg = axis_at(plan, profile, s[i])
         out[i, 0] = x
@@ -87,10 +85,10 @@ def _axis_many(plan: Array, profile: Array, s: Array, out: Array) -> None:
 class Frame(NamedTuple):
     """Axis position and unit vectors, each (n, 3): position, t (up-chainage), u (right), w (up)."""
 
-    position: Array
-    t: Array
-    u: Array
-    w: Array
+    position: Float
+    t: Float
+    u: Float
+    w: Float
 
 
 @dataclass(frozen=True)
@@ -118,9 +116,9 @@ class CentreLine:
         Chainage of both ends, m.
     """
 
-    plan: Array
-    profile: Array
-    origin: Array
+    plan: Float
+    profile: Float
+    origin: Float
     start: float
     end: float
 
@@ -220,17 +218,17 @@ class CentreLine:
             origin=origin,
         )
 
-    def _rows(self, chainage: Array) -> Array:
+    def _rows(self, chainage: Float) -> Float:
         s = np.ascontiguousarray(np.atleast_1d(chainage), dtype=np.float64)
         out = np.empty((s.size, 8))
         _axis_many(self.plan, self.profile, s, out)
         return out
 
-    def position(self, chainage: Array) -> Array:
+    def position(self, chainage: Float) -> Float:
         """Coordinates of the axis at chainages (n,) -> (n, 3), m."""
         return self._rows(chainage)[:, :3] + self.origin
 
-    def frame(self, chainage: Array) -> Frame:
+    def frame(self, chainage: Float) -> Frame:
         """Position and unit vectors t, u, w of the axis at chainages (n,)."""
         row = self._rows(chainage)
         c, n, g = row[:, 3], row[:, 4], row[:, 6]
@@ -243,7 +241,7 @@ class CentreLine:
             np.column_stack([-g * c / q, -g * n / q, 1.0 / q]),
         )
 
-    def vertices(self, spacing: float) -> Array:
+    def vertices(self, spacing: float) -> Float:
         """Axis vertices every ``spacing`` m of chainage, the last at the end of the tunnel; (n, 3)."""
         count = math.ceil((self.end - self.start) / spacing - 1e-9)
         s = np.append(self.start + spacing * np.arange(count), self.end)

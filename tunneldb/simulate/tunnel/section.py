@@ -13,11 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-
-Array = NDArray[np.float64]
 
 LINE, ARC = 0.0, 1.0
 # Columns of a primitive: kind, arc at its start, length, then
@@ -27,7 +25,7 @@ LINE, ARC = 0.0, 1.0
 
 
 @njit(cache=True, nogil=True, inline="always")
-def nearest(parts: Array, u: float, w: float) -> tuple[float, float, float, float]:
+def nearest(parts: Float, u: float, w: float) -> tuple[float, float, float, float]:
     """Nearest point of a section: arc, offset (positive inside) and the gradient (u, w) of the offset.
 
     In the interior of a convex section the nearest point never is a corner, so the side on which a point lies
@@ -78,7 +76,7 @@ def nearest(parts: Array, u: float, w: float) -> tuple[float, float, float, floa
 
 
 @njit(cache=True, nogil=True)
-def _nearest_many(parts: Array, u: Array, w: Array, out: Array) -> None:
+def _nearest_many(parts: Float, u: Float, w: Float, out: Float) -> None:
     for i in range(u.shape[0]):
         arc, offset, gu, gw = nearest(parts, u[i], w[i])
         out[i, 0] = arc
@@ -88,7 +86,7 @@ def _nearest_many(parts: Array, u: Array, w: Array, out: Array) -> None:
 
 
 @njit(cache=True, nogil=True, inline="always")
-def on_section(parts: Array, arc: float) -> tuple[float, float, float, float]:
+def on_section(parts: Float, arc: float) -> tuple[float, float, float, float]:
     """Position (u, w) and inward unit normal (u, w) of a section at an arc."""
     side = 1.0 if arc >= 0.0 else -1.0
     a = abs(arc)
@@ -105,7 +103,7 @@ def on_section(parts: Array, arc: float) -> tuple[float, float, float, float]:
 
 
 @njit(cache=True, nogil=True)
-def _on_section_many(parts: Array, arc: Array, out: Array) -> None:
+def _on_section_many(parts: Float, arc: Float, out: Float) -> None:
     for i in range(arc.shape[0]):
         out[i] = on_section(parts, arc[i])
 
@@ -131,20 +129,20 @@ class Section:
     """
 
     name: str
-    parts: Array
+    parts: Float
     half_perimeter: float
     floor_arc: float
     floor: float
     half_width: float
 
-    def point(self, arc: Array) -> tuple[Array, Array]:
+    def point(self, arc: Float) -> tuple[Float, Float]:
         """Positions (n, 2) and inward unit normals (n, 2) in (u, w) at arcs (n,)."""
         a = np.ascontiguousarray(np.atleast_1d(arc), dtype=np.float64)
         out = np.empty((a.size, 4))
         _on_section_many(self.parts, a, out)
         return out[:, :2], out[:, 2:]
 
-    def project(self, u: Array, w: Array) -> tuple[Array, Array, Array]:
+    def project(self, u: Float, w: Float) -> tuple[Float, Float, Float]:
         """Arc (n,), offset (n,) (positive inside) and gradient of the offset (n, 2) of points (u, w)."""
         pu = np.ascontiguousarray(np.atleast_1d(u), dtype=np.float64)
         pw = np.ascontiguousarray(np.atleast_1d(w), dtype=np.float64)

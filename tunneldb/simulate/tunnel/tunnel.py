@@ -12,18 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from tunneldb.arrays import Float
 from tunneldb.simulate.tunnel.centreline import CentreLine, axis_at
 from tunneldb.simulate.tunnel.section import Section, nearest, on_section
-
-Array = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True, inline="always")
 def newton_step(
-    plan: Array, profile: Array, x: float, y: float, z: float, s: float
+    plan: Float, profile: Float, x: float, y: float, z: float, s: float
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
     """One Newton step towards the chainage whose perpendicular plane holds the point.
 
@@ -54,7 +52,7 @@ def gradient(
 
 
 @njit(cache=True, nogil=True)
-def _unroll_many(plan: Array, profile: Array, parts: Array, xyz: Array, s: Array, out: Array) -> None:
+def _unroll_many(plan: Float, profile: Float, parts: Float, xyz: Float, s: Float, out: Float) -> None:
     for i in range(xyz.shape[0]):
         x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
         chainage = s[i]
@@ -75,7 +73,7 @@ def _unroll_many(plan: Array, profile: Array, parts: Array, xyz: Array, s: Array
 
 
 @njit(cache=True, nogil=True)
-def _roll_many(plan: Array, profile: Array, parts: Array, s: Array, arc: Array, offset: Array, out: Array) -> None:
+def _roll_many(plan: Float, profile: Float, parts: Float, s: Float, arc: Float, offset: Float, out: Float) -> None:
     for i in range(s.shape[0]):
         ax, ay, az, c, n, _, g, _ = axis_at(plan, profile, s[i])
         pu, pw, nu, nw = on_section(parts, arc[i])
@@ -89,10 +87,10 @@ def _roll_many(plan: Array, profile: Array, parts: Array, s: Array, arc: Array, 
 class Unrolled(NamedTuple):
     """Chainage, arc and offset (n,), m, and unit normal into the tunnel (n, 3)."""
 
-    chainage: Array
-    arc: Array
-    offset: Array
-    normal: Array
+    chainage: Float
+    arc: Float
+    offset: Float
+    normal: Float
 
 
 @dataclass(frozen=True)
@@ -102,7 +100,7 @@ class Tunnel:
     line: CentreLine
     section: Section
 
-    def roll(self, chainage: Array, arc: Array, offset: Array | float = 0.0) -> Array:
+    def roll(self, chainage: Float, arc: Float, offset: Float | float = 0.0) -> Float:
         """Coordinates (n, 3) of points of the unrolled plane, ``offset`` m off the surface into the tunnel."""
         given = np.atleast_1d(chainage), np.asarray(arc), np.asarray(offset)
         s, a, o = (np.array(x, dtype=float) for x in np.broadcast_arrays(*given))
@@ -110,7 +108,7 @@ class Tunnel:
         _roll_many(self.line.plan, self.line.profile, self.section.parts, s, a, o, out)
         return out + self.line.origin
 
-    def unroll(self, xyz: Array) -> Unrolled:
+    def unroll(self, xyz: Float) -> Unrolled:
         """Chainage, arc, offset and normal of points (n, 3) within the bend's radius of the axis."""
         points = np.atleast_2d(np.asarray(xyz, float))
         out = np.empty((len(points), 6))
@@ -127,7 +125,7 @@ class Tunnel:
         )
         return Unrolled(out[:, 0], out[:, 1], out[:, 2], out[:, 3:])
 
-    def area_factor(self, chainage: Array, arc: Array) -> Array:
+    def area_factor(self, chainage: Float, arc: Float) -> Float:
         """Area on the surface for a unit of area in the unrolled plane, at points (n,)."""
         h = 1e-3
         s, a = np.atleast_1d(np.asarray(chainage, float)), np.atleast_1d(np.asarray(arc, float))
