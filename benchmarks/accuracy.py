@@ -19,9 +19,10 @@ import psycopg
 
 from benchmarks.common import print_table, progress, save, scratch_database
 from benchmarks.scene import LINING, Scene
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import get_survey
 
 Figures = dict[str, Any]
 

@@ -24,7 +24,7 @@ from tunneldb.classification.classes import Klass
 from tunneldb.classification.classify import find_bare_scene, find_scene
 from tunneldb.classification.ground.extraction import GroundSettings, find_ground
 from tunneldb.classification.scene import Scene
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.centreline import centreline_through
 from tunneldb.pointcloud.thinning import thin, voxel_edge
 from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate.parameters import Parameters
@@ -99,7 +99,7 @@ def of_bare(xyz: NDArray[np.float64]) -> Scene:
     voxels = Voxels(settings.voxel)
     voxels.add(xyz)
     points = voxels.centroids()
-    line = Line.through(points)
+    line = centreline_through(points)
     return find_bare_scene(points, line, find_ground(points, line, settings, spread=voxels.spread()))
 
 

@@ -9,9 +9,10 @@ import laspy
 
 from benchmarks.common import print_table
 from benchmarks.scene import Scene
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.pointcloud.reader import read_chunks
 from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import get_survey
 
 CHUNK = 1_000_000
 

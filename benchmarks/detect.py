@@ -105,16 +105,18 @@ def timed(spent: dict[str, float], name: str) -> Iterator[None]:
 def parts(dsn: str, path: Path, count: int) -> dict[str, float]:
     """Seconds of one core for each part of what is done with a point, per point, from the end of a file."""
     use_threads(1)  # before Numba is imported
-    from tunneldb.database import connect, get_survey
+    from tunneldb.database import connect
     from tunneldb.pipeline.detect import load_floor
     from tunneldb.pointcloud.formats.raw import read_raw
     from tunneldb.pointcloud.points import Points
-    from tunneldb.pointcloud.poses import load_poses
-    from tunneldb.raster.accumulator import Accumulator, Grid
+    from tunneldb.raster.accumulator import Accumulator
+    from tunneldb.raster.grid import Grid
     from tunneldb.raster.observation import Eye, Radiometer
     from tunneldb.raster.rasterize import CHUNK, Lens
     from tunneldb.store.images import load_reference
+    from tunneldb.store.poses import load_poses
     from tunneldb.store.surface import load_surface
+    from tunneldb.store.survey import get_survey
 
     km = int(BORDER) // 1000
     spent: dict[str, float] = {}

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from tunneldb.classification.ground.accuracy import Agreement
 from tunneldb.classification.ground.extraction import GroundSettings, find_ground
 from tunneldb.classification.ground.ransac import planes
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.centreline import centreline_through
 from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate import Parameters, simulate
 
@@ -97,7 +97,7 @@ def ours(xyz: Float) -> Bool:
     voxels = Voxels(SETTINGS.voxel)
     voxels.add(xyz)
     thin = voxels.centroids()
-    line = Line.through(thin)
+    line = centreline_through(thin)
     ground = find_ground(thin, line, SETTINGS, 0, voxels.spread())
     assert ground is not None
     return ground.is_ground(*line.place(xyz), xyz[:, 2])
@@ -107,7 +107,7 @@ def by_segments(xyz: Float, thin: bool, normals: bool, through: bool) -> Bool:
     """Steps of the paper on the segments, without levels and walls: inliers, or all points up to γ above the plane."""
     voxels = Voxels(SETTINGS.voxel)
     voxels.add(xyz)
-    line = Line.through(voxels.centroids())
+    line = centreline_through(voxels.centroids())
     seeds = voxels.centroids() if thin else xyz
     along, across = line.place(seeds)
     number = np.floor(along / STEP).astype(np.int64)

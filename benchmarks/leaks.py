@@ -26,9 +26,10 @@ from shapely.geometry.base import BaseGeometry
 from benchmarks.common import print_table, progress, save, scratch_database, tunneldb
 from benchmarks.leak_set import SET, Case, Truth, prepare
 from benchmarks.scene import Scene
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.evaluate.measure import HALF, Comparison, compare, figures
 from tunneldb.evaluate.survey import read_findings
+from tunneldb.store.survey import get_survey
 
 SMALLEST, STRONG = 0.1, 4.0
 HEADER = (

@@ -23,9 +23,10 @@ import laspy
 from benchmarks import pipeline
 from benchmarks.common import print_table, progress, save, scratch_database, tunneldb
 from benchmarks.scene import Scene
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.pipeline.load import load_files
 from tunneldb.pointcloud.selection import FilterSettings
+from tunneldb.store.survey import get_survey
 from tunneldb.threads import threads, use_threads
 
 CHUNK = 1_000_000

@@ -33,7 +33,8 @@ import psycopg
 from benchmarks import peer
 from benchmarks.common import COMMAND, print_table, progress, save, scratch_database, tunneldb
 from benchmarks.scene import Scene
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
+from tunneldb.store.survey import get_survey
 
 PARTS = ("one", "serial", "parallel", "peer", "peer-as-worded")
 DEFAULT = PARTS[:4]

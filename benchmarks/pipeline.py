@@ -11,8 +11,9 @@ import psycopg
 from psycopg import sql
 
 from benchmarks.scene import Scene
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.pointcloud.thinning import thin, voxel_edge
+from tunneldb.store.survey import get_survey
 
 SURVEY_DENSITY = 100.0  # points/m²
 STAGES = ("axis", "segments", "sections")

@@ -26,8 +26,8 @@ from rasterio.features import rasterize
 from benchmarks.common import COMMAND, print_table, progress, save, scratch_database
 from benchmarks.synthetic import CORNER, Size, make
 from tunneldb.database import connect
-from tunneldb.raster.accumulator import Grid
 from tunneldb.raster.geotiff import Raster, encode
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.pixel_state import State
 from tunneldb.report.pdf import find_browser
 from tunneldb.store.images import DARK

@@ -21,8 +21,9 @@ from psycopg import sql
 
 from benchmarks.common import progress
 from tunneldb.classification.classes import Klass
-from tunneldb.database import PointZ, Survey, connect, copy_binary, get_survey, pack, resolve_dsn
+from tunneldb.database import PointZ, connect, copy_binary, pack, resolve_dsn
 from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey, get_survey
 
 Connection = psycopg.Connection[Any]
 

@@ -29,12 +29,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.common import scratch_database
 from benchmarks.scene import Scene
-from tunneldb.database import connect, get_survey
+from tunneldb.anomalies.detect import Found
+from tunneldb.database import connect
 from tunneldb.pipeline import detect as stage
 from tunneldb.pipeline.parameters import settings
-from tunneldb.anomalies.detect import Found
-from tunneldb.raster.pixel_state import State
 from tunneldb.raster.geotiff import NODATA, STEP
+from tunneldb.raster.pixel_state import State
+from tunneldb.store.survey import get_survey
 
 IMAGE = Path(__file__).parent / "images" / "leak-steps.png"
 TUNNEL = (

@@ -9,10 +9,10 @@ import laspy
 import numpy as np
 import psycopg
 
-from tunneldb.database import get_survey
 from tunneldb.pipeline.load import load_files
 from tunneldb.pointcloud.selection import FilterSettings
 from tunneldb.store.scan_files import Loaded
+from tunneldb.store.survey import get_survey
 
 START = 970.0  # chainage of the axis' beginning: the kilometre changes in the middle
 LENGTH = 60.0

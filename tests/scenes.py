@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tunneldb.classification.classes import Klass
 from tunneldb.geometry.frame import segment_rows, tangents
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.surface import Surface
 from tunneldb.simulate.generate import Cloud, Simulation
 from tunneldb.simulate.parameters import Parameters
@@ -28,7 +28,7 @@ def scan(parameters: Parameters) -> tuple[Simulation, Cloud, NDArray[np.uint8]]:
     return simulation, cloud, TRUTH[cloud.klass]
 
 
-def exact(simulation: Simulation) -> tuple[Surface, Line]:
+def exact(simulation: Simulation) -> tuple[Surface, PlanLine]:
     """The surface of its tunnel, with two sections each 10 m, and its axis."""
     axis, section = simulation.tunnel.line, simulation.tunnel.section
     number = np.arange(int(np.floor(axis.start / 10)), int(np.ceil(axis.end / 10)))
@@ -47,7 +47,7 @@ def exact(simulation: Simulation) -> tuple[Surface, Line]:
         number, segment_rows(vertices, tangents(vertices)), np.column_stack([stations[:-1], stations[1:]]), at,
         np.tile(radius, (len(at), 1)), np.tile(length, (len(at), 1)), 10.0,
     )  # fmt: skip
-    return surface, Line.of(vertices, stations)
+    return surface, PlanLine.of(vertices, stations)
 
 
 def share(truth: NDArray[np.uint8], found: NDArray[np.uint8], klass: int) -> tuple[float, float]:

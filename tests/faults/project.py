@@ -18,10 +18,11 @@ from faults.scene import NAME, SRID, THIN, Scene
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.database.fetch import fetch_array
 from tunneldb.database.server import DATABASE, Server
 from tunneldb.queue import batch as job
+from tunneldb.store.survey import get_survey
 
 COMMAND = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
 PREPARED = "prepared"

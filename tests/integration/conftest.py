@@ -17,8 +17,8 @@ from tunneldb.anomalies.geometries import shapes
 from tunneldb.database import install, open_connection
 from tunneldb.geometry.frame import frame_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
-from tunneldb.raster.accumulator import BLOCK, Grid
 from tunneldb.raster.geotiff import KINDS, Raster, decode, encode
+from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.pixel_state import State
 from tunneldb.store.images import DARK
 

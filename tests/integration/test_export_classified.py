@@ -12,9 +12,9 @@ from click.testing import CliRunner
 
 from tunneldb.classification.classes import Klass
 from tunneldb.cli.main import main
-from tunneldb.database import get_survey
 from tunneldb.simulate import Parameters, Simulation, write
 from tunneldb.store.scene import load_scene
+from tunneldb.store.survey import get_survey
 
 NAME = "s"
 START, LENGTH, BORDER = 970.0, 60.0, 1015.0  # a kilometre ends in the middle of the first file

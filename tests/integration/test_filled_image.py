@@ -11,9 +11,9 @@ import rasterio
 from affine import Affine
 
 from tests.integration.conftest import PIXEL, without_intensity
-from tunneldb.database import get_survey
 from tunneldb.export.images.image import export_filled
 from tunneldb.raster.geotiff import Raster, decode, encode
+from tunneldb.store.survey import get_survey
 
 LAST = 249
 """Number of the example's last block, from 12450 to 12500 m."""

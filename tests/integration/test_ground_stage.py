@@ -14,12 +14,12 @@ from scipy.spatial import cKDTree
 
 from tests.integration.test_detect import NAME, command, parameters, prepare
 from tunneldb.classification.classes import Klass
-from tunneldb.database import get_survey
 from tunneldb.pipeline import ground as stage
 from tunneldb.pipeline.parameters import settings
 from tunneldb.simulate import Simulation, write
 from tunneldb.store.scene import line_of, load_ground, load_scene
 from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import get_survey
 
 PLANE = 13_000.0
 START = PLANE - 20.0

@@ -15,10 +15,11 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
 from tunneldb.cli.main import _describe_database_error
-from tunneldb.database import connect, copy_binary, get_survey, pack
+from tunneldb.database import connect, copy_binary, pack
 from tunneldb.pipeline.ground import read_points
 from tunneldb.store.catalog import remove_survey
 from tunneldb.store.sources import sample
+from tunneldb.store.survey import get_survey
 
 DATABASE = "tunneldb_growth"
 SURVEYS = {"short": 25, "long": 1000, "third": 985, "fourth": 990}  # km of each: 3000 partitions

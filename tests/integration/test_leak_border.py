@@ -18,15 +18,16 @@ from tunneldb.anomalies import detect as detection
 from tunneldb.anomalies.background.contrast import relative
 from tunneldb.anomalies.background.level_map import DryMap, map_dry
 from tunneldb.anomalies.regions import Region, Traits
-from tunneldb.database import get_survey
+from tunneldb.geometry.section_outliers import Astray
 from tunneldb.pipeline import calibration as radiometry
 from tunneldb.pipeline import detect as job
 from tunneldb.pipeline.parameters import settings
 from tunneldb.radiometry.roughness import Roughness
-from tunneldb.raster.accumulator import Accumulator, Grid
+from tunneldb.raster.accumulator import Accumulator
+from tunneldb.raster.floor import Floor
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import develop
 from tunneldb.raster.observation import Eye
-from tunneldb.raster.pixel_state import Astray, Floor
 from tunneldb.raster.rasterize import gather
 from tunneldb.simulate import Simulation, generate, write
 from tunneldb.simulate.lining.leaks import Leak
@@ -34,6 +35,7 @@ from tunneldb.store.anomaly_parts import replace_parts
 from tunneldb.store.scene import load_arcs
 from tunneldb.store.sources import sources
 from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import get_survey
 
 START, PLANE = 12_990.0, 13_000.0
 SHIFT = 480.0

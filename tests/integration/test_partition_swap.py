@@ -11,8 +11,8 @@ import psycopg
 import pytest
 from loading import SURVEY, add_survey, load, tube, write
 
-from tunneldb.database import get_survey
 from tunneldb.store.sources import sample
+from tunneldb.store.survey import get_survey
 
 COUNT = "SELECT count(*) FROM tunnel.point WHERE survey_id = 1 AND km = 1"
 

@@ -15,9 +15,9 @@ from psycopg import sql
 from queued import add_file, add_run
 
 from tunneldb.cli.main import main
-from tunneldb.database import get_survey
 from tunneldb.queue.batch import give_up_file, plan
 from tunneldb.queue.preview import FRAGMENT_BYTES, KILOMETRE_BYTES, PIXEL_BYTES, ROW_BYTES, preview
+from tunneldb.store.survey import get_survey
 
 COUNT = 2000
 

@@ -11,13 +11,14 @@ import psycopg
 import pytest
 from loading import ORIGIN, START, SURVEY, add_survey, files, load, rows, tube, write
 
-from tunneldb.database import get_survey, open_connection
+from tunneldb.database import open_connection
 from tunneldb.errors import UserError
 from tunneldb.pipeline.load import load_kilometre, parameters_of, settings_of
 from tunneldb.pipeline.read import read_file
 from tunneldb.pointcloud.selection import FilterSettings
 from tunneldb.pointcloud.spool import ROW, Rows, Spool
 from tunneldb.store.fragment import read_fragment, write_fragments
+from tunneldb.store.survey import get_survey
 
 SETTINGS = FilterSettings()
 

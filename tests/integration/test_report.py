@@ -25,8 +25,9 @@ from psycopg.conninfo import make_conninfo
 
 from tests.integration.conftest import without_intensity
 from tunneldb.cli.main import main
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.report.page import write_html
+from tunneldb.store.survey import get_survey
 
 SURVEY = "demo-2024"
 LENGTH, STRIP = 200.0, 50.0

@@ -12,7 +12,6 @@ from tunneldb.classification.classes import Klass
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.lining_relief import Relief
 from tunneldb.classification.objects.clusters import Cluster
-from tunneldb.database import Survey, get_survey
 from tunneldb.store.scene import (
     line_of,
     load_arcs,
@@ -24,6 +23,7 @@ from tunneldb.store.scene import (
     save_ground,
     save_relief,
 )
+from tunneldb.store.survey import Survey, get_survey
 
 # The example's tunnel is thought to go on into kilometres 11 and 13.
 FIRST, STOP = 11_990, 13_010

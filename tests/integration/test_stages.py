@@ -12,11 +12,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tunneldb.cli.main import main
-from tunneldb.database import Survey, get_survey
 from tunneldb.errors import UserError
 from tunneldb.pipeline.run import parse_km
 from tunneldb.simulate import Parameters, Simulation, write
 from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey, get_survey
 
 NAME = "curve"
 START = 960.0

@@ -10,8 +10,8 @@ import pytest
 from psycopg.rows import dict_row
 
 from tests.integration.test_statistics import GIRTH, STEP, add_coverage, add_survey
-from tunneldb.database import get_survey
 from tunneldb.report.data import find_stretch
+from tunneldb.store.survey import get_survey
 
 FROM, TO = 207.5, 483.2
 """The scan, on the given axis; segments of 10 m reach from 200 to 490 m."""

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from straight import straight
 
+from tunneldb.geometry.section_outliers import Astray
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.radiometry.oren_nayar import incidence_db
-from tunneldb.raster.accumulator import Accumulator, Grid, Window
+from tunneldb.raster.accumulator import Accumulator, Window
+from tunneldb.raster.floor import Floor
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.observation import Eye, Radiometer
-from tunneldb.raster.pixel_state import Astray, Floor, State, reach, states
+from tunneldb.raster.pixel_state import State, reach, states
 from tunneldb.raster.projection import WEIGHT, weight_of
 from tunneldb.raster.rasterize import Lens
 

@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from tunneldb.anomalies.coverage import cover
-from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.pixel_state import State
 
 

@@ -7,8 +7,8 @@ from shapely.geometry import box
 from tunneldb.anomalies.background.contrast import relative
 from tunneldb.anomalies.background.level_map import map_dry
 from tunneldb.anomalies.threshold import dark_pixels
-from tunneldb.raster.accumulator import Grid
 from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import Picture
 from tunneldb.raster.pixel_state import State
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tunneldb.export.images.gap_fill import fill_blocks, fill_gaps
+from tunneldb.raster.gap_fill import fill_blocks, fill_gaps
 
 Single = np.ndarray[tuple[int, ...], np.dtype[np.float32]]
 

@@ -11,7 +11,8 @@ from tunneldb.classification.objects.clusters import CELL, NEAR, Cluster, Lookup
 from tunneldb.classification.objects.objects import ClusterSettings, bars
 from tunneldb.classification.objects.spacing import Spacing
 from tunneldb.classification.scene import Scene
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.centreline import centreline_through
+from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.pipeline.parameters import settings
 from tunneldb.pointcloud.thinning import thin, voxel_edge
 from tunneldb.pointcloud.voxels import Voxels
@@ -63,7 +64,7 @@ def test_a_bare_cloud_is_classed_as_the_truth(survey) -> None:
     voxels = Voxels(0.1)
     voxels.add(cloud.xyz)
     points = voxels.centroids()
-    line = Line.through(points)
+    line = centreline_through(points)
     ground = find_ground(points, line, GroundSettings(), spread=voxels.spread())
     scene = find_bare_scene(points, line, ground)
     assert scene.relief is not None
@@ -82,7 +83,7 @@ def test_a_field_with_a_wall_has_no_lining() -> None:
     wall = np.column_stack([rng.uniform(10, 50, 20_000), np.full(20_000, 8.0), rng.uniform(0, 6, 20_000)])
     tree = rng.normal([30, -8, 4], 1.0, (3000, 3))
     points = np.concatenate([meadow, wall, tree])
-    line = Line.through(points)
+    line = centreline_through(points)
     scene = find_bare_scene(points, line, find_ground(points, line, GroundSettings()))
     assert scene.relief is None
     assert not np.isin(scene.classes(points), (Klass.LINING, Klass.NICHE)).any()
@@ -90,7 +91,7 @@ def test_a_field_with_a_wall_has_no_lining() -> None:
 
 @pytest.mark.parametrize("points", [np.empty((0, 3)), np.ones((1, 3)), np.ones((50, 3))])
 def test_hardly_any_points_are_no_tunnel(points: np.ndarray) -> None:
-    line = Line.of([[0.0, 0.0], [1.0, 0.0]], [0.0, 1.0])
+    line = PlanLine.of([[0.0, 0.0], [1.0, 0.0]], [0.0, 1.0])
     scene = find_bare_scene(points, line, None)
     assert scene.relief is None
     assert len(scene.classes(points)) == len(points)

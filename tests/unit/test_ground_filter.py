@@ -8,7 +8,8 @@ import pytest
 from tunneldb.classification.ground.accuracy import Agreement
 from tunneldb.classification.ground.extraction import MARGIN, GroundSettings, find_ground
 from tunneldb.classification.ground.ransac import planes
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.centreline import centreline_through
+from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate import Cloud, Parameters, rise, simulate
 
@@ -18,14 +19,14 @@ SCENE = {"length": 24.0, "straight": 6.0, "leaks": 1, "people": 3, "equipment": 
 PROFILER = {"scanner": "profiler", "profile_spacing": 0.05, "profile_points": 800}
 
 
-def _axis(parameters: Parameters) -> Line:
+def _axis(parameters: Parameters) -> PlanLine:
     """The tunnel's own axis, with a vertex every 5 m."""
     line = parameters.tunnel().line
     vertices = line.vertices(5.0)
-    return Line.of(vertices, line.start + 5.0 * np.arange(len(vertices)))
+    return PlanLine.of(vertices, line.start + 5.0 * np.arange(len(vertices)))
 
 
-def _agreement(cloud: Cloud, line: Line) -> Agreement:
+def _agreement(cloud: Cloud, line: PlanLine) -> Agreement:
     """Of ground found from voxels, as for a bare file, at all points; rails are no part of it."""
     voxels = Voxels(SETTINGS.voxel)
     voxels.add(cloud.xyz)
@@ -52,7 +53,7 @@ def test_errors_stay_below_half_a_percent(section, radius, slope, ballast, scann
         section=section, radius=radius, slope=slope, ballast=ballast, sleepers=ballast > 0, **SCENE, **scanner
     )
     cloud = simulate(parameters)
-    agreement = _agreement(cloud, Line.through(cloud.xyz))
+    agreement = _agreement(cloud, centreline_through(cloud.xyz))
     assert agreement.total < 0.005
     assert agreement.kappa > 0.98
 
@@ -137,17 +138,17 @@ def test_a_round_tunnel_has_no_ground(radius):
     rng = np.random.default_rng(6)
     angle, along = rng.uniform(0, 2 * np.pi, 200_000), rng.uniform(0, 25, 200_000)
     cloud = np.column_stack([along, radius * np.sin(angle), radius * np.cos(angle)]) + rng.normal(0, 0.003, (200_000, 3))
-    assert find_ground(cloud, Line.of([[0, 0], [25, 0]], [0, 25]), SETTINGS) is None
+    assert find_ground(cloud, PlanLine.of([[0, 0], [25, 0]], [0, 25]), SETTINGS) is None
 
 
 @pytest.mark.parametrize("points", [np.empty((0, 3)), np.zeros((1, 3)), np.ones((1000, 3)), np.full((9, 3), np.nan)])
 def test_too_few_points_make_no_ground(points):
-    assert find_ground(points, Line.of([[0, 0], [5, 0]], [0, 5]), SETTINGS) is None
+    assert find_ground(points, PlanLine.of([[0, 0], [5, 0]], [0, 5]), SETTINGS) is None
 
 
 def test_a_wall_alone_has_no_ground_and_a_floor_alone_no_feet():
     rng = np.random.default_rng(7)
-    line = Line.of([[0, 0], [20, 0]], [0, 20])
+    line = PlanLine.of([[0, 0], [20, 0]], [0, 20])
     wall = rng.uniform(0, 1, (40_000, 3)) * [20, 0, 5] + rng.normal(0, 0.003, (40_000, 3))
     floor = rng.uniform(0, 1, (40_000, 3)) * [20, 5, 0] + rng.normal(0, 0.003, (40_000, 3))
     assert find_ground(wall, line, SETTINGS) is None
@@ -172,7 +173,7 @@ def test_floor_is_found_beside_a_parked_train_that_hides_it():
     other += [sheet([0, -4, 6], [40, 0, 0], [0, 8, 0]), sheet([10, -1.6, 4], [20, 0, 0], [0, 3.2, 0])]
     cloud = np.vstack([floor, *other]) + rng.normal(0, 0.003, (len(floor) + sum(map(len, other)), 3))
     cloud[:, 2] += 0.03 * cloud[:, 0]
-    line = Line.of([[0, 0], [40, 0]], [0, 40])
+    line = PlanLine.of([[0, 0], [40, 0]], [0, 40])
     ground = find_ground(cloud, line, SETTINGS)
     assert ground is not None
     found = ground.is_ground(*line.place(cloud), cloud[:, 2])

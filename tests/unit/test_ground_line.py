@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.centreline import centreline_through
+from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.simulate import Parameters, simulate
 
 CORNER = (500_000.0, 4_700_000.0)
@@ -18,14 +19,14 @@ def _arc(radius: float, spacing: float, length: float) -> np.ndarray:
 
 
 def test_straight_line_gives_distance_and_right_hand_offset():
-    line = Line.of([[0, 0, 5], [0, 10, 6], [0, 25, 7]], [100, 110, 125])
+    line = PlanLine.of([[0, 0, 5], [0, 10, 6], [0, 25, 7]], [100, 110, 125])
     along, across = line.place(np.array([[2.0, 3.0, 0.0], [-1.0, 20.0, 9.0], [0.5, -4.0, 0.0], [0.5, 30.0, 0.0]]))
     np.testing.assert_allclose(along, [103.0, 120.0, 96.0, 130.0], atol=1e-12)
     np.testing.assert_allclose(across, [2.0, -1.0, 0.5, 0.5], atol=1e-12)
 
 
 def test_chainage_of_vertices_is_kept_though_it_is_not_their_distance():
-    line = Line.of([[0, 0], [0, 10], [0, 20]], [0.0, 10.5, 20.0])
+    line = PlanLine.of([[0, 0], [0, 10], [0, 20]], [0.0, 10.5, 20.0])
     along, _ = line.place(np.array([[3.0, 5.0], [3.0, 10.0], [3.0, 15.0]]))
     np.testing.assert_allclose(along, [5.25, 10.5, 15.25])
 
@@ -33,7 +34,7 @@ def test_chainage_of_vertices_is_kept_though_it_is_not_their_distance():
 def test_on_a_circle_along_is_the_angle_and_across_the_distance_from_its_centre():
     radius = 300.0
     vertices = _arc(radius, 2.0, 200.0)
-    line = Line.of(vertices, 2.0 * np.arange(len(vertices)))
+    line = PlanLine.of(vertices, 2.0 * np.arange(len(vertices)))
     rng = np.random.default_rng(1)
     angle, right = rng.uniform(0.01, 0.65, 5000), rng.uniform(-8, 8, 5000)
     from_centre = radius - right
@@ -47,7 +48,7 @@ def test_on_a_circle_along_is_the_angle_and_across_the_distance_from_its_centre(
 def test_place_and_point_are_inverse_and_continuous_at_bends():
     vertices = np.array([[0, 0], [10, 0], [18, 6], [20, 15], [20, 30]]) + np.array(CORNER)
     step = np.hypot(*np.diff(vertices, axis=0).T)
-    line = Line.of(vertices, np.concatenate([[7.0], 7.0 + np.cumsum(step)]))
+    line = PlanLine.of(vertices, np.concatenate([[7.0], 7.0 + np.cumsum(step)]))
     rng = np.random.default_rng(2)
     a, x = rng.uniform(2.0, 55.0, 4000), rng.uniform(-3, 3, 4000)
     along, across = line.place(line.point(a, x))
@@ -64,7 +65,7 @@ def test_place_and_point_are_inverse_and_continuous_at_bends():
 )
 def test_line_refuses_what_is_none(vertices, along):
     with pytest.raises(ValueError, match="line"):
-        Line.of(vertices, along)
+        PlanLine.of(vertices, along)
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 35.0, 90.0, 170.0, 290.0])
@@ -74,7 +75,7 @@ def test_short_piece_shows_its_direction_though_it_may_be_wider_than_long(azimut
     cloud = simulate(parameters)
     # Of the shorter one, 2 m that are four times as wide.
     piece = np.abs(cloud.chainage - 5.0) < 1.0 if length == 10.0 else np.full(len(cloud), True)
-    line = Line.through(cloud.xyz[piece])
+    line = centreline_through(cloud.xyz[piece])
     direction = np.diff(line.vertices, axis=0)
     true = np.array([np.sin(np.radians(azimuth)), np.cos(np.radians(azimuth))])
     sine = (direction[:, 0] * true[1] - direction[:, 1] * true[0]) / np.hypot(*direction.T)
@@ -84,7 +85,7 @@ def test_short_piece_shows_its_direction_though_it_may_be_wider_than_long(azimut
 def test_long_bend_is_followed():
     parameters = Parameters(length=220, radius=-70, straight=20, density=40, scanner="profiler", scanner_offset=0.0, leaks=1)
     cloud = simulate(parameters)
-    line = Line.through(cloud.xyz)
+    line = centreline_through(cloud.xyz)
     assert line.distance[-1] == pytest.approx(220.0, abs=4.0)
     along, across = line.place(parameters.tunnel().line.position(np.linspace(5, 215, 100)))
     assert np.abs(across).max() < 0.8
@@ -93,19 +94,19 @@ def test_long_bend_is_followed():
 
 
 def test_single_point_gets_a_line_and_no_points_an_error():
-    line = Line.through(np.array([[5.0, 6.0, 7.0]] * 3))
+    line = centreline_through(np.array([[5.0, 6.0, 7.0]] * 3))
     along, across = line.place(np.array([[5.0, 6.0, 7.0]]))
     assert np.isfinite(along).all()
     assert abs(across[0]) < 1.0
     with pytest.raises(ValueError, match="no points"):
-        Line.through(np.full((4, 3), np.nan))
+        centreline_through(np.full((4, 3), np.nan))
 
 
 def test_a_point_far_away_does_not_lead_the_line_astray():
     rng = np.random.default_rng(10)
     angle = rng.uniform(0, 2 * np.pi, 20_000)
     tube = np.column_stack([rng.uniform(0, 12, 20_000), 4 * np.sin(angle), 4 * np.cos(angle)])
-    line = Line.through(np.vstack([tube, [[9e5, -4e5, 3e3]]]))
+    line = centreline_through(np.vstack([tube, [[9e5, -4e5, 3e3]]]))
     _, across = line.place(tube)
     assert np.abs(across).max() < 4.2
     assert line.distance[-1] == pytest.approx(12.0, abs=0.5)

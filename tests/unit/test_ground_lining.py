@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tunneldb.classification.lining_relief import CELL, Relief, Wall
-from tunneldb.raster.appendages import DELTA
+from tunneldb.geometry.robust_plane import DELTA
 
 LENGTH, HALF = 40.0, 6.0
 

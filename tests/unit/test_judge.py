@@ -12,8 +12,8 @@ from tunneldb.anomalies.background.contrast import Relative
 from tunneldb.anomalies.detect import Detection, Found, detect
 from tunneldb.anomalies.regions import Region, Traits
 from tunneldb.anomalies.verdict import evidence, judge
-from tunneldb.raster.accumulator import Grid
 from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.pixel_state import State
 
 PIXEL, SIGMA = 0.02, 0.3

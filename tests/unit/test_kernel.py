@@ -11,17 +11,17 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.frame import plan_lengths, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
 from tunneldb.pointcloud.poses import PoseModel
-from tunneldb.pointcloud.reader import Points
+from tunneldb.pointcloud.reader import Points, Source
 from tunneldb.radiometry.correction import Kind, to_decibel
 from tunneldb.radiometry.oren_nayar import incidence_db
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.raster import rasterize as module
-from tunneldb.raster.accumulator import LEVEL, OFFSET, Accumulator, Grid
+from tunneldb.raster.accumulator import LEVEL, OFFSET, Accumulator
+from tunneldb.raster.floor import Floor
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.observation import Eye, Radiometer
-from tunneldb.raster.pixel_state import Floor
 from tunneldb.raster.projection import WEIGHT
 from tunneldb.raster.rasterize import Lens, gather
-from tunneldb.store.sources import Source
 from tunneldb.threads import threads, use_threads
 
 KM, START, LENGTH = 3, 3100.0, 60.0

@@ -12,9 +12,10 @@ from tunneldb.anomalies.matching import match, match_parts
 from tunneldb.anomalies.regions import regions
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
 from tunneldb.errors import UserError
-from tunneldb.raster.accumulator import LEVEL, OFFSET, Accumulator, Grid
+from tunneldb.raster.accumulator import LEVEL, OFFSET, Accumulator
 from tunneldb.raster.appendages import distance_from_plane, off_plane, reach, recessed
 from tunneldb.raster.geotiff import NODATA, Raster, decode, encode
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.pixel_state import State
 from tunneldb.raster.projection import WEIGHT, Pixels
 

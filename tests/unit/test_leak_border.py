@@ -11,8 +11,8 @@ from hypothesis.extra.numpy import arrays
 from tunneldb.anomalies.background.contrast import Relative
 from tunneldb.anomalies.detect import Found
 from tunneldb.anomalies.regions import Region, Traits, regions, together, unite
-from tunneldb.raster.accumulator import Grid
 from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.grid import Grid
 
 PIXEL = 0.5  # 2000 columns a kilometre
 DRY = 1.25

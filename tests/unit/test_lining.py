@@ -11,12 +11,15 @@ from straight import LENGTH, straight
 from tunneldb.anomalies.geometries import shapes
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.ground.wall_arcs import foot_arcs
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.plan_line import PlanLine
+from tunneldb.geometry.section_outliers import Astray
 from tunneldb.radiometry.edge_normals import Edges
 from tunneldb.raster import appendages as appendage
 from tunneldb.raster import ring_steps as step
-from tunneldb.raster.accumulator import Accumulator, Grid
-from tunneldb.raster.pixel_state import FLOOR_EDGE, Astray, Floor, State, reach, states
+from tunneldb.raster.accumulator import Accumulator
+from tunneldb.raster.floor import FLOOR_EDGE, Floor
+from tunneldb.raster.grid import Grid
+from tunneldb.raster.pixel_state import State, reach, states
 from tunneldb.raster.projection import Pixels
 
 
@@ -46,7 +49,7 @@ def flat(half_width: float, level: float, **others: object) -> Ground:
     )  # fmt: skip
 
 
-LINE = Line.of([[0.0, 0.0], [LENGTH, 0.0]], [0.0, LENGTH])
+LINE = PlanLine.of([[0.0, 0.0], [LENGTH, 0.0]], [0.0, LENGTH])
 
 
 def test_the_ground_of_a_box_begins_at_its_corner():

@@ -7,8 +7,8 @@ from shapely.geometry import box
 from tunneldb.anomalies.background.contrast import Relative
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
 from tunneldb.radiometry.robust_statistics import plain_statistics, robust_statistics
-from tunneldb.raster.accumulator import Grid
 from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.pixel_state import State
 
 TILE = 25

@@ -8,9 +8,7 @@ import numpy as np
 
 from tunneldb.alignment.elements import Float
 from tunneldb.arrays import Bool
-from tunneldb.geometry.stationing import Stationing
-
-KILOMETRE = 1000.0
+from tunneldb.geometry.stationing import KILOMETRE, Stationing
 
 
 @dataclass(frozen=True)

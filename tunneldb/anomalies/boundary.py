@@ -6,10 +6,10 @@ import numpy as np
 from numba import njit
 
 from tunneldb.anomalies.background.contrast import Relative
-from tunneldb.anomalies.inside import inside
 from tunneldb.anomalies.joints import longer
 from tunneldb.arrays import Bool, Int16, Int32, UInt8
 from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.polygons import inside
 
 BAND = 2
 """Pixels to both sides of the rim that may change sides, each time."""

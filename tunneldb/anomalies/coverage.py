@@ -9,7 +9,7 @@ from numba import njit
 
 from tunneldb.anomalies.threshold import MEDIAN_PIXELS
 from tunneldb.arrays import Bool, Int64, Single, UInt8
-from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.grid import Grid
 
 STEP = 0.1
 """Least length of a step along the tunnel, m."""

@@ -17,7 +17,7 @@ from tunneldb.anomalies.regions import Region, regions
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
 from tunneldb.anomalies.verdict import Verdict, judge
 from tunneldb.arrays import Bool, Float, Int32, Int64, UInt8
-from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import WET_EDGE
 
 GAP = 5.0

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from tunneldb.arrays import Bool, Int64
-from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.grid import Grid
 
 GAP = 0.12
 """Water that runs down a wall leaves dry places no longer than this, m."""

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numba import njit
 
-from tunneldb.anomalies.inside import inside
 from tunneldb.arrays import Bool, Int16, Int32, UInt8
 from tunneldb.raster.geotiff import STEP
+from tunneldb.raster.image import MAX_MEDIAN
+from tunneldb.raster.polygons import inside
 
 if TYPE_CHECKING:
     from tunneldb.anomalies.background.contrast import Relative
@@ -20,9 +21,6 @@ MEDIAN = 5
 
 MEDIAN_PIXELS = 12
 """The filter is widened until it holds so many pixels with points on average."""
-
-MAX_MEDIAN = 51
-"""Side of the widest median filter, pixels."""
 
 
 def filter_size(filled: float) -> int:

@@ -10,18 +10,19 @@ from scipy import ndimage
 
 from tunneldb.arrays import Float, Int64
 from tunneldb.classification.ground.model import COLUMN, Ground
-from tunneldb.classification.lining_relief import Prior, Relief, Wall
+from tunneldb.classification.lining_relief import Relief, Wall
 from tunneldb.classification.objects.clusters import Cluster
 from tunneldb.classification.objects.objects import ClusterSettings, Rest, find_clusters, sort_clusters
 from tunneldb.classification.objects.spacing import Spacing
 from tunneldb.classification.scene import Scene
 from tunneldb.classification.sections import lining, surface_through
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.plan_line import PlanLine
+from tunneldb.geometry.section_outliers import Prior
 from tunneldb.geometry.surface import Surface
 
 
 def find_scene(
-    points: Float, line: Line, surface: Surface, ground: Ground | None, settings: ClusterSettings | None = None
+    points: Float, line: PlanLine, surface: Surface, ground: Ground | None, settings: ClusterSettings | None = None
 ) -> Scene:
     """Find lining and clusters in points of survey density about the surface of the sections.
 
@@ -29,7 +30,7 @@ def find_scene(
     ----------
     points : (n, 3) float array
         In the tunnel's SRID, m.
-    line : Line
+    line : PlanLine
         The axis, along which is chainage.
     surface : Surface
         Surface of the sections.
@@ -69,7 +70,7 @@ def find_scene(
     return Scene(line, ground, clusters, surface, relief)
 
 
-def find_bare_scene(points: Float, line: Line, ground: Ground | None, settings: ClusterSettings | None = None) -> Scene:
+def find_bare_scene(points: Float, line: PlanLine, ground: Ground | None, settings: ClusterSettings | None = None) -> Scene:
     """Find lining and clusters in a cloud that has no axis and no sections.
 
     Clusters of the region of interest (Li et al. 2023, eq. 1–4) that are large and whose normals are coherent are lining, and
@@ -81,7 +82,7 @@ def find_bare_scene(points: Float, line: Line, ground: Ground | None, settings: 
     ----------
     points : (n, 3) float array
         m; thinned to voxels serves best.
-    line : Line
+    line : PlanLine
         What the cloud follows.
     ground : Ground or None
         The ground, if there is one.

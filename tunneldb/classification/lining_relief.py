@@ -17,9 +17,10 @@ from scipy import ndimage
 from tunneldb.arrays import Bool, Float, Int64, Single
 from tunneldb.classification.ground.model import Ground
 from tunneldb.classification.ground.wall_arcs import foot_arcs
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.plan_line import PlanLine
+from tunneldb.geometry.robust_plane import DELTA
+from tunneldb.geometry.section_outliers import Prior
 from tunneldb.geometry.surface import Surface
-from tunneldb.raster.appendages import DELTA
 
 CELL = 0.25
 """Edge of a cell, m."""
@@ -134,7 +135,7 @@ class Wall:
     right: Float
 
     @classmethod
-    def of(cls, ground: Ground | None, line: Line, surface: Surface) -> Wall | None:
+    def of(cls, ground: Ground | None, line: PlanLine, surface: Surface) -> Wall | None:
         """Find it by the feet of the walls; None without ground."""
         if ground is None:
             return None
@@ -148,41 +149,6 @@ class Wall:
         left, right = np.interp(chainage, self.chainage, self.left), np.interp(chainage, self.chainage, self.right)
         # Half a cell farther, so that the last of the wall lies in a cell, too.
         return np.asarray((arc[:, None] > left - CELL / 2) & (arc[:, None] < right + CELL / 2))
-
-
-@dataclass(frozen=True)
-class Prior:
-    """Where the surface left the lining, because a section was measured in a niche or on something hung on the wall.
-
-    Attributes
-    ----------
-    surface : Surface
-        The tunnel.
-    apart : (k, 361) float array
-        Offset of the lining from each section at each whole degree, m; 0 where the section is on it.
-    """
-
-    surface: Surface
-    apart: Float
-
-    @classmethod
-    def of(cls, surface: Surface) -> Prior:
-        """Take the sections that stand apart from those beside them (:meth:`Surface.astray`)."""
-        return cls(surface, surface.astray())
-
-    def at(self, chainage: Float, arc: Float) -> Float:
-        """Offset of the lining where the surface left it; (rows,) arcs by (columns,) chainages, m."""
-        out = np.zeros((len(arc), len(chainage)))
-        at = self.surface.chainages
-        if len(at) < 2 or not self.apart.any():
-            return out
-        after = np.clip(np.searchsorted(at, chainage, side="right"), 1, len(at) - 1)
-        share = np.clip((chainage - at[after - 1]) / (at[after] - at[after - 1]), 0.0, 1.0)
-        for column in np.flatnonzero(self.apart[after].any(axis=1) | self.apart[after - 1].any(axis=1)):
-            a, b, g = after[column] - 1, after[column], share[column]
-            nodes = (1 - g) * self.surface.arcs[a] + g * self.surface.arcs[b]
-            out[:, column] = np.interp(arc, nodes, (1 - g) * self.apart[a] + g * self.apart[b])
-        return out
 
 
 def _apart(found: Float, expected: Float) -> Bool:

@@ -14,7 +14,7 @@ from tunneldb.classification.classes import Klass
 from tunneldb.classification.ground.model import Ground
 from tunneldb.classification.lining_relief import Relief, level_at
 from tunneldb.classification.objects.clusters import Cluster, Lookup, look_up
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.surface import Surface
 
 SPHERE_SKIN = 0.01
@@ -34,8 +34,8 @@ class Scene:
 
     Attributes
     ----------
-    line : Line
-        Line along the tunnel, in whose frame the ground stands.
+    line : PlanLine
+        PlanLine along the tunnel, in whose frame the ground stands.
     ground : Ground or None
         The ground, if there is one.
     clusters : sequence of Cluster
@@ -48,7 +48,7 @@ class Scene:
         Target spheres: x, y, z of the centre and radius, m.
     """
 
-    line: Line
+    line: PlanLine
     ground: Ground | None
     clusters: Sequence[Cluster]
     surface: Surface | None

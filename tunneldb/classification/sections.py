@@ -12,10 +12,10 @@ from tunneldb.classification.objects.dbscan import dbscan
 from tunneldb.classification.objects.objects import ClusterSettings, Rest
 from tunneldb.classification.objects.spacing import Spacing
 from tunneldb.geometry.frame import frame_of, locate, nearest_segment, segment_rows, tangents
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.plan_line import PlanLine
+from tunneldb.geometry.robust_plane import DELTA
 from tunneldb.geometry.surface import Surface
 from tunneldb.geometry.unrolling import CROWN, NODES
-from tunneldb.raster.appendages import DELTA
 
 COHERENT = 0.8
 """Cosine of the angle between neighbouring normals that the clusters of a lining reach on the average."""
@@ -96,7 +96,7 @@ def _coherence(points: Float, index: Int64) -> float:  # pragma: no cover - comp
     return total / (count * (near - 1))
 
 
-def surface_through(line: Line, along: Float, across: Float, z: Float, wall: Bool) -> Surface | None:
+def surface_through(line: PlanLine, along: Float, across: Float, z: Float, wall: Bool) -> Surface | None:
     """Sections through points in the frame of a line; None where walls and roof (``wall``) don't close around the middle."""
     if wall.sum() < _LEAST:
         return None

@@ -10,7 +10,8 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
+from tunneldb.store.survey import get_survey
 
 
 @verb(examples=["tunneldb axis ringo-2024", "tunneldb axis ringo-2024 --from 511+700 -o axis.svg"])

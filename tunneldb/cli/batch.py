@@ -14,9 +14,10 @@ from rich.console import Console
 from tunneldb.cli.load import density_of
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb, wants_json
-from tunneldb.database import Survey, connect, get_survey
+from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.pipeline.parameters import PARAMETERS, settings
+from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
     import psycopg

@@ -14,10 +14,11 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
-from tunneldb.database import Survey, connect, get_survey
+from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import make_folder, replacing, told_to_end
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
+from tunneldb.store.survey import Survey, get_survey
 
 _PLAIN = (".gpkg", ".dxf")
 

@@ -9,11 +9,12 @@ import click
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say, step
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.images.image import export_kilometre, image_kilometres
 from tunneldb.files import make_folder
 from tunneldb.pipeline.run import parse_km
+from tunneldb.store.survey import get_survey
 
 
 @verb(examples=["tunneldb image ringo-2024 -o images --km 511-512"])

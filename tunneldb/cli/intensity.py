@@ -11,11 +11,12 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.figures.intensity_dependence import check_format, write_figure
 from tunneldb.radiometry.correction import Kind
 from tunneldb.radiometry.diagnosis import Look
+from tunneldb.store.survey import get_survey
 
 _FILES = (".las", ".laz", ".e57")
 

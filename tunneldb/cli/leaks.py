@@ -14,7 +14,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import records, tell, verb
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
-from tunneldb.database import Survey, connect, get_survey
+from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.tables.leaks import (
     Anomaly,
@@ -29,6 +29,7 @@ from tunneldb.export.tables.leaks import (
 )
 from tunneldb.files import replacing
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
+from tunneldb.store.survey import Survey, get_survey
 
 _BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
 _WIDTH = 1000  # a pipe or a file has no width: nothing is to be cut there

@@ -11,8 +11,9 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.store.survey import get_survey
 
 if TYPE_CHECKING:
     from tunneldb.store.scan_files import Loaded

@@ -10,11 +10,12 @@ import psycopg
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, step
-from tunneldb.database import Survey, connect, get_survey
+from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.images.image import export_filled, export_kilometre, image_kilometres
 from tunneldb.export.qgis import store_project, store_styles, write_project
 from tunneldb.files import make_folder
+from tunneldb.store.survey import Survey, get_survey
 
 
 @verb(

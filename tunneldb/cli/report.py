@@ -13,11 +13,12 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
-from tunneldb.database import Survey, connect, get_survey
+from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import replacing, told_to_end
 from tunneldb.report.page import CARDS, write_html
 from tunneldb.report.pdf import find_browser, print_pdf
+from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
     from rich.progress import Progress

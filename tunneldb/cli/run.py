@@ -10,10 +10,11 @@ import click
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.pipeline.parameters import PARAMETERS, settings
 from tunneldb.store.ledger import Run
+from tunneldb.store.survey import get_survey
 
 if TYPE_CHECKING:
     from tunneldb.pipeline.stages import Stage

@@ -13,9 +13,10 @@ from rich.console import Console
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import records, tell, verb, wants_json
 from tunneldb.cli.tables import print_table
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.pipeline.order import STAGES
+from tunneldb.store.survey import get_survey
 
 
 @verb(examples=["tunneldb status", "tunneldb status pajares-2026 --watch", "tunneldb status pajares-2026 --json"])

@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 import click
 import psycopg
 
-from tunneldb.database import Survey
 from tunneldb.errors import UserError
+from tunneldb.store.survey import Survey
 
 _METRES = re.compile(r"-?\d+(\.\d*)?")
 

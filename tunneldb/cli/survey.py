@@ -10,8 +10,9 @@ import click
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
 from tunneldb.cli.tables import print_table
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.store.survey import get_survey
 
 FILE = click.Path(path_type=Path)
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import records, tell, verb
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.store.survey import get_survey
 
 _SPACE = ("x", "y", "z")
 _PLANE = ("chainage", "arc", "offset")

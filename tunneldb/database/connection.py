@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import psycopg
@@ -49,42 +47,6 @@ def open_connection(dsn: str | None) -> psycopg.Connection[Any]:
         connection.close()
         raise UserError(f"the server is PostgreSQL {major}; tunneldb needs {MINIMUM_POSTGRESQL} or newer")
     return connection
-
-
-def connect(dsn: str | None) -> psycopg.Connection[Any]:
-    """Connect to a database that `tunneldb init` has prepared; None means the embedded server.
-
-    Returns
-    -------
-    psycopg.Connection
-        In a transaction of its own (no autocommit), idle.
-
-    Raises
-    ------
-    UserError
-        When the server is down, has no PostGIS, or its schema is absent, older or newer than this program's.
-    """
-    from tunneldb.database.schema import require_current_schema
-
-    connection = open_connection(dsn)
-    try:
-        require_current_schema(connection)
-        connection.rollback()
-    except BaseException:
-        connection.close()
-        raise
-    return connection
-
-
-@contextmanager
-def snapshot(connection: psycopg.Connection[Any]) -> Iterator[None]:
-    """Read what the database holds at one moment, for the length of a with block: what others commit meanwhile is not seen.
-
-    The connection must be idle.
-    """
-    with connection.transaction():
-        connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY")
-        yield
 
 
 def sqlalchemy_engine(dsn: str | None) -> sqlalchemy.Engine:

@@ -8,7 +8,7 @@ from typing import Any, LiteralString
 
 import psycopg
 
-from tunneldb.database.connection import resolve_dsn
+from tunneldb.database.connection import open_connection, resolve_dsn
 from tunneldb.database.schema import require_current_schema
 from tunneldb.threads import threads
 
@@ -49,3 +49,39 @@ def worker_session(dsn: str | None) -> Iterator[psycopg.Connection[Any]]:
         conn.execute("SELECT set_config('max_parallel_workers_per_gather', %s, false)", [str(threads() - 1)])
         conn.commit()
         yield conn
+
+
+def connect(dsn: str | None) -> psycopg.Connection[Any]:
+    """Connect to a database that `tunneldb init` has prepared; None means the embedded server.
+
+    Returns
+    -------
+    psycopg.Connection
+        In a transaction of its own (no autocommit), idle.
+
+    Raises
+    ------
+    UserError
+        When the server is down, has no PostGIS, or its schema is absent, older or newer than this program's.
+    """
+    from tunneldb.database.schema import require_current_schema
+
+    connection = open_connection(dsn)
+    try:
+        require_current_schema(connection)
+        connection.rollback()
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+@contextmanager
+def snapshot(connection: psycopg.Connection[Any]) -> Iterator[None]:
+    """Read what the database holds at one moment, for the length of a with block: what others commit meanwhile is not seen.
+
+    The connection must be idle.
+    """
+    with connection.transaction():
+        connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY")
+        yield

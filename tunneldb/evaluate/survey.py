@@ -15,12 +15,13 @@ from shapely.geometry.base import BaseGeometry
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
-from tunneldb.pointcloud.poses import PoseModel, load_poses
+from tunneldb.pointcloud.poses import PoseModel
+from tunneldb.store.poses import load_poses
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
-KILOMETRE = 1000.0
 WIDE = 1e4  # m of arc, more than any section has
 
 

@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 from tunneldb.arrays import Int64
 from tunneldb.errors import UserError
 from tunneldb.geometry.frame import Float, frame_at, locate, nearest_segment, segment_rows, tangents
+from tunneldb.geometry.stationing import KILOMETRE
 
-KILOMETRE = 1000.0
 MILLIMETRE = 0.001
 DENSE = 2.0  # m between vertices
 

@@ -1,16 +1,18 @@
-"""The course of a tunnel in plan, found from the points alone."""
+"""The centreline of a tunnel in plan, found from the points alone."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import solve
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float
+from tunneldb.geometry.plan_line import PlanLine
 
 _CELL = 1.0  # m in plan
 _REACH = 3.0  # cells closer than this are neighbours, m: profiles may lie apart
@@ -24,7 +26,25 @@ _ASTRAY = 0.02  # of a slice's cells may lie beyond each wall
 _FAR = 1 << 24  # cells; more than any tunnel is long
 
 
-def course(points: Float) -> Float:
+def centreline_through(points: ArrayLike) -> PlanLine:
+    """Line that a bare cloud of a tunnel follows, of any direction, straight or curved; from 0.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        m, the tunnel's surface without other things farther off; thinned evenly serves best.
+
+    Raises
+    ------
+    ValueError
+        No points.
+    """
+    vertices = centreline(np.asarray(points, dtype=np.float64))
+    steps = np.hypot(*np.diff(vertices, axis=0).T)
+    return PlanLine.of(vertices, np.concatenate([[0.0], np.cumsum(steps)]))
+
+
+def centreline(points: Float) -> Float:
     """Vertices (k, 2) of a line along a tunnel, from the end that lies farther west.
 
     A long tunnel's points are strung out by the way to one of its ends, through neighbouring cells of the plan. A
@@ -138,10 +158,8 @@ def _filled(sample: Float, angle: float) -> int:
 
 def _centred(vertices: Float, plan: Float) -> Float:
     """The line again, with vertices every 5 m, in the middle between the walls, and smooth."""
-    from tunneldb.geometry.plan_line import Line
-
     step = np.hypot(*np.diff(vertices, axis=0).T)
-    line = Line.of(vertices, np.concatenate([[0.0], np.cumsum(step)]))
+    line = PlanLine.of(vertices, np.concatenate([[0.0], np.cumsum(step)]))
     length = float(line.distance[-1])
     if length < 4 * _STEP:
         return vertices

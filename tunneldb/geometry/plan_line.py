@@ -10,14 +10,13 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Float, Int32
-from tunneldb.geometry.centreline import course
 
 _APRON = 30.0  # m around the line in which the search begins at the nearest segment
 _MOST_CELLS = 1 << 20
 
 
 @dataclass(frozen=True)
-class Line:
+class PlanLine:
     """A polyline in plan whose points are told by the distance along it and to its right.
 
     Neighbouring segments meet in the bisector of their angle, where both distances agree: along and across are
@@ -38,8 +37,8 @@ class Line:
     _corner: Float = field(repr=False)  # x, y of the grid and the edge of a cell
 
     @classmethod
-    def of(cls, vertices: ArrayLike, along: ArrayLike) -> Line:
-        """Line through given vertices.
+    def of(cls, vertices: ArrayLike, along: ArrayLike) -> PlanLine:
+        """PlanLine through given vertices.
 
         Parameters
         ----------
@@ -72,24 +71,6 @@ class Line:
         segments[:, 7], segments[:, 8] = distance[:-1], distance[1:]
         grid, corner = _nearest_segments(at, length)
         return cls(at, distance, segments, grid, corner)
-
-    @classmethod
-    def through(cls, points: ArrayLike) -> Line:
-        """Line that a bare cloud of a tunnel follows, of any direction, straight or curved; from 0.
-
-        Parameters
-        ----------
-        points : (n, 3) array
-            m, the tunnel's surface without other things farther off; thinned evenly serves best.
-
-        Raises
-        ------
-        ValueError
-            No points.
-        """
-        vertices = course(np.asarray(points, dtype=np.float64))
-        steps = np.hypot(*np.diff(vertices, axis=0).T)
-        return cls.of(vertices, np.concatenate([[0.0], np.cumsum(steps)]))
 
     def place(self, xyz: Float) -> tuple[Float, Float]:
         """Distance along the line and to its right, (n,) each, of points (n, 2 or 3), m."""

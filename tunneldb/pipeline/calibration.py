@@ -14,7 +14,6 @@ from tunneldb.anomalies.background.contrast import Relative
 from tunneldb.anomalies.detect import Detection, dry_places
 from tunneldb.arrays import Bool, Int32, Int64
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.poses import load_poses
 from tunneldb.radiometry.cells import Sight
 from tunneldb.radiometry.correction import Kind, Views, needs_reference, range_span
 from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
@@ -30,6 +29,7 @@ from tunneldb.radiometry.roughness import (
 )
 from tunneldb.raster.observation import Eye, Radiometer, Seen, Span
 from tunneldb.store.images import load_reference
+from tunneldb.store.poses import load_poses
 from tunneldb.store.sources import sample
 from tunneldb.store.survey import Survey
 

@@ -13,14 +13,18 @@ from tunneldb.anomalies.background.level_map import map_dry
 from tunneldb.anomalies.coverage import cover
 from tunneldb.anomalies.detect import detect as find_anomalies
 from tunneldb.errors import UserError
+from tunneldb.geometry.section_outliers import Astray
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.calibration import calibrate, dry_sigma, find_radiometer
+from tunneldb.pointcloud.reader import Source
 from tunneldb.radiometry.roughness import Roughness
-from tunneldb.raster.accumulator import KILOMETRE, Accumulator, Grid
+from tunneldb.raster.accumulator import Accumulator
+from tunneldb.raster.floor import HIDDEN, Floor
 from tunneldb.raster.geotiff import KINDS
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import develop, halo
 from tunneldb.raster.observation import Eye
-from tunneldb.raster.pixel_state import HIDDEN, Astray, Floor
 from tunneldb.raster.rasterize import Counts, gather
 from tunneldb.store.anomalies import save_anomalies
 from tunneldb.store.images import (
@@ -33,7 +37,7 @@ from tunneldb.store.images import (
 )
 from tunneldb.store.range_curve import save_range_curve
 from tunneldb.store.scene import load_arcs
-from tunneldb.store.sources import Source, sources
+from tunneldb.store.sources import sources
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 

@@ -19,8 +19,8 @@ from tunneldb.classification.objects.objects import ClusterSettings
 from tunneldb.classification.scene import Scene
 from tunneldb.database.fetch import fetch_array
 from tunneldb.errors import UserError
-from tunneldb.geometry.alignment import KILOMETRE
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.plan_line import PlanLine
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.partition import partition, partition_exists
 from tunneldb.store.scene import line_of, load_spheres, save_clusters, save_ground, save_relief
@@ -68,7 +68,7 @@ def ground(
     return {"metres": metres, "clusters": clusters, **{klass.name.lower(): int(count[klass]) for klass in Klass}}
 
 
-def find(points: Float, line: Line, surface: Surface, values: Mapping[str, float]) -> Scene:
+def find(points: Float, line: PlanLine, surface: Surface, values: Mapping[str, float]) -> Scene:
     """Find ground, lining and clusters from points (n, 3) of survey density, m."""
     found = find_ground(points, line, GroundSettings.of(values))
     return find_scene(points, line, surface, found, ClusterSettings.of(values))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tunneldb.arrays import Float, Int32, Single
 from tunneldb.errors import UserError
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.calibration import UNKNOWN, find_radiometer, find_range_curve, roughness_of, take_sample
 from tunneldb.pipeline.detect import ASIDE, load_floor
 from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_scans
@@ -25,7 +26,6 @@ from tunneldb.radiometry.incidence import incidence_cosine
 from tunneldb.radiometry.oren_nayar import incidence_db
 from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
-from tunneldb.raster.accumulator import KILOMETRE
 from tunneldb.raster.observation import Eye
 from tunneldb.store.images import load_reference, load_regions
 from tunneldb.store.sources import SAMPLE

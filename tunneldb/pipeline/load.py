@@ -14,7 +14,8 @@ import psycopg
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import parameters_of, require_same_density, settings_of
 from tunneldb.pipeline.read import Begin, Counts, Reading, silent
 from tunneldb.pointcloud.reader import ScanHeader, read_header

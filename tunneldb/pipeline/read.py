@@ -14,13 +14,15 @@ from typing import Any
 import psycopg
 
 from tunneldb.errors import UserError
-from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import require_same_density
-from tunneldb.pointcloud.poses import PoseModel, load_poses
+from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
 from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
 from tunneldb.pointcloud.spool import Spool
 from tunneldb.store.fragment import drop_fragments, write_fragments
+from tunneldb.store.poses import load_poses
 from tunneldb.store.scan_files import (
     Content,
     Recorded,

@@ -9,6 +9,7 @@ from typing import Any, LiteralString
 import psycopg
 
 from tunneldb.errors import UserError
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
@@ -86,7 +87,7 @@ def _plant(conn: psycopg.Connection[Any], survey: Survey) -> None:
             "survey": survey.id,
             "srid": survey.srid,
             "n": alignment.number.tolist(),
-            "km": (chainage // 1000.0).astype(int).tolist(),
+            "km": (chainage // KILOMETRE).astype(int).tolist(),
             "x": x,
             "y": y,
             "z": z,

@@ -13,18 +13,21 @@ from numpy.typing import NDArray
 from tunneldb.arrays import Bool, Float
 from tunneldb.classification.targets.curvature import Curved
 from tunneldb.classification.targets.detection import LEAST_POINTS, Refusal, Sphere, confirmed, find_spheres, join
-from tunneldb.database import Survey, snapshot
+from tunneldb.database import snapshot
 from tunneldb.errors import UserError
-from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.run import loaded_kilometres
-from tunneldb.pointcloud.poses import TIME_TOLERANCE, PoseModel, load_poses
-from tunneldb.pointcloud.reader import CHUNK, Points, read_chunks
+from tunneldb.pointcloud.poses import TIME_TOLERANCE, PoseModel
+from tunneldb.pointcloud.reader import CHUNK, Points, Source, read_chunks
 from tunneldb.pointcloud.spool import BINS_PER_METRE, Spool, bin_of, windows
 from tunneldb.store.ledger import stage_run
+from tunneldb.store.poses import load_poses
 from tunneldb.store.scene import line_of, load_ground
-from tunneldb.store.sources import Source, sources
+from tunneldb.store.sources import sources
 from tunneldb.store.surface import load_alignment, load_surface
+from tunneldb.store.survey import Survey
 
 Progress = Callable[[int], None]
 

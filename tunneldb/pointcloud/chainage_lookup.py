@@ -6,8 +6,9 @@ import numpy as np
 from numba import njit
 
 from tunneldb.arrays import Float, Int32, Int64, Intp, Single, UInt8
-from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.frame import frame_of, locate, nearest_segment, segment_rows, tangents
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pointcloud.noise import CellCounts
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.spool import BINS_PER_METRE, ROW, Rows

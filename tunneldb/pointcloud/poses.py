@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import psycopg
 from numba import njit
-from psycopg import sql
 
 from tunneldb.arrays import Float, Int32, Int64
-from tunneldb.database.fetch import fetch_array
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.reader import Points
-
-if TYPE_CHECKING:
-    from tunneldb.database import Survey
 
 # Times in a CSV are rounded; beyond the ends of the trajectory they may be off by this much, s.
 TIME_TOLERANCE = 0.001
@@ -153,28 +146,6 @@ class PoseModel:
         if self.mobile:
             return _interpolate(self.time, self.track, points.time)
         return self.station[np.searchsorted(self.scan_id, points.scan_id)]
-
-
-def load_poses(conn: psycopg.Connection[Any], survey: Survey) -> PoseModel:
-    """Read the trajectory of a mobile survey, or the stations of a static one.
-
-    Raises
-    ------
-    UserError
-        If the survey has none.
-    """
-    table, key = ("pose", "time") if survey.platform == "mobile" else ("station", "scan_id")
-    fields: list[tuple[str, str, sql.Composable]] = [(key, "f8", sql.SQL("{}::float8").format(sql.Identifier(key)))]
-    fields += [("x", "f8", sql.SQL("ST_X(geom)")), ("y", "f8", sql.SQL("ST_Y(geom)")), ("z", "f8", sql.SQL("ST_Z(geom)"))]
-    source = sql.SQL("FROM {} WHERE survey_id = %(survey)s").format(sql.Identifier("tunnel", table))
-    rows = fetch_array(conn, fields, source, {"survey": survey.id})
-    if len(rows) == 0:
-        kind = "trajectory" if survey.platform == "mobile" else "stations"
-        raise UserError(f"survey {survey.name} has no {kind}: add the survey again with --{kind}")
-    xyz = np.column_stack([rows["x"], rows["y"], rows["z"]])
-    if survey.platform == "mobile":
-        return PoseModel.from_trajectory(rows["time"], xyz)
-    return PoseModel.from_stations(rows["scan_id"].astype(np.int64), xyz)
 
 
 def _count_scans(scan_id: Int32) -> tuple[Int64, Int64]:

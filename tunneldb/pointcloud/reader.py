@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from pyproj import CRS
@@ -91,3 +92,27 @@ def describe_crs(crs: CRS) -> str:
     """Name of a coordinate system with its EPSG code, where it has one."""
     code = horizontal(crs).to_epsg()
     return f"EPSG:{code} ({crs.name})" if code is not None else crs.name
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a kilometre needs of a scan file that was read.
+
+    Attributes
+    ----------
+    path : Path
+        Where it lay then.
+    ranges : list of (int, int)
+        Point numbers, from 0, half-open, among which are all the file's points of the kilometre and 10 m to both sides.
+    dimension : str or None
+        The survey's intensity dimension.
+    """
+
+    path: Path
+    ranges: list[tuple[int, int]]
+    dimension: str | None
+
+    @property
+    def points(self) -> int:
+        """Points to read."""
+        return sum(end - begin for begin, end in self.ranges)

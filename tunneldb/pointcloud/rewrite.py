@@ -22,7 +22,7 @@ from tunneldb.pointcloud.formats.e57_records import E57Records
 from tunneldb.pointcloud.formats.faults import decoding
 from tunneldb.pointcloud.formats.las import KIND, read_las_header
 from tunneldb.pointcloud.formats.las_header import Head, read_head
-from tunneldb.pointcloud.formats.las_records import FORMAT_OF, Bytes, coordinates, fields, record_size, upgraded
+from tunneldb.pointcloud.formats.las_records import FORMAT_OF, coordinates, fields, record_size, upgraded
 from tunneldb.pointcloud.formats.laz import writing
 from tunneldb.pointcloud.points import CHUNK
 from tunneldb.threads import threads
@@ -39,7 +39,7 @@ class _Source:
     """What is to be written: what surrounds the points, the points, and what of the header is known only afterwards."""
 
     head: Head
-    chunks: Iterator[Bytes]
+    chunks: Iterator[UInt8]
     patches: Callable[[], tuple[int, bytes] | None]
 
 
@@ -128,7 +128,7 @@ def _of_las(path: Path, size: int) -> _Source:
     return _Source(head, (upgraded(records, before) for records in _read(path, header.points, size)), lambda: None)
 
 
-def _read(path: Path, count: int, size: int, selection: DecompressionSelection = _EVERYTHING) -> Iterator[Bytes]:
+def _read(path: Path, count: int, size: int, selection: DecompressionSelection = _EVERYTHING) -> Iterator[UInt8]:
     backends = (LazBackend.Lazrs,) if threads() == 1 else (LazBackend.LazrsParallel, LazBackend.Lazrs)
     with decoding(path, KIND):
         las = laspy.open(path, laz_backend=backends, read_evlrs=False, decompression_selection=selection)

@@ -19,7 +19,8 @@ from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.errors import UserError
-from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pointcloud.chainage_lookup import STRETCHING, Places
 from tunneldb.pointcloud.noise import DIAMETER, POINTS, CellCounts, is_noise, search_radii
 from tunneldb.pointcloud.points import CHUNK, Points

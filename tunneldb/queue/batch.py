@@ -14,14 +14,15 @@ from psycopg.rows import class_row
 from psycopg.types.json import Jsonb
 
 from tunneldb.errors import UserError
-from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load import chainages_near, header_kilometres, parameters_of, settings_of
 from tunneldb.pipeline.run import loaded_kilometres
 from tunneldb.pipeline.stages import STAGES
 from tunneldb.pointcloud.formats.e57 import is_e57
 from tunneldb.pointcloud.formats.las_bounds import header_box
-from tunneldb.pointcloud.poses import load_poses
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
+from tunneldb.store.poses import load_poses
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 

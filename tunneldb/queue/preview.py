@@ -16,6 +16,7 @@ from typing import Any
 import psycopg
 
 from tunneldb.database.server import Server
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.parameters import PARAMETERS
 from tunneldb.pointcloud.reader import read_header
 from tunneldb.queue.batch import STEPS, Plan, extent
@@ -156,7 +157,7 @@ def preview(
     length = sum(high - low for low, high in _union(sorted(of_files[file.name] for file in new if file.name in of_files)))
     kept = _kept(conn, survey, plan)
     rows = _rows(points, length, kept, plan)
-    disk = _disk(conn, plan, rows, length or 1000.0 * len(plan.kilometres), workers)
+    disk = _disk(conn, plan, rows, length or KILOMETRE * len(plan.kilometres), workers)
     folder = Server().home().cluster if embedded else None
     speeds = _speeds(conn)
     return Preview(
@@ -179,7 +180,7 @@ def preview(
 
 def kilometres_of(stretch: tuple[float, float]) -> range:
     """Kilometres that a stretch from one chainage to another, m, lies in."""
-    return range(int(stretch[0] // 1000.0), math.ceil(stretch[1] / 1000.0))
+    return range(int(stretch[0] // KILOMETRE), math.ceil(stretch[1] / KILOMETRE))
 
 
 def _stretches(conn: psycopg.Connection[Any], survey: Survey, plan: Plan) -> dict[str, tuple[float, float]]:
@@ -246,7 +247,7 @@ def _disk(conn: psycopg.Connection[Any], plan: Plan, rows: float, length: float,
         ROW_BYTES * rows,
         FRAGMENT_BYTES * rows + ROW_BYTES * rows * min(workers / max(len(plan.kilometres), 1), 1.0),
         PIXEL_BYTES * GIRTH * length / pixel**2 if detects else 0.0,
-        KILOMETRE_BYTES * length / 1000.0,
+        KILOMETRE_BYTES * length / KILOMETRE,
         float(row[0]),
     )
 

@@ -17,7 +17,7 @@ from scipy import signal
 from scipy.interpolate import CubicSpline
 
 from tunneldb.arrays import Float
-from tunneldb.radiometry.cells import CELL, ROUGHNESS, STRETCH, Cells, Index
+from tunneldb.radiometry.cells import CELL, ROUGHNESS, STRETCH, Cells, Int64
 from tunneldb.radiometry.range_spline import RangeSpline, one_maximum
 
 TUKEY = 4.685
@@ -285,7 +285,7 @@ class _Problem:
         return _positive(spread)
 
 
-def _within(number: Index, values: Float, aside: Float, weight: Float) -> Float:
+def _within(number: Int64, values: Float, aside: Float, weight: Float) -> Float:
     """Values (n, m) less what a constant and a slope over ``aside`` (n,) say of those of the same number.
 
     So nothing is left of a reflectance that depends on the place in the section, constant along a strip: not even by where
@@ -353,7 +353,7 @@ def _covariances(left: Float, there: Float) -> tuple[Float, Float]:
     return along, np.asarray(of[distance])
 
 
-def _sums(number: Index, values: Float, weight: Float | None = None, count: int = 0) -> Float:
+def _sums(number: Int64, values: Float, weight: Float | None = None, count: int = 0) -> Float:
     """Sums (count, …) of values (n, …), times their weights (n,), of each number."""
     if values.ndim == 1:
         return np.asarray(np.bincount(number, values if weight is None else values * weight, minlength=count), np.float64)
@@ -364,7 +364,7 @@ def _per(values: Float, like: Float) -> Float:
     return values if like.ndim == 1 else values[:, None]
 
 
-def _medians(number: Index, values: Float) -> Float:
+def _medians(number: Int64, values: Float) -> Float:
     """Median (n,) of the values of each one's number."""
     order = np.argsort(number, kind="stable")
     there, first = np.unique(number[order], return_index=True)

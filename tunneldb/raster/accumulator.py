@@ -16,17 +16,13 @@ from types import TracebackType
 from typing import BinaryIO
 
 import numpy as np
-from affine import Affine
 from numba import njit, prange
 
-from tunneldb.arrays import Bool, Float, Int32, Single, Whole
+from tunneldb.arrays import Bool, Int32, Single, Whole
 from tunneldb.errors import UserError
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.projection import WEIGHT, Pixels
 from tunneldb.threads import threads
-
-KILOMETRE = 1000.0
-BLOCK = 50.0
-"""Length of a block of the image along the tunnel, m."""
 
 MEMORY = 400_000_000
 """Bytes of memory for sums."""
@@ -44,120 +40,6 @@ GREATEST = 2**14 - 1
 FULL = 2**17 - WEIGHT
 """A pixel whose weights add up to more takes no more points: then no sum passes 2³¹. These are 2,047 points seen straight on
 from near by, 0.4 mm apart in a pixel of 2 cm. Pixels larger than that have sums of 64 bits and are never full."""
-
-
-@dataclass(frozen=True)
-class Grid:
-    """Pixels of one kilometre in the unrolled plane: columns along the chainage, rows from the greatest arc.
-
-    With a halo the grid has a block more before the kilometre and one after it, so that pixels at its ends can be judged by
-    what lies about them. Rows and columns of the grids of all kilometres line up.
-
-    Attributes
-    ----------
-    km : int
-        Kilometre: chainage from 1000 km to 1000 (km + 1).
-    pixel : float
-        Side of a pixel, m; divides a block of 50 m.
-    bottom : int
-        Arc of the lower edge of the last row, in pixels.
-    rows : int
-        Number of rows.
-    halo : int
-        Columns beyond each end of the kilometre that take points, at most a block; 0 for the kilometre alone.
-    """
-
-    km: int
-    pixel: float
-    bottom: int
-    rows: int
-    halo: int = 0
-
-    @classmethod
-    def covering(cls, km: int, pixel: float, arc_min: float, arc_max: float, halo: int = 0) -> Grid:
-        """Make the grid that covers the given arcs, m, and a halo, pixels.
-
-        Raises
-        ------
-        UserError
-            If the pixel is smaller than 2 mm or doesn't divide 50 m.
-        """
-        if not pixel >= 0.002 or abs(BLOCK / pixel - round(BLOCK / pixel)) > 1e-6:
-            raise UserError(f"image.pixel must be at least 0.002 m and divide 50 m: {pixel:g} m does not")
-        bottom, top = int(np.floor(arc_min / pixel)), int(np.ceil(arc_max / pixel))
-        return cls(km, pixel, bottom, top - bottom, halo)
-
-    @property
-    def columns(self) -> int:
-        """Number of columns."""
-        return self.block_columns * self.blocks
-
-    @property
-    def block_columns(self) -> int:
-        """Number of columns in a block."""
-        return round(BLOCK / self.pixel)
-
-    @property
-    def blocks(self) -> int:
-        """Number of blocks."""
-        return round(KILOMETRE / BLOCK) + 2 * self._ahead
-
-    @property
-    def _ahead(self) -> int:
-        """Blocks before the kilometre."""
-        return 1 if self.halo else 0
-
-    @property
-    def inner(self) -> slice:
-        """Columns of the kilometre itself."""
-        return slice(self._ahead * self.block_columns, (self.blocks - self._ahead) * self.block_columns)
-
-    @property
-    def near(self) -> slice:
-        """Columns that take points: the kilometre's and those of the halo."""
-        return slice(self.inner.start - self.halo, self.inner.stop + self.halo)
-
-    @property
-    def first_block(self) -> int:
-        """Number of the first block, counted from chainage 0."""
-        return self.km * round(KILOMETRE / BLOCK) - self._ahead
-
-    @property
-    def first_column(self) -> int:
-        """Number of the first column, counted from chainage 0."""
-        return self.first_block * self.block_columns
-
-    @property
-    def west(self) -> float:
-        """Chainage at which the first column begins, m."""
-        return self.first_block * BLOCK
-
-    def transform(self, column: int = 0) -> Affine:
-        """Transform from pixels, counted from a column, to (chainage, arc)."""
-        return Affine(
-            self.pixel, 0.0, self.west + column * self.pixel, 0.0, -self.pixel, (self.bottom + self.rows) * self.pixel
-        )
-
-    def place(self, chainage: Float, arc: Float) -> tuple[Int32, Int32]:
-        """Row and column of places (n,) in the unrolled plane, m; column -1 outside the grid."""
-        with np.errstate(invalid="ignore"):
-            column = np.floor((chainage - self.west) / self.pixel)
-            row = self.rows - 1 - (np.floor(arc / self.pixel) - self.bottom)
-            held = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
-        return np.where(held, row, 0).astype(np.int32), np.where(held, column, -1).astype(np.int32)
-
-    def pick(self, mask: Bool, chainage: Float, arc: Float) -> Bool:
-        """Value of a mask (rows, columns) at places (n,) in the unrolled plane; False outside the grid."""
-        row, column = self.place(chainage, arc)
-        return np.asarray((column >= 0) & mask[row, column], dtype=np.bool_)
-
-    def chainages(self, columns: slice) -> Float:
-        """Chainage of the centres of columns, m."""
-        return np.asarray(self.west + (np.arange(columns.start, columns.stop) + 0.5) * self.pixel)
-
-    def arcs(self) -> Float:
-        """Arc of the centres of the rows, m."""
-        return np.asarray((self.bottom + self.rows - np.arange(self.rows) - 0.5) * self.pixel)
 
 
 @dataclass(frozen=True)

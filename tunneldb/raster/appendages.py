@@ -9,9 +9,7 @@ import numpy as np
 from numba import njit, prange
 
 from tunneldb.arrays import Bool, Int32, Single
-
-DELTA = 0.03
-"""Distance from the plane from which a pixel is an appendage (eq. 23), m."""
+from tunneldb.geometry.robust_plane import DELTA
 
 PART = 2.0
 """Side of the part of the lining that a plane is fitted to, m: signs and boxes are smaller than half of it."""

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.anomalies.threshold import MAX_MEDIAN
 from tunneldb.arrays import Int16, UInt8
+from tunneldb.geometry.section_outliers import Astray
 from tunneldb.geometry.surface import Surface
-from tunneldb.raster.accumulator import BLOCK, Accumulator, Grid, Window
+from tunneldb.raster.accumulator import Accumulator, Window
+from tunneldb.raster.floor import Floor
 from tunneldb.raster.geotiff import NODATA, whole
-from tunneldb.raster.pixel_state import Astray, Floor, State, reach, states
+from tunneldb.raster.grid import BLOCK, Grid
+from tunneldb.raster.pixel_state import State, reach, states
 
 WET_EDGE = 3
 """Pixels about a wet one that don't count as dry lining."""
@@ -87,3 +89,6 @@ def _with_surface(grid: Grid, surface: Surface) -> range:
     west, east = surface.chainages[[0, -1]] + (-surface.reach, surface.reach)
     first, last = np.floor((np.array([west, east]) - grid.west) / BLOCK).astype(int)
     return range(max(int(first), 0), min(int(last), grid.blocks - 1) + 1)
+
+MAX_MEDIAN = 51
+"""Side of the widest median filter, pixels."""

@@ -9,13 +9,14 @@ import numpy as np
 
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import Points
 from tunneldb.radiometry.correction import Kind, Views, observe
 from tunneldb.radiometry.edge_normals import Edges
 from tunneldb.radiometry.reference_curve import ReferenceCurve
-from tunneldb.raster.pixel_state import Floor
+from tunneldb.raster.floor import Floor
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ class Eye:
 
         ``depth`` is how far in front of the surface and behind it lining is looked for, m: tolerance and recess.
         """
-        start, stop = km * 1000.0, (km + 1) * 1000.0
+        start, stop = km * KILOMETRE, (km + 1) * KILOMETRE
         touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)
         if not touching.any():
             raise UserError(f"kilometre {km} has no segments yet: run its stages segments and sections first")
@@ -158,10 +159,10 @@ class Eye:
             If a point's scanner position is unknown.
         """
         unrolled = self.surface.unroll(points.xyz)
-        start = self.km * 1000.0
+        start = self.km * KILOMETRE
         with np.errstate(invalid="ignore"):
             use = (unrolled.offset <= self.tolerance) & (unrolled.offset >= -self.recess)
-            use &= (unrolled.chainage >= start) & (unrolled.chainage < start + 1000.0)
+            use &= (unrolled.chainage >= start) & (unrolled.chainage < start + KILOMETRE)
         views = None
         if self.radiometer:
             radiometer = self.radiometer

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 import rasterio.features
 import shapely
 from shapely.geometry import Polygon
 
 from tunneldb.arrays import Bool
+from tunneldb.raster.grid import Grid
 
 SIMPLIFY = 0.75
 """Tolerance of the simplification, pixels: enough to straighten the stairs of a slanting edge."""
@@ -50,3 +53,14 @@ def _straighten(stairs: Polygon) -> Polygon:
     """Simplify a polygon by less than the tolerance; one that would fall apart keeps its stairs."""
     simple = shapely.simplify(stairs, SIMPLIFY, preserve_topology=True)
     return simple if isinstance(simple, Polygon) and not simple.is_empty and simple.is_valid else stairs
+
+
+def inside(grid: Grid, polygons: Sequence[Polygon]) -> Iterator[tuple[slice, Bool]]:
+    """Columns of each block that a polygon reaches, with a mask (rows, columns) of the pixels whose centres lie in one."""
+    for start in range(0, grid.columns, grid.block_columns):
+        columns = slice(start, start + grid.block_columns)
+        transform, shape = grid.transform(start), (grid.rows, grid.block_columns)
+        west, east = transform.c, transform.c + shape[1] * transform.a
+        near = [polygon for polygon in polygons if polygon.bounds[0] < east and polygon.bounds[2] > west]
+        if near:
+            yield columns, rasterio.features.geometry_mask(near, shape, transform, invert=True)

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.reader import Points, read_chunks
+from tunneldb.pointcloud.reader import Points, Source, read_chunks
 from tunneldb.radiometry.oren_nayar import incidence_db
 from tunneldb.radiometry.reference_curve import SPAN_TOLERANCE
-from tunneldb.raster.accumulator import Accumulator, Grid
+from tunneldb.raster.accumulator import Accumulator
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.observation import Eye, Span
 from tunneldb.raster.projection import COSINES, Faces, Optics, Pixels, Scanner, Shape, Tally, Target, look
-from tunneldb.store.sources import Source
 from tunneldb.threads import threads
 
 Counts = dict[str, Any]

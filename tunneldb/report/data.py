@@ -15,9 +15,9 @@ from psycopg.rows import class_row, dict_row
 from shapely.geometry import Polygon
 
 from tunneldb.arrays import Float
-from tunneldb.database import Survey
 from tunneldb.errors import UserError
 from tunneldb.pipeline.order import STAGES
+from tunneldb.store.survey import Survey
 
 Row = dict[str, Any]
 

@@ -15,12 +15,12 @@ from PIL import Image
 from scipy import ndimage
 
 from tunneldb.arrays import Intp, Single, UInt8
-from tunneldb.database import Survey
-from tunneldb.export.images.gap_fill import FILL, fill_gaps
-from tunneldb.raster.accumulator import BLOCK
+from tunneldb.raster.gap_fill import FILL, fill_gaps
 from tunneldb.raster.geotiff import Raster, decode
+from tunneldb.raster.grid import BLOCK
 from tunneldb.raster.pixel_state import State
 from tunneldb.store.images import DARK
+from tunneldb.store.survey import Survey
 
 Form = Literal["WEBP", "JPEG"]
 """Format of pictures: WebP is smaller; JPEG goes into a PDF as it is, where browsers unpack others to many times the size."""

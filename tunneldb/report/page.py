@@ -13,12 +13,13 @@ import psycopg
 from markupsafe import Markup
 
 from tunneldb import __version__
-from tunneldb.database import Survey, snapshot
-from tunneldb.export.exchange.places import crs_text
+from tunneldb.database import snapshot
 from tunneldb.report import data, text
 from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, without_detection
 from tunneldb.report.lining import Form
 from tunneldb.report.strip import LETTERS, Progress, Strips
+from tunneldb.store.catalog import crs_text
+from tunneldb.store.survey import Survey
 
 CARDS = 400
 """Leaks of which a printed report shows picture and section at most, the largest first; the HTML file shows those of all."""

@@ -10,11 +10,11 @@ import numpy as np
 import psycopg
 from markupsafe import Markup
 
-from tunneldb.database import Survey
 from tunneldb.report import text
 from tunneldb.report.data import Coverage, Leak, label_chainages
 from tunneldb.report.drawing import Section, Sign, near, outline_path, place_signs, share_path, ticks, without_detection
 from tunneldb.report.lining import Form, Lining, Picture, Window
+from tunneldb.store.survey import Survey
 
 PICTURE, SHAPE = 256, 4 / 3
 """Width of a leak's picture at most, pixels, and its width for its height."""

@@ -15,8 +15,8 @@ from tunneldb.anomalies.detect import Found
 from tunneldb.anomalies.geometries import shapes
 from tunneldb.anomalies.matching import match, match_parts
 from tunneldb.anomalies.regions import Region
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
-from tunneldb.raster.accumulator import KILOMETRE
 from tunneldb.store.anomaly_parts import Border, Cluster, link, replace_parts
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey

@@ -10,7 +10,7 @@ import numpy as np
 import psycopg
 
 from tunneldb.anomalies.regions import Region, Traits, together, unite
-from tunneldb.raster.accumulator import KILOMETRE
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.store.survey import Survey
 
 LOCK = -3

@@ -271,3 +271,17 @@ def remove_tunnel(connection: psycopg.Connection[Any], name: str) -> None:
         raise UserError(f"the tunnel {name!r} has surveys: {names}; remove them first (tunneldb survey remove)")
     if connection.execute("DELETE FROM tunnel.tunnel WHERE name = %s", [name]).rowcount == 0:
         raise UserError(f"there is no tunnel {name!r}: tunneldb tunnel list")
+
+
+def crs_text(conn: psycopg.Connection[Any], srid: int) -> str:
+    """A coordinate system of the database as other programs know it: AUTHORITY:CODE, or its definition.
+
+    Raises
+    ------
+    UserError
+        The SRID isn't in ``spatial_ref_sys``.
+    """
+    row = conn.execute("SELECT auth_name, auth_srid, srtext FROM spatial_ref_sys WHERE srid = %s", [srid]).fetchone()
+    if row is None:
+        raise UserError(f"SRID {srid} is not in the database's spatial_ref_sys; add its definition there")
+    return f"{row[0]}:{row[1]}" if row[0] in ("EPSG", "ESRI") else str(row[2])

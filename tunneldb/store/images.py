@@ -14,12 +14,14 @@ from tunneldb.anomalies.background.level_map import DryMap
 from tunneldb.anomalies.coverage import Coverage
 from tunneldb.anomalies.detect import Detection
 from tunneldb.arrays import Bool, Single, UInt8
-from tunneldb.database import Survey
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.radiometry.robust_statistics import Dry
 from tunneldb.radiometry.roughness import Roughness
-from tunneldb.raster.accumulator import Grid, Window
+from tunneldb.raster.accumulator import Window
 from tunneldb.raster.geotiff import Raster, encode
+from tunneldb.raster.grid import Grid
+from tunneldb.store.survey import Survey
 
 DARK = 5
 """Value of dark pixels in the image of states, beside those of :class:`tunneldb.raster.pixel_state.State`."""
@@ -41,7 +43,7 @@ def load_regions(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: s
     rows = conn.execute(
         "SELECT public.ST_AsBinary(geom) FROM tunnel.region WHERE survey_id = %s AND kind = %s"
         " AND public.ST_XMax(geom) > %s AND public.ST_XMin(geom) < %s ORDER BY id",
-        (survey.id, kind, km * 1000.0, (km + 1) * 1000.0),
+        (survey.id, kind, km * KILOMETRE, (km + 1) * KILOMETRE),
     ).fetchall()
     return [shapely.from_wkb(bytes(wkb)) for (wkb,) in rows]
 

@@ -14,7 +14,8 @@ from psycopg import sql
 from tunneldb.arrays import Int32, Int64
 from tunneldb.database.copy import copy_binary
 from tunneldb.database.fetch import fetch_array
-from tunneldb.geometry.alignment import KILOMETRE, Alignment
+from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pointcloud.prefetch import prefetch
 from tunneldb.pointcloud.selection import voxel_reach
 from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, ROW, Rows, Spool, bin_of, windows

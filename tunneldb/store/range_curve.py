@@ -6,8 +6,8 @@ from typing import Any
 
 import psycopg
 
-from tunneldb.database import Survey
 from tunneldb.radiometry.range_curve import RangeCurve
+from tunneldb.store.survey import Survey
 
 
 def save_range_curve(conn: psycopg.Connection[Any], survey: Survey, km: int, found: RangeCurve | None) -> None:

@@ -16,8 +16,8 @@ from tunneldb.classification.lining_relief import Relief
 from tunneldb.classification.objects.clusters import CELL, Cluster
 from tunneldb.classification.scene import Scene
 from tunneldb.database.copy import copy_binary, pack_array, pack_row, pack_value, unpack_array
-from tunneldb.geometry.alignment import KILOMETRE
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.plan_line import PlanLine
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
@@ -26,15 +26,15 @@ BESIDE = 20.0
 """What lies so far beyond the ends of a stretch is loaded too: heights are interpolated, things reach over the ends, m."""
 
 
-def line_of(surface: Surface) -> Line:
+def line_of(surface: Surface) -> PlanLine:
     """The axis as a line in plan: the vertices of the segments, at their chainages."""
     vertices = surface.segments[:, :6].reshape(-1, 3)
     along = surface.ends.ravel()
     new = np.diff(along, prepend=-np.inf) > 1e-6
-    return Line.of(vertices[new], along[new])
+    return PlanLine.of(vertices[new], along[new])
 
 
-def save_ground(conn: psycopg.Connection[Any], survey: Survey, km: int, line: Line, ground: Ground | None, arcs: Float) -> int:
+def save_ground(conn: psycopg.Connection[Any], survey: Survey, km: int, line: PlanLine, ground: Ground | None, arcs: Float) -> int:
     """Replace the ground of a kilometre; returns the metres that have one.
 
     Parameters

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from psycopg import sql
 
 from tunneldb.database.fetch import fetch_array
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.reader import Points
+from tunneldb.pointcloud.reader import Points, Source
 from tunneldb.store.partition import partition, rows_in
 from tunneldb.store.scan_files import checksum
 from tunneldb.store.survey import Survey
@@ -29,30 +28,6 @@ _FIELDS = (
     ("scan", "i4", sql.Identifier("scan_id")),
     ("intensity", "f4", sql.Identifier("intensity")),
 )
-
-
-@dataclass(frozen=True)
-class Source:
-    """What a kilometre needs of a scan file that was read.
-
-    Attributes
-    ----------
-    path : Path
-        Where it lay then.
-    ranges : list of (int, int)
-        Point numbers, from 0, half-open, among which are all the file's points of the kilometre and 10 m to both sides.
-    dimension : str or None
-        The survey's intensity dimension.
-    """
-
-    path: Path
-    ranges: list[tuple[int, int]]
-    dimension: str | None
-
-    @property
-    def points(self) -> int:
-        """Points to read."""
-        return sum(end - begin for begin, end in self.ranges)
 
 
 def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Source]:

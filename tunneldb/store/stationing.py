@@ -10,9 +10,11 @@ from typing import Any
 
 import psycopg
 
+from tunneldb.arrays import Float
 from tunneldb.csvfile import read_csv
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import Equation, Stationing
+from tunneldb.store.survey import Survey
 
 
 def read_equations(path: Path) -> list[Equation]:
@@ -80,3 +82,13 @@ def load_stationing(connection: psycopg.Connection[Any], tunnel_id: int) -> Stat
         [tunnel_id],
     ).fetchall()
     return Stationing([Equation(*row) for row in rows])
+
+
+def labels(conn: psycopg.Connection[Any], survey: Survey, chainages: Float) -> list[str]:
+    """Stations at chainages (m) of a survey's tunnel, written 12+345.678."""
+    rows = conn.execute(
+        "SELECT tunnel_api.station_label(%s, c.chainage) FROM unnest(%s::float8[]) WITH ORDINALITY AS c (chainage, n)"
+        " ORDER BY n",
+        [survey.tunnel_id, chainages.tolist()],
+    ).fetchall()
+    return [row[0] for row in rows]

@@ -9,10 +9,10 @@ from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.histogram import take_levels
 from tunneldb.anomalies.background.level_map import DryMap
-from tunneldb.anomalies.inside import inside
 from tunneldb.arrays import Int16, Single, UInt8
-from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import Picture
+from tunneldb.raster.polygons import inside
 
 
 @dataclass(frozen=True)

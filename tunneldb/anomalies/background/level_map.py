@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 from tunneldb.anomalies.background.histogram import fill_levels
 from tunneldb.anomalies.background.model import Fit
 from tunneldb.arrays import Int32, Single, UInt8
-from tunneldb.raster.accumulator import Grid
+from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import Picture
 
 TILE = 0.5

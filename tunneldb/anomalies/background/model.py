@@ -11,11 +11,11 @@ from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.histogram import column_modes, fill_levels, row_modes, settle_windows, tile_histograms
 from tunneldb.anomalies.background.smooth import fill, slow
-from tunneldb.anomalies.inside import inside
 from tunneldb.arrays import Bool, Float, Int16, Int32, Single, UInt8, UInt16
 from tunneldb.radiometry.robust_statistics import robust_statistics
 from tunneldb.raster.geotiff import STEP
 from tunneldb.raster.image import Picture
+from tunneldb.raster.polygons import inside
 
 SAMPLE, LINES = 15_000_000, 6_000_000
 """Pixels, about, that are looked at for tiles, and for rows and columns, which hold far more each."""

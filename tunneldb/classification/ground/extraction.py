@@ -15,7 +15,7 @@ from tunneldb.classification.ground.level_profile import is_round, level_ground,
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.ground.ransac import planes
 from tunneldb.classification.ground.wall_foot import steady, walls
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.pointcloud.voxels import Voxels
 
 MARGIN = 32
@@ -75,7 +75,7 @@ class _Points:
 
 
 def find_ground(
-    points: Float, line: Line, settings: GroundSettings, seed: int = 0, spread: Float | None = None
+    points: Float, line: PlanLine, settings: GroundSettings, seed: int = 0, spread: Float | None = None
 ) -> Ground | None:
     """Find the ground of a tunnel.
 
@@ -88,7 +88,7 @@ def find_ground(
     ----------
     points : (n, 3) float array
         m; those not finite are left out.
-    line : Line
+    line : PlanLine
         What the tunnel follows.
     settings : GroundSettings
         Parameters.
@@ -121,7 +121,7 @@ def find_ground(
     return Ground(held.start, held.first, height, gamma, foot, lean)
 
 
-def _lower(points: Float, line: Line, settings: GroundSettings, spread: Float | None) -> _Points | None:
+def _lower(points: Float, line: PlanLine, settings: GroundSettings, spread: Float | None) -> _Points | None:
     """Keep the lower part of each segment's points, thin them, place them and sort them."""
     points = np.asarray(points, dtype=np.float64)
     kept = below(*line.place(points), points[:, 2], float(_STEP))

@@ -6,11 +6,11 @@ import numpy as np
 
 from tunneldb.arrays import Float, Intp
 from tunneldb.classification.ground.model import COLUMN, Ground
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.surface import Surface
 
 
-def foot_arcs(ground: Ground | None, line: Line, surface: Surface) -> Float:
+def foot_arcs(ground: Ground | None, line: PlanLine, surface: Surface) -> Float:
     """Arcs at which the ground begins on the left and on the right, at each of its whole metres of chainage.
 
     The feet are lines in space; both their coordinates change when they are unrolled, so that the arcs at whole metres are

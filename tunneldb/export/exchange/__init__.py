@@ -8,9 +8,9 @@ from typing import Any
 
 import psycopg
 
-from tunneldb.database import Survey
 from tunneldb.errors import UserError
 from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey
 
 
 def write_survey(

@@ -15,7 +15,6 @@ from ezdxf.units import M
 from shapely.geometry import Polygon
 
 from tunneldb import __version__
-from tunneldb.database import Survey
 from tunneldb.export.exchange.entity import APPLICATION, Spot, draw_spot, write
 from tunneldb.export.exchange.lines import (
     axis_line,
@@ -28,10 +27,12 @@ from tunneldb.export.exchange.lines import (
     tick_chainages,
     ticks,
 )  # fmt: skip
-from tunneldb.export.exchange.places import crs_text, labels
 from tunneldb.export.exchange.sheet import draw_profiles, draw_unrolled
 from tunneldb.export.exchange.table import Table, read_table
 from tunneldb.geometry.surface import Surface
+from tunneldb.store.catalog import crs_text
+from tunneldb.store.stationing import labels
+from tunneldb.store.survey import Survey
 
 MARGIN = 50.0
 """Between the map, the unrolled lining and the profiles, m."""

@@ -14,14 +14,15 @@ import pyogrio.raw
 import shapely
 
 from tunneldb import __version__
-from tunneldb.database import Survey
 from tunneldb.export.exchange.lines import edges, is_hundred, on_map, outline, stretches, tick_chainages, ticks
-from tunneldb.export.exchange.places import crs_text, labels
 from tunneldb.export.exchange.table import Column, Table, read_table
 from tunneldb.export.qgis.layer import LAYERS, VectorLayer
 from tunneldb.export.qgis.styles import STYLE_NAME, style_text
 from tunneldb.export.tables.leaks import UNDEFINED_CARTESIAN
 from tunneldb.geometry.surface import Surface
+from tunneldb.store.catalog import crs_text
+from tunneldb.store.stationing import labels
+from tunneldb.store.survey import Survey
 
 VERSION = {"VERSION": "1.2"}
 """Of the GeoPackage: one that QGIS and others of some years ago read without a warning."""

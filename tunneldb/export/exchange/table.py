@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from psycopg import sql
 
 from tunneldb.arrays import Bool
-from tunneldb.database import Survey
+from tunneldb.store.survey import Survey
 
 _ALONG = ("chainage_from", "chainage_to"), ("chainage", "chainage")
 """Columns that say where a row lies along the tunnel: those of something long, and those of a place."""

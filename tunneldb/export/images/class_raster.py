@@ -10,11 +10,11 @@ import psycopg
 
 from tunneldb.arrays import Float, Intp, UInt8
 from tunneldb.classification.classes import Klass
-from tunneldb.database import Survey
 from tunneldb.export.images.palette import PALETTES
 from tunneldb.geometry.surface import Surface
 from tunneldb.raster.geotiff import Raster
 from tunneldb.store.scene import load_scene
+from tunneldb.store.survey import Survey
 
 NO_CLASS = PALETTES["class"].nodata
 """Value of a pixel without a class."""

@@ -13,16 +13,18 @@ from affine import Affine
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from tunneldb.database import Survey, snapshot
+from tunneldb.database import snapshot
 from tunneldb.export.images import preview
 from tunneldb.export.images.class_raster import ClassPainter
 from tunneldb.export.images.cog import Extent, write_cog
-from tunneldb.export.images.gap_fill import FILL, TOLD, fill_blocks
 from tunneldb.export.images.palette import PALETTES
 from tunneldb.files import replacing
-from tunneldb.raster.accumulator import BLOCK
+from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.raster.gap_fill import FILL, TOLD, fill_blocks
 from tunneldb.raster.geotiff import KINDS, Raster, decode
+from tunneldb.raster.grid import BLOCK
 from tunneldb.store.stationing import load_stationing
+from tunneldb.store.survey import Survey
 
 
 def image_kilometres(conn: psycopg.Connection, survey: Survey) -> list[int]:
@@ -213,6 +215,6 @@ def _leaks(conn: psycopg.Connection, survey: Survey, km: int) -> list[Polygon]:
         "SELECT public.ST_AsBinary(unrolled) FROM tunnel.anomaly"
         " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected'"
         " AND coalesce(judged, kind) = 'leak' ORDER BY id",
-        (survey.id, km * 1000.0, (km + 1) * 1000.0),
+        (survey.id, km * KILOMETRE, (km + 1) * KILOMETRE),
     )
     return [shapely.from_wkb(bytes(wkb)) for (wkb,) in rows]

@@ -1,6 +1,6 @@
 """PNG previews of a kilometre's image: one strip a hectometre, with a grid, ticks and a scale.
 
-Gaps between profiles are filled in it, see :mod:`tunneldb.export.images.gap_fill`.
+Gaps between profiles are filled in it, see :mod:`tunneldb.raster.gap_fill`.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from shapely.geometry import Polygon
 
 from tunneldb.arrays import Single, UInt8
 from tunneldb.classification.classes import Klass
-from tunneldb.export.images.gap_fill import FILL, fill_gaps
 from tunneldb.export.images.palette import PALETTES
 from tunneldb.geometry.stationing import Stationing
+from tunneldb.raster.gap_fill import FILL, fill_gaps
 
 STRIP = 100.0
 """Length of a strip, m."""

@@ -17,7 +17,7 @@ from tunneldb.classification.scene import Scene
 from tunneldb.errors import UserError
 from tunneldb.export.pointcloud.survey import CLASS_NAMES, same_file
 from tunneldb.files import replacing
-from tunneldb.geometry.plan_line import Line
+from tunneldb.geometry.centreline import centreline_through
 from tunneldb.pointcloud.reader import read_header
 from tunneldb.pointcloud.rewrite import read_coordinates, rewrite
 from tunneldb.pointcloud.voxels import Voxels
@@ -111,6 +111,6 @@ def find_scene_of(
         progress(len(xyz))
     thinned, spread = voxels.centroids(), voxels.spread()
     del voxels  # room for the models
-    line = Line.through(thinned)
+    line = centreline_through(thinned)
     ground = find_ground(thinned, line, settings, spread=spread)
     return find_bare_scene(thinned, line, ground, ClusterSettings.of(values)), origin

@@ -13,13 +13,14 @@ import psycopg
 
 from tunneldb.arrays import Int64
 from tunneldb.classification.classes import Klass
-from tunneldb.database import Survey, snapshot
+from tunneldb.database import snapshot
 from tunneldb.errors import UserError
 from tunneldb.files import replacing
 from tunneldb.pipeline.run import loaded_kilometres
 from tunneldb.pointcloud.rewrite import rewrite
 from tunneldb.store.scene import load_scene
 from tunneldb.store.sources import unchanged_file
+from tunneldb.store.survey import Survey
 
 CLASS_NAMES = {int(klass): klass.name.lower() for klass in Klass}
 """Names of the classes, as they are written into the files."""

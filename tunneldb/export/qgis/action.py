@@ -7,8 +7,8 @@ import uuid
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from tunneldb.database import Survey
 from tunneldb.export.qgis.source import Source
+from tunneldb.store.survey import Survey
 
 RECOMPUTED_FROM = ("axis_vertex", "segment")
 """Layers that offer it."""

@@ -15,7 +15,6 @@ from pathlib import Path
 import psycopg
 
 from tunneldb import __version__
-from tunneldb.database import Survey
 from tunneldb.export.qgis.action import RECOMPUTED_FROM, recompute
 from tunneldb.export.qgis.crs import crs_element, no_crs
 from tunneldb.export.qgis.extent import Extent, View, first_window, largest_leak, map_extent, sheet_extent, unrolled_extents
@@ -26,6 +25,7 @@ from tunneldb.export.qgis.source import Source
 from tunneldb.export.qgis.space import docks, filled_layers, scene, viewpoint
 from tunneldb.export.qgis.styles import require_table, style_elements
 from tunneldb.files import replacing
+from tunneldb.store.survey import Survey
 
 QGIS_VERSION = "3.22.0-Białowieża"
 """Version whose form of project is written; later ones read it."""

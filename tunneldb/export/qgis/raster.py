@@ -10,8 +10,8 @@ import numpy as np
 import rasterio
 
 from tunneldb.arrays import Float
-from tunneldb.export.images.gap_fill import TOLD
 from tunneldb.export.images.palette import PALETTES, hexadecimal
+from tunneldb.raster.gap_fill import TOLD
 
 FILLED = "offset-filled"
 """Kind of image that lies under the offset measured, where there is nothing else to show."""

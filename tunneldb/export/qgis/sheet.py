@@ -6,10 +6,10 @@ import uuid
 import xml.etree.ElementTree as ET
 
 from tunneldb import __version__
-from tunneldb.database import Survey
-from tunneldb.export.images.gap_fill import TOLD
 from tunneldb.export.qgis.extent import Extent
 from tunneldb.export.qgis.layer import SHEETS
+from tunneldb.raster.gap_fill import TOLD
+from tunneldb.store.survey import Survey
 
 LENGTH = 50.0
 """Length of tunnel on a sheet, m, as in the view."""

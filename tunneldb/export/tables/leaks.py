@@ -23,7 +23,7 @@ from rich.cells import cell_len
 from rich.table import Table
 from shapely.geometry import Polygon, mapping
 
-from tunneldb.database import Survey
+from tunneldb.store.survey import Survey
 
 Geometry = Literal["unrolled", "map", "3d"]
 """Unrolled plane (chainage, arc); map strip beside the axis; on the surface in space."""

@@ -30,7 +30,7 @@ from tunneldb.pointcloud.formats.e57 import (
 )
 from tunneldb.pointcloud.formats.faults import decoding
 from tunneldb.pointcloud.formats.las_header import HEADER_SIZE, Head, Record
-from tunneldb.pointcloud.formats.las_records import Bytes, fields, record_size
+from tunneldb.pointcloud.formats.las_records import fields, record_size
 
 FORMAT = 7
 """Point format: with time and colour."""
@@ -82,7 +82,7 @@ class E57Records:
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.returns = np.zeros(15, np.uint64)
 
-    def read(self, size: int) -> Iterator[Bytes]:
+    def read(self, size: int) -> Iterator[UInt8]:
         """Read the points, no more than `size` at a time; once.
 
         Raises
@@ -104,7 +104,7 @@ class E57Records:
         middle = bytes(247 - 227)  # no waveforms, no extended records
         return 179, struct.pack("<6d", *corners) + middle + struct.pack("<Q15Q", self.count, *map(int, self.returns))
 
-    def _read_scan(self, image: Any, scan: Scan, size: int) -> Iterator[Bytes]:
+    def _read_scan(self, image: Any, scan: Scan, size: int) -> Iterator[UInt8]:
         node = image.root()["data3D"][scan.index]
         flags = scan.flags(None)
         wanted = [name for name in (*_names(), *(name for name, _, _ in self.extras)) if name in scan.fields]
@@ -114,7 +114,7 @@ class E57Records:
             if good.any():
                 yield self._records(scan, node, {name: column[good] for name, column in values.items()})
 
-    def _records(self, scan: Scan, node: Any, values: dict[str, NDArray[Any]]) -> Bytes:
+    def _records(self, scan: Scan, node: Any, values: dict[str, NDArray[Any]]) -> UInt8:
         xyz = own_coordinates(scan, values) @ scan.rotation.T
         if scan.position is not None:
             xyz += scan.position
@@ -124,7 +124,7 @@ class E57Records:
         if np.abs(stored).max() >= 2**31:
             raise UserError(f"{self.path}: scan {scan.name!r} lies outside of the bounds in its header; mend the file")
         before = record_size(FORMAT)
-        out: Bytes = np.zeros((len(xyz), before + 4 * len(self.extras)), np.uint8)
+        out: UInt8 = np.zeros((len(xyz), before + 4 * len(self.extras)), np.uint8)
         point = fields(out, FORMAT)
         for column, axis in enumerate("XYZ"):
             point[axis] = stored[:, column]

@@ -10,8 +10,9 @@ from typing import BinaryIO
 import lazrs
 import numpy as np
 
+from tunneldb.arrays import UInt8
 from tunneldb.pointcloud.formats.las_header import Head
-from tunneldb.pointcloud.formats.las_records import Bytes, record_size
+from tunneldb.pointcloud.formats.las_records import record_size
 from tunneldb.threads import threads
 
 
@@ -33,7 +34,7 @@ class LazWriter:
         file.write(head.before_points(vlr.record_data()))
         self.compressor = (lazrs.LasZipCompressor if threads() == 1 else lazrs.ParLasZipCompressor)(file, vlr)
 
-    def write(self, records: Bytes) -> None:
+    def write(self, records: UInt8) -> None:
         """Add points (n, size)."""
         self.compressor.compress_many(np.ascontiguousarray(records).reshape(-1))
 
