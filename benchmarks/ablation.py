@@ -30,7 +30,7 @@ from benchmarks.leaks import HEADER, Outcome, chosen, plain, row, values
 from benchmarks.scene import Scene
 from tunneldb.anomalies import detect as detection
 from tunneldb.anomalies import regions as region
-from tunneldb.anomalies.background.level_map import DryMap, map_dry
+from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
 from tunneldb.anomalies.verdict import Verdict
 from tunneldb.cli.main import main as command
 from tunneldb.database import connect
@@ -40,8 +40,8 @@ from tunneldb.raster import pixel_state as lining
 from tunneldb.raster import rasterize as gather
 from tunneldb.raster.accumulator import Accumulator
 from tunneldb.raster.geotiff import STEP
-from tunneldb.raster.image import Picture
-from tunneldb.raster.pixel_state import State
+from tunneldb.raster.image import LiningImage
+from tunneldb.raster.pixel_state import PixelState
 
 Replacement = tuple[Any, str, Any]
 
@@ -89,12 +89,12 @@ def _other_curve(dsn: str, scene: Scene) -> Iterator[None]:
         conn.commit()
 
 
-def one_level(picture: Picture, dry_regions: Sequence[Polygon] = ()) -> DryMap:
+def one_level(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) -> BackgroundMap:
     """One mean and one standard deviation for all of the lining (eq. 19)."""
-    local = map_dry(picture)
-    dry = robust_statistics(picture.level[picture.state == State.LINING][::7] * STEP["corrected"])
+    local = map_background(picture)
+    dry = robust_statistics(picture.level[picture.state == PixelState.LINING][::7] * STEP["corrected"])
     flat = [np.zeros_like(part) for part in (local.rings, local.bands, local.smooth)]
-    return DryMap(
+    return BackgroundMap(
         local.grid, local.tile, np.full_like(local.sigma, dry.sigma), dry.mean, dry.sigma, local.count, dry.mean, *flat
     )
 
@@ -105,8 +105,8 @@ def corrected_by(law: str) -> list[Replacement]:
 
     def raw(*arguments: Any) -> Any:
         known = calibrate(*arguments)
-        radiometer = replace(known.eye.radiometer, kind="reflectance", reference=None)
-        return replace(known, eye=replace(known.eye, radiometer=radiometer))
+        radiometer = replace(known.observer.radiometer, kind="reflectance", reference=None)
+        return replace(known, observer=replace(known.observer, radiometer=radiometer))
 
     if law == "raw":
         return [(stage, "calibrate", raw), (gather, "incidence_db", lambda cosine, roughness: np.zeros_like(cosine))]
@@ -114,14 +114,14 @@ def corrected_by(law: str) -> list[Replacement]:
 
 
 def without_weights() -> list[Replacement]:
-    look = gather.Lens.look
+    look = gather.Projector.project
 
-    def same(lens: gather.Lens, points: Any) -> Any:
-        pixels, tally = look(lens, points)
+    def same(projector: gather.Projector, points: Any) -> Any:
+        pixels, tally = look(projector, points)
         pixels.weight[: len(points)] = 1
         return pixels, tally
 
-    return [(gather.Lens, "look", same)]
+    return [(gather.Projector, "project", same)]
 
 
 class Kept:
@@ -132,9 +132,9 @@ class Kept:
         self._kept: dict[str, tuple[dict[int, np.ndarray], Any]] = {}
         self._gather = stage._gather
 
-    def gather(self, eye: Any, files: Any, image: Accumulator, *others: Any) -> Any:
+    def gather(self, observer: Any, files: Any, image: Accumulator, *others: Any) -> Any:
         if self.name not in self._kept:
-            counts = self._gather(eye, files, image, *others)
+            counts = self._gather(observer, files, image, *others)
             self._kept[self.name] = {block: image._fetch(block).copy() for block in image.blocks()}, counts
         blocks, counts = self._kept[self.name]
         for block, sums in blocks.items():
@@ -146,8 +146,8 @@ def after(function: Callable[..., Any], change: Callable[[Any], Any]) -> Callabl
     return lambda *arguments, **named: change(function(*arguments, **named))
 
 
-def recess_is_off(picture: Picture) -> Picture:
-    picture.state[picture.state == State.RECESS] = State.OFF
+def recess_is_off(picture: LiningImage) -> LiningImage:
+    picture.state[picture.state == PixelState.RECESS] = PixelState.OFF
     return picture
 
 

@@ -85,7 +85,7 @@ def compare(connection: psycopg.Connection, survey_id: int, scene: Scene, surfac
     arc, chainage, offset = (
         1000 * (getattr(found, name) - truth[name][on_lining])[known] for name in ("arc", "chainage", "offset")
     )
-    back = surface.roll(found.chainage[known], found.arc[known], found.offset[known])
+    back = surface.to_space(found.chainage[known], found.arc[known], found.offset[known])
     return {
         "points": len(points),
         "unrolled": 100 * float(known.mean()),
@@ -113,8 +113,8 @@ def jump(surface: Surface, start: float, end: float) -> float:
     for plane in np.arange(np.floor(start / SPACING) + 1, np.ceil(end / SPACING)) * SPACING:
         arc_from, arc_to = surface.arc_range(float(plane))
         arcs = np.arange(arc_from + 0.05, arc_to - 0.05, 0.05)
-        before = surface.roll(np.full_like(arcs, plane - apart), arcs, np.zeros_like(arcs))
-        after = surface.roll(np.full_like(arcs, plane + apart), arcs, np.zeros_like(arcs))
+        before = surface.to_space(np.full_like(arcs, plane - apart), arcs, np.zeros_like(arcs))
+        after = surface.to_space(np.full_like(arcs, plane + apart), arcs, np.zeros_like(arcs))
         largest = max(largest, float(np.linalg.norm(after - before, axis=1).max()))
     return largest
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common import print_table, progress, save
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.classification.classify import find_bare_scene, find_scene
 from tunneldb.classification.ground.extraction import GroundSettings, find_ground
 from tunneldb.classification.scene import Scene
@@ -43,7 +43,15 @@ THINGS = {
     "people": 4, "equipment": 6, "bollards": 2, "globes": 4, "spheres": 6, "free_cables": 2, "catenary": True,
     "sleepers": True, "leaks": 2,
 }  # fmt: skip
-COUNTED = (Klass.GROUND, Klass.LINING, Klass.NICHE, Klass.APPENDAGE, Klass.RAIL, Klass.OBJECT, Klass.SPHERE)
+COUNTED = (
+    PointClass.GROUND,
+    PointClass.LINING,
+    PointClass.NICHE,
+    PointClass.APPENDAGE,
+    PointClass.RAIL,
+    PointClass.OBJECT,
+    PointClass.SPHERE,
+)
 
 
 def main() -> None:
@@ -105,7 +113,7 @@ def of_bare(xyz: NDArray[np.float64]) -> Scene:
 
 def figures(truth: Classes, classes: Classes) -> dict[str, Any]:
     """Agreement, and of each class how many of its points are found and how many of those found are its own."""
-    seen = truth != Klass.NOISE
+    seen = truth != PointClass.NOISE
     truth, classes = truth[seen], classes[seen]
     out: dict[str, Any] = {"agreement": float((truth == classes).mean())}
     for klass in COUNTED:

@@ -33,10 +33,7 @@ from tunneldb.threads import use_threads
 NAME, BORDER = "dense", 13_000.0
 PARTS = 2_000_000  # points whose parts are timed
 COMMAND = (
-    "from tunneldb.threads import use_threads\n"
-    "use_threads({threads})\n"
-    "from tunneldb.cli.main import main\n"
-    "main({arguments})"
+    "from tunneldb.threads import use_threads\nuse_threads({threads})\nfrom tunneldb.cli.main import main\nmain({arguments})"
 )
 DECODE = """
 import sys, laspy
@@ -111,8 +108,8 @@ def parts(dsn: str, path: Path, count: int) -> dict[str, float]:
     from tunneldb.pointcloud.points import Points
     from tunneldb.raster.accumulator import Accumulator
     from tunneldb.raster.grid import Grid
-    from tunneldb.raster.observation import Eye, Radiometer
-    from tunneldb.raster.rasterize import CHUNK, Lens
+    from tunneldb.raster.observation import Observer, Radiometer
+    from tunneldb.raster.rasterize import CHUNK, Projector
     from tunneldb.store.images import load_reference
     from tunneldb.store.poses import load_poses
     from tunneldb.store.surface import load_surface
@@ -125,13 +122,13 @@ def parts(dsn: str, path: Path, count: int) -> dict[str, float]:
         surface = load_surface(conn, survey, km * 1000.0, (km + 1) * 1000.0)
         radiometer = Radiometer("amplitude", load_poses(conn, survey), load_reference(conn, survey), 75.0, 40.0)
         floor = load_floor(conn, survey, km, 0.0)
-    eye = Eye.of(surface, km, (0.5, 1.2), radiometer, floor)
+    observer = Observer.of(surface, km, (0.5, 1.2), radiometer, floor)
     grid = Grid.covering(km, 0.02, float(surface.arcs.min()), float(surface.arcs.max()))
-    lens = Lens.of(eye, grid, 12.0)
+    projector = Projector.of(observer, grid, 12.0)
     with Accumulator(grid) as image:
         wanted = min(PARTS, count // 4)
         chunks = read_raw(path, "Amplitude", CHUNK, [(count - wanted - CHUNK, count)])
-        image.add(lens.look(Points.of(next(chunks)))[0], CHUNK)  # compiled, and memory at hand
+        image.add(projector.project(Points.of(next(chunks)))[0], CHUNK)  # compiled, and memory at hand
         done = 0
         while done < wanted:
             with timed(spent, "decoding what is needed"):
@@ -139,7 +136,7 @@ def parts(dsn: str, path: Path, count: int) -> dict[str, float]:
             with timed(spent, "coordinates"):
                 points = Points.of(raw)
             with timed(spent, "unrolling, view, correction, pixel"):
-                pixels, _ = lens.look(points)
+                pixels, _ = projector.project(points)
             with timed(spent, "sums of the image"):
                 image.add(pixels, len(points))
             done += len(points)

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from tunneldb.classification.ground.accuracy import Agreement
 from tunneldb.classification.ground.extraction import GroundSettings, find_ground
-from tunneldb.classification.ground.ransac import planes
+from tunneldb.classification.ground.ransac import ransac_planes
 from tunneldb.geometry.centreline import centreline_through
 from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate import Parameters, simulate
@@ -117,7 +117,7 @@ def by_segments(xyz: Float, thin: bool, normals: bool, through: bool) -> Bool:
     local = np.column_stack([along - (number + 0.5) * STEP, across, seeds[:, 2]])[order]
     bounds = np.column_stack([edges[:-1], edges[1:]])
     s = SETTINGS
-    found = planes(local, bounds, s.distance, s.angle, s.radius, np.arange(len(bounds)), normals).coefficients
+    found = ransac_planes(local, bounds, s.distance, s.angle, s.radius, np.arange(len(bounds)), normals).coefficients
     along, across = line.place(xyz)
     k = np.clip(np.floor(along / STEP).astype(np.int64) - first, 0, len(found) - 1)
     c = found[k]

@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.common import print_table, progress, save
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.thinning import thin, voxel_edge
-from tunneldb.radiometry.cells import Sight
+from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.range_curve import estimate_range_curve
 from tunneldb.simulate.generate import Cloud, simulate
 from tunneldb.simulate.parameters import Parameters
@@ -92,11 +92,11 @@ def measured(parameters: Parameters, name: str) -> dict[str, Any]:
     }
 
 
-def _seen(cloud: Cloud, chosen: np.ndarray) -> Sight:
+def _seen(cloud: Cloud, chosen: np.ndarray) -> IntensitySamples:
     """Some points as they were seen."""
     place = np.column_stack([cloud.chainage[chosen], cloud.arc[chosen].astype(np.float64)])
     columns = cloud.range[chosen], np.cos(cloud.incidence[chosen]), cloud.amplitude[chosen]
-    return Sight(place, cloud.scan_id[chosen], *(column.astype(np.float64) for column in columns))
+    return IntensitySamples(place, cloud.scan_id[chosen], *(column.astype(np.float64) for column in columns))
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ from benchmarks.synthetic import CORNER, Size, make
 from tunneldb.database import connect
 from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import State
+from tunneldb.raster.pixel_state import PixelState
 from tunneldb.report.pdf import find_browser
 from tunneldb.store.images import DARK
 
@@ -56,9 +56,9 @@ def images(conn: psycopg.Connection[Any], survey_id: int, kilometres: int, pixel
             near = outlines[tree.query(shapely.box(chainages[0], -REACH, chainages[-1], REACH))]
             dark = rasterize(near, noise.shape, transform=transform).astype(bool) if len(near) else np.zeros(noise.shape, bool)
             values = (-12.0 + 0.5 * np.roll(noise, 37 * n, axis=1) - 5.0 * dark).astype(np.float32)
-            state = np.where(wall[:, None], np.where(dark, DARK, State.LINING), State.FLOOR).astype(np.float32)
+            state = np.where(wall[:, None], np.where(dark, DARK, PixelState.LINING), PixelState.FLOOR).astype(np.float32)
             hidden = (chainages % 800 < 6)[None, :] & wall[:, None]
-            values[hidden], state[hidden] = np.nan, State.EMPTY
+            values[hidden], state[hidden] = np.nan, PixelState.EMPTY
             for kind, shown in (("corrected", values), ("state", state)):
                 conn.execute(
                     "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %b)",

@@ -24,7 +24,7 @@ from scipy.spatial.distance import pdist
 
 from benchmarks.common import print_table, progress, save
 from tunneldb.classification.objects.dbscan import dbscan
-from tunneldb.classification.targets.curvature import Curved
+from tunneldb.classification.targets.curvature import CurvedCells
 from tunneldb.classification.targets.detection import LEAST_POINTS, Sphere, confirmed, find_spheres, join
 from tunneldb.classification.targets.fit import coverage, distance_error, fit_ratio
 from tunneldb.simulate import Parameters, Simulation
@@ -170,7 +170,7 @@ def run(number: int, ours: Tally, free: Tally, paper: Tally) -> int:
     eyes = eyes_of(simulation, np.concatenate([cloud.time for cloud in clouds]), scan)
     truth = np.array([sphere.centre for sphere in simulation.spheres])
     begun = time.perf_counter()
-    curved = Curved(RADIUS, LEAST_POINTS)
+    curved = CurvedCells(RADIUS, LEAST_POINTS)
     curved.add(xyz)
     curved.close()
     kept = curved.holds(xyz)

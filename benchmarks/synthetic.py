@@ -20,7 +20,7 @@ import shapely
 from psycopg import sql
 
 from benchmarks.common import progress
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.database import PointZ, connect, copy_binary, pack, resolve_dsn
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey, get_survey
@@ -147,12 +147,12 @@ def _points(connection: Connection, survey: Survey, km: int, count: int) -> None
             arc = girth * (number * 0.6180339887498949 % 1 - 0.5)  # multiples of the golden ratio fill the section evenly
             noise = number * 1.4142135623730951 % 1 - 0.5
             whole = np.ones(len(number), np.int32)
-            xyz = surface.roll(chainage, arc, np.float64(0.004) * noise)
+            xyz = surface.to_space(chainage, arc, np.float64(0.004) * noise)
             yield pack([
                 survey.id * whole, km * whole, chainage, 300_000 + chainage, PointZ(xyz, SRID),
                 surface.number[surface.segment_index(chainage)].astype(np.int32), whole, file_id * whole,
                 (-12 + 2 * noise).astype(np.float32), 0 * whole.astype(np.int16),
-                np.where(np.abs(arc) < CORNER, Klass.LINING, Klass.GROUND).astype(np.int16),
+                np.where(np.abs(arc) < CORNER, PointClass.LINING, PointClass.GROUND).astype(np.int16),
             ])  # fmt: skip
 
     copy_binary(connection, table, COLUMNS, chunks(), fresh=True)
@@ -339,7 +339,7 @@ CROSS JOIN LATERAL (VALUES
 
 SPHERES = """
 INSERT INTO tunnel.target_sphere (survey_id, km, number, scan_id, chainage, geom, radius, nominal, rms, sigma, coverage, points)
-SELECT %(id)s, floor(c / 1000), i + 1, scan, c, tunnel_api.roll(%(id)s, c, 7.0, 0.5), 0.0726, 0.0725, 0.0028, 0.0002, 0.41, 900
+SELECT %(id)s, floor(c / 1000), i + 1, scan, c, tunnel_api.to_space(%(id)s, c, 7.0, 0.5), 0.0726, 0.0725, 0.0028, 0.0002, 0.41, 900
 FROM generate_series(0, %(kilometres)s * 5 - 1) AS i, generate_series(1, 2) AS scan, LATERAL (SELECT i * 200 + 103.0 AS c) q
 """
 

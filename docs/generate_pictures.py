@@ -34,7 +34,7 @@ from tunneldb.database import connect
 from tunneldb.pipeline import detect as stage
 from tunneldb.pipeline.parameters import settings
 from tunneldb.raster.geotiff import NODATA, STEP
-from tunneldb.raster.pixel_state import State
+from tunneldb.raster.pixel_state import PixelState
 from tunneldb.store.survey import get_survey
 
 IMAGE = Path(__file__).parent / "images" / "leak-steps.png"
@@ -147,12 +147,12 @@ def draw(steps: Steps, leaks: list[BaseGeometry], path: Path) -> None:
         middle - 8,
         middle + 4,
     )
-    state = np.where(a["state"] <= State.FLOOR, a["state"], 0)
+    state = np.where(a["state"] <= PixelState.FLOOR, a["state"], 0)
     colours = ListedColormap(list(STATES.values()))
     image = show(next(panels), steps, state, "3  state of the pixels", 0, 4, colours, BoundaryNorm(np.arange(-0.5, 5), 5))
     image.set_ticks(range(5), labels=list(STATES))
     show(next(panels), steps, a["dry"], "4  level of dry lining, dB", middle - 8, middle + 4)
-    contrast = np.where(a["state"] <= State.RECESS, a["drop"] / a["sigma"], np.nan)
+    contrast = np.where(a["state"] <= PixelState.RECESS, a["drop"] / a["sigma"], np.nan)
     show(next(panels), steps, contrast, "5  drop below it, in its standard deviations", -3, 12, "viridis")
     show(
         next(panels),

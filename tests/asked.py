@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import psycopg
 
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 
 NICHE = (12399.0, 12401.0, 3.3, 4.3)
 """From chainage to chainage, and how far right of the axis from and to, m."""
 
-POINTS = {Klass.LINING: 300, Klass.GROUND: 200}
+POINTS = {PointClass.LINING: 300, PointClass.GROUND: 200}
 """Points of each class between 12+340 and 12+345; as many again lie outside."""
 
 MOVED, SPARSE = 1245, 1233
@@ -57,7 +57,7 @@ def prepare(conn: psycopg.Connection, survey: str) -> None:
         "INSERT INTO tunnel.cluster (survey_id, km, class, chainage_from, chainage_to, height_from, height_to, points, cell,"
         " cells, geom) SELECT %s, 12, %s, %s, %s, 0.2, 2.2, 90, 0.1, '{0,0,0}',"
         " tunnel_api.map_strip(%s, ST_MakeEnvelope(%s, %s, %s, %s, 0))",
-        (row[0], int(Klass.NICHE), low, high, row[0], low, left, high, right),
+        (row[0], int(PointClass.NICHE), low, high, row[0], low, left, high, right),
     )
     _points(conn, row[0])
 

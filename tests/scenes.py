@@ -7,7 +7,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.surface import Surface
@@ -15,7 +15,17 @@ from tunneldb.simulate.generate import Cloud, Simulation
 from tunneldb.simulate.parameters import Parameters
 
 TRUTH = np.array(
-    [Klass.LINING, Klass.GROUND, Klass.APPENDAGE, Klass.NICHE, Klass.NOISE, Klass.RAIL, Klass.OBJECT, Klass.SPHERE], np.uint8
+    [
+        PointClass.LINING,
+        PointClass.GROUND,
+        PointClass.APPENDAGE,
+        PointClass.NICHE,
+        PointClass.NOISE,
+        PointClass.RAIL,
+        PointClass.OBJECT,
+        PointClass.SPHERE,
+    ],
+    np.uint8,
 )
 """Class of each code of the simulator's truth."""
 

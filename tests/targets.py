@@ -104,8 +104,8 @@ def scan(
         Only rays within this angle (radians) of the direction to this place; all things' first centre by default.
     """
     rng = np.random.default_rng(seed)
-    eye = np.array(station, float)
-    aim = np.array(things[0].centre if towards is None else towards) - eye  # type: ignore[union-attr]
+    observer = np.array(station, float)
+    aim = np.array(things[0].centre if towards is None else towards) - observer  # type: ignore[union-attr]
     aim = aim / np.linalg.norm(aim)
     side = np.cross(aim, [0.0, 0.0, 1.0])
     side /= np.linalg.norm(side)
@@ -119,7 +119,7 @@ def scan(
     total, weight, number = np.zeros(len(u)), np.zeros(len(u)), np.full(len(u), -1)
     for k in range(7):  # the middle of the beam and six places of it
         shift = 0.0 if k == 0 else beam / 3.0
-        origin = eye + shift * (np.cos(k * np.pi / 3) * side + np.sin(k * np.pi / 3) * up)
+        origin = observer + shift * (np.cos(k * np.pi / 3) * side + np.sin(k * np.pi / 3) * up)
         ranges = np.array([thing.hit(np.broadcast_to(origin, direction.shape), direction) for thing in things])
         nearest = ranges.argmin(0)
         hit = np.isfinite(ranges.min(0))
@@ -129,4 +129,4 @@ def scan(
             number[hit] = nearest[hit]
     seen = number >= 0
     mean = total[seen] / weight[seen] + rng.standard_normal(int(seen.sum())) * noise
-    return eye + mean[:, None] * direction[seen], number[seen]
+    return observer + mean[:, None] * direction[seen], number[seen]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.geometry.surface import Surface
 
 FLOOR, HALF_FLOOR = 2.5, float(np.sqrt(4.0**2 - 2.5**2))
@@ -15,10 +15,10 @@ CORNER = 4.0 * float(np.arccos(-FLOOR / 4.0))
 
 THINGS = (
     # class, chainage, m right of the axis, length, width, height from, to
-    (Klass.OBJECT, 12352.0, 1.2, 0.4, 0.6, 0.0, 1.8),
-    (Klass.OBJECT, 12388.0, -1.5, 2.0, 1.0, 0.0, 1.1),
-    (Klass.RAIL, 12400.0, 0.72, 180.0, 0.1, 0.0, 0.17),
-    (Klass.APPENDAGE, 12450.0, -3.6, 60.0, 0.1, 1.0, 1.1),
+    (PointClass.OBJECT, 12352.0, 1.2, 0.4, 0.6, 0.0, 1.8),
+    (PointClass.OBJECT, 12388.0, -1.5, 2.0, 1.0, 0.0, 1.1),
+    (PointClass.RAIL, 12400.0, 0.72, 180.0, 0.1, 0.0, 0.17),
+    (PointClass.APPENDAGE, 12450.0, -3.6, 60.0, 0.1, 1.0, 1.1),
 )
 SPHERES = ((12313.0, -2.0, 1.4), (12344.0, 2.2, 1.5), (12373.0, -2.4, 1.3), (12406.0, 2.0, 1.6), (12441.0, -2.2, 1.5))
 """Chainage, m right of the axis, and height above the floor."""

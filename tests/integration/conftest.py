@@ -19,7 +19,7 @@ from tunneldb.geometry.frame import frame_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
 from tunneldb.raster.geotiff import KINDS, Raster, decode, encode
 from tunneldb.raster.grid import BLOCK, Grid
-from tunneldb.raster.pixel_state import State
+from tunneldb.raster.pixel_state import PixelState
 from tunneldb.store.images import DARK
 
 DATABASE = "tunneldb_example"
@@ -217,7 +217,7 @@ def _segments(conn: psycopg.Connection, survey_id: int, surface: Surface) -> Non
 def _sections(conn: psycopg.Connection, survey_id: int, surface: Surface) -> None:
     for k, chainage in enumerate(surface.chainages):
         arc = surface.arcs[k]
-        ring = surface.roll(np.full(361, chainage), arc, np.zeros(361))
+        ring = surface.to_space(np.full(361, chainage), arc, np.zeros(361))
         conn.execute(
             "INSERT INTO tunnel.section (survey_id, km, segment, half, chainage, half_width, angle_step, radius, arc, "
             "geom, points, interpolated) VALUES (%s, %s, %s, %s, %s, 0.5, 5, %s, %s, ST_GeomFromWKB(%s, %s), 900, %s)",
@@ -319,11 +319,11 @@ def without_intensity(conn: psycopg.Connection, every: int = 1) -> None:
 
 def _states(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """State of pixels, without the dark ones: a niche on the right, a cable on the left, the floor at both edges."""
-    state = np.full(x.shape, State.LINING, float)
-    state[x < SEEN_FROM] = State.EMPTY
-    state[(x > 12360) & (x < 12362) & (y > 5) & (y < 7)] = State.RECESS
-    state[np.abs(y + 6.5) < 0.2] = State.OFF
-    state[np.abs(y) > CORNER] = State.FLOOR
+    state = np.full(x.shape, PixelState.LINING, float)
+    state[x < SEEN_FROM] = PixelState.EMPTY
+    state[(x > 12360) & (x < 12362) & (y > 5) & (y < 7)] = PixelState.RECESS
+    state[np.abs(y + 6.5) < 0.2] = PixelState.OFF
+    state[np.abs(y) > CORNER] = PixelState.FLOOR
     return state
 
 

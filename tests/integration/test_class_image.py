@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from psycopg import sql
 from things import CORNER, FLOOR, HALF_FLOOR, THINGS
 
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.cli.main import main
 
 
@@ -47,11 +47,11 @@ def floor_arc(across: float) -> float:
 def test_each_pixel_shows_what_is_there(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
     assert {"demo-2024-km012-class.tif", "demo-2024-km012-class.png"} <= set(image(tmp_path))
     classes, chainage, arc = read(tmp_path / "demo-2024-km012-class.tif")
-    expected = np.where(np.abs(arc) < CORNER, int(Klass.LINING), int(Klass.GROUND))
+    expected = np.where(np.abs(arc) < CORNER, int(PointClass.LINING), int(PointClass.GROUND))
     unsure = np.abs(np.abs(arc) - CORNER) < 0.15
     inner = np.abs(chainage - 12400) < 98
     for klass, at, across, length, width, low, high in THINGS:
-        if klass == Klass.APPENDAGE:  # on the wall: seen from the axis at this angle
+        if klass == PointClass.APPENDAGE:  # on the wall: seen from the axis at this angle
             angle = np.arctan2(across, (low + high) / 2 - FLOOR)
             middle, half = 4.0 * angle, (high - low) / 2 * 1.1
         else:
@@ -63,7 +63,7 @@ def test_each_pixel_shows_what_is_there(conn: psycopg.Connection, example: str, 
     assert sure.mean() > 0.9
     wrong = sure & (classes != expected)
     assert not wrong.any(), np.unique(np.column_stack([expected[wrong], classes[wrong]]), axis=0)
-    for klass in (Klass.LINING, Klass.GROUND, Klass.OBJECT, Klass.RAIL, Klass.APPENDAGE):
+    for klass in (PointClass.LINING, PointClass.GROUND, PointClass.OBJECT, PointClass.RAIL, PointClass.APPENDAGE):
         assert (classes[inner] == klass).any(), klass
 
 
@@ -95,6 +95,6 @@ def test_tunnel_without_ground_has_lining_and_things(conn: psycopg.Connection, e
     conn.commit()
     image(tmp_path)
     classes, _, arc = read(tmp_path / "demo-2024-km012-class.tif")
-    assert not (classes == Klass.GROUND).any()
+    assert not (classes == PointClass.GROUND).any()
     wall = np.abs(arc) < CORNER - 0.3
-    assert (classes[wall] == Klass.LINING).mean() > 0.98
+    assert (classes[wall] == PointClass.LINING).mean() > 0.98

@@ -20,7 +20,7 @@ from psycopg.rows import dict_row
 from things import FLOOR, HALF_FLOOR, SPHERES, THINGS, beside
 
 from tests.integration.conftest import GIRTH, NAME, SEEN_FROM, WET, example_surface
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.database import connect
 
 PAGE = Path(__file__).parents[2] / "docs" / "cookbook.md"
@@ -112,7 +112,7 @@ def asked(server_dsn: str, example_template: str) -> Iterator[Asked]:
 
 def put(conn: psycopg.Connection, query: str) -> Rows:
     """The rows of an answer; a point written out is taken to PLACE."""
-    x, y, z = SURFACE.roll(*(np.array([value]) for value in PLACE))[0].tolist()
+    x, y, z = SURFACE.to_space(*(np.array([value]) for value in PLACE))[0].tolist()
     query = re.sub(r"ST_MakePoint\([\d.]+, [\d.]+, [\d.]+\)", f"ST_MakePoint({x}, {y}, {z})", query)
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(query.encode()).fetchall()
@@ -208,7 +208,7 @@ def by_the_niche(rows: Rows, a: Asked) -> None:
 
 
 def behind(rows: Rows, a: Asked) -> None:
-    objects = [thing for thing in THINGS if thing[0] == Klass.OBJECT]
+    objects = [thing for thing in THINGS if thing[0] == PointClass.OBJECT]
     wanted = [
         (leak.id, label(thing[1]), thing[6])
         for leak in a.leaks for thing in objects
@@ -352,7 +352,7 @@ def place(rows: Rows, a: Asked) -> None:
 
 def click(rows: Rows, a: Asked) -> None:
     (row,) = rows
-    there = SURFACE.roll(np.array([PLACE[0]]), np.array([PLACE[1]]), np.zeros(1))[0]
+    there = SURFACE.to_space(np.array([PLACE[0]]), np.array([PLACE[1]]), np.zeros(1))[0]
     np.testing.assert_allclose([row["x"], row["y"], row["z"]], there, rtol=0, atol=1e-4)
 
 
@@ -395,7 +395,7 @@ def sparse(rows: Rows, a: Asked) -> None:
 
 
 def tall(rows: Rows, a: Asked) -> None:
-    objects = [thing for thing in THINGS if thing[0] == Klass.OBJECT and thing[6] > 1]
+    objects = [thing for thing in THINGS if thing[0] == PointClass.OBJECT and thing[6] > 1]
     assert [row["label"] for row in rows] == [label(thing[1]) for thing in objects] != []
     for row, thing in zip(rows, objects, strict=True):
         close(row, length_m=thing[3], tall_m=thing[6])

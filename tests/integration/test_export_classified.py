@@ -10,7 +10,7 @@ import psycopg
 import pytest
 from click.testing import CliRunner
 
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.cli.main import main
 from tunneldb.simulate import Parameters, Simulation, write
 from tunneldb.store.scene import load_scene
@@ -83,14 +83,14 @@ def test_files_get_the_classes(
         for dimension in set(before.point_format.dimension_names) - {"classification"}:
             np.testing.assert_array_equal(before[dimension], after[dimension], err_msg=dimension)
         found = np.asarray(after.classification)
-        assert (found[-10:] == Klass.UNASSIGNED).all()
+        assert (found[-10:] == PointClass.UNASSIGNED).all()
         found, klass = found[:-10], klass[:-10]
-        assert np.mean(found[klass == FLOOR] == Klass.GROUND) > 0.98
-        assert np.mean(found[klass == LINING] == Klass.LINING) > 0.95
-        assert np.mean(klass[found == Klass.GROUND] == FLOOR) > 0.98
+        assert np.mean(found[klass == FLOOR] == PointClass.GROUND) > 0.98
+        assert np.mean(found[klass == LINING] == PointClass.LINING) > 0.95
+        assert np.mean(klass[found == PointClass.GROUND] == FLOOR) > 0.98
         np.testing.assert_array_equal(found, scene.classes(np.asarray(before.xyz))[:-10])
         total += np.bincount(after.classification, minlength=256)
-    for klass in (Klass.GROUND, Klass.LINING, Klass.UNASSIGNED):
+    for klass in (PointClass.GROUND, PointClass.LINING, PointClass.UNASSIGNED):
         assert f"{total[klass]:,}".replace(",", " ") in text
 
     export(tmp_path / "second", "--km", 1)  # both files touch it

@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from tests.integration.test_detect import NAME, command, parameters, prepare
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.pipeline import ground as stage
 from tunneldb.pipeline.parameters import settings
 from tunneldb.simulate import Simulation, write
@@ -98,10 +98,10 @@ def test_points_get_the_classes_of_the_truth(sections: psycopg.Connection, scan:
     truth = truth_of(scan, xyz)
     ground = np.isin(truth, (FLOOR, RAIL))
     judged = truth != OUTLIER
-    wrong = np.isin(found, (Klass.GROUND, Klass.RAIL)) != ground
+    wrong = np.isin(found, (PointClass.GROUND, PointClass.RAIL)) != ground
     assert wrong[judged].mean() < 0.01
-    assert (found[truth == LINING] == Klass.LINING).mean() > 0.98
-    assert (found[truth == OBJECT] == Klass.OBJECT).mean() > 0.9
+    assert (found[truth == LINING] == PointClass.LINING).mean() > 0.98
+    assert (found[truth == OBJECT] == PointClass.OBJECT).mean() > 0.9
     assert (found != 0).all()
     metres = [n for (n,) in conn.execute("SELECT n FROM tunnel.ground ORDER BY n").fetchall()]
     assert metres == list(range(metres[0], metres[-1] + 1))
@@ -155,7 +155,7 @@ def test_points_on_target_spheres_are_theirs_once_it_runs_again(sections: psycop
     conn = sections
     command("run", NAME, "--from", "ground", "--to", "ground")
     xyz, before = points(conn)
-    centre = xyz[np.flatnonzero(before == Klass.OBJECT)[0]]
+    centre = xyz[np.flatnonzero(before == PointClass.OBJECT)[0]]
     survey = get_survey(conn, NAME)
     conn.execute(  # as found before there were segments
         "INSERT INTO tunnel.target_sphere (survey_id, km, number, scan_id, geom, radius, nominal, rms, sigma, coverage, points)"
@@ -168,7 +168,7 @@ def test_points_on_target_spheres_are_theirs_once_it_runs_again(sections: psycop
     np.testing.assert_array_equal(again, xyz)
     on_it = np.linalg.norm(xyz - centre, axis=1) <= 0.2
     assert on_it.sum() > 1
-    assert (after[on_it] == Klass.SPHERE).all()
+    assert (after[on_it] == PointClass.SPHERE).all()
     np.testing.assert_array_equal(load_scene(conn, survey, 12, 13).classes(xyz)[on_it], after[on_it])
 
 
@@ -201,8 +201,8 @@ def test_a_tunnel_without_ground_has_none_and_all_of_it_is_lining(conn: psycopg.
     conn.commit()
     command("run", NAME, "--from", "ground", "--to", "ground")
     _, found = points(conn)
-    assert not (found == Klass.GROUND).any()
-    assert (found == Klass.LINING).mean() > 0.8
+    assert not (found == PointClass.GROUND).any()
+    assert (found == PointClass.LINING).mean() > 0.8
     assert conn.execute("SELECT count(*) FROM tunnel.ground").fetchone() == (0,)
 
 

@@ -15,10 +15,10 @@ from shapely.geometry import Polygon
 from tests.integration.test_detect import APPENDAGE, FLOOR, NAME, command, counts, outlines, parameters, prepare, share_of
 from tests.loading import SURVEY, add_survey
 from tunneldb.anomalies import detect as detection
-from tunneldb.anomalies.background.contrast import relative
-from tunneldb.anomalies.background.level_map import DryMap, map_dry
-from tunneldb.anomalies.regions import Region, Traits
-from tunneldb.geometry.section_outliers import Astray
+from tunneldb.anomalies.background.contrast import contrast_image
+from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
+from tunneldb.anomalies.regions import Region, RegionProperties
+from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.pipeline import calibration as radiometry
 from tunneldb.pipeline import detect as job
 from tunneldb.pipeline.parameters import settings
@@ -26,9 +26,9 @@ from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.accumulator import Accumulator
 from tunneldb.raster.floor import Floor
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.image import develop
-from tunneldb.raster.observation import Eye
-from tunneldb.raster.rasterize import gather
+from tunneldb.raster.image import lining_image
+from tunneldb.raster.observation import Observer
+from tunneldb.raster.rasterize import rasterize
 from tunneldb.simulate import Simulation, generate, write
 from tunneldb.simulate.lining.leaks import Leak
 from tunneldb.store.anomaly_parts import replace_parts
@@ -77,11 +77,11 @@ def sections(conn: psycopg.Connection, scan: Path) -> psycopg.Connection:
     return conn
 
 
-def flat(grid: Grid, mean: float, spread: float) -> DryMap:
+def flat(grid: Grid, mean: float, spread: float) -> BackgroundMap:
     """Dry lining that is everywhere alike."""
     rings, bands = np.zeros(grid.columns, np.float32), np.zeros((grid.rows, grid.blocks), np.float32)
     smooth = np.zeros((-(-grid.rows // 25), grid.columns // 25), np.float32)
-    return DryMap(grid, 25, np.full_like(smooth, spread), mean, spread, 1, mean, rings, bands, smooth)
+    return BackgroundMap(grid, 25, np.full_like(smooth, spread), mean, spread, 1, mean, rings, bands, smooth)
 
 
 @pytest.fixture
@@ -97,16 +97,18 @@ def uncut(sections: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> list
     values = settings()
     radiometer = radiometry.find_radiometer(conn, survey, values["intensity.max_incidence"], values["intensity.max_range"])
     depth = values["lining.tolerance"], values["lining.recess"]
-    eye = Eye.of(surface, 12, depth, radiometer, floor, grid.halo * PIXEL)
+    observer = Observer.of(surface, 12, depth, radiometer, floor, grid.halo * PIXEL)
     (points,) = conn.execute("SELECT points FROM tunnel.scan_file").fetchone()
     files = [replace(file, ranges=[(0, points)]) for file in sources(conn, survey, 12)]
     with Accumulator(grid) as image:
-        gather(eye, files, image, ROUGHNESS.sigma, lambda share: None)
-        picture = develop(image, eye.floor, Astray.of(surface), values["appendage.distance"], lambda window: None)
-    dry = map_dry(picture)
+        rasterize(observer, files, image, ROUGHNESS.sigma, lambda share: None)
+        picture = lining_image(
+            image, observer.floor, SectionOutliers.of(surface), values["appendage.distance"], lambda window: None
+        )
+    dry = map_background(picture)
     mean, spread = dry.mean, dry.spread
     even = flat(grid, mean, spread)
-    found = detection.detect(relative(picture, even), even, 0.05)
+    found = detection.detect(contrast_image(picture, even), even, 0.05)
     conn.rollback()
     monkeypatch.setattr(job, "map_dry", lambda picture, _: flat(picture.grid, mean, spread))
     monkeypatch.setattr(radiometry, "roughness_of", lambda *_: ROUGHNESS)
@@ -197,7 +199,9 @@ def test_pixels_of_two_sizes_are_not_put_together(sections: psycopg.Connection, 
 
 
 def region(first: int, last: int, row: int = 0) -> Region:
-    return Region(0.5, first, row, np.ones((2, last - first), bool), 2 * (last - first), 1.0, float(first), Traits(rim=1.0))
+    return Region(
+        0.5, first, row, np.ones((2, last - first), bool), 2 * (last - first), 1.0, float(first), RegionProperties(rim=1.0)
+    )
 
 
 THROUGH = {
@@ -223,7 +227,7 @@ def test_any_order_of_kilometres_puts_the_same_together(conn: psycopg.Connection
             made = cluster.region
             box = (made.column, made.row, made.stop, made.row + len(made.mask))
             assert seen.setdefault(box, made).mask.tolist() == made.mask.tolist()
-            assert made.traits == Traits(rim=float(len(cluster.parts)))
+            assert made.traits == RegionProperties(rim=float(len(cluster.parts)))
             assert (made.filled, made.drop_max) == (made.mask.sum(), max(part.region.drop_max for part in cluster.parts))
     assert sorted(seen) == [
         (25_500, 9, 26_000, 11), (25_990, 0, 28_020, 2), (26_000, 20, 26_007, 22), (28_000, -9, 28_020, -7),

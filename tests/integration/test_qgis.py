@@ -26,7 +26,7 @@ from psycopg.conninfo import make_conninfo
 from rasterio.errors import NotGeoreferencedWarning
 
 from tests.integration.conftest import LEAKS, example_surface, without_intensity
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.cli.main import main
 from tunneldb.export.images.palette import COLOURS, PALETTES, hexadecimal
 
@@ -266,9 +266,9 @@ def test_classes_are_named_and_drawn_in_their_colours(shared: Path, seen: dict[s
         pixels = image.read([1, 2, 3])
     shares = {klass: (pixels == np.array(colour)[:, None, None]).all(axis=0).mean() for klass, colour in COLOURS.items()}
     # the wall is 18.0 m round and the floor 6.2 m wide, of 64 m
-    assert shares[Klass.LINING] == pytest.approx(17.96 / 64, rel=0.02)
-    assert shares[Klass.GROUND] == pytest.approx(6.24 / 64, rel=0.05)
-    for klass in (Klass.OBJECT, Klass.RAIL, Klass.APPENDAGE):
+    assert shares[PointClass.LINING] == pytest.approx(17.96 / 64, rel=0.02)
+    assert shares[PointClass.GROUND] == pytest.approx(6.24 / 64, rel=0.05)
+    for klass in (PointClass.OBJECT, PointClass.RAIL, PointClass.APPENDAGE):
         assert shares[klass] > 0, klass
 
 
@@ -351,7 +351,7 @@ def test_3d_view_looks_at_the_largest_leak(shared: Path) -> None:
     assert set(seen["layers"]) == {"axis", "section", "leak_3d", "target_sphere", "ground"}
     # a terrain would hide what lies below it, and its height shift all layers in QGIS 3.22
     assert (seen["terrain"], seen["offset"], seen["lights"]) == (False, 0, 1)
-    place = example_surface()[0].roll(np.array([12402.5]), np.array([0.0]), np.zeros(1))[0]
+    place = example_surface()[0].to_space(np.array([12402.5]), np.array([0.0]), np.zeros(1))[0]
     camera = seen["camera"]
     assert [*seen["origin"][:2], camera["elev"]] == pytest.approx([place[0], place[1], place[2] - 4.0], abs=0.1)
     assert seen["origin"] == [camera["xMap"], camera["yMap"], 0]
@@ -400,7 +400,7 @@ def test_3d_view_shows_leaks_on_the_lining_in_their_colours(shared: Path, tmp_pa
     centre = np.array([camera["xMap"], camera["yMap"], camera["zMap"]])
     found = []
     for chainage, arc, _, review in LEAKS:
-        place = example_surface()[0].roll(np.array([chainage]), np.array([arc]), np.zeros(1))[0]
+        place = example_surface()[0].to_space(np.array([chainage]), np.array([arc]), np.zeros(1))[0]
         row, column = in_picture(camera, centre, place, pixels.shape[1:]).round().astype(int)
         if review == "rejected" or np.linalg.norm(place - centre) > 40 or not (0 <= column < pixels.shape[2]):
             continue
@@ -417,7 +417,7 @@ def test_place_on_the_image_is_told(rows: psycopg.Connection, shared: Path) -> N
     title, text = seen["told"]
     assert title == "12+367.891"
     numbers = [float(number) for number in re.findall(r"-?\d+\.\d+", text)]
-    point = example_surface()[0].roll(np.array([12367.891]), np.array([-3.456]), np.zeros(1))[0]
+    point = example_surface()[0].to_space(np.array([12367.891]), np.array([-3.456]), np.zeros(1))[0]
     assert numbers == pytest.approx([12367.891, -3.456, *point], abs=0.002)
     assert "12+360 and 7.89 m on" in seen["tip"]
 

@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from tests.integration.conftest import NAME, example_surface
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.lining_relief import Relief
 from tunneldb.classification.objects.clusters import Cluster
@@ -115,7 +115,7 @@ def test_clusters_belong_to_the_kilometre_of_their_middle(conn: psycopg.Connecti
 
     def cluster(along: float, height: float) -> Cluster:
         xyz = rng.uniform(-0.5, 0.5, (200, 3)) + np.array([500_000.0, 4_640_000.0 + along, 600.0])
-        return Cluster.of(Klass.OBJECT, xyz, along + xyz[:, 0] - 500_000.0, np.full(200, height))
+        return Cluster.of(PointClass.OBJECT, xyz, along + xyz[:, 0] - 500_000.0, np.full(200, height))
 
     given = [cluster(12_000.3, 1.0), cluster(12_700.0, np.nan), cluster(12_999.9, 2.0)]
     assert [save_clusters(conn, survey, km, given) for km in (11, 12, 13)] == [0, 3, 0]

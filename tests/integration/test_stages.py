@@ -74,7 +74,7 @@ def sample(simulation: Simulation, folder: Path, count: int) -> tuple[np.ndarray
     lining = np.flatnonzero(columns["class"] == LINING)
     chosen = np.random.default_rng(0).choice(lining, count, replace=False)
     known = np.column_stack([columns[name][chosen].astype(float) for name in ("chainage", "arc", "offset")])
-    return simulation.tunnel.roll(*known.T), known
+    return simulation.tunnel.to_space(*known.T), known
 
 
 def test_accuracy(scanned: tuple[Simulation, Path], conn: psycopg.Connection) -> None:
@@ -95,7 +95,7 @@ def test_accuracy(scanned: tuple[Simulation, Path], conn: psycopg.Connection) ->
     assert chainage < 0.020
     assert offset < 0.010
     _sql_is_python(conn, survey, points[:300], unrolled.chainage[:300], unrolled.arc[:300], unrolled.offset[:300])
-    back = surface.roll(unrolled.chainage, unrolled.arc, unrolled.offset)
+    back = surface.to_space(unrolled.chainage, unrolled.arc, unrolled.offset)
     assert np.nanmax(np.linalg.norm(back - points, axis=1)) < 0.001
     _no_jump(conn, survey)
 
@@ -105,7 +105,7 @@ def _sql_is_python(
 ) -> None:
     rows = conn.execute(
         "SELECT u.chainage, u.arc, u.offset,"
-        "       ST_3DDistance(p.point, tunnel_api.roll(%(id)s, u.chainage, u.arc, u.offset))"
+        "       ST_3DDistance(p.point, tunnel_api.to_space(%(id)s, u.chainage, u.arc, u.offset))"
         "  FROM unnest(%(x)s::float8[], %(y)s::float8[], %(z)s::float8[]) WITH ORDINALITY AS v (x, y, z, i),"
         "       ST_SetSRID(ST_MakePoint(v.x, v.y, v.z), 25830) AS p (point), tunnel_api.unroll(%(id)s, p.point) u ORDER BY v.i",
         {"id": survey.id, **dict(zip("xyz", points.T.tolist(), strict=True))},
@@ -121,8 +121,8 @@ def _no_jump(conn: psycopg.Connection, survey: Survey) -> None:
     for plane in surface.ends[1:, 0]:
         low, high = surface.arc_range(plane)
         arc = np.linspace(low + 0.1, high - 0.1, 100)
-        before = surface.roll(np.full(100, plane - 1e-5), arc, np.zeros(100))
-        after = surface.roll(np.full(100, plane + 1e-5), arc, np.zeros(100))
+        before = surface.to_space(np.full(100, plane - 1e-5), arc, np.zeros(100))
+        after = surface.to_space(np.full(100, plane + 1e-5), arc, np.zeros(100))
         held = ~np.isnan(before[:, 0]) & ~np.isnan(after[:, 0])
         assert held.any()
         assert np.linalg.norm(before - after, axis=1)[held].max() < 0.003
@@ -253,7 +253,7 @@ def test_unroll_command(curve: tuple[psycopg.Connection, Survey, Path]) -> None:
             leaks=0,
         )
     )
-    points = simulation.tunnel.roll(np.array([980.0, 1010.0]), np.array([-3.0, 5.0]), np.zeros(2))
+    points = simulation.tunnel.to_space(np.array([980.0, 1010.0]), np.array([-3.0, 5.0]), np.zeros(2))
     table = folder / "points.csv"
     with table.open("w", newline="") as stream:
         writer = csv.writer(stream)
@@ -405,7 +405,7 @@ def test_shapes_there_and_back(curve: tuple[psycopg.Connection, Survey, Path]) -
         """
         SELECT ST_ZMax(r.rolled) - ST_ZMin(r.rolled), ST_HausdorffDistance(tunnel_api.unroll_shape(%(id)s, r.rolled), p.plane),
                ST_Area(m.mapped) / ST_Area(p.plane), ST_NumInteriorRings(r.rolled)
-        FROM (SELECT ST_GeomFromText(%(plane)s) AS plane) p, LATERAL (SELECT tunnel_api.roll(%(id)s, p.plane) AS rolled) r,
+        FROM (SELECT ST_GeomFromText(%(plane)s) AS plane) p, LATERAL (SELECT tunnel_api.to_space(%(id)s, p.plane) AS rolled) r,
              LATERAL (SELECT tunnel_api.map_strip(%(id)s, p.plane) AS mapped) m
         """,
         {"id": survey.id, "plane": plane},
@@ -415,9 +415,9 @@ def test_shapes_there_and_back(curve: tuple[psycopg.Connection, Survey, Path]) -
     assert mapped == pytest.approx(1 - 3 / 300, abs=0.003)  # inside of a right-hand curve of R 300 m, 3 m off the axis
     assert holes == 1
     outside = "LINESTRING (980 2, 2000 2)"
-    assert conn.execute("SELECT tunnel_api.roll(%s, ST_GeomFromText(%s))", [survey.id, outside]).fetchone() == (None,)
+    assert conn.execute("SELECT tunnel_api.to_space(%s, ST_GeomFromText(%s))", [survey.id, outside]).fetchone() == (None,)
     with pytest.raises(psycopg.errors.RaiseException, match="not a MULTIPOINT"):
-        conn.execute("SELECT tunnel_api.roll(%s, ST_GeomFromText('MULTIPOINT (1 1)'))", [survey.id])
+        conn.execute("SELECT tunnel_api.to_space(%s, ST_GeomFromText('MULTIPOINT (1 1)'))", [survey.id])
 
 
 @pytest.mark.parametrize(("stage", "says"), [("segments", "has no axis yet"), ("sections", "has no segments yet")])

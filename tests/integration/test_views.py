@@ -13,7 +13,7 @@ import shapely
 from psycopg import sql
 from queued import add_file, add_goal, add_job, add_worker
 
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 
 GEOMETRIES = {
     "axis": "LineStringZ",
@@ -448,7 +448,7 @@ def test_loaded_kilometre_that_was_never_processed_is_listed(conn: psycopg.Conne
 
 def test_classes_are_those_of_the_program(conn: psycopg.Connection) -> None:
     rows = conn.execute("SELECT id, name FROM tunnel_api.class ORDER BY id").fetchall()
-    assert rows == [(int(klass), klass.name.lower()) for klass in Klass]
+    assert rows == [(int(klass), klass.name.lower()) for klass in PointClass]
 
 
 def test_points_have_the_class_that_was_found_beside_that_of_the_file(conn: psycopg.Connection, points: None) -> None:

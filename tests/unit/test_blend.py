@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from straight import straight
 
-from tunneldb.geometry.section_outliers import Astray
+from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.radiometry.oren_nayar import incidence_db
 from tunneldb.raster.accumulator import Accumulator, Window
 from tunneldb.raster.floor import Floor
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.observation import Eye, Radiometer
-from tunneldb.raster.pixel_state import State, reach, states
+from tunneldb.raster.observation import Observer, Radiometer
+from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
 from tunneldb.raster.projection import WEIGHT, weight_of
-from tunneldb.raster.rasterize import Lens
+from tunneldb.raster.rasterize import Projector
 
 PIXEL, RADIUS, ROUGHNESS = 0.05, 4.0, 12.0
 ROUND = straight(np.full(361, RADIUS))
@@ -41,9 +41,9 @@ def scan(stations: list[float], lean: float, max_range: float = 40.0) -> tuple[W
     points = Points(xyz, np.zeros(count), which.astype(np.int32), raw, np.zeros(count, np.uint8))
     place = np.column_stack([stations, np.zeros(len(stations)), np.full(len(stations), 100.0)])
     poses = PoseModel.from_stations(np.arange(len(stations)), place)
-    eye = Eye.of(ROUND, 0, (0.5, 1.2), Radiometer("reflectance", poses, None, 75.0, max_range), FLOOR)
+    observer = Observer.of(ROUND, 0, (0.5, 1.2), Radiometer("reflectance", poses, None, 75.0, max_range), FLOOR)
     with Accumulator(GRID) as image:
-        pixels, _ = Lens.of(eye, GRID, ROUGHNESS).look(points)
+        pixels, _ = Projector.of(observer, GRID, ROUGHNESS).project(points)
         image.add(pixels, count)
         return image.window(0, 1200), points, np.where(pixels.column[:count] >= 0, pixels.corrected[:count], np.nan)
 
@@ -70,12 +70,12 @@ def test_what_is_seen_beyond_the_limits_only_is_not_seen() -> None:
     chainage = GRID.chainages(slice(0, 1200))
     for window, limit in ((scan([30.0], 0.0)[0], RADIUS * np.tan(np.radians(75.0))), (scan([30.0], 0.0, 8.0)[0], 48.0**0.5)):
         columns = slice(100, 1100)
-        state = states(window, columns, GRID, FLOOR, Astray.of(ROUND), 0.03)
+        state = pixel_states(window, columns, GRID, FLOOR, SectionOutliers.of(ROUND), 0.03)
         off = np.abs(chainage[columns] - 30.0)
         assert reach(PIXEL) < 100
         assert (window.weight[:, np.abs(chainage - 30.0) > limit + PIXEL] == 0).all()
-        assert (state[1:-1, off > limit + PIXEL] == State.EMPTY).all()
-        assert (state[1:-1, off < limit - PIXEL] == State.LINING).mean() > 0.99
+        assert (state[1:-1, off > limit + PIXEL] == PixelState.EMPTY).all()
+        assert (state[1:-1, off < limit - PIXEL] == PixelState.LINING).mean() > 0.99
 
 
 @pytest.mark.parametrize("far", [5.0, 40.0])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from tunneldb.anomalies.coverage import cover
+from tunneldb.anomalies.coverage import measure_coverage
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import State
+from tunneldb.raster.pixel_state import PixelState
 
 
 def picture(rng, grid):
@@ -15,7 +15,7 @@ def picture(rng, grid):
     state = np.kron(rng.choice([0, 0, 1, 1, 1, 2, 3, 4], coarse), np.ones((5, 5), int))[: grid.rows, : grid.columns]
     state = np.where((state > 0) & (state < 3) & (rng.random(state.shape) < 0.4), 0, state).astype(np.uint8)
     dark = np.kron(rng.random(coarse) < 0.2, np.ones((5, 5), bool))[: grid.rows, : grid.columns]
-    return state, dark & (state <= State.RECESS)
+    return state, dark & (state <= PixelState.RECESS)
 
 
 @pytest.mark.parametrize(("pixel", "halo", "step"), [(0.5, 0, 0.5), (0.1, 12, 0.1), (0.04, 5, 0.2), (0.05, 7, 0.1)])
@@ -23,11 +23,11 @@ def picture(rng, grid):
 def test_areas_are_those_of_the_pixels(pixel, halo, step, size):
     grid = Grid.covering(3, pixel, -30 * pixel, 30 * pixel, halo)
     state, dark = picture(np.random.default_rng(1), grid)
-    found = cover(state, dark, grid, size)
+    found = measure_coverage(state, dark, grid, size)
     assert found.step == pytest.approx(step)
     assert len(found.lining) == round(1000 / step)
-    lining = state <= State.RECESS
-    held = (state == State.LINING) | (state == State.RECESS)
+    lining = state <= PixelState.RECESS
+    held = (state == PixelState.LINING) | (state == PixelState.RECESS)
     votes = ndimage.convolve(held.astype(int), np.ones((size, size), int), mode="constant")
     seen = lining & (held | (votes > 0.2 * min(size * size, 12)))
     assert 0 < (seen & ~held).sum() < (lining & ~held).sum()
@@ -39,9 +39,9 @@ def test_areas_are_those_of_the_pixels(pixel, halo, step, size):
 def test_floor_and_appendages_do_not_count_and_what_was_not_scanned_is_not_seen():
     grid = Grid.covering(0, 0.1, 0.0, 1.0)
     state = np.zeros((grid.rows, grid.columns), np.uint8)
-    state[:, :5000] = State.LINING
-    state[:2], state[2:4] = State.FLOOR, State.OFF
-    found = cover(state, np.zeros(state.shape, bool), grid, 5)
+    state[:, :5000] = PixelState.LINING
+    state[:2], state[2:4] = PixelState.FLOOR, PixelState.OFF
+    found = measure_coverage(state, np.zeros(state.shape, bool), grid, 5)
     np.testing.assert_allclose(found.lining, 0.06, rtol=1e-5)
     np.testing.assert_allclose(found.seen[:5000], 0.06, rtol=1e-5)
     assert not found.seen[5002:].any()

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 import pytest
 
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.cli.main import main
 from tunneldb.pipeline.parameters import PARAMETERS
 
@@ -105,7 +105,7 @@ def test_parameters_exist(page: Path) -> None:
 
 def test_classes_are_those_of_the_program() -> None:
     rows = re.findall(r"^\| (\d+) \| (\w+) \|", (ROOT / "docs" / "classes.md").read_text("utf-8"), re.MULTILINE)
-    assert [(int(code), name) for code, name in rows] == [(int(klass), klass.name.lower()) for klass in Klass]
+    assert [(int(code), name) for code, name in rows] == [(int(klass), klass.name.lower()) for klass in PointClass]
 
 
 @pages

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from tunneldb.anomalies.background.contrast import relative
-from tunneldb.anomalies.background.level_map import map_dry
+from tunneldb.anomalies.background.contrast import contrast_image
+from tunneldb.anomalies.background.level_map import map_background
 from tunneldb.anomalies.threshold import dark_pixels
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.image import Picture
-from tunneldb.raster.pixel_state import State
+from tunneldb.raster.image import LiningImage
+from tunneldb.raster.pixel_state import PixelState
 
 PIXEL = 0.02
 NOISE = 0.35
@@ -40,11 +40,11 @@ class Lining:
         level = np.full(state.shape, NODATA, np.int16)
         state[:, self.columns] = self.held
         level[:, self.columns] = np.where(self.held, np.rint(100 * shown), NODATA)
-        return Picture(self.grid, state, level)
+        return LiningImage(self.grid, state, level)
 
     def map(self, drawn=(), **how):
         """Error of the level, dB, and the standard deviation, (rows, columns) of the lining; and the map."""
-        dry = map_dry(self.picture(**how), drawn)
+        dry = map_background(self.picture(**how), drawn)
         error = dry.levels(slice(0, self.grid.rows), self.columns) - self.dry
         sigma = np.kron(dry.sigma, np.ones((dry.tile, dry.tile)))[: self.grid.rows, self.columns]
         return error, sigma, dry
@@ -198,11 +198,11 @@ def test_no_lining():
     lining = Lining(1.0)
     lining.held[:] = False
     picture = lining.picture()
-    dry = map_dry(picture)
+    dry = map_background(picture)
     assert dry.count == 0
     assert np.isnan(dry.mean)
     assert (dry.sigma > 0).all()
-    assert (relative(picture, dry).drop == NODATA).all()
+    assert (contrast_image(picture, dry).drop == NODATA).all()
 
 
 def test_recesses_do_not_count():
@@ -210,8 +210,8 @@ def test_recesses_do_not_count():
     picture = lining.picture()
     recess = lining.within(420.0, 423.0, -2.0, 2.0)
     picture.level[:, lining.columns][recess] -= 400
-    picture.state[:, lining.columns][recess] = State.RECESS
-    dry = map_dry(picture)
+    picture.state[:, lining.columns][recess] = PixelState.RECESS
+    dry = map_background(picture)
     level = dry.levels(slice(0, lining.grid.rows), lining.columns)
     assert np.abs(level - 2.0).max() < 0.1
     assert dry.count == recess.size - recess.sum()
@@ -232,7 +232,7 @@ def test_the_map_is_the_same_on_both_sides_of_the_end_of_a_kilometre():
         far = (2500, 25) if grid is before else (25, 2500)
         state[:, here - far[0] : here + far[1]] = whole.state[:, end - far[0] : end + far[1]]
         level[:, here - far[0] : here + far[1]] = whole.level[:, end - far[0] : end + far[1]]
-        dry = map_dry(Picture(grid, state, level))
+        dry = map_background(LiningImage(grid, state, level))
         levels.append(dry.levels(slice(0, grid.rows), slice(here - 25, here + 25)))
     np.testing.assert_allclose(levels[0], levels[1], atol=0.15)
 
@@ -243,14 +243,14 @@ def test_drawn_dry_regions_rule_what_lies_in_them_and_nothing_else():
         lining.leak(420.0, 424.0, -2.0, 2.0)
     region = box(420.0, -2.0, 424.0, 0.0)
     picture = drawn.picture()
-    dry = map_dry(picture, [region])
+    dry = map_background(picture, [region])
     level = dry.levels(slice(0, drawn.grid.rows), drawn.columns)
     core = drawn.within(421.0, 423.0, -1.5, -0.5)
     assert np.abs(level[core] - (2.0 - 3.0)).max() < 0.1
     other = ~drawn.within(419.0, 425.0, -3.0, 1.0)
     before, _, _ = plain.map()
     assert np.abs(level - drawn.dry - before)[other].max() < 0.05
-    dark = dark_pixels(relative(picture, dry), 5)[:, drawn.columns]
+    dark = dark_pixels(contrast_image(picture, dry), 5)[:, drawn.columns]
     assert not dark[drawn.within(420.0, 424.0, -2.0, 0.0)].any()
     assert dark[drawn.within(420.0, 424.0, 0.6, 2.0)].mean() > 0.97
 
@@ -260,8 +260,8 @@ def test_drop_is_dry_level_less_level_in_the_memory_of_the_picture():
     lining.held[np.random.default_rng(2).random(lining.held.shape) < 0.2] = False
     picture = lining.picture()
     level = picture.level.copy()
-    dry = map_dry(picture)
-    found = relative(picture, dry)
+    dry = map_background(picture)
+    found = contrast_image(picture, dry)
     assert found.drop is picture.level
     assert found.state is picture.state
     held = level != NODATA

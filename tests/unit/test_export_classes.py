@@ -11,7 +11,7 @@ from affine import Affine
 from numpy.typing import NDArray
 from PIL import Image
 
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.export.images import preview
 from tunneldb.export.images.class_raster import ClassPainter
 from tunneldb.export.images.cog import Extent, write_cog
@@ -48,14 +48,14 @@ def test_pixel_has_the_class_of_the_point_in_its_middle(tube: Surface) -> None:
         radius = np.hypot(points[:, 0], points[:, 2] - 50.0)
         stands_off = np.abs(radius - (RADIUS - 0.25)) < 1e-3
         right = points[:, 0] > 0
-        return np.where(stands_off, Klass.APPENDAGE, np.where(right, Klass.LINING, Klass.NICHE)).astype(np.uint8)
+        return np.where(stands_off, PointClass.APPENDAGE, np.where(right, PointClass.LINING, PointClass.NICHE)).astype(np.uint8)
 
     # rows from arc +3 m down to -3 m, columns from chainage 1000 on
     painted = ClassPainter(tube, classes).paint(Raster(values, Affine(0.1, 0, 1000.0, 0, -0.1, 3.0)))
     expected = np.zeros((60, 100), np.uint8)
-    expected[10:30, 20:90] = Klass.LINING
-    expected[30:50, 20:90] = Klass.NICHE
-    expected[30, 40:60] = Klass.APPENDAGE
+    expected[10:30, 20:90] = PointClass.LINING
+    expected[30:50, 20:90] = PointClass.NICHE
+    expected[30, 40:60] = PointClass.APPENDAGE
     assert (painted == expected).all()
     # the pixel of row 10 and column 20: arc 1.95 m, chainage 1002.05 m
     angle = 1.95 / RADIUS
@@ -68,28 +68,28 @@ def test_pixel_across_the_seam_is_that_beside_it(tube: Surface) -> None:
 
     def classes(points: NDArray[np.float64]) -> NDArray[np.uint8]:
         seen.append(points)
-        return np.full(len(points), Klass.GROUND, np.uint8)
+        return np.full(len(points), PointClass.GROUND, np.uint8)
 
     painted = ClassPainter(tube, classes).paint(Raster(np.zeros((253, 3), np.float32), Affine(0.1, 0, 1050, 0, -0.1, 12.65)))
-    assert (painted == Klass.GROUND).all()
+    assert (painted == PointClass.GROUND).all()
     assert seen[0][0] == pytest.approx([0.0, 50.05, 46.0], abs=2e-3)
 
 
 def test_pixel_off_the_tunnel_is_unassigned(tube: Surface) -> None:
     def classes(points: NDArray[np.float64]) -> NDArray[np.uint8]:
-        return np.full(len(points), Klass.LINING, np.uint8)
+        return np.full(len(points), PointClass.LINING, np.uint8)
 
     painted = ClassPainter(tube, classes).paint(Raster(np.zeros((2, 20), np.float32), Affine(1, 0, 1090.0, 0, -1, 1.0)))
-    assert (painted[:, :10] == Klass.LINING).all()
-    assert (painted[:, 10:] == Klass.UNASSIGNED).all()
+    assert (painted[:, :10] == PointClass.LINING).all()
+    assert (painted[:, 10:] == PointClass.UNASSIGNED).all()
 
 
 @pytest.fixture
 def written(tmp_path: Path) -> Path:
     """Two blocks of a larger image, a third one between them missing."""
     rng = np.random.default_rng(1)
-    left = rng.choice(np.array([0, *map(int, Klass)], np.uint8), (300, 500))
-    right = np.full((300, 500), int(Klass.GROUND), np.uint8)
+    left = rng.choice(np.array([0, *map(int, PointClass)], np.uint8), (300, 500))
+    right = np.full((300, 500), int(PointClass.GROUND), np.uint8)
     path = tmp_path / "x-class.tif"
     write_cog(path, "class", Extent(Affine(0.1, 0, 1000, 0, -0.1, 15), 300, 1500), [(0, left), (1000, right)])
     return path
@@ -104,12 +104,12 @@ def test_file_of_classes_explains_itself(written: Path) -> None:
         assert image.overviews(1)
         assert image.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG"
         coarse = image.read(1, out_shape=(75, 375))
-    assert {klass: colours[klass][:3] for klass in Klass} == COLOURS
+    assert {klass: colours[klass][:3] for klass in PointClass} == COLOURS
     assert (values[:, 500:1000] == 0).all()
-    assert (values[:, 1000:] == Klass.GROUND).all()
-    assert set(np.unique(values[:, :500])) == {0, *Klass}
+    assert (values[:, 1000:] == PointClass.GROUND).all()
+    assert set(np.unique(values[:, :500])) == {0, *PointClass}
     # a smaller picture holds classes, not means of their codes
-    assert set(np.unique(coarse)) <= {0, *Klass}
+    assert set(np.unique(coarse)) <= {0, *PointClass}
     assert list(written.parent.iterdir()) == [written]
 
 
@@ -137,14 +137,14 @@ def test_smaller_picture_shows_the_commonest_class() -> None:
 
 def test_preview_paints_classes_and_names_those_there(tmp_path: Path) -> None:
     values = np.full((100, 2000), np.nan, np.float32)
-    values[:40] = Klass.LINING
-    values[60:] = Klass.GROUND
+    values[:40] = PointClass.LINING
+    values[60:] = PointClass.GROUND
     path = tmp_path / "class.png"
     preview.draw(path, "x", "class", [preview.Strip(1000.0, values)], Stationing(), 2.5, 0.05)
     pixels = np.asarray(Image.open(path).convert("RGB")).reshape(-1, 3)
     painted = {klass: int((pixels == colour).all(axis=1).sum()) for klass, colour in COLOURS.items()}
     # gaps of 1 m are closed from both sides by 0.3 m; lines of the grid take a little
-    assert painted[Klass.LINING] == pytest.approx(46 * 2000, rel=0.03)
-    assert painted[Klass.GROUND] == pytest.approx(46 * 2000, rel=0.03)
+    assert painted[PointClass.LINING] == pytest.approx(46 * 2000, rel=0.03)
+    assert painted[PointClass.GROUND] == pytest.approx(46 * 2000, rel=0.03)
     # less than a legend's square of 15 × 15; letters are drawn in greys
-    assert all(painted[klass] < 50 for klass in Klass if klass not in (Klass.LINING, Klass.GROUND))
+    assert all(painted[klass] < 50 for klass in PointClass if klass not in (PointClass.LINING, PointClass.GROUND))

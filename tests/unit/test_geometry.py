@@ -103,7 +103,7 @@ def test_there_and_back(radius: float, slope: float, seed: int) -> None:
     chainage = rng.uniform(0.5, 59.5, 200)
     arc = rng.uniform(-0.95, 0.95, 200) * TUNNEL_RADIUS * np.pi * 0.9
     offset = rng.uniform(-0.5, 0.5, 200)
-    points = varied.roll(chainage, arc, offset)
+    points = varied.to_space(chainage, arc, offset)
     assert not np.isnan(points).any()
     back = varied.unroll(points)
     np.testing.assert_allclose(back.chainage, chainage, atol=1e-8)
@@ -115,8 +115,8 @@ def test_surface_is_continuous_across_planes() -> None:
     surface = circular_surface(Helix(300.0, 0.04), 100.0)
     planes = surface.ends[1:, 0]
     for arc in (-10.0, 0.0, 7.0):
-        before = surface.roll(planes - 1e-6, np.full(len(planes), arc), np.zeros(len(planes)))
-        after = surface.roll(planes + 1e-6, np.full(len(planes), arc), np.zeros(len(planes)))
+        before = surface.to_space(planes - 1e-6, np.full(len(planes), arc), np.zeros(len(planes)))
+        after = surface.to_space(planes + 1e-6, np.full(len(planes), arc), np.zeros(len(planes)))
         assert np.linalg.norm(after - before, axis=1).max() < 1e-5
 
 
@@ -134,7 +134,7 @@ def test_off_the_tunnel() -> None:
     unrolled = surface.unroll(far)
     assert np.isnan(unrolled.chainage).all()
     assert np.isnan(unrolled.offset).all()
-    assert np.isnan(surface.roll(np.array([50.0, 500.0]), np.array([20.0, 0.0]), np.zeros(2))).all()
+    assert np.isnan(surface.to_space(np.array([50.0, 500.0]), np.array([20.0, 0.0]), np.zeros(2))).all()
 
 
 def test_unroll_does_not_depend_on_order() -> None:
@@ -155,7 +155,7 @@ def test_gap_between_sections_is_off_the_tunnel() -> None:
         surface.number, surface.segments, surface.ends, surface.chainages[keep], surface.radius[keep], surface.arcs[keep], 10.0
     )
     chainage = np.array([10.0, 32.0, 45.0, 58.0, 80.0])
-    held = ~np.isnan(holed.roll(chainage, np.zeros(5), np.zeros(5))[:, 0])
+    held = ~np.isnan(holed.to_space(chainage, np.zeros(5), np.zeros(5))[:, 0])
     np.testing.assert_array_equal(held, [True, True, False, True, True])
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scenes import exact, scan, share
 
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.classification.classify import find_bare_scene, find_scene
 from tunneldb.classification.ground.extraction import GroundSettings, find_ground
 from tunneldb.classification.objects.clusters import CELL, NEAR, Cluster, Lookup, look_up, pieces
@@ -48,11 +48,11 @@ def test_a_survey_is_classed_as_the_truth(survey) -> None:
     centres = np.array([[*sphere.centre, sphere.radius] for sphere in simulation.spheres])
     scene = Scene(line, ground, found.clusters, surface, found.relief, centres)
     classes = scene.classes(cloud.xyz)
-    seen = truth != Klass.NOISE
+    seen = truth != PointClass.NOISE
     assert (classes == truth)[seen].mean() > 0.98
     for klass, least, own in (
-        (Klass.GROUND, 0.99, 0.95), (Klass.LINING, 0.99, 0.99), (Klass.NICHE, 0.9, 0.9), (Klass.APPENDAGE, 0.97, 0.9),
-        (Klass.OBJECT, 0.85, 0.85), (Klass.SPHERE, 0.99, 0.9), (Klass.RAIL, 0.3, 0.9),
+        (PointClass.GROUND, 0.99, 0.95), (PointClass.LINING, 0.99, 0.99), (PointClass.NICHE, 0.9, 0.9), (PointClass.APPENDAGE, 0.97, 0.9),
+        (PointClass.OBJECT, 0.85, 0.85), (PointClass.SPHERE, 0.99, 0.9), (PointClass.RAIL, 0.3, 0.9),
     ):  # fmt: skip
         recall, precision = share(truth[seen], classes[seen], klass)
         assert recall > least, (klass.name, recall)
@@ -69,9 +69,13 @@ def test_a_bare_cloud_is_classed_as_the_truth(survey) -> None:
     scene = find_bare_scene(points, line, ground)
     assert scene.relief is not None
     classes = scene.classes(cloud.xyz)
-    seen = (truth != Klass.NOISE) & (truth != Klass.SPHERE)
+    seen = (truth != PointClass.NOISE) & (truth != PointClass.SPHERE)
     assert (classes == truth)[seen].mean() > 0.97
-    for klass, least, own in ((Klass.LINING, 0.97, 0.99), (Klass.APPENDAGE, 0.95, 0.85), (Klass.OBJECT, 0.85, 0.8)):
+    for klass, least, own in (
+        (PointClass.LINING, 0.97, 0.99),
+        (PointClass.APPENDAGE, 0.95, 0.85),
+        (PointClass.OBJECT, 0.85, 0.8),
+    ):
         recall, precision = share(truth[seen], classes[seen], klass)
         assert recall > least, (klass.name, recall)
         assert precision > own, (klass.name, precision)
@@ -86,7 +90,7 @@ def test_a_field_with_a_wall_has_no_lining() -> None:
     line = centreline_through(points)
     scene = find_bare_scene(points, line, find_ground(points, line, GroundSettings()))
     assert scene.relief is None
-    assert not np.isin(scene.classes(points), (Klass.LINING, Klass.NICHE)).any()
+    assert not np.isin(scene.classes(points), (PointClass.LINING, PointClass.NICHE)).any()
 
 
 @pytest.mark.parametrize("points", [np.empty((0, 3)), np.ones((1, 3)), np.ones((50, 3))])
@@ -95,7 +99,7 @@ def test_hardly_any_points_are_no_tunnel(points: np.ndarray) -> None:
     scene = find_bare_scene(points, line, None)
     assert scene.relief is None
     assert len(scene.classes(points)) == len(points)
-    assert not np.isin(scene.classes(points), (Klass.LINING, Klass.NICHE, Klass.GROUND)).any()
+    assert not np.isin(scene.classes(points), (PointClass.LINING, PointClass.NICHE, PointClass.GROUND)).any()
 
 
 def test_classes_do_not_depend_on_how_points_are_cut(survey) -> None:
@@ -114,15 +118,16 @@ def test_defaults_are_those_of_the_parameters() -> None:
 
 
 def test_a_point_finds_the_nearest_cluster() -> None:
-    near = Cluster.of(Klass.OBJECT, np.array([[0.05, 0.05, 0.05]]), np.zeros(1), np.zeros(1))
-    far = Cluster.of(Klass.APPENDAGE, np.array([[0.35, 0.05, 0.05]]), np.zeros(1), np.zeros(1))
+    near = Cluster.of(PointClass.OBJECT, np.array([[0.05, 0.05, 0.05]]), np.zeros(1), np.zeros(1))
+    far = Cluster.of(PointClass.APPENDAGE, np.array([[0.35, 0.05, 0.05]]), np.zeros(1), np.zeros(1))
     for order in ([near, far], [far, near]):
         lookup = Lookup.of(order)
         x = (np.arange(-6, 10) + 0.5) * CELL
         found = [look_up(at, 0.05, 0.05, lookup.first, lookup.last, lookup.keys, lookup.klass) for at in x]
         cells = np.floor(x / CELL).astype(int)
         expected = [
-            Klass.OBJECT if abs(c) <= min(NEAR, abs(c - 3)) else Klass.APPENDAGE if abs(c - 3) <= NEAR else 0 for c in cells
+            PointClass.OBJECT if abs(c) <= min(NEAR, abs(c - 3)) else PointClass.APPENDAGE if abs(c - 3) <= NEAR else 0
+            for c in cells
         ]
         assert found == expected
 
@@ -130,17 +135,17 @@ def test_a_point_finds_the_nearest_cluster() -> None:
 def test_long_clusters_are_cut_at_whole_tens_of_metres() -> None:
     along = np.linspace(983.0, 1023.5, 500)
     xyz = np.column_stack([along + 4e5, np.zeros(500), np.ones(500)])
-    parts = pieces(Klass.APPENDAGE, xyz, along, np.full(500, 1.0))
+    parts = pieces(PointClass.APPENDAGE, xyz, along, np.full(500, 1.0))
     assert [np.floor(part.along_from / 10) for part in parts] == [98, 99, 100, 101, 102]
     assert all(np.floor(part.along_to / 10) == np.floor(part.along_from / 10) for part in parts)
     assert sum(part.points for part in parts) == 500
-    short = pieces(Klass.OBJECT, xyz[along < 992], along[along < 992], np.full(500, np.nan)[along < 992])
+    short = pieces(PointClass.OBJECT, xyz[along < 992], along[along < 992], np.full(500, np.nan)[along < 992])
     assert len(short) == 1
     assert short[0].height_from is None
 
 
 def test_hull_holds_the_cells() -> None:
-    one = Cluster.of(Klass.OBJECT, np.array([[5e5 + 0.02, 4.7e6 + 0.03, 7.0]]), np.zeros(1), np.zeros(1))
+    one = Cluster.of(PointClass.OBJECT, np.array([[5e5 + 0.02, 4.7e6 + 0.03, 7.0]]), np.zeros(1), np.zeros(1))
     x, y = one.hull.T
     area = 0.5 * float(np.sum((x - x[0]) * np.roll(y - y[0], -1) - np.roll(x - x[0], -1) * (y - y[0])))
     assert area == pytest.approx(CELL**2, rel=1e-3)

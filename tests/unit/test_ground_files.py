@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.cli.main import main
 from tunneldb.export.pointcloud import single_file as bare
 from tunneldb.simulate import Parameters, Simulation, write
@@ -63,10 +63,10 @@ def test_tunnel(tunnel: tuple[Path, np.ndarray], tmp_path: Path) -> None:
     las = laspy.read(tmp_path / "out.laz")
     np.testing.assert_array_equal(las.xyz, laspy.read(source).xyz)
     found = np.asarray(las.classification)
-    assert np.mean((found == Klass.GROUND) == (truth == FLOOR)) > 0.98
-    assert np.mean(found[truth == LINING] == Klass.LINING) > 0.9
+    assert np.mean((found == PointClass.GROUND) == (truth == FLOOR)) > 0.98
+    assert np.mean(found[truth == LINING] == PointClass.LINING) > 0.9
     assert "ground" in text
-    assert f"{np.count_nonzero(found == Klass.GROUND):,}".replace(",", " ") in text
+    assert f"{np.count_nonzero(found == PointClass.GROUND):,}".replace(",", " ") in text
     assert "no ground" not in text
     assert "no lining" not in text
 
@@ -78,7 +78,7 @@ def test_far_from_the_origin(tunnel: tuple[Path, np.ndarray], tmp_path: Path) ->
     far = save(tmp_path / "far.laz", xyz + np.array([3e8, -7e8, 1e5]))
     ground(far, tmp_path / "out.laz")
     found = np.asarray(laspy.read(tmp_path / "out.laz").classification)
-    assert np.mean((found == Klass.GROUND) == (truth == FLOOR)) > 0.98
+    assert np.mean((found == PointClass.GROUND) == (truth == FLOOR)) > 0.98
 
 
 def test_vault_alone_has_no_ground(tunnel: tuple[Path, np.ndarray], tmp_path: Path) -> None:
@@ -89,8 +89,8 @@ def test_vault_alone_has_no_ground(tunnel: tuple[Path, np.ndarray], tmp_path: Pa
     text = ground(save(tmp_path / "vault.laz", vault), tmp_path / "out.laz")
     assert "no ground" in text
     found = np.asarray(laspy.read(tmp_path / "out.laz").classification)
-    assert not (found == Klass.GROUND).any()
-    assert (found == Klass.LINING).mean() > 0.9
+    assert not (found == PointClass.GROUND).any()
+    assert (found == PointClass.LINING).mean() > 0.9
 
 
 def test_field_has_no_lining(tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ def test_field_has_no_lining(tmp_path: Path) -> None:
     text = ground(save(tmp_path / "field.laz", field), tmp_path / "out.laz")
     assert "no lining" in text
     found = np.asarray(laspy.read(tmp_path / "out.laz").classification)
-    assert (found == Klass.GROUND).mean() > 0.95
+    assert (found == PointClass.GROUND).mean() > 0.95
 
 
 @pytest.mark.parametrize(
@@ -196,5 +196,5 @@ def test_real_tunnel(tmp_path: Path) -> None:
     assert counts.sum() == 1_139_889
     share = counts / counts.sum()
     # A floor of 9 m in a section with a perimeter of 28 m, seen from 2 m above it.
-    assert 0.2 < share[Klass.GROUND] < 0.6
-    assert 0.3 < share[Klass.LINING] < 0.8
+    assert 0.2 < share[PointClass.GROUND] < 0.6
+    assert 0.3 < share[PointClass.LINING] < 0.8

@@ -7,7 +7,7 @@ import pytest
 
 from tunneldb.classification.ground.accuracy import Agreement
 from tunneldb.classification.ground.extraction import MARGIN, GroundSettings, find_ground
-from tunneldb.classification.ground.ransac import planes
+from tunneldb.classification.ground.ransac import ransac_planes
 from tunneldb.geometry.centreline import centreline_through
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.pointcloud.voxels import Voxels
@@ -196,7 +196,7 @@ def test_plane_of_many_points_stands_up_to_a_larger_one_that_is_steep():
     slant[:, 2] = 5.0 + (slant[:, 1] - 2.0)
     points = np.vstack([floor, slant]) + rng.normal(0, 0.005, (3000, 3))
     bounds, seed = np.array([[0, 3000]]), np.array([1])
-    checked = planes(points, bounds, 0.05, 15.0, 0.3, seed)
+    checked = ransac_planes(points, bounds, 0.05, 15.0, 0.3, seed)
     np.testing.assert_allclose(checked.coefficients[0], [5.0, 0.04, 0.0], atol=0.01)
-    plain = planes(points, bounds, 0.05, 15.0, 0.3, seed, check=False)
+    plain = ransac_planes(points, bounds, 0.05, 15.0, 0.3, seed, check=False)
     assert plain.coefficients[0, 2] == pytest.approx(1.0, abs=0.05)

@@ -8,13 +8,13 @@ import shapely
 from scipy import ndimage
 from shapely.geometry import Polygon, box
 
-from tunneldb.anomalies.background.contrast import Relative
-from tunneldb.anomalies.detect import Detection, Found, detect
-from tunneldb.anomalies.regions import Region, Traits
+from tunneldb.anomalies.background.contrast import ContrastImage
+from tunneldb.anomalies.detect import Detection, Found, find_anomalies
+from tunneldb.anomalies.regions import Region, RegionProperties
 from tunneldb.anomalies.verdict import evidence, judge
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import State
+from tunneldb.raster.pixel_state import PixelState
 
 PIXEL, SIGMA = 0.02, 0.3
 WIDTH, HALF = 14.0, 4.0  # of the canvas: from chainage 0, and from arc -HALF to HALF, m
@@ -27,7 +27,7 @@ class Canvas:
         self.rng, self.filled = np.random.default_rng(seed), filled
         self.grid = Grid.covering(0, PIXEL, -HALF, HALF)
         self.drop = np.zeros((self.grid.rows, round(WIDTH / PIXEL)))
-        self.state = np.full(self.drop.shape, State.LINING, np.uint8)
+        self.state = np.full(self.drop.shape, PixelState.LINING, np.uint8)
         self.chainage, self.arc = (np.arange(self.drop.shape[1]) + 0.5) * PIXEL, self.grid.arcs()[:, None]
 
     def inside(self, shape: Polygon) -> np.ndarray:
@@ -47,15 +47,15 @@ class Canvas:
     def paint(self, shape: Polygon, drop: float) -> None:
         self.drop = np.maximum(self.drop, drop * ndimage.gaussian_filter(self.inside(shape), 0.4))
 
-    def detect(self) -> Detection:
+    def find_anomalies(self) -> Detection:
         noisy = self.drop + self.rng.normal(0, SIGMA, self.drop.shape)
         empty = self.rng.random(self.drop.shape) > self.filled
         drop = np.full((self.grid.rows, self.grid.columns), NODATA, np.int16)
         state = np.zeros(drop.shape, np.uint8)
         drop[:, : self.drop.shape[1]] = np.where(empty, NODATA, np.rint(100 * noisy))
-        state[:, : self.drop.shape[1]] = np.where(empty & (self.state == State.LINING), State.EMPTY, self.state)
+        state[:, : self.drop.shape[1]] = np.where(empty & (self.state == PixelState.LINING), PixelState.EMPTY, self.state)
         sigma = np.full((self.grid.rows // 25, self.grid.columns // 25), SIGMA, np.float32)
-        return detect(Relative(self.grid, state, drop, 25, sigma), SimpleNamespace(count=1), 0.05)
+        return find_anomalies(ContrastImage(self.grid, state, drop, 25, sigma), SimpleNamespace(count=1), 0.05)
 
 
 def blob(chainage: float, arc: float, area: float, seed: int = 0) -> Polygon:
@@ -174,7 +174,7 @@ def test_repairs_that_joints_and_appendages_cut_up_have_straight_sides_still(dro
         canvas.paint(patch, drop)
     canvas.paint(box(2.2, -HALF, 2.22, HALF), 3.0)  # a joint through the first
     for hidden in (box(2.3, 1.2, 2.65, 1.6), box(4.0, 0.8, 8.0, 0.95), box(9.9, 0.2, 10.2, 0.5), box(8.9, 1.1, 9.3, 1.5)):
-        canvas.state[canvas.inside(hidden) > 0] = State.OFF
+        canvas.state[canvas.inside(hidden) > 0] = PixelState.OFF
     found = [anomaly for anomaly in canvas.detect().found if anomaly.verdict.kind != "joint"]
     assert len(found) == 4
     assert all(anomaly.verdict.reasons[0] == "rectangular" for anomaly in found)
@@ -202,8 +202,8 @@ def test_leaks_of_many_shapes_are_not_taken_for_something_built(seed: int) -> No
 
 def test_what_shows_between_appendages_only_is_no_leak() -> None:
     canvas = Canvas(12)
-    canvas.state[canvas.inside(box(3.0, 0.0, 6.0, 1.2)) > 0] = State.OFF
-    canvas.state[canvas.inside(box(3.3, 0.4, 5.7, 0.8)) > 0] = State.LINING
+    canvas.state[canvas.inside(box(3.0, 0.0, 6.0, 1.2)) > 0] = PixelState.OFF
+    canvas.state[canvas.inside(box(3.3, 0.4, 5.7, 0.8)) > 0] = PixelState.LINING
     canvas.paint(box(3.3, 0.4, 5.7, 0.8), 4.0)
     (only,) = canvas.detect().found
     assert only.verdict.kind == "dark"
@@ -223,7 +223,7 @@ def test_a_bolt_pocket_is_dark_and_a_leak_on_the_back_of_a_niche_is_a_leak() -> 
     pockets = [box(1 + 2 * k, 2.0, 1.25 + 2 * k, 2.25) for k in range(5)]
     niche = box(3.0, -2.5, 5.0, -0.5)
     for recess in (*pockets, niche):
-        canvas.state[canvas.inside(recess) > 0.5] = State.RECESS
+        canvas.state[canvas.inside(recess) > 0.5] = PixelState.RECESS
     for pocket in pockets:
         canvas.paint(pocket, 3.0)
     leak = blob(4.0, -1.5, 0.6)
@@ -238,7 +238,7 @@ def test_a_bolt_pocket_is_dark_and_a_leak_on_the_back_of_a_niche_is_a_leak() -> 
 
 def test_a_dark_line_beside_a_cable_is_its_shadow() -> None:
     canvas = Canvas(8)
-    canvas.state[np.abs(canvas.arc[:, 0] - 1.0) < 0.04] = State.OFF
+    canvas.state[np.abs(canvas.arc[:, 0] - 1.0) < 0.04] = PixelState.OFF
     canvas.paint(box(2.0, 1.04, 12.0, 1.13), 3.0)
     found = canvas.detect()
     assert found.found
@@ -255,7 +255,7 @@ def _region(side: int, drop: float, share: float = 1.0, pixel: float = PIXEL) ->
     row, column = np.mgrid[:side, :side]
     mask = np.hypot(row - side / 2 + 0.5, column - side / 2 + 0.5) < side / 2
     filled = round(share * mask.sum())
-    traits = Traits(sigma=filled * SIGMA, rim=4.0 * side, steps=4.0 * side, inside=4.0 * side * drop)
+    traits = RegionProperties(sigma=filled * SIGMA, rim=4.0 * side, steps=4.0 * side, inside=4.0 * side * drop)
     return Region(pixel, 0, 0, mask, filled, filled * drop, drop, traits)
 
 

@@ -11,7 +11,7 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.frame import plan_lengths, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
 from tunneldb.pointcloud.poses import PoseModel
-from tunneldb.pointcloud.reader import Points, Source
+from tunneldb.pointcloud.reader import Points, ScanSource
 from tunneldb.radiometry.correction import Kind, to_decibel
 from tunneldb.radiometry.oren_nayar import incidence_db
 from tunneldb.radiometry.reference_curve import ReferenceCurve
@@ -19,9 +19,9 @@ from tunneldb.raster import rasterize as module
 from tunneldb.raster.accumulator import LEVEL, OFFSET, Accumulator
 from tunneldb.raster.floor import Floor
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.observation import Eye, Radiometer
+from tunneldb.raster.observation import Observer, Radiometer
 from tunneldb.raster.projection import WEIGHT
-from tunneldb.raster.rasterize import Lens, gather
+from tunneldb.raster.rasterize import Projector, rasterize
 from tunneldb.threads import threads, use_threads
 
 KM, START, LENGTH = 3, 3100.0, 60.0
@@ -85,7 +85,7 @@ def cloud(count: int, seed: int = 1) -> Points:
     offset[loose] = rng.uniform(-3.5, 3.5, loose.sum())
     exact = np.flatnonzero(rng.random(count) < 0.02)
     chainage[exact] = rng.choice(np.concatenate([SURFACE.ends[:, 0], SURFACE.chainages, [START]]), len(exact))
-    xyz = SURFACE.roll(chainage, arc, offset)
+    xyz = SURFACE.to_space(chainage, arc, offset)
     lost = np.isnan(xyz[:, 0])
     xyz[lost] = ORIGIN + rng.uniform(-80.0, 80.0, (lost.sum(), 3))
     time = np.clip(chainage - START - 1.0 + rng.normal(0.0, 0.01, count), 0.0, LENGTH - 2.0)
@@ -98,12 +98,12 @@ def cloud(count: int, seed: int = 1) -> Points:
     )
 
 
-def eye(kind: str, mobile: bool, curve: ReferenceCurve = FAR) -> Eye:
+def observer(kind: str, mobile: bool, curve: ReferenceCurve = FAR) -> Observer:
     if kind == "none":
-        return Eye.of(SURFACE, KM, DEPTH, None, FLOOR)
+        return Observer.of(SURFACE, KM, DEPTH, None, FLOOR)
     reference = None if kind == "reflectance" else curve
     typed: Kind = kind  # type: ignore[assignment]
-    return Eye.of(SURFACE, KM, DEPTH, Radiometer(typed, poses(mobile), reference, MAX_INCIDENCE, MAX_RANGE), FLOOR)
+    return Observer.of(SURFACE, KM, DEPTH, Radiometer(typed, poses(mobile), reference, MAX_INCIDENCE, MAX_RANGE), FLOOR)
 
 
 def grid(pixel: float = 0.02) -> Grid:
@@ -116,9 +116,9 @@ def test_each_point_is_what_the_steps_in_numpy_make_of_it(kind: str, mobile: boo
     points = cloud(60_000)
     points.intensity[::50] = np.nan
     points.intensity[1::50] = 0.0
-    look = eye(kind, mobile, CURVE)
+    look = observer(kind, mobile, CURVE)
     assert look.edges.sharp.any()
-    pixels, tally = Lens.of(look, grid(), ROUGHNESS).look(points)
+    pixels, tally = Projector.of(look, grid(), ROUGHNESS).project(points)
 
     unrolled = SURFACE.unroll(points.xyz)
     row, column = grid().place(unrolled.chainage, unrolled.arc)
@@ -160,22 +160,22 @@ def test_the_order_of_points_does_not_change_where_they_fall() -> None:
     points = cloud(30_000, 2)
     order = np.random.default_rng(3).permutation(len(points))
     mixed = Points(*(getattr(points, name)[order] for name in Points.__dataclass_fields__))
-    lens = Lens.of(eye("amplitude", True), grid(), ROUGHNESS)
-    straight = [array[: len(points)].copy() for array in lens.look(points)[0]]
-    shuffled = [array[: len(points)].copy() for array in lens.look(mixed)[0]]
+    projector = Projector.of(observer("amplitude", True), grid(), ROUGHNESS)
+    straight = [array[: len(points)].copy() for array in projector.project(points)[0]]
+    shuffled = [array[: len(points)].copy() for array in projector.project(mixed)[0]]
     np.testing.assert_array_equal(straight[1][order], shuffled[1])
     held = shuffled[1] >= 0
     for one, other in zip(straight, shuffled, strict=True):
         np.testing.assert_array_equal(one[order][held], other[held])
 
 
-def read(monkeypatch: pytest.MonkeyPatch, look: Eye, parts: list[list[Points]], pixel: float = 0.1) -> Accumulator:
+def read(monkeypatch: pytest.MonkeyPatch, look: Observer, parts: list[list[Points]], pixel: float = 0.1) -> Accumulator:
     """Image of files, each a list of chunks."""
     files = {Path(f"{k}.laz"): chunks for k, chunks in enumerate(parts)}
     monkeypatch.setattr(module, "read_chunks", lambda path, dimension, size, ranges: iter(files[path]))
     image = Accumulator(grid(pixel))
-    sources = [Source(path, [(0, sum(map(len, chunks)))], "Amplitude") for path, chunks in files.items()]
-    gather(look, sources, image, ROUGHNESS, lambda share: None)
+    sources = [ScanSource(path, [(0, sum(map(len, chunks)))], "Amplitude") for path, chunks in files.items()]
+    rasterize(look, sources, image, ROUGHNESS, lambda share: None)
     return image
 
 
@@ -184,7 +184,7 @@ def part(points: Points, chosen: np.ndarray) -> Points:
 
 
 def test_the_image_depends_neither_on_files_nor_on_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    points, look, before = cloud(50_000, 4), eye("amplitude", True), threads()
+    points, look, before = cloud(50_000, 4), observer("amplitude", True), threads()
     index = np.arange(len(points))
     splits = [
         [[points]],
@@ -207,8 +207,8 @@ def test_the_image_depends_neither_on_files_nor_on_threads(monkeypatch: pytest.M
 
 
 def test_a_pixel_is_the_weighted_mean_of_its_points(monkeypatch: pytest.MonkeyPatch) -> None:
-    points, look = cloud(50_000, 6), eye("reflectance", False)
-    pixels, _ = Lens.of(look, grid(0.5), ROUGHNESS).look(points)
+    points, look = cloud(50_000, 6), observer("reflectance", False)
+    pixels, _ = Projector.of(look, grid(0.5), ROUGHNESS).project(points)
     with read(monkeypatch, look, [[points]], 0.5) as image:
         window = image.window(0, image.grid.columns)
     # One that points of very different weight fall into.
@@ -231,19 +231,19 @@ def test_points_of_unknown_scanner_position_are_refused(monkeypatch: pytest.Monk
     points = cloud(20_000, 7)
     points.time[15_000:] += 2.5
     with pytest.raises(UserError, match=r"0\.laz: gps_time of \d+ points is outside the trajectory, up to 2\.[45]\d\d s after"):
-        read(monkeypatch, eye("amplitude", True), [[points]])
+        read(monkeypatch, observer("amplitude", True), [[points]])
     points.scan_id[points.scan_id == 12] = 13
     with pytest.raises(UserError, match=r"0\.laz: no station for scan_id 13 \(\d+ points\)"):
-        read(monkeypatch, eye("amplitude", False), [[points]])
+        read(monkeypatch, observer("amplitude", False), [[points]])
 
 
 def test_a_time_just_beyond_the_trajectory_is_that_of_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
     points = cloud(20_000, 8)
     points.time[:] = LENGTH - 2.0
-    with read(monkeypatch, eye("amplitude", True), [[points]], 0.5) as image:
+    with read(monkeypatch, observer("amplitude", True), [[points]], 0.5) as image:
         at_end = image.window(0, image.grid.columns)
     points.time[:] += 0.0009
-    with read(monkeypatch, eye("amplitude", True), [[points]], 0.5) as image:
+    with read(monkeypatch, observer("amplitude", True), [[points]], 0.5) as image:
         beyond = image.window(0, image.grid.columns)
     np.testing.assert_array_equal(at_end.corrected, beyond.corrected)
 
@@ -251,11 +251,11 @@ def test_a_time_just_beyond_the_trajectory_is_that_of_its_end(monkeypatch: pytes
 def test_points_that_the_curve_does_not_span_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     short = ReferenceCurve.from_rows(np.array([0.5, 3.0]), np.array([30.0, 28.0]))
     with pytest.raises(UserError, match=r"spans 0\.5 to 3 m, the lining lies .* % "):
-        read(monkeypatch, eye("amplitude", True, short), [[cloud(20_000, 9)]])
+        read(monkeypatch, observer("amplitude", True, short), [[cloud(20_000, 9)]])
 
 
 def test_no_point_on_the_lining_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     points = cloud(5_000)
     points.xyz[:, 2] += 30.0
     with pytest.raises(UserError, match=r"no point of 0\.laz lies on the lining of kilometre 3"):
-        read(monkeypatch, eye("amplitude", True), [[points]])
+        read(monkeypatch, observer("amplitude", True), [[points]])

@@ -6,17 +6,17 @@ import shapely
 import shapely.affinity
 from shapely.geometry import Polygon, box
 
-from tunneldb.anomalies.background.contrast import Relative
+from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.detect import _columns, _filled
 from tunneldb.anomalies.matching import match, match_parts
-from tunneldb.anomalies.regions import regions
+from tunneldb.anomalies.regions import find_regions
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
 from tunneldb.errors import UserError
 from tunneldb.raster.accumulator import LEVEL, OFFSET, Accumulator
 from tunneldb.raster.appendages import distance_from_plane, off_plane, reach, recessed
 from tunneldb.raster.geotiff import NODATA, Raster, decode, encode
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import State
+from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.projection import WEIGHT, Pixels
 
 PIXEL = 0.02
@@ -270,7 +270,7 @@ def _rings():
     wet = (distance < 60) & (distance > 20)
     corrected[wet] -= 3.0
     state = (rng.random(corrected.shape) < 0.6).astype(np.uint8)
-    level = np.where(state == State.LINING, np.rint(corrected * 100), NODATA).astype(np.int16)
+    level = np.where(state == PixelState.LINING, np.rint(corrected * 100), NODATA).astype(np.int16)
     return state, level, wet
 
 
@@ -283,14 +283,14 @@ def cut_out(mask, level, min_area, dry_mean=0.0):
     whole[:, 50 : 50 + mask.shape[1]] = mask
     state = (drop != NODATA).astype(np.uint8)
     sigma = np.full((-(-len(mask) // 25), grid.columns // 25), 0.3, np.float32)
-    found = regions(whole, whole, Relative(grid, state, drop, 25, sigma), min_area, lambda _: True)
+    found = find_regions(whole, whole, ContrastImage(grid, state, drop, 25, sigma), min_area, lambda _: True)
     return [shapely.affinity.translate(region.outline, -50 * PIXEL) for region in found], found
 
 
 def test_wet_polygon_with_a_hole_has_the_true_area_and_drop():
     state, level, _ = _rings()
     sigma = np.full((1, 1), 0.3, np.float32)
-    mask = dark_pixels(Relative(Grid(0, PIXEL, 0, 200), state, -level, 300, sigma), filter_size(0.6))
+    mask = dark_pixels(ContrastImage(Grid(0, PIXEL, 0, 200), state, -level, 300, sigma), filter_size(0.6))
     (found,), (region,) = cut_out(mask, level, 0.05, 0.5)
     centre = shapely.Point(150 * PIXEL, 100 * PIXEL)
     true = centre.buffer(60 * PIXEL, 64).difference(centre.buffer(20 * PIXEL, 64))
@@ -346,9 +346,9 @@ def test_a_part_known_before_and_the_whole_are_the_same_leak():
 
 
 def test_gap_in_the_scan_is_not_taken_for_a_sparse_scan() -> None:
-    state = np.full((10, 400), State.EMPTY, np.uint8)
-    state[:, 20:60] = state[:, 300:350] = State.LINING
-    state[:, 30:40:3] = State.EMPTY
+    state = np.full((10, 400), PixelState.EMPTY, np.uint8)
+    state[:, 20:60] = state[:, 300:350] = PixelState.LINING
+    state[:, 30:40:3] = PixelState.EMPTY
     columns = _columns(state, 0, 400)
     assert _filled(*columns, 50) == pytest.approx(86 / 90)
     assert _filled(*columns, 400) == pytest.approx(86 / 330)

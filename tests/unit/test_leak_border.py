@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tunneldb.anomalies.background.contrast import Relative
+from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.detect import Found
-from tunneldb.anomalies.regions import Region, Traits, regions, together, unite
+from tunneldb.anomalies.regions import Region, RegionProperties, find_regions, together, unite
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
 
@@ -34,8 +34,8 @@ def cut_by_kilometre(mask: np.ndarray, level: np.ndarray, first: int, bottom: in
         wet[here], levels[here] = mask[there], level[there]
         drop = np.where(levels == NODATA, NODATA, 100 * DRY - levels).astype(np.int16)
         sigma = np.full((len(wet), grid.columns), 0.25, np.float32)
-        relative = Relative(grid, (drop != NODATA).astype(np.uint8), drop, 1, sigma)
-        found += [(km, region) for region in regions(wet, wet, relative, 0.0, lambda _: True)]
+        relative = ContrastImage(grid, (drop != NODATA).astype(np.uint8), drop, 1, sigma)
+        found += [(km, region) for region in find_regions(wet, wet, relative, 0.0, lambda _: True)]
     return found
 
 
@@ -91,7 +91,7 @@ def test_a_leak_across_three_kilometres_is_one() -> None:
 
 def test_regions_that_touch_by_a_corner_or_have_other_pixels_stay_apart() -> None:
     def part(column: int, row: int, pixel: float = PIXEL) -> Region:
-        return Region(pixel, column, row, np.ones((2, 3), bool), 6, 1.0, 1.0, Traits())
+        return Region(pixel, column, row, np.ones((2, 3), bool), 6, 1.0, 1.0, RegionProperties())
 
     assert together([part(0, 0), part(3, 1)]) == [[0, 1]]
     assert together([part(3, 1), part(0, 0)]) == [[1, 0]]

@@ -12,14 +12,14 @@ from tunneldb.anomalies.geometries import shapes
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.ground.wall_arcs import foot_arcs
 from tunneldb.geometry.plan_line import PlanLine
-from tunneldb.geometry.section_outliers import Astray
+from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.radiometry.edge_normals import Edges
 from tunneldb.raster import appendages as appendage
 from tunneldb.raster import ring_steps as step
 from tunneldb.raster.accumulator import Accumulator
 from tunneldb.raster.floor import FLOOR_EDGE, Floor
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import State, reach, states
+from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
 from tunneldb.raster.projection import Pixels
 
 
@@ -115,14 +115,14 @@ def test_a_section_measured_in_a_niche_or_on_a_box_leaves_the_wall(apart):
     radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
     radius[5, 250:300] += apart
     surface = straight(radius)
-    astray = Astray.of(surface)
+    outliers = SectionOutliers.of(surface)
     at = np.array([20.0, float(surface.chainages[5]), 40.0])
     middle = np.interp(275, np.arange(361), surface.arcs[5])
     edge = np.interp(250, np.arange(361), surface.arcs[5])
-    level, bent = astray.level(at, np.array([middle, -middle, 0.0, edge]))
+    level, bent = outliers.level(at, np.array([middle, -middle, 0.0, edge]))
     np.testing.assert_allclose(level[:3], [[0, apart, 0], [0, 0, 0], [0, 0, 0]], atol=1e-6)
     assert bent.tolist() == [[False] * 3, [False] * 3, [False] * 3, [False, True, False]]
-    assert astray.level(at[[0, 2]], np.array([middle])) is None
+    assert outliers.level(at[[0, 2]], np.array([middle])) is None
 
 
 def wall(rng, surface, depth):
@@ -148,31 +148,31 @@ def test_the_back_of_a_niche_is_lining_though_a_section_was_measured_in_it(measu
         image.add(Pixels(row, column, np.ones(len(x), np.int32), offset, nothing, nothing), len(x))
         columns = slice(400, 800)
         window = image.window(columns.start - reach(0.05), columns.stop + reach(0.05))
-        state = states(window, columns, grid, floor, Astray.of(surface), 0.03)
+        state = pixel_states(window, columns, grid, floor, SectionOutliers.of(surface), 0.03)
     inside = (column >= 400) & (column < 800)
     seen = np.zeros(len(x), np.uint8)
     seen[inside] = state[row[inside], column[inside] - 400]
     within = (np.minimum(x - 26.0, 29.0 - x) > 0.3) & (z > -1.3) & (z < 0.7)
     around = (np.maximum(26.0 - x, x - 29.0) > 0.3) | (z < -1.8) | (z > 1.3)
     edge = niche & (np.minimum(x - 26.0, 29.0 - x) < 0.02)
-    assert (seen[within] == State.RECESS).all()
+    assert (seen[within] == PixelState.RECESS).all()
     # Where the surface bends from the wall into the niche and back, over some degrees, there is none.
     share = 0.8 if measured else 1.0
-    assert (seen[around & inside] == State.LINING).mean() >= share
-    assert (seen[around & inside & (np.abs(z) < 0.5)] == State.LINING).all()
-    assert (seen[edge] == State.OFF).mean() > 0.98
+    assert (seen[around & inside] == PixelState.LINING).mean() >= share
+    assert (seen[around & inside & (np.abs(z) < 0.5)] == PixelState.LINING).all()
+    assert (seen[edge] == PixelState.OFF).mean() > 0.98
 
 
 def test_beyond_the_ends_of_the_section_nothing_is_left_to_be_seen():
     grid = Grid.covering(0, 0.05, -15.0, 15.0)
     floor = Floor.of(0, np.full(61, np.nan), np.full(61, np.nan))
     with Accumulator(grid) as image:
-        state = states(image.window(0, 1400), slice(200, 1400), grid, floor, Astray.of(ROUND), 0.03)
+        state = pixel_states(image.window(0, 1400), slice(200, 1400), grid, floor, SectionOutliers.of(ROUND), 0.03)
     arc, chainage = grid.arcs(), grid.chainages(slice(200, 1400))
     beyond = np.abs(arc) > 4.0 * np.pi + 0.05
-    assert (state[beyond] == State.OFF).all()
-    assert (state[np.abs(arc) < 4.0 * np.pi - 0.05][:, chainage < LENGTH] == State.EMPTY).all()
-    assert (state[:, chainage > LENGTH + 5.0] == State.OFF).all()
+    assert (state[beyond] == PixelState.OFF).all()
+    assert (state[np.abs(arc) < 4.0 * np.pi - 0.05][:, chainage < LENGTH] == PixelState.EMPTY).all()
+    assert (state[:, chainage > LENGTH + 5.0] == PixelState.OFF).all()
 
 
 def ring(rng, pixel, filled=0.9):
@@ -229,16 +229,16 @@ def test_what_does_not_go_all_round_is_no_step():
 def test_rock_that_differs_from_section_to_section_is_lining():
     rng = np.random.default_rng(1)
     radius = 4.0 + np.repeat(rng.normal(0, 0.1, (12, 73)), 5, axis=1)[:, :361]
-    assert (Astray.of(straight(radius)).apart != 0).mean() < 0.03
+    assert (SectionOutliers.of(straight(radius)).apart != 0).mean() < 0.03
 
 
 def test_a_wider_stretch_is_no_niche():
     radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
     radius[6:] += 0.5
-    assert not Astray.of(straight(radius)).apart.any()
+    assert not SectionOutliers.of(straight(radius)).apart.any()
     radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
     radius[6] += 0.5
-    assert not Astray.of(straight(radius)).apart.any()
+    assert not SectionOutliers.of(straight(radius)).apart.any()
 
 
 @pytest.mark.parametrize(

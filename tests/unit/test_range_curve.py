@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tunneldb.errors import UserError
-from tunneldb.radiometry.cells import Sight
-from tunneldb.radiometry.dependence import Dependence, course
+from tunneldb.radiometry.cells import IntensitySamples
+from tunneldb.radiometry.dependence import Dependence, class_means
 from tunneldb.radiometry.oren_nayar import incidence_db
 from tunneldb.radiometry.range_curve import estimate_range_curve
 from tunneldb.radiometry.range_spline import RangeSpline, one_maximum
@@ -24,7 +24,7 @@ def _sight(true=range_term, **parameters):
     range_m = cloud.range[near].astype(float)
     level = cloud.amplitude[near] - range_term(range_m) + true(range_m)
     place = np.column_stack([cloud.chainage[near], cloud.arc[near]])
-    return Sight(place, cloud.scan_id[near], range_m, np.cos(cloud.incidence[near].astype(float)), level)
+    return IntensitySamples(place, cloud.scan_id[near], range_m, np.cos(cloud.incidence[near].astype(float)), level)
 
 
 def _errors(found, true):
@@ -47,17 +47,19 @@ def test_curve_of_static_stations_is_within_a_third_of_a_decibel(seed, section, 
     assert found.roughness == pytest.approx(roughness, abs=2.0)
 
 
-def _alone(sight):
+def _alone(samples):
     """Each cell as only the nearest scan saw it."""
-    cell = np.unique(np.floor(sight.place / 0.5).astype(int), axis=0, return_inverse=True)[1].reshape(-1)
-    order = np.lexsort((sight.range_m, cell))
-    nearest = sight.scan[order[np.unique(cell[order], return_index=True)[1]]]
-    return sight.some(sight.scan == nearest[cell])
+    cell = np.unique(np.floor(samples.place / 0.5).astype(int), axis=0, return_inverse=True)[1].reshape(-1)
+    order = np.lexsort((samples.range_m, cell))
+    nearest = samples.scan[order[np.unique(cell[order], return_index=True)[1]]]
+    return samples.some(samples.scan == nearest[cell])
 
 
-def _darker(sight, drop):
+def _darker(samples, drop):
     """Soot up to so many dB, by chainage and arc."""
-    return Sight(sight.place, sight.scan, sight.range_m, sight.cosine, sight.level - drop(*sight.place.T))
+    return IntensitySamples(
+        samples.place, samples.scan, samples.range_m, samples.cosine, samples.level - drop(*samples.place.T)
+    )
 
 
 SOOT = {
@@ -91,8 +93,8 @@ def test_a_profiler_that_moves_across_the_section_tells():
     away = 3.0 + 1.5 * np.sin(place[:, 0] / 1.5)
     range_m = np.hypot(away, place[:, 1])
     level = range_term(range_m) + incidence_db(away / range_m, 15.0) + rng.normal(0, 0.3, len(place))
-    sight = Sight(place, np.zeros(len(place), int), range_m, away / range_m, level)
-    found = estimate_range_curve(_darker(sight, SOOT["constant"]))
+    samples = IntensitySamples(place, np.zeros(len(place), int), range_m, away / range_m, level)
+    found = estimate_range_curve(_darker(samples, SOOT["constant"]))
     found.require()
     assert found.overlapping == 0
     assert np.abs(_errors(found, range_term)[0]).max() < 0.2
@@ -141,7 +143,7 @@ def test_cells_of_any_reflectance_seen_by_several_scans():
     cosine = wall / range_m
     cell = np.floor(place / 0.5) @ [1, 1000]
     level = np.sin(cell * 12.9898) + range_term(range_m) + incidence_db(cosine, 15.0) + rng.normal(0, 0.3, len(place))
-    found = estimate_range_curve(Sight(place, scan, range_m, cosine, level).some(cosine > np.cos(np.radians(75))))
+    found = estimate_range_curve(IntensitySamples(place, scan, range_m, cosine, level).some(cosine > np.cos(np.radians(75))))
     found.require()
     assert np.abs(_errors(found, range_term)[0]).max() < 0.3
     assert found.roughness == pytest.approx(15.0, abs=2.0)
@@ -155,18 +157,18 @@ def test_range_and_incidence_that_are_one_function_are_refused():
     range_m = np.hypot(place[:, 0] - 20.0 * scan, 4.0)
     level = range_term(range_m) + incidence_db(4.0 / range_m, 15.0) + rng.normal(0, 0.3, len(place))
     with pytest.raises(UserError, match=r"uncertain by .* dB at .*scan a target"):
-        estimate_range_curve(Sight(place, scan, range_m, 4.0 / range_m, level)).require()
+        estimate_range_curve(IntensitySamples(place, scan, range_m, 4.0 / range_m, level)).require()
 
 
 def test_too_little_lining_is_refused():
-    sight = _sight()
+    samples = _sight()
     with pytest.raises(UserError, match="it takes 200"):
-        estimate_range_curve(sight.some(sight.place[:, 0] < 2.0))
+        estimate_range_curve(samples.some(samples.place[:, 0] < 2.0))
 
 
 def test_a_curve_goes_on_beyond_what_it_was_found_on():
-    sight = _sight(_inverse_square, seed=6)
-    found = estimate_range_curve(sight, reach=(1.0, 40.0))
+    samples = _sight(_inverse_square, seed=6)
+    found = estimate_range_curve(samples, reach=(1.0, 40.0))
     assert found.curve.range_m[0] < 1.0
     assert found.curve.range_m[-1] > 40.0
     # The inverse square is a straight line over ln R.
@@ -200,10 +202,10 @@ def test_one_maximum_is_the_least_loss_of_that_shape():
 def test_course_of_a_straight_line():
     rng = np.random.default_rng(8)
     at = rng.uniform(2.0, 12.0, 50_000)
-    seen = course(at, 3.0 - 0.5 * at + rng.normal(0, 0.1, len(at)))
+    seen = class_means(at, 3.0 - 0.5 * at + rng.normal(0, 0.1, len(at)))
     assert seen.slope == pytest.approx(-0.5, abs=0.005)
     assert seen.spread == pytest.approx(0.5 * 10.0 / np.sqrt(12.0), rel=0.02)
-    assert len(course(at[:5], at[:5]).at) == 0
+    assert len(class_means(at[:5], at[:5]).at) == 0
 
 
 def test_verdict_says_what_is_left():

@@ -79,10 +79,10 @@ def test_no_ray_goes_through_a_stone() -> None:
     """Each stone hides what is behind it: along rays to the ballast all other points of it stay below."""
     simulation, u, h, cloud = floor(scanner="static", ballast=0.02, length=10.0, angular_step=0.25)
     stone = np.flatnonzero((cloud.klass == FLOOR) & (np.abs(u) < 2.5))
-    eye = simulation.scanner.stations()[0]
+    observer = simulation.scanner.stations()[0]
     rng = np.random.default_rng(3)
     chosen = rng.choice(stone, 4000)
-    back = cloud.xyz[chosen] - eye
+    back = cloud.xyz[chosen] - observer
     back /= np.linalg.norm(back, axis=1)[:, None]
     tree = cKDTree(cloud.xyz[stone, :2])
     for before in (0.03, 0.06, 0.12):

@@ -146,7 +146,7 @@ def test_there_and_back(section: Section, line: CentreLine, share: float, along:
     if np.abs(abs(arc) - section.parts[1:, 1]).min() < 0.4:
         return  # near corners the nearest point is another one
     s = line.start + share * (line.end - line.start)
-    back = tunnel.unroll(tunnel.roll(np.array([s]), np.array([arc]), np.array([offset])))
+    back = tunnel.unroll(tunnel.to_space(np.array([s]), np.array([arc]), np.array([offset])))
     assert back.chainage[0] == pytest.approx(s, abs=1e-8)
     assert back.arc[0] == pytest.approx(arc, abs=1e-8)
     assert back.offset[0] == pytest.approx(offset, abs=1e-8)
@@ -157,12 +157,15 @@ def test_normal_is_perpendicular_to_the_surface(line: CentreLine) -> None:
     tunnel = Tunnel(line, SECTIONS["leaning"])
     rng = np.random.default_rng(5)
     s, arc = rng.uniform(line.start + 1, line.end - 1, 300), rng.uniform(-8.5, 8.5, 300)
-    normal = tunnel.unroll(tunnel.roll(s, arc)).normal
+    normal = tunnel.unroll(tunnel.to_space(s, arc)).normal
     h = 1e-4
-    for tangent in (tunnel.roll(s + h, arc) - tunnel.roll(s - h, arc), tunnel.roll(s, arc + h) - tunnel.roll(s, arc - h)):
+    for tangent in (
+        tunnel.to_space(s + h, arc) - tunnel.to_space(s - h, arc),
+        tunnel.to_space(s, arc + h) - tunnel.to_space(s, arc - h),
+    ):
         np.testing.assert_allclose(np.sum(tangent * normal, axis=1) / (2 * h), 0.0, atol=2e-5)
     centre = line.position(s)
-    assert np.all(np.sum((centre - tunnel.roll(s, arc)) * normal, axis=1) > 0)
+    assert np.all(np.sum((centre - tunnel.to_space(s, arc)) * normal, axis=1) > 0)
 
 
 def test_level_circular_tunnel_on_an_arc_is_a_torus() -> None:
@@ -170,7 +173,7 @@ def test_level_circular_tunnel_on_an_arc_is_a_torus() -> None:
     tunnel = Tunnel(CentreLine.curve(100.0, bend, straight=0.0, azimuth=0.0), circular(r, 2.8))
     rng = np.random.default_rng(6)
     s, arc = rng.uniform(0.0, 100.0, 1000), rng.uniform(-9.3, 9.3, 1000)
-    x, y, z = tunnel.roll(s, arc).T
+    x, y, z = tunnel.to_space(s, arc).T
     to_centre = np.hypot(x - bend, y)
     np.testing.assert_allclose(np.hypot(to_centre - bend, z), r, atol=1e-10)
     np.testing.assert_allclose(bend * np.arctan2(y, bend - x), s, atol=1e-9)

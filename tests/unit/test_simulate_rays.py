@@ -121,9 +121,9 @@ def test_cables_are_tubes_and_hide_the_lining_behind_them() -> None:
     np.testing.assert_allclose(to[on], row[7], atol=2e-4)
     # Seen from the trolley, no point of the lining lies in line with the middle of the cable.
     assert simulation.tunnel.section.floor < row[4]
-    eye = np.array([p.scanner_offset, simulation.tunnel.section.floor + p.scanner_height])
-    point = np.column_stack([np.sum(d * f.u, axis=1), np.sum(d * f.w, axis=1)]) - eye
-    middle = row[3:5] - eye
+    observer = np.array([p.scanner_offset, simulation.tunnel.section.floor + p.scanner_height])
+    point = np.column_stack([np.sum(d * f.u, axis=1), np.sum(d * f.w, axis=1)]) - observer
+    middle = row[3:5] - observer
     angle = np.arctan2(*point.T) - np.arctan2(*middle)
     hidden = np.abs(angle) < 0.8 * np.arcsin(row[7] / np.hypot(*middle))
     assert hidden.sum() > 50

@@ -25,7 +25,7 @@ def scan(**values: Any) -> tuple[Simulation, Cloud]:
     return Simulation(p), simulate(p)
 
 
-def eyes(simulation: Simulation, cloud: Cloud) -> np.ndarray:
+def observers(simulation: Simulation, cloud: Cloud) -> np.ndarray:
     """Where the trolley's scanner was at each point."""
     trajectory = simulation.scanner.trajectory()
     return np.column_stack([np.interp(cloud.time, trajectory[:, 0], c) for c in trajectory[:, 1:].T])
@@ -63,10 +63,10 @@ def test_pockets_are_recesses_seen_through_their_mouths(segments: tuple[Simulati
     assert (shapely.distance(shapely.union_all(pockets), points) < 2e-3).all()
     # Where the way to the back of a pocket crosses the surface, the pocket is open.
     sample = np.flatnonzero(deep)[back][:300]
-    eye, spot = eyes(simulation, cloud)[sample], cloud.xyz[sample]
+    observer, spot = observers(simulation, cloud)[sample], cloud.xyz[sample]
     share = np.linspace(0.0, 0.25, 251)
-    length = np.linalg.norm(spot - eye, axis=1)[:, None, None]
-    way = spot[:, None] + share[None, :, None] * (eye - spot)[:, None] / length
+    length = np.linalg.norm(spot - observer, axis=1)[:, None, None]
+    way = spot[:, None] + share[None, :, None] * (observer - spot)[:, None] / length
     plane = simulation.tunnel.unroll(way.reshape(-1, 3))
     offset = plane.offset.reshape(len(sample), -1)
     out = np.argmax(offset > 0.016, axis=1)  # above every ring

@@ -61,11 +61,11 @@ def gap(part: np.ndarray, xyz: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.maximum(q, 0.0), axis=-1) + np.minimum(q.max(axis=-1), 0.0)
 
 
-def passing(eye: np.ndarray, xyz: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Distance from a place to the segments from ``eye`` to ``xyz``."""
-    way = xyz - eye
-    share = np.clip(np.sum((centre - eye) * way, axis=1) / np.sum(way * way, axis=1), 0.0, 1.0)
-    return np.linalg.norm(eye + share[:, None] * way - centre, axis=1)
+def passing(observer: np.ndarray, xyz: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Distance from a place to the segments from ``observer`` to ``xyz``."""
+    way = xyz - observer
+    share = np.clip(np.sum((centre - observer) * way, axis=1) / np.sum(way * way, axis=1), 0.0, 1.0)
+    return np.linalg.norm(observer + share[:, None] * way - centre, axis=1)
 
 
 @pytest.fixture(scope="module", params=range(len(CASES)))
@@ -94,7 +94,7 @@ def test_points_lie_on_the_thing_whose_number_they_bear(scene: tuple[Simulation,
 def test_no_ray_goes_through_a_thing(scene: tuple[Simulation, Cloud]) -> None:
     """March to a sample of points past every ball, rod and brick."""
     simulation, cloud = scene
-    eye = sight(simulation, cloud)
+    observer = sight(simulation, cloud)
     rng = np.random.default_rng(1)
     behind = np.flatnonzero((cloud.range > 2.0) & (cloud.klass != OUTLIER))  # mixed pixels lie behind edges
     sample = np.union1d(rng.choice(behind, 3000), rng.choice(np.flatnonzero(cloud.thing > 0), 500))
@@ -102,18 +102,18 @@ def test_no_ray_goes_through_a_thing(scene: tuple[Simulation, Cloud]) -> None:
     for thing in simulation.things:
         middle, radius = thing.extent()
         for part, centre, reach in zip(thing.parts, middle, radius, strict=True):
-            near = sample[passing(eye[sample], cloud.xyz[sample], centre) < reach]
-            way = eye[near, None] + share[:, None] * (cloud.xyz[near] - eye[near])[:, None]
+            near = sample[passing(observer[sample], cloud.xyz[sample], centre) < reach]
+            way = observer[near, None] + share[:, None] * (cloud.xyz[near] - observer[near])[:, None]
             assert gap(part, way).min(initial=1.0) > -1e-6, thing.kind
 
 
 def test_no_point_lies_in_the_shadow_of_a_sphere(scene: tuple[Simulation, Cloud]) -> None:
     simulation, cloud = scene
-    eye = sight(simulation, cloud)
+    observer = sight(simulation, cloud)
     for sphere in simulation.spheres:
         others = cloud.thing != sphere.id
         others[others] &= cloud.klass[others] != OUTLIER  # mixed pixels lie behind its edge
-        assert passing(eye[others], cloud.xyz[others], sphere.centre).min() > sphere.radius - 1e-6
+        assert passing(observer[others], cloud.xyz[others], sphere.centre).min() > sphere.radius - 1e-6
 
 
 def _touching(p: Parameters) -> TargetSphere:
@@ -128,11 +128,11 @@ def test_exactly_the_rays_towards_a_sphere_meet_it(scanner: Any) -> None:
     p = Parameters(**values, spheres=3, sphere_radius=0.15)
     sphere = _touching(p)
     without, cloud = simulate(Parameters(**values)), simulate(p)
-    eye = sight(Simulation(p), without)
-    way = without.xyz - eye
+    observer = sight(Simulation(p), without)
+    way = without.xyz - observer
     distance = np.linalg.norm(way, axis=1)
-    along = np.sum((sphere.centre - eye) * way, axis=1) / distance
-    past = np.linalg.norm(sphere.centre - eye - along[:, None] * way / distance[:, None], axis=1)
+    along = np.sum((sphere.centre - observer) * way, axis=1) / distance
+    past = np.linalg.norm(sphere.centre - observer - along[:, None] * way / distance[:, None], axis=1)
     aimed = (past < sphere.radius * np.sqrt(1.0 - GRAZING**2)) & (along > 0.0) & (along < distance)
     on = (cloud.thing == sphere.id) | ((cloud.klass == OUTLIER) & np.isin(cloud.time, without.time[aimed]))
     clear = np.isin(cloud.thing, (0, sphere.id))  # tripods of the other spheres may stand before it
@@ -172,8 +172,8 @@ def test_about_half_of_the_hidden_sphere_is_seen() -> None:
     simulation = Simulation(p)
     cloud = simulate(p)
     hidden = simulation.spheres[3]
-    eye = simulation.tunnel.line.frame(simulation.tunnel.unroll(hidden.centre).chainage)
-    position = eye.position[0] + p.scanner_offset * eye.u[0] + simulation.scanner.height * eye.w[0]
+    observer = simulation.tunnel.line.frame(simulation.tunnel.unroll(hidden.centre).chainage)
+    position = observer.position[0] + p.scanner_offset * observer.u[0] + simulation.scanner.height * observer.w[0]
     distance = np.linalg.norm(position - hidden.centre)
     # Shots per area of a disc across the rays: profiles apart by 1 cm, shots in them by the angle.
     expected = np.pi * hidden.radius**2 / (p.profile_spacing * 2.0 * np.pi / p.profile_points * distance)
@@ -200,12 +200,12 @@ def test_mixed_pixels_lie_behind_edges() -> None:
     simulation, cloud = Simulation(p), simulate(p)
     mixed = np.flatnonzero(cloud.klass == OUTLIER)
     assert 20 < mixed.size < 0.1 * (cloud.thing > 0).sum()
-    eye = sight(simulation, cloud)[mixed]
-    way = eye[:, None] + np.linspace(0.0, 1.0, 4000)[:, None] * (cloud.xyz[mixed] - eye)[:, None]
+    observer = sight(simulation, cloud)[mixed]
+    way = observer[:, None] + np.linspace(0.0, 1.0, 4000)[:, None] * (cloud.xyz[mixed] - observer)[:, None]
     nearest = np.full(mixed.size, np.inf)
     for thing in simulation.things:
         for part, centre, reach in zip(thing.parts, *thing.extent(), strict=True):
-            near = np.flatnonzero(passing(eye, cloud.xyz[mixed], centre) < reach)
+            near = np.flatnonzero(passing(observer, cloud.xyz[mixed], centre) < reach)
             nearest[near] = np.minimum(nearest[near], gap(part, way[near]).min(axis=1, initial=np.inf))
     assert nearest.max() < 1e-3
     assert nearest.min() > -BEAM - 1e-6

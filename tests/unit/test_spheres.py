@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.targets import Ball, Rod, Thing, Wall, scan
-from tunneldb.classification.targets.curvature import Curved
+from tunneldb.classification.targets.curvature import CurvedCells
 from tunneldb.classification.targets.detection import Refusal, Sphere, confirmed, find_spheres, join
 from tunneldb.classification.targets.fit import coverage, distance_error, fit_ratio, fit_sphere
 from tunneldb.geometry.normals import eigenvalues, normal
@@ -23,14 +23,18 @@ FLOOR = Wall((X, Y, Z - 1.5), (0.0, 0.0, 1.0))
 
 
 def look(
-    things: list[Thing], seed: int, eye: tuple[float, float, float] = (-5.0, 0.0, 0.0), known: bool = True, step: float = 0.0018
+    things: list[Thing],
+    seed: int,
+    observer: tuple[float, float, float] = (-5.0, 0.0, 0.0),
+    known: bool = True,
+    step: float = 0.0018,
 ) -> tuple[list[Sphere], list[Refusal]]:
     """What is found of things around `AT` that are scanned from a place, relative to it."""
-    station = np.add(AT, eye)
-    opening = 0.9 / float(np.linalg.norm(eye))
+    station = np.add(AT, observer)
+    opening = 0.9 / float(np.linalg.norm(observer))
     points, _ = scan(things, station, step, seed, towards=AT, opening=opening)
-    eyes = np.broadcast_to(station if known else np.full(3, np.nan), points.shape)
-    return find_spheres(points, eyes, R, TOLERANCE)
+    observers = np.broadcast_to(station if known else np.full(3, np.nan), points.shape)
+    return find_spheres(points, observers, R, TOLERANCE)
 
 
 FOUND = {
@@ -80,8 +84,8 @@ OTHERS = {
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("eye", [(-5.0, 0.0, 0.0), (-3.0, -2.0, 1.0)], ids=["level", "above"])
 @pytest.mark.parametrize("name", OTHERS)
-def test_nothing_else_is_taken_for_one(name: str, eye: tuple[float, float, float], seed: int) -> None:
-    found, _ = look(OTHERS[name], seed, eye)
+def test_nothing_else_is_taken_for_one(name: str, observer: tuple[float, float, float], seed: int) -> None:
+    found, _ = look(OTHERS[name], seed, observer)
     assert not found
 
 
@@ -113,12 +117,12 @@ def test_two_spheres_that_touch_are_two() -> None:
 def test_the_order_of_the_points_hardly_matters() -> None:
     station = np.add(AT, (-5.0, 0.0, 0.0))
     points, _ = scan(FOUND["free"], station, 0.0018, 7, towards=AT)
-    eyes = np.broadcast_to(station, points.shape)
-    one, _ = find_spheres(points, eyes, R, TOLERANCE)
-    other, _ = find_spheres(np.random.default_rng(1).permutation(points), eyes, R, TOLERANCE)
+    observers = np.broadcast_to(station, points.shape)
+    one, _ = find_spheres(points, observers, R, TOLERANCE)
+    other, _ = find_spheres(np.random.default_rng(1).permutation(points), observers, R, TOLERANCE)
     assert len(one) == len(other) == 1
     assert distance_error(one[0].centre, other[0].centre) < 1e-5
-    again, _ = find_spheres(points, eyes, R, TOLERANCE)
+    again, _ = find_spheres(points, observers, R, TOLERANCE)
     assert np.array_equal(one[0].centre, again[0].centre)
 
 
@@ -134,8 +138,8 @@ def test_sigma_is_as_large_as_the_errors() -> None:
     station = np.add(AT, (-5.0, 0.0, 0.0))
     for seed in range(40):
         points, number = scan([Ball(AT, R), WALL], station, 0.0022, seed, towards=AT, opening=0.02)
-        eyes = np.broadcast_to(station, points.shape)
-        fit = fit_sphere(points, eyes, np.add(AT, 0.004), R, 3 * TOLERANCE)
+        observers = np.broadcast_to(station, points.shape)
+        fit = fit_sphere(points, observers, np.add(AT, 0.004), R, 3 * TOLERANCE)
         assert fit is not None
         assert np.mean(number[fit.used] == 0) > 0.98
         fixed.append(distance_error(fit.centre, np.array(AT)))
@@ -181,7 +185,7 @@ def test_curved_keeps_spheres_whole_and_walls_out() -> None:
         out = rng.standard_normal((150, 3))
         out[:, 1] = -np.abs(out[:, 1])
         balls.append(np.array(place) + R * out / np.linalg.norm(out, axis=1)[:, None] * [1, -1, 1])
-    curved = Curved(R, 30)
+    curved = CurvedCells(R, 30)
     parts = [np.array(AT) + part @ turn.T for part in (wall, *balls)]
     for part in parts:
         for chunk in np.array_split(part, 3):

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from tunneldb.anomalies.background.contrast import Relative
+from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
 from tunneldb.radiometry.robust_statistics import plain_statistics, robust_statistics
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import State
+from tunneldb.raster.pixel_state import PixelState
 
 TILE = 25
 
@@ -19,26 +19,28 @@ def spotted(seed=5):
     rng = np.random.default_rng(seed)
     row, column = np.mgrid[:200, :300]
     disc = np.hypot(row - 99.5, column - 149.5) < 60
-    state = np.where(rng.random(disc.shape) < 0.6, rng.choice([State.LINING, State.RECESS], disc.shape), State.EMPTY)
+    state = np.where(
+        rng.random(disc.shape) < 0.6, rng.choice([PixelState.LINING, PixelState.RECESS], disc.shape), PixelState.EMPTY
+    )
     drop = np.where(state > 0, np.rint(100 * (rng.normal(0, 0.3, disc.shape) + 3.0 * disc)), NODATA).astype(np.int16)
     sigma = rng.uniform(0.3, 1.2, (8, 12)).astype(np.float32)
-    return Relative(Grid(0, 0.02, 0, 200), state.astype(np.uint8), drop, TILE, sigma), disc
+    return ContrastImage(Grid(0, 0.02, 0, 200), state.astype(np.uint8), drop, TILE, sigma), disc
 
 
 @pytest.mark.parametrize("size", [5, 7, 11])
 def test_a_pixel_is_dark_by_the_vote_of_the_lining_about_it(size):
     relative, _ = spotted()
     state, drop = relative.state, relative.drop
-    state[50:60, 20:90] = State.OFF
-    state[:30] = State.FLOOR
+    state[50:60, 20:90] = PixelState.OFF
+    state[:30] = PixelState.FLOOR
     found = dark_pixels(relative, size)
     rng, half = np.random.default_rng(1), size // 2
     limit = 3.0 * np.kron(relative.sigma, np.ones((TILE, TILE)))
     for i, j in zip(rng.integers(0, 200, 500), rng.integers(0, 300, 500), strict=True):
         about = np.s_[max(i - half, 0) : i + half + 1, max(j - half, 0) : j + half + 1]
-        lining = (state[about] == State.LINING) | (state[about] == State.RECESS)
+        lining = (state[about] == PixelState.LINING) | (state[about] == PixelState.RECESS)
         dark = lining & (drop[about] / 100.0 > limit[about])
-        assert found[i, j] == (2 * dark.sum() > lining.sum() > 0.2 * 12 and state[i, j] <= State.RECESS)
+        assert found[i, j] == (2 * dark.sum() > lining.sum() > 0.2 * 12 and state[i, j] <= PixelState.RECESS)
 
 
 def test_what_is_dark_here_is_not_where_the_lining_varies_more():
@@ -52,9 +54,9 @@ def test_what_is_dark_here_is_not_where_the_lining_varies_more():
 def test_an_appendage_is_never_dark():
     relative, disc = spotted()
     relative.sigma[:] = 0.4
-    relative.state[:, 140:145] = State.OFF
+    relative.state[:, 140:145] = PixelState.OFF
     found = dark_pixels(relative, 5)
-    closed = relative.state == State.OFF
+    closed = relative.state == PixelState.OFF
     assert not found[closed].any()
     assert found[disc & ~closed].mean() > 0.95
 
@@ -65,8 +67,8 @@ def test_nothing_in_a_drawn_dry_region_is_dark():
     state, drop = np.zeros(shape, np.uint8), np.full(shape, NODATA, np.int16)
     state[:, :300], drop[:, :300] = small.state, small.drop
     sigma = np.full((8, grid.columns // TILE), 0.4, np.float32)
-    before = dark_pixels(Relative(grid, state, drop, TILE, sigma), 5)
-    found = dark_pixels(Relative(grid, state, drop, TILE, sigma, (box(2.0, 1.0, 3.0, 3.0),)), 5)
+    before = dark_pixels(ContrastImage(grid, state, drop, TILE, sigma), 5)
+    found = dark_pixels(ContrastImage(grid, state, drop, TILE, sigma, (box(2.0, 1.0, 3.0, 3.0),)), 5)
     inside = np.zeros(shape, bool)
     inside[50:150, 100:150] = True
     assert before[inside].any()

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tunneldb.alignment.elements import Float, PlanElement, ProfileElement
+from tunneldb.alignment.elements import PlanElement, ProfileElement
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 
 CHORD_ERROR = 0.0005  # m; half of what is promised, for lines that bend in plan and in profile at once

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.alignment.elements import Float
-from tunneldb.arrays import Bool
+from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.stationing import KILOMETRE, Stationing
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from tunneldb.alignment.design import Design
-from tunneldb.alignment.elements import Float
+from tunneldb.arrays import Float
 from tunneldb.csvfile import read_csv
 from tunneldb.errors import UserError
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from tunneldb.anomalies.background.contrast import Relative
+from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.joints import longer
 from tunneldb.arrays import Bool, Int16, Int32, UInt8
 from tunneldb.raster.geotiff import NODATA
-from tunneldb.raster.polygons import inside
+from tunneldb.raster.polygons import mask_of_polygons
 
 BAND = 2
 """Pixels to both sides of the rim that may change sides, each time."""
@@ -29,7 +29,7 @@ ENOUGH = 4
 RIM, LISTED = 1, 2
 
 
-def settle(dark: Bool, relative: Relative, size: int) -> Bool:
+def refine_boundary(dark: Bool, relative: ContrastImage, size: int) -> Bool:
     """Move the rim of dark regions to where half of their contrast is reached.
 
     The threshold of three sigma lies at the outermost edge of a strongly wet patch and at the innermost of a weak one; a mean
@@ -39,7 +39,7 @@ def settle(dark: Bool, relative: Relative, size: int) -> Bool:
     ----------
     dark : (rows, columns) bool array
         Dark pixels by the threshold; changed in place.
-    relative : Relative
+    relative : ContrastImage
         Their drop.
     size : int
         Side of the median filter that they went through, pixels.
@@ -52,15 +52,13 @@ def settle(dark: Bool, relative: Relative, size: int) -> Bool:
     for _ in range(TIMES):
         row, column, becomes = _settled(dark, relative.drop, relative.state, size // 2)
         dark[row, column] = becomes
-    for columns, mask in inside(relative.grid, relative.drawn):
+    for columns, mask in mask_of_polygons(relative.grid, relative.drawn):
         dark[:, columns][mask] = False
     return dark
 
 
 @njit(cache=True, nogil=True)
-def _settled(
-    dark: Bool, drop: Int16, state: UInt8, most: int
-) -> tuple[Int32, Int32, Bool]:  # pragma: no cover - compiled
+def _settled(dark: Bool, drop: Int16, state: UInt8, most: int) -> tuple[Int32, Int32, Bool]:  # pragma: no cover - compiled
     """Pixels near the rim that change sides, and to which."""
     near, row, column = _near(dark)
     becomes = np.empty(len(row), np.bool_)
@@ -110,9 +108,7 @@ def _near(dark: Bool) -> tuple[UInt8, Int32, Int32]:  # pragma: no cover - compi
 
 
 @njit(cache=True, nogil=True)
-def _core(
-    dark: Bool, near: UInt8, drop: Int16, i: int, j: int
-) -> tuple[float, int]:  # pragma: no cover - compiled
+def _core(dark: Bool, near: UInt8, drop: Int16, i: int, j: int) -> tuple[float, int]:  # pragma: no cover - compiled
     """Mean drop of dark pixels about one, every other one, but for those at the rim, and of how many it is."""
     rows, columns = dark.shape
     total, held = 0.0, 0
@@ -125,9 +121,7 @@ def _core(
 
 
 @njit(cache=True, nogil=True)
-def _level(
-    drop: Int16, state: UInt8, i: int, j: int, half: int
-) -> tuple[float, int]:  # pragma: no cover - compiled
+def _level(drop: Int16, state: UInt8, i: int, j: int, half: int) -> tuple[float, int]:  # pragma: no cover - compiled
     """Mean drop of the lining about a pixel, and of how many pixels it is."""
     total, seen = 0.0, 0
     for m in range(max(i - half, 0), min(i + half + 1, drop.shape[0])):

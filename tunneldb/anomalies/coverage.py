@@ -33,7 +33,7 @@ class Coverage:
     wet: Single
 
 
-def cover(state: UInt8, dark: Bool, grid: Grid, size: int) -> Coverage:
+def measure_coverage(state: UInt8, dark: Bool, grid: Grid, size: int) -> Coverage:
     """Add up the lining of a kilometre, what was seen of it and what is wet.
 
     A pixel of lining was seen when it holds points, or when enough pixels about it do for the median filter to tell
@@ -42,7 +42,7 @@ def cover(state: UInt8, dark: Bool, grid: Grid, size: int) -> Coverage:
     Parameters
     ----------
     state : (rows, columns) uint8 array
-        Values of :class:`tunneldb.raster.pixel_state.State`.
+        Values of :class:`tunneldb.raster.pixel_state.PixelState`.
     dark : (rows, columns) bool array
         Wet pixels, as the median filter left them.
     grid : Grid
@@ -67,9 +67,7 @@ def _wide(grid: Grid) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _cover(
-    state: UInt8, dark: Bool, first: int, stop: int, half: int, enough: float
-) -> Int64:  # pragma: no cover - compiled
+def _cover(state: UInt8, dark: Bool, first: int, stop: int, half: int, enough: float) -> Int64:  # pragma: no cover - compiled
     """Pixels of each column from ``first`` to ``stop`` that are lining, were seen, are wet."""
     rows, columns = state.shape
     out = np.zeros((3, stop - first), np.int64)

@@ -9,11 +9,11 @@ import numpy as np
 from numba import njit
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.contrast import Relative
-from tunneldb.anomalies.background.level_map import DryMap
-from tunneldb.anomalies.boundary import settle
-from tunneldb.anomalies.joints import lines
-from tunneldb.anomalies.regions import Region, regions
+from tunneldb.anomalies.background.contrast import ContrastImage
+from tunneldb.anomalies.background.level_map import BackgroundMap
+from tunneldb.anomalies.boundary import refine_boundary
+from tunneldb.anomalies.joints import find_joints
+from tunneldb.anomalies.regions import Region, find_regions
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
 from tunneldb.anomalies.verdict import Verdict, judge
 from tunneldb.arrays import Bool, Float, Int32, Int64, UInt8
@@ -99,14 +99,14 @@ class Detection:
     wet_pixels: int
 
 
-def detect(relative: Relative, dry: DryMap, min_area: float) -> Detection:
+def find_anomalies(relative: ContrastImage, dry: BackgroundMap, min_area: float) -> Detection:
     """Find what is dark in a kilometre.
 
     Parameters
     ----------
-    relative : Relative
+    relative : ContrastImage
         State and drop of its pixels.
-    dry : DryMap
+    dry : BackgroundMap
         What they are relative to.
     min_area : float
         Smaller leaks are left out, m² in the unrolled plane.
@@ -118,7 +118,7 @@ def detect(relative: Relative, dry: DryMap, min_area: float) -> Detection:
     wet = np.zeros(state.shape, np.bool_)
     if not dry.count:
         return Detection([], [], wet.copy(), wet, size, pixels, 0)
-    dark = settle(dark_pixels(relative, size), relative, size)
+    dark = refine_boundary(dark_pixels(relative, size), relative, size)
     found, cut, leaks = [], [], []
     ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
     for region in _regions(dark, relative, min_area):
@@ -134,13 +134,13 @@ def detect(relative: Relative, dry: DryMap, min_area: float) -> Detection:
     return Detection(found, cut, dark, wet, size, pixels, sum(region.filled for region in leaks))
 
 
-def _regions(dark: Bool, relative: Relative, min_area: float) -> list[Region]:
+def _regions(dark: Bool, relative: ContrastImage, min_area: float) -> list[Region]:
     """Regions of the dark pixels, joints cut off from what they run through."""
     inner = relative.grid.inner
-    joints = lines(dark, inner.start, inner.stop, relative.grid.pixel)
+    joints = find_joints(dark, inner.start, inner.stop, relative.grid.pixel)
     if not joints.any():
-        return regions(dark, dark, relative, min_area, _may_drip)
-    parts = [regions(part, dark, relative, min_area, _may_drip) for part in (dark & ~joints, joints)]
+        return find_regions(dark, dark, relative, min_area, _may_drip)
+    parts = [find_regions(part, dark, relative, min_area, _may_drip) for part in (dark & ~joints, joints)]
     return sorted([*parts[0], *parts[1]], key=lambda region: (region.column, region.row))
 
 
@@ -148,7 +148,7 @@ def _may_drip(region: Region) -> bool:
     return bool(region.filled) and judge(region).kind == "leak"
 
 
-def dry_places(relative: Relative, found: Detection, chainage: Float, arc: Float) -> Bool:
+def dry_places(relative: ContrastImage, found: Detection, chainage: Float, arc: Float) -> Bool:
     """Tell which places (n,) in the unrolled plane, m, lie on lining of the kilometre that is neither dark nor next to it."""
     row, column = relative.grid.place(chainage, arc)
     inner = relative.grid.inner
@@ -177,9 +177,7 @@ def _filled(lining: Int64, could: Int64, gap: int) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _columns(
-    state: UInt8, first: int, stop: int
-) -> tuple[Int64, Int64]:  # pragma: no cover - compiled
+def _columns(state: UInt8, first: int, stop: int) -> tuple[Int64, Int64]:  # pragma: no cover - compiled
     """Pixels of each column that show lining, and that could."""
     lining, could = np.zeros(stop - first, np.int64), np.zeros(stop - first, np.int64)
     for i in range(state.shape[0]):

@@ -54,7 +54,7 @@ class Dark:
         return cut
 
 
-def hang(pieces: Dark, wanted: Bool, cut: Bool, grid: Grid) -> tuple[Int64, Int64]:
+def attach_drips(pieces: Dark, wanted: Bool, cut: Bool, grid: Grid) -> tuple[Int64, Int64]:
     """Find what each piece is a part of.
 
     A drip is narrower than WIDE, smaller than what it hangs below, and begins within GAP of it, towards the crown, or of

@@ -81,7 +81,7 @@ def _within(outline: Polygon, surface: Surface) -> Polygon:
 
 def _off(unrolled: Float, surface: Surface) -> Bool:
     """Which (chainage, arc) rows (n, 2) don't lie on the surface."""
-    return np.isnan(surface.roll(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled)))[:, 0])
+    return np.isnan(surface.to_space(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled)))[:, 0])
 
 
 def strip(surface: Surface, unrolled: Float) -> Float:
@@ -93,7 +93,7 @@ def strip(surface: Surface, unrolled: Float) -> Float:
 def _roll(outline: Polygon, surface: Surface) -> Polygon:
     def ring(line: shapely.LinearRing) -> Float:
         unrolled = shapely.get_coordinates(line)
-        return surface.roll(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled)))
+        return surface.to_space(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled)))
 
     return Polygon(ring(outline.exterior), [ring(hole) for hole in outline.interiors])
 
@@ -102,7 +102,7 @@ def _clock(outline: Polygon, surface: Surface) -> float:
     inside = outline.representative_point()
     chainage = np.array([inside.x])
     origin, _, right, up = surface.frames(chainage)[0]
-    ray = surface.roll(chainage, np.array([inside.y]), np.zeros(1))[0] - origin
+    ray = surface.to_space(chainage, np.array([inside.y]), np.zeros(1))[0] - origin
     hours = (np.degrees(np.arctan2(ray @ right, ray @ up)) / 30.0) % 12.0
     return float(hours) if hours > 0 else 12.0
 
@@ -111,9 +111,9 @@ def _area(outline: Polygon, surface: Surface) -> float:
     """Area in the unrolled plane × the mean stretch of the surface against it (slope, curve)."""
     chainage, arc = _samples(outline)
     zero = np.zeros(len(chainage))
-    here = surface.roll(chainage, arc, zero)
-    along = surface.roll(chainage + _STEP, arc, zero) - here
-    across = surface.roll(chainage, arc + _STEP, zero) - here
+    here = surface.to_space(chainage, arc, zero)
+    along = surface.to_space(chainage + _STEP, arc, zero) - here
+    across = surface.to_space(chainage, arc + _STEP, zero) - here
     stretch = np.linalg.norm(np.cross(along, across), axis=1) / _STEP**2
     known = np.isfinite(stretch)
     return float(outline.area * (stretch[known].mean() if known.any() else 1.0))

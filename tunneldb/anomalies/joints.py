@@ -20,7 +20,7 @@ STRAIGHT = 0.015
 """Standard deviation of the middle of a joint about a straight line, m: it is built to millimetres, pixels are larger."""
 
 
-def lines(dark: Bool, first: int, stop: int, pixel: float) -> Bool:
+def find_joints(dark: Bool, first: int, stop: int, pixel: float) -> Bool:
     """Find the pixels of narrow straight lines around the tunnel or along it that are long enough.
 
     Parameters

@@ -11,8 +11,8 @@ from numba import njit
 from scipy import sparse
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.contrast import Relative
-from tunneldb.anomalies.drips import Dark, hang
+from tunneldb.anomalies.background.contrast import ContrastImage
+from tunneldb.anomalies.drips import Dark, attach_drips
 from tunneldb.anomalies.joints import beside
 from tunneldb.anomalies.straight_edges import SHARP, straight
 from tunneldb.arrays import Bool, Float, Int16, Int64, Single, UInt8
@@ -26,7 +26,7 @@ LONG = 0.5
 """Regions that are longer are kept even if they are small, m: joints."""
 
 
-class Traits(NamedTuple):
+class RegionProperties(NamedTuple):
     """Sums over the pixels of a region, and over the sides by which they face what is not dark.
 
     Attributes
@@ -74,7 +74,7 @@ class Region:
         How many of them hold points.
     drop_sum, drop_max : float
         Sum over those and greatest of the drop below dry lining, dB.
-    traits : Traits
+    traits : RegionProperties
         Further sums.
     """
 
@@ -85,7 +85,7 @@ class Region:
     filled: int
     drop_sum: float
     drop_max: float
-    traits: Traits
+    traits: RegionProperties
 
     @property
     def stop(self) -> int:
@@ -113,7 +113,9 @@ class Region:
         return outline(self.mask, self.column, self.row, self.pixel)
 
 
-def regions(part: Bool, dark: Bool, relative: Relative, min_area: float, drips: Callable[[Region], bool]) -> list[Region]:
+def find_regions(
+    part: Bool, dark: Bool, relative: ContrastImage, min_area: float, drips: Callable[[Region], bool]
+) -> list[Region]:
     """Connected dark regions of a kilometre that are large or long enough, or are cut by its ends and may be a part of one.
 
     Drips that hang below a region are a part of it.
@@ -124,7 +126,7 @@ def regions(part: Bool, dark: Bool, relative: Relative, min_area: float, drips: 
         Dark pixels that may belong to a region; those beyond the ends of the kilometre don't count.
     dark : (rows, columns) bool array
         All dark pixels; sides towards these are no rim.
-    relative : Relative
+    relative : ContrastImage
         Their drop.
     min_area : float
         Smaller regions within the kilometre are left out, m².
@@ -140,7 +142,7 @@ def regions(part: Bool, dark: Bool, relative: Relative, min_area: float, drips: 
     pieces = Dark.of(runs, label.astype(np.int64), count)
     ends = pieces.touches(inner.start, inner.stop)
     wanted = ends | (pieces.pixels * grid.pixel**2 >= min_area * (1 - 1e-12)) | (pieces.extent * grid.pixel >= LONG)
-    whole, bridges = hang(pieces, wanted, ends, grid)
+    whole, bridges = attach_drips(pieces, wanted, ends, grid)
     alone = _by_label(runs, label, count)
     for k in np.unique(whole[whole != np.arange(count)]).tolist():
         if not drips(_cut_out(alone(k), dark, relative)):
@@ -158,7 +160,7 @@ def _by_label(runs: Int64, label: Int64, count: int) -> Callable[[int], Int64]:
     return lambda k: runs[order[stops[k] : stops[k + 1]]]
 
 
-def _cut_out(runs: Int64, dark: Bool, relative: Relative) -> Region:
+def _cut_out(runs: Int64, dark: Bool, relative: ContrastImage) -> Region:
     grid = relative.grid
     top, bottom = int(runs[:, 0].min()), int(runs[:, 0].max())
     first = int(runs[:, 1].min())
@@ -177,7 +179,7 @@ def _cut_out(runs: Int64, dark: Bool, relative: Relative) -> Region:
         int(sums[0]),
         float(sums[1]),
         float(sums[2]),
-        Traits(*sums[3:].tolist(), *map(float, sides)),
+        RegionProperties(*sums[3:].tolist(), *map(float, sides)),
     )
 
 
@@ -197,7 +199,7 @@ def unite(parts: Sequence[Region]) -> Region:
         sum(part.filled for part in parts),
         float(sum(part.drop_sum for part in parts)),
         max(part.drop_max for part in parts),
-        Traits(*(float(sum(sums)) for sums in zip(*(part.traits for part in parts), strict=True))),
+        RegionProperties(*(float(sum(sums)) for sums in zip(*(part.traits for part in parts), strict=True))),
     )
 
 

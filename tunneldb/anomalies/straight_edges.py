@@ -17,9 +17,7 @@ SLOPES = np.arange(-0.04, 0.05, 0.02)
 some degrees, and so does the unrolled plane."""
 
 
-def straight(
-    runs: Int64, dark: Bool, drop: Int16, state: UInt8, across: int, least: float
-) -> tuple[int, int]:
+def straight(runs: Int64, dark: Bool, drop: Int16, state: UInt8, across: int, least: float) -> tuple[int, int]:
     """Count the sharp sides of a region, and those of them that lie on one straight line for each of the four directions.
 
     What was built ends along the tunnel and around it, on four lines; water ends anywhere. Sides that face appendages, the

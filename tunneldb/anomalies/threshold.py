@@ -10,10 +10,10 @@ from numba import njit
 from tunneldb.arrays import Bool, Int16, Int32, UInt8
 from tunneldb.raster.geotiff import STEP
 from tunneldb.raster.image import MAX_MEDIAN
-from tunneldb.raster.polygons import inside
+from tunneldb.raster.polygons import mask_of_polygons
 
 if TYPE_CHECKING:
-    from tunneldb.anomalies.background.contrast import Relative
+    from tunneldb.anomalies.background.contrast import ContrastImage
 
 
 MEDIAN = 5
@@ -35,7 +35,7 @@ def filter_size(filled: float) -> int:
     return size
 
 
-def dark_pixels(relative: Relative, size: int) -> Bool:
+def dark_pixels(relative: ContrastImage, size: int) -> Bool:
     """Mark dark pixels.
 
     A lining pixel that lies more than three local standard deviations below the local level of dry lining is dark
@@ -44,7 +44,7 @@ def dark_pixels(relative: Relative, size: int) -> Bool:
 
     Parameters
     ----------
-    relative : Relative
+    relative : ContrastImage
         The picture relative to dry lining.
     size : int
         Side of the median filter, pixels.
@@ -56,15 +56,13 @@ def dark_pixels(relative: Relative, size: int) -> Bool:
     limit = np.minimum(np.floor(3.0 * relative.sigma / STEP["corrected"]), 32767).astype(np.int16)
     enough = 0.2 * min(size * size, MEDIAN_PIXELS)
     dark: Bool = _dark(relative.state, relative.drop, limit, relative.tile, size // 2, enough)
-    for columns, mask in inside(relative.grid, relative.drawn):
+    for columns, mask in mask_of_polygons(relative.grid, relative.drawn):
         dark[:, columns][mask] = False
     return dark
 
 
 @njit(cache=True, nogil=True)
-def _dark(
-    state: UInt8, drop: Int16, limit: Int16, tile: int, half: int, enough: float
-) -> Bool:  # pragma: no cover - compiled
+def _dark(state: UInt8, drop: Int16, limit: Int16, tile: int, half: int, enough: float) -> Bool:  # pragma: no cover - compiled
     rows, columns = state.shape
     out = np.zeros((rows, columns), np.bool_)
     # Lining and dark pixels of each column in the rows of the filter, with zeros beyond both ends.

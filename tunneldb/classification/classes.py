@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 
-class Klass(IntEnum):
+class PointClass(IntEnum):
     """What a point lies on (ASPRS LAS 1.4: 1 unassigned, 2 ground, 64 to 255 free for the user)."""
 
     UNASSIGNED = 1  # nothing is known of it: outside the tunnel

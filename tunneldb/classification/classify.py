@@ -12,12 +12,12 @@ from tunneldb.arrays import Float, Int64
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.lining_relief import Relief, Wall
 from tunneldb.classification.objects.clusters import Cluster
-from tunneldb.classification.objects.objects import ClusterSettings, Rest, find_clusters, sort_clusters
+from tunneldb.classification.objects.objects import ClusterSettings, ResidualPoints, find_clusters, sort_clusters
 from tunneldb.classification.objects.spacing import Spacing
 from tunneldb.classification.scene import Scene
-from tunneldb.classification.sections import lining, surface_through
+from tunneldb.classification.sections import find_lining, surface_through
 from tunneldb.geometry.plan_line import PlanLine
-from tunneldb.geometry.section_outliers import Prior
+from tunneldb.geometry.section_outliers import OutlierOffsets
 from tunneldb.geometry.surface import Surface
 
 
@@ -53,19 +53,21 @@ def find_scene(
         off &= ~ground.is_ground(along, across, points[:, 2])
     chainage, arc, offset = places.chainage[off], places.arc[off], places.offset[off]
     along, across, points = along[off], across[off], points[off]
-    relief = Relief.of(chainage, arc, offset, Wall.of(ground, line, surface), Prior.of(surface))
+    relief = Relief.of(chainage, arc, offset, Wall.of(ground, line, surface), OutlierOffsets.of(surface))
     plane, tolerance = relief.level(chainage, arc)
     depth = offset - plane
     with np.errstate(invalid="ignore"):
-        lining = np.abs(depth) <= tolerance
+        find_lining = np.abs(depth) <= tolerance
     unrolled = np.column_stack([chainage, arc])
-    spacing = Spacing.of(unrolled[lining]) or Spacing.of(unrolled)
+    spacing = Spacing.of(unrolled[find_lining]) or Spacing.of(unrolled)
     clusters: list[Cluster] = []
     if spacing is not None:
         height = heights(ground, along, across, points[:, 2])
         top = settings.region * tops(along, height)
-        rest = ~lining
-        left = Rest(points[rest], along[rest], across[rest], height[rest], depth[rest], top[rest])
+        residual = ~find_lining
+        left = ResidualPoints(
+            points[residual], along[residual], across[residual], height[residual], depth[residual], top[residual]
+        )
         clusters = find_clusters(left, spacing, settings, ground)
     return Scene(line, ground, clusters, surface, relief)
 
@@ -107,12 +109,12 @@ def find_bare_scene(points: Float, line: PlanLine, ground: Ground | None, settin
         return Scene(line, ground, [], None, None)
     top = settings.region * tops(along, height)
     off = np.flatnonzero(~floor)
-    rest = Rest(points[off], along[off], across[off], height[off], np.full(len(off), np.nan), top[off])
+    residual = ResidualPoints(points[off], along[off], across[off], height[off], np.full(len(off), np.nan), top[off])
     kept = floor.copy()
-    kept[off] = lining(rest, spacing, settings)
+    kept[off] = find_lining(residual, spacing, settings)
     surface = surface_through(line, along[kept], across[kept], z[kept], kept[kept] & ~floor[kept])
     if surface is None:
-        return Scene(line, ground, sort_clusters(rest, spacing, settings, ground), None, None)
+        return Scene(line, ground, sort_clusters(residual, spacing, settings, ground), None, None)
     return find_scene(points, line, surface, ground, settings)
 
 

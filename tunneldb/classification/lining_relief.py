@@ -19,7 +19,7 @@ from tunneldb.classification.ground.model import Ground
 from tunneldb.classification.ground.wall_arcs import foot_arcs
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.robust_plane import DELTA
-from tunneldb.geometry.section_outliers import Prior
+from tunneldb.geometry.section_outliers import OutlierOffsets
 from tunneldb.geometry.surface import Surface
 
 CELL = 0.25
@@ -67,7 +67,9 @@ class Relief:
     spread: Single
 
     @classmethod
-    def of(cls, chainage: Float, arc: Float, offset: Float, wall: Wall | None = None, prior: Prior | None = None) -> Relief:
+    def of(
+        cls, chainage: Float, arc: Float, offset: Float, wall: Wall | None = None, prior: OutlierOffsets | None = None
+    ) -> Relief:
         """Find the relief of a lining from points of survey density.
 
         Parameters
@@ -76,7 +78,7 @@ class Relief:
             Points that are not ground, in the unrolled plane, m; those with NaN are left out.
         wall : Wall, optional
             Where the lining ends above the ground; without it all of the surface is lining.
-        prior : Prior, optional
+        prior : OutlierOffsets, optional
             Where the surface is known to have left the lining.
 
         Returns

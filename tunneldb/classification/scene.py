@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit, prange
 
 from tunneldb.arrays import Bool, Float, Int64, Single, UInt8
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.classification.ground.model import Ground
 from tunneldb.classification.lining_relief import Relief, level_at
 from tunneldb.classification.objects.clusters import Cluster, Lookup, look_up
@@ -20,12 +20,12 @@ from tunneldb.geometry.surface import Surface
 SPHERE_SKIN = 0.01
 """Points up to this far outside a target sphere are its own, m: three times a scanner's noise."""
 
-BEHIND = (Klass.NICHE, Klass.LINING)
+BEHIND = (PointClass.NICHE, PointClass.LINING)
 """Classes of clusters that lie behind the lining's plane."""
 
 _BLOCK = 4096
-_UNASSIGNED, _GROUND, _LINING = int(Klass.UNASSIGNED), int(Klass.GROUND), int(Klass.LINING)
-_SPHERE, _NOISE = int(Klass.SPHERE), int(Klass.NOISE)
+_UNASSIGNED, _GROUND, _LINING = int(PointClass.UNASSIGNED), int(PointClass.GROUND), int(PointClass.LINING)
+_SPHERE, _NOISE = int(PointClass.SPHERE), int(PointClass.NOISE)
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Scene:
     spheres: Float = field(default_factory=lambda: np.empty((0, 4)))
 
     def classes(self, xyz: Float) -> UInt8:
-        """Class (:class:`tunneldb.classification.classes.Klass`) of each point (n, 3) in the tunnel's SRID.
+        """Class (:class:`tunneldb.classification.classes.PointClass`) of each point (n, 3) in the tunnel's SRID.
 
         What is within a target sphere is a sphere; else what the ground model holds is ground; what is near enough to the
         lining's plane is lining; the rest belongs to the cluster in whose cells it lies, or is noise. Points off the ground
@@ -95,7 +95,7 @@ class Scene:
         if self.relief is None:
             return Lookup.of(list(self.clusters)), Lookup.of([])
         behind = [cluster for cluster in self.clusters if cluster.klass in BEHIND]
-        return Lookup.of([cluster for cluster in self.clusters if cluster.klass != Klass.NICHE]), Lookup.of(behind)
+        return Lookup.of([cluster for cluster in self.clusters if cluster.klass != PointClass.NICHE]), Lookup.of(behind)
 
 
 @njit(cache=True, nogil=True, parallel=True)

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.objects.dbscan import dbscan
-from tunneldb.classification.objects.objects import ClusterSettings, Rest
+from tunneldb.classification.objects.objects import ClusterSettings, ResidualPoints
 from tunneldb.classification.objects.spacing import Spacing
 from tunneldb.geometry.frame import frame_of, locate, nearest_segment, segment_rows, tangents
 from tunneldb.geometry.plan_line import PlanLine
@@ -39,11 +39,11 @@ _LEAST = 3  # points that fill a class
 _NEIGHBOURS = 16  # of a normal
 
 
-def lining(rest: Rest, spacing: Spacing, settings: ClusterSettings) -> Bool:
+def find_lining(residual: ResidualPoints, spacing: Spacing, settings: ClusterSettings) -> Bool:
     """Tell which points are lining: clusters of the region by their size and normals, and all above it."""
-    kept = rest.height >= rest.top
+    kept = residual.height >= residual.top
     region = np.flatnonzero(~kept)
-    places = np.column_stack([rest.along * spacing.shrink, rest.across, rest.xyz[:, 2]])[region]
+    places = np.column_stack([residual.along * spacing.shrink, residual.across, residual.xyz[:, 2]])[region]
     if len(region) < settings.min_points:
         return kept
     radius = settings.radius * spacing.across
@@ -57,7 +57,7 @@ def lining(rest: Rest, spacing: Spacing, settings: ClusterSettings) -> Bool:
     for k in range(count):
         group = order[bounds[k] : bounds[k + 1]]
         size = len(group) >= LARGE * len(region)
-        share = rest.height[region[group]] / np.maximum(rest.top[region[group]], 1e-9)
+        share = residual.height[region[group]] / np.maximum(residual.top[region[group]], 1e-9)
         if size and np.ptp(share) >= TALL:
             good[k] = coherence(places[group]) >= COHERENT
     kept[region] = (labels >= 0) & good[labels]

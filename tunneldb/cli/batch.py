@@ -104,10 +104,10 @@ def batch(
 def _work(survey: Survey, dsn: str | None, count: int) -> Watch:
     """Let workers do what is to be done, and show what becomes of it."""
     from tunneldb.cli.watch import Watch
-    from tunneldb.queue.pool import Team, interrupts
+    from tunneldb.queue.pool import WorkerPool, interrupts
     from tunneldb.queue.worker import Orders
 
-    team = Team(Orders(dsn, 1, survey.id), count)
+    team = WorkerPool(Orders(dsn, 1, survey.id), count)
     # the picture is drawn on stdout, which JSON has for itself
     console = Console(stderr=True) if wants_json() and sys.stderr.isatty() else None
     with interrupts(team), Watch(dsn, survey.name, console) as watch:

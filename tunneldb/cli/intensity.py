@@ -15,7 +15,7 @@ from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.figures.intensity_dependence import check_format, write_figure
 from tunneldb.radiometry.correction import Kind
-from tunneldb.radiometry.diagnosis import Look
+from tunneldb.radiometry.diagnosis import Diagnosis
 from tunneldb.store.survey import get_survey
 
 _FILES = (".las", ".laz", ".e57")
@@ -71,7 +71,7 @@ def intensity(
         click.echo(f"figure to {output}", err=True)
 
 
-def _look_at_file(path: Path, dimension: str | None, kind: str | None, scanner: tuple[float, float, float] | None) -> Look:
+def _look_at_file(path: Path, dimension: str | None, kind: str | None, scanner: tuple[float, float, float] | None) -> Diagnosis:
     from tunneldb.pipeline.intensity_diagnosis import look_at_file
 
     if dimension is None:
@@ -82,7 +82,7 @@ def _look_at_file(path: Path, dimension: str | None, kind: str | None, scanner: 
         return look_at_file(path, dimension, cast(Kind, kind), scanner, step(progress))
 
 
-def _look_at_survey(settings: Settings, name: str, km: str | None) -> Look:
+def _look_at_survey(settings: Settings, name: str, km: str | None) -> Diagnosis:
     from tunneldb.pipeline.intensity_diagnosis import look_at_survey
     from tunneldb.pipeline.parameters import settings as defaults
     from tunneldb.pipeline.run import loaded_kilometres, parse_km
@@ -94,7 +94,7 @@ def _look_at_survey(settings: Settings, name: str, km: str | None) -> Look:
             return look_at_survey(conn, survey, kilometres, defaults(), step(progress)("intensity", len(kilometres)))
 
 
-def _print(look: Look) -> None:
+def _print(look: Diagnosis) -> None:
     header = ["over", "slope before", "slope after", "medians before", "medians after"]
     print_table(header, look.dependence.rows(), right=(1, 2, 3, 4))
     for note in look.notes:

@@ -42,7 +42,7 @@ def unroll(settings: Settings, survey: str, points: Path, output: Path | None, i
     with connect(settings.dsn) as conn:
         surface = load_surface(conn, get_survey(conn, survey))
     if inverse:
-        result = surface.roll(*coordinates.T)
+        result = surface.to_space(*coordinates.T)
     else:
         unrolled = surface.unroll(coordinates)
         result = np.column_stack([unrolled.chainage, unrolled.arc, unrolled.offset])

@@ -33,11 +33,11 @@ def worker(settings: Settings, concurrency: int, threads: int) -> None:
     A worker needs the database and the scan files, under the same paths as where the batch was called. A server that is away is
     waited for. Ctrl-C, SIGTERM and tunneldb stop let it end the stage that it is at; a second Ctrl-C ends it at once.
     """
-    from tunneldb.queue.pool import Team, interrupts
+    from tunneldb.queue.pool import WorkerPool, interrupts
     from tunneldb.queue.worker import Orders
 
     jobs = _Jobs(settings.dsn)
-    team = Team(Orders(settings.dsn, threads), concurrency)
+    team = WorkerPool(Orders(settings.dsn, threads), concurrency)
     with interrupts(team), bar("jobs") as progress:
         task = progress.add_task("jobs", total=None)
         team.start()

@@ -115,7 +115,7 @@ def scanner_distance(conn: psycopg.Connection[Any], survey: Survey, shapes: Sequ
         return np.zeros(0)
     inside = shapely.get_coordinates(shapely.point_on_surface(np.asarray(shapes, dtype=object)))
     surface = load_surface(conn, survey, float(inside[:, 0].min()), float(inside[:, 0].max()))
-    return distance_from_scanner(surface.roll(inside[:, 0], inside[:, 1], np.zeros(len(inside))), load_poses(conn, survey))
+    return distance_from_scanner(surface.to_space(inside[:, 0], inside[:, 1], np.zeros(len(inside))), load_poses(conn, survey))
 
 
 def distance_from_scanner(points: Float, poses: PoseModel) -> Float:

@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit, prange
 from scipy.interpolate import CubicSpline
 
-from tunneldb.arrays import Int64
+from tunneldb.arrays import Float, Int64
 from tunneldb.errors import UserError
-from tunneldb.geometry.frame import Float, frame_at, locate, nearest_segment, segment_rows, tangents
+from tunneldb.geometry.frame import frame_at, locate, nearest_segment, segment_rows, tangents
 from tunneldb.geometry.stationing import KILOMETRE
 
 MILLIMETRE = 0.001

@@ -18,7 +18,7 @@ OFF_WALL = 0.03
 
 
 @dataclass(frozen=True)
-class Astray:
+class SectionOutliers:
     """Where the surface leaves the wall, because a section was measured in a niche or on something hung on the wall.
 
     Such a section stands apart from those beside it, and between them the surface departs from the wall as it does from
@@ -37,9 +37,9 @@ class Astray:
     apart: Float
 
     @classmethod
-    def of(cls, surface: Surface) -> Astray:
-        """Take the sections that stand apart from those beside them (:meth:`Surface.astray`)."""
-        apart = surface.astray()
+    def of(cls, surface: Surface) -> SectionOutliers:
+        """Take the sections that stand apart from those beside them (:meth:`Surface.section_outliers`)."""
+        apart = surface.section_outliers()
         # A tunnel that is wider or narrower all round has no niche.
         apart[(apart != 0.0).mean(axis=1) > MOST] = 0.0
         return cls(surface, apart)
@@ -69,7 +69,7 @@ class Astray:
 
 
 @dataclass(frozen=True)
-class Prior:
+class OutlierOffsets:
     """Where the surface left the lining, because a section was measured in a niche or on something hung on the wall.
 
     Attributes
@@ -84,9 +84,9 @@ class Prior:
     apart: Float
 
     @classmethod
-    def of(cls, surface: Surface) -> Prior:
-        """Take the sections that stand apart from those beside them (:meth:`Surface.astray`)."""
-        return cls(surface, surface.astray())
+    def of(cls, surface: Surface) -> OutlierOffsets:
+        """Take the sections that stand apart from those beside them (:meth:`Surface.section_outliers`)."""
+        return cls(surface, surface.section_outliers())
 
     def at(self, chainage: Float, arc: Float) -> Float:
         """Offset of the lining where the surface left it; (rows,) arcs by (columns,) chainages, m."""

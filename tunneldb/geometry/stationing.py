@@ -59,4 +59,5 @@ def chainage_label(metres: float, decimals: int = 3) -> str:
     width = 4 + decimals if decimals else 3
     return f"{'-' if units < 0 else ''}{kilometres}+{rest / scale:0{width}.{decimals}f}"
 
+
 KILOMETRE = 1000.0

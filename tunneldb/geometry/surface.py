@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.arrays import Int64
-from tunneldb.geometry.frame import Float, frame_at
-from tunneldb.geometry.unrolling import NODES, bracket, roll_all, unroll_all
+from tunneldb.arrays import Float, Int64
+from tunneldb.geometry.frame import frame_at
+from tunneldb.geometry.unrolling import NODES, bracket, to_plane_all, to_space_all
 
 APART = 0.06
 """A section that stands apart from those beside it by more was not measured on the wall, m."""
@@ -69,18 +69,18 @@ class Surface:
 
     def unroll(self, points: Float) -> Unrolled:
         """Chainage, arc, offset and surface normal of points (n, 3) in the tunnel's SRID."""
-        unrolled, normal = unroll_all(
+        unrolled, normal = to_plane_all(
             self.segments, self.number, self.ends, self.chainages, self.radius, self.arcs, self.reach,
             np.ascontiguousarray(points, dtype=np.float64),
         )  # fmt: skip
         return Unrolled(unrolled[:, 0], unrolled[:, 1], unrolled[:, 2], normal)
 
-    def roll(self, chainage: Float, arc: Float, offset: Float) -> Float:
+    def to_space(self, chainage: Float, arc: Float, offset: Float) -> Float:
         """Points (n, 3) of coordinates in the unrolled plane (n,); NaN where they lie off the tunnel."""
         unrolled = np.ascontiguousarray(np.column_stack(np.broadcast_arrays(chainage, arc, offset)), dtype=np.float64)
         which = self.segment_index(unrolled[:, 0])
         return np.asarray(
-            roll_all(self.segments, which, self.ends, self.chainages, self.radius, self.arcs, self.reach, unrolled)
+            to_space_all(self.segments, which, self.ends, self.chainages, self.radius, self.arcs, self.reach, unrolled)
         )
 
     def segment_index(self, chainage: Float) -> Int64:
@@ -107,7 +107,7 @@ class Surface:
         ends = (1.0 - g) * self.arcs[a, [0, -1]] + g * self.arcs[b, [0, -1]]
         return float(ends[0]), float(ends[1])
 
-    def astray(self) -> Float:
+    def section_outliers(self) -> Float:
         """How far each section stands apart from those beside it, (k, 361), m; 0 where it is on the lining.
 
         A section that was measured in a niche or on something hung on the wall does. Each is compared with the median of the

@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from tunneldb.arrays import Int64
-from tunneldb.geometry.frame import Float, frame_at, frame_of, locate, nearest_segment
+from tunneldb.arrays import Float, Int64
+from tunneldb.geometry.frame import frame_at, frame_of, locate, nearest_segment
 
 NODES = 361
 CROWN = 180
@@ -246,7 +246,7 @@ def unroll_point(
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def unroll_all(
+def to_plane_all(
     segments: Float,
     number: Int64,
     ends: Float,
@@ -317,7 +317,7 @@ def _roll_one(
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def roll_all(
+def to_space_all(
     segments: Float,
     which: Int64,
     ends: Float,

@@ -10,15 +10,15 @@ import psycopg
 import shapely
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.contrast import Relative
+from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.detect import Detection, dry_places
 from tunneldb.arrays import Bool, Int32, Int64
 from tunneldb.errors import UserError
-from tunneldb.radiometry.cells import Sight
-from tunneldb.radiometry.correction import Kind, Views, needs_reference, range_span
+from tunneldb.radiometry.cells import IntensitySamples
+from tunneldb.radiometry.correction import Kind, Observations, needs_reference, range_span
 from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
-from tunneldb.radiometry.robust_statistics import Dry, plain_statistics
+from tunneldb.radiometry.robust_statistics import DryLevel, plain_statistics
 from tunneldb.radiometry.roughness import (
     STEEPEST,
     TELLING,
@@ -27,7 +27,7 @@ from tunneldb.radiometry.roughness import (
     drawn_regions,
     find_roughness,
 )
-from tunneldb.raster.observation import Eye, Radiometer, Seen, Span
+from tunneldb.raster.observation import ObservedPoints, Observer, Radiometer, RangeSpan
 from tunneldb.store.images import load_reference
 from tunneldb.store.poses import load_poses
 from tunneldb.store.sources import sample
@@ -56,7 +56,7 @@ class Sample:
 
     Attributes
     ----------
-    seen : Seen
+    seen : ObservedPoints
         Where they lie and what they show.
     scan_id : (n,) int array
         Scan that each is of.
@@ -64,15 +64,15 @@ class Sample:
         Those on the lining, clear of its foot.
     """
 
-    seen: Seen
+    seen: ObservedPoints
     scan_id: Int32
     clear: Bool
 
     @property
-    def views(self) -> Views:
+    def observations(self) -> Observations:
         """How the scanner saw the points."""
-        assert self.seen.views is not None
-        return self.seen.views
+        assert self.seen.observations is not None
+        return self.seen.observations
 
     @property
     def telling(self) -> Bool:
@@ -81,9 +81,9 @@ class Sample:
 
     def along(self, curve: ReferenceCurve) -> Sample:
         """Correct for distance by a curve what was seen with an UNKNOWN one."""
-        views = self.views
-        level = (views.raw_db - curve(views.range_m.astype(np.float64))).astype(np.float32)
-        return replace(self, seen=replace(self.seen, views=replace(views, distance_db=level)))
+        observations = self.observations
+        level = (observations.raw_db - curve(observations.range_m.astype(np.float64))).astype(np.float32)
+        return replace(self, seen=replace(self.seen, observations=replace(observations, distance_db=level)))
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Calibration:
 
     Attributes
     ----------
-    eye : Eye
+    observer : Observer
         Sees points with the range curve that holds here.
     view : Sample
         What it sees at survey density.
@@ -102,7 +102,7 @@ class Calibration:
         Range curve found on this kilometre's lining; None where it was measured, or isn't needed.
     """
 
-    eye: Eye
+    observer: Observer
     view: Sample
     roughness: Roughness
     found: RangeCurve | None
@@ -135,32 +135,32 @@ def find_radiometer(conn: psycopg.Connection[Any], survey: Survey, max_incidence
     return Radiometer(kind, load_poses(conn, survey), reference, max_incidence, max_range)
 
 
-def take_sample(conn: psycopg.Connection[Any], survey: Survey, eye: Eye) -> Sample:
+def take_sample(conn: psycopg.Connection[Any], survey: Survey, observer: Observer) -> Sample:
     """Look at points of survey density, and check their ranges against the reference curve before files are read."""
-    points = sample(conn, survey, eye.km)
-    seen = eye.see(points, f"survey {survey.name}")
+    points = sample(conn, survey, observer.km)
+    seen = observer.observe(points, f"survey {survey.name}")
     if not seen.lining.any():
         raise UserError(
-            f"no point of kilometre {eye.km} lies on the lining: within {eye.tolerance:g} m of the sections and seen at"
+            f"no point of kilometre {observer.km} lies on the lining: within {observer.tolerance:g} m of the sections and seen at"
             f" less than intensity.max_incidence from nearer than intensity.max_range"
         )
-    assert eye.radiometer is not None
-    if eye.radiometer.reference:
-        span = Span()
-        assert seen.views is not None
-        span.add(*range_span(seen.views, seen.lining, eye.radiometer.reference))
-        span.require(eye.radiometer.reference)
-    return Sample(seen, points.scan_id, seen.lining & ~eye.floor.covers(seen.chainage, seen.arc, CORNER))
+    assert observer.radiometer is not None
+    if observer.radiometer.reference:
+        span = RangeSpan()
+        assert seen.observations is not None
+        span.add(*range_span(seen.observations, seen.lining, observer.radiometer.reference))
+        span.require(observer.radiometer.reference)
+    return Sample(seen, points.scan_id, seen.lining & ~observer.floor.covers(seen.chainage, seen.arc, CORNER))
 
 
-def calibrate(conn: psycopg.Connection[Any], survey: Survey, eye: Eye, drawn: list[Polygon]) -> Calibration:
+def calibrate(conn: psycopg.Connection[Any], survey: Survey, observer: Observer, drawn: list[Polygon]) -> Calibration:
     """Find range curve and roughness of a kilometre on points of survey density.
 
     Parameters
     ----------
     conn, survey
         Where.
-    eye : Eye
+    observer : Observer
         Of :func:`find_radiometer`'s radiometer.
     drawn : list of Polygon
         Homogeneous regions that the user drew, if any: they decide about the roughness.
@@ -170,42 +170,45 @@ def calibrate(conn: psycopg.Connection[Any], survey: Survey, eye: Eye, drawn: li
     UserError
         If nothing is seen of the lining, it lies outside the reference curve, or its own curve can't be found on it.
     """
-    view = take_sample(conn, survey, eye)
+    view = take_sample(conn, survey, observer)
     if survey.reference != "auto":
-        return Calibration(eye, view, roughness_of(view, drawn), None)
-    assert eye.radiometer is not None
+        return Calibration(observer, view, roughness_of(view, drawn), None)
+    assert observer.radiometer is not None
     try:
-        found = find_range_curve(view, eye)
+        found = find_range_curve(view, observer)
         found.require()
     except UserError as error:
-        raise UserError(f"survey {survey.name}, kilometre {eye.km}: {error}; {BORROW}") from None
-    eye = replace(eye, radiometer=replace(eye.radiometer, reference=found.curve))
+        raise UserError(f"survey {survey.name}, kilometre {observer.km}: {error}; {BORROW}") from None
+    observer = replace(observer, radiometer=replace(observer.radiometer, reference=found.curve))
     view = view.along(found.curve)
-    return Calibration(eye, view, roughness_of(view, drawn) if drawn else _roughness_found(view, found), found)
+    return Calibration(observer, view, roughness_of(view, drawn) if drawn else _roughness_found(view, found), found)
 
 
-def find_range_curve(view: Sample, eye: Eye) -> RangeCurve:
+def find_range_curve(view: Sample, observer: Observer) -> RangeCurve:
     """Range curve and roughness from the lining itself; see :func:`estimate_range_curve`.
 
     It spans the ranges of all that full density may hold as lining: what stands out from it or back behind it too.
     """
-    seen, views, near = view.seen, view.views, view.telling
-    ranges = views.range_m[seen.lining].astype(np.float64)
+    seen, observations, near = view.seen, view.observations, view.telling
+    ranges = observations.range_m[seen.lining].astype(np.float64)
     return estimate_range_curve(
-        Sight(
+        IntensitySamples(
             np.column_stack([seen.chainage[near], seen.arc[near]]),
             view.scan_id[near],
-            views.range_m[near].astype(np.float64),
-            views.cosine[near].astype(np.float64),
-            views.raw_db[near].astype(np.float64),
+            observations.range_m[near].astype(np.float64),
+            observations.cosine[near].astype(np.float64),
+            observations.raw_db[near].astype(np.float64),
         ),
-        reach=(max(float(ranges.min()) - eye.tolerance, 0.1), float(ranges.max()) + max(eye.tolerance, eye.recess)),
+        reach=(
+            max(float(ranges.min()) - observer.tolerance, 0.1),
+            float(ranges.max()) + max(observer.tolerance, observer.recess),
+        ),
     )
 
 
 def _roughness_found(view: Sample, found: RangeCurve) -> Roughness:
     """The roughness that was found with the range curve, as founded as its deviation says."""
-    angle = np.degrees(np.arccos(view.views.cosine[view.telling]))
+    angle = np.degrees(np.arccos(view.observations.cosine[view.telling]))
     return Roughness(
         found.roughness,
         found.roughness_sigma < TELLING,
@@ -219,20 +222,20 @@ def _roughness_found(view: Sample, found: RangeCurve) -> Roughness:
 
 def roughness_of(view: Sample, drawn: list[Polygon]) -> Roughness:
     """Roughness from the regions that the user drew, or from automatic ones."""
-    seen, views = view.seen, view.views
+    seen, observations = view.seen, view.observations
     if drawn:
-        regions = drawn_regions(_polygon_of(seen, drawn), view.scan_id, views.cosine, views.distance_db)
+        regions = drawn_regions(_polygon_of(seen, drawn), view.scan_id, observations.cosine, observations.distance_db)
         if len(regions) < 2:
             raise UserError(f"the {len(drawn)} homogeneous regions drawn hold too few points: draw larger ones, or none")
         return find_roughness(regions)
     near = view.telling
     regions = automatic_regions(
-        seen.chainage[near], seen.arc[near], view.scan_id[near], views.cosine[near], views.distance_db[near]
+        seen.chainage[near], seen.arc[near], view.scan_id[near], observations.cosine[near], observations.distance_db[near]
     )
     return find_roughness(regions)
 
 
-def _polygon_of(seen: Seen, polygons: list[Polygon]) -> Int64:
+def _polygon_of(seen: ObservedPoints, polygons: list[Polygon]) -> Int64:
     """Number of the polygon that holds each point, -1 for none."""
     number = np.full(len(seen.chainage), -1, np.int64)
     usable = np.flatnonzero(seen.use)
@@ -243,19 +246,19 @@ def _polygon_of(seen: Seen, polygons: list[Polygon]) -> Int64:
 
 def dry_sigma(
     view: Sample,
-    darker: Relative,
+    darker: ContrastImage,
     found: Detection,
     roughness: Roughness,
     dry_regions: list[Polygon],
-) -> tuple[Dry, Dry, Dry]:
+) -> tuple[DryLevel, DryLevel, DryLevel]:
     """Standard deviation of dry lining points, raw and corrected by Lambert's law and Oren–Nayar (Table 1)."""
-    seen, views = view.seen, view.views
+    seen, observations = view.seen, view.observations
     if dry_regions:
         dry = seen.lining & (_polygon_of(seen, dry_regions) >= 0)
     else:
         dry = view.clear & dry_places(darker, found, seen.chainage, seen.arc)
     return (
-        plain_statistics(views.raw_db[dry]),
-        plain_statistics(views.corrected(0.0)[dry]),
-        plain_statistics(views.corrected(roughness.sigma)[dry]),
+        plain_statistics(observations.raw_db[dry]),
+        plain_statistics(observations.corrected(0.0)[dry]),
+        plain_statistics(observations.corrected(roughness.sigma)[dry]),
     )

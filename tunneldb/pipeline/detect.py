@@ -8,24 +8,24 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from tunneldb.anomalies.background.contrast import relative
-from tunneldb.anomalies.background.level_map import map_dry
-from tunneldb.anomalies.coverage import cover
-from tunneldb.anomalies.detect import detect as find_anomalies
+from tunneldb.anomalies.background.contrast import contrast_image
+from tunneldb.anomalies.background.level_map import map_background
+from tunneldb.anomalies.coverage import measure_coverage
+from tunneldb.anomalies.detect import find_anomalies
 from tunneldb.errors import UserError
-from tunneldb.geometry.section_outliers import Astray
+from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.calibration import calibrate, dry_sigma, find_radiometer
-from tunneldb.pointcloud.reader import Source
+from tunneldb.pointcloud.reader import ScanSource
 from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.accumulator import Accumulator
 from tunneldb.raster.floor import HIDDEN, Floor
 from tunneldb.raster.geotiff import KINDS
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.image import develop, halo
-from tunneldb.raster.observation import Eye
-from tunneldb.raster.rasterize import Counts, gather
+from tunneldb.raster.image import halo, lining_image
+from tunneldb.raster.observation import Observer
+from tunneldb.raster.rasterize import Counts, rasterize
 from tunneldb.store.anomalies import save_anomalies
 from tunneldb.store.images import (
     ImageStore,
@@ -67,23 +67,23 @@ def detect(
     radiometer = find_radiometer(conn, survey, values["intensity.max_incidence"], values["intensity.max_range"])
     beyond = grid.halo * grid.pixel
     depth = values["lining.tolerance"], values["lining.recess"]
-    eye = Eye.of(surface, km, depth, radiometer, load_floor(conn, survey, km, beyond), beyond)
+    observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, km, beyond), beyond)
     with Accumulator(grid) as image:
         if radiometer is None:
-            return _offset_only(conn, survey, eye, files, image, progress)
-        known = calibrate(conn, survey, eye, load_regions(conn, survey, km, "homogeneous"))
-        eye, view, roughness = known.eye, known.view, known.roughness
-        counts = _gather(eye, files, image, roughness.sigma, progress)
+            return _offset_only(conn, survey, observer, files, image, progress)
+        known = calibrate(conn, survey, observer, load_regions(conn, survey, km, "homogeneous"))
+        observer, view, roughness = known.observer, known.view, known.roughness
+        counts = _gather(observer, files, image, roughness.sigma, progress)
         images = ImageStore(conn, survey, grid, KINDS)
-        picture = develop(image, eye.floor, Astray.of(surface), values["appendage.distance"], images.save)
+        picture = lining_image(image, observer.floor, SectionOutliers.of(surface), values["appendage.distance"], images.save)
     dry_regions = load_regions(conn, survey, km, "dry")
-    dry = map_dry(picture, dry_regions)
-    darker = relative(picture, dry)
+    dry = map_background(picture, dry_regions)
+    darker = contrast_image(picture, dry)
     found = find_anomalies(darker, dry, values["leak.min_area"])
     images.save_states(darker.state, found.dark)
     save_range_curve(conn, survey, km, known.found)
     save_radiometry(conn, survey, km, roughness, dry, found, dry_sigma(view, darker, found, roughness, dry_regions))
-    coverage = cover(darker.state, found.wet, grid, found.size)
+    coverage = measure_coverage(darker.state, found.wet, grid, found.size)
     save_coverage(conn, survey, km, coverage)
     matched = save_anomalies(conn, survey, km, surface, found.found, found.cut, values["leak.min_area"])
     return {
@@ -121,20 +121,20 @@ def load_floor(conn: psycopg.Connection[Any], survey: Survey, km: int, halo: flo
 def _offset_only(
     conn: psycopg.Connection[Any],
     survey: Survey,
-    eye: Eye,
-    files: list[Source],
+    observer: Observer,
+    files: list[ScanSource],
     image: Accumulator,
     progress: Callable[[float], None],
 ) -> Counts:
     """Make the offset image of a survey without intensity."""
-    counts = _gather(eye, files, image, 0.0, progress)
+    counts = _gather(observer, files, image, 0.0, progress)
     images = ImageStore(conn, survey, image.grid, ["offset"])
     for block in image.inner_blocks():
         images.save(image.window(block * image.grid.block_columns, (block + 1) * image.grid.block_columns))
-    drop_radiometry(conn, survey, eye.km)
-    drop_coverage(conn, survey, eye.km)
-    save_range_curve(conn, survey, eye.km, None)
-    save_anomalies(conn, survey, eye.km, eye.surface, [], [], 0.0)
+    drop_radiometry(conn, survey, observer.km)
+    drop_coverage(conn, survey, observer.km)
+    save_range_curve(conn, survey, observer.km, None)
+    save_anomalies(conn, survey, observer.km, observer.surface, [], [], 0.0)
     return {
         **counts,
         "pixels": images.pixels,
@@ -143,11 +143,15 @@ def _offset_only(
     }
 
 
-def _gather(eye: Eye, files: list[Source], image: Accumulator, roughness: float, progress: Callable[[float], None]) -> Counts:
+def _gather(
+    observer: Observer, files: list[ScanSource], image: Accumulator, roughness: float, progress: Callable[[float], None]
+) -> Counts:
     """Read the files into the image, which must not show the halo alone."""
-    counts = gather(eye, files, image, roughness, progress)
+    counts = rasterize(observer, files, image, roughness, progress)
     if not image.inner_blocks():
-        raise UserError(f"no point of {', '.join(file.path.name for file in files)} lies on the lining of kilometre {eye.km}")
+        raise UserError(
+            f"no point of {', '.join(file.path.name for file in files)} lies on the lining of kilometre {observer.km}"
+        )
     return counts
 
 

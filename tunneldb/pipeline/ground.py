@@ -11,7 +11,7 @@ import psycopg
 from psycopg import sql
 
 from tunneldb.arrays import Float
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.classification.classify import find_scene
 from tunneldb.classification.ground.extraction import MARGIN, GroundSettings, find_ground
 from tunneldb.classification.ground.wall_arcs import foot_arcs
@@ -65,7 +65,7 @@ def ground(
     progress(0.8)
     conn.execute("SELECT tunnel_api.class_write(%s, %s, %b)", [survey.id, km, classes.tobytes()])
     count = np.bincount(classes, minlength=256)
-    return {"metres": metres, "clusters": clusters, **{klass.name.lower(): int(count[klass]) for klass in Klass}}
+    return {"metres": metres, "clusters": clusters, **{klass.name.lower(): int(count[klass]) for klass in PointClass}}
 
 
 def find(points: Float, line: PlanLine, surface: Surface, values: Mapping[str, float]) -> Scene:

@@ -19,14 +19,14 @@ from tunneldb.pipeline.detect import ASIDE, load_floor
 from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_scans
 from tunneldb.pointcloud.reader import Points, read_chunks, read_header
 from tunneldb.pointcloud.thinning import thin
-from tunneldb.radiometry.cells import Sight
+from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
-from tunneldb.radiometry.diagnosis import Look, pool
+from tunneldb.radiometry.diagnosis import Diagnosis, pool
 from tunneldb.radiometry.incidence import incidence_cosine
 from tunneldb.radiometry.oren_nayar import incidence_db
 from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
-from tunneldb.raster.observation import Eye
+from tunneldb.raster.observation import Observer
 from tunneldb.store.images import load_reference, load_regions
 from tunneldb.store.sources import SAMPLE
 from tunneldb.store.surface import load_surface
@@ -45,7 +45,7 @@ def look_at_survey(
     kilometres: Sequence[int],
     values: Mapping[str, float],
     progress: Callable[[float], None] = lambda count: None,
-) -> Look:
+) -> Diagnosis:
     """Look at lining points of survey density of some kilometres; nothing is changed.
 
     Parameters
@@ -73,7 +73,9 @@ def look_at_survey(
     return pool(f"{survey.name}, kilometre {numbers}: {survey.intensity_kind}", looks)
 
 
-def _look_at_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], most: int) -> Look:
+def _look_at_kilometre(
+    conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], most: int
+) -> Diagnosis:
     kind = cast(Kind, survey.intensity_kind)
     measured = load_reference(conn, survey) if needs_reference(kind) else None
     surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
@@ -85,9 +87,9 @@ def _look_at_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, v
         values["intensity.max_range"],
     )
     depth = values["lining.tolerance"], values["lining.recess"]
-    eye = Eye.of(surface, km, depth, radiometer, load_floor(conn, survey, km, 0.0))
-    view = take_sample(conn, survey, eye)
-    found, refused = _attempt(lambda: find_range_curve(view, eye), view.views.raw_db[view.telling])
+    observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, km, 0.0))
+    view = take_sample(conn, survey, observer)
+    found, refused = _attempt(lambda: find_range_curve(view, observer), view.observations.raw_db[view.telling])
     if needs_reference(kind) and measured is None:
         roughness, note = found.roughness if found else None, None
         view = view.along(found.curve if found else UNKNOWN)
@@ -96,7 +98,7 @@ def _look_at_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, v
         roughness, note = known.sigma, known.note
     near = np.flatnonzero(view.telling)
     near = near[:: max(1, len(near) // most)]
-    seen = view.views
+    seen = view.observations
     return _look(
         f"kilometre {km}",
         kind,
@@ -114,7 +116,7 @@ def look_at_file(
     kind: Kind,
     scanner: tuple[float, float, float] | None,
     begin: Callable[[str, float | None], Callable[[float], None]] = lambda text, total: lambda count: None,
-) -> Look:
+) -> Diagnosis:
     """Look at a scan file by itself: normals are those of planes through neighbouring points.
 
     Parameters
@@ -155,9 +157,9 @@ def look_at_file(
     flat = np.isfinite(cosine) & np.isfinite(level)
     if not flat.any():
         raise UserError(f"{path}: no surface is flat enough for its normal, and so for incidence angles, to be known")
-    sight = Sight(xyz, scan_id, range_m, cosine, level).some(flat)
-    range_m, cosine, level = sight.range_m, sight.cosine, sight.level
-    found, refused = _attempt(lambda: estimate_range_curve(sight, unrolled=False), level)
+    samples = IntensitySamples(xyz, scan_id, range_m, cosine, level).some(flat)
+    range_m, cosine, level = samples.range_m, samples.cosine, samples.level
+    found, refused = _attempt(lambda: estimate_range_curve(samples, unrolled=False), level)
     distance = level
     if found and needs_reference(kind):
         distance = level - found.curve(range_m)
@@ -183,7 +185,7 @@ def _look(
     found: RangeCurve | None,
     measured: ReferenceCurve | None,
     remarks: list[str | None],
-) -> Look:
+) -> Diagnosis:
     """Correct points by what is known, and say by what."""
     nothing = roughness is None or (needs_reference(kind) and found is None and measured is None)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -206,7 +208,7 @@ def _look(
         if found.hardly_overlaps:
             notes.append(f"{title}: hardly any of it was seen by two scans, so it is taken to be alike within a few metres")
     notes += [f"{title}: {remark}" for remark in remarks if remark]
-    return Look(
+    return Diagnosis(
         f"{title}: {kind}",
         points.range_m,
         np.degrees(np.arccos(np.clip(points.cosine, -1.0, 1.0))),
@@ -255,9 +257,7 @@ def _stations(path: Path, scanner: tuple[float, float, float] | None) -> dict[in
     return posed
 
 
-def _thinned(
-    path: Path, dimension: str, progress: Callable[[float], None]
-) -> tuple[Float, Int32, Single]:
+def _thinned(path: Path, dimension: str, progress: Callable[[float], None]) -> tuple[Float, Int32, Single]:
     """Coordinates, scan and raw intensity of a scan's points, each scan thinned to a point a voxel."""
     kept: list[Points] = []
     edge, count = THINNEST, 0

@@ -11,7 +11,7 @@ import psycopg
 from numpy.typing import NDArray
 
 from tunneldb.arrays import Bool, Float
-from tunneldb.classification.targets.curvature import Curved
+from tunneldb.classification.targets.curvature import CurvedCells
 from tunneldb.classification.targets.detection import LEAST_POINTS, Refusal, Sphere, confirmed, find_spheres, join
 from tunneldb.database import snapshot
 from tunneldb.errors import UserError
@@ -20,7 +20,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.run import loaded_kilometres
 from tunneldb.pointcloud.poses import TIME_TOLERANCE, PoseModel
-from tunneldb.pointcloud.reader import CHUNK, Points, Source, read_chunks
+from tunneldb.pointcloud.reader import CHUNK, Points, ScanSource, read_chunks
 from tunneldb.pointcloud.spool import BINS_PER_METRE, Spool, bin_of, windows
 from tunneldb.store.ledger import stage_run
 from tunneldb.store.poses import load_poses
@@ -159,18 +159,18 @@ class _Place:
         found = float(self.surface.unroll(centre[None]).chainage[0])
         return given, None if np.isnan(found) else found
 
-    def eyes(self, points: Points) -> Float:
+    def observers(self, points: Points) -> Float:
         """Where the scanner was for each point (n, 3), m; NaN where it isn't known."""
-        eyes = np.full((len(points), 3), np.nan)
+        observers = np.full((len(points), 3), np.nan)
         if self.poses is None or len(points) == 0:
-            return eyes
+            return observers
         if self.poses.mobile:
             first, last = self.poses.time[0] - TIME_TOLERANCE, self.poses.time[-1] + TIME_TOLERANCE
             known = (points.time >= first) & (points.time <= last)
         else:
             known = np.isin(points.scan_id, self.poses.scan_id)
-        eyes[known] = self.poses.positions(points.some(known))
-        return eyes
+        observers[known] = self.poses.positions(points.some(known))
+        return observers
 
 
 def _if_there(load: Callable[..., Any], conn: psycopg.Connection[Any], survey: Survey) -> Any:
@@ -202,14 +202,14 @@ class _Kilometre:
 
     place: _Place
     km: int
-    files: list[Source]
+    files: list[ScanSource]
     radius: float
     tolerance: float
     on_ground: Callable[[Float], Bool] | None
 
     def search(self, begin: Callable[[str, int], Progress]) -> tuple[list[Found], list[tuple[int, Refusal]]]:
         total = sum(file.points for file in self.files)
-        curved = Curved(self.radius, LEAST_POINTS)
+        curved = CurvedCells(self.radius, LEAST_POINTS)
         step = begin(f"km {self.km}: what isn't flat", total)
         for points in self._chunks():
             curved.add(points.xyz)
@@ -245,7 +245,7 @@ class _Kilometre:
         for file in self.files:
             yield from read_chunks(file.path, None, CHUNK, file.ranges)
 
-    def _kept(self, points: Points, curved: Curved) -> NDArray[Any]:
+    def _kept(self, points: Points, curved: CurvedCells) -> NDArray[Any]:
         points = points.some(curved.holds(points.xyz))
         if self.on_ground is not None:
             points = points.some(~self.on_ground(points.xyz))
@@ -253,7 +253,7 @@ class _Kilometre:
         inside = np.isfinite(chainage)
         points = points.some(inside)
         rows = np.empty(len(points), _KEPT)
-        rows["xyz"], rows["eye"], rows["scan"] = points.xyz, self.place.eyes(points), points.scan_id
+        rows["xyz"], rows["eye"], rows["scan"] = points.xyz, self.place.observers(points), points.scan_id
         rows["chainage"] = chainage[inside]
         return rows
 

@@ -17,7 +17,7 @@ from tunneldb.pointcloud.spool import BINS_PER_METRE, ROW, Rows
 STRETCHING = 1.5
 
 
-class Places:
+class ChainageLookup:
     """Chainage of the cells of space, and of points in them.
 
     Parameters

@@ -185,9 +185,7 @@ def position_at(time: Float, track: Float, wanted: float, k: int) -> tuple[float
 
 
 @njit(cache=True, nogil=True)
-def _interpolate(
-    time: Float, track: Float, wanted: Float
-) -> Float:  # pragma: no cover - compiled
+def _interpolate(time: Float, track: Float, wanted: Float) -> Float:  # pragma: no cover - compiled
     out = np.empty((len(wanted), 3))
     k = 0
     for i in range(len(wanted)):

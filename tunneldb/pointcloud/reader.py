@@ -95,7 +95,7 @@ def describe_crs(crs: CRS) -> str:
 
 
 @dataclass(frozen=True)
-class Source:
+class ScanSource:
     """What a kilometre needs of a scan file that was read.
 
     Attributes

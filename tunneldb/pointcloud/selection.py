@@ -21,7 +21,7 @@ from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.pointcloud.chainage_lookup import STRETCHING, Places
+from tunneldb.pointcloud.chainage_lookup import STRETCHING, ChainageLookup
 from tunneldb.pointcloud.noise import DIAMETER, POINTS, CellCounts, is_noise, search_radii
 from tunneldb.pointcloud.points import CHUNK, Points
 from tunneldb.pointcloud.poses import PoseFaults, PoseModel
@@ -195,7 +195,7 @@ class _Filter:
         self.path, self.dimension = path, dimension
         self.poses, self.settings = poses, settings
         self.counts, self.cells = FilterCounts(), CellCounts()
-        self.places = Places(alignment, settings.max_distance, self.cells.edge)
+        self.places = ChainageLookup(alignment, settings.max_distance, self.cells.edge)
         self.rows, self.cloud = Spool(memory // 2), Spool(memory // 2, PLACE)
 
     def __enter__(self) -> _Filter:

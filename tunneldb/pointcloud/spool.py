@@ -230,9 +230,7 @@ def _write_all(file: IO[bytes], view: memoryview) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _sort_by_bin(
-    rows: Rows, bins: Int64, first: int, count: int
-) -> tuple[Rows, Int64]:  # pragma: no cover - compiled
+def _sort_by_bin(rows: Rows, bins: Int64, first: int, count: int) -> tuple[Rows, Int64]:  # pragma: no cover - compiled
     start = np.zeros(count + 1, np.int64)
     for i in range(len(bins)):
         start[bins[i] - first + 1] += 1

@@ -28,7 +28,7 @@ class _Member:
 
 
 @dataclass
-class Team:
+class WorkerPool:
     """Worker processes.
 
     Parameters
@@ -103,7 +103,7 @@ def _pass_on(process: subprocess.Popen[bytes]) -> None:
 
 
 @contextmanager
-def interrupts(team: Team) -> Iterator[None]:
+def interrupts(team: WorkerPool) -> Iterator[None]:
     """Let Ctrl-C and SIGTERM ask the team to leave, the second time at once."""
 
     def ask(number: int, frame: FrameType | None) -> None:

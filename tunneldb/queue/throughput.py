@@ -14,7 +14,7 @@ Steps = Sequence[Sequence[tuple[str, dt.datetime | None]]]
 
 
 @dataclass(frozen=True)
-class Pace:
+class Throughput:
     """Times of a survey so far.
 
     Attributes
@@ -63,7 +63,7 @@ class Pace:
         return max(self.mean[stage] - ((now - began).total_seconds() if began is not None else 0.0), 0.0)
 
 
-def measure(conn: psycopg.Connection[Any], survey: str) -> Pace:
+def measure(conn: psycopg.Connection[Any], survey: str) -> Throughput:
     """Return the pace of a survey, from its ledger.
 
     Only runs of a kilometre count, and the reading of a file; loads by ``tunneldb load`` of several files at once do not.
@@ -80,7 +80,7 @@ def measure(conn: psycopg.Connection[Any], survey: str) -> Pace:
     for stage, _, seconds in runs:
         taken.setdefault(stage, []).append(seconds)
     mean = {stage: sum(seconds) / len(seconds) for stage, seconds in taken.items()}
-    return Pace(mean, [(end, seconds) for _, end, seconds in runs])
+    return Throughput(mean, [(end, seconds) for _, end, seconds in runs])
 
 
 def points_per_second(

@@ -83,7 +83,7 @@ class Cells:
 
 
 @dataclass(frozen=True)
-class Sight:
+class IntensitySamples:
     """Points as seen.
 
     Attributes
@@ -104,30 +104,32 @@ class Sight:
     cosine: Float
     level: Float
 
-    def some(self, chosen: Bool) -> Sight:
+    def some(self, chosen: Bool) -> IntensitySamples:
         """The chosen points."""
-        return Sight(self.place[chosen], self.scan[chosen], self.range_m[chosen], self.cosine[chosen], self.level[chosen])
+        return IntensitySamples(
+            self.place[chosen], self.scan[chosen], self.range_m[chosen], self.cosine[chosen], self.level[chosen]
+        )
 
 
-def group(sight: Sight, spline: RangeSpline, *, unrolled: bool) -> Cells:
+def group(samples: IntensitySamples, spline: RangeSpline, *, unrolled: bool) -> Cells:
     """Gather points into cells; ``unrolled`` says that places are in the unrolled plane of a tunnel."""
-    at = np.floor(sight.place / CELL).astype(np.int64)
-    number, first = _number(np.column_stack([at, sight.scan.astype(np.int64)]))
+    at = np.floor(samples.place / CELL).astype(np.int64)
+    number, first = _number(np.column_stack([at, samples.scan.astype(np.int64)]))
     points = np.bincount(number)
     cell, some = _number(at[first])
 
     def mean(values: Float) -> Float:
         return np.asarray(np.bincount(number, values) / points)
 
-    where = sight.place[first[some]]
+    where = samples.place[first[some]]
     stretch = _number(np.floor(where[:, :1] / STRETCH if unrolled else where / STRETCH).astype(np.int64))[0]
     row, column = (_places(where[:, axis]) if unrolled else np.full(len(where), -1) for axis in (0, 1))
     return Cells(
         cell,
-        np.column_stack([mean(column) for column in spline(sight.range_m).T]),
-        np.column_stack([mean(incidence_db(sight.cosine, roughness)) for roughness in ROUGHNESS]),
-        mean(sight.level),
-        mean(sight.place[:, 1] - (at[:, 1] + 0.5) * CELL) if unrolled else np.zeros(len(points)),
+        np.column_stack([mean(column) for column in spline(samples.range_m).T]),
+        np.column_stack([mean(incidence_db(samples.cosine, roughness)) for roughness in ROUGHNESS]),
+        mean(samples.level),
+        mean(samples.place[:, 1] - (at[:, 1] + 0.5) * CELL) if unrolled else np.zeros(len(points)),
         np.minimum(points, ENOUGH).astype(np.float64),
         stretch,
         _number(np.floor(where[:, :1] / RING).astype(np.int64))[0] if unrolled else stretch,

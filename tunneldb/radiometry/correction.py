@@ -42,7 +42,7 @@ def to_decibel(raw: Single | Float, kind: Kind) -> Float:
 
 
 @dataclass(frozen=True)
-class Views:
+class Observations:
     """How the scanner saw each point; all arrays (n,).
 
     Attributes
@@ -74,7 +74,9 @@ def needs_reference(kind: Kind) -> bool:
     return kind != "reflectance"
 
 
-def observe(points: Float, scanner: Float, normal: Float, raw: Single, kind: Kind, reference: ReferenceCurve | None) -> Views:
+def observe(
+    points: Float, scanner: Float, normal: Float, raw: Single, kind: Kind, reference: ReferenceCurve | None
+) -> Observations:
     """Range, incidence and distance-corrected intensity of points.
 
     Parameters
@@ -106,13 +108,13 @@ def observe(points: Float, scanner: Float, normal: Float, raw: Single, kind: Kin
         )
     knots = reference.range_m if reference else np.zeros(0)
     values = reference.intensity_db if reference else np.zeros(0)
-    return Views(*_observe(points, scanner, normal, raw.astype(np.float32, copy=False), kind == "linear", knots, values))
+    return Observations(*_observe(points, scanner, normal, raw.astype(np.float32, copy=False), kind == "linear", knots, values))
 
 
-def range_span(views: Views, use: Bool, reference: ReferenceCurve) -> tuple[float, float, int, int]:
+def range_span(observations: Observations, use: Bool, reference: ReferenceCurve) -> tuple[float, float, int, int]:
     """Nearest and farthest range (m) of the points to use, how many are outside the curve's span, and all."""
     nearest, farthest, outside, count = _range_span(
-        views.range_m, use, reference.range_m[0] - SPAN_TOLERANCE, reference.range_m[-1] + SPAN_TOLERANCE
+        observations.range_m, use, reference.range_m[0] - SPAN_TOLERANCE, reference.range_m[-1] + SPAN_TOLERANCE
     )
     return nearest, farthest, outside, count
 

@@ -23,7 +23,7 @@ STEEP = 10.0
 
 
 @dataclass(frozen=True)
-class Course:
+class ClassMeans:
     """Intensity over classes of range or incidence; arrays (k,), of classes that hold enough points.
 
     Attributes
@@ -59,11 +59,11 @@ class Course:
         return float(np.sqrt(np.average(away**2, weights=self.points)))
 
 
-def course(at: Float, level: Float) -> Course:
+def class_means(at: Float, level: Float) -> ClassMeans:
     """Course of intensity (n,), dB, over range, m, or incidence, degrees; NaNs are left out."""
     known = np.isfinite(at) & np.isfinite(level)
     at, level = at[known], level[known]
-    none = Course(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
+    none = ClassMeans(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
     if len(at) < FEWEST:
         return none
     first, last = np.quantile(at, ENDS)
@@ -78,7 +78,7 @@ def course(at: Float, level: Float) -> Course:
     if not rows:
         return none
     table = np.array(rows)
-    return Course(table[:, 0], table[:, 1], table[:, 2], table[:, 3], table[:, 4].astype(np.int64))
+    return ClassMeans(table[:, 0], table[:, 1], table[:, 2], table[:, 3], table[:, 4].astype(np.int64))
 
 
 def _by_class(number: Intp, level: Float) -> list[tuple[int, Float]]:
@@ -93,18 +93,18 @@ class Dependence:
 
     Attributes
     ----------
-    raw_range, raw_incidence : Course
+    raw_range, raw_incidence : ClassMeans
         Of intensity as measured.
-    range, incidence : Course
+    range, incidence : ClassMeans
         Of corrected intensity.
     scatter : float
         Half the distance between the quartiles of corrected intensity as a standard deviation, dB.
     """
 
-    raw_range: Course
-    raw_incidence: Course
-    range: Course
-    incidence: Course
+    raw_range: ClassMeans
+    raw_incidence: ClassMeans
+    range: ClassMeans
+    incidence: ClassMeans
     scatter: float
 
     @classmethod
@@ -113,10 +113,10 @@ class Dependence:
         known = corrected[np.isfinite(corrected)]
         low, high = np.quantile(known, (0.25, 0.75)) if len(known) else (np.nan, np.nan)
         return cls(
-            course(range_m, raw),
-            course(angle, raw),
-            course(range_m, corrected),
-            course(angle, corrected),
+            class_means(range_m, raw),
+            class_means(angle, raw),
+            class_means(range_m, corrected),
+            class_means(angle, corrected),
             float(high - low) / 1.349,
         )
 

@@ -13,7 +13,7 @@ from tunneldb.radiometry.reference_curve import ReferenceCurve
 
 
 @dataclass(frozen=True)
-class Look:
+class Diagnosis:
     """Points as seen, and what their intensity was corrected with.
 
     Attributes
@@ -50,13 +50,13 @@ class Look:
         return Dependence.of(self.range_m, self.angle, self.raw, self.corrected)
 
 
-def pool(title: str, looks: list[Look]) -> Look:
+def pool(title: str, looks: list[Diagnosis]) -> Diagnosis:
     """Put looks at several kilometres of one survey together."""
 
     def all_of(name: str) -> Float:
         return np.concatenate([getattr(look, name) for look in looks])
 
-    return Look(
+    return Diagnosis(
         title,
         all_of("range_m"),
         all_of("angle"),

@@ -50,7 +50,7 @@ class Edges:
         # Whole multiples, so that the nodes lie at the same places for the kilometres on both sides of a border.
         arc = np.arange(np.floor(lowest / _ACROSS), np.ceil(highest / _ACROSS) + 1) * _ACROSS
         c, a = (grid.ravel() for grid in np.meshgrid(chainage, arc, indexing="ij"))
-        feet = surface.roll(c, a, np.zeros(len(c)))
+        feet = surface.to_space(c, a, np.zeros(len(c)))
         shape = (len(chainage), len(arc), 3)
         normals = surface.unroll(feet).normal.reshape(shape)
         sharp = np.zeros(shape[:2], np.bool_)

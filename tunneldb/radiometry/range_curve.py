@@ -25,7 +25,7 @@ import numpy as np
 
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
-from tunneldb.radiometry.cells import CELL, Cells, Sight, group
+from tunneldb.radiometry.cells import CELL, Cells, IntensitySamples, group
 from tunneldb.radiometry.range_spline import RangeSpline
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.radiometry.regression import Fit, fit
@@ -111,12 +111,14 @@ class RangeCurve:
             )
 
 
-def estimate_range_curve(sight: Sight, *, unrolled: bool = True, reach: tuple[float, float] = (np.inf, 0.0)) -> RangeCurve:
+def estimate_range_curve(
+    samples: IntensitySamples, *, unrolled: bool = True, reach: tuple[float, float] = (np.inf, 0.0)
+) -> RangeCurve:
     """Estimate range curve and roughness from points on the lining.
 
     Parameters
     ----------
-    sight : Sight
+    samples : IntensitySamples
         Points.
     unrolled : bool
         Whether their places are in the unrolled plane of a tunnel, else in space.
@@ -129,24 +131,24 @@ def estimate_range_curve(sight: Sight, *, unrolled: bool = True, reach: tuple[fl
         If there are too few points, or all are seen from the same distance. How sure the curve is, is not judged:
         see :meth:`RangeCurve.require`.
     """
-    angle = np.degrees(np.arccos(np.clip(sight.cosine, 0.0, 1.0)))
-    usable = np.isfinite(sight.level) & (angle <= STEEPEST) & (sight.cosine > 0) & (sight.range_m > 0)
-    sight = sight.some(usable & np.isfinite(sight.place).all(axis=1))
-    count = len(np.unique(np.floor(sight.place / CELL), axis=0))
+    angle = np.degrees(np.arccos(np.clip(samples.cosine, 0.0, 1.0)))
+    usable = np.isfinite(samples.level) & (angle <= STEEPEST) & (samples.cosine > 0) & (samples.range_m > 0)
+    samples = samples.some(usable & np.isfinite(samples.place).all(axis=1))
+    count = len(np.unique(np.floor(samples.place / CELL), axis=0))
     if count < FEWEST_CELLS:
         raise UserError(
             f"a range curve can't be found on {count} cells of lining of {CELL:g} m: it takes {FEWEST_CELLS}; {ADVICE}"
         )
-    nearest, low, high, farthest = (float(r) for r in np.quantile(sight.range_m, (PRESENT[0], 0.01, 0.99, PRESENT[1])))
+    nearest, low, high, farthest = (float(r) for r in np.quantile(samples.range_m, (PRESENT[0], 0.01, 0.99, PRESENT[1])))
     if high < LEAST_SPREAD * low:
         raise UserError(
             f"range and incidence can't be told apart on this lining: nearly all of it lies {low:.2f} to {high:.2f} m from"
             f" the scanner, so that no course over range shows; {ADVICE}"
         )
     spline = RangeSpline.over(nearest, farthest)
-    cells = group(sight, spline, unrolled=unrolled)
+    cells = group(samples, spline, unrolled=unrolled)
     rows = np.union1d(
-        np.geomspace(min(reach[0], sight.range_m.min()) / BEYOND, max(reach[1], sight.range_m.max()) * BEYOND, NODES),
+        np.geomspace(min(reach[0], samples.range_m.min()) / BEYOND, max(reach[1], samples.range_m.max()) * BEYOND, NODES),
         [nearest, farthest],
     )
     curves = []

@@ -16,8 +16,8 @@ import numpy as np
 from scipy import signal
 from scipy.interpolate import CubicSpline
 
-from tunneldb.arrays import Float
-from tunneldb.radiometry.cells import CELL, ROUGHNESS, STRETCH, Cells, Int64
+from tunneldb.arrays import Float, Int64
+from tunneldb.radiometry.cells import CELL, ROUGHNESS, STRETCH, Cells
 from tunneldb.radiometry.range_spline import RangeSpline, one_maximum
 
 TUKEY = 4.685

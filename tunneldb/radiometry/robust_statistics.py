@@ -18,7 +18,7 @@ CLIPPED_SIGMA = 0.7426
 
 
 @dataclass(frozen=True)
-class Dry:
+class DryLevel:
     """Mean and standard deviation of dry lining (eq. 19), dB, and from how many values."""
 
     mean: float
@@ -31,16 +31,16 @@ class Dry:
         return self.mean - 3.0 * self.sigma
 
 
-def plain_statistics(values: NDArray[np.floating]) -> Dry:
+def plain_statistics(values: NDArray[np.floating]) -> DryLevel:
     """Mean and standard deviation (eq. 19) of values that are known to be dry; NaNs are left out."""
     values = np.asarray(values, dtype=np.float64)
     values = values[np.isfinite(values)]
     if len(values) == 0:
-        return Dry(np.nan, np.nan, 0)
-    return Dry(float(values.mean()), float(values.std()), len(values))
+        return DryLevel(np.nan, np.nan, 0)
+    return DryLevel(float(values.mean()), float(values.std()), len(values))
 
 
-def robust_statistics(values: NDArray[np.floating]) -> Dry:
+def robust_statistics(values: NDArray[np.floating]) -> DryLevel:
     """Mean and standard deviation of the dry part of values of which up to about 30 % are wet.
 
     Wet lining is darker, so that it pulls mean, median and standard deviation. The shortest interval that
@@ -75,4 +75,4 @@ def robust_statistics(values: NDArray[np.floating]) -> Dry:
         mean = float(total[last] - total[first]) / kept
         variance = float(squares[last] - squares[first]) / kept - mean * mean
         sigma = np.sqrt(max(variance, 0.0)) / CLIPPED_SIGMA
-    return Dry(mean, float(sigma), last - first)
+    return DryLevel(mean, float(sigma), last - first)

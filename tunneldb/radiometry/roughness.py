@@ -224,9 +224,7 @@ def drawn_regions(
     return _take(regions, np.flatnonzero(regions.points >= MIN_CELL_POINTS))
 
 
-def _group(
-    keys: Int64, cosine: NDArray[np.floating], level: NDArray[np.floating]
-) -> tuple[Intp, Regions, Float]:
+def _group(keys: Int64, cosine: NDArray[np.floating], level: NDArray[np.floating]) -> tuple[Intp, Regions, Float]:
     """Average points of the same key; return one point of each group, the groups, and each one's spread."""
     count = len(keys)
     order = np.lexsort(keys.T[::-1])

@@ -8,20 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunneldb.arrays import Int16, UInt8
-from tunneldb.geometry.section_outliers import Astray
+from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.geometry.surface import Surface
 from tunneldb.raster.accumulator import Accumulator, Window
 from tunneldb.raster.floor import Floor
 from tunneldb.raster.geotiff import NODATA, whole
 from tunneldb.raster.grid import BLOCK, Grid
-from tunneldb.raster.pixel_state import State, reach, states
+from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
 
 WET_EDGE = 3
 """Pixels about a wet one that don't count as dry lining."""
 
 
 @dataclass(frozen=True)
-class Picture:
+class LiningImage:
     """State and intensity of all pixels of a kilometre and of those beyond its ends by which they are judged.
 
     Attributes
@@ -29,7 +29,7 @@ class Picture:
     grid : Grid
         The pixels.
     state : (rows, columns) uint8 array
-        Values of :class:`tunneldb.raster.pixel_state.State`.
+        Values of :class:`tunneldb.raster.pixel_state.PixelState`.
     level : (rows, columns) int16 array
         Corrected intensity in steps of the stored image, NODATA where there is no point.
     """
@@ -49,7 +49,9 @@ def _judged() -> int:
     return MAX_MEDIAN // 2 + WET_EDGE
 
 
-def develop(image: Accumulator, floor: Floor, astray: Astray, delta: float, keep: Callable[[Window], None]) -> Picture:
+def lining_image(
+    image: Accumulator, floor: Floor, outliers: SectionOutliers, delta: float, keep: Callable[[Window], None]
+) -> LiningImage:
     """Find the state of every pixel, block by block.
 
     Parameters
@@ -58,7 +60,7 @@ def develop(image: Accumulator, floor: Floor, astray: Astray, delta: float, keep
         The sums of all points.
     floor : Floor
         Where the floor begins.
-    astray : Astray
+    outliers : SectionOutliers
         Where the surface leaves the wall.
     delta : float
         Distance from the lining's plane from which a pixel is an appendage, m.
@@ -66,22 +68,22 @@ def develop(image: Accumulator, floor: Floor, astray: Astray, delta: float, keep
         Takes the means of each block of the kilometre itself.
     """
     grid = image.grid
-    state = np.full((grid.rows, grid.columns), State.OFF, np.uint8)
+    state = np.full((grid.rows, grid.columns), PixelState.OFF, np.uint8)
     level = np.full((grid.rows, grid.columns), NODATA, np.int16)
     judged = min(_judged(), grid.halo)
     inner = set(image.inner_blocks())
-    for block in sorted({*image.blocks(), *_with_surface(grid, astray.surface)}):
+    for block in sorted({*image.blocks(), *_with_surface(grid, outliers.surface)}):
         first = max(block * grid.block_columns, grid.inner.start - judged)
         columns = slice(first, min((block + 1) * grid.block_columns, grid.inner.stop + judged))
         if columns.start >= columns.stop:
             continue
         window = image.window(columns.start - reach(grid.pixel), columns.stop + reach(grid.pixel))
-        state[:, columns] = states(window, columns, grid, floor, astray, delta)
+        state[:, columns] = pixel_states(window, columns, grid, floor, outliers, delta)
         here = window.cut(columns)
         level[:, columns] = whole(here.corrected, "corrected")
         if block in inner:
             keep(here)
-    return Picture(grid, state, level)
+    return LiningImage(grid, state, level)
 
 
 def _with_surface(grid: Grid, surface: Surface) -> range:
@@ -89,6 +91,7 @@ def _with_surface(grid: Grid, surface: Surface) -> range:
     west, east = surface.chainages[[0, -1]] + (-surface.reach, surface.reach)
     first, last = np.floor((np.array([west, east]) - grid.west) / BLOCK).astype(int)
     return range(max(int(first), 0), min(int(last), grid.blocks - 1) + 1)
+
 
 MAX_MEDIAN = 51
 """Side of the widest median filter, pixels."""

@@ -13,7 +13,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import Points
-from tunneldb.radiometry.correction import Kind, Views, observe
+from tunneldb.radiometry.correction import Kind, Observations, observe
 from tunneldb.radiometry.edge_normals import Edges
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.raster.floor import Floor
@@ -43,7 +43,7 @@ class Radiometer:
 
 
 @dataclass(frozen=True)
-class Seen:
+class ObservedPoints:
     """Points near the surface; all arrays (n,).
 
     Attributes
@@ -54,7 +54,7 @@ class Seen:
         Points near the surface, in the kilometre, and whose intensity can be corrected.
     lining : bool array
         Those of them that don't lie on the floor.
-    views : Views or None
+    observations : Observations or None
         Range, incidence and intensity; None when the survey has no intensity.
     """
 
@@ -63,11 +63,11 @@ class Seen:
     offset: Float
     use: Bool
     lining: Bool
-    views: Views | None
+    observations: Observations | None
 
 
 @dataclass(frozen=True)
-class Eye:
+class Observer:
     """Turns points of a survey into what the image of one kilometre takes.
 
     Attributes
@@ -106,7 +106,7 @@ class Eye:
         radiometer: Radiometer | None,
         floor: Floor,
         halo: float = 0.0,
-    ) -> Eye:
+    ) -> Observer:
         """Make the eye for a kilometre that the surface covers at least in part, and so many metres beyond its ends.
 
         ``depth`` is how far in front of the surface and behind it lining is looked for, m: tolerance and recess.
@@ -143,7 +143,7 @@ class Eye:
             points.classification[inside],
         )
 
-    def see(self, points: Points, name: str) -> Seen:
+    def observe(self, points: Points, name: str) -> ObservedPoints:
         """Unroll points and look up their intensity.
 
         Parameters
@@ -163,22 +163,22 @@ class Eye:
         with np.errstate(invalid="ignore"):
             use = (unrolled.offset <= self.tolerance) & (unrolled.offset >= -self.recess)
             use &= (unrolled.chainage >= start) & (unrolled.chainage < start + KILOMETRE)
-        views = None
+        observations = None
         if self.radiometer:
             radiometer = self.radiometer
             scanner = radiometer.poses.positions(points, name)
             normals = self.edges.normals_of(points.xyz, unrolled)
-            views = observe(points.xyz, scanner, normals, points.intensity, radiometer.kind, radiometer.reference)
+            observations = observe(points.xyz, scanner, normals, points.intensity, radiometer.kind, radiometer.reference)
             with np.errstate(invalid="ignore"):
-                use &= views.cosine >= np.cos(np.radians(radiometer.max_incidence))
-                use &= views.range_m <= radiometer.max_range
-            use &= np.isfinite(views.raw_db)
+                use &= observations.cosine >= np.cos(np.radians(radiometer.max_incidence))
+                use &= observations.range_m <= radiometer.max_range
+            use &= np.isfinite(observations.raw_db)
         lining = use & ~self.floor.covers(unrolled.chainage, unrolled.arc)
-        return Seen(unrolled.chainage, unrolled.arc, unrolled.offset, use, lining, views)
+        return ObservedPoints(unrolled.chainage, unrolled.arc, unrolled.offset, use, lining, observations)
 
 
 @dataclass
-class Span:
+class RangeSpan:
     """Ranges of the lining points so far, against those of the reference curve.
 
     Attributes

@@ -7,17 +7,17 @@ from enum import IntEnum
 import numpy as np
 from numba import njit
 
-from tunneldb.arrays import Bool, Float, UInt8
-from tunneldb.geometry.section_outliers import Astray
+from tunneldb.arrays import Bool, Float, UInt8, Whole
+from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.geometry.unrolling import bracket
 from tunneldb.raster import appendages as appendage
 from tunneldb.raster import ring_steps as step
-from tunneldb.raster.accumulator import Whole, Window
+from tunneldb.raster.accumulator import Window
 from tunneldb.raster.floor import Floor
 from tunneldb.raster.grid import Grid
 
 
-class State(IntEnum):
+class PixelState(IntEnum):
     """What a pixel shows."""
 
     EMPTY = 0
@@ -32,7 +32,7 @@ def reach(pixel: float) -> int:
     return appendage.reach(pixel) + step.reach(pixel)
 
 
-def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Astray, delta: float) -> UInt8:
+def pixel_states(window: Window, columns: slice, grid: Grid, floor: Floor, outliers: SectionOutliers, delta: float) -> UInt8:
     """State of the pixels of some columns.
 
     Parameters
@@ -45,7 +45,7 @@ def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Ast
         The pixels.
     floor : Floor
         Where the floor begins.
-    astray : Astray
+    outliers : SectionOutliers
         Where the surface leaves the wall.
     delta : float
         Distance from the lining's plane from which a pixel is an appendage, m.
@@ -53,12 +53,12 @@ def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Ast
     Returns
     -------
     (rows, columns) uint8 array
-        Values of :class:`State`.
+        Values of :class:`PixelState`.
     """
     chainage, arc = grid.chainages(window.columns), grid.arcs()
     left, right = floor.bounds(chainage)
     offset, bent = window.offset, None
-    if (strayed := astray.level(chainage, arc)) is not None:
+    if (strayed := outliers.level(chainage, arc)) is not None:
         offset, bent = offset - strayed[0], strayed[1]
     row = -grid.bottom - grid.rows
     jumps = step.steps(offset, grid.pixel, row, arc, left, right)
@@ -75,7 +75,7 @@ def states(window: Window, columns: slice, grid: Grid, floor: Floor, astray: Ast
     off, recess = (mask[:, columns.start - first : columns.stop - first] for mask in (off, recess))
     if bent is not None:
         off, recess = off | bent[:, inner], recess & ~bent[:, inner]
-    surface = astray.surface
+    surface = outliers.surface
     state: UInt8 = _states(
         window.weight[:, inner], off, recess, arc,
         left[inner], right[inner], *_ends(surface.chainages, surface.arcs, surface.reach, chainage[inner]),

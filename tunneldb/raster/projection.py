@@ -1,6 +1,6 @@
 """All that is done with each point of a scan file, in one compiled pass: unrolled, seen, corrected, given its pixel.
 
-The formulas are those of `Surface.unroll`, `Edges.normals_of`, `PoseModel.positions`, `observe` and `Views.corrected`,
+The formulas are those of `Surface.unroll`, `Edges.normals_of`, `PoseModel.positions`, `observe` and `Observations.corrected`,
 whose compiled parts are called here. What is known of the point before (its segment, section and degree, interval of the
 trajectory and of the reference curve) shortens the search and changes nothing of what is found, so that neither the
 order of points nor the number of threads does.
@@ -29,7 +29,7 @@ COSINES = 2048
 """Steps of the cosine at which the loss by incidence is computed; between them it is interpolated, to less than 0.001 dB."""
 
 
-class Shape(NamedTuple):
+class SurfaceArrays(NamedTuple):
     """A surface, see `Surface`."""
 
     segments: Float
@@ -41,7 +41,7 @@ class Shape(NamedTuple):
     reach: float
 
 
-class Faces(NamedTuple):
+class EdgeArrays(NamedTuple):
     """Edges, see `Edges`; ``any`` tells whether there are any."""
 
     any: bool
@@ -52,7 +52,7 @@ class Faces(NamedTuple):
     sharp: Bool
 
 
-class Scanner(NamedTuple):
+class PoseArrays(NamedTuple):
     """Scanner positions, see `PoseModel`."""
 
     scan_id: Int64
@@ -61,7 +61,7 @@ class Scanner(NamedTuple):
     track: Float
 
 
-class Optics(NamedTuple):
+class CorrectionArrays(NamedTuple):
     """How intensity is corrected.
 
     ``wanted`` is False for a survey without it, then nothing below counts. ``knots`` (m) and ``values`` (dB) are the
@@ -81,7 +81,7 @@ class Optics(NamedTuple):
     far: float
 
 
-class Target(NamedTuple):
+class PixelTarget(NamedTuple):
     """Where points go.
 
     ``low`` and ``high`` (3) are the box of points to look at, m; ``tolerance`` and ``recess`` the greatest distances in
@@ -127,8 +127,8 @@ class Pixels(NamedTuple):
         return cls(whole[0], whole[1], whole[2], single[0], single[1], single[2])
 
 
-class Tally(NamedTuple):
-    """What `look` counts.
+class ProjectionCounts(NamedTuple):
+    """What `project` counts.
 
     Points used in the kilometre itself; those whose scanner position is unknown (they go nowhere); of those used, in the
     halo too, that are not floor, how many there are, how many lie outside the reference curve's ranges, and the nearest and
@@ -143,18 +143,18 @@ class Tally(NamedTuple):
     farthest: float
 
 
-def look(
-    shape: Shape,
-    faces: Faces,
-    scanner: Scanner,
-    optics: Optics,
-    target: Target,
+def project(
+    shape: SurfaceArrays,
+    faces: EdgeArrays,
+    scanner: PoseArrays,
+    optics: CorrectionArrays,
+    target: PixelTarget,
     xyz: Float,
     time: Float,
     scan_id: Int32,
     intensity: Single,
     pixels: Pixels,
-) -> Tally:
+) -> ProjectionCounts:
     """Find the pixel of each point and what it adds there.
 
     Parameters
@@ -168,7 +168,9 @@ def look(
     """
     counts, ranges = _look(shape, faces, scanner, optics, target, xyz, time, scan_id, intensity, pixels)
     used, lost, lining, outside = counts.sum(axis=0).tolist()
-    return Tally(used, lost, lining, outside, float(ranges[:, 0].min(initial=np.inf)), float(ranges[:, 1].max(initial=-np.inf)))
+    return ProjectionCounts(
+        used, lost, lining, outside, float(ranges[:, 0].min(initial=np.inf)), float(ranges[:, 1].max(initial=-np.inf))
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -203,11 +205,11 @@ def _loss_at(loss: Float, cosine: float) -> float:
 
 @njit(cache=True, nogil=True, parallel=True, error_model="numpy")
 def _look(
-    shape: Shape,
-    faces: Faces,
-    scanner: Scanner,
-    optics: Optics,
-    target: Target,
+    shape: SurfaceArrays,
+    faces: EdgeArrays,
+    scanner: PoseArrays,
+    optics: CorrectionArrays,
+    target: PixelTarget,
     xyz: Float,
     time: Float,
     scan_id: Int32,

@@ -10,13 +10,23 @@ from typing import Any
 import numpy as np
 
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.reader import Points, Source, read_chunks
+from tunneldb.pointcloud.reader import Points, ScanSource, read_chunks
 from tunneldb.radiometry.oren_nayar import incidence_db
 from tunneldb.radiometry.reference_curve import SPAN_TOLERANCE
 from tunneldb.raster.accumulator import Accumulator
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.observation import Eye, Span
-from tunneldb.raster.projection import COSINES, Faces, Optics, Pixels, Scanner, Shape, Tally, Target, look
+from tunneldb.raster.observation import Observer, RangeSpan
+from tunneldb.raster.projection import (
+    COSINES,
+    CorrectionArrays,
+    EdgeArrays,
+    Pixels,
+    PixelTarget,
+    PoseArrays,
+    ProjectionCounts,
+    SurfaceArrays,
+    project,
+)
 from tunneldb.threads import threads
 
 Counts = dict[str, Any]
@@ -25,14 +35,16 @@ CHUNK = 50_000
 """Points read at a time by one thread: a chunk of most LAZ files, and few enough to stay in the processor's cache."""
 
 
-def gather(eye: Eye, files: list[Source], image: Accumulator, roughness: float, progress: Callable[[float], None]) -> Counts:
+def rasterize(
+    observer: Observer, files: list[ScanSource], image: Accumulator, roughness: float, progress: Callable[[float], None]
+) -> Counts:
     """Read the files and put their points into the image.
 
     Parameters
     ----------
-    eye : Eye
+    observer : Observer
         The kilometre, and how its points are seen.
-    files : list of Source
+    files : list of ScanSource
         What to read.
     image : Accumulator
         Gets the points.
@@ -48,14 +60,14 @@ def gather(eye: Eye, files: list[Source], image: Accumulator, roughness: float, 
         or no point lies on the lining.
     """
     total, read, used = sum(file.points for file in files), 0, 0
-    span = Span()
-    lens = Lens.of(eye, image.grid, roughness)
-    reference = eye.radiometer.reference if eye.radiometer else None
+    span = RangeSpan()
+    projector = Projector.of(observer, image.grid, roughness)
+    reference = observer.radiometer.reference if observer.radiometer else None
     for path, points in _chunks(files):
-        pixels, tally = lens.look(points)
+        pixels, tally = projector.project(points)
         if tally.lost:
-            assert eye.radiometer is not None
-            raise eye.radiometer.poses.faults(eye.near(points)).error(path.name)
+            assert observer.radiometer is not None
+            raise observer.radiometer.poses.faults(observer.near(points)).error(path.name)
         image.add(pixels, len(points))
         span.add(tally.nearest, tally.farthest, tally.outside, tally.lining)
         read += len(points)
@@ -64,11 +76,13 @@ def gather(eye: Eye, files: list[Source], image: Accumulator, roughness: float, 
     if reference:
         span.require(reference)
     if not used:
-        raise UserError(f"no point of {', '.join(file.path.name for file in files)} lies on the lining of kilometre {eye.km}")
+        raise UserError(
+            f"no point of {', '.join(file.path.name for file in files)} lies on the lining of kilometre {observer.km}"
+        )
     return {"files": len(files), "points_read": read, "points_used": used}
 
 
-def _chunks(files: list[Source]) -> Iterator[tuple[Path, Points]]:
+def _chunks(files: list[ScanSource]) -> Iterator[tuple[Path, Points]]:
     size = CHUNK if threads() == 1 else 4 * CHUNK * threads()  # so that each thread has chunks to decode
     for file in files:
         for points in read_chunks(file.path, file.dimension, size, file.ranges):
@@ -76,30 +90,30 @@ def _chunks(files: list[Source]) -> Iterator[tuple[Path, Points]]:
 
 
 @dataclass
-class Lens:
-    """What the kernel needs, prepared once for a kilometre; `look` takes chunk after chunk."""
+class Projector:
+    """What the kernel needs, prepared once for a kilometre; `project` takes chunk after chunk."""
 
-    shape: Shape
-    faces: Faces
-    scanner: Scanner
-    optics: Optics
-    target: Target
+    shape: SurfaceArrays
+    faces: EdgeArrays
+    scanner: PoseArrays
+    optics: CorrectionArrays
+    target: PixelTarget
     pixels: Pixels
 
     @classmethod
-    def of(cls, eye: Eye, grid: Grid, roughness: float) -> Lens:
+    def of(cls, observer: Observer, grid: Grid, roughness: float) -> Projector:
         """Prepare it for an image; ``roughness`` in degrees."""
-        s, edges, floor = eye.surface, eye.edges, eye.floor
+        s, edges, floor = observer.surface, observer.edges, observer.floor
         return cls(
-            Shape(s.segments, s.number, s.ends, s.chainages, s.radius, s.arcs, s.reach),
-            Faces(bool(edges.sharp.any()), edges.start, edges.first, edges.feet, edges.normals, edges.sharp),
-            _scanner(eye),
-            _optics(eye, roughness),
-            Target(
-                eye.box[0],
-                eye.box[1],
-                eye.tolerance,
-                eye.recess,
+            SurfaceArrays(s.segments, s.number, s.ends, s.chainages, s.radius, s.arcs, s.reach),
+            EdgeArrays(bool(edges.sharp.any()), edges.start, edges.first, edges.feet, edges.normals, edges.sharp),
+            _scanner(observer),
+            _optics(observer, roughness),
+            PixelTarget(
+                observer.box[0],
+                observer.box[1],
+                observer.tolerance,
+                observer.recess,
                 grid.west,
                 1.0 / grid.pixel,
                 grid.bottom,
@@ -115,11 +129,11 @@ class Lens:
             Pixels.empty(0),
         )
 
-    def look(self, points: Points) -> tuple[Pixels, Tally]:
+    def project(self, points: Points) -> tuple[Pixels, ProjectionCounts]:
         """Find the pixels of a chunk of points; what is returned is overwritten by the next chunk."""
         if len(self.pixels.row) < len(points):
             self.pixels = Pixels.empty(len(points))
-        tally = look(
+        tally = project(
             self.shape,
             self.faces,
             self.scanner,
@@ -134,19 +148,19 @@ class Lens:
         return self.pixels, tally
 
 
-def _scanner(eye: Eye) -> Scanner:
-    if eye.radiometer is None:
-        return Scanner(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
-    poses = eye.radiometer.poses
-    return Scanner(poses.scan_id, poses.station, poses.time, poses.track)
+def _scanner(observer: Observer) -> PoseArrays:
+    if observer.radiometer is None:
+        return PoseArrays(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
+    poses = observer.radiometer.poses
+    return PoseArrays(poses.scan_id, poses.station, poses.time, poses.track)
 
 
-def _optics(eye: Eye, roughness: float) -> Optics:
+def _optics(observer: Observer, roughness: float) -> CorrectionArrays:
     nothing = np.zeros(0)
-    if eye.radiometer is None:
-        return Optics(False, False, nothing, nothing, -np.inf, np.inf, nothing, 0.0, np.inf)
-    radiometer, curve = eye.radiometer, eye.radiometer.reference
-    return Optics(
+    if observer.radiometer is None:
+        return CorrectionArrays(False, False, nothing, nothing, -np.inf, np.inf, nothing, 0.0, np.inf)
+    radiometer, curve = observer.radiometer, observer.radiometer.reference
+    return CorrectionArrays(
         True,
         radiometer.kind == "linear",
         curve.range_m if curve else nothing,

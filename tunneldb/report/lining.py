@@ -18,7 +18,7 @@ from tunneldb.arrays import Intp, Single, UInt8
 from tunneldb.raster.gap_fill import FILL, fill_gaps
 from tunneldb.raster.geotiff import Raster, decode
 from tunneldb.raster.grid import BLOCK
-from tunneldb.raster.pixel_state import State
+from tunneldb.raster.pixel_state import PixelState
 from tunneldb.store.images import DARK
 from tunneldb.store.survey import Survey
 
@@ -31,7 +31,7 @@ KEPT = 7
 NO_STATE = 255
 """Where a block has no state."""
 
-EMPTY, OFF, FLOOR_CODE = int(State.EMPTY), int(State.OFF), int(State.FLOOR)
+EMPTY, OFF, FLOOR_CODE = int(PixelState.EMPTY), int(PixelState.OFF), int(PixelState.FLOOR)
 
 HELD = 0.2
 """Lining is shown as seen where at least this share of its pixels holds points: the same share as the median filter needs to
@@ -99,7 +99,7 @@ class _Block:
     shown : Raster
         Corrected intensity, dB, or offset from the surface, m.
     state : (rows, columns) uint8 array
-        Values of :class:`State`, DARK or NO_STATE.
+        Values of :class:`PixelState`, DARK or NO_STATE.
     """
 
     shown: Raster
@@ -109,7 +109,7 @@ class _Block:
         """What is shown of its lining, thinned, dB or m."""
         thin = (slice(None, None, 4), slice(None, None, 4))
         values = self.shown.values[thin]
-        return values[np.isfinite(values) & np.isin(self.state[thin], (State.LINING, State.RECESS, DARK))]
+        return values[np.isfinite(values) & np.isin(self.state[thin], (PixelState.LINING, PixelState.RECESS, DARK))]
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ class Lining:
         if "state" in rows:
             state = np.nan_to_num(decode(rows["state"]).values, nan=NO_STATE)
         else:  # without intensity, and from before there were states
-            state = np.where(np.isfinite(shown.values), np.float32(State.LINING), np.float32(State.EMPTY))
+            state = np.where(np.isfinite(shown.values), np.float32(PixelState.LINING), np.float32(PixelState.EMPTY))
         self._kept[number] = block = _Block(shown, state.astype(np.uint8))
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)

@@ -6,7 +6,7 @@
 
 from tunneldb.simulate.floor_profile import rise
 from tunneldb.simulate.generate import Cloud, Simulation, simulate
-from tunneldb.simulate.objects.primitives import TargetSphere, Thing
+from tunneldb.simulate.objects.primitives import Primitive, TargetSphere
 from tunneldb.simulate.output import Files, write
 from tunneldb.simulate.parameters import PRESETS, Parameters
 from tunneldb.simulate.tunnel.centreline import CentreLine, Element
@@ -20,10 +20,10 @@ __all__ = [
     "Element",
     "Files",
     "Parameters",
+    "Primitive",
     "Section",
     "Simulation",
     "TargetSphere",
-    "Thing",
     "Tunnel",
     "Unrolled",
     "box",

@@ -21,7 +21,7 @@ from tunneldb.simulate.lining.rings import build
 from tunneldb.simulate.lining.seepage import joint_leaks, niche_leaks, with_drips
 from tunneldb.simulate.objects.fixtures import FLOOR, RAIL, Appendage, Niche, furnish, refuges
 from tunneldb.simulate.objects.overhead import overhead, sleepers
-from tunneldb.simulate.objects.primitives import TargetSphere, Thing, parts_table
+from tunneldb.simulate.objects.primitives import Primitive, TargetSphere, parts_table
 from tunneldb.simulate.objects.wall_clutter import clutter
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.placement import stand
@@ -94,7 +94,7 @@ class Simulation:
         How the lining is put together.
     coat : Coat or None
         How bright it is from place to place; None: plain.
-    things : list of Thing
+    things : list of Primitive
         What stands or hangs free, thing i with number i + 1.
     spheres : list of TargetSphere
         Target spheres; sphere i is thing i.
@@ -126,7 +126,7 @@ class Simulation:
         self.scanner = Scanner(parameters, self.tunnel)
         standing, spheres = stand(parameters, self.tunnel, self.scanner, self.appendages, self.niches, free)
         self.spheres: list[TargetSphere] = spheres
-        self.things: list[Thing] = standing + overhead(parameters, self.tunnel, loose, len(standing) + 1)
+        self.things: list[Primitive] = standing + overhead(parameters, self.tunnel, loose, len(standing) + 1)
         self._scene = scene(
             self.tunnel,
             self.appendages,

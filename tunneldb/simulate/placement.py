@@ -16,7 +16,7 @@ from tunneldb.simulate.floor_profile import rise
 from tunneldb.simulate.objects import equipment
 from tunneldb.simulate.objects.equipment import STANDING, UP, Place
 from tunneldb.simulate.objects.fixtures import APPENDAGE, Appendage, Niche
-from tunneldb.simulate.objects.primitives import TargetSphere, Thing, rod
+from tunneldb.simulate.objects.primitives import Primitive, TargetSphere, rod
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.scanner import Scanner
 from tunneldb.simulate.tunnel.tunnel import Tunnel
@@ -110,7 +110,7 @@ def _wall_spot(
     raise UserError("no room on the walls for another target sphere or lamp: ask for fewer or a longer tunnel")
 
 
-def _hiding_cable(floor: _Floor, s: float, centre: Float, wall: Float, radius: float) -> Thing:
+def _hiding_cable(floor: _Floor, s: float, centre: Float, wall: Float, radius: float) -> Primitive:
     """A cable along the tunnel that covers the upper half of a sphere from where the scanner stands."""
     p, scanner, line = floor.parameters, floor.scanner, floor.tunnel.line
     if p.scanner == "static":
@@ -130,17 +130,17 @@ def _hiding_cable(floor: _Floor, s: float, centre: Float, wall: Float, radius: f
     ends = middle - 0.8 * along, middle + 0.8 * along
     back = wall - centre
     parts = [rod(*ends, thick), *(rod(end, end + back * 1.5, 0.008) for end in ends)]
-    return Thing("cable", APPENDAGE, 6.0, np.array(parts))
+    return Primitive("cable", APPENDAGE, 6.0, np.array(parts))
 
 
 def _spheres(
     floor: _Floor, furniture: list[Appendage], niches: list[Niche], rng: np.random.Generator
-) -> tuple[list[TargetSphere], list[Thing]]:
+) -> tuple[list[TargetSphere], list[Primitive]]:
     """Target spheres on tripods and wall brackets in turn; the third touches the wall, the fourth is half hidden."""
     p, tunnel = floor.parameters, floor.tunnel
     radius = p.sphere_radius
     spheres: list[TargetSphere] = []
-    carriers: list[Thing] = []
+    carriers: list[Primitive] = []
     for i in range(p.spheres):
         kind = {2: "touching", 3: "hidden"}.get(i, "tripod" if i % 2 == 0 else "bracket")
         if kind == "tripod":
@@ -150,8 +150,8 @@ def _spheres(
         else:
             s, arc = _wall_spot(floor, furniture, niches, radius + 0.15, rng)
             offset = radius if kind == "touching" else radius + float(rng.uniform(0.18, 0.4))
-            wall = tunnel.roll(np.array([s]), np.array([arc]))[0]
-            centre = tunnel.roll(np.array([s]), np.array([arc]), offset)[0]
+            wall = tunnel.to_space(np.array([s]), np.array([arc]))[0]
+            centre = tunnel.to_space(np.array([s]), np.array([arc]), offset)[0]
             if kind != "touching":
                 carriers.append(equipment.sphere_bracket(wall, centre, radius))
             if kind == "hidden":
@@ -174,7 +174,7 @@ def stand(
     furniture: list[Appendage],
     niches: list[Niche],
     seed: np.random.SeedSequence,
-) -> tuple[list[Thing], list[TargetSphere]]:
+) -> tuple[list[Primitive], list[TargetSphere]]:
     """Everything that stands free, numbered from 1, and the target spheres, which have the first numbers.
 
     Raises
@@ -201,7 +201,7 @@ def stand(
             things.append(equipment.globe_on_post(floor.place(*floor.find("globe", streams[4])), radius, streams[4]))
         else:
             s, arc = _wall_spot(floor, furniture, niches, radius + 0.15, streams[4])
-            at = tunnel.unroll(tunnel.roll(np.array([s]), np.array([arc]), 0.1))
-            wall = tunnel.roll(np.array([s]), np.array([arc]))[0]
+            at = tunnel.unroll(tunnel.to_space(np.array([s]), np.array([arc]), 0.1))
+            wall = tunnel.to_space(np.array([s]), np.array([arc]))[0]
             things.append(equipment.globe_on_wall(wall, at.normal[0], radius))
     return [replace(thing, number=i + 1) for i, thing in enumerate(things)], spheres

@@ -184,7 +184,7 @@ class Scanner:
         p, line, half = self.parameters, self.tunnel.line, self.tunnel.section.half_perimeter
         n = round(density * 2.0 * half * (plan.chainage_to - plan.chainage))
         s = np.sort(rng.uniform(plan.chainage, plan.chainage_to, n))
-        target = self.tunnel.roll(s, rng.uniform(-half, half, n)) - line.origin
+        target = self.tunnel.to_space(s, rng.uniform(-half, half, n)) - line.origin
         if p.scanner == "static":
             gap = (line.end - line.start) / self.station_chainage.size
             k = np.clip(((s - line.start) / gap).astype(int), 0, self.station_chainage.size - 1)

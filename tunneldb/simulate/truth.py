@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 
 from tunneldb.arrays import Float
 from tunneldb.simulate.lining.leaks import Leak
-from tunneldb.simulate.lining.reflectance import GRIME_RISE, Coat, soot_amount
+from tunneldb.simulate.lining.reflectance import GRIME_RISE, Reflectance, soot_amount
 from tunneldb.simulate.lining.relief import wider_from
 from tunneldb.simulate.lining.rings import POCKET, POCKET_FROM_JOINT, POCKETS, Rings
 
@@ -92,7 +92,7 @@ def joints(rings: Rings, start: float, end: float, lowest: float) -> list[Dry]:
     return [d for d in cut if d.outline.area > 0.0]
 
 
-def soot(coat: Coat, start: float, end: float) -> list[Dry]:
+def soot(coat: Reflectance, start: float, end: float) -> list[Dry]:
     """Where soot darkens by half of what was asked or more; its drop is the mean over that."""
     asked, middle, width = coat.soot.tolist()
     if asked == 0.0:
@@ -106,7 +106,7 @@ def soot(coat: Coat, start: float, end: float) -> list[Dry]:
     return [Dry(outline, "soot", float(np.average(level.mean(axis=1), weights=half)))]
 
 
-def grime(coat: Coat, start: float, end: float) -> list[Dry]:
+def grime(coat: Reflectance, start: float, end: float) -> list[Dry]:
     """Where grime darkens by half of its most or more, on average along the tunnel; the drop is the mean over that."""
     dry = []
     for side, edge, fade, drop in coat.grime.tolist():

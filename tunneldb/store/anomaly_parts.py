@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from tunneldb.anomalies.regions import Region, Traits, together, unite
+from tunneldb.anomalies.regions import Region, RegionProperties, together, unite
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.store.survey import Survey
 
@@ -147,6 +147,6 @@ def _load(conn: psycopg.Connection[Any], survey: Survey, kilometres: Iterable[in
     parts = []
     for key, km, anomaly, pixel, (column, row, columns, height), bits, filled, total, most, traits in rows:
         mask = np.unpackbits(np.frombuffer(bits, np.uint8), count=height * columns).astype(np.bool_).reshape(height, columns)
-        region = Region(pixel, column, row, mask, filled, total, most, Traits(*traits))
+        region = Region(pixel, column, row, mask, filled, total, most, RegionProperties(*traits))
         parts.append(Part(key, km, anomaly, region))
     return parts

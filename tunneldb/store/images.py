@@ -10,13 +10,13 @@ import psycopg
 import shapely
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.level_map import DryMap
+from tunneldb.anomalies.background.level_map import BackgroundMap
 from tunneldb.anomalies.coverage import Coverage
 from tunneldb.anomalies.detect import Detection
 from tunneldb.arrays import Bool, Single, UInt8
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.radiometry.reference_curve import ReferenceCurve
-from tunneldb.radiometry.robust_statistics import Dry
+from tunneldb.radiometry.robust_statistics import DryLevel
 from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.accumulator import Window
 from tunneldb.raster.geotiff import Raster, encode
@@ -24,7 +24,7 @@ from tunneldb.raster.grid import Grid
 from tunneldb.store.survey import Survey
 
 DARK = 5
-"""Value of dark pixels in the image of states, beside those of :class:`tunneldb.raster.pixel_state.State`."""
+"""Value of dark pixels in the image of states, beside those of :class:`tunneldb.raster.pixel_state.PixelState`."""
 
 
 def load_reference(conn: psycopg.Connection[Any], survey: Survey) -> ReferenceCurve | None:
@@ -107,9 +107,9 @@ def save_radiometry(
     survey: Survey,
     km: int,
     roughness: Roughness,
-    dry: DryMap,
+    dry: BackgroundMap,
     found: Detection,
-    sigma: tuple[Dry, Dry, Dry],
+    sigma: tuple[DryLevel, DryLevel, DryLevel],
 ) -> None:
     """Replace the radiometry of a kilometre.
 
@@ -119,7 +119,7 @@ def save_radiometry(
         Where.
     roughness : Roughness
         Stored as NULL where the incidence angles don't determine it.
-    dry : DryMap
+    dry : BackgroundMap
         Dry lining: the medians of its level and standard deviation, with the threshold by them.
     found : Detection
         Pixel counts.

@@ -110,9 +110,7 @@ def by_chainage(chainage: Float) -> Int32:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True)
-def _fill(
-    packed: UInt8, rows: UInt8, order: Int32, template: UInt8, file_ids: UInt8
-) -> None:  # pragma: no cover - compiled
+def _fill(packed: UInt8, rows: UInt8, order: Int32, template: UInt8, file_ids: UInt8) -> None:  # pragma: no cover - compiled
     for k in range(len(order)):
         row, out = rows[order[k]], packed[k]
         for b in range(_END):

@@ -34,7 +34,9 @@ def line_of(surface: Surface) -> PlanLine:
     return PlanLine.of(vertices[new], along[new])
 
 
-def save_ground(conn: psycopg.Connection[Any], survey: Survey, km: int, line: PlanLine, ground: Ground | None, arcs: Float) -> int:
+def save_ground(
+    conn: psycopg.Connection[Any], survey: Survey, km: int, line: PlanLine, ground: Ground | None, arcs: Float
+) -> int:
     """Replace the ground of a kilometre; returns the metres that have one.
 
     Parameters

@@ -12,7 +12,7 @@ from psycopg import sql
 
 from tunneldb.database.fetch import fetch_array
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.reader import Points, Source
+from tunneldb.pointcloud.reader import Points, ScanSource
 from tunneldb.store.partition import partition, rows_in
 from tunneldb.store.scan_files import checksum
 from tunneldb.store.survey import Survey
@@ -30,7 +30,7 @@ _FIELDS = (
 )
 
 
-def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Source]:
+def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[ScanSource]:
     """Scan files of a survey that touch a kilometre, in order of chainage; each must be what was loaded.
 
     A file's checksum is read once in the life of a process, and once more whenever its size or time of change is another.
@@ -51,7 +51,7 @@ def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Sour
     found = []
     for name, size, known, ranges in rows:
         path = unchanged_file(name, size, known)
-        found.append(Source(path, [(part.lower, part.upper) for part in ranges], survey.intensity_dimension))
+        found.append(ScanSource(path, [(part.lower, part.upper) for part in ranges], survey.intensity_dimension))
     return found
 
 

@@ -8,15 +8,15 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.histogram import take_levels
-from tunneldb.anomalies.background.level_map import DryMap
+from tunneldb.anomalies.background.level_map import BackgroundMap
 from tunneldb.arrays import Int16, Single, UInt8
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.image import Picture
-from tunneldb.raster.polygons import inside
+from tunneldb.raster.image import LiningImage
+from tunneldb.raster.polygons import mask_of_polygons
 
 
 @dataclass(frozen=True)
-class Relative:
+class ContrastImage:
     """State of all pixels of a picture, and how much darker than dry lining they are.
 
     Attributes
@@ -24,7 +24,7 @@ class Relative:
     grid : Grid
         The pixels.
     state : (rows, columns) uint8 array
-        Values of :class:`tunneldb.raster.pixel_state.State`.
+        Values of :class:`tunneldb.raster.pixel_state.PixelState`.
     drop : (rows, columns) int16 array
         Level of dry lining there less that of the pixel, in steps of 0.01 dB, positive where it is darker; NODATA where
         there is no point. What lies in drawn dry regions is at most 0.
@@ -44,11 +44,11 @@ class Relative:
     drawn: tuple[Polygon, ...] = ()
 
 
-def relative(picture: Picture, dry: DryMap) -> Relative:
+def contrast_image(picture: LiningImage, dry: BackgroundMap) -> ContrastImage:
     """Take the level of dry lining from that of all pixels, in the memory of ``picture.level``, which is lost."""
     drop = picture.level
     take_levels(dry.base, dry.rings, dry.bands, dry.smooth, dry.tile, drop)
-    for block, mask in inside(picture.grid, dry.drawn):
+    for block, mask in mask_of_polygons(picture.grid, dry.drawn):
         here = drop[:, block]
         here[mask] = np.minimum(here[mask], 0)
-    return Relative(picture.grid, picture.state, drop, dry.tile, dry.sigma, dry.drawn)
+    return ContrastImage(picture.grid, picture.state, drop, dry.tile, dry.sigma, dry.drawn)

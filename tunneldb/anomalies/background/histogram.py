@@ -38,7 +38,7 @@ CHUNK = 10
 
 @njit(cache=True, nogil=True)
 def settle(histogram: Int32) -> tuple[float, float, int]:  # pragma: no cover - compiled
-    """Mean and standard deviation of the dry part of a histogram, as in :func:`tunneldb.radiometry.robust_statistics.robust_statistics`.
+    """Mean and standard deviation of the dry part of a histogram, as in `radiometry.robust_statistics`.
 
     Both in bins, the mean from the lower side of the first one, and the number of values; NaN where there are none. Values
     are taken for evenly spread over their bin.
@@ -311,9 +311,7 @@ def tile_histograms(
 
 
 @njit(cache=True, nogil=True)
-def settle_windows(
-    histograms: UInt16, used: Bool, half: int
-) -> tuple[Single, Single, Int32]:  # pragma: no cover - compiled
+def settle_windows(histograms: UInt16, used: Bool, half: int) -> tuple[Single, Single, Int32]:  # pragma: no cover - compiled
     """Mean and standard deviation of dry lining in windows of 2 ``half`` + 1 tiles to a side about each tile.
 
     Of the tiles that are used. (Tiles down, tiles along) each, dB, NaN where there is nothing; and the number of values.

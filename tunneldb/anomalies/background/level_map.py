@@ -9,10 +9,10 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.histogram import fill_levels
-from tunneldb.anomalies.background.model import Fit
+from tunneldb.anomalies.background.model import BackgroundFit
 from tunneldb.arrays import Int32, Single, UInt8
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.image import Picture
+from tunneldb.raster.image import LiningImage
 
 TILE = 0.5
 """Side of a tile, about, m."""
@@ -25,7 +25,7 @@ SHOWN = 2_000_000
 
 
 @dataclass(frozen=True)
-class DryMap:
+class BackgroundMap:
     """Level and standard deviation of dry lining, locally.
 
     The level is a sum: that of the kilometre, of each column (rings of other concrete), of each row by blocks of 50 m
@@ -74,16 +74,16 @@ class DryMap:
         return out
 
 
-def map_dry(picture: Picture, dry_regions: Sequence[Polygon] = ()) -> DryMap:
+def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) -> BackgroundMap:
     """Map the dry lining of a picture.
 
-    Level and standard deviation are those of the dry part of the lining (:func:`tunneldb.radiometry.robust_statistics.robust_statistics`):
+    Level and standard deviation are those of the dry part of the lining (`radiometry.robust_statistics`):
     of a column, of a row along 150 m, of windows of tiles. As long as no more than half of each is wet, leaks don't count.
     Lining set back behind the wall doesn't count either.
 
     Parameters
     ----------
-    picture : Picture
+    picture : LiningImage
         State and level of the pixels.
     dry_regions : sequence of Polygon
         Dry lining that the user drew, in the unrolled plane, m. Tiles that lie in it for the larger part take plain mean
@@ -93,13 +93,13 @@ def map_dry(picture: Picture, dry_regions: Sequence[Polygon] = ()) -> DryMap:
     tile, count = _tile_side(grid), int(np.count_nonzero(state == 1))
     if count == 0:
         return _nothing(grid, tile, tuple(dry_regions))
-    fit = Fit(picture, tile, count, dry_regions)
+    fit = BackgroundFit(picture, tile, count, dry_regions)
     for _ in range(PASSES):
         fit.add_bands()
         fit.add_rings()
         fit.add_smooth()
     sigma = fit.sigma()
-    dry = DryMap(grid, tile, sigma, 0.0, 0.0, count, *fit.parts[:4], tuple(dry_regions))
+    dry = BackgroundMap(grid, tile, sigma, 0.0, 0.0, count, *fit.parts[:4], tuple(dry_regions))
     return replace(dry, mean=_mean_level(dry, state), spread=_weighted_median(sigma, fit.lining))
 
 
@@ -110,14 +110,14 @@ def _tile_side(grid: Grid) -> int:
     return int(sides[np.argmin(np.abs(sides * grid.pixel - TILE))])
 
 
-def _nothing(grid: Grid, tile: int, drawn: tuple[Polygon, ...]) -> DryMap:
+def _nothing(grid: Grid, tile: int, drawn: tuple[Polygon, ...]) -> BackgroundMap:
     """Map of a picture without lining."""
     shape = -(-grid.rows // tile), grid.columns // tile
     flat = np.zeros(grid.columns, np.float32), np.zeros((grid.rows, grid.blocks), np.float32), np.zeros(shape, np.float32)
-    return DryMap(grid, tile, np.ones(shape, np.float32), np.nan, np.nan, 0, 0.0, *flat, drawn)
+    return BackgroundMap(grid, tile, np.ones(shape, np.float32), np.nan, np.nan, 0, 0.0, *flat, drawn)
 
 
-def _mean_level(dry: DryMap, state: UInt8) -> float:
+def _mean_level(dry: BackgroundMap, state: UInt8) -> float:
     """Median over the lining of the level of dry lining, from some of its rows, dB."""
     rows, columns = state.shape
     every = max(1, rows * columns // SHOWN)

@@ -14,8 +14,8 @@ from tunneldb.anomalies.background.smooth import fill, slow
 from tunneldb.arrays import Bool, Float, Int16, Int32, Single, UInt8, UInt16
 from tunneldb.radiometry.robust_statistics import robust_statistics
 from tunneldb.raster.geotiff import STEP
-from tunneldb.raster.image import Picture
-from tunneldb.raster.polygons import inside
+from tunneldb.raster.image import LiningImage
+from tunneldb.raster.polygons import mask_of_polygons
 
 SAMPLE, LINES = 15_000_000, 6_000_000
 """Pixels, about, that are looked at for tiles, and for rows and columns, which hold far more each."""
@@ -51,12 +51,12 @@ DRAWN = 0.5
 """Part of a tile's lining that must lie in drawn dry regions for them to rule it."""
 
 
-class Fit:
-    """Model of dry lining of a picture that holds lining; see :class:`tunneldb.anomalies.background.level_map.DryMap` for its parts.
+class BackgroundFit:
+    """Model of dry lining of a picture that holds lining; see `BackgroundMap` for its parts.
 
     Parameters
     ----------
-    picture : Picture
+    picture : LiningImage
         State and level of the pixels.
     tile : int
         Side of a tile, pixels.
@@ -66,7 +66,7 @@ class Fit:
         Drawn dry regions.
     """
 
-    def __init__(self, picture: Picture, tile: int, count: int, drawn: Sequence[Polygon]) -> None:
+    def __init__(self, picture: LiningImage, tile: int, count: int, drawn: Sequence[Polygon]) -> None:
         grid = self.grid = picture.grid
         self.picture, self.tile, self.drawn = picture, tile, drawn
         self.every, self.apart = max(1, count // SAMPLE), max(1, count // LINES)
@@ -183,7 +183,7 @@ class Fit:
         """
         tile, shape = self.tile, self.smooth.shape
         moments = np.zeros((3, *shape))
-        for columns, mask in inside(self.grid, self.drawn):
+        for columns, mask in mask_of_polygons(self.grid, self.drawn):
             row, column = np.nonzero(mask & (self.picture.state[:, columns] == 1))
             level = np.empty(mask.shape, np.float32)
             fill_levels(self.base, self.rings, self.bands, smooth, self.tile, 0, columns.start, level)

@@ -13,7 +13,7 @@ from tunneldb.arrays import Float, Int64
 from tunneldb.classification.ground.height_field import below, blended, carried_on, filled, refined
 from tunneldb.classification.ground.level_profile import is_round, level_ground, profiles
 from tunneldb.classification.ground.model import COLUMN, Ground
-from tunneldb.classification.ground.ransac import planes
+from tunneldb.classification.ground.ransac import ransac_planes
 from tunneldb.classification.ground.wall_foot import steady, walls
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.pointcloud.voxels import Voxels
@@ -158,7 +158,7 @@ def _segments(held: _Points, settings: GroundSettings, seed: int) -> tuple[Float
     middle = np.repeat(centres, np.diff(bounds, axis=1)[:, 0])
     local = np.column_stack([held.along - middle, held.across, held.z])
     starts = (np.int64(seed) << 32) + number.astype(np.int64) + 1_000_000
-    found = planes(local, bounds, settings.distance, settings.angle, settings.radius, starts)
+    found = ransac_planes(local, bounds, settings.distance, settings.angle, settings.radius, starts)
     return np.asarray(centres, dtype=np.float64), found.coefficients
 
 

@@ -32,7 +32,7 @@ class Planes(NamedTuple):
     inliers: Int64
 
 
-def planes(
+def ransac_planes(
     points: Float, bounds: Int64, distance: float, angle: float, radius: float, seed: Int64, check: bool = True
 ) -> Planes:
     """Best plane of each group of points.

@@ -29,7 +29,7 @@ class Cluster:
     Attributes
     ----------
     klass : int
-        Class of its points, see :class:`tunneldb.classification.classes.Klass`.
+        Class of its points, see :class:`tunneldb.classification.classes.PointClass`.
     cells : (m, 3) int32 array
         Cells that its points fill: floor(xyz / 0.1 m), each once, sorted.
     points : int

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import ndimage
 
 from tunneldb.arrays import Bool, Float, Int64
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.classification.ground.model import Ground
 from tunneldb.classification.objects.clusters import Cluster, pieces
 from tunneldb.classification.objects.dbscan import dbscan
@@ -60,7 +60,7 @@ class ClusterSettings:
 
 
 @dataclass(frozen=True)
-class Rest:
+class ResidualPoints:
     """Points that are neither ground nor lining.
 
     Attributes
@@ -87,16 +87,18 @@ class Rest:
     def __len__(self) -> int:
         return len(self.xyz)
 
-    def __getitem__(self, chosen: Bool | Int64) -> Rest:
+    def __getitem__(self, chosen: Bool | Int64) -> ResidualPoints:
         parts = (self.xyz, self.along, self.across, self.height, self.depth, self.top)
-        return Rest(*(part[chosen] for part in parts))
+        return ResidualPoints(*(part[chosen] for part in parts))
 
     def clusters(self, klass: int, known: bool) -> list[Cluster]:
         """One cluster, or pieces of it, of all these points; ``known``: the heights are those above a ground."""
         return pieces(klass, self.xyz, self.along, self.height if known else np.full(len(self), np.nan))
 
 
-def find_clusters(rest: Rest, spacing: Spacing, settings: ClusterSettings, ground: Ground | None) -> list[Cluster]:
+def find_clusters(
+    residual: ResidualPoints, spacing: Spacing, settings: ClusterSettings, ground: Ground | None
+) -> list[Cluster]:
     """Clusters of the points that are neither ground nor lining, each with its class; noise is left out.
 
     Behind the lining's plane a cluster wide enough is a niche. Before it bars along the ground are taken out first, for
@@ -106,25 +108,27 @@ def find_clusters(rest: Rest, spacing: Spacing, settings: ClusterSettings, groun
     what is on the wall and what is off it.
     """
     with np.errstate(invalid="ignore"):
-        behind = rest.depth < 0.0
+        behind = residual.depth < 0.0
     found = [
         cluster
-        for recess in _groups(rest[behind], spacing, settings)
+        for recess in _groups(residual[behind], spacing, settings)
         if _is_wide(recess)
-        for cluster in recess.clusters(Klass.NICHE, ground is not None)
+        for cluster in recess.clusters(PointClass.NICHE, ground is not None)
     ]
-    return found + sort_clusters(rest[~behind], spacing, settings, ground)
+    return found + sort_clusters(residual[~behind], spacing, settings, ground)
 
 
-def sort_clusters(rest: Rest, spacing: Spacing, settings: ClusterSettings, ground: Ground | None) -> list[Cluster]:
+def sort_clusters(
+    residual: ResidualPoints, spacing: Spacing, settings: ClusterSettings, ground: Ground | None
+) -> list[Cluster]:
     """Clusters of points that are neither ground nor behind the lining: rails, objects and appendages."""
     known = ground is not None
     found: list[Cluster] = []
-    rails = bars(rest.along, rest.across, rest.height) if known else np.zeros(len(rest), np.bool_)
+    rails = bars(residual.along, residual.across, residual.height) if known else np.zeros(len(residual), np.bool_)
     if rails.any():
-        found += rest[rails].clusters(Klass.RAIL, known)
+        found += residual[rails].clusters(PointClass.RAIL, known)
     radius = settings.radius * spacing.across
-    for group in _groups(rest[~rails], spacing, settings):
+    for group in _groups(residual[~rails], spacing, settings):
         found += _sorted(group, radius, spacing, settings, known)
     return found
 
@@ -183,49 +187,49 @@ def _long(thin: Bool, metres: int) -> Int64:
     return np.where(lengths[labels] >= metres, labels, 0).astype(np.int64)
 
 
-def _groups(rest: Rest, spacing: Spacing, settings: ClusterSettings) -> list[Rest]:
+def _groups(residual: ResidualPoints, spacing: Spacing, settings: ClusterSettings) -> list[ResidualPoints]:
     """Clusters by DBSCAN, distances along shrunk to the spacing across."""
-    if len(rest) == 0:
+    if len(residual) == 0:
         return []
-    places = np.column_stack([rest.along * spacing.shrink, rest.across, rest.xyz[:, 2]])
+    places = np.column_stack([residual.along * spacing.shrink, residual.across, residual.xyz[:, 2]])
     labels = dbscan(places, settings.radius * spacing.across, settings.min_points)
     order = np.argsort(labels, kind="stable")
     bounds = np.searchsorted(labels[order], np.arange(labels.max() + 2))
-    return [rest[order[first:last]] for first, last in itertools.pairwise(bounds)]
+    return [residual[order[first:last]] for first, last in itertools.pairwise(bounds)]
 
 
-def _is_wide(group: Rest) -> bool:
+def _is_wide(group: ResidualPoints) -> bool:
     """Tell whether a cluster is larger than ``RECESS`` in two directions."""
     extent = np.ptp(np.column_stack([group.along, group.across, group.xyz[:, 2]]), axis=0)
     return int((extent >= RECESS).sum()) >= 2
 
 
-def _sorted(group: Rest, radius: float, spacing: Spacing, settings: ClusterSettings, known: bool) -> list[Cluster]:
+def _sorted(group: ResidualPoints, radius: float, spacing: Spacing, settings: ClusterSettings, known: bool) -> list[Cluster]:
     """Classed clusters of one group of points before the lining."""
     depth = np.where(np.isnan(group.depth), np.inf, group.depth)
     on_wall = float(depth.min()) <= radius
     if not _stands(group, radius):
         free = not on_wall and bool((group.height < group.top).any())
-        return group.clusters(Klass.OBJECT if free else Klass.APPENDAGE, known)
+        return group.clusters(PointClass.OBJECT if free else PointClass.APPENDAGE, known)
     if not on_wall:
-        return group.clusters(Klass.OBJECT, known)
+        return group.clusters(PointClass.OBJECT, known)
     if (depth <= FLAT).mean() >= 0.95:
-        return group.clusters(Klass.APPENDAGE, known)
+        return group.clusters(PointClass.APPENDAGE, known)
     off = depth > radius
     parted = group[off]
     found: list[Cluster] = []
-    rest = np.ones(len(parted), np.bool_)
+    residual = np.ones(len(parted), np.bool_)
     places = np.column_stack([parted.along * spacing.shrink, parted.across, parted.xyz[:, 2]])
     labels = dbscan(places, radius, settings.min_points)
     for label in range(int(labels.max(initial=-1)) + 1):
         part = parted[labels == label]
-        rest[labels == label] = False
-        found += part.clusters(Klass.OBJECT if _stands(part, radius) else Klass.APPENDAGE, known)
-    hanging = np.concatenate([np.flatnonzero(~off), np.flatnonzero(off)[rest]])
-    return found + group[hanging].clusters(Klass.APPENDAGE, known)
+        residual[labels == label] = False
+        found += part.clusters(PointClass.OBJECT if _stands(part, radius) else PointClass.APPENDAGE, known)
+    hanging = np.concatenate([np.flatnonzero(~off), np.flatnonzero(off)[residual]])
+    return found + group[hanging].clusters(PointClass.APPENDAGE, known)
 
 
-def _stands(group: Rest, radius: float) -> bool:
+def _stands(group: ResidualPoints, radius: float) -> bool:
     """Tell whether a cluster reaches down to the ground."""
     with np.errstate(invalid="ignore"):
         return bool((group.height <= radius).any())

@@ -23,7 +23,7 @@ FLAT = 0.08
 MOST = 1 << 16  # points of a cell that are summed up: more would say nothing new, and single precision tires
 
 
-class Curved:
+class CurvedCells:
     """Where a scan is not flat; add all points, `close` it, then ask `holds` for each point.
 
     Parameters

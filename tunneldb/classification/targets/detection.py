@@ -15,9 +15,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float, Int64
-from tunneldb.classification.targets.fit import Fit, cells_of, coverage, fit_sphere
-from tunneldb.classification.targets.hough import NEAR, REACH, Scattered, candidates
-from tunneldb.classification.targets.refinement import settle
+from tunneldb.classification.targets.fit import SphereFit, cells_of, coverage, fit_sphere
+from tunneldb.classification.targets.hough import NEAR, REACH, Scattered, hough_candidates
+from tunneldb.classification.targets.refinement import refine_spheres
 
 LEAST_POINTS = 30
 """Points on a sphere; with fewer, its centre is known to 1 or 2 mm at best and its radius not at all."""
@@ -114,8 +114,8 @@ def find_spheres(
         What is a ball or nearly, but no such sphere.
     """
     points = Scattered(xyz, REACH * radius)
-    centres, noise = candidates(points, eyes, radius)
-    there = settle(points, centres, radius)
+    centres, noise = hough_candidates(points, eyes, radius)
+    there = refine_spheres(points, centres, radius)
     near_radius = np.abs(there.radius - radius) <= tolerance + 3.0 * there.radius_sigma
     other_ball = (there.radius_sigma <= tolerance / 4.0) & (there.seen >= 1.5 * LEAST_COVERAGE)  # for the report
     likely = np.flatnonzero(
@@ -167,13 +167,13 @@ def _judge(points: Float, eyes: Float, start: Float, radius: float, tolerance: f
     return Sphere(fit.centre, fit.radius, fit.radius_sigma, fit.rms, fit.sigma, seen, count, firm)
 
 
-def _greatest_rms(fit: Fit, tolerance: float, noise: float) -> float:
+def _greatest_rms(fit: SphereFit, tolerance: float, noise: float) -> float:
     """By how much points of a sphere may scatter, m: chance hardly makes so few do so by more; noise is known to a tenth."""
     by_chance = 1.0 + 3.0 / math.sqrt(2.0 * float(fit.used.sum()))
     return min(tolerance, 1.1 * by_chance * noise * fit.expected)
 
 
-def _other_ball(points: Float, eyes: Float, fit: Fit, radius: float, tolerance: float, noise: float) -> Refusal | None:
+def _other_ball(points: Float, eyes: Float, fit: SphereFit, radius: float, tolerance: float, noise: float) -> Refusal | None:
     """What is a sphere, but of another radius: a lamp, a helmet."""
     if not radius / 2.0 < fit.radius < 2.0 * radius:
         return None
@@ -195,7 +195,7 @@ def _towards(points: Float, eyes: Float, centre: Float) -> Float:
     return mean if np.linalg.norm(mean) > 1e-6 else np.array([0.0, 0.0, 1.0])
 
 
-def _share_on(points: Float, fit: Fit, towards: Float, radius: float, tolerance: float) -> float:
+def _share_on(points: Float, fit: SphereFit, towards: Float, radius: float, tolerance: float) -> float:
     """Share of the points in and near the sphere, in the directions in which it is seen, that lie on it."""
     far = np.linalg.norm(points - fit.centre, axis=1)
     on = np.abs(far - radius) <= 1.5 * tolerance
@@ -207,7 +207,7 @@ def _share_on(points: Float, fit: Fit, towards: Float, radius: float, tolerance:
     return float(on.sum()) / float(held[cell].sum())
 
 
-def _is_cylinder(points: Float, fit: Fit, radius: float, tolerance: float) -> bool:
+def _is_cylinder(points: Float, fit: SphereFit, radius: float, tolerance: float) -> bool:
     """Whether the surface goes on beyond the sphere as a cylinder of its radius: a bollard, a post, a pipe.
 
     From where a cylinder has left the sphere that it ends in by two tolerances, points along it on a third of its rim tell.
@@ -228,7 +228,7 @@ def _is_cylinder(points: Float, fit: Fit, radius: float, tolerance: float) -> bo
     return False
 
 
-def _astray(points: Float, fit: Fit, radius: float) -> float:
+def _astray(points: Float, fit: SphereFit, radius: float) -> float:
     """By how much the surface under the noise differs from the sphere, rms, m; 0 where that can't be told from chance.
 
     Noise differs from point to point, and a shape hardly does: the correlation of the residuals of neighbours (Moran's I, 1950,

@@ -37,7 +37,7 @@ BANDS, SECTORS = 8, 6
 
 
 @dataclass(frozen=True)
-class Fit:
+class SphereFit:
     """A sphere of the nominal radius through points.
 
     Attributes
@@ -76,7 +76,7 @@ class Fit:
         return math.sqrt(float(np.trace(self.covariance)))
 
 
-def fit_sphere(points: Float, eyes: Float, start: Float, radius: float, widest: float) -> Fit | None:
+def fit_sphere(points: Float, observers: Float, start: Float, radius: float, widest: float) -> SphereFit | None:
     """Fit a sphere of known radius.
 
     Points within three standard deviations of the sphere are on it; the standard deviation is that of the points found so,
@@ -95,7 +95,7 @@ def fit_sphere(points: Float, eyes: Float, start: Float, radius: float, widest: 
 
     Returns
     -------
-    Fit or None
+    SphereFit or None
         None if fewer than 6 points are on it, or the fit leads away from the start by a radius.
 
     Notes
@@ -105,7 +105,7 @@ def fit_sphere(points: Float, eyes: Float, start: Float, radius: float, widest: 
     centre, band = start, widest
     for _ in range(STEPS):
         before = centre
-        distance, cosine = _seen(points, eyes, centre, radius)
+        distance, cosine = _seen(points, observers, centre, radius)
         near = (np.abs(distance) <= widest) & ~(cosine < GRAZING)
         # From all that is near, not only from what is within the band: that would be less from turn to turn.
         spread = max(1.4826 * float(np.median(np.abs(distance[near]))), LEAST_SPREAD) if near.any() else widest
@@ -122,12 +122,12 @@ def fit_sphere(points: Float, eyes: Float, start: Float, radius: float, widest: 
             break
         band = narrower
     centre, covariance = _solve(points[used], scale, centre, radius, free=False)
-    distance, cosine = _seen(points, eyes, centre, radius)
+    distance, cosine = _seen(points, observers, centre, radius)
     on = (np.abs(distance) <= band) & ~(cosine < BEHIND)
     solution, wider = _solve(points[used], scale, np.append(centre, radius), radius, free=True)
     radius_sigma = math.sqrt(wider[3, 3]) if wider[3, 3] > 0.0 else math.inf  # a plane has no radius
     expected = _rms(np.nan_to_num(cosine[used], nan=1.0))
-    return Fit(
+    return SphereFit(
         centre, covariance, solution[:3], float(solution[3]), radius_sigma, _rms(distance[used]), expected, on, used
     )  # fmt: skip
 
@@ -136,11 +136,11 @@ def _rms(values: Float) -> float:
     return math.sqrt(float(values @ values) / len(values))
 
 
-def _seen(points: Float, eyes: Float, centre: Float, radius: float) -> tuple[Float, Float]:
+def _seen(points: Float, observers: Float, centre: Float, radius: float) -> tuple[Float, Float]:
     """Distance of each point from the sphere, outwards positive, and cosine of incidence there (NaN without an eye)."""
     out = points - centre
     far = np.maximum(np.linalg.norm(out, axis=1), 1e-9)
-    sight = eyes - points
+    sight = observers - points
     length = np.linalg.norm(sight, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         cosine = np.einsum("ij,ij->i", out, sight) / (far * length)

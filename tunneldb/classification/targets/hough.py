@@ -64,7 +64,7 @@ class Scattered:
         return self.order[around(self.xyz, self.key, self.span, self.edge, place - self.low, reach)]
 
 
-def candidates(points: Scattered, eyes: Float, radius: float) -> tuple[Float, float]:
+def hough_candidates(points: Scattered, eyes: Float, radius: float) -> tuple[Float, float]:
     """Places where the centre of a sphere may be.
 
     Parameters

@@ -18,7 +18,7 @@ NARROW = 0.1  # and at last
 PASSES = 12
 
 
-class Settled(NamedTuple):
+class RefinedSpheres(NamedTuple):
     """Where candidates have come to, k of them.
 
     Attributes
@@ -44,9 +44,9 @@ class Settled(NamedTuple):
     radius_sigma: Float
 
 
-def settle(points: Scattered, centres: Float, radius: float) -> Settled:
+def refine_spheres(points: Scattered, centres: Float, radius: float) -> RefinedSpheres:
     """Fit spheres of a radius (m) to candidates (k, 3) by Gauss-Newton steps with Tukey's weights, whose reach shrinks."""
-    settled = Settled(*_settle(points.xyz, points.key, points.span, points.edge, centres - points.low, radius))
+    settled = RefinedSpheres(*_settle(points.xyz, points.key, points.span, points.edge, centres - points.low, radius))
     return settled._replace(centres=settled.centres + points.low)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.files import replacing
-from tunneldb.radiometry.dependence import Course
-from tunneldb.radiometry.diagnosis import Look
+from tunneldb.radiometry.dependence import ClassMeans
+from tunneldb.radiometry.diagnosis import Diagnosis
 from tunneldb.radiometry.oren_nayar import incidence_db
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def check_format(path: Path) -> None:
         raise UserError(f"{path}: a figure is written as {', '.join(FORMATS)}")
 
 
-def write_figure(look: Look, path: Path) -> None:
+def write_figure(look: Diagnosis, path: Path) -> None:
     """Write the figure: raw and corrected intensity over range and incidence, range curve and incidence effect.
 
     The file appears whole. Raises UserError if its ending stands for no format or it can't be written.
@@ -51,7 +51,7 @@ def write_figure(look: Look, path: Path) -> None:
         figure.savefig(temporary, dpi=110)
 
 
-def _panel(axes: Axes, at: Float, level: Float, course: Course, over: str, what: str) -> None:
+def _panel(axes: Axes, at: Float, level: Float, course: ClassMeans, over: str, what: str) -> None:
     axes.set_xlabel(over)
     axes.set_ylabel(what)
     known = np.isfinite(at) & np.isfinite(level)
@@ -69,7 +69,7 @@ def _panel(axes: Axes, at: Float, level: Float, course: Course, over: str, what:
     axes.legend(loc="lower left", fontsize=8)
 
 
-def _curves(axes: Axes, look: Look) -> None:
+def _curves(axes: Axes, look: Diagnosis) -> None:
     """Range curves, each about its mean over the ranges that all of them have: they are known but for a constant."""
     axes.set_xlabel("range, m")
     axes.set_ylabel("range curve about its mean, dB")
@@ -91,7 +91,7 @@ def _curves(axes: Axes, look: Look) -> None:
         axes.text(0.5, 0.5, "no range curve", ha="center", va="center", transform=axes.transAxes)
 
 
-def _losses(axes: Axes, look: Look) -> None:
+def _losses(axes: Axes, look: Diagnosis) -> None:
     axes.set_xlabel("incidence, °")
     axes.set_ylabel("effect of incidence, dB")
     angle = np.linspace(0.0, 80.0, 161)

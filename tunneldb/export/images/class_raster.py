@@ -9,7 +9,7 @@ import numpy as np
 import psycopg
 
 from tunneldb.arrays import Float, Intp, UInt8
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.export.images.palette import PALETTES
 from tunneldb.geometry.surface import Surface
 from tunneldb.raster.geotiff import Raster
@@ -73,8 +73,8 @@ class ClassPainter:
         # The last pixel before the seam straight below the axis may reach beyond it by a part of itself.
         at, arcs = self.surface.chainages, self.surface.arcs
         arc = np.clip(arc, np.interp(chainage, at, arcs[:, 0]) + SEAM, np.interp(chainage, at, arcs[:, -1]) - SEAM)
-        points = self.surface.roll(chainage, arc, offset.values[row, column].astype(np.float64))
+        points = self.surface.to_space(chainage, arc, offset.values[row, column].astype(np.float64))
         held = np.isfinite(points[:, 0])
-        classes = np.full(len(row), Klass.UNASSIGNED, np.uint8)
+        classes = np.full(len(row), PointClass.UNASSIGNED, np.uint8)
         classes[held] = self.classes(points[held])
         return classes

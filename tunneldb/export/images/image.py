@@ -13,6 +13,7 @@ from affine import Affine
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
+from tunneldb.arrays import Single
 from tunneldb.database import snapshot
 from tunneldb.export.images import preview
 from tunneldb.export.images.class_raster import ClassPainter
@@ -69,7 +70,7 @@ def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Pat
             *_beside(conn, survey, blocks[-1] + 1),
         ]
 
-        def shrunk() -> Iterator[tuple[int, preview.Single]]:
+        def shrunk() -> Iterator[tuple[int, Single]]:
             for other, block in around:
                 raster = _read(conn, survey, other, "offset", block)
                 if raster.transform.a == first.transform.a:
@@ -89,7 +90,7 @@ def _beside(conn: psycopg.Connection, survey: Survey, block: int) -> list[tuple[
     return conn.execute(query, (survey.id, block)).fetchall()
 
 
-def _laid(raster: Raster, like: Raster) -> preview.Single:
+def _laid(raster: Raster, like: Raster) -> Single:
     """Values of a block in the rows of another one."""
     down = round((like.transform.f - raster.transform.f) / like.transform.a)
     values = np.full(like.values.shape, np.nan, np.float32)
@@ -142,19 +143,17 @@ class _Sheet:
     def __init__(self, pixel: float) -> None:
         self._factor = preview_factor(pixel)
         self.pixel = pixel * self._factor
-        self._blocks: list[tuple[float, preview.Single]] = []
+        self._blocks: list[tuple[float, Single]] = []
 
     def note(self, west: float, pixels: NDArray[Any]) -> None:
         """Take a block that begins at a chainage, m."""
-        shrink: Callable[[NDArray[Any], int], preview.Single] = (
-            preview.shrink_codes if pixels.dtype == np.uint8 else preview.shrink
-        )
+        shrink: Callable[[NDArray[Any], int], Single] = preview.shrink_codes if pixels.dtype == np.uint8 else preview.shrink
         self._blocks.append((west, shrink(pixels, self._factor)))
 
     def strips(self) -> Iterator[preview.Strip]:
         """Lay the blocks into strips of a hectometre."""
         width = round(preview.STRIP / self.pixel)
-        by_start: dict[float, preview.Single] = {}
+        by_start: dict[float, Single] = {}
         for west, values in self._blocks:
             start = np.floor(west / preview.STRIP + 1e-9) * preview.STRIP
             strip = by_start.setdefault(start, np.full((values.shape[0], width), np.nan, np.float32))

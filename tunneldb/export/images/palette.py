@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tunneldb.classification.classes import Klass
-from tunneldb.raster.pixel_state import State
+from tunneldb.classification.classes import PointClass
+from tunneldb.raster.pixel_state import PixelState
 from tunneldb.store.images import DARK
 
 Colour = tuple[int, int, int]
 
-COLOURS: dict[Klass, Colour] = {
-    Klass.UNASSIGNED: (176, 176, 176),
-    Klass.GROUND: (166, 129, 76),
-    Klass.LINING: (143, 163, 184),
-    Klass.NICHE: (78, 110, 168),
-    Klass.APPENDAGE: (230, 163, 30),
-    Klass.RAIL: (59, 59, 59),
-    Klass.OBJECT: (200, 50, 43),
-    Klass.SPHERE: (31, 166, 74),
-    Klass.NOISE: (176, 79, 196),
+COLOURS: dict[PointClass, Colour] = {
+    PointClass.UNASSIGNED: (176, 176, 176),
+    PointClass.GROUND: (166, 129, 76),
+    PointClass.LINING: (143, 163, 184),
+    PointClass.NICHE: (78, 110, 168),
+    PointClass.APPENDAGE: (230, 163, 30),
+    PointClass.RAIL: (59, 59, 59),
+    PointClass.OBJECT: (200, 50, 43),
+    PointClass.SPHERE: (31, 166, 74),
+    PointClass.NOISE: (176, 79, 196),
 }
 
 
@@ -43,11 +43,11 @@ PALETTES = {
     "class": Palette({int(klass): (klass.name.lower(), colour) for klass, colour in COLOURS.items()}, nodata=0),
     "state": Palette(
         {
-            int(State.EMPTY): ("unseen", (226, 229, 233)),
-            int(State.LINING): ("lining", COLOURS[Klass.LINING]),
-            int(State.RECESS): ("recess", COLOURS[Klass.NICHE]),
-            int(State.OFF): ("appendage", COLOURS[Klass.APPENDAGE]),
-            int(State.FLOOR): ("floor", COLOURS[Klass.GROUND]),
+            int(PixelState.EMPTY): ("unseen", (226, 229, 233)),
+            int(PixelState.LINING): ("lining", COLOURS[PointClass.LINING]),
+            int(PixelState.RECESS): ("recess", COLOURS[PointClass.NICHE]),
+            int(PixelState.OFF): ("appendage", COLOURS[PointClass.APPENDAGE]),
+            int(PixelState.FLOOR): ("floor", COLOURS[PointClass.GROUND]),
             DARK: ("dark", (24, 24, 34)),
         },
         nodata=255,

@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 from shapely.geometry import Polygon
 
 from tunneldb.arrays import Single, UInt8
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.export.images.palette import PALETTES
 from tunneldb.geometry.stationing import Stationing
 from tunneldb.raster.gap_fill import FILL, fill_gaps
@@ -82,7 +82,7 @@ def _filled(kind: str, values: Single, reach: float) -> Single:
         return values
     if kind != "class":
         return fill_gaps(values, reach)
-    floating = values == Klass.NOISE
+    floating = values == PointClass.NOISE
     return np.where(floating, values, fill_gaps(np.where(floating, np.float32(np.nan), values), reach))
 
 

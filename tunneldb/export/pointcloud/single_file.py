@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.arrays import Float, Int64
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.classification.classify import find_bare_scene
 from tunneldb.classification.ground.extraction import GroundSettings, find_ground
 from tunneldb.classification.objects.objects import ClusterSettings
@@ -73,7 +73,7 @@ def classify_file(source: Path, target: Path, values: Mapping[str, float], begin
         raise UserError(f"{target.parent}: no such folder")
     count = read_header(source).points
     scene, origin = find_scene_of(source, values, begin("points", count))
-    lining = any(cluster.klass == Klass.LINING for cluster in scene.clusters) or scene.relief is not None
+    lining = any(cluster.klass == PointClass.LINING for cluster in scene.clusters) or scene.relief is not None
     if scene.ground is None and not lining:
         raise UserError(f"{source}: neither ground nor lining is found in its {count} points: is it the scan of a tunnel?")
     with replacing(target) as temporary:
@@ -81,9 +81,7 @@ def classify_file(source: Path, target: Path, values: Mapping[str, float], begin
     return Classified(counts, scene.ground is not None, lining)
 
 
-def find_scene_of(
-    source: Path, values: Mapping[str, float], progress: Callable[[int], None]
-) -> tuple[Scene, Float]:
+def find_scene_of(source: Path, values: Mapping[str, float], progress: Callable[[int], None]) -> tuple[Scene, Float]:
     """Make the models of a file in one pass over its points.
 
     Returns

@@ -12,7 +12,7 @@ from typing import Any
 import psycopg
 
 from tunneldb.arrays import Int64
-from tunneldb.classification.classes import Klass
+from tunneldb.classification.classes import PointClass
 from tunneldb.database import snapshot
 from tunneldb.errors import UserError
 from tunneldb.files import replacing
@@ -22,7 +22,7 @@ from tunneldb.store.scene import load_scene
 from tunneldb.store.sources import unchanged_file
 from tunneldb.store.survey import Survey
 
-CLASS_NAMES = {int(klass): klass.name.lower() for klass in Klass}
+CLASS_NAMES = {int(klass): klass.name.lower() for klass in PointClass}
 """Names of the classes, as they are written into the files."""
 
 _STAGE = "ground"

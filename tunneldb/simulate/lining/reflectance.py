@@ -31,7 +31,7 @@ SOOT_WIDTH, SOOT_LENGTH, SOOT_CHANGE, SOOT_RANGE = (0.15, 0.25), 15.0, 0.35, (0.
 GRIME_FADE, GRIME_RISE, GRIME_LENGTH, GRIME_CHANGE = (0.1, 0.3), 0.04, 3.0, 0.25
 
 
-class Coat(NamedTuple):
+class Reflectance(NamedTuple):
     """Levels of a lining for the kernels.
 
     Attributes
@@ -72,7 +72,7 @@ def coat(
     furniture: Sequence[Appendage],
     marks: list[Mark],
     seed: np.random.SeedSequence,
-) -> Coat | None:
+) -> Reflectance | None:
     """Levels as asked; None: the lining is plain."""
     p, line, half = parameters, tunnel.line, tunnel.section.floor_arc
     if p.lining == "plain" and not (p.soot or p.grime or marks):
@@ -88,7 +88,7 @@ def coat(
         for a in runs
     ]
     rows = mark_table(marks)
-    return Coat(
+    return Reflectance(
         rings,
         int(seed.generate_state(1)[0]),
         np.array(texture),
@@ -102,13 +102,13 @@ def coat(
 
 
 @njit(cache=True, nogil=True)
-def soot_amount(coat: Coat, s: float) -> float:
+def soot_amount(coat: Reflectance, s: float) -> float:
     """Soot in the middle at a chainage, as a share of what was asked."""
     return min(max(1.0 + SOOT_CHANGE * clouds(s / SOOT_LENGTH, 0.5, coat.salt + 2), SOOT_RANGE[0]), SOOT_RANGE[1])
 
 
 @njit(cache=True, nogil=True)
-def _grime(coat: Coat, s: float, arc: float) -> float:
+def _grime(coat: Reflectance, s: float, arc: float) -> float:
     """Grime at a place, dB: the most that any band gives."""
     most = 0.0
     for i in range(coat.grime.shape[0]):
@@ -123,7 +123,7 @@ def _grime(coat: Coat, s: float, arc: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _mark_level(coat: Coat, s: float, arc: float) -> float:
+def _mark_level(coat: Reflectance, s: float, arc: float) -> float:
     """Level of the mark at a place, dB; 0: there is none. Strokes of a number overlap and are painted once."""
     b = bin_of(s, coat.start, coat.mark_bins)
     for j in range(coat.mark_bins[b], coat.mark_bins[b + 1]):
@@ -135,7 +135,7 @@ def _mark_level(coat: Coat, s: float, arc: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def level(coat: Coat, s: float, arc: float) -> float:
+def level(coat: Reflectance, s: float, arc: float) -> float:
     """Level of the lining at a chainage and an arc, dB added to the reflectance."""
     total = ring_level(coat.rings, s, arc)
     if coat.texture[0] > 0.0:

@@ -30,7 +30,7 @@ CLOSE = 1e-6  # m
 SIDE = 5e-4
 
 
-class Skin(NamedTuple):
+class LiningRelief(NamedTuple):
     """Relief of the lining for the kernels.
 
     Attributes
@@ -66,7 +66,7 @@ def wider_from(tunnel: Tunnel) -> float:
     return 0.5 * (tunnel.line.start + tunnel.line.end)
 
 
-def skin(parameters: Parameters, tunnel: Tunnel, rings: Rings, seed: np.random.SeedSequence) -> Skin | None:
+def skin(parameters: Parameters, tunnel: Tunnel, rings: Rings, seed: np.random.SeedSequence) -> LiningRelief | None:
     """Relief as asked; None: the surface is the nominal one."""
     p = parameters
     is_rough = p.lining == "shotcrete"
@@ -75,7 +75,7 @@ def skin(parameters: Parameters, tunnel: Tunnel, rings: Rings, seed: np.random.S
     rng = np.random.default_rng(seed)
     step = np.clip(rng.standard_normal(rings.level.size), -3.0, 3.0) * p.ring_step
     rough = ROUGH_MOST * sum(ROUGH) if is_rough else 0.0
-    return Skin(
+    return LiningRelief(
         rings,
         step,
         np.array([wider_from(tunnel), p.radius_step]),
@@ -89,7 +89,7 @@ def skin(parameters: Parameters, tunnel: Tunnel, rings: Rings, seed: np.random.S
 
 
 @njit(cache=True, nogil=True)
-def _rough(skin: Skin, s: float, arc: float) -> float:
+def _rough(skin: LiningRelief, s: float, arc: float) -> float:
     """Height of shotcrete, m."""
     total = 0.0
     for i in range(2):
@@ -98,7 +98,7 @@ def _rough(skin: Skin, s: float, arc: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def height(skin: Skin, s: float, arc: float) -> float:
+def height(skin: LiningRelief, s: float, arc: float) -> float:
     """Height of the lining over the nominal section at a chainage and an arc, m, positive into the tunnel."""
     if abs(arc) > skin.floor_arc:
         return 0.0
@@ -114,7 +114,7 @@ def height(skin: Skin, s: float, arc: float) -> float:
 
 @njit(cache=True, nogil=True)
 def meet_skin(
-    skin: Skin, plan: Float, profile: Float, parts: Float, o: Float, d: Float, r: float, s: float, cosine: float
+    skin: LiningRelief, plan: Float, profile: Float, parts: Float, o: Float, d: Float, r: float, s: float, cosine: float
 ) -> tuple[float, float, float, float, bool]:
     """Range at which a ray that meets the nominal section at range r, chainage s, meets the lining.
 
@@ -177,7 +177,7 @@ def meet_skin(
 
 @njit(cache=True, nogil=True)
 def _gap(
-    skin: Skin, plan: Float, profile: Float, parts: Float, o: Float, d: Float, t: float, s: float
+    skin: LiningRelief, plan: Float, profile: Float, parts: Float, o: Float, d: Float, t: float, s: float
 ) -> tuple[float, float, float, float, tuple[float, float, float, float, float, float, float, float, float]]:
     """At range t: chainage, arc, gap to the lining, height over the axis; what :func:`newton_step` found."""
     x, y, z = o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]

@@ -9,7 +9,7 @@ import numpy as np
 
 from tunneldb.arrays import Float
 from tunneldb.simulate.objects.fixtures import APPENDAGE, FLOOR
-from tunneldb.simulate.objects.primitives import Thing, brick, rod
+from tunneldb.simulate.objects.primitives import Primitive, brick, rod
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
@@ -41,7 +41,7 @@ def _supports(start: float, end: float, spacing: float) -> Float:
     return np.linspace(start, end, max(1, round((end - start) / spacing)) + 1)
 
 
-def _free_cable(tunnel: Tunnel, rng: np.random.Generator) -> Thing:
+def _free_cable(tunnel: Tunnel, rng: np.random.Generator) -> Primitive:
     """A cable on hangers 0.35 to 0.9 m off the lining, 4 to 8 m long spans of it sagging by 5 to 25 cm."""
     line, section = tunnel.line, tunnel.section
     supports = _supports(line.start, line.end, HANGERS)
@@ -51,12 +51,12 @@ def _free_cable(tunnel: Tunnel, rng: np.random.Generator) -> Thing:
     u, w = point + off * normal
     chainage = _supports(line.start, line.end, PIECE)
     parts = _wire(tunnel, chainage, u, w - _sag(chainage, supports, depth), radius)
-    wall, hook = tunnel.roll(supports, np.array(arc)), tunnel.roll(supports, np.array(arc), off)
+    wall, hook = tunnel.to_space(supports, np.array(arc)), tunnel.to_space(supports, np.array(arc), off)
     parts += [rod(a, b, 0.008) for a, b in zip(wall, hook, strict=True)]
-    return Thing("cable", APPENDAGE, 6.0, np.array(parts))
+    return Primitive("cable", APPENDAGE, 6.0, np.array(parts))
 
 
-def _contact_line(tunnel: Tunnel) -> Thing:
+def _contact_line(tunnel: Tunnel) -> Primitive:
     """Contact wire and messenger over the track, droppers between them, arms from the crown."""
     line, section = tunnel.line, tunnel.section
     crown = float(section.point(np.array([0.0]))[0][0, 1])
@@ -73,10 +73,10 @@ def _contact_line(tunnel: Tunnel) -> Thing:
         parts += _wire(tunnel, np.array([s, s]), 0.0, np.array([top, crown]), 0.03)
         parts += _wire(tunnel, np.array([s, s]), np.array([0.0, 0.6]), np.array([wire, top]), 0.02)
         parts += _wire(tunnel, np.array([s, s]), 0.6, np.array([top, crown]), 0.02)
-    return Thing("catenary", APPENDAGE, 3.0, np.array(parts))
+    return Primitive("catenary", APPENDAGE, 3.0, np.array(parts))
 
 
-def overhead(parameters: Parameters, tunnel: Tunnel, seed: np.random.SeedSequence, first: int) -> list[Thing]:
+def overhead(parameters: Parameters, tunnel: Tunnel, seed: np.random.SeedSequence, first: int) -> list[Primitive]:
     """Free cables and the contact line, numbered from ``first``."""
     things = [_free_cable(tunnel, np.random.default_rng(s)) for s in seed.spawn(parameters.free_cables)]
     if parameters.catenary:
@@ -84,7 +84,7 @@ def overhead(parameters: Parameters, tunnel: Tunnel, seed: np.random.SeedSequenc
     return [replace(thing, number=first + i) for i, thing in enumerate(things)]
 
 
-def sleepers(parameters: Parameters, tunnel: Tunnel) -> list[Thing]:
+def sleepers(parameters: Parameters, tunnel: Tunnel) -> list[Primitive]:
     """Sleepers along the track; they are floor and have no number."""
     if not parameters.sleepers:
         return []
@@ -93,4 +93,4 @@ def sleepers(parameters: Parameters, tunnel: Tunnel) -> list[Thing]:
     frame = line.frame(s)
     middle = frame.position + (section.floor + SLEEPER_TOP - 0.5 * SLEEPER[2]) * frame.w
     parts = [brick(*row) for row in zip(middle, [SLEEPER] * s.size, np.stack([frame.t, frame.u, frame.w], axis=1), strict=True)]
-    return [Thing("sleeper", FLOOR, 1.0, np.array(parts))]
+    return [Primitive("sleeper", FLOOR, 1.0, np.array(parts))]

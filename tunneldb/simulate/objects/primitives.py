@@ -50,7 +50,7 @@ def brick(centre: Float, size: Sequence[float], axes: Float) -> Float:
 
 
 @dataclass(frozen=True)
-class Thing:
+class Primitive:
     """Something that stands or hangs free.
 
     Attributes
@@ -108,7 +108,7 @@ class Parts(NamedTuple):
     list: Int64
 
 
-def parts_table(tunnel: Tunnel, things: Sequence[Thing]) -> Parts:
+def parts_table(tunnel: Tunnel, things: Sequence[Primitive]) -> Parts:
     """Lay the parts of things out for the kernels."""
     line = tunnel.line
     rows = np.vstack([np.empty((0, COLUMNS)), *(t.parts for t in things)])

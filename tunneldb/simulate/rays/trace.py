@@ -9,8 +9,8 @@ from numba import njit
 
 from tunneldb.arrays import Float
 from tunneldb.simulate.lining.ballast import Ground, bump
-from tunneldb.simulate.lining.reflectance import Coat, level
-from tunneldb.simulate.lining.relief import Skin, meet_skin
+from tunneldb.simulate.lining.reflectance import Reflectance, level
+from tunneldb.simulate.lining.relief import LiningRelief, meet_skin
 from tunneldb.simulate.objects.fixtures import APPENDAGE, FLOOR, LINING, NICHE, OUTLIER
 from tunneldb.simulate.objects.primitives import BEAM, Parts, meet_parts
 from tunneldb.simulate.rays.intersect import meet_item, meet_lining, meet_niche, meet_uneven, unrolled, wetness
@@ -31,8 +31,8 @@ def trace(
     sc: Scene,
     parts: Parts | None,
     ground: Ground | None,
-    coat: Coat | None,
-    skin: Skin | None,
+    coat: Reflectance | None,
+    skin: LiningRelief | None,
     origin: Float,
     direction: Float,
     hint: Float,

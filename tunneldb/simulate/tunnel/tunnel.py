@@ -100,7 +100,7 @@ class Tunnel:
     line: CentreLine
     section: Section
 
-    def roll(self, chainage: Float, arc: Float, offset: Float | float = 0.0) -> Float:
+    def to_space(self, chainage: Float, arc: Float, offset: Float | float = 0.0) -> Float:
         """Coordinates (n, 3) of points of the unrolled plane, ``offset`` m off the surface into the tunnel."""
         given = np.atleast_1d(chainage), np.asarray(arc), np.asarray(offset)
         s, a, o = (np.array(x, dtype=float) for x in np.broadcast_arrays(*given))
@@ -129,6 +129,6 @@ class Tunnel:
         """Area on the surface for a unit of area in the unrolled plane, at points (n,)."""
         h = 1e-3
         s, a = np.atleast_1d(np.asarray(chainage, float)), np.atleast_1d(np.asarray(arc, float))
-        ds = (self.roll(s + h, a) - self.roll(s - h, a)) / (2 * h)
-        da = (self.roll(s, a + h) - self.roll(s, a - h)) / (2 * h)
+        ds = (self.to_space(s + h, a) - self.to_space(s - h, a)) / (2 * h)
+        da = (self.to_space(s, a + h) - self.to_space(s, a - h)) / (2 * h)
         return np.linalg.norm(np.cross(ds, da), axis=1)
