@@ -339,7 +339,7 @@ CROSS JOIN LATERAL (VALUES
 
 SPHERES = """
 INSERT INTO tunnel.target_sphere (survey_id, km, number, scan_id, chainage, geom, radius, nominal, rms, sigma, coverage, points)
-SELECT %(id)s, floor(c / 1000), i + 1, scan, c, tunnel_api.to_space(%(id)s, c, 7.0, 0.5), 0.0726, 0.0725, 0.0028, 0.0002, 0.41, 900
+SELECT %(id)s, floor(c / 1000), i + 1, scan, c, tunnel_api.roll(%(id)s, c, 7.0, 0.5), 0.0726, 0.0725, 0.0028, 0.0002, 0.41, 900
 FROM generate_series(0, %(kilometres)s * 5 - 1) AS i, generate_series(1, 2) AS scan, LATERAL (SELECT i * 200 + 103.0 AS c) q
 """
 

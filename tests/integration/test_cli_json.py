@@ -98,7 +98,7 @@ def test_what_is_compared_and_computed(example: str, tmp_path: Path, conn: psyco
     assert (unrolled["points"], unrolled["off_tunnel"]) == (2, 1)
     on, off = unrolled["rows"]
     survey = rows(conn, "SELECT id FROM tunnel.survey")[0][0]
-    place = rows(conn, f"SELECT ST_X(g), ST_Y(g), ST_Z(g) FROM tunnel_api.to_space({survey}, 12345.0, 2.0, 0.0) g")[0]
+    place = rows(conn, f"SELECT ST_X(g), ST_Y(g), ST_Z(g) FROM tunnel_api.roll({survey}, 12345.0, 2.0, 0.0) g")[0]
     assert [float(on[name]) for name in "xyz"] == pytest.approx(place, abs=1e-3)
     assert off["x"] == ""
 

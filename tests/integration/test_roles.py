@@ -48,7 +48,7 @@ def test_everyone_reads_every_view(person: psycopg.Connection) -> None:
 def test_readers_unroll_and_sum_without_rights_on_tables(person: psycopg.Connection) -> None:
     survey = person.execute("SELECT id FROM tunnel_api.survey").fetchone()[0]
     chainage, arc, offset = person.execute(
-        "SELECT u.* FROM tunnel_api.unroll(%(s)s, tunnel_api.to_space(%(s)s, 12345.0, 2.0, 0.1)) u", {"s": survey}
+        "SELECT u.* FROM tunnel_api.unroll(%(s)s, tunnel_api.roll(%(s)s, 12345.0, 2.0, 0.1)) u", {"s": survey}
     ).fetchone()
     assert (chainage, arc, offset) == pytest.approx((12345, 2, 0.1), abs=1e-3)
     assert person.execute("SELECT tunnel_api.wet_area('demo-2024', 12300, 12500)").fetchone()[0] > 10

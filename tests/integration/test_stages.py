@@ -105,7 +105,7 @@ def _sql_is_python(
 ) -> None:
     rows = conn.execute(
         "SELECT u.chainage, u.arc, u.offset,"
-        "       ST_3DDistance(p.point, tunnel_api.to_space(%(id)s, u.chainage, u.arc, u.offset))"
+        "       ST_3DDistance(p.point, tunnel_api.roll(%(id)s, u.chainage, u.arc, u.offset))"
         "  FROM unnest(%(x)s::float8[], %(y)s::float8[], %(z)s::float8[]) WITH ORDINALITY AS v (x, y, z, i),"
         "       ST_SetSRID(ST_MakePoint(v.x, v.y, v.z), 25830) AS p (point), tunnel_api.unroll(%(id)s, p.point) u ORDER BY v.i",
         {"id": survey.id, **dict(zip("xyz", points.T.tolist(), strict=True))},
@@ -405,7 +405,7 @@ def test_shapes_there_and_back(curve: tuple[psycopg.Connection, Survey, Path]) -
         """
         SELECT ST_ZMax(r.rolled) - ST_ZMin(r.rolled), ST_HausdorffDistance(tunnel_api.unroll_shape(%(id)s, r.rolled), p.plane),
                ST_Area(m.mapped) / ST_Area(p.plane), ST_NumInteriorRings(r.rolled)
-        FROM (SELECT ST_GeomFromText(%(plane)s) AS plane) p, LATERAL (SELECT tunnel_api.to_space(%(id)s, p.plane) AS rolled) r,
+        FROM (SELECT ST_GeomFromText(%(plane)s) AS plane) p, LATERAL (SELECT tunnel_api.roll(%(id)s, p.plane) AS rolled) r,
              LATERAL (SELECT tunnel_api.map_strip(%(id)s, p.plane) AS mapped) m
         """,
         {"id": survey.id, "plane": plane},
@@ -415,9 +415,9 @@ def test_shapes_there_and_back(curve: tuple[psycopg.Connection, Survey, Path]) -
     assert mapped == pytest.approx(1 - 3 / 300, abs=0.003)  # inside of a right-hand curve of R 300 m, 3 m off the axis
     assert holes == 1
     outside = "LINESTRING (980 2, 2000 2)"
-    assert conn.execute("SELECT tunnel_api.to_space(%s, ST_GeomFromText(%s))", [survey.id, outside]).fetchone() == (None,)
+    assert conn.execute("SELECT tunnel_api.roll(%s, ST_GeomFromText(%s))", [survey.id, outside]).fetchone() == (None,)
     with pytest.raises(psycopg.errors.RaiseException, match="not a MULTIPOINT"):
-        conn.execute("SELECT tunnel_api.to_space(%s, ST_GeomFromText('MULTIPOINT (1 1)'))", [survey.id])
+        conn.execute("SELECT tunnel_api.roll(%s, ST_GeomFromText('MULTIPOINT (1 1)'))", [survey.id])
 
 
 @pytest.mark.parametrize(("stage", "says"), [("segments", "has no axis yet"), ("sections", "has no segments yet")])
