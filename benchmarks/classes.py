@@ -30,7 +30,7 @@ from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate.parameters import Parameters
 
 sys.path.append(str(Path(__file__).parent.parent / "tests"))
-from scenes import exact, scan
+from support.simulated_scenes import exact, scan
 
 Classes = NDArray[np.uint8]
 

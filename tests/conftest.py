@@ -7,7 +7,6 @@ installed once a session. With pytest-xdist each worker has its own server.
 from __future__ import annotations
 
 import itertools
-import os
 import shutil
 import signal
 import tempfile
@@ -18,9 +17,12 @@ import psycopg
 import pytest
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
+from support.system import missing
 
 from tunneldb.database import connect, install, open_connection
 from tunneldb.database.server import Server
+
+pytest_plugins = ["support.example_survey"]
 
 TEMPLATE = "tunneldb_template"
 # Nothing of value is in it: no need to wait for the disk, and small enough for two workers on a small machine.
@@ -49,7 +51,7 @@ def chromium() -> Path:
     """Chromium, in which pages are looked at; without it their tests are skipped, but fail where CI=true, as in .ci/run."""
     path = Path("/usr/bin/chromium")
     if not path.exists():
-        (pytest.fail if os.environ.get("CI") == "true" else pytest.skip)("needs Chromium")
+        missing("Chromium")
     return path
 
 
@@ -79,7 +81,7 @@ def empty_dsn(server_dsn: str) -> Iterator[str]:
 def dsn(request: pytest.FixtureRequest, server_dsn: str, template: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """DSN of a fresh, installed database; also in TUNNELDB_DSN, for commands.
 
-    It holds the example survey when the test asks for `example` (see integration/conftest.py).
+    It holds the example survey when the test asks for `example` (see support/example_survey.py).
     """
     source = request.getfixturevalue("example_template") if "example" in request.fixturenames else template
     with _temporary(server_dsn, source) as fresh:

@@ -17,6 +17,7 @@ import pytest
 from faults.conftest import Survey
 from faults.project import COMMAND, Project, differences, register, runs, state
 from faults.waiting import done, wait_for
+from support.system import missing
 
 from tunneldb.database.server import DATABASE, Server
 
@@ -42,7 +43,7 @@ def mend(machine: str) -> None:
 @pytest.fixture(scope="module")
 def network() -> Iterator[None]:
     if os.geteuid() != 0 or shutil.which("ip") is None or shutil.which("unshare") is None:
-        pytest.skip("network namespaces take root, ip (iproute2) and unshare (util-linux)")
+        missing("network namespaces take root, ip (iproute2) and unshare (util-linux)")
     try:
         ip("link", "add", BRIDGE, "type", "bridge")
         ip("addr", "add", f"{SERVER}/24", "dev", BRIDGE)
@@ -56,7 +57,7 @@ def network() -> Iterator[None]:
             ip("-n", machine, "link", "set", "lo", "up")
     except subprocess.CalledProcessError as error:
         _remove_network()
-        pytest.skip(f"no network namespaces can be made here: {error.stderr.strip()}")
+        missing(f"network namespaces: {error.stderr.strip()}")
     yield
     _remove_network()
 

@@ -98,7 +98,7 @@ def sql_files() -> list[Path]:
     folder = resource_dir("sql")
     lines = (folder / "install.txt").read_text("utf-8").splitlines()
     listed = [line.strip() for line in lines if line.strip() and not line.startswith("#")]
-    different = {path.name for path in folder.glob("*.sql")} ^ set(listed)
+    different = {path.relative_to(folder).as_posix() for path in folder.rglob("*.sql")} ^ set(listed)
     if different:
         raise ValueError(f"{folder / 'install.txt'} and its folder differ in {', '.join(sorted(different))}")
     return [folder / name for name in listed]

@@ -7,7 +7,7 @@ Inside the segment the plane turns steadily from the first to the second: the pl
 
 so that a point's fraction is ``d_a / (d_a + d_b)``, its distances from the two planes. It is 0 and 1 on them, hence
 continuous across segments whatever the point's distance from the axis, and differs from the angle on a true circular
-arc of radius 300 m by less than 0.2 mm in a segment of 10 m. The same formulas stand in ``sql/unroll.sql``.
+arc of radius 300 m by less than 0.2 mm in a segment of 10 m. The same formulas stand in ``sql/geometry/unroll.sql``.
 """
 
 from __future__ import annotations

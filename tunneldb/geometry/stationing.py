@@ -1,4 +1,4 @@
-"""Stationing: what places along a tunnel are called, as in ``sql/stationing.sql``."""
+"""Stationing: what places along a tunnel are called, as in ``sql/geometry/stationing.sql``."""
 
 from __future__ import annotations
 

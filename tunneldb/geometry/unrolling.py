@@ -1,4 +1,4 @@
-"""Unrolling of points and its inverse (Gonçalves et al., 2012, stage 5), compiled; the same steps as ``sql/unroll.sql``.
+"""Unrolling of points and its inverse (Gonçalves et al., 2012, stage 5); the same steps as ``sql/geometry/unroll.sql``.
 
 A section is a closed curve of 361 nodes, one per degree from -180° to 180°, each at ``radius`` from the axis and with
 ``arc``, its length along the section from the crown. Between two sections the nodes, and the arcs, are blended linearly

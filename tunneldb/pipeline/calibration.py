@@ -141,8 +141,8 @@ def take_sample(conn: psycopg.Connection[Any], survey: Survey, observer: Observe
     seen = observer.observe(points, f"survey {survey.name}")
     if not seen.lining.any():
         raise UserError(
-            f"no point of kilometre {observer.km} lies on the lining: within {observer.tolerance:g} m of the sections and seen at"
-            f" less than intensity.max_incidence from nearer than intensity.max_range"
+            f"no point of kilometre {observer.km} lies on the lining: within {observer.tolerance:g} m of the sections and seen"
+            f" at less than intensity.max_incidence from nearer than intensity.max_range"
         )
     assert observer.radiometer is not None
     if observer.radiometer.reference:

@@ -60,7 +60,7 @@ def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_tim
 def read_chunks(path: Path, dimension: str | None, size: int = CHUNK, ranges: Ranges | None = None) -> Iterator[Points]:
     """Read a scan file chunk by chunk.
 
-    Parameters, order and errors are those of `tunneldb.pointcloud.formats.raw.read_raw`; without a dimension the intensity is 0.
+    Parameters, order and errors are those of `pointcloud.formats.raw.read_raw`; without a dimension the intensity is 0.
 
     Yields
     ------

@@ -1,0 +1,124 @@
+-- How much of the lining was seen, from what detection notes of each kilometre by steps of chainage (tunnel.coverage).
+
+-- What is known of each kilometre, and what was summed up before it. Over kilometres without detection the sums stay as they
+-- are. Read by coverage_at below and stretch_statistics (leaks/statistics.sql).
+CREATE OR REPLACE VIEW tunnel_api.coverage_sums AS
+SELECT c.survey_id::bigint * 1000000 + 500000 + c.km AS id, c.survey_id, c.km, c.step, c.lining_sums, c.seen_sums,
+       c.wet_sums, 1000 * count(*) OVER earlier AS length_before, coalesce(sum(c.lining_total) OVER earlier, 0) AS lining_before,
+       coalesce(sum(c.seen_total) OVER earlier, 0) AS seen_before, coalesce(sum(c.wet_total) OVER earlier, 0) AS wet_before
+  FROM tunnel.coverage c
+WINDOW earlier AS (PARTITION BY c.survey_id ORDER BY c.km ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING);
+COMMENT ON VIEW tunnel_api.coverage_sums IS
+    'Lining of each kilometre, what the last detection saw of it and the pixels that it found wet, as running sums over steps of chainage; coverage_at reads them';
+COMMENT ON COLUMN tunnel_api.coverage_sums.step IS 'Length of a step, m; the first begins with the kilometre';
+COMMENT ON COLUMN tunnel_api.coverage_sums.lining_sums IS 'Lining from the beginning of the kilometre to that of each step and to the end of the last, m²';
+COMMENT ON COLUMN tunnel_api.coverage_sums.seen_sums IS 'The same of the lining seen, m²';
+COMMENT ON COLUMN tunnel_api.coverage_sums.wet_sums IS 'The same of wet pixels, m²';
+COMMENT ON COLUMN tunnel_api.coverage_sums.length_before IS 'Length of the kilometres before it that were detected, m';
+COMMENT ON COLUMN tunnel_api.coverage_sums.lining_before IS 'Their lining, m²';
+COMMENT ON COLUMN tunnel_api.coverage_sums.seen_before IS 'Their lining seen, m²';
+COMMENT ON COLUMN tunnel_api.coverage_sums.wet_before IS 'Their wet pixels, m²';
+
+
+-- Running sums of the steps of a kilometre (the first is 0) at a place so far along it (m); a step counts by its share. The
+-- planner puts the body in the place of a call, so that no call is paid for each place.
+CREATE OR REPLACE FUNCTION tunnel_api.sum_upto(sums float8[], step float8, along float8)
+RETURNS float8
+LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT
+AS $$
+    SELECT $1[least(floor($3 / $2)::int, cardinality($1) - 2) + 1]
+        + ($1[least(floor($3 / $2)::int, cardinality($1) - 2) + 2] - $1[least(floor($3 / $2)::int, cardinality($1) - 2) + 1])
+            * least($3 / $2 - least(floor($3 / $2)::int, cardinality($1) - 2), 1)
+$$;
+COMMENT ON FUNCTION tunnel_api.sum_upto(float8[], float8, float8) IS
+'Sum over steps of one length (m) up to a place (m from where they begin), of their running sums, of which the first is 0.';
+
+
+CREATE OR REPLACE FUNCTION tunnel_api.coverage_at(survey_id int, places float8[])
+RETURNS TABLE (n int, chainage float8, length float8, lining float8, seen float8, wet float8)
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+ROWS 100
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SET jit = off
+SET enable_nestloop = off  -- how few or many places there are is not known when it is planned
+SET enable_mergejoin = off  -- it would sort rows with sums of a kilometre in them
+SET plan_cache_mode = force_generic_plan
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    wanted constant float8[] := places;
+    first_km int;
+    last_km int;
+BEGIN
+    SELECT floor(min(p) / 1000), floor(max(p) / 1000) INTO first_km, last_km FROM unnest(wanted) p;
+    RETURN QUERY
+        WITH km AS MATERIALIZED (  -- [:] takes the sums out of their storage once, not for each place
+            SELECT c.km, c.km * 1000::float8 AS start, c.step, c.length_before, c.lining_before, c.seen_before, c.wet_before,
+                c.lining_sums[:] AS lining, c.seen_sums[:] AS seen, c.wet_sums[:] AS wet
+            FROM tunnel_api.coverage_sums c
+            WHERE c.survey_id = survey_key AND c.km <= last_km AND c.km >= (
+                SELECT max(b.km) FROM tunnel.coverage b WHERE b.survey_id = survey_key AND b.km <= greatest(first_km, (
+                    SELECT min(a.km) FROM tunnel.coverage a WHERE a.survey_id = survey_key)))
+        ), known AS MATERIALIZED (
+            SELECT array_agg(k.km ORDER BY k.km) AS km FROM km k
+        )
+        SELECT p.n::int, p.chainage, coalesce(k.length_before + i.along, 0),
+            coalesce(k.lining_before + tunnel_api.sum_upto(k.lining, k.step, i.along), 0),
+            coalesce(k.seen_before + tunnel_api.sum_upto(k.seen, k.step, i.along), 0),
+            coalesce(k.wet_before + tunnel_api.sum_upto(k.wet, k.step, i.along), 0)
+        FROM known CROSS JOIN LATERAL unnest(wanted) WITH ORDINALITY AS p (chainage, n)
+        LEFT JOIN km k ON k.km = known.km[width_bucket(floor(p.chainage / 1000)::int, known.km)]
+        CROSS JOIN LATERAL (SELECT least(p.chainage - k.start, 1000) AS along) i
+        ORDER BY p.n;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.coverage_at(int, float8[]) IS
+'At each of some chainages of a survey (m): length of tunnel that was looked at (m), its lining, the lining seen and wet pixels (m²), all from where the survey begins on. The differences between two places are those of the stretch between; a step that a place cuts counts by its share.';
+
+
+-- Where a survey begins and ends: at its first and last point, within its segments. Segments end at vertices, up to a spacing
+-- beyond the points, and lining out there is nothing that a survey should have seen. Files know where they reach along the
+-- given axis, on which segment n goes from n to n + 1 times the spacing; that is carried over to the axis found.
+CREATE OR REPLACE VIEW tunnel_api.km_ends AS
+SELECT g.survey_id::bigint * 1000000 + 500000 + g.km AS id, g.survey_id, g.km,
+       min(g.chainage_from + (g.chainage_to - g.chainage_from) * greatest(0, f.first - g.n)) AS chainage_from,
+       max(g.chainage_to - (g.chainage_to - g.chainage_from) * greatest(0, g.n + 1 - f.last)) AS chainage_to
+  FROM (SELECT s.id AS survey_id, coalesce(min(q.chainage_from) / t.spacing, '-Infinity') AS first,
+               coalesce(max(q.chainage_to) / t.spacing, 'Infinity') AS last
+          FROM tunnel.survey s
+          JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+          LEFT JOIN tunnel.scan_file q ON q.survey_id = s.id
+         GROUP BY s.id, t.spacing) f
+  JOIN tunnel.segment g ON g.survey_id = f.survey_id AND g.n < f.last AND g.n + 1 > f.first
+ GROUP BY g.survey_id, g.km;
+COMMENT ON VIEW tunnel_api.km_ends IS
+    'Where each kilometre of a survey begins and ends: with its segments, as far as they were scanned';
+
+
+CREATE OR REPLACE FUNCTION tunnel_api.survey_ends(survey_id int, OUT chainage_from float8, OUT chainage_to float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+COST 5000  -- once a survey, not once a kilometre
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$ SELECT min(k.chainage_from), max(k.chainage_to) FROM tunnel_api.km_ends k WHERE k.survey_id = $1 $$;
+COMMENT ON FUNCTION tunnel_api.survey_ends(int) IS
+'Least and greatest chainage (m) of what a survey scanned: its first and last point, within its segments.';
+
+
+CREATE OR REPLACE FUNCTION tunnel_api.coverage(
+    survey text, chainage_from float8, chainage_to float8,
+    OUT lining_area float8, OUT seen_area float8, OUT seen_share float8, OUT wet_pixel_area float8, OUT wet_pixel_share float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+AS $$
+    SELECT d.lining, d.seen, d.seen / nullif(d.lining, 0), d.wet, d.wet / nullif(d.seen, 0)
+    FROM (SELECT tunnel_api.survey_id($1) AS id) s
+    CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
+    CROSS JOIN LATERAL (SELECT ARRAY[greatest($2, e.chainage_from), least($3, e.chainage_to)] AS ends) r
+    LEFT JOIN LATERAL (
+        SELECT max(c.lining) - min(c.lining) AS lining, max(c.seen) - min(c.seen) AS seen, max(c.wet) - min(c.wet) AS wet
+        FROM tunnel_api.coverage_at(s.id, r.ends) c
+        HAVING max(c.length) > min(c.length)) d ON true
+    WHERE e.chainage_from IS NOT NULL AND r.ends[1] < r.ends[2]
+$$;
+COMMENT ON FUNCTION tunnel_api.coverage(text, float8, float8) IS
+'Lining of a survey between two chainages (m), what the last detection saw of it, and the pixels that it found wet, after the median filter (m²); seen_share of the lining, wet_pixel_share of what was seen, as Xu et al. (2018) state it. Steps of chainage that an end cuts count by their share; kilometres without detection are not counted.';

@@ -1,0 +1,50 @@
+-- Sums over leaks, and the leaks nearest to a point.
+
+-- Distances are taken in the unrolled plane, along the lining, so that a leak behind a corner or on the other wall is as far as
+-- one has to go. There the index on the polygons gives the nearest ones first.
+CREATE OR REPLACE FUNCTION tunnel_api.nearest_leaks(survey_id int, point geometry, wanted int DEFAULT 5)
+RETURNS TABLE (id bigint, label text, chainage_from float8, chainage_to float8, clock float8, area float8, distance float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+ROWS 5
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+    SELECT l.id, l.label, l.chainage_from, l.chainage_to, l.clock, l.area, l.distance
+    FROM tunnel_api.unroll($1, $2) u
+    CROSS JOIN LATERAL (SELECT ST_MakePoint(u.chainage, u.arc) AS place) p
+    CROSS JOIN LATERAL (
+        SELECT a.id, a.label, a.chainage_from, a.chainage_to, a.clock, a.area, a.unrolled <-> p.place AS distance
+        FROM tunnel_api.leak a
+        WHERE a.survey_id = $1 AND a.detected AND a.review <> 'rejected'
+        ORDER BY a.unrolled <-> p.place
+        LIMIT $3) l
+    WHERE u.chainage IS NOT NULL
+    ORDER BY l.distance
+$$;
+COMMENT ON FUNCTION tunnel_api.nearest_leaks(int, geometry, int) IS
+'The leaks, found last and not rejected, nearest to a point in the tunnel''s SRID, nearest first: distance along the lining from where the point stands over it (m), 0 on a leak; not across the seam in the middle of the floor, so that a leak beyond it is as far as over the crown. None where the point lies off the tunnel.';
+
+
+-- Wet area of a stretch of a survey, m² on the lining: the leaks (of kind leak, after judging) that were found last and are
+-- not rejected, cut at both ends. Runs with the owner's rights, for it reads the tables themselves. Those that are not cut come
+-- from the index alone, of which no more is read than the longest leak can reach.
+CREATE OR REPLACE FUNCTION tunnel_api.wet_area(survey text, chainage_from float8, chainage_to float8)
+RETURNS float8
+LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER
+SET search_path = pg_catalog, public, pg_temp
+AS $$
+    WITH given AS MATERIALIZED (
+        SELECT s.id, (SELECT max(l.chainage_to - l.chainage_from) FROM tunnel.anomaly l WHERE l.survey_id = s.id) AS longest
+        FROM tunnel.survey s WHERE s.name = $1
+    )
+    SELECT coalesce(sum(CASE WHEN l.chainage_from >= $2 AND l.chainage_to <= $3 THEN l.area
+        ELSE l.area * (SELECT ST_Area(ST_ClipByBox2D(a.unrolled, ST_MakeBox2D(
+            ST_MakePoint($2, -1e4), ST_MakePoint($3, 1e4)))) / ST_Area(a.unrolled)
+            FROM tunnel.anomaly a WHERE a.id = l.id) END), 0)
+    FROM tunnel.anomaly l
+    WHERE l.survey_id = (SELECT g.id FROM given g) AND l.detected AND l.review <> 'rejected'
+        AND coalesce(l.judged, l.kind) = 'leak'
+        AND l.chainage_from > $2 - 1e-6 - (SELECT g.longest FROM given g)
+        AND l.chainage_to > $2 AND l.chainage_from < $3 AND $2 < $3
+$$;
+COMMENT ON FUNCTION tunnel_api.wet_area(text, float8, float8) IS
+'Wet area (m² on the lining) of a survey between two chainages (m), of leaks found last and not rejected.';

@@ -1,0 +1,111 @@
+-- Waterproofing of each kilometre. Needs stretch_statistics (leaks/statistics.sql). The statistics of a kilometre are kept
+-- (tunnel.waterproof) for who asks of all of a long tunnel.
+--
+-- Whoever changes leaks or coverage adds a note, a row without statistics, for each kilometre that he touches, in the same
+-- transaction (triggers of schema tunnel). At its end the notes are replaced, and what was kept before, by new statistics; in
+-- one statement, so that these know of all that the replaced rows stand for. Statistics are therefore right for whoever sees
+-- their row and no other of its kilometre: any change that they do not know of has left a note, or statistics of its own, that
+-- nobody has replaced. Nobody waits for anybody: what somebody else is just replacing is left alone, and then two rows are left,
+-- of which none is believed until the next change. What is not kept is worked out when it is asked for.
+
+CREATE OR REPLACE VIEW tunnel_api.km_waterproof AS
+SELECT s.id::bigint * 1000000 + 500000 + k.km AS id, s.id AS survey_id, s.name AS survey, k.km,
+       k.chainage_from, k.chainage_to, t.lining_area, t.seen_share, t.wet_area, t.wet_ratio, t.patches, t.largest_area,
+       t.largest_leak, t.window_patches, t.window_from, t.window_to, t.window_wet_area, t.class
+  FROM tunnel.survey s
+  JOIN tunnel_api.km_ends k ON k.survey_id = s.id
+  LEFT JOIN tunnel.waterproof w ON w.survey_id = k.survey_id AND w.km = k.km
+       AND w.chainage_from = k.chainage_from AND w.chainage_to = k.chainage_to
+       AND NOT EXISTS (SELECT FROM tunnel.waterproof o
+                        WHERE o.survey_id = w.survey_id AND o.km = w.km AND o.id <> w.id)
+ CROSS JOIN LATERAL (
+        SELECT w.lining_area, w.seen_share, w.wet_area, w.wet_ratio, w.patches, w.largest_area, w.largest_leak,
+               w.window_patches, w.window_from, w.window_to, w.window_wet_area, w.class
+         WHERE w.id IS NOT NULL
+         UNION ALL
+        SELECT f.lining_area, f.seen_share, f.wet_area, f.wet_ratio, f.patches, f.largest_area, f.largest_leak,
+               f.window_patches, f.window_from, f.window_to, f.window_wet_area, f.class
+          FROM tunnel_api.stretch_statistics(s.id, ARRAY[k.chainage_from], ARRAY[k.chainage_to]) f
+         WHERE w.id IS NULL) t;
+COMMENT ON VIEW tunnel_api.km_waterproof IS
+    'Waterproofing of each kilometre by GB 50108-2008, as far as a scan can tell: see leak_statistics and waterproof_class';
+COMMENT ON COLUMN tunnel_api.km_waterproof.lining_area IS 'Lining, seen or not, m²';
+COMMENT ON COLUMN tunnel_api.km_waterproof.seen_share IS 'Share of it that was seen: the rest cannot be certified';
+COMMENT ON COLUMN tunnel_api.km_waterproof.wet_area IS 'Area of the leaks within the kilometre, m²; a leak over its end by its part';
+COMMENT ON COLUMN tunnel_api.km_waterproof.wet_ratio IS 'wet_area, of the lining seen';
+COMMENT ON COLUMN tunnel_api.km_waterproof.patches IS 'Leaks in the kilometre or over its ends';
+COMMENT ON COLUMN tunnel_api.km_waterproof.largest_area IS 'Area of the largest of them, whole, m²';
+COMMENT ON COLUMN tunnel_api.km_waterproof.largest_leak IS 'Its id';
+COMMENT ON COLUMN tunnel_api.km_waterproof.window_patches IS 'Most leaks in any 100 m² of lining';
+COMMENT ON COLUMN tunnel_api.km_waterproof.window_from IS 'Where those 100 m² begin, m';
+COMMENT ON COLUMN tunnel_api.km_waterproof.window_to IS 'Where they end, m';
+COMMENT ON COLUMN tunnel_api.km_waterproof.window_wet_area IS 'Greatest wet area in any 100 m² of lining, m²';
+COMMENT ON COLUMN tunnel_api.km_waterproof.class IS 'Best class that the lining seen keeps; NULL if none was seen';
+
+-- Works out a kilometre anew and keeps it, in place of what was noted and kept. What goes wrong is said, but is no reason to
+-- refuse the change that brought it about. One that has no segments, or whose segments reach beyond the kilometre's ends (leaks
+-- out there are noted elsewhere), is not kept: a row of no stretch stands for it (NaN is nobody's end), in place of its notes.
+CREATE OR REPLACE FUNCTION tunnel_api.keep_waterproof(survey_id int, km int) RETURNS void
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    kilometre constant int := km;
+BEGIN
+    WITH gone AS (
+        DELETE FROM tunnel.waterproof w
+         WHERE w.id IN (SELECT o.id FROM tunnel.waterproof o WHERE o.survey_id = survey_key AND o.km = kilometre
+                           FOR UPDATE SKIP LOCKED)
+    )
+    INSERT INTO tunnel.waterproof (survey_id, km, chainage_from, chainage_to, lining_area, seen_share, wet_area, wet_ratio,
+        patches, largest_area, largest_leak, window_patches, window_from, window_to, window_wet_area, class)
+    SELECT survey_key, kilometre, coalesce(f.chainage_from, 'NaN'), coalesce(f.chainage_to, 'NaN'), f.lining_area, f.seen_share,
+        f.wet_area, f.wet_ratio, f.patches, f.largest_area, f.largest_leak, f.window_patches, f.window_from, f.window_to,
+        f.window_wet_area, f.class
+      FROM (SELECT) one
+      LEFT JOIN (
+        SELECT t.*
+          FROM tunnel_api.km_ends k
+         CROSS JOIN LATERAL tunnel_api.stretch_statistics(survey_key, ARRAY[k.chainage_from], ARRAY[k.chainage_to]) t
+         WHERE k.survey_id = survey_key AND k.km = kilometre
+           AND k.chainage_from > kilometre * 1000 - 0.01 AND k.chainage_to < (kilometre + 1) * 1000 + 0.01) f ON true;
+EXCEPTION
+    WHEN OTHERS THEN
+        RAISE WARNING 'the waterproofing of kilometre % of survey % is not kept: %', kilometre, survey_key, SQLERRM;
+        DELETE FROM tunnel.waterproof w
+         WHERE w.id IN (SELECT o.id FROM tunnel.waterproof o WHERE o.survey_id = survey_key AND o.km = kilometre
+                           FOR UPDATE SKIP LOCKED);
+        INSERT INTO tunnel.waterproof (survey_id, km, chainage_from, chainage_to) VALUES (survey_key, kilometre, 'NaN', 'NaN');
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.keep_waterproof(int, int) IS
+'Keeps the statistics of a kilometre, for view km_waterproof to be quick; it is right without that, too. Called at the end of each transaction that changes leaks or coverage, and by tunneldb init.';
+
+-- At the end of a transaction, once a kilometre: the first call takes the notes of the others away. Under a stricter isolation
+-- than read committed it would make transactions fail that only look at each other's kilometres, so there nothing is kept.
+CREATE OR REPLACE FUNCTION tunnel_api.keep_at_commit() RETURNS trigger
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+BEGIN
+    IF current_setting('transaction_isolation') = 'read committed'
+       AND EXISTS (SELECT FROM tunnel.waterproof w WHERE w.id = NEW.id) THEN
+        PERFORM tunnel_api.keep_waterproof(NEW.survey_id, NEW.km);
+    END IF;
+    RETURN NULL;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.keep_at_commit() IS
+    'Trigger of tunnel.waterproof: keeps the statistics of a kilometre in which something was changed';
+
+DROP TRIGGER IF EXISTS keep ON tunnel.waterproof;
+CREATE CONSTRAINT TRIGGER keep AFTER INSERT ON tunnel.waterproof DEFERRABLE INITIALLY DEFERRED
+    FOR EACH ROW WHEN (NEW.chainage_from IS NULL) EXECUTE FUNCTION tunnel_api.keep_at_commit();
+
+-- What an earlier version kept may be of other limits. Nobody is at it: making the trigger has waited for all.
+DO $$
+BEGIN
+    DELETE FROM tunnel.waterproof;
+    PERFORM tunnel_api.keep_waterproof(k.survey_id, k.km) FROM tunnel_api.km_ends k;
+END
+$$;

@@ -1,0 +1,85 @@
+-- Views of what is darker than dry lining. A leak on a vertical wall has no area in plan, so there are three geometries,
+-- each with a view of its own for QGIS: unrolled (chainage, arc; SRID 0), on the map beside the axis, and in space.
+-- Views named leak hold the anomalies of kind leak. Needs stationing (geometry/stationing.sql).
+
+CREATE OR REPLACE VIEW tunnel_api.anomaly AS
+SELECT a.id, a.survey_id, s.name AS survey, a.km,
+       (SELECT min(g.n) FROM tunnel.segment g
+         WHERE g.survey_id = a.survey_id AND g.n BETWEEN m.near - 2 AND m.near + 2
+           AND m.chainage BETWEEN g.chainage_from AND g.chainage_to) AS segment,
+       a.chainage_from, a.chainage_to,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, m.chainage) l) AS label,
+       a.arc_from, a.arc_to, a.clock,
+       coalesce(a.judged, a.kind) AS kind, a.kind AS found, a.reasons, a.confidence, a.contrast,
+       a.area, a.drop_mean, a.drop_max, a.image_share,
+       a.review, a.reviewed_by, a.reviewed_at, a.remark, a.detected, a.created_at, a.detected_at,
+       a.unrolled::public.geometry(Polygon, 0) AS unrolled,
+       a.map::public.geometry AS map,
+       a.surface::public.geometry AS surface
+  FROM tunnel.anomaly a
+  JOIN tunnel.survey s ON s.id = a.survey_id
+  JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+ CROSS JOIN LATERAL (SELECT (a.chainage_from + a.chainage_to) / 2 AS chainage,
+                            floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m;
+
+CREATE OR REPLACE VIEW tunnel_api.leak AS SELECT * FROM tunnel_api.anomaly WHERE kind = 'leak';
+
+COMMENT ON VIEW tunnel_api.anomaly IS
+    'What is darker than dry lining, with three geometries: leaks, joints, other dark spots; review, remark and kind can be updated';
+COMMENT ON VIEW tunnel_api.leak IS 'Water leaks: anomalies of kind leak, with their three geometries; review, remark and kind can be updated';
+
+-- The views of one geometry, and the comments on the columns of all eight.
+DO $$
+DECLARE
+    base text;
+    shown record;
+    comment record;
+    others text;
+BEGIN
+    FOREACH base IN ARRAY ARRAY['anomaly', 'leak'] LOOP
+        SELECT string_agg(quote_ident(attname), ', ' ORDER BY attnum) INTO others
+          FROM pg_attribute
+         WHERE attrelid = format('tunnel_api.%I', base)::regclass AND attnum > 0
+           AND attname NOT IN ('unrolled', 'map', 'surface');
+        FOR shown IN SELECT * FROM (VALUES
+            ('unrolled', 'unrolled', 'in the unrolled plane (chainage, arc), SRID 0'),
+            ('map', 'map', 'on the map strip beside the axis, in the tunnel''s SRID'),
+            ('3d', 'surface', 'on the lining in space, in the tunnel''s SRID')) AS g (suffix, geometry, text)
+        LOOP
+            EXECUTE format('CREATE OR REPLACE VIEW tunnel_api.%I AS SELECT %s, %I AS geom FROM tunnel_api.%I',
+                           base || '_' || shown.suffix, others, shown.geometry, base);
+            EXECUTE format('COMMENT ON VIEW tunnel_api.%I IS %L', base || '_' || shown.suffix,
+                           CASE base WHEN 'leak' THEN 'Leaks ' ELSE 'Anomalies ' END || shown.text
+                           || '; review, remark and kind can be updated');
+        END LOOP;
+    END LOOP;
+    FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
+        ('segment', 'Number of the segment that holds its middle'),
+        ('label', 'Station of its middle, as 12+345.678'),
+        ('chainage_from', 'Least chainage, m'),
+        ('chainage_to', 'Greatest chainage, m'),
+        ('arc_from', 'Least arc, m from the crown, positive right looking up-chainage'),
+        ('arc_to', 'Greatest arc, m'),
+        ('clock', 'Clock position of the middle, hours: 12 is the crown, 3 the right wall looking up-chainage'),
+        ('kind', 'leak, joint or dark (dark but dry): as an inspector judged it, else as found'),
+        ('found', 'What detection takes it for'),
+        ('reasons', 'Why detection takes it for that'),
+        ('confidence', 'How sure detection is of that, 0-1; NULL from before there were kinds'),
+        ('contrast', 'Mean drop in standard deviations of the dry lining about it; NULL from before there were kinds'),
+        ('area', 'Area on the lining, m²'),
+        ('drop_mean', 'Mean drop of corrected intensity below dry lining, dB'),
+        ('drop_max', 'Greatest drop of corrected intensity below dry lining, dB'),
+        ('image_share', 'Share of the polygon on which the image holds measurements, 0-1'),
+        ('review', 'open, confirmed or rejected'),
+        ('reviewed_by', 'Who reviewed or judged it last, set by the database'),
+        ('reviewed_at', 'When it was reviewed or judged last, set by the database'),
+        ('remark', 'The reviewer''s remark'),
+        ('detected', 'False when the last detection found it no more (kept for its review)')) AS t (name, text)
+      JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
+      JOIN pg_class c ON c.oid = a.attrelid
+     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname ~ '^(anomaly|leak)(_|$)'
+    LOOP
+        EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', comment.view, comment."column", comment.text);
+    END LOOP;
+END
+$$;

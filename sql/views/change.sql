@@ -1,0 +1,23 @@
+-- What happened to a survey: what people changed through the views (access/audit.sql) and the stages that ran, in one list by time.
+
+CREATE OR REPLACE VIEW tunnel_api.change AS
+SELECT e.id * 2 AS id, e.survey, e.at, e.who, e.view AS what,
+       CASE e.view WHEN 'anomaly' THEN (SELECT a.km FROM tunnel.anomaly a WHERE a.id = e.row_id)
+                   WHEN 'axis_vertex' THEN (SELECT v.km FROM tunnel.axis_vertex v WHERE v.id = e.row_id) END AS km,
+       (SELECT format('%s %s', e.action, e.row_id)
+               || coalesce(': ' || string_agg(CASE k.key WHEN 'geom' THEN 'geom'
+                      ELSE format('%s %s -> %s', k.key, coalesce(e.before ->> k.key, '-'), coalesce(e.after ->> k.key, '-')) END,
+                      ', ' ORDER BY k.key), '')
+          FROM jsonb_object_keys(coalesce(e.after, e.before)) AS k (key)) AS detail
+  FROM tunnel_api.audit e
+ UNION ALL
+SELECT r.id * 2 + 1, s.name, r.finished_at, r.worker, r.stage, r.km, concat_ws(': ', r.outcome, r.message)
+  FROM tunnel.run r
+  JOIN tunnel.survey s ON s.id = r.survey_id
+ WHERE r.finished_at IS NOT NULL;
+COMMENT ON VIEW tunnel_api.change IS 'What happened to a survey: edits by hand (tunnel_api.audit) and stages that ran (tunnel_api.run)';
+COMMENT ON COLUMN tunnel_api.change.at IS 'When it was changed, or the run ended';
+COMMENT ON COLUMN tunnel_api.change.who IS 'Who was logged in; of a stage the machine and process, NULL of one by hand';
+COMMENT ON COLUMN tunnel_api.change.what IS 'anomaly, axis_vertex or region, or the stage';
+COMMENT ON COLUMN tunnel_api.change.km IS 'Kilometre; NULL of a region, of what is there no more, and of a run over the whole survey';
+COMMENT ON COLUMN tunnel_api.change.detail IS 'What was done to which row, or how the run ended';

@@ -1,0 +1,213 @@
+-- What may be written through the views, by INSTEAD OF triggers: the position of axis vertices, review, remark and kind of
+-- leaks and other anomalies (views/anomaly.sql), and regions drawn by hand. The functions run with the owner's rights, so that who edits
+-- needs no right on schema tunnel, and stamp each row with session_user, which stays the person's own name in them. Each locks
+-- its row and takes only what the person changed: what somebody else did meanwhile stays, and the audit says what truly was.
+-- What both changed, each to something else, is refused to the later one, as a failure of serialization.
+
+-- Moves an axis vertex. Frame and unit: the tunnel's SRID, m.
+CREATE OR REPLACE FUNCTION tunnel_api.edit_axis_vertex() RETURNS trigger
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+DECLARE
+    was tunnel.axis_vertex;
+BEGIN
+    IF (NEW.id, NEW.survey_id, NEW.survey, NEW.n, NEW.km, NEW.chainage, NEW.label, NEW.points, NEW.source,
+        NEW.edited_by, NEW.edited_at) IS DISTINCT FROM
+       (OLD.id, OLD.survey_id, OLD.survey, OLD.n, OLD.km, OLD.chainage, OLD.label, OLD.points, OLD.source,
+        OLD.edited_by, OLD.edited_at) THEN
+        RAISE EXCEPTION 'of an axis vertex only the position (geom) can be edited'
+            USING ERRCODE = 'feature_not_supported';
+    END IF;
+    IF NEW.geom IS NULL OR ST_IsEmpty(NEW.geom) THEN
+        RAISE EXCEPTION 'axis vertex % at chainage % cannot be without a position', OLD.n, OLD.label
+            USING ERRCODE = 'null_value_not_allowed';
+    END IF;
+    IF ST_SRID(NEW.geom) <> ST_SRID(OLD.geom) THEN
+        RAISE EXCEPTION 'axis vertex % is in SRID %, its new position in SRID %',
+            OLD.n, ST_SRID(OLD.geom), ST_SRID(NEW.geom)
+            USING ERRCODE = 'invalid_parameter_value', HINT = 'Transform the position first (ST_Transform).';
+    END IF;
+    IF ST_X(NEW.geom) IN ('NaN', 'Infinity', '-Infinity') OR ST_Y(NEW.geom) IN ('NaN', 'Infinity', '-Infinity')
+       OR coalesce(ST_Z(NEW.geom), 'NaN') IN ('NaN', 'Infinity', '-Infinity') THEN
+        RAISE EXCEPTION 'the new position of axis vertex % needs three finite coordinates, got %',
+            OLD.n, ST_AsText(NEW.geom)
+            USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    IF NEW.geom = OLD.geom THEN
+        RETURN NEW;
+    END IF;
+    SELECT v.* INTO was FROM tunnel.axis_vertex v WHERE v.id = OLD.id FOR UPDATE;
+    IF NOT FOUND THEN
+        RETURN NULL;  -- gone meanwhile
+    END IF;
+    IF was.geom = NEW.geom THEN
+        RETURN NEW;
+    END IF;
+    IF NOT was.geom = OLD.geom THEN
+        RAISE EXCEPTION 'axis vertex % at chainage % was moved meanwhile', OLD.n, OLD.label
+            USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
+    END IF;
+    NEW.source := 'edited';
+    NEW.edited_by := session_user;
+    NEW.edited_at := clock_timestamp();
+    UPDATE tunnel.axis_vertex
+       SET geom = NEW.geom, source = NEW.source, edited_by = NEW.edited_by, edited_at = NEW.edited_at
+     WHERE id = OLD.id;
+    PERFORM tunnel_api.note_edit(OLD.survey, 'axis_vertex', OLD.id,
+                                 jsonb_build_object('geom', ST_AsEWKT(was.geom), 'source', was.source),
+                                 jsonb_build_object('geom', ST_AsEWKT(NEW.geom), 'source', NEW.source));
+    RETURN NEW;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.edit_axis_vertex() IS 'Trigger of view axis_vertex: moves a vertex and notes who and when';
+
+CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.axis_vertex
+    FOR EACH ROW EXECUTE FUNCTION tunnel_api.edit_axis_vertex();
+
+-- Sets the review, the remark and the kind of an anomaly; for the views anomaly, leak and those of one geometry alike.
+-- A kind other than the one that was found is noted as judged; the one that was found takes that back.
+-- Geometries, whose columns differ between the views, are never written back.
+CREATE OR REPLACE FUNCTION tunnel_api.review_anomaly() RETURNS trigger
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+DECLARE
+    was record;
+BEGIN
+    IF (NEW.id, NEW.survey_id, NEW.survey, NEW.km, NEW.segment, NEW.chainage_from, NEW.chainage_to, NEW.label,
+        NEW.arc_from, NEW.arc_to, NEW.clock, NEW.found, NEW.reasons, NEW.confidence, NEW.contrast, NEW.area, NEW.drop_mean,
+        NEW.drop_max, NEW.image_share, NEW.reviewed_by, NEW.reviewed_at, NEW.detected, NEW.created_at, NEW.detected_at)
+       IS DISTINCT FROM
+       (OLD.id, OLD.survey_id, OLD.survey, OLD.km, OLD.segment, OLD.chainage_from, OLD.chainage_to, OLD.label,
+        OLD.arc_from, OLD.arc_to, OLD.clock, OLD.found, OLD.reasons, OLD.confidence, OLD.contrast, OLD.area, OLD.drop_mean,
+        OLD.drop_max, OLD.image_share, OLD.reviewed_by, OLD.reviewed_at, OLD.detected, OLD.created_at, OLD.detected_at) THEN
+        RAISE EXCEPTION 'of a leak or another anomaly only the review, the remark and the kind can be edited'
+            USING ERRCODE = 'feature_not_supported';
+    END IF;
+    IF NEW.review IS NULL OR NEW.review NOT IN ('open', 'confirmed', 'rejected') THEN
+        RAISE EXCEPTION 'the review of % % can be open, confirmed or rejected, not %',
+            OLD.kind, OLD.id, coalesce(NEW.review, 'empty')
+            USING ERRCODE = 'check_violation';
+    END IF;
+    IF NEW.kind IS NULL OR NEW.kind NOT IN ('leak', 'joint', 'dark') THEN
+        RAISE EXCEPTION 'the kind of % % can be leak, joint or dark, not %', OLD.kind, OLD.id, coalesce(NEW.kind, 'empty')
+            USING ERRCODE = 'check_violation';
+    END IF;
+    IF (NEW.review, NEW.remark, NEW.kind) IS NOT DISTINCT FROM (OLD.review, OLD.remark, OLD.kind) THEN
+        RETURN NEW;
+    END IF;
+    SELECT a.review, a.remark, coalesce(a.judged, a.kind) AS kind INTO was
+      FROM tunnel.anomaly a WHERE a.id = OLD.id FOR UPDATE;
+    IF NOT FOUND THEN
+        RETURN NULL;  -- gone meanwhile
+    END IF;
+    NEW.review := CASE WHEN NEW.review = OLD.review THEN was.review ELSE NEW.review END;
+    NEW.remark := CASE WHEN NEW.remark IS NOT DISTINCT FROM OLD.remark THEN was.remark ELSE NEW.remark END;
+    NEW.kind := CASE WHEN NEW.kind = OLD.kind THEN was.kind ELSE NEW.kind END;
+    IF (NEW.review, NEW.remark, NEW.kind) IS NOT DISTINCT FROM (was.review, was.remark, was.kind) THEN
+        RETURN NEW;
+    END IF;
+    IF was.review NOT IN (OLD.review, NEW.review) OR was.kind NOT IN (OLD.kind, NEW.kind)
+       OR (was.remark IS DISTINCT FROM OLD.remark AND was.remark IS DISTINCT FROM NEW.remark) THEN
+        RAISE EXCEPTION '% % at % was changed meanwhile: it is %, with the kind % and %', OLD.kind, OLD.id, OLD.label,
+            was.review, was.kind, coalesce('the remark ' || quote_literal(was.remark), 'no remark')
+            USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
+    END IF;
+    NEW.reviewed_by := session_user;
+    NEW.reviewed_at := clock_timestamp();
+    UPDATE tunnel.anomaly a
+       SET review = NEW.review, remark = NEW.remark, reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at,
+           judged = CASE WHEN NEW.kind = was.kind THEN a.judged ELSE nullif(NEW.kind, a.kind) END
+     WHERE a.id = OLD.id;
+    PERFORM tunnel_api.note_edit(OLD.survey, 'anomaly', OLD.id, to_jsonb(was),
+                                 jsonb_build_object('review', NEW.review, 'remark', NEW.remark, 'kind', NEW.kind));
+    RETURN NEW;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.review_anomaly() IS
+    'Trigger of the views of anomalies and leaks: sets review, remark and kind and notes who and when';
+
+DO $$
+DECLARE
+    name text;
+BEGIN
+    FOREACH name IN ARRAY ARRAY['anomaly', 'anomaly_unrolled', 'anomaly_map', 'anomaly_3d',
+                                'leak', 'leak_unrolled', 'leak_map', 'leak_3d'] LOOP
+        EXECUTE format('CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.%I
+                            FOR EACH ROW EXECUTE FUNCTION tunnel_api.review_anomaly()', name);
+    END LOOP;
+END
+$$;
+
+-- Adds, changes or deletes a region drawn by hand in the unrolled plane (m). A new one names its survey by survey_id or,
+-- without that, by name.
+CREATE OR REPLACE FUNCTION tunnel_api.edit_region() RETURNS trigger
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+DECLARE
+    was tunnel.region;
+    its tunnel.survey;
+BEGIN
+    IF TG_OP = 'DELETE' THEN
+        DELETE FROM tunnel.region r WHERE r.id = OLD.id RETURNING r.* INTO was;
+        IF NOT FOUND THEN
+            RETURN NULL;  -- gone meanwhile
+        END IF;
+        PERFORM tunnel_api.note_edit(OLD.survey, 'region', OLD.id,
+                                     jsonb_build_object('kind', was.kind, 'geom', ST_AsEWKT(was.geom)), NULL);
+        RETURN OLD;
+    END IF;
+    IF NOT coalesce(ST_IsValid(NEW.geom), false) THEN
+        RAISE EXCEPTION 'a region must be a valid polygon: %', coalesce(ST_IsValidReason(NEW.geom), 'it is empty')
+            USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    IF TG_OP = 'UPDATE' THEN
+        IF (NEW.id, NEW.survey_id, NEW.survey, NEW.drawn_by, NEW.drawn_at) IS DISTINCT FROM
+           (OLD.id, OLD.survey_id, OLD.survey, OLD.drawn_by, OLD.drawn_at) THEN
+            RAISE EXCEPTION 'of a region only the kind and the outline (geom) can be edited'
+                USING ERRCODE = 'feature_not_supported';
+        END IF;
+        IF NEW.kind IS NOT DISTINCT FROM OLD.kind AND NEW.geom = OLD.geom THEN
+            RETURN NEW;
+        END IF;
+        SELECT r.* INTO was FROM tunnel.region r WHERE r.id = OLD.id FOR UPDATE;
+        IF NOT FOUND THEN
+            RETURN NULL;
+        END IF;
+        NEW.kind := CASE WHEN NEW.kind = OLD.kind THEN was.kind ELSE NEW.kind END;
+        NEW.geom := CASE WHEN NEW.geom = OLD.geom THEN was.geom ELSE NEW.geom END;
+        IF NEW.kind IS NOT DISTINCT FROM was.kind AND NEW.geom = was.geom THEN
+            RETURN NEW;
+        END IF;
+        IF was.kind NOT IN (OLD.kind, NEW.kind) OR NOT (was.geom = OLD.geom OR was.geom = NEW.geom) THEN
+            RAISE EXCEPTION 'region % was changed meanwhile', OLD.id
+                USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
+        END IF;
+    ELSE
+        SELECT s.* INTO its FROM tunnel.survey s
+         WHERE CASE WHEN NEW.survey_id IS NULL THEN s.name = NEW.survey ELSE s.id = NEW.survey_id END;
+        IF NOT FOUND THEN
+            RAISE EXCEPTION 'a region needs the survey it belongs to; there is none %',
+                coalesce('with id ' || NEW.survey_id, 'named ' || NEW.survey, 'without a name')
+                USING ERRCODE = 'invalid_parameter_value';
+        END IF;
+        NEW.survey_id := its.id;
+        NEW.survey := its.name;
+    END IF;
+    NEW.drawn_by := session_user;
+    NEW.drawn_at := clock_timestamp();
+    IF TG_OP = 'INSERT' THEN
+        INSERT INTO tunnel.region (survey_id, kind, geom, drawn_by, drawn_at)
+        VALUES (NEW.survey_id, NEW.kind, NEW.geom, NEW.drawn_by, NEW.drawn_at)
+        RETURNING id INTO NEW.id;
+    ELSE
+        UPDATE tunnel.region
+           SET kind = NEW.kind, geom = NEW.geom, drawn_by = NEW.drawn_by, drawn_at = NEW.drawn_at
+         WHERE id = OLD.id;
+    END IF;
+    PERFORM tunnel_api.note_edit(NEW.survey, 'region', NEW.id,
+                                 CASE TG_OP WHEN 'UPDATE' THEN jsonb_build_object('kind', was.kind, 'geom', ST_AsEWKT(was.geom)) END,
+                                 jsonb_build_object('kind', NEW.kind, 'geom', ST_AsEWKT(NEW.geom)));
+    RETURN NEW;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.edit_region() IS 'Trigger of view region: writes a region and notes who and when';
+
+CREATE OR REPLACE TRIGGER edit INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.region
+    FOR EACH ROW EXECUTE FUNCTION tunnel_api.edit_region();

@@ -1,0 +1,78 @@
+-- Views of what the leaks of each kilometre sum up to, and of the radiometry they rest on. Classes of waterproofing are in
+-- leaks/waterproof.sql.
+
+CREATE OR REPLACE VIEW tunnel_api.range_curve AS
+SELECT (r.survey_id::bigint * 1000000 + 500000 + r.km) * 10000 + c.n AS id, r.survey_id, s.name AS survey, r.km,
+       c.range_m, c.intensity_db, c.sigma_db
+  FROM tunnel.range_curve r
+  JOIN tunnel.survey s ON s.id = r.survey_id
+ CROSS JOIN LATERAL unnest(r.range_m, r.intensity_db, r.sigma_db) WITH ORDINALITY AS c (range_m, intensity_db, sigma_db, n);
+COMMENT ON VIEW tunnel_api.range_curve IS
+    'Range curve that was found on the lining of each kilometre, of surveys whose reference is auto: a row a range';
+COMMENT ON COLUMN tunnel_api.range_curve.range_m IS 'Range, m';
+COMMENT ON COLUMN tunnel_api.range_curve.intensity_db IS 'Intensity of dry lining at right angles at this range, dB';
+COMMENT ON COLUMN tunnel_api.range_curve.sigma_db IS 'Standard deviation of the curve''s shape there, dB; NULL beyond the ranges of nearly all points, where it goes on by its slope';
+
+CREATE OR REPLACE VIEW tunnel_api.radiometry AS
+SELECT r.survey_id::bigint * 1000000 + 500000 + r.km AS id, r.survey_id, s.name AS survey, r.km, s.reference,
+       c.range_from, c.range_to, c.range_sigma, r.roughness, r.dry_mean, r.dry_sigma, r.threshold, r.sigma_raw,
+       r.sigma_lambert, r.sigma_oren_nayar, r.regions, r.pixels, r.wet_pixels
+  FROM tunnel.radiometry r
+  JOIN tunnel.survey s ON s.id = r.survey_id
+  LEFT JOIN LATERAL (SELECT min(v.range_m) AS range_from, max(v.range_m) AS range_to, max(v.sigma_db) AS range_sigma
+                       FROM tunnel.range_curve q CROSS JOIN LATERAL unnest(q.range_m, q.sigma_db) AS v (range_m, sigma_db)
+                      WHERE q.survey_id = r.survey_id AND q.km = r.km AND v.sigma_db IS NOT NULL) c ON true;
+COMMENT ON VIEW tunnel_api.radiometry IS 'Intensity correction of each kilometre (Xu et al., 2018)';
+COMMENT ON COLUMN tunnel_api.radiometry.reference IS 'Range curve of the survey: none, measured or auto';
+COMMENT ON COLUMN tunnel_api.radiometry.range_from IS 'Least of the ranges that the curve was found on (tunnel_api.range_curve), m; NULL unless the reference is auto';
+COMMENT ON COLUMN tunnel_api.radiometry.range_to IS 'Greatest of them, m';
+COMMENT ON COLUMN tunnel_api.radiometry.range_sigma IS 'Greatest standard deviation of its shape between them, dB: what is judged';
+COMMENT ON COLUMN tunnel_api.radiometry.roughness IS 'Roughness angle of Oren-Nayar, degrees (eq. 13-18)';
+COMMENT ON COLUMN tunnel_api.radiometry.threshold IS 'Corrected intensity below which lining is wet, dB (eq. 19-20)';
+COMMENT ON COLUMN tunnel_api.radiometry.sigma_raw IS 'Standard deviation of dry lining before correction, dB';
+COMMENT ON COLUMN tunnel_api.radiometry.sigma_lambert IS 'The same after correction by Lambert''s law, dB';
+COMMENT ON COLUMN tunnel_api.radiometry.sigma_oren_nayar IS 'The same after correction by Oren-Nayar, dB';
+
+-- Of a kilometre that was detected before there was a coverage the lining seen is what that detection counted: pixels of
+-- lining that hold measurements × the area of a pixel.
+CREATE OR REPLACE VIEW tunnel_api.km_statistics AS
+SELECT s.id::bigint * 1000000 + 500000 + g.km AS id, s.id AS survey_id, s.name AS survey, g.km, g.chainage_from,
+       g.chainage_to, c.lining AS lining_area, d.seen AS seen_area, d.seen / nullif(c.lining, 0) AS seen_share,
+       l.wet_area, l.wet_area / nullif(d.seen, 0) AS wet_share, c.wet / nullif(c.seen, 0) AS wet_pixel_share, l.leaks,
+       l.leaks_open, l.leaks_confirmed, l.leaks_rejected, l.largest_area, l.greatest_drop
+  FROM tunnel.survey s
+  JOIN (SELECT k.*, k.chainage_from < k.km * 1000 + 1e-6 AND k.chainage_to > (k.km + 1) * 1000 - 1e-6 AS whole
+          FROM tunnel_api.km_ends k) g ON g.survey_id = s.id
+  LEFT JOIN tunnel.coverage w ON w.survey_id = g.survey_id AND w.km = g.km
+  LEFT JOIN LATERAL (
+        SELECT w.lining_total AS lining, w.seen_total AS seen, w.wet_total AS wet WHERE g.whole
+         UNION ALL
+        SELECT sum(v.lining * i.share), sum(v.seen * i.share), sum(v.wet * i.share)
+          FROM unnest(w.lining, w.seen, w.wet) WITH ORDINALITY AS v (lining, seen, wet, n)
+         -- the tunnel may end within the kilometre, even within a step of it
+         CROSS JOIN LATERAL (SELECT greatest(0, least(g.chainage_to - w.km * 1000 - v.n * w.step, 0)
+                                 - greatest(g.chainage_from - w.km * 1000 - v.n * w.step, -w.step)) / w.step AS share) i
+         WHERE NOT g.whole) c ON c.lining IS NOT NULL
+ CROSS JOIN LATERAL (SELECT coalesce(c.seen, (
+        SELECT (r.counts ->> 'lining_pixels')::float8 * (r.parameters ->> 'image.pixel')::float8 ^ 2
+          FROM tunnel.run r
+         WHERE r.survey_id = g.survey_id AND r.km = g.km AND r.stage = 'detect' AND r.outcome = 'done'
+         ORDER BY r.finished_at DESC, r.id DESC LIMIT 1)) AS seen) d
+ CROSS JOIN LATERAL (
+        SELECT count(*) FILTER (WHERE k.review <> 'rejected') AS leaks,
+               count(*) FILTER (WHERE k.review = 'open') AS leaks_open,
+               count(*) FILTER (WHERE k.review = 'confirmed') AS leaks_confirmed,
+               count(*) FILTER (WHERE k.review = 'rejected') AS leaks_rejected,
+               coalesce(sum(k.area) FILTER (WHERE k.review <> 'rejected'), 0) AS wet_area,
+               max(k.area) FILTER (WHERE k.review <> 'rejected') AS largest_area,
+               max(k.drop_max) FILTER (WHERE k.review <> 'rejected') AS greatest_drop
+          FROM tunnel.anomaly k
+         WHERE k.survey_id = g.survey_id AND k.km = g.km AND k.detected AND coalesce(k.judged, k.kind) = 'leak') l;
+COMMENT ON VIEW tunnel_api.km_statistics IS 'Leaks of each kilometre, summed; without those rejected or no longer found';
+COMMENT ON COLUMN tunnel_api.km_statistics.lining_area IS 'Lining, seen or not, m²; NULL before detection, and after one by an earlier version';
+COMMENT ON COLUMN tunnel_api.km_statistics.seen_area IS 'Lining that the last detection saw, m²; NULL before it';
+COMMENT ON COLUMN tunnel_api.km_statistics.seen_share IS 'seen_area / lining_area';
+COMMENT ON COLUMN tunnel_api.km_statistics.wet_area IS 'Area of the leaks on the lining, m²';
+COMMENT ON COLUMN tunnel_api.km_statistics.wet_share IS 'wet_area / seen_area';
+COMMENT ON COLUMN tunnel_api.km_statistics.wet_pixel_share IS 'Share of wet pixels, after the median filter, in the lining seen (Xu et al., 2018)';
+COMMENT ON COLUMN tunnel_api.km_statistics.leaks IS 'Leaks open or confirmed';

@@ -1,0 +1,152 @@
+-- Views of a tunnel and its geometry: tunnel, survey, file, point, axis, axis_vertex, segment, section, section_unrolled,
+-- region. Each has a stable integer key first and its geometry last; all lengths are metres. Labels are
+-- stations. Needs stationing (geometry/stationing.sql).
+--
+-- Tunnels differ in SRID, so what lies on the map is cast to plain geometry: a column that states a type but no SRID
+-- makes QGIS look for rows of SRID 0, of which there are none. Of a plain column QGIS reads 100 rows (with "estimated
+-- table metadata" in its connection) to find type, SRID and Z.
+
+CREATE OR REPLACE VIEW tunnel_api.tunnel AS
+SELECT t.id, t.name, t.srid, t.start_chainage, t.spacing, t.design, t.created_at,
+       t.alignment::public.geometry AS geom
+  FROM tunnel.tunnel t;
+COMMENT ON VIEW tunnel_api.tunnel IS 'Tunnels, with the axis as it was given';
+COMMENT ON COLUMN tunnel_api.tunnel.srid IS 'Coordinate reference system of all the tunnel''s geometry on the map';
+COMMENT ON COLUMN tunnel_api.tunnel.start_chainage IS 'Chainage of the first vertex of the given axis, m';
+COMMENT ON COLUMN tunnel_api.tunnel.spacing IS 'Distance between the vertices of a survey''s axis, m';
+COMMENT ON COLUMN tunnel_api.tunnel.design IS 'File and alignment that the axis was read from, where it is a design alignment';
+COMMENT ON COLUMN tunnel_api.tunnel.geom IS 'Axis as given, in the tunnel''s SRID';
+
+CREATE OR REPLACE VIEW tunnel_api.survey AS
+SELECT s.id, s.tunnel_id, t.name AS tunnel, s.name, s.date, s.platform, s.intensity_dimension, s.intensity_kind,
+       s.reference, t.srid, s.created_at, f.files, f.points, f.chainage_from, f.chainage_to
+  FROM tunnel.survey s
+  JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+  LEFT JOIN LATERAL (SELECT count(*) AS files, coalesce(sum(kept), 0)::bigint AS points,
+                            min(chainage_from) AS chainage_from, max(chainage_to) AS chainage_to
+                       FROM tunnel.scan_file WHERE survey_id = s.id) f ON true;
+COMMENT ON VIEW tunnel_api.survey IS 'Scanning campaigns of tunnels, with what is loaded of each';
+COMMENT ON COLUMN tunnel_api.survey.points IS 'Points kept in the database at survey density';
+COMMENT ON COLUMN tunnel_api.survey.intensity_kind IS 'amplitude (dB), reflectance (dB, range removed), linear (counts) or none';
+COMMENT ON COLUMN tunnel_api.survey.reference IS
+    'Range curve of the intensity: none, measured on a target, or auto, from the lining of each kilometre (tunnel_api.range_curve)';
+
+CREATE OR REPLACE VIEW tunnel_api.file AS
+SELECT f.id, f.survey_id, s.name AS survey, f.name, f.path, f.checksum, f.bytes, f.points, f.noise, f.outside, f.thinned,
+       f.kept, f.chainage_from, f.chainage_to, f.extent, f.srid, f.loaded_at
+  FROM tunnel.scan_file f
+  JOIN tunnel.survey s ON s.id = f.survey_id;
+COMMENT ON VIEW tunnel_api.file IS 'Scan files loaded, with what was dropped of each';
+COMMENT ON COLUMN tunnel_api.file.checksum IS 'SHA-256 of the file';
+COMMENT ON COLUMN tunnel_api.file.points IS 'Points in the file = noise + outside + thinned + kept';
+COMMENT ON COLUMN tunnel_api.file.noise IS 'Points dropped as isolated (Xu et al., 2018, section II-D)';
+COMMENT ON COLUMN tunnel_api.file.outside IS 'Points dropped as too far from the axis or beyond its ends';
+COMMENT ON COLUMN tunnel_api.file.thinned IS 'Points dropped by thinning to survey density';
+
+-- The key is the row's place in its partition: loading or a stage that rewrites the kilometre deals it out anew.
+-- There is no join, so that a condition on survey_id and km reads those partitions only, and one on chainage
+-- (BRIN) only its part of them.
+CREATE OR REPLACE VIEW tunnel_api.point AS
+SELECT ((p.km::bigint & 65535) << 44) | ((p.ctid::text::pg_catalog.point)[0]::bigint << 12)
+         | (p.ctid::text::pg_catalog.point)[1]::bigint AS id,
+       p.survey_id, p.km, p.chainage, p.segment, p.gps_time, p.scan_id, p.file_id, p.intensity, p.classification,
+       p.class, p.geom::public.geometry AS geom
+  FROM tunnel.point p;
+COMMENT ON VIEW tunnel_api.point IS
+    'Points at survey density, in chainage order; state survey_id and km (and chainage) to read only their part';
+COMMENT ON COLUMN tunnel_api.point.id IS 'Key within a survey, valid until the kilometre is loaded or tagged anew';
+COMMENT ON COLUMN tunnel_api.point.km IS 'floor(chainage / 1000) on the given axis, at loading';
+COMMENT ON COLUMN tunnel_api.point.chainage IS 'Chainage, m: on the given axis as loaded, on the axis found after stage segments';
+COMMENT ON COLUMN tunnel_api.point.segment IS 'Number of the segment that holds the point; NULL before stage segments or off the tunnel';
+COMMENT ON COLUMN tunnel_api.point.intensity IS 'As in the file, in the unit of the survey''s intensity_kind; 0 if none';
+
+CREATE OR REPLACE VIEW tunnel_api.axis AS
+SELECT s.id, s.id AS survey_id, s.name AS survey, t.name AS tunnel, a.vertices, a.interpolated, a.edited,
+       a.first * t.spacing AS chainage_from, a.last * t.spacing AS chainage_to,
+       (SELECT l.label FROM tunnel_api.stationing(t.id, a.first * t.spacing) l) AS label_from,
+       (SELECT l.label FROM tunnel_api.stationing(t.id, a.last * t.spacing) l) AS label_to,
+       a.geom::public.geometry AS geom
+  FROM tunnel.survey s
+  JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+  JOIN LATERAL (SELECT count(*) AS vertices,
+                       count(*) FILTER (WHERE source = 'interpolated') AS interpolated,
+                       count(*) FILTER (WHERE source = 'edited') AS edited,
+                       min(n) AS first, max(n) AS last, public.st_makeline(v.geom ORDER BY n) AS geom
+                  FROM tunnel.axis_vertex v WHERE v.survey_id = s.id) a ON a.vertices > 1;
+COMMENT ON VIEW tunnel_api.axis IS 'Axis of each survey, one line';
+COMMENT ON COLUMN tunnel_api.axis.id IS 'The survey''s id';
+COMMENT ON COLUMN tunnel_api.axis.interpolated IS 'Vertices without enough points around them';
+COMMENT ON COLUMN tunnel_api.axis.edited IS 'Vertices placed by hand';
+
+CREATE OR REPLACE VIEW tunnel_api.axis_vertex AS
+SELECT v.id, v.survey_id, s.name AS survey, v.n, v.km, v.n * t.spacing AS chainage,
+       (SELECT l.label FROM tunnel_api.stationing(t.id, v.n * t.spacing) l) AS label, v.points, v.source, v.edited_by, v.edited_at,
+       v.geom::public.geometry AS geom
+  FROM tunnel.axis_vertex v
+  JOIN tunnel.survey s ON s.id = v.survey_id
+  JOIN tunnel.tunnel t ON t.id = s.tunnel_id;
+COMMENT ON VIEW tunnel_api.axis_vertex IS
+    'Vertices of the axes. A vertex that is moved (UPDATE of geom) becomes "edited" and stays so; segments and what follows are stale then';
+COMMENT ON COLUMN tunnel_api.axis_vertex.n IS 'Number: the vertex stands at chainage n × spacing of the given axis';
+COMMENT ON COLUMN tunnel_api.axis_vertex.points IS 'Points averaged';
+COMMENT ON COLUMN tunnel_api.axis_vertex.source IS 'measured, interpolated or edited (by hand)';
+COMMENT ON COLUMN tunnel_api.axis_vertex.edited_by IS 'Who moved it last, set by the database';
+COMMENT ON COLUMN tunnel_api.axis_vertex.edited_at IS 'When it was moved last, set by the database';
+
+-- A segment is stale when a vertex that its planes depend on (the two of its ends and the next on either side) is not
+-- where the segments were built.
+CREATE OR REPLACE VIEW tunnel_api.segment AS
+SELECT g.id, g.survey_id, s.name AS survey, g.n, g.km, g.chainage_from, g.chainage_to,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, g.chainage_from) l) AS label_from,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, g.chainage_to) l) AS label_to,
+       g.points,
+       100 * (g.vertex_to[3] - g.vertex_from[3]) / nullif(g.chainage_to - g.chainage_from, 0) AS slope,
+       EXISTS (SELECT FROM tunnel.segment o
+                 JOIN tunnel.axis_vertex v ON v.survey_id = o.survey_id AND v.n BETWEEN o.n AND o.n + 1
+                WHERE o.survey_id = g.survey_id AND o.n BETWEEN g.n - 1 AND g.n + 1
+                  AND public.st_3ddistance(v.geom, public.st_setsrid(public.st_makepoint(
+                        (CASE v.n WHEN o.n THEN o.vertex_from ELSE o.vertex_to END)[1],
+                        (CASE v.n WHEN o.n THEN o.vertex_from ELSE o.vertex_to END)[2],
+                        (CASE v.n WHEN o.n THEN o.vertex_from ELSE o.vertex_to END)[3]),
+                      public.st_srid(v.geom))) > 1e-4) AS stale,
+       g.geom::public.geometry AS geom
+  FROM tunnel.segment g
+  JOIN tunnel.survey s ON s.id = g.survey_id;
+COMMENT ON VIEW tunnel_api.segment IS 'Segments: the tunnel between planes perpendicular to the axis at consecutive vertices';
+COMMENT ON COLUMN tunnel_api.segment.n IS 'Number: that of the vertex at its start';
+COMMENT ON COLUMN tunnel_api.segment.slope IS 'Rise of the axis up-chainage, %';
+COMMENT ON COLUMN tunnel_api.segment.stale IS 'True when the axis has moved since the segment was made: run stage segments again';
+
+CREATE OR REPLACE VIEW tunnel_api.section AS
+SELECT c.id, c.survey_id, s.name AS survey, c.km, c.segment, c.half, c.chainage,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, c.chainage) l) AS label, c.half_width, c.angle_step, c.points, c.interpolated,
+       c.geom::public.geometry AS geom
+  FROM tunnel.section c
+  JOIN tunnel.survey s ON s.id = c.survey_id;
+COMMENT ON VIEW tunnel_api.section IS 'Cross-sections at 25 % and 75 % of each segment, drawn in space';
+COMMENT ON COLUMN tunnel_api.section.half IS 'Place in the segment, %: 25 or 75';
+COMMENT ON COLUMN tunnel_api.section.half_width IS 'Half the length of tunnel whose points the section was made from, m';
+COMMENT ON COLUMN tunnel_api.section.angle_step IS 'Width of an angular class, degrees';
+COMMENT ON COLUMN tunnel_api.section.interpolated IS 'Angular classes that are not measured: empty, or rejected as something hung on the wall; filled from their neighbours';
+
+CREATE OR REPLACE VIEW tunnel_api.section_unrolled AS
+SELECT c.id, c.survey_id, s.name AS survey, c.km, c.segment, c.half, c.chainage,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, c.chainage) l) AS label, e.arc_from, e.arc_to, c.angle_step, c.interpolated,
+       public.st_makeline(public.st_makepoint(c.chainage, e.arc_from), public.st_makepoint(c.chainage, e.arc_to)
+           )::public.geometry(LineString, 0) AS geom
+  FROM tunnel.section c
+  JOIN tunnel.survey s ON s.id = c.survey_id
+ CROSS JOIN LATERAL (SELECT min(a) AS arc_from, max(a) AS arc_to FROM unnest(c.arc) a) e;
+COMMENT ON VIEW tunnel_api.section_unrolled IS 'Cross-sections in the unrolled plane (chainage, arc), SRID 0';
+COMMENT ON COLUMN tunnel_api.section_unrolled.arc_from IS 'Arc at the left end, straight below the axis, m';
+COMMENT ON COLUMN tunnel_api.section_unrolled.arc_to IS 'Arc at the right end, straight below the axis, m';
+
+CREATE OR REPLACE VIEW tunnel_api.region AS
+SELECT r.id, r.survey_id, s.name AS survey, r.kind, r.drawn_by, r.drawn_at,
+       r.geom::public.geometry(Polygon, 0) AS geom
+  FROM tunnel.region r
+  JOIN tunnel.survey s ON s.id = r.survey_id;
+COMMENT ON VIEW tunnel_api.region IS
+    'Regions of the unrolled plane drawn by hand for the intensity correction; rows may be added, changed and deleted';
+COMMENT ON COLUMN tunnel_api.region.kind IS 'homogeneous (one material: gives the roughness) or dry (dry lining: gives the threshold)';
+COMMENT ON COLUMN tunnel_api.region.geom IS 'Polygon in the unrolled plane (chainage, arc), m';

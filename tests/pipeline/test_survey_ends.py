@@ -1,0 +1,102 @@
+"""A scan that ends between two vertices of the axis: lining beyond it is none that the survey should have seen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import psycopg
+import pytest
+from psycopg.rows import dict_row
+
+from tests.sql.test_statistics import GIRTH, STEP, add_coverage, add_survey
+from tunneldb.report.data import find_stretch
+from tunneldb.store.survey import get_survey
+
+FROM, TO = 207.5, 483.2
+"""The scan, on the given axis; segments of 10 m reach from 200 to 490 m."""
+
+
+def ask(conn: psycopg.Connection, query: str, *values: object) -> list[dict[str, Any]]:
+    with conn.cursor(row_factory=dict_row) as cursor:
+        return cursor.execute(query, values).fetchall()  # type: ignore[arg-type]
+
+
+def add_file(conn: psycopg.Connection, survey: int, name: str, low: float | None, high: float | None) -> None:
+    conn.execute(
+        "INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, thinned, kept, "
+        "chainage_from, chainage_to) VALUES (%s, %s, %s, repeat('0', 64), 1, 1, 0, 0, 0, 1, %s, %s)",
+        (survey, name, f"/{name}", low, high),
+    )
+
+
+@pytest.fixture
+def scanned(conn: psycopg.Connection) -> int:
+    """A survey in two files, of which detection saw nine tenths of the lining, and nothing of what lies beyond."""
+    survey = add_survey(conn, 200, 490)
+    add_file(conn, survey, "b.laz", 330.0, TO)
+    add_file(conn, survey, "a.laz", FROM, 340.0)
+    add_file(conn, survey, "empty.laz", None, None)
+    at = STEP * (np.arange(10_000) + 0.5)
+    lining = np.where((at > 200) & (at < 490), STEP * GIRTH, 0)
+    seen = np.where((at > FROM) & (at < TO), 0.9 * lining, 0)
+    add_coverage(conn, survey, 0, lining, seen, 0 * seen)
+    return survey
+
+
+def test_what_is_stated_ends_with_the_points(conn: psycopg.Connection, scanned: int) -> None:
+    whole = ("s", "-Infinity", "Infinity")
+    rows = [
+        *ask(conn, "SELECT * FROM tunnel_api.leak_statistics(%s, %s, %s)", *whole),
+        *ask(conn, "SELECT * FROM tunnel_api.km_waterproof"),
+        *ask(conn, "SELECT * FROM tunnel_api.km_statistics"),
+    ]
+    for row in rows:
+        assert (row["chainage_from"], row["chainage_to"]) == (pytest.approx(FROM), pytest.approx(TO))
+    rows += ask(conn, "SELECT * FROM tunnel_api.coverage(%s, %s, %s)", *whole)
+    for row in rows:
+        assert row["lining_area"] == pytest.approx(GIRTH * (TO - FROM), rel=1e-6)
+        assert row["seen_share"] == pytest.approx(0.9, rel=1e-6)
+    conn.commit()
+    assert find_stretch(conn, get_survey(conn, "s"), -np.inf, np.inf) == (pytest.approx(FROM), pytest.approx(TO))
+
+
+def test_ends_lie_on_the_axis_that_was_found(conn: psycopg.Connection, scanned: int) -> None:
+    """Three quarters of the first segment, and a third of the last, whatever their lengths."""
+    conn.execute("UPDATE tunnel.segment SET chainage_to = 210.4 WHERE n = 20")
+    conn.execute("UPDATE tunnel.segment SET chainage_from = 480.4, chainage_to = 490.6 WHERE n = 48")
+    (row,) = ask(conn, "SELECT * FROM tunnel_api.survey_ends(%s)", scanned)
+    assert row["chainage_from"] == pytest.approx(200 + 0.75 * 10.4)
+    assert row["chainage_to"] == pytest.approx(480.4 + 0.32 * 10.2)
+
+
+def test_files_beyond_the_axis_do_not_widen_it(conn: psycopg.Connection, scanned: int) -> None:
+    add_file(conn, scanned, "far.laz", 120.0, 900.0)
+    (row,) = ask(conn, "SELECT * FROM tunnel_api.survey_ends(%s)", scanned)
+    assert (row["chainage_from"], row["chainage_to"]) == (200, 490)
+
+
+def test_rings_at_the_ends_state_the_part_that_was_scanned(conn: psycopg.Connection, scanned: int) -> None:
+    rings = ask(conn, "SELECT * FROM tunnel_api.ring_statistics('s', 2, 200)")
+    assert [(rings[n]["number"], rings[n]["chainage_from"], rings[n]["chainage_to"]) for n in (0, -1)] == [
+        (4, 206, 208), (142, 482, 484),
+    ]  # fmt: skip
+    assert [ring["seen_share"] for ring in rings] == pytest.approx([0.9] * 139, rel=1e-5)
+    assert sum(ring["lining_area"] for ring in rings) == pytest.approx(GIRTH * (TO - FROM), rel=1e-6)
+    (one,) = ask(conn, "SELECT * FROM tunnel_api.ring_statistics('s', 1000, 0)")
+    assert (one["chainage_from"], one["chainage_to"], one["lining_area"]) == (0, 1000, pytest.approx(GIRTH * (TO - FROM)))
+
+
+def test_sheets_are_those_of_the_scan(conn: psycopg.Connection, scanned: int) -> None:
+    conn.execute(
+        "INSERT INTO tunnel.section (survey_id, km, segment, half, chainage, half_width, angle_step, radius, arc, geom, points,"
+        " interpolated) SELECT %s, 0, n, 25, 10 * n + 2.5, 0.1, 5, array_fill(3.0::float8, ARRAY[361]),"
+        " (SELECT array_agg((i - 180) * 0.05 ORDER BY i) FROM generate_series(0, 360) i),"
+        " 'SRID=25830;LINESTRING Z (0 0 0, 1 0 0)', 1, 0 FROM generate_series(20, 48) n",
+        [scanned],
+    )
+    sheets = ask(conn, "SELECT * FROM tunnel_api.sheet ORDER BY number")
+    assert [sheet["number"] for sheet in sheets] == [4, 5, 6, 7, 8, 9]
+    assert [sheet["seen_share"] for sheet in sheets] == pytest.approx([0.9] * 6, rel=0.01)
+    conn.execute("UPDATE tunnel.scan_file SET chainage_to = 450.5 WHERE name = 'b.laz'")
+    assert len(ask(conn, "SELECT FROM tunnel_api.sheet")) == 5

@@ -1,0 +1,53 @@
+"""The SQL of the documentation runs, and its reference pages are what the program says of itself."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+from types import ModuleType
+
+import psycopg
+from support.cookbook_survey import prepare
+from support.queue_rows import add_file, add_job, add_worker
+
+ROOT = Path(__file__).parents[2]
+BLOCK = re.compile(r"^```sql\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def test_every_query_runs(conn: psycopg.Connection, example: str) -> None:
+    """Each by itself, on the example survey with edits and a batch under way; one that selects must find something there."""
+    prepare(conn, example)
+    add_job(conn, example, 12, "axis", add_worker(conn, "calc-1", 4711))
+    add_file(conn, example, "km-13.laz", 13)
+    conn.commit()
+    wrong = []
+    for page in sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")]):
+        text = page.read_text("utf-8")
+        for block in BLOCK.finditer(text):
+            place = f"{page.name}:{text[: block.start()].count(chr(10)) + 2}"
+            try:
+                cursor = conn.execute(block[1].encode())
+                while cursor.nextset():
+                    pass
+                if cursor.rowcount == 0:
+                    wrong.append(f"{place}: no row")
+            except psycopg.Error as error:
+                wrong.append(f"{place}: {error}")
+            conn.rollback()
+    assert not wrong, "\n".join(wrong)
+
+
+def test_reference_pages_are_up_to_date(conn: psycopg.Connection) -> None:
+    script = generator()
+    old = [page for page, write in script.PAGES.items() if (ROOT / "docs" / page).read_text("utf-8") != write(conn)]
+    assert not old, "python docs/generate_reference.py writes them anew"
+
+
+def generator() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("generate_reference", ROOT / "docs" / "generate_reference.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

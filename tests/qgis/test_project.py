@@ -1,0 +1,710 @@
+"""The QGIS project, opened, drawn and edited by real QGIS where it is installed."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import unicodedata
+import warnings
+import zipfile
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+import pypdf
+import pytest
+import rasterio
+from click.testing import CliRunner, Result
+from psycopg import sql
+from psycopg.conninfo import make_conninfo
+from rasterio.errors import NotGeoreferencedWarning
+from support.example_survey import LEAKS, example_surface, without_intensity
+from support.system import missing
+
+from tunneldb.classification.classes import PointClass
+from tunneldb.cli.main import main
+from tunneldb.export.images.palette import COLOURS, PALETTES, hexadecimal
+
+SCRIPT = Path(__file__).with_name("open_in_qgis.py")
+PYTHON = "/usr/bin/python3"
+ENVIRONMENT = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "LC_ALL": "C.UTF-8", "PYTHONPATH": ""}
+
+ON_MAP = {
+    "axis": "LineStringZ",
+    "axis_vertex": "PointZ",
+    "segment": "LineStringZ",
+    "section": "LineStringZ",
+    "leak_map": "Polygon",
+    "anomaly_map": "Polygon",
+    "target_sphere": "PointZ",
+    "cluster": "Polygon",
+    "ground": "LineStringZ",
+    "leak_3d": "PolygonZ",
+}
+IMAGES = ("raw", "corrected", "offset", "state", "class")
+UNROLLED = {
+    "leak_unrolled": "Polygon", "anomaly_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon",
+    "sheet": "Polygon", "leak_sheet": "Polygon",
+}  # fmt: skip
+NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet"}
+"""Layers of the unrolled plane that its theme does not show."""
+STYLED = {*ON_MAP, *UNROLLED} - {"leak_sheet"}
+
+
+@cache
+def has_qgis() -> bool:
+    try:
+        found = subprocess.run([PYTHON, "-c", "import qgis.core, qgis._3d"], env=ENVIRONMENT, capture_output=True, check=False)
+    except FileNotFoundError:
+        return False
+    return found.returncode == 0
+
+
+@pytest.fixture(scope="session")
+def template(example_template: str) -> str:
+    return example_template
+
+
+def write(output: Path | None, *options: str, dsn: str | None = None) -> Result:
+    where = [] if dsn is None else ["--dsn", dsn]
+    file = [] if output is None else ["-o", str(output)]
+    return CliRunner().invoke(main, [*where, "qgis", "demo-2024", *file, *options])
+
+
+def act(project: Path | str, *arguments: str, before: tuple[str, ...] = (), **environment: str) -> dict[str, Any]:
+    """Run an action on a project in QGIS, by a command if one is to stand before it."""
+    if not has_qgis():
+        missing("QGIS")
+    done = subprocess.run(
+        [*before, PYTHON, str(SCRIPT), str(project), *arguments],
+        env=ENVIRONMENT | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout.splitlines()[-1])
+    assert isinstance(result, dict)
+    return result
+
+
+@pytest.fixture(scope="module")
+def shared_dsn(server_dsn: str, example_template: str) -> str:
+    """Database of the tests that only read."""
+    with psycopg.connect(server_dsn, autocommit=True) as connection:
+        connection.execute(sql.SQL("CREATE DATABASE qgis_shared TEMPLATE {}").format(sql.Identifier(example_template)))
+    return make_conninfo(server_dsn, dbname="qgis_shared")
+
+
+@pytest.fixture(scope="module")
+def shared(shared_dsn: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Project of the tests that only read."""
+    path = tmp_path_factory.mktemp("project") / "demo.qgz"
+    result = write(path, dsn=shared_dsn)
+    assert result.exit_code == 0, result.output
+    return path
+
+
+@pytest.fixture(scope="module")
+def seen(shared: Path) -> dict[str, Any]:
+    """What QGIS sees of it."""
+    return act(shared, "describe")
+
+
+@pytest.fixture
+def rows(shared_dsn: str) -> Iterator[psycopg.Connection]:
+    """Connection to the database of the tests that only read."""
+    with psycopg.connect(shared_dsn) as connection:
+        yield connection
+
+
+@pytest.fixture
+def project(shared: Path, conn: psycopg.Connection, tmp_path: Path) -> Path:
+    """The same project on a database of the test's own."""
+    path = tmp_path / "own.qgs"
+    path.write_text(qgs(shared).replace("dbname='qgis_shared'", f"dbname='{conn.info.dbname}'"), encoding="utf-8")
+    (tmp_path / "demo-images").symlink_to(shared.parent / "demo-images")
+    return path
+
+
+def qgs(path: Path) -> str:
+    with zipfile.ZipFile(path) as archive:
+        (name,) = archive.namelist()
+        return archive.read(name).decode()
+
+
+def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str, Any]) -> None:
+    layers = seen["layers"]
+    assert {name for name, layer in layers.items() if not layer["valid"]} == set()
+    assert set(layers) == {*ON_MAP, *UNROLLED, *(f"demo-2024-km012-{kind}" for kind in IMAGES)}
+    assert seen["crs"] == "EPSG:25830"
+    for name, kind in (ON_MAP | UNROLLED).items():
+        layer = layers[name]
+        view = "leak_unrolled" if name == "leak_sheet" else name
+        dry = "AND kind <> 'leak'" if name.startswith("anomaly") else ""
+        on_sheet = "AND review <> 'rejected'" if name == "leak_sheet" else ""
+        (count,) = rows.execute(  # type: ignore[misc]
+            f"SELECT count(*) FROM tunnel_api.{view} WHERE survey = 'demo-2024' {dry} {on_sheet}"  # type: ignore[arg-type]
+        ).fetchone()
+        assert (layer["wkb"], layer["features"]) == (kind, count), name
+        assert layer["crs"] == ("EPSG:25830" if name in ON_MAP else ""), name
+        assert layer["error"] == "", name
+    for kind in IMAGES:
+        assert layers[f"demo-2024-km012-{kind}"]["crs"] == ""
+
+
+def test_height_reaches_qgis(rows: psycopg.Connection, seen: dict[str, Any]) -> None:
+    layers = seen["layers"]
+    for name in ("axis_vertex", "axis", "segment", "section", "leak_3d", "target_sphere", "ground"):
+        heights = rows.execute(f"SELECT ST_ZMax(geom) FROM tunnel_api.{name}").fetchall()  # type: ignore[arg-type]
+        assert sorted(layers[name]["z"]) == pytest.approx(sorted(z for (z,) in heights)), name
+    assert layers["target_sphere"]["clamping"] == "absolute"
+    for name in ("axis", "section", "leak_3d", "ground"):
+        assert (layers[name]["clamping"], layers[name]["binding"]) == ("absolute", "vertex")
+
+
+def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
+    layers = seen["layers"]
+    for name in ("leak_map", "leak_unrolled", "leak_3d", "anomaly_map", "anomaly_unrolled"):
+        assert (layers[name]["read_only"], layers[name]["editable"]) == (False, ["kind", "review", "remark"])
+        assert layers[name]["widget"]["review"] == layers[name]["widget"]["kind"] == "ValueMap"
+        assert set(layers[name]["aliases"]) == set(layers[name]["widget"]) - {"geom"}
+    assert (layers["axis_vertex"]["read_only"], layers["axis_vertex"]["editable"]) == (False, [])
+    assert all(
+        layers[name]["read_only"]
+        for name in (
+            "axis",
+            "segment",
+            "section",
+            "section_unrolled",
+            "target_sphere",
+            "cluster",
+            "ground",
+            "sheet",
+            "leak_sheet",
+        )
+    )
+
+
+def test_themes_and_views(seen: dict[str, Any]) -> None:
+    assert set(seen["themes"]) == {"Map", "Unrolled", "3D", "Inspection sheets"}
+    assert set(seen["themes"]["Inspection sheets"]) == {"leak_sheet", "demo-2024-km012-corrected"}
+    assert set(seen["themes"]["Map"]) == {
+        "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster",
+    }  # fmt: skip
+    assert set(seen["themes"]["3D"]) == {"axis", "section", "leak_3d", "target_sphere", "ground"}
+    assert set(seen["themes"]["Unrolled"]) == {*UNROLLED, "demo-2024-km012-corrected"} - NOT_AT_FIRST
+    assert seen["bookmarks"] == ["Map", "Unrolled", "Unrolled, km 12"]
+    # all there is to the map, without the unrolled plane: there a new 3D view begins
+    assert seen["full_extent"] == seen["extent"]
+    # the second canvas follows the theme, and starts where there is lining
+    assert seen["canvas_theme"] == "Unrolled"
+    low, high = (corner.split(",") for corner in seen["canvas_extent"].split(" : "))
+    assert 12300 <= float(low[0]) < float(high[0]) <= 12500
+    assert float(low[1]) < -9 < 9 < float(high[1])
+
+
+@pytest.mark.parametrize("theme", ["Map", "Unrolled"])
+def test_themes_are_drawn(shared: Path, tmp_path: Path, theme: str) -> None:
+    picture = tmp_path / f"{theme}.png"
+    assert act(shared, "render", theme, str(picture)) == {"saved": True, "errors": []}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        image = rasterio.open(picture)
+    with image:
+        pixels = image.read([1, 2, 3]).astype(int)
+    inked = (pixels < 250).any(axis=0)
+    colourful = np.ptp(pixels, axis=0) > 80
+    orange = (pixels[0] > 180) & (pixels[1] > 80) & (pixels[1] < 180) & (pixels[2] < 80)
+    assert orange.sum() > 30, "an open leak"
+    assert colourful.sum() > 200
+    # the image of the lining fills half of its picture; a map of a tunnel is mostly paper
+    assert 0.4 < inked.mean() < 0.9 if theme == "Unrolled" else 0.01 < inked.mean() < 0.3
+    if theme == "Unrolled":
+        rows = np.flatnonzero(inked.mean(axis=1) > 0.9)
+        assert rows[-1] - rows[0] > 0.4 * inked.shape[0], "the lining"
+
+
+def test_states_are_named_and_drawn_in_their_colours(shared: Path, seen: dict[str, Any], tmp_path: Path) -> None:
+    entries = PALETTES["state"].entries
+    legend = [[code, name, hexadecimal(colour)] for code, (name, colour) in entries.items()]
+    assert seen["layers"]["demo-2024-km012-state"]["legend"] == legend
+    assert [name for _, name, _ in legend] == ["unseen", "lining", "recess", "appendage", "floor", "dark"]
+    picture = tmp_path / "state.png"
+    # 160 m along the tunnel by 64 m across in 1600 × 640 pixels: one of the image is one of the picture
+    assert act(shared, "draw_layer", "demo-2024-km012-state", "12300,-32,12460,32", str(picture))["saved"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        image = rasterio.open(picture)
+    with image:
+        pixels = image.read([1, 2, 3])
+    area = {
+        name: (pixels == np.array(colour)[:, None, None]).all(axis=0).sum() * 0.01 for name, colour in entries.values()
+    }  # fmt: skip
+    # the wall is 18.0 m round, of which 0.4 m are hidden by a cable
+    assert area["unseen"] == pytest.approx(10 * (17.96 - 0.4), rel=0.02)
+    assert area["recess"] == pytest.approx(4, abs=0.5)
+    assert area["appendage"] == pytest.approx(160 * 0.4, rel=0.1)
+    assert area["dark"] > 5
+
+
+def test_classes_are_named_and_drawn_in_their_colours(shared: Path, seen: dict[str, Any], tmp_path: Path) -> None:
+    legend = {klass: (klass.name.lower(), hexadecimal(colour)) for klass, colour in COLOURS.items()}
+    assert seen["layers"]["demo-2024-km012-class"]["legend"] == [[int(k), name, colour] for k, (name, colour) in legend.items()]
+    picture = tmp_path / "class.png"
+    # 160 m along the tunnel by 64 m across in 1600 × 640 pixels: one of the image is one of the picture
+    assert act(shared, "draw_layer", "demo-2024-km012-class", "12320,-32,12480,32", str(picture))["saved"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        image = rasterio.open(picture)
+    with image:
+        pixels = image.read([1, 2, 3])
+    shares = {klass: (pixels == np.array(colour)[:, None, None]).all(axis=0).mean() for klass, colour in COLOURS.items()}
+    # the wall is 18.0 m round and the floor 6.2 m wide, of 64 m
+    assert shares[PointClass.LINING] == pytest.approx(17.96 / 64, rel=0.02)
+    assert shares[PointClass.GROUND] == pytest.approx(6.24 / 64, rel=0.05)
+    for klass in (PointClass.OBJECT, PointClass.RAIL, PointClass.APPENDAGE):
+        assert shares[klass] > 0, klass
+
+
+@pytest.fixture(scope="module")
+def sheets(shared: Path) -> Path:
+    """The inspection sheets, printed."""
+    path = shared.with_name("sheets.pdf")
+    assert act(shared, "atlas", str(path)) == {"saved": True, "error": "", "sheets": 4}
+    return path
+
+
+def words(path: Path) -> list[str]:
+    """The text of each page."""
+    return [" ".join(unicodedata.normalize("NFKC", page.extract_text()).split()) for page in pypdf.PdfReader(path).pages]
+
+
+def test_sheets_keep_their_scale_in_the_preview(shared: Path) -> None:
+    assert act(shared, "preview") == {"scales": [200] * 4}
+
+
+def test_a_sheet_is_printed_for_each_50_m(sheets: Path) -> None:
+    for number, page in enumerate(words(sheets), start=1):
+        start = 250 + 50 * number
+        assert f"12+{start} – 12+{start + 50}" in page
+        assert f"Inspection sheet {number} of 4" in page
+        assert all(f"12+{start + along}" in page.split("Tunnel demo")[0] for along in range(0, 51, 10)), "ticks"
+    assert number == 4
+
+
+def test_a_sheet_lists_its_leaks_and_no_others(sheets: Path) -> None:
+    middles = [chainage for chainage, _, _, review in LEAKS if review != "rejected"]
+    for number, page in enumerate(words(sheets)):
+        listed = [float(f"{km}{m}") for km, m in re.findall(r"\b(12)\+(\d{3}\.\d{3})\b", page)]
+        assert listed == pytest.approx([m for m in middles if 0 <= m - 12300 - 50 * number < 50], abs=0.5)
+        assert f"leaks {len(listed)}, " in page
+        assert page.count("confirmed") == 1 + (2 if number == 2 else 0), "beside the legend"
+
+
+def crowd(conn: psycopg.Connection, count: int, apart: float, remark: str) -> None:
+    """Put so many leaks on the second sheet, some metres apart, each with a remark; the database has the last first."""
+    conn.execute("DELETE FROM tunnel.anomaly WHERE kind <> 'leak'")
+    conn.execute(
+        "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, area, "
+        "drop_mean, drop_max, image_share, unrolled, map, surface, remark) "
+        "SELECT survey_id, km, at, at + 0.05, 0, 0.1, clock, kind, reasons, 0.01, drop_mean, drop_max, 1, "
+        "ST_MakeEnvelope(at, 0, at + 0.05, 0.1), map, surface, format(%s, i) "
+        "FROM tunnel.anomaly, generate_series(%s, 1, -1) AS i, LATERAL (SELECT 12351 + i * %s AS at) AS placed WHERE id = 1",
+        (remark, count, apart),
+    )
+    conn.commit()
+
+
+def test_long_tables_go_on_on_another_page(conn: psycopg.Connection, project: Path, tmp_path: Path) -> None:
+    crowd(conn, 60, 0.5, "No %s")
+    assert act(project, "atlas", str(tmp_path / "long.pdf"))["sheets"] == 4
+    pages = words(tmp_path / "long.pdf")
+    assert ["leaks continued" in page for page in pages] == [False, False, True, False, False]
+    remarks = [int(number) for page in pages for number in re.findall(r"\bNo (\d+)\b", page)]
+    assert remarks == list(range(1, 61))
+    assert "more leaks" not in "".join(pages)
+
+
+def test_a_table_that_is_too_long_says_how_many_leaks_it_lacks(conn: psycopg.Connection, project: Path, tmp_path: Path) -> None:
+    """Also where each leak has a long remark, of which there is no room for more than a line."""
+    crowd(conn, 600, 0.08, "No %s drips\nfrom a crack beside the joint, more in winter")
+    assert act(project, "atlas", str(tmp_path / "long.pdf"))["sheets"] == 4
+    pages = words(tmp_path / "long.pdf")
+    listed = [int(number) for page in pages for number in re.findall(r"\bNo (\d+)\b", page)]
+    assert listed == list(range(1, len(listed) + 1))
+    assert 400 < len(listed) < 600
+    assert ["more leaks" in page for page in pages] == [False] * 6 + [True] + [False] * 2
+    assert f"... and {600 - len(listed)} more leaks: table of the report" in pages[6]
+    assert "leaks 600, " in pages[1]
+
+
+def test_3d_view_looks_at_the_largest_leak(shared: Path) -> None:
+    seen = act(shared, "space")
+    assert (seen["name"], seen["crs"]) == ("3D", "EPSG:25830")
+    assert seen["open"] == "0", "QGIS 3.24 and later open it when asked to"
+    assert set(seen["layers"]) == {"axis", "section", "leak_3d", "target_sphere", "ground"}
+    # a terrain would hide what lies below it, and its height shift all layers in QGIS 3.22
+    assert (seen["terrain"], seen["offset"], seen["lights"]) == (False, 0, 1)
+    place = example_surface()[0].to_space(np.array([12402.5]), np.array([0.0]), np.zeros(1))[0]
+    camera = seen["camera"]
+    assert [*seen["origin"][:2], camera["elev"]] == pytest.approx([place[0], place[1], place[2] - 4.0], abs=0.1)
+    assert seen["origin"] == [camera["xMap"], camera["yMap"], 0]
+    assert (camera["x"], camera["y"], camera["zMap"]) == (0, 0, camera["elev"])
+
+
+def in_picture(camera: dict[str, float], centre: np.ndarray, point: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Row and column at which a camera with a field of view of 45° upright sees a point (east, north, up)."""
+    pitch, yaw = np.radians([camera["pitch"], camera["yaw"]])
+    tilt = np.array([[1, 0, 0], [0, np.cos(pitch), -np.sin(pitch)], [0, np.sin(pitch), np.cos(pitch)]])
+    turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+    right, up, back = (turn @ tilt).T
+    across, upward, behind = np.stack([right, up, back]) @ (point - centre) - [0, 0, camera["dist"]]
+    half = shape[0] / 2
+    return half * np.array([1 + upward / behind / np.tan(np.pi / 8), shape[1] / shape[0] - across / behind / np.tan(np.pi / 8)])
+
+
+def test_layer_without_rows_is_not_in_3d(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    """It would leave the whole view blank; its style is in the database."""
+    conn.execute("DELETE FROM tunnel.image")
+    conn.execute("DELETE FROM tunnel.target_sphere")
+    conn.commit()
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    assert set(act(tmp_path / "demo.qgz", "space")["layers"]) == {"axis", "section", "leak_3d", "ground"}
+    after = {name: qgs(tmp_path / "demo.qgz").split(f"<id>tunneldb_layer_{name}</id>")[1] for name in ("target_sphere", "axis")}
+    assert "<renderer-3d" not in after["target_sphere"].split("</maplayer>")[0]
+    assert "<renderer-3d" in after["axis"].split("</maplayer>")[0]
+
+
+def test_3d_view_shows_leaks_on_the_lining_in_their_colours(shared: Path, tmp_path: Path) -> None:
+    """Real rendering: each leak in view has its colour at the pixel where its place in space is seen."""
+    screen = shutil.which("xvfb-run")
+    if screen is None:
+        missing("xvfb-run, for OpenGL without a screen")
+    software = {"QT_QPA_PLATFORM": "xcb", "LIBGL_ALWAYS_SOFTWARE": "1"}
+    picture = tmp_path / "space.png"
+    seen = act(shared, "space", str(picture), before=(screen, "-a", "-s", "-screen 0 1280x1024x24 +extension GLX"), **software)
+    if seen["drawn"] is not True:
+        missing(seen["drawn"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        image = rasterio.open(picture)
+    with image:
+        pixels = image.read([1, 2, 3]).astype(int)
+    camera = seen["camera"]
+    centre = np.array([camera["xMap"], camera["yMap"], camera["zMap"]])
+    found = []
+    for chainage, arc, _, review in LEAKS:
+        place = example_surface()[0].to_space(np.array([chainage]), np.array([arc]), np.zeros(1))[0]
+        row, column = in_picture(camera, centre, place, pixels.shape[1:]).round().astype(int)
+        if review == "rejected" or np.linalg.norm(place - centre) > 40 or not (0 <= column < pixels.shape[2]):
+            continue
+        red, green, blue = pixels[:, row - 2 : row + 3, column - 2 : column + 3].reshape(3, -1)
+        own = (red > green + 50) & (green > blue + 30) if review == "open" else (blue > green + 50) & (green >= red)
+        found.append((chainage, bool(own.any())))
+    assert found == [(12402.5, True), (12428.0, True), (12436.0, True)]
+    for colour in ((40, 52, 64), (120, 140, 155), (166, 129, 76)):
+        assert (pixels == np.array(colour)[:, None, None]).all(axis=0).sum() > 500, "axis, sections and ground"
+
+
+def test_place_on_the_image_is_told(rows: psycopg.Connection, shared: Path) -> None:
+    seen = act(shared, "where", "12367.891", "-3.456")
+    title, text = seen["told"]
+    assert title == "12+367.891"
+    numbers = [float(number) for number in re.findall(r"-?\d+\.\d+", text)]
+    point = example_surface()[0].to_space(np.array([12367.891]), np.array([-3.456]), np.zeros(1))[0]
+    assert numbers == pytest.approx([12367.891, -3.456, *point], abs=0.002)
+    assert "12+360 and 7.89 m on" in seen["tip"]
+
+
+def test_vertex_moved_in_qgis_is_saved_with_its_stamp(conn: psycopg.Connection, project: Path) -> None:
+    before = conn.execute("SELECT ST_X(geom), ST_Y(geom), ST_Z(geom) FROM tunnel.axis_vertex WHERE n = 1235").fetchone()
+    conn.commit()
+    assert act(project, "move_vertex", "1235", "0.25", "0.125")["saved"]
+    x, y, z, source, by, at = conn.execute(
+        "SELECT ST_X(geom), ST_Y(geom), ST_Z(geom), source, edited_by, edited_at FROM tunnel.axis_vertex WHERE n = 1235"
+    ).fetchone()  # type: ignore[misc]
+    assert before is not None
+    assert (x, y, z) == pytest.approx((before[0] + 0.25, before[1], before[2] + 0.125), abs=1e-6)
+    assert (source, by) == conn.execute("SELECT 'edited', session_user::text").fetchone()
+    assert at is not None
+
+
+@pytest.mark.parametrize(
+    ("layer", "key", "kind"),
+    [
+        ("leak_unrolled", "3", "dark"), ("leak_map", "3", "joint"), ("leak_3d", "3", ""), ("anomaly_unrolled", "8", "leak"),
+        ("anomaly_map", "9", "joint"),
+    ],
+)  # fmt: skip
+def test_review_in_qgis_is_saved_with_its_stamp(
+    conn: psycopg.Connection, project: Path, layer: str, key: str, kind: str
+) -> None:
+    assert act(project, "review", key, "rejected", "a stain, dry to the touch", layer, kind)["saved"]
+    review, remark, judged, by, at = conn.execute(
+        "SELECT review, remark, judged, reviewed_by, reviewed_at FROM tunnel.anomaly WHERE id = %s", (key,)
+    ).fetchone()  # type: ignore[misc]
+    assert (review, remark, judged) == ("rejected", "a stain, dry to the touch", kind or None)
+    assert (by,) == conn.execute("SELECT session_user::text").fetchone()
+    assert at is not None
+
+
+@pytest.mark.parametrize(("chosen", "kind"), [("homogeneous", "homogeneous"), ("dry", "dry"), ("default", "dry")])
+def test_region_drawn_in_qgis_belongs_to_the_survey(conn: psycopg.Connection, project: Path, chosen: str, kind: str) -> None:
+    conn.execute("DELETE FROM tunnel.region")
+    conn.commit()
+    assert act(project, "draw", chosen)["saved"]
+    rows = conn.execute("SELECT survey, kind, ST_Area(geom) FROM tunnel_api.region").fetchall()
+    assert rows == [("demo-2024", kind, 8)]
+
+
+def test_viewer_opens_the_project_but_cannot_edit(server_dsn: str, project: Path) -> None:
+    with psycopg.connect(server_dsn, autocommit=True) as connection:
+        connection.execute("CREATE ROLE reader LOGIN IN ROLE tunnel_viewer")
+    text = project.read_text()
+    assert "user=" not in text
+    project.write_text(text.replace("host=", "user='reader' host="), encoding="utf-8")
+    layers = act(project, "describe")["layers"]
+    assert all(layer["valid"] for layer in layers.values())
+    done = subprocess.run(
+        [PYTHON, str(SCRIPT), str(project), "review", "1", "confirmed", ""],
+        env=ENVIRONMENT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert "cannot be edited" in done.stderr
+
+
+def test_inspector_edits_and_what_is_stale_can_be_recomputed(conn: psycopg.Connection, server_dsn: str, project: Path) -> None:
+    with psycopg.connect(server_dsn, autocommit=True) as connection:
+        connection.execute("CREATE ROLE mover LOGIN IN ROLE tunnel_inspector")
+    conn.execute("DELETE FROM tunnel.run WHERE stage = 'detect'")
+    conn.commit()
+    project.write_text(project.read_text().replace("host=", "user='mover' host="), encoding="utf-8")
+    assert act(project, "move_vertex", "1235", "0", "0.125")["saved"]
+    assert act(project, "review", "3", "confirmed", "wet")["saved"]
+    edited = conn.execute("SELECT n, edited_by FROM tunnel.axis_vertex WHERE source = 'edited'").fetchall()
+    assert edited == [(1235, "mover")]
+    assert conn.execute("SELECT reviewed_by FROM tunnel.anomaly WHERE id = 3").fetchone() == ("mover",)
+    stale = conn.execute("SELECT stage FROM tunnel_api.stage_status WHERE stale ORDER BY step").fetchall()
+    assert stale == [("segments",), ("sections",), ("ground",)]
+    # as the action has it, but by one who may: without its points the example itself cannot be computed
+    commands = act(project, "recompute")
+    assert commands["segment"] == commands["axis_vertex"]
+    words = [word.replace("user='mover'", "") for word in commands["axis_vertex"]]
+    assert words[3:] == ["run", "demo-2024", "--stale"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "survey demo-2024 holds no points yet" in done.stderr
+    conn.execute("DROP ROLE mover")
+    conn.commit()
+
+
+@pytest.mark.parametrize(
+    "view",
+    [
+        "leak_map", "leak_3d", "leak_unrolled", "anomaly_map", "anomaly_unrolled", "axis_vertex", "segment", "section",
+        "target_sphere", "cluster", "ground",
+    ],
+)  # fmt: skip
+def test_layer_added_by_hand_finds_its_style_srid_and_height(shared: Path, view: str) -> None:
+    added = act(shared, "add", view)
+    assert added["valid"]
+    assert added["loaded"], "no default style"
+    assert added["renderer"] in ("categorizedSymbol", "RuleRenderer", "singleSymbol")
+    assert added["alias"] == "Survey key"
+    assert (added["wkb"], added["crs"]) == ((ON_MAP | UNROLLED)[view], "" if view in UNROLLED else "EPSG:25830")
+
+
+def test_styles_have_one_default_a_layer_and_are_replaced(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    def styles() -> list[tuple[Any, ...]]:
+        return conn.execute(
+            "SELECT f_table_name, f_geometry_column, count(*) FILTER (WHERE useasdefault), count(*), "
+            "bool_and(f_table_catalog = current_database() AND f_table_schema = 'tunnel_api') "
+            "FROM public.layer_styles GROUP BY 1, 2 ORDER BY 1, 2"
+        ).fetchall()
+
+    conn.execute("DELETE FROM tunnel.image")
+    conn.commit()
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    first = styles()
+    assert {(row[0], row[1]) for row in first} == {
+        *((name, "geom") for name in STYLED), ("leak", "unrolled"), ("leak", "map"), ("leak", "surface"),
+        ("anomaly", "unrolled"), ("anomaly", "map"),
+    }  # fmt: skip
+    assert all(row[2:] == (1, 1, True) for row in first)
+    conn.execute(
+        "INSERT INTO public.layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column, stylename, "
+        "useasdefault) VALUES (current_database(), 'tunnel_api', 'axis', 'geom', 'my own', true)"
+    )
+    conn.commit()
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    again = {row[:2]: row[2:] for row in styles()}
+    # the user's own style stays, but no longer as the default
+    assert again.pop(("axis", "geom")) == (1, 2, True)
+    assert all(counts == (1, 1, True) for counts in again.values())
+
+
+def test_project_holds_relative_paths_and_spares_qgis_the_search(shared: Path) -> None:
+    text = qgs(shared)
+    assert str(shared.parent) not in text
+    assert "<datasource>./demo-images/demo-2024-km012-corrected.tif</datasource>" in text
+    sources = re.findall(r"<datasource>([^<]*tunnel_api[^<]*)</datasource>", text)
+    assert len(sources) == len(ON_MAP | UNROLLED)
+    assert all("estimatedmetadata=true" in source and "checkPrimaryKeyUnicity='0'" in source for source in sources)
+
+
+def test_project_holds_no_password(conn: psycopg.Connection, dsn: str, example: str, tmp_path: Path) -> None:
+    conn.execute("DELETE FROM tunnel.image")
+    conn.commit()
+    assert write(tmp_path / "demo.qgs", dsn=make_conninfo(dsn, password="s3cret")).exit_code == 0
+    text = (tmp_path / "demo.qgs").read_text()
+    assert "s3cret" not in text
+    assert "password" not in text
+
+
+def test_service_stands_for_the_connection(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    conn.execute("DELETE FROM tunnel.image")
+    conn.commit()
+    assert write(tmp_path / "demo.qgs", "--service", "o'tunnels").exit_code == 0
+    text = (tmp_path / "demo.qgs").read_text()
+    assert "<datasource>service='o\\'tunnels' key=" in text
+    assert "host=" not in text
+
+
+def test_project_without_leaks_sections_and_images(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    for table in ("anomaly", "image", "section"):
+        conn.execute(f"DELETE FROM tunnel.{table}")  # type: ignore[arg-type]
+    conn.commit()
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    seen = act(tmp_path / "demo.qgz", "describe")
+    assert all(layer["valid"] for layer in seen["layers"].values())
+    assert (seen["layers"]["leak_3d"]["wkb"], seen["layers"]["leak_3d"]["features"]) == ("PolygonZ", 0)
+    assert seen["bookmarks"] == ["Map"]
+
+
+def test_offset_is_shown_where_there_is_no_intensity(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    conn.execute("DELETE FROM tunnel.image WHERE kind <> 'offset'")
+    conn.commit()
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    assert set(act(tmp_path / "demo.qgz", "describe")["themes"]["Unrolled"]) == {
+        *UNROLLED, "demo-2024-km012-offset",
+    } - NOT_AT_FIRST  # fmt: skip
+
+
+def test_lining_of_profiles_apart_is_seen_without_intensity(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    """Profiles 0.5 m apart: under the offset measured lies the same with gaps filled, which says that it is."""
+    without_intensity(conn, every=5)
+    project = tmp_path / "demo.qgz"
+    assert write(project).exit_code == 0
+    names = "demo-2024-km012-offset", "demo-2024-km012-offset-filled"
+    layers, shares = [], []
+    for name in names:
+        with rasterio.open(tmp_path / "demo-images" / f"{name}.tif") as image:
+            layers.append(image.read(1))
+            shares.append(np.isfinite(layers[-1]).mean())
+            told = image.descriptions[0]
+    assert told == "offset, gaps up to 0.6 m filled"
+    assert shares == [pytest.approx(0.2, abs=0.01), pytest.approx(1.0, abs=2e-3)]
+    held = np.isfinite(layers[0])
+    assert np.array_equal(layers[0][held], layers[1][held]), "what was measured is as it was"
+    seen = act(project, "describe")
+    for theme in ("Unrolled", "Inspection sheets"):
+        assert [name for name in seen["themes"][theme] if name in names] == list(names), "the measured one on top"
+    white = []
+    for name in names:
+        act(project, "draw_layer", name, "12352,-3,12392,3", str(tmp_path / "r.png"))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            image = rasterio.open(tmp_path / "r.png")
+        with image:
+            white.append(float((image.read([1, 2, 3]) > 250).all(axis=0)[200:-200].mean()))
+    assert white[0] > 0.5
+    assert white[1] < 0.01
+
+
+def test_sheets_without_intensity_speak_of_no_leaks(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    without_intensity(conn, every=5)
+    assert write(tmp_path / "demo.qgz").exit_code == 0
+    path = tmp_path / "sheets.pdf"
+    assert act(tmp_path / "demo.qgz", "atlas", str(path)) == {"saved": True, "error": "", "sheets": 4}
+    pages = words(path)
+    assert len(pages) == 4
+    for page in pages:
+        assert "leaks were not sought" in page
+        assert "gaps up to 0.6 m filled" in page
+        for word in ("Drop", "leaks 0", "seen yet", "Orange"):
+            assert word not in page
+
+
+def test_project_in_the_database_opens_for_a_viewer(
+    conn: psycopg.Connection, server_dsn: str, example: str, tmp_path: Path
+) -> None:
+    conn.execute("DELETE FROM tunnel.image WHERE kind <> 'corrected'")
+    conn.execute("CREATE ROLE looker LOGIN IN ROLE tunnel_viewer")
+    conn.commit()
+    images = tmp_path / "some where" / "images"
+    (tmp_path / "service.conf").write_text(
+        f"[tunnels]\nhost={conn.info.host}\nport={conn.info.port}\ndbname={conn.info.dbname}\nuser=looker\n"
+    )
+    for _ in range(2):  # the second takes the place of the first
+        result = write(None, "--database", "--service", "tunnels", "--images", str(images))
+        assert result.exit_code == 0, result.output
+    assert conn.execute("SELECT name FROM public.qgis_projects").fetchall() == [("demo-2024",)]
+    stored = "postgresql:?service=tunnels&sslmode=disable&dbname=&schema=public&project=demo-2024"
+    seen = act(stored, "describe", PGSERVICEFILE=str(tmp_path / "service.conf"))
+    conn.execute("DROP ROLE looker")
+    conn.commit()
+    assert all(layer["valid"] for layer in seen["layers"].values())
+    assert seen["layers"]["demo-2024-km012-corrected"]["source"] == str(images / "demo-2024-km012-corrected.tif")
+    assert seen["layers"]["leak_map"]["features"] == len(LEAKS)
+    assert seen["bookmarks"] == ["Map", "Unrolled", "Unrolled, km 12"]
+    assert list(tmp_path.glob("*.qg?")) == []
+
+
+def test_project_goes_into_file_and_database(
+    conn: psycopg.Connection, example: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    conn.execute("DELETE FROM tunnel.image WHERE block <> 246 OR kind <> 'raw'")
+    conn.commit()
+    monkeypatch.chdir(tmp_path)
+    assert write(tmp_path / "demo.qgz", "--database", "the demo").exit_code == 0
+    content, by = conn.execute("SELECT content, metadata ->> 'last_modified_user' FROM public.qgis_projects").fetchone()  # type: ignore[misc]
+    (tmp_path / "stored.qgz").write_bytes(content)
+    image = tmp_path / "demo-images" / "demo-2024-km012-raw.tif"
+    assert f"<datasource>{image}</datasource>" in qgs(tmp_path / "stored.qgz")
+    assert f"<datasource>./{image.relative_to(tmp_path)}</datasource>" in qgs(tmp_path / "demo.qgz")
+    assert (by,) == conn.execute("SELECT session_user::text").fetchone()
+    assert write(None, "--database").exit_code == 0
+    assert (tmp_path / "demo-2024-images" / image.name).exists()
+    assert write(None).exit_code == 2
+
+
+def test_socket_that_qgis_cannot_reach_is_refused(conn: psycopg.Connection, dsn: str, example: str, tmp_path: Path) -> None:
+    conn.execute("DELETE FROM tunnel.image")
+    conn.commit()
+    (tmp_path / "a b").symlink_to(conn.info.host)
+    result = write(tmp_path / "demo.qgz", dsn=make_conninfo(dsn, host=str(tmp_path / "a b")))
+    assert result.exit_code == 2
+    assert "--service" in result.stderr
+    assert write(tmp_path / "demo.qgz", "--service", "tunnels").exit_code == 0
+
+
+def test_errors_are_one_line(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    result = write(tmp_path / "demo.txt")
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert "ends in .qgz or .qgs" in result.stderr
+    result = write(tmp_path / "nowhere" / "demo.qgz")
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    conn.execute("DELETE FROM tunnel.axis_vertex")
+    conn.execute("DELETE FROM tunnel.anomaly")
+    conn.execute("DELETE FROM tunnel.image")
+    conn.commit()
+    result = write(tmp_path / "demo.qgz")
+    assert result.exit_code == 2
+    assert "has no axis yet" in result.stderr
+    assert list(tmp_path.iterdir()) == []

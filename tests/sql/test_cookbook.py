@@ -1,0 +1,468 @@
+"""Each question of the cookbook has the right answer: by closed formulas, NumPy and shapely, not by the views that it asks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+import pytest
+import shapely
+from psycopg import sql
+from psycopg.conninfo import make_conninfo
+from psycopg.rows import dict_row
+from support.cookbook_survey import CONFIRMED, GONE, MOVED, NICHE, OLD, POINTS, SPARSE, prepare
+from support.example_objects import FLOOR, HALF_FLOOR, SPHERES, THINGS, beside
+from support.example_survey import GIRTH, NAME, SEEN_FROM, WET, example_surface
+
+from tunneldb.classification.classes import PointClass
+from tunneldb.database import connect
+
+PAGE = Path(__file__).parents[2] / "docs" / "cookbook.md"
+QUESTION = re.compile(r"^### (.+?)$(?:(?!^#).)*?^```sql\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+QUESTIONS = dict(QUESTION.findall(PAGE.read_text("utf-8")))
+PLACE = (12345.0, 2.0, 0.1)
+"""Chainage, arc and offset of the point that is asked about in place of the page's, m."""
+
+Rows = list[dict[str, Any]]
+SURFACE, VERTICES = example_surface()
+WHO = "SELECT session_user"
+
+
+@dataclass(frozen=True)
+class Leak:
+    """An anomaly as its table holds it."""
+
+    id: int
+    kind: str
+    detected: bool
+    review: str
+    area: float
+    confidence: float
+    unrolled: shapely.Polygon
+    map: shapely.Polygon
+    surface: shapely.Polygon
+
+    @property
+    def low(self) -> float:
+        return float(self.unrolled.bounds[0])
+
+    @property
+    def high(self) -> float:
+        return float(self.unrolled.bounds[2])
+
+    @property
+    def middle(self) -> float:
+        return (self.low + self.high) / 2
+
+    def part(self, low: float, high: float) -> float:
+        """Area between two chainages, m²."""
+        cut = shapely.intersection(self.unrolled, shapely.box(low, -20, high, 20))
+        return self.area * float(cut.area / self.unrolled.area)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The answers to all questions, and what the tables hold."""
+
+    answers: dict[str, Rows]
+    anomalies: list[Leak]
+    who: str
+
+    @property
+    def leaks(self) -> list[Leak]:
+        """Leaks that the last detection found, rejected ones too."""
+        return [leak for leak in self.anomalies if leak.kind == "leak" and leak.detected]
+
+    @property
+    def wet(self) -> list[Leak]:
+        """Leaks that count."""
+        return [leak for leak in self.leaks if leak.review != "rejected"]
+
+    def at(self, chainage: float) -> int:
+        """Id of the leak there."""
+        return next(leak.id for leak in self.anomalies if leak.low < chainage < leak.high)
+
+
+@pytest.fixture(scope="module")
+def asked(server_dsn: str, example_template: str) -> Iterator[Asked]:
+    database = "test_cookbook"
+    with psycopg.connect(server_dsn, autocommit=True) as admin:
+        admin.execute(
+            sql.SQL("CREATE DATABASE {} TEMPLATE {}").format(sql.Identifier(database), sql.Identifier(example_template))
+        )
+    with connect(make_conninfo(server_dsn, dbname=database)) as conn:
+        prepare(conn, NAME)
+        conn.commit()
+        answers = {title: put(conn, query) for title, query in QUESTIONS.items()}
+        rows = conn.execute(
+            "SELECT id, kind, detected, review, area, confidence, ST_AsBinary(unrolled), ST_AsBinary(map), ST_AsBinary(surface)"
+            " FROM tunnel.anomaly ORDER BY chainage_from"
+        ).fetchall()
+        anomalies = [Leak(*row[:6], *(shapely.from_wkb(bytes(wkb)) for wkb in row[6:])) for row in rows]
+        yield Asked(answers, anomalies, conn.execute(WHO).fetchone()[0])
+    with psycopg.connect(server_dsn, autocommit=True) as admin:
+        admin.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(sql.Identifier(database)))
+
+
+def put(conn: psycopg.Connection, query: str) -> Rows:
+    """The rows of an answer; a point written out is taken to PLACE."""
+    x, y, z = SURFACE.to_space(*(np.array([value]) for value in PLACE))[0].tolist()
+    query = re.sub(r"ST_MakePoint\([\d.]+, [\d.]+, [\d.]+\)", f"ST_MakePoint({x}, {y}, {z})", query)
+    with conn.cursor(row_factory=dict_row) as cursor:
+        return cursor.execute(query.encode()).fetchall()
+
+
+def ids(rows: Rows) -> list[int]:
+    return [row["id"] for row in rows]
+
+
+def label(chainage: float) -> str:
+    return f"{int(chainage // 1000)}+{chainage % 1000:07.3f}"
+
+
+def close(row: dict[str, Any], digits: int = 2, **expected: float) -> None:
+    """The numbers of a row, as the answer rounds them."""
+    for name, value in expected.items():
+        assert float(row[name]) == pytest.approx(value, abs=0.6 * 10**-digits), name
+
+
+def over(rows: Rows, a: Asked) -> None:
+    wanted = [leak for leak in a.wet if leak.area > 0.2]
+    assert ids(rows) == [leak.id for leak in wanted] != []
+    for row, leak in zip(rows, wanted, strict=True):
+        close(row, area_m2=leak.area)
+        assert row["label"] == label(leak.middle)
+        assert row["segment"] == leak.middle // 10
+        assert (row["label_from"], row["label_to"]) == (label(leak.middle // 10 * 10), label(leak.middle // 10 * 10 + 10))
+
+
+def above(rows: Rows, a: Asked) -> None:
+    """At 10 and 2 o'clock the arch of 4 m has gone round by 60° from the crown."""
+    wanted = [leak for leak in a.wet if abs(leak.unrolled.centroid.y) < 4 * np.pi / 3]
+    assert ids(rows) == [leak.id for leak in wanted] != []
+    for row, leak in zip(rows, wanted, strict=True):
+        close(row, 1, clock=(leak.unrolled.centroid.y / 4 * 6 / np.pi - 0.001) % 12)
+
+
+def largest(rows: Rows, a: Asked) -> None:
+    assert ids(rows) == [leak.id for leak in sorted(a.wet, key=lambda leak: -leak.area)]
+
+
+def nearest(rows: Rows, a: Asked) -> None:
+    wanted = sorted(a.wet, key=lambda leak: leak.unrolled.distance(shapely.Point(12410, 0)))[:5]
+    assert ids(rows) == [leak.id for leak in wanted]
+    for row, leak in zip(rows, wanted, strict=True):
+        close(row, away_m=leak.unrolled.distance(shapely.Point(12410, 0)))
+
+
+def together(rows: Rows, a: Asked) -> None:
+    begins = {leak.id: 12415 <= leak.low <= 12440 for leak in a.wet}
+    pairs = {
+        frozenset((p.id, q.id)): p.unrolled.distance(q.unrolled)
+        for p, q in combinations(a.wet, 2)
+        if (begins[p.id] or begins[q.id]) and p.unrolled.distance(q.unrolled) <= 10
+    }
+    found = [frozenset((row["id"], row["next"])) for row in rows]
+    assert set(found) == set(pairs)
+    assert len(found) == len(pairs)
+    assert {sum(begins[key] for key in pair) for pair in pairs} == {1, 2}
+    assert any(begins[max(pair)] > begins[min(pair)] for pair in pairs)
+    for row, pair in zip(rows, found, strict=True):
+        close(row, apart_m=pairs[pair])
+
+
+def repaired(rows: Rows, a: Asked) -> None:
+    patch = shapely.box(12400, 2, 12430, 8)
+    wanted = {leak.id: leak.unrolled.intersection(patch).area / leak.unrolled.area for leak in a.leaks}
+    wanted = {key: share for key, share in wanted.items() if share > 0}
+    assert set(ids(rows)) == set(wanted) != set()
+    for row in rows:
+        close(row, covered=wanted[row["id"]])
+
+
+def on_the_map(rows: Rows, a: Asked) -> None:
+    x, y, _ = VERTICES[10]
+    frame = shapely.box(x - 25, y - 25, x + 25, y + 25)
+    wanted = {leak.id for leak in a.leaks if frame.intersects(shapely.box(*leak.map.bounds))}
+    assert set(ids(rows)) == wanted
+    assert 0 < len(wanted) < len(a.leaks)
+
+
+def by_the_niche(rows: Rows, a: Asked) -> None:
+    low, high, left, right = NICHE
+    corners = [(low, left), (high, left), (high, right), (low, right)]
+    niche = shapely.Polygon([beside(SURFACE, chainage, np.array([across]), 0)[0, :2] for chainage, across in corners])
+    lines = {leak.id: shapely.LineString(shapely.get_coordinates(leak.surface.exterior)) for leak in a.anomalies}
+    near = {leak.id: lines[leak.id].distance(niche) for leak in a.leaks}
+    near = {key: away for key, away in near.items() if away <= 3}
+    assert set(ids(rows)) == set(near) != set()
+    for row in rows:
+        close(row, 1, away_m=near[row["id"]])
+        assert row["niche"] == label((low + high) / 2)
+
+
+def behind(rows: Rows, a: Asked) -> None:
+    objects = [thing for thing in THINGS if thing[0] == PointClass.OBJECT]
+    wanted = [
+        (leak.id, label(thing[1]), thing[6])
+        for leak in a.leaks for thing in objects
+        if leak.high >= thing[1] - thing[3] / 2 - 10 and leak.low <= thing[1] + thing[3] / 2 + 10
+    ]  # fmt: skip
+    assert [(row["id"], row["object"], float(row["tall_m"])) for row in rows] == wanted != []
+
+
+def second_look(rows: Rows, a: Asked) -> None:
+    wanted = [one for one in a.anomalies if one.detected and one.review == "open" and one.confidence < 0.85]
+    assert set(ids(rows)) == {one.id for one in wanted} != set()
+    assert [float(row["confidence"]) for row in rows] == sorted(round(one.confidence, 2) for one in wanted)
+    assert {row["kind"] for row in rows} == {"leak", "joint", "dark"}
+
+
+def kilometres(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    close(row, 0, lining_m2=200 * GIRTH, seen_percent=100 * (12500 - SEEN_FROM) / 200)
+    close(row, wet_m2=sum(leak.area for leak in a.wet), largest_m2=max(leak.area for leak in a.wet))
+    assert (row["km"], row["leaks"]) == (12, len(a.wet))
+
+
+def hundreds(rows: Rows, a: Asked) -> None:
+    assert [row["chainage"] for row in rows] == [label(12000 + 100 * i) for i in range(10)]
+    for i, row in enumerate(rows):
+        close(row, wet_m2=sum(leak.part(12000 + 100 * i, 12100 + 100 * i) for leak in a.wet))
+    assert sum(float(row["wet_m2"]) for row in rows) > 3
+
+
+def stretch(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    close(row, 0, lining_m2=110 * GIRTH)
+    close(row, 3, seen_share=1, wet_pixel_share=0.1 * (WET[1] - WET[0]) / 110)
+
+
+def classes(rows: Rows, a: Asked) -> None:
+    assert max(leak.area for leak in a.wet) > 0.3  # so that only the last class is left
+    assert [(row["class"], row["holds"]) for row in rows] == [(1, False), (2, False), (3, False), (4, True)]
+    assert [row["leaks"] for row in rows] == [len(a.wet)] * 3 + [0]
+    close(rows[0], seen_share=(12500 - SEEN_FROM) / 200)
+
+
+def worst(rows: Rows, a: Asked) -> None:
+    """The most leaks that any window as long as 100 m² of lining reaches into, each tried from just before its end."""
+    long = 100 / GIRTH
+    most = max(sum(q.low <= p.high - 1e-6 + long and q.high >= p.high - 1e-6 for q in a.wet) for p in a.wet)
+    (row,) = rows
+    assert row["window_patches"] == len(row["window_leaks"]) == most
+    start, end = (1000 * int(text[:2]) + float(text[3:]) for text in (row["chainage_from"], row["chainage_to"]))
+    assert end - start == pytest.approx(long, abs=0.002)
+    assert row["window_leaks"] == sorted(leak.id for leak in a.wet if leak.low <= end and leak.high >= start)
+
+
+def kilometre_classes(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert (row["km"], row["patches"], row["class"]) == (12, len(a.wet), 4)
+    close(row, wet_permille=1000 * sum(leak.area for leak in a.wet) / (GIRTH * (12500 - SEEN_FROM)))
+    assert row["window_patches"] == a.answers["Where are the worst 100 m² of a stretch?"][0]["window_patches"]
+
+
+def rings(rows: Rows, a: Asked) -> None:
+    wanted = {
+        n + 1: (sum(leak.part(12300 + 1.5 * n, 12301.5 + 1.5 * n) for leak in a.wet), sum(
+            leak.high > 12300 + 1.5 * n and leak.low < 12301.5 + 1.5 * n for leak in a.wet))
+        for n in range(134)
+    }  # fmt: skip
+    wanted = {number: ring for number, ring in wanted.items() if ring[1]}
+    assert [row["number"] for row in rows] == sorted(wanted, key=lambda n: -wanted[n][0])[:10]
+    assert len(rows) > 5
+    for row in rows:
+        close(row, wet_m2=wanted[row["number"]][0])
+        assert row["patches"] == wanted[row["number"]][1]
+        assert row["label"] == label(12300 + 1.5 * (row["number"] - 1))
+
+
+def progress(rows: Rows, a: Asked) -> None:
+    count = {review: sum(leak.review == review for leak in a.leaks) for review in ("open", "confirmed", "rejected")}
+    (row,) = rows
+    assert {review: row[f"leaks_{review}"] for review in count} == count
+    assert min(count.values()) > 0
+    close(row, 0, open_percent=100 * count["open"] / sum(count.values()))
+
+
+def confirmed(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert (row["id"], row["who"], row["before"], row["remark"]) == (a.at(CONFIRMED), a.who, "open", "seen")
+
+
+def history(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert row["who"] == a.who
+    assert row["before"] == {"review": "open", "remark": None}
+    assert row["after"] == {"review": "rejected", "remark": "seen"}
+
+
+def reviewers(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert (row["who"], row["edits"], row["confirmed"], row["rejected"]) == (a.who, 2, 1, 1)
+
+
+def changes(rows: Rows, a: Asked) -> None:
+    times = [row["at"] for row in rows]
+    assert times == sorted(times, reverse=True)
+    edits = [(row["what"], row["detail"]) for row in rows if row["who"] == a.who]
+    assert f"update {a.at(CONFIRMED)}: remark - -> seen, review open -> confirmed" in [text for _, text in edits]
+    assert [what for what, _ in edits] == ["axis_vertex", "anomaly", "anomaly", "region"]
+    assert [row["what"] for row in rows[len(edits) :]] == ["detect", "ground", "sections", "segments", "axis", "load"]
+    assert {row["detail"] for row in rows[len(edits) :]} == {"done"}
+    assert {row["km"] for row in rows} == {12, None}  # the region has none
+
+
+def new(rows: Rows, a: Asked) -> None:
+    """All but that of OLD, and that which is gone."""
+    assert ids(rows) == [leak.id for leak in a.leaks if leak.id != a.at(OLD)]
+
+
+def gone(rows: Rows, a: Asked) -> None:
+    assert ids(rows) == [a.at(GONE)]
+
+
+def stale(rows: Rows, a: Asked) -> None:
+    """A moved vertex makes the segments stale, and all that rests on them."""
+    assert [(row["km"], row["stage"]) for row in rows] == [
+        (12, stage) for stage in ("segments", "sections", "ground", "detect")
+    ]
+    assert rows[0]["reason"] == "axis edited since"
+
+
+def dates(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert (row["km"], row["files"]) == (12, "demo.laz")
+    assert row["loaded"].timestamp() == 1714897800  # 2024-05-05 08:30 UTC
+    assert (row["detected"] - row["loaded"]).total_seconds() == 5 * 3600
+
+
+def place(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert row["chainage"] == label(PLACE[0])
+    close(row, 3, arc=PLACE[1], offset=PLACE[2])
+
+
+def click(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    there = SURFACE.to_space(np.array([PLACE[0]]), np.array([PLACE[1]]), np.zeros(1))[0]
+    np.testing.assert_allclose([row["x"], row["y"], row["z"]], there, rtol=0, atol=1e-4)
+
+
+def sizes(rows: Rows, a: Asked) -> None:
+    assert [row["chainage"] for row in rows] == [label(12300 + 20 * i) for i in range(11)]
+    for row in rows:
+        close(row, 3, width_m=8, height_m=4 + FLOOR)
+
+
+def doubtful(rows: Rows, a: Asked) -> None:
+    assert [(row["label"], row["interpolated"]) for row in rows] == [(label(12412.5), 4), (label(12417.5), 4)]
+
+
+def steep(rows: Rows, a: Asked) -> None:
+    assert len(rows) == 10
+    for row in rows:
+        close(row, percent=2)
+
+
+def not_measured(rows: Rows, a: Asked) -> None:
+    assert [(row["n"], row["source"], row["edited_by"]) for row in rows] == [
+        (1241, "interpolated", None), (1242, "interpolated", None), (MOVED, "edited", a.who)
+    ]  # fmt: skip
+    assert [row["edited_at"] is None for row in rows] == [True, True, False]
+
+
+def points(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert row["points"] == sum(POINTS.values())
+    close(row, intensity_db=-12)
+
+
+def lie_on(rows: Rows, a: Asked) -> None:
+    assert {row["name"]: row["points"] for row in rows} == {klass.name.lower(): count for klass, count in POINTS.items()}
+
+
+def sparse(rows: Rows, a: Asked) -> None:
+    assert (rows[0]["label_from"], float(rows[0]["points_per_m"])) == (label(10 * SPARSE), 10)
+    assert {float(row["points_per_m"]) for row in rows[1:]} == {250}
+
+
+def tall(rows: Rows, a: Asked) -> None:
+    objects = [thing for thing in THINGS if thing[0] == PointClass.OBJECT and thing[6] > 1]
+    assert [row["label"] for row in rows] == [label(thing[1]) for thing in objects] != []
+    for row, thing in zip(rows, objects, strict=True):
+        close(row, length_m=thing[3], tall_m=thing[6])
+
+
+def ground(rows: Rows, a: Asked) -> None:
+    assert [row["label"] for row in rows] == [label(12300 + 50 * i) for i in range(5)]
+    for row, chainage in zip(rows, range(12300, 12501, 50), strict=True):
+        close(row, 3, height_m=600 + 0.02 * (chainage - 12300) - FLOOR)
+        close(row, width_m=2 * HALF_FLOOR)
+
+
+def spheres(rows: Rows, a: Asked) -> None:
+    """Every other sphere was seen twice, 0.2 mm apart in each coordinate."""
+    assert {row["number"] for row in rows} == {number for number in range(1, len(SPHERES) + 1) if number % 2}
+    for row in rows:
+        close(row, 1, apart_mm=0.2 * np.sqrt(3))
+
+
+CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
+    "Which leaks over 0.2 m² are there between two chainages, and on which segment?": over,
+    "Which drip from above?": above,
+    "Which are the largest of the whole tunnel?": largest,
+    "Which leak is nearest to a point?": nearest,
+    "Which leaks are so close together that they may be one?": together,
+    "Which leaks does a repair cover?": repaired,
+    "Which leaks lie in a part of the map?": on_the_map,
+    "Which leaks are near a niche?": by_the_niche,
+    "Which leaks may go on behind something that stands before them?": behind,
+    "Which deserve a second look?": second_look,
+    "How much of each kilometre is wet?": kilometres,
+    "How much of each 100 m?": hundreds,
+    "Of a stretch?": stretch,
+    "Which class of waterproofing does a stretch keep, and what breaks the others?": classes,
+    "Where are the worst 100 m² of a stretch?": worst,
+    "Which class does each kilometre keep?": kilometre_classes,
+    "Which rings of a segmental lining are the wettest?": rings,
+    "How far is the review?": progress,
+    "Who confirmed which leaks of a stretch, and when?": confirmed,
+    "What became of a leak?": history,
+    "Who reviewed how many leaks?": reviewers,
+    "What changed since a date?": changes,
+    "Which leaks were found for the first time in the last week?": new,
+    "Which leaks did the last detection not find again?": gone,
+    "Which kilometres are stale, and why?": stale,
+    "When was each kilometre loaded and detected, and from which files?": dates,
+    "At which chainage is a point, and how far from the lining?": place,
+    "Where in space is a click on the unrolled image?": click,
+    "How wide and high is the tunnel every 20 m?": sizes,
+    "Which sections are doubtful?": doubtful,
+    "Where is the tunnel steepest?": steep,
+    "Which vertices of the axis are not measured?": not_measured,
+    "How many points lie in a stretch, and how bright are they?": points,
+    "On what do they lie?": lie_on,
+    "Where are the points too sparse?": sparse,
+    "What stands in the tunnel?": tall,
+    "How high is the ground, and how wide?": ground,
+    "How well do the scans agree on a target sphere?": spheres,
+}
+
+
+def test_every_question_has_an_answer_that_is_checked() -> None:
+    assert list(QUESTIONS) == list(CHECKS)
+    assert len(QUESTIONS) >= 20
+    assert PAGE.read_text("utf-8").count("\n### ") == len(QUESTIONS)
+
+
+@pytest.mark.parametrize("title", CHECKS)
+def test_answer(asked: Asked, title: str) -> None:
+    CHECKS[title](asked.answers[title], asked)

@@ -1,0 +1,1 @@
+"""What tests share: tunnels, surveys, scenes and files that are made for them."""
