@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 _POOLS = ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS", "GDAL_NUM_THREADS")
 _chosen: list[int] = []
@@ -33,3 +35,25 @@ def use_threads(count: int) -> None:
 def threads() -> int:
     """Threads that this process computes with: what `use_threads` said, or one a core."""
     return _chosen[0] if _chosen else os.cpu_count() or 1
+
+
+def in_blocks(work: Callable[[int, int], object], count: int, size: int) -> None:
+    """Call ``work(begin, end)`` for each block of ``size`` of ``count`` items, as many at a time as there are threads.
+
+    Parameters
+    ----------
+    work : callable
+        Takes the first number of a block and the one after its last. It gains by threads as far as it lets go of Python's
+        lock, as compiled kernels and NumPy do; blocks must not write to the same places.
+    count, size : int
+        How many items there are, and how many make a block.
+    """
+    starts = range(0, count, size)
+    many = min(threads(), len(starts))
+    if many <= 1:
+        for begin in starts:
+            work(begin, min(begin + size, count))
+        return
+    with ThreadPoolExecutor(many) as pool:
+        for _ in pool.map(lambda begin: work(begin, min(begin + size, count)), starts):
+            pass

@@ -1,0 +1,15 @@
+"""How loops over points and pixels are compiled: the two kinds of function that there are.
+
+A kernel is called from Python, on arrays of one type each, so that it is compiled once. It lets other threads run meanwhile
+(`tunneldb.threads.in_blocks` gives each of them a block of the points). What a kernel calls, for each point, is inner.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+kernel = njit(cache=True, nogil=True)
+"""Decorator of a compiled function that Python calls."""
+
+inner = njit(cache=True, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+"""Decorator of a compiled function that only compiled functions call: it takes less to compile."""
