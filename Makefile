@@ -1,4 +1,5 @@
 # make demo   a simulated tunnel from its scan to leaks in QGIS, in ./demo
+# make quick  those of the tests that need no server
 # make test   lint, types and all tests, against the wheel as a user would install it
 # make faults 100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
 # make docs   the documentation as a site, in ./site
@@ -10,7 +11,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find tunneldb sql migrations -type f -not -name '*.py[co]' -not -name '*.nb[ic]') pyproject.toml README.md LICENSE
 
-.PHONY: install demo test tests faults docs bench lint clean
+.PHONY: install demo quick test tests faults docs bench lint clean
 .DELETE_ON_ERROR:
 
 install: $(VENV)/wheel
@@ -43,11 +44,16 @@ demo: install
 
 lint: install
 	$(BIN)/ruff check
+	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
 
 # Not `python -m pytest`: that would put the source tree before the wheel. Linting takes a core for a minute, beside the tests.
 tests: $(VENV)/wheel $(VENV)/tests
 	$(BIN)/pytest -n 2 --dist loadscope -rs
+
+quick: $(VENV)/wheel
+	$(BIN)/pytest -n 2 -m "not server" -rs
 
 test: $(VENV)/wheel $(VENV)/tests
 	$(MAKE) -j 2 lint tests

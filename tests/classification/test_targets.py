@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 import pytest
-from tests.targets import Ball, Rod, Thing, Wall, scan
+from support.target_spheres import Ball, Rod, Thing, Wall, scan
 
 from tunneldb.classification.targets.curvature import CurvedCells
 from tunneldb.classification.targets.detection import Refusal, Sphere, confirmed, find_spheres, join

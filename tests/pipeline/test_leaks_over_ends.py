@@ -11,7 +11,7 @@ import psycopg
 import pytest
 import shapely
 from shapely.geometry import Polygon
-from tests.loading import SURVEY, add_survey
+from support.loaded_survey import SURVEY, add_survey
 
 from tests.pipeline.test_detect import APPENDAGE, FLOOR, NAME, command, counts, outlines, parameters, prepare, share_of
 from tunneldb.anomalies import detect as detection
