@@ -50,10 +50,10 @@ lint: install
 
 # Not `python -m pytest`: that would put the source tree before the wheel. Linting takes a core for a minute, beside the tests.
 tests: $(VENV)/wheel $(VENV)/tests
-	$(BIN)/pytest -n 2 --dist loadscope -rs
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -rs
 
 quick: $(VENV)/wheel
-	$(BIN)/pytest -n 2 -m "not server" -rs
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not server" -rs
 
 test: $(VENV)/wheel $(VENV)/tests
 	$(MAKE) -j 2 lint tests

@@ -34,11 +34,23 @@ _numbers = itertools.count(1)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+LONG = ("faults", "report", "qgis", "pipeline", "queue", "simulate", "classification")
+"""Folders whose tests take longest, in the order in which they begin: the last tests of a run are short ones."""
+
+SHARED = ("long", "short")
+"""Fixtures of the session that take minutes to make: what asks for them runs on one worker, whatever its module."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests that need a server: those that ask for it, by whatever fixture."""
+    """Mark the tests that need a server, by whatever fixture, and say which run on one worker, and in which order."""
     for item in items:
-        if "server_dsn" in getattr(item, "fixturenames", ()):
+        fixtures = getattr(item, "fixturenames", ())
+        if "server_dsn" in fixtures:
             item.add_marker("server")
+        group = next((name for name in SHARED if name in fixtures and "faults" in item.path.parts), item.path.name)
+        item.add_marker(pytest.mark.xdist_group(f"{item.path.parent.name}/{group}"))
+    place = {name: n for n, name in enumerate(LONG)}
+    items.sort(key=lambda item: place.get(item.path.parent.name, len(LONG)))
 
 
 @pytest.fixture(scope="session", autouse=True)
