@@ -39,11 +39,11 @@ from measure_results import (
     clean_json,
     compare_tables,
     distance_of,
+    excerpt,
     gaps_of_images,
     measure,
     one_to_one,
     read_table,
-    shorten,
 )
 
 CHANGING = (
@@ -149,7 +149,7 @@ def compare_texts(findings: Findings, item: str, before: str, after: str) -> Non
     for first, second in zip_longest(*lines, fillvalue=""):
         same, greatest = distance_of(first, second)
         if not same and not gap.rows:
-            gap.example = f", as {shorten(first)} | {shorten(second)}"
+            gap.example = f", as {excerpt(first, second)}"
         gap.rows, gap.greatest = gap.rows + (not same), max(gap.greatest, greatest)
     findings.values(item, {"text": gap})
 
