@@ -28,8 +28,8 @@ WIDEST = 1e-6
 
 TIMES = {
     "at", "backend_start", "created_at", "detected_at", "done_at", "drawn_at", "duration", "edited_at", "failed_at",
-    "finished_at", "found_at", "heartbeat", "input_at", "last_change", "left", "loaded_at", "now", "points_per_second", "rate", "read_at",
-    "requested_at", "retry_after", "reviewed_at", "seconds", "since", "started_at", "update_time",
+    "finished_at", "found_at", "heartbeat", "input_at", "last_change", "left", "loaded_at", "now", "points_per_second", "rate",
+    "read_at", "requested_at", "retry_after", "reviewed_at", "seconds", "since", "started_at", "update_time",
 }  # fmt: skip
 MACHINES = {"backend_pid", "dsn", "host", "job_id", "path", "pid", "versions", "who", "worker", "worker_id"}
 VOLATILE = TIMES | MACHINES | {"checksum"}  # a LAZ file holds its day
