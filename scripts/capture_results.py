@@ -13,6 +13,7 @@ import os
 import shutil
 import struct
 import subprocess
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
@@ -21,6 +22,21 @@ from typing import Any
 import numpy as np
 import psycopg
 from psycopg import sql
+
+csv.field_size_limit(sys.maxsize)
+
+
+QUERIES = {
+    "waterproof": "SELECT w.* FROM tunnel_api.survey s, tunnel_api.waterproof_class('s', s.chainage_from, s.chainage_to) w",
+    "sections": "SELECT c, a.* FROM tunnel_api.survey s, generate_series(ceil(s.chainage_from)::int, s.chainage_to::int, 7) c, "
+    "tunnel_api.section_at(s.id, c) a",
+    "unroll": "SELECT v.n, u.* FROM tunnel_api.axis_vertex v, "
+    "tunnel_api.unroll(v.survey_id, ST_Translate(v.geom, 1, -2, 0.5)) u ORDER BY v.n",
+    "roll": "SELECT v.n, ST_AsEWKT(r) FROM tunnel_api.axis_vertex v, "
+    "tunnel_api.roll(v.survey_id, v.chainage + 3, 2.5, 0.1) r ORDER BY v.n",
+    "rings": "SELECT r.* FROM tunnel_api.survey s, tunnel_api.ring_statistics('s', 10, s.chainage_from) r",
+}
+"""Functions at places of the survey, with all digits."""
 
 
 class Scene:
@@ -84,13 +100,14 @@ class Scene:
             "axis.txt": ["axis", "s"],
             "axis.json": ["axis", "s", "-o", "out/axis.csv", "--json"],
             "unroll.json": ["unroll", "s", "scan/points.csv", "-o", "out/unrolled.csv", "--json"],
-            "roll.json": ["unroll", "s", "out/unrolled.csv", "--inverse", "-o", "out/rolled.csv", "--json"],
         }.items():  # fmt: skip
             self.run(*words, said=name)
-        self.query("waterproof.txt", "SELECT w.* FROM tunnel_api.survey s, tunnel_api.waterproof_class('s', s.chainage_from,"
-                   " s.chainage_to) w")  # fmt: skip
-        self.query("sections.txt", "SELECT c, a.* FROM tunnel_api.survey s, generate_series(ceil(s.chainage_from)::int,"
-                   " s.chainage_to::int, 7) c, tunnel_api.section_at(s.id, c) a")  # fmt: skip
+        rows = list(csv.DictReader((self.folder / "out" / "unrolled.csv").open()))
+        inside = [f"{row['chainage']},{row['arc']},{row['offset']}\n" for row in rows if row["chainage"]]
+        (self.folder / "out" / "inside.csv").write_text("chainage,arc,offset\n" + "".join(inside))
+        self.run("unroll", "s", "out/inside.csv", "--inverse", "-o", "out/rolled.csv", said="rolled.txt")
+        for name, query in QUERIES.items():
+            self.query(f"{name}.txt", query)
 
     def export(self) -> None:
         """Write all kinds of files."""
@@ -111,7 +128,7 @@ def demo(scene: Scene) -> None:
               "--patches", 4, "--joint-leaks", 2, "--drips", said="simulate.txt")  # fmt: skip
     scene.register(25830, 12300, "--trajectory", "scan/demo.trajectory.csv", "--reference", "scan/demo.reference.csv",
                    "--intensity", "Amplitude", "--intensity-kind", "amplitude")  # fmt: skip
-    scene.run("load", "s", *scene.scans(), said="load.txt")
+    scene.run("load", "s", *scene.scans(), "--json", said="load.json")
     scene.run("run", "s", said="run.txt")
     scene.look()
     scene.export()
@@ -142,7 +159,7 @@ def static(scene: Scene) -> None:
               "--ballast", 0.02, "--sleepers", "--catenary", "--seed", 5, said="simulate.txt")  # fmt: skip
     scene.register(25830, 12970, "--stations", "scan/dirty.stations.csv", "--reference", "auto", "--intensity", "Amplitude",
                    "--intensity-kind", "amplitude")  # fmt: skip
-    scene.run("load", "s", *scene.scans(), said="load.txt")
+    scene.run("load", "s", *scene.scans(), "--json", said="load.json")
     scene.run("run", "s", said="run.txt")
     scene.run("spheres", "s", "--radius", 0.0725, "--control", "scan/dirty.spheres.csv", "--report", "out/spheres.md",
               said="spheres.txt")  # fmt: skip
@@ -164,7 +181,7 @@ def ringo(scene: Scene, source: Path) -> None:
     for name in ("ringo.laz", "ringo.axis.csv", "ringo.trajectory.csv"):
         shutil.copyfile(source / name, scene.folder / "scan" / name)
     scene.register(3794, 511746.75, "--trajectory", "scan/ringo.trajectory.csv", "--intensity-kind", "none")
-    scene.run("load", "s", *scene.scans(), said="load.txt")
+    scene.run("load", "s", *scene.scans(), "--json", said="load.json")
     scene.run("run", "s", said="run.txt")
     scene.look()
     scene.export()
@@ -205,13 +222,12 @@ SELECT n.nspname, c.relname,
 CATALOG = """
 WITH own AS (SELECT oid, nspname FROM pg_namespace WHERE nspname IN ('tunnel', 'tunnel_audit', 'tunnel_api', 'tunnel_queue'))
 SELECT 'column' AS kind, a.attrelid::regclass || '.' || a.attname AS name,
-       format_type(a.atttypid, a.atttypmod) || ' ' || a.attnotnull || coalesce(' ' || pg_get_expr(d.adbin, d.adrelid), '')
-       AS what,
+       concat_ws(' ', format_type(a.atttypid, a.atttypmod), a.attnotnull, pg_get_expr(d.adbin, d.adrelid)) AS what,
        col_description(a.attrelid, a.attnum) AS comment
   FROM pg_attribute a JOIN pg_class c ON c.oid = a.attrelid JOIN own ON own.oid = c.relnamespace
   LEFT JOIN pg_attrdef d ON d.adrelid = a.attrelid AND d.adnum = a.attnum
  WHERE a.attnum > 0 AND c.relkind IN ('r', 'p', 'v')
-UNION ALL SELECT 'view', c.oid::regclass::text, pg_get_viewdef(c.oid) || ' ' || coalesce(c.relacl::text, ''),
+UNION ALL SELECT 'view', c.oid::regclass::text, concat_ws(' ', pg_get_viewdef(c.oid), c.relacl),
        obj_description(c.oid, 'pg_class') FROM pg_class c JOIN own ON own.oid = c.relnamespace WHERE c.relkind = 'v'
 UNION ALL SELECT 'constraint', k.conrelid::regclass || '.' || k.conname, pg_get_constraintdef(k.oid), NULL
   FROM pg_constraint k JOIN own ON own.oid = k.connamespace
@@ -220,9 +236,9 @@ UNION ALL SELECT 'index', indexrelid::regclass::text, pg_get_indexdef(indexrelid
 UNION ALL SELECT 'trigger', t.tgrelid::regclass || '.' || t.tgname, pg_get_triggerdef(t.oid),
        obj_description(t.oid, 'pg_trigger')
   FROM pg_trigger t JOIN pg_class c ON c.oid = t.tgrelid JOIN own ON own.oid = c.relnamespace WHERE NOT t.tgisinternal
-UNION ALL SELECT 'function', p.oid::regprocedure::text, pg_get_function_arguments(p.oid) || ' -> '
-       || coalesce(pg_get_function_result(p.oid), '') || ' ' || p.provolatile || p.proparallel || p.prosecdef || p.proisstrict
-       || coalesce(p.proacl::text, ''), obj_description(p.oid, 'pg_proc') FROM pg_proc p JOIN own ON own.oid = p.pronamespace
+UNION ALL SELECT 'function', p.oid::regprocedure::text, concat_ws(' ', pg_get_function_arguments(p.oid), '->',
+       pg_get_function_result(p.oid), p.provolatile, p.proparallel, p.prosecdef, p.proisstrict, p.proacl),
+       obj_description(p.oid, 'pg_proc') FROM pg_proc p JOIN own ON own.oid = p.pronamespace
 """
 
 

@@ -12,7 +12,6 @@ is named in VOLATILE, CHANGING and SAID.
 from __future__ import annotations
 
 import base64
-import csv
 import datetime as dt
 import json
 import re
@@ -40,11 +39,11 @@ from measure_results import (
     clean_json,
     compare_tables,
     distance_of,
+    excerpt,
     gaps_of_images,
     measure,
     one_to_one,
     read_table,
-    shorten,
 )
 
 CHANGING = (
@@ -150,7 +149,7 @@ def compare_texts(findings: Findings, item: str, before: str, after: str) -> Non
     for first, second in zip_longest(*lines, fillvalue=""):
         same, greatest = distance_of(first, second)
         if not same and not gap.rows:
-            gap.example = f", as {shorten(first)} | {shorten(second)}"
+            gap.example = f", as {excerpt(first, second)}"
         gap.rows, gap.greatest = gap.rows + (not same), max(gap.greatest, greatest)
     findings.values(item, {"text": gap})
 
@@ -200,10 +199,10 @@ class Capture:
         rules = CHANGING + (SAID if path.parent.name == "said" else ())
 
         def clean(text: str) -> str:
-            text = text.replace(self.about["folder"], "FOLDER").replace(self.about["day"][scene], "DAY")
+            text = text.replace(self.about["folder"], "FOLDER")
             for pattern, word in rules:
                 text = pattern.sub(word, text)
-            return text
+            return text.replace(self.about["day"][scene], "DAY")
 
         return clean
 
@@ -279,7 +278,6 @@ def capture(folder: Path, tunneldb: Path, real: Path | None, only: Sequence[str]
 @click.option("--only", multiple=True, help="Only this scene.")
 def compare(before: Path, after: Path, only: Sequence[str]) -> None:
     """Compare two captures; exit code 1 where anything differs."""
-    csv.field_size_limit(sys.maxsize)
     findings, sides = Findings(), (Capture(before), Capture(after))
     for scene in sorted(set().union(*(side.about["seconds"] for side in sides))):
         if only and scene not in only:
