@@ -247,7 +247,7 @@ def _fit_planes(
             if total < _MIN_POINTS:
                 continue
             every = 1 + total // _SAMPLE
-            count, seen = 0, 0
+            count, seen = np.int64(0), 0  # no literal: what is called with one is compiled for it once more
             for k in range(counts.shape[0]):
                 counts[k] = 0.0
             for m in range(below, above):
@@ -292,30 +292,25 @@ def _fit_plane(part: Float, count: int, level: float, fine: Int64) -> tuple[floa
             return np.nan, np.nan
         before, lean, slant = a, b, c
         a, b, c = plane_of_moments(s, sx, sy, sxx, sxy, syy, sz, sxz, syz, _FLATTEST)
-        sigma = _spread(part, count, a, b, c, fine)
+        # Standard deviation about the plane, from the median of the distances.
+        for f in range(_FINES):
+            fine[f] = 0
+        total = 0
+        for k in range(count):
+            f = int(abs(part[k, 2] - a - b * part[k, 0] - c * part[k, 1]) / _FINE)
+            if f < _FINES:
+                fine[f] += 1
+                total += 1
+        below, sigma = 0, np.nan
+        for f in range(_FINES):
+            if 2 * (below + fine[f]) >= total and fine[f] > 0:
+                sigma = 1.4826 * (f + (0.5 * total - below) / fine[f]) * _FINE
+                break
+            below += fine[f]
         if max(abs(a - before), abs(b - lean), abs(c - slant)) < _REST:
             break
         scale = min(max(_TUKEY * sigma, DELTA), 2.0 * _FIRST)
     return a, sigma
-
-
-@inner
-def _spread(part: Float, count: int, a: float, b: float, c: float, fine: Int64) -> float:  # pragma: no cover - compiled
-    """Standard deviation of the points about a plane, from the median of their distances."""
-    for f in range(_FINES):
-        fine[f] = 0
-    total = 0
-    for k in range(count):
-        f = int(abs(part[k, 2] - a - b * part[k, 0] - c * part[k, 1]) / _FINE)
-        if f < _FINES:
-            fine[f] += 1
-            total += 1
-    below = 0
-    for f in range(_FINES):
-        if 2 * (below + fine[f]) >= total and fine[f] > 0:
-            return 1.4826 * (f + (0.5 * total - below) / fine[f]) * _FINE
-        below += fine[f]
-    return np.nan
 
 
 @inner

@@ -109,7 +109,7 @@ def _in_order(labels: Int64, count: int) -> Int64:
 @inner
 def _neighbours(cells: Int64, row: int, layer: int, c: int, runs: Int64) -> int:  # pragma: no cover - compiled
     """Write the first and last + 1 of the runs of filled cells about a cell, itself included; how many runs there are."""
-    count, first = 0, 0
+    count, first = 0, np.int64(0)  # no literal: what is called with one is compiled for it once more
     for dz in range(-_NEAR, _NEAR + 1):
         for dy in range(-_NEAR, _NEAR + 1):
             key = cells[c] + dz * layer + dy * row
