@@ -13,7 +13,6 @@ on their order, nor on whether they were thinned in parts before.
 from __future__ import annotations
 
 import math
-
 from collections.abc import Sequence
 from typing import Any
 
