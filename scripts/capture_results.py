@@ -48,10 +48,12 @@ class Scene:
         Folder of the scene; emptied.
     tunneldb : Path
         The program.
+    scans : Path or None
+        Folder of another capture, whose simulated scans are taken in place of new ones.
     """
 
-    def __init__(self, folder: Path, tunneldb: Path) -> None:
-        self.folder, self.tunneldb = folder, tunneldb
+    def __init__(self, folder: Path, tunneldb: Path, scans: Path | None = None) -> None:
+        self.folder, self.tunneldb, self.former = folder, tunneldb, scans and scans / folder.name
         shutil.rmtree(folder, ignore_errors=True)
         for name in ("scan", "out", "said", "tables"):
             (folder / name).mkdir(parents=True)
@@ -65,9 +67,17 @@ class Scene:
         if done.returncode not in codes:
             raise SystemExit(f"{self.folder.name}: {' '.join(command)}\n{done.stdout}{done.stderr}")
         if said:
-            code = "" if said.endswith("json") else f"exit {done.returncode}\n"
-            (self.folder / "said" / said).write_text(done.stdout + code)
+            rest = "" if said.endswith("json") else (done.stderr if done.returncode else "") + f"exit {done.returncode}\n"
+            (self.folder / "said" / said).write_text(done.stdout + rest)
         return done.stdout
+
+    def simulate(self, *words: object) -> None:
+        """Make the scan in the folder ``scan``, or copy it from the other capture."""
+        if self.former is None:
+            self.run("simulate", "scan", *words, said="simulate.txt")
+        else:
+            shutil.copytree(self.former / "scan", self.folder / "scan", dirs_exist_ok=True)
+            shutil.copyfile(self.former / "said" / "simulate.txt", self.folder / "said" / "simulate.txt")
 
     def query(self, said: str, statement: str) -> None:
         """Run an SQL statement; keep its rows."""
@@ -124,8 +134,8 @@ class Scene:
 
 def demo(scene: Scene) -> None:
     """Take the scan of scripts/demo.sh through all stages."""
-    scene.run("simulate", "scan", "--preset", "demo", "--name", "demo", "--lining", "segments", "--soot", 2, "--paint", 4,
-              "--patches", 4, "--joint-leaks", 2, "--drips", said="simulate.txt")  # fmt: skip
+    scene.simulate("--preset", "demo", "--name", "demo", "--lining", "segments", "--soot", 2, "--paint", 4,
+                   "--patches", 4, "--joint-leaks", 2, "--drips")  # fmt: skip
     scene.register(25830, 12300, "--trajectory", "scan/demo.trajectory.csv", "--reference", "scan/demo.reference.csv",
                    "--intensity", "Amplitude", "--intensity-kind", "amplitude")  # fmt: skip
     scene.run("load", "s", *scene.scans(), "--json", said="load.json")
@@ -139,6 +149,9 @@ def demo(scene: Scene) -> None:
     scene.run("leaks", "s", "--from", "12+330", "--to", "12+400", "--clock", "10-2", said="leaks-crown.txt")
 
 
+DESIGNS = {"j-landxml.xml": 6676, "indot-twin-branch.xml": 6458, "indot-twin-branch.ifc": 6458, "aplitop-3.ifc": 25830}
+"""Design alignments among the data of the tests, with the coordinate system in which each is read."""
+
 EDITS = """
 UPDATE tunnel_api.leak SET review = 'confirmed', remark = 'drips' WHERE id = (SELECT min(id) FROM tunnel_api.leak);
 UPDATE tunnel_api.leak SET review = 'rejected' WHERE id = (SELECT max(id) FROM tunnel_api.leak);
@@ -150,13 +163,13 @@ SELECT s.id, 'dry', ST_MakeEnvelope(12975, -2, 12979, 2) FROM tunnel_api.survey 
 
 def static(scene: Scene) -> None:
     """Take a dirty tunnel, scanned from stations, through all stages; edit by hand and run again what is stale."""
-    scene.run("simulate", "scan", "--name", "dirty", "--length", 60, "--section", "horseshoe", "--scanner", "static",
+    scene.simulate("--name", "dirty", "--length", 60, "--section", "horseshoe", "--scanner", "static",
               "--station-spacing", 12, "--angular-step", 0.18, "--start-chainage", 12970, "--slope", 2, "--radius", 300,
               "--lining", "cast", "--ring", 8, "--ring-step", 0.003, "--roughness", 10, "--relief", 0.002, "--beam", 0.3,
               "--leaks", 8, "--leak-area", 0.1, 2.5, "--leak-drop", 1.5, 8, "--leak-edge", 0.03, "--joint-leaks", 3,
               "--niche-leaks", 1, "--drips", "--soot", 2, "--grime", 2, "--patches", 5, "--paint", 5, "--clutter", 3,
               "--people", 2, "--equipment", 3, "--bollards", 1, "--globes", 2, "--spheres", 6, "--free-cables", 1,
-              "--ballast", 0.02, "--sleepers", "--catenary", "--seed", 5, said="simulate.txt")  # fmt: skip
+              "--ballast", 0.02, "--sleepers", "--catenary", "--seed", 5)  # fmt: skip
     scene.register(25830, 12970, "--stations", "scan/dirty.stations.csv", "--reference", "auto", "--intensity", "Amplitude",
                    "--intensity-kind", "amplitude")  # fmt: skip
     scene.run("load", "s", *scene.scans(), "--json", said="load.json")
@@ -190,9 +203,8 @@ def ringo(scene: Scene, source: Path) -> None:
 
 def batch(scene: Scene) -> None:
     """Take three kilometres through a batch of two workers, at low density; then give them a stationing of their own."""
-    scene.run("simulate", "scan", "--name", "long", "--length", 3000, "--radius", 4000, "--s-curve", "--slope", 1.7,
-              "--scanner", "profiler", "--density", 25, "--no-truth", "--leaks", 120, "--leak-area", 2, 20,
-              said="simulate.txt")  # fmt: skip
+    scene.simulate("--name", "long", "--length", 3000, "--radius", 4000, "--s-curve", "--slope", 1.7,
+              "--scanner", "profiler", "--density", 25, "--no-truth", "--leaks", 120, "--leak-area", 2, 20)  # fmt: skip
     scene.register(25830, 0, "--trajectory", "scan/long.trajectory.csv", "--reference", "scan/long.reference.csv",
                    "--intensity", "Amplitude", "--intensity-kind", "amplitude")  # fmt: skip
     scene.run("batch", "s", *scene.scans(), "--workers", 2, "--density", "all", "--set", "image.pixel=0.25")
@@ -204,6 +216,24 @@ def batch(scene: Scene) -> None:
     scene.run("leaks", "s", "--geometry", "3d", "-o", "out/leaks.gpkg")
     scene.run("image", "s", "--km", "1", "-o", "out/images")
     scene.run("export", "s", "-o", "out/s.gpkg")
+
+
+def files(scene: Scene, real: Path | None) -> None:
+    """Read the design alignments of the tests, and the real scan files each by itself."""
+    scene.run("init")
+    tests = Path(__file__).resolve().parent.parent / "tests"
+    for name, srid in DESIGNS.items():
+        shutil.copyfile(next(tests.rglob(name)), scene.folder / "scan" / name)
+        scene.run("tunnel", "add", name, "--srid", srid, "--axis", f"scan/{name}", said=f"add-{name}.txt", codes=(0, 2))
+    scene.run("tunnel", "stationing", "j-landxml.xml", "--show", said="stationing.txt")
+    scene.run("tunnel", "list", said="tunnels.txt")
+    for name in ("pump.e57", "lone-star.laz", "extra-bytes.laz"):
+        if real is not None and (real / name).exists():
+            shutil.copyfile(real / name, scene.folder / "scan" / name)
+            scene.run("ground", f"scan/{name}", "-o", f"out/{name}.laz", said=f"ground-{name}.txt")
+            scene.run("intensity", f"scan/{name}", "--intensity", "intensity", "--intensity-kind", "linear",
+                      "--scanner", 0, 0, 1.5, "-o", f"out/{name}.png", said=f"intensity-{name}.txt",
+                      codes=(0, 1, 2))  # fmt: skip
 
 
 RELATIONS = """
