@@ -13,3 +13,11 @@ kernel = njit(cache=True, nogil=True)
 
 inner = njit(cache=True, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 """Decorator of a compiled function that only compiled functions call: it takes less to compile."""
+
+point_kernel = njit(cache=True, nogil=True, error_model="numpy")
+"""A kernel that divides for each point of a file: division by zero is infinite or NaN, and no test for it stands in the loop."""
+
+point_inner = njit(
+    cache=True, nogil=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True
+)
+"""What such a kernel calls for each point, put into it whole: several numbers returned cost nothing then."""
