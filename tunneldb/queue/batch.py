@@ -22,7 +22,7 @@ from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.pointcloud.formats.e57 import is_e57
 from tunneldb.pointcloud.formats.las_bounds import header_box
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
-from tunneldb.store.poses import load_poses
+from tunneldb.store.sources import load_poses
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
