@@ -17,6 +17,7 @@ from tunneldb.anomalies.geometries import shapes
 from tunneldb.database import install, open_connection
 from tunneldb.geometry.frame import frames_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
+from tunneldb.pipeline.stages import STAGES
 from tunneldb.raster.geotiff import KINDS, Raster, decode, encode
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.pixel_state import PixelState
@@ -86,7 +87,7 @@ def example_template(server_dsn: str) -> str:
     with psycopg.connect(server_dsn, autocommit=True) as connection:
         connection.execute(sql.SQL("CREATE DATABASE {} TEMPLATE template0").format(sql.Identifier(DATABASE)))
     with open_connection(make_conninfo(server_dsn, dbname=DATABASE)) as connection:
-        install(connection)
+        install(connection, STAGES)
         _fill(connection)
     return DATABASE
 
