@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numba import njit, prange
 from scipy import ndimage
 
-from tunneldb.arrays import Float, Int64
+from tunneldb.arrays import Float
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.lining_relief import Relief, Wall
 from tunneldb.classification.objects.clusters import Cluster
@@ -57,14 +56,14 @@ def find_scene(
     plane, tolerance = relief.level(chainage, arc)
     depth = offset - plane
     with np.errstate(invalid="ignore"):
-        find_lining = np.abs(depth) <= tolerance
+        lining = np.abs(depth) <= tolerance
     unrolled = np.column_stack([chainage, arc])
-    spacing = Spacing.of(unrolled[find_lining]) or Spacing.of(unrolled)
+    spacing = Spacing.of(unrolled[lining]) or Spacing.of(unrolled)
     clusters: list[Cluster] = []
     if spacing is not None:
         height = heights(ground, along, across, points[:, 2])
         top = settings.region * tops(along, height)
-        residual = ~find_lining
+        residual = ~lining
         left = ResidualPoints(
             points[residual], along[residual], across[residual], height[residual], depth[residual], top[residual]
         )
@@ -145,22 +144,12 @@ def _of_metre(along: Float, value: Float, share: float) -> Float:
         return np.empty(0)
     metre = np.floor(along).astype(np.int64)
     metre -= metre.min()
-    first = np.concatenate([[0], np.cumsum(np.bincount(metre))])
-    return np.asarray(_quantiles(metre, value, first, share)[metre], dtype=np.float64)
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _quantiles(metre: Int64, value: Float, first: Int64, share: float) -> Float:  # pragma: no cover - compiled
-    """Quantile of the values of each metre, NaN where it has none; ``first`` tells how many come before it."""
-    held = np.empty(len(value))
-    end = first[:-1].copy()
-    for i in range(len(value)):
-        held[end[metre[i]]] = value[i]
-        end[metre[i]] += 1
-    out = np.full(len(end), np.nan)
-    for m in prange(len(end)):
-        count = first[m + 1] - first[m]
-        if count > 0:
-            at = int(np.floor(share * (count - 1)))
-            out[m] = np.partition(held[first[m] : first[m + 1]], at)[at]
-    return out
+    # Few bits: NumPy sorts these in linear time.
+    order = np.argsort(metre.astype(np.min_scalar_type(metre.max())), kind="stable")
+    value, count = value[order], np.bincount(metre)
+    ends = np.cumsum(count)
+    quantile = np.full(len(count), np.nan)
+    for m in np.flatnonzero(count).tolist():
+        at = int(share * (count[m] - 1))
+        quantile[m] = np.partition(value[ends[m] - count[m] : ends[m]], at)[at]
+    return quantile[metre]

@@ -10,11 +10,17 @@ import numpy as np
 from scipy import ndimage
 
 from tunneldb.arrays import Float, Int64
-from tunneldb.classification.ground.height_field import below, blended, carried_on, filled, refined
-from tunneldb.classification.ground.level_profile import is_round, level_ground, profiles
+from tunneldb.classification.ground.height_field import (
+    blend_segments,
+    extrapolate_edges,
+    fill_gaps,
+    in_lower_part,
+    refine_heights,
+)
+from tunneldb.classification.ground.level_profile import is_round, level_ground, level_profiles
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.ground.ransac import ransac_planes
-from tunneldb.classification.ground.wall_foot import steady, walls
+from tunneldb.classification.ground.wall_foot import fit_walls, steady
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.pointcloud.voxels import Voxels
 
@@ -109,13 +115,12 @@ def find_ground(
     level = _levels(held, centres, coefficients, settings)
     rows = held.start + np.arange(held.rows + 1, dtype=np.float64)
     columns = (held.first + np.arange(held.columns, dtype=np.float64)) * COLUMN
-    height = filled(blended(rows, columns, centres, coefficients, level, _STEP))
+    height = fill_gaps(blend_segments(rows, columns, centres, coefficients, level, _STEP))
     if not np.isfinite(height).any():
         return None
     height, gamma = _refine(held, height, settings)
-    foot, lean = walls(
-        held.along, held.across, held.z, held.cells, held.start, held.first, height, np.maximum(gamma, settings.distance), seed
-    )
+    low = np.maximum(gamma, settings.distance)
+    foot, lean = fit_walls(held.along, held.across, held.z, held.cells, held.start, height, low, seed)
     foot, lean = steady(foot, lean)
     height = _to_walls(height, columns, foot, gamma)
     return Ground(held.start, held.first, height, gamma, foot, lean)
@@ -124,7 +129,7 @@ def find_ground(
 def _lower(points: Float, line: PlanLine, settings: GroundSettings, spread: Float | None) -> _Points | None:
     """Keep the lower part of each segment's points, thin them, place them and sort them."""
     points = np.asarray(points, dtype=np.float64)
-    kept = below(*line.place(points), points[:, 2], float(_STEP))
+    kept = in_lower_part(*line.place(points), points[:, 2], float(_STEP))
     points = points[kept]
     voxels = Voxels(settings.voxel)
     voxels.add(points)
@@ -164,8 +169,8 @@ def _segments(held: _Points, settings: GroundSettings, seed: int) -> tuple[Float
 
 def _levels(held: _Points, centres: Float, coefficients: Float, settings: GroundSettings) -> Float:
     """Levels of the ground about each segment's plane, column by column."""
-    found = profiles(
-        held.along, held.across, held.z, held.cells, held.start, held.first, held.columns,
+    found = level_profiles(
+        held.along, held.across, held.z, held.cells, held.start, held.columns,
         centres, coefficients, float(_STEP), settings.distance,
     )  # fmt: skip
     slope = math.tan(math.radians(settings.angle))
@@ -183,10 +188,10 @@ def _refine(held: _Points, height: Float, settings: GroundSettings) -> tuple[Flo
     gamma = np.full(len(height), min(settings.gamma, settings.distance))
     for _ in range(_PASSES):
         # What stands on the ground spoils both less and less.
-        height, number, square = refined(
+        height, number, square = refine_heights(
             held.along, held.across, held.z, held.spread, held.cells, held.start, held.first, height, gamma
         )
-        height = carried_on(height, _TOUCHED)
+        height = extrapolate_edges(height, _TOUCHED)
         spread = np.sqrt(square / np.maximum(number, 1.0))
         gamma = np.where(number > 0, np.clip(_SPREADS * spread, _LEAST_GAMMA, settings.gamma), settings.gamma)
     return height, gamma
