@@ -61,8 +61,8 @@ def find_scene(
     spacing = Spacing.of(unrolled[lining]) or Spacing.of(unrolled)
     clusters: list[Cluster] = []
     if spacing is not None:
-        height = heights(ground, along, across, points[:, 2])
-        top = settings.region * tops(along, height)
+        height = heights_above_ground(ground, along, across, points[:, 2])
+        top = settings.region * tunnel_heights(along, height)
         residual = ~lining
         left = ResidualPoints(
             points[residual], along[residual], across[residual], height[residual], depth[residual], top[residual]
@@ -102,11 +102,11 @@ def find_bare_scene(points: Float, line: PlanLine, ground: Ground | None, settin
     along, across = line.place(points)
     z = points[:, 2]
     floor = np.zeros(len(points), np.bool_) if ground is None else ground.is_ground(along, across, z)
-    height = heights(ground, along, across, z)
+    height = heights_above_ground(ground, along, across, z)
     spacing = Spacing.of(np.column_stack([along, across, z])[~floor])
     if spacing is None:
         return Scene(line, ground, [], None, None)
-    top = settings.region * tops(along, height)
+    top = settings.region * tunnel_heights(along, height)
     off = np.flatnonzero(~floor)
     residual = ResidualPoints(points[off], along[off], across[off], height[off], np.full(len(off), np.nan), top[off])
     kept = floor.copy()
@@ -117,13 +117,13 @@ def find_bare_scene(points: Float, line: PlanLine, ground: Ground | None, settin
     return find_scene(points, line, surface, ground, settings)
 
 
-def heights(ground: Ground | None, along: Float, across: Float, z: Float) -> Float:
+def heights_above_ground(ground: Ground | None, along: Float, across: Float, z: Float) -> Float:
     """Height of points (n,) above the ground, m, or above the lowest point of their metre where there is no ground.
 
     Where the ground has a gap, or ends, it goes on level from its nearest place in the row.
     """
     if ground is None or not np.isfinite(ground.height).any():
-        return z - _of_metre(along, z, 0.0)
+        return z - _quantile_of_metre(along, z, 0.0)
     hidden = np.isnan(ground.height)
     nearest = ndimage.distance_transform_edt(hidden, sampling=(10.0, 1.0), return_distances=False, return_indices=True)
     whole = replace(ground, height=ground.height[tuple(nearest)])
@@ -133,12 +133,12 @@ def heights(ground: Ground | None, along: Float, across: Float, z: Float) -> Flo
     return z - whole.height_at(inside, np.maximum(beside, ground.first * COLUMN))
 
 
-def tops(along: Float, height: Float) -> Float:
+def tunnel_heights(along: Float, height: Float) -> Float:
     """Height of the tunnel at each point (n,), m: that of all but the highest thousandth of points of its metre."""
-    return _of_metre(along, height, 0.999)
+    return _quantile_of_metre(along, height, 0.999)
 
 
-def _of_metre(along: Float, value: Float, share: float) -> Float:
+def _quantile_of_metre(along: Float, value: Float, share: float) -> Float:
     """Quantile of the values of each point's metre along the tunnel."""
     if len(along) == 0:
         return np.empty(0)

@@ -37,7 +37,7 @@ class Scene:
     Attributes
     ----------
     line : PlanLine
-        PlanLine along the tunnel, in whose frame the ground stands.
+        Line along the tunnel, in whose frame the ground stands.
     ground : Ground or None
         The ground, if there is one.
     clusters : sequence of Cluster

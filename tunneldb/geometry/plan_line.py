@@ -40,7 +40,7 @@ class PlanLine:
 
     @classmethod
     def of(cls, vertices: ArrayLike, along: ArrayLike) -> PlanLine:
-        """PlanLine through given vertices.
+        """Line through given vertices.
 
         Parameters
         ----------

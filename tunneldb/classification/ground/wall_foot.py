@@ -114,20 +114,23 @@ def _reach(planes: Float) -> Float:
     return np.where(possible, _WITHIN * np.sqrt(1.0 + planes[:, 2] ** 2), 0.0)
 
 
-def steady(foot: Float, lean: Float) -> tuple[Float, Float]:
-    """Feet and leans again, those of niches, doors and things by the wall after the rows beside them."""
+def replace_outliers(foot: Float, lean: Float) -> tuple[Float, Float]:
+    """Feet and leans of the walls, (rows, 2) each, without those of niches, doors and objects by the wall.
+
+    A foot that lies off the running median of the rows is replaced by it; leans are the running median of the others'.
+    """
     foot, lean = foot.copy(), lean.copy()
     for side in range(2):
-        usual = _median(foot[:, side])
+        median = _running_median(foot[:, side])
         with np.errstate(invalid="ignore"):
-            astray = ~(np.abs(foot[:, side] - usual) < _APART)
-        slant = _median(np.where(astray, np.nan, lean[:, side]))
-        foot[astray, side] = usual[astray]
-        lean[:, side] = slant
+            outlier = ~(np.abs(foot[:, side] - median) < _APART)
+        leaning = _running_median(np.where(outlier, np.nan, lean[:, side]))
+        foot[outlier, side] = median[outlier]
+        lean[:, side] = leaning
     return foot, lean
 
 
-def _median(values: Float) -> Float:
+def _running_median(values: Float) -> Float:
     """Median of each value and those beside it that are known; NaN where fewer than three are."""
 
     def middle(window: Float) -> float:
