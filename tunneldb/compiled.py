@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from numba import njit
 
+from tunneldb.arrays import Int64
+
 kernel = njit(cache=True, nogil=True)
 """Decorator of a compiled function that Python calls."""
 
@@ -15,9 +17,21 @@ inner = njit(cache=True, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=T
 """Decorator of a compiled function that only compiled functions call: it takes less to compile."""
 
 point_kernel = njit(cache=True, nogil=True, error_model="numpy")
-"""A kernel that divides for each point of a file: division by zero is infinite or NaN, and no test for it stands in the loop."""
+"""A kernel that divides for each point or pixel: division by zero is infinite or NaN, so no test for it is in the loop."""
 
 point_inner = njit(
     cache=True, nogil=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True
 )
 """What such a kernel calls for each point, put into it whole: several numbers returned cost nothing then."""
+
+
+@inner
+def lower_bound(values: Int64, wanted: int, begin: int, end: int) -> int:  # pragma: no cover - compiled
+    """Place of the first of growing values that is not below the one wanted, looked for from begin on; end if none is."""
+    while begin < end:
+        middle = (begin + end) >> 1
+        if values[middle] < wanted:
+            begin = middle + 1
+        else:
+            end = middle
+    return begin
