@@ -65,7 +65,7 @@ def pixel_states(window: Window, columns: slice, grid: Grid, floor: Floor, outli
     # What counts for the planes of the columns, of what counts for the steps.
     near = appendage.reach(grid.pixel)
     first = max(columns.start - near, window.columns.start)
-    offset = offset[:, first - window.columns.start : columns.stop + near - window.columns.start]
+    offset = np.ascontiguousarray(offset[:, first - window.columns.start : columns.stop + near - window.columns.start])
     distance = appendage.distance_from_plane(offset, grid.pixel, (row, grid.first_column + first))
     recess = appendage.recessed(offset, distance, grid.pixel, delta)
     off = appendage.off_plane(distance, recess, grid.pixel, delta)
