@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from tunneldb.arrays import Float, Int32, Single
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.pipeline.calibration import UNKNOWN, find_radiometer, find_range_curve, roughness_of, take_sample
-from tunneldb.pipeline.detect import ASIDE, load_floor
+from tunneldb.pipeline.calibration import UNKNOWN, find_range_curve, observe_sample, roughness_of
+from tunneldb.pipeline.detect import ASIDE, load_floor, load_radiometer
 from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_scans
 from tunneldb.pointcloud.reader import Points, read_chunks, read_header
 from tunneldb.pointcloud.thinning import thin
@@ -28,7 +28,7 @@ from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.raster.observation import Observer
 from tunneldb.store.images import load_reference, load_regions
-from tunneldb.store.sources import SAMPLE
+from tunneldb.store.sources import SAMPLE, sample
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
@@ -80,7 +80,7 @@ def _look_at_kilometre(
     measured = load_reference(conn, survey) if needs_reference(kind) else None
     surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
     # Without a curve the lining itself is asked, whether or not detection is to go by it.
-    radiometer = find_radiometer(
+    radiometer = load_radiometer(
         conn,
         survey if measured else replace(survey, reference="auto"),
         values["intensity.max_incidence"],
@@ -88,7 +88,7 @@ def _look_at_kilometre(
     )
     depth = values["lining.tolerance"], values["lining.recess"]
     observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, km, 0.0))
-    view = take_sample(conn, survey, observer)
+    view = observe_sample(sample(conn, survey, km), observer, survey.name)
     found, refused = _attempt(lambda: find_range_curve(view, observer), view.observations.raw_db[view.telling])
     if needs_reference(kind) and measured is None:
         roughness, note = found.roughness if found else None, None
