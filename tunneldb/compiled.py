@@ -8,8 +8,22 @@ from __future__ import annotations
 
 from numba import njit
 
+from tunneldb.arrays import Int64
+
 kernel = njit(cache=True, nogil=True)
 """Decorator of a compiled function that Python calls."""
 
 inner = njit(cache=True, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 """Decorator of a compiled function that only compiled functions call: it takes less to compile."""
+
+
+@inner
+def lower_bound(values: Int64, wanted: int, begin: int, end: int) -> int:  # pragma: no cover - compiled
+    """Place of the first of growing values that is not below the one wanted, looked for from begin on; end if none is."""
+    while begin < end:
+        middle = (begin + end) >> 1
+        if values[middle] < wanted:
+            begin = middle + 1
+        else:
+            end = middle
+    return begin
