@@ -23,6 +23,7 @@ from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.floor import Floor
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import LiningImage
+from tunneldb.raster.observation import Observer
 from tunneldb.simulate import Simulation, generate, write
 from tunneldb.simulate.lining.leaks import Leak
 from tunneldb.store.anomaly_parts import replace_parts
@@ -87,14 +88,14 @@ def uncut(sections: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> list
     first, values = int(START - SHIFT), settings()
     inputs = job.load_inputs(conn, survey, 12, values)
     assert inputs.sample is not None
-    observer = replace(
-        inputs.observer, surface=surface, floor=Floor.of(first, *load_arcs(conn, survey, int(START), int(START) + 24))
-    )
+    floor = Floor.of(first, *load_arcs(conn, survey, int(START), int(START) + 24))
+    depth = values["lining.tolerance"], values["lining.recess"]
+    grid = job.kilometre_grid(surface, 12, PIXEL)
     (points,) = conn.execute("SELECT points FROM tunnel.scan_file").fetchone()
     elsewhere = replace(
         inputs,
-        observer=observer,
-        grid=job.kilometre_grid(surface, 12, PIXEL),
+        observer=Observer.of(surface, 12, depth, inputs.observer.radiometer, floor, grid.halo * PIXEL),
+        grid=grid,
         files=[replace(file, ranges=[(0, points)]) for file in inputs.files],
     )
     conn.rollback()
