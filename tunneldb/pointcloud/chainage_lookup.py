@@ -53,7 +53,7 @@ class ChainageLookup:
             return
         new = centres[known:]
         a = self.alignment
-        chainage, distance, segment = self._located(new, np.full(len(new), -1, np.int32))
+        chainage, distance, segment = self._located(new, np.full(len(new), -1, np.int32), True)
         near = (distance + self.slack <= self.limit) & (chainage - self.slack >= a.start) & (chainage + self.slack <= a.end)
         chainage = np.clip(chainage, a.start, a.end)
         self.chainage = np.concatenate([self.chainage, chainage])
@@ -92,20 +92,20 @@ class ChainageLookup:
         rows: Rows = np.empty(len(picked), ROW)
         for begin in range(0, len(picked), _BLOCK):
             part, chosen = rows[begin : begin + _BLOCK], picked[begin : begin + _BLOCK]
-            xyz = points.xyz[chosen]
-            chainage, _, _ = self._located(xyz, self.segment[cell[chosen]])
+            xyz = points.xyz.take(chosen, axis=0)
+            chainage, _, _ = self._located(xyz, self.segment.take(cell.take(chosen)), False)
             part["x"], part["y"], part["z"] = xyz.T
             part["chainage"] = np.clip(chainage, self.alignment.start, self.alignment.end)
-            part["time"] = points.time[chosen]
-            part["intensity"] = points.intensity[chosen]
-            part["scan_id"] = points.scan_id[chosen]
+            part["time"] = points.time.take(chosen)
+            part["intensity"] = points.intensity.take(chosen)
+            part["scan_id"] = points.scan_id.take(chosen)
             part["tag"] = tag[begin : begin + _BLOCK]
-            part["classification"] = points.classification[chosen]
+            part["classification"] = points.classification.take(chosen)
         return rows
 
-    def _located(self, xyz: Float, start: Int32) -> tuple[Float, Float, Int32]:
-        """Chainage, distance from the axis and segment of points (n, 3), looked for from segments (n,) on; -1: unknown."""
-        chainage, distance, segment = np.empty(len(xyz)), np.empty(len(xyz)), np.empty(len(xyz), np.int32)
+    def _located(self, xyz: Float, start: Int32, distances: bool) -> tuple[Float, Float, Int32]:
+        """Chainage, distance from the axis (if wanted) and segment of points (n, 3), looked for from segments (n,) on."""
+        chainage, distance, segment = np.empty(len(xyz)), np.empty(len(xyz) if distances else 0), np.empty(len(xyz), np.int32)
         a = self.alignment
         _locate(self.segments, a.number, float(a.spacing), xyz, start, chainage, distance, segment)
         return chainage, distance, segment
@@ -117,7 +117,8 @@ def _locate(
 ) -> None:  # pragma: no cover - compiled
     """Write chainage, distance from the axis and segment of points; beyond the ends the nearest end, infinitely far.
 
-    The segment is looked for from the one that start says on; from the last point's where it says -1.
+    The segment is looked for from the one that start says on; from the last point's where it says -1. No distances are
+    written, and computed, if there is no room for them.
     """
     k = -1
     for i in range(xyz.shape[0]):
@@ -131,10 +132,12 @@ def _locate(
             nearest = nearest_segment(segments, x, y, z)
             last = 2 * nearest >= segments.shape[0]
             chainage[i] = (number[nearest] + (1 if last else 0)) * spacing
-            distance[i] = np.inf
             segment[i] = nearest
+            if distance.shape[0] > 0:
+                distance[i] = np.inf
             continue
-        plane = frame_of(segments, k, f)
         chainage[i] = (number[k] + f) * spacing
-        distance[i] = math.sqrt((x - plane[0]) ** 2 + (y - plane[1]) ** 2 + (z - plane[2]) ** 2)
         segment[i] = k
+        if distance.shape[0] > 0:
+            plane = frame_of(segments, k, f)
+            distance[i] = math.sqrt((x - plane[0]) ** 2 + (y - plane[1]) ** 2 + (z - plane[2]) ** 2)

@@ -123,7 +123,7 @@ def pick(
 
 def _voxels(xyz: Float, edge: float) -> tuple[Int32, int]:
     """Number of the voxel of each point, (n,), and how many voxels there are."""
-    voxels = CellCounts(edge, max(1024, len(xyz) // 16))
+    voxels = CellCounts(edge, max(1024, len(xyz) // 2))
     return voxels.add(xyz), len(voxels.counts)
 
 
