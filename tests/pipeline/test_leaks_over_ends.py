@@ -109,7 +109,7 @@ def uncut(sections: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> list
     result = job.compute_detection(elsewhere, inputs.sample, values, lambda window: None, lambda share: None)
     dry = result.background
     monkeypatch.setattr(job, "map_background", lambda picture, _: flat(picture.grid, dry.mean, dry.spread))
-    return [shapely.affinity.translate(anomaly.outline, SHIFT) for anomaly in result.anomalies.found]
+    return [shapely.affinity.translate(anomaly.outline, SHIFT) for anomaly in result.anomalies.anomalies]
 
 
 def assert_same(found: dict[int, Polygon], expected: list[Polygon]) -> None:
@@ -224,7 +224,7 @@ def test_any_order_of_kilometres_puts_the_same_together(conn: psycopg.Connection
             made = cluster.region
             box = (made.column, made.row, made.stop, made.row + len(made.mask))
             assert seen.setdefault(box, made).mask.tolist() == made.mask.tolist()
-            assert made.traits == RegionProperties(rim=float(len(cluster.parts)))
+            assert made.properties == RegionProperties(rim=float(len(cluster.parts)))
             assert (made.filled, made.drop_max) == (made.mask.sum(), max(part.region.drop_max for part in cluster.parts))
     assert sorted(seen) == [
         (25_500, 9, 26_000, 11), (25_990, 0, 28_020, 2), (26_000, 20, 26_007, 22), (28_000, -9, 28_020, -7),

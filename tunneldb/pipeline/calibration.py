@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.contrast import ContrastImage
-from tunneldb.anomalies.detect import Detection, dry_places
+from tunneldb.anomalies.detect import Detection, background_places
 from tunneldb.arrays import Bool, Int32, Int64
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.points import Points
@@ -234,7 +234,7 @@ def dry_sigma(
     if dry_regions:
         dry = seen.lining & (_polygon_of(seen, dry_regions) >= 0)
     else:
-        dry = view.clear & dry_places(darker, found, seen.chainage, seen.arc)
+        dry = view.clear & background_places(darker, found, seen.chainage, seen.arc)
     return (
         plain_statistics(observations.raw_db[dry]),
         plain_statistics(observations.corrected(0.0)[dry]),

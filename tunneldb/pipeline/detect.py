@@ -240,7 +240,7 @@ def _save(
     save_range_curve(conn, survey, km, result.calibration.found)
     save_radiometry(conn, survey, km, roughness, result.background, found, result.dry_levels)
     save_coverage(conn, survey, km, result.coverage)
-    matched = save_anomalies(conn, survey, km, surface, found.found, found.cut, min_area)
+    matched = save_anomalies(conn, survey, km, surface, found.anomalies, found.cut, min_area)
     coverage = result.coverage
     return {
         **result.counts,
