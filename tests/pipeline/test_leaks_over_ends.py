@@ -197,7 +197,14 @@ def test_pixels_of_two_sizes_are_not_put_together(sections: psycopg.Connection, 
 
 def region(first: int, last: int, row: int = 0) -> Region:
     return Region(
-        0.5, first, row, np.ones((2, last - first), bool), 2 * (last - first), 1.0, float(first), RegionProperties(rim=1.0)
+        0.5,
+        first,
+        row,
+        np.ones((2, last - first), bool),
+        2 * (last - first),
+        1.0,
+        float(first),
+        RegionProperties(perimeter=1.0),
     )
 
 
@@ -224,7 +231,7 @@ def test_any_order_of_kilometres_puts_the_same_together(conn: psycopg.Connection
             made = cluster.region
             box = (made.column, made.row, made.stop, made.row + len(made.mask))
             assert seen.setdefault(box, made).mask.tolist() == made.mask.tolist()
-            assert made.properties == RegionProperties(rim=float(len(cluster.parts)))
+            assert made.properties == RegionProperties(perimeter=float(len(cluster.parts)))
             assert (made.filled, made.drop_max) == (made.mask.sum(), max(part.region.drop_max for part in cluster.parts))
     assert sorted(seen) == [
         (25_500, 9, 26_000, 11), (25_990, 0, 28_020, 2), (26_000, 20, 26_007, 22), (28_000, -9, 28_020, -7),

@@ -1,4 +1,4 @@
-"""Whether intensity depends on range or incidence: looks at a survey, or at a scan file by itself."""
+"""Whether intensity depends on range or incidence: diagnoses of a survey, and of a scan file by itself."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ MOST_POINTS = 2_000_000
 """Points of a thinned scan, at the most."""
 
 
-def look_at_survey(
+def diagnose_survey(
     conn: psycopg.Connection[Any],
     survey: Survey,
     kilometres: Sequence[int],
@@ -65,15 +65,15 @@ def look_at_survey(
     if survey.intensity_kind == "none":
         raise UserError(f"survey {survey.name} has no intensity: it was added with --intensity-kind none")
     share = max(1, SAMPLE // len(kilometres))
-    looks = []
+    diagnoses = []
     for km in kilometres:
-        looks.append(_look_at_kilometre(conn, survey, km, values, share))
+        diagnoses.append(_diagnose_kilometre(conn, survey, km, values, share))
         progress(1)
     numbers = ", ".join(map(str, kilometres))
-    return pool(f"{survey.name}, kilometre {numbers}: {survey.intensity_kind}", looks)
+    return pool(f"{survey.name}, kilometre {numbers}: {survey.intensity_kind}", diagnoses)
 
 
-def _look_at_kilometre(
+def _diagnose_kilometre(
     conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], most: int
 ) -> Diagnosis:
     kind = cast(Kind, survey.intensity_kind)
@@ -99,7 +99,7 @@ def _look_at_kilometre(
     near = np.flatnonzero(view.telling)
     near = near[:: max(1, len(near) // most)]
     seen = view.observations
-    return _look(
+    return _diagnosis(
         f"kilometre {km}",
         kind,
         _Points(*(v[near].astype(np.float64) for v in (seen.range_m, seen.cosine, seen.raw_db, seen.distance_db))),
@@ -110,7 +110,7 @@ def _look_at_kilometre(
     )
 
 
-def look_at_file(
+def diagnose_file(
     path: Path,
     dimension: str,
     kind: Kind,
@@ -164,7 +164,7 @@ def look_at_file(
     if found and needs_reference(kind):
         distance = level - found.curve(range_m)
     roughness = found.roughness if found else None
-    return _look(path.name, kind, _Points(range_m, cosine, level, distance), roughness, found, None, [refused])
+    return _diagnosis(path.name, kind, _Points(range_m, cosine, level, distance), roughness, found, None, [refused])
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ class _Points:
     distance: Float
 
 
-def _look(
+def _diagnosis(
     title: str,
     kind: Kind,
     points: _Points,
