@@ -118,9 +118,9 @@ def search(
     for km in kilometres:
         with snapshot(conn):
             files = sources(conn, survey, km)
-            look = _Kilometre(place, km, files, radius, tolerance, _ground_of(conn, survey, km))
+            kilometre = _Kilometre(place, km, files, radius, tolerance, _ground_of(conn, survey, km))
         points += sum(file.points for file in files)
-        found, refused = look.search(begin)
+        found, refused = kilometre.search(begin)
         rows += found
         refusals += refused
     rows, weak = _numbered(rows, radius, place)

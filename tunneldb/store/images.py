@@ -71,12 +71,13 @@ class ImageStore:
         self.conn, self.survey, self.grid, self.kinds = conn, survey, grid, kinds
         self.pixels = 0
         self._blocks: list[int] = []
-        conn.execute("DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s", (survey.id, grid.km))
 
     def save(self, window: Window) -> None:
         """Save a whole block as points fell into it."""
         grid, columns = self.grid, window.columns
         block = grid.first_block + columns.start // grid.block_columns
+        if not self._blocks:  # only now: what makes the images takes long, and others look at those that are there
+            self.conn.execute("DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s", (self.survey.id, grid.km))
         self.pixels += int(np.count_nonzero(window.weight))
         self._blocks.append(block)
         for kind in self.kinds:

@@ -10,7 +10,7 @@ import psycopg
 import shapely
 from psycopg import sql
 
-from tunneldb.arrays import Float
+from tunneldb.arrays import Float, UInt8
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.lining_relief import Relief
 from tunneldb.classification.objects.clusters import CELL, Cluster
@@ -212,6 +212,11 @@ def load_clusters(conn: psycopg.Connection[Any], survey: Survey, first: float, s
         )
         for klass, cells, points, along_from, along_to, height_from, height_to, hull in rows
     ]  # fmt: skip
+
+
+def save_classes(conn: psycopg.Connection[Any], survey: Survey, km: int, classes: UInt8) -> None:
+    """Give the points of a kilometre their classes (n,), in the order of its rows."""
+    conn.execute("SELECT tunnel_api.class_write(%s, %s, %b)", [survey.id, km, classes.tobytes()])
 
 
 def load_scene(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_to: int) -> Scene:
