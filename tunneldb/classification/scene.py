@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit, prange
 
-from tunneldb.arrays import Bool, Float, Int64, Single, UInt8, UInt32
+from tunneldb.arrays import Bool, Float, Int64, Single, UInt8
 from tunneldb.classification.classes import PointClass
 from tunneldb.classification.ground.model import Ground
 from tunneldb.classification.lining_relief import Relief, level_at
@@ -85,8 +85,7 @@ class Scene:
         return np.asarray(
             _classes(
                 xyz, unrolled, relief.cell, relief.column, relief.row, relief.offset, relief.spread,
-                inner.first, inner.last, inner.keys, inner.table, inner.klass,
-                outer.first, outer.last, outer.keys, outer.table, outer.klass, spheres,
+                inner.first, inner.last, inner.keys, inner.klass, outer.first, outer.last, outer.keys, outer.klass, spheres,
             )
         )  # fmt: skip
 
@@ -103,8 +102,8 @@ class Scene:
 def _classes(
     xyz: Float, unrolled: Float, cell: float, column: int, row: int,
     relief: Single, spread: Single,
-    inner_first: Int64, inner_last: Int64, inner_keys: Int64, inner_table: UInt32, inner_klass: UInt8,
-    outer_first: Int64, outer_last: Int64, outer_keys: Int64, outer_table: UInt32, outer_klass: UInt8, spheres: Float,
+    inner_first: Int64, inner_last: Int64, inner_keys: Int64, inner_klass: UInt8,
+    outer_first: Int64, outer_last: Int64, outer_keys: Int64, outer_klass: UInt8, spheres: Float,
 ) -> UInt8:  # fmt: skip  # pragma: no cover - compiled
     count = xyz.shape[0]
     out = np.empty(count, np.uint8)
@@ -125,9 +124,9 @@ def _classes(
                 out[i] = _LINING
                 continue
             if off < 0.0:
-                klass = look_up(x, y, z, outer_first, outer_last, outer_keys, outer_table, outer_klass)
+                klass = look_up(x, y, z, outer_first, outer_last, outer_keys, outer_klass)
             else:
-                klass = look_up(x, y, z, inner_first, inner_last, inner_keys, inner_table, inner_klass)
+                klass = look_up(x, y, z, inner_first, inner_last, inner_keys, inner_klass)
             if klass == 0:  # no cluster: of the lining's rough edge, or in the air
                 klass = _LINING if abs(off) <= 2.0 else _NOISE
             out[i] = klass
