@@ -3,7 +3,7 @@
 # make test   lint, types and all tests, against the wheel as a user would install it
 # make faults 100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
 # make docs   the documentation as a site, in ./site
-# make bench  the figures of the README and the docs
+# make bench  the main figures of docs/figures.md
 # Each installs what it lacks: PostgreSQL with PostGIS by apt, and a virtual environment in .venv.
 
 PYTHON ?= python3
@@ -50,10 +50,10 @@ lint: install
 
 # Not `python -m pytest`: that would put the source tree before the wheel. Linting takes a core for a minute, beside the tests.
 tests: $(VENV)/wheel $(VENV)/tests
-	$(BIN)/pytest -n 2 --dist loadscope -rs
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -rs
 
 quick: $(VENV)/wheel
-	$(BIN)/pytest -n 2 -m "not server" -rs
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not server" -rs
 
 test: $(VENV)/wheel $(VENV)/tests
 	$(MAKE) -j 2 lint tests

@@ -21,6 +21,7 @@ from support.system import missing
 
 from tunneldb.database import connect, install, open_connection
 from tunneldb.database.server import Server
+from tunneldb.pipeline.stages import STAGES
 
 pytest_plugins = ["support.example_survey"]
 
@@ -34,11 +35,23 @@ _numbers = itertools.count(1)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+LONG = ("faults", "report", "qgis", "pipeline", "queue", "simulate", "classification")
+"""Folders whose tests take longest, in the order in which they begin: the last tests of a run are short ones."""
+
+SHARED = ("long", "short")
+"""Fixtures of the session that take minutes to make: what asks for them runs on one worker, whatever its module."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests that need a server: those that ask for it, by whatever fixture."""
+    """Mark the tests that need a server, by whatever fixture, and say which run on one worker, and in which order."""
     for item in items:
-        if "server_dsn" in getattr(item, "fixturenames", ()):
+        fixtures = getattr(item, "fixturenames", ())
+        if "server_dsn" in fixtures:
             item.add_marker("server")
+        group = next((name for name in SHARED if name in fixtures and "faults" in item.path.parts), item.path.name)
+        item.add_marker(pytest.mark.xdist_group(f"{item.path.parent.name}/{group}"))
+    place = {name: n for n, name in enumerate(LONG)}
+    items.sort(key=lambda item: place.get(item.path.parent.name, len(LONG)))
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -73,7 +86,7 @@ def template(server_dsn: str) -> str:
     """Name of the database that is migrated and installed, to be copied."""
     create_database(server_dsn, TEMPLATE)
     with open_connection(make_conninfo(server_dsn, dbname=TEMPLATE)) as connection:
-        install(connection)
+        install(connection, STAGES)
     return TEMPLATE
 
 

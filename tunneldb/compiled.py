@@ -1,4 +1,4 @@
-"""How loops over points and pixels are compiled: the two kinds of function that there are.
+"""How loops over points and pixels are compiled: the kinds of function that there are.
 
 A kernel is called from Python, on arrays of one type each, so that it is compiled once. It lets other threads run meanwhile
 (`tunneldb.threads.in_blocks` gives each of them a block of the points). What a kernel calls, for each point, is inner.
@@ -15,6 +15,14 @@ kernel = njit(cache=True, nogil=True)
 
 inner = njit(cache=True, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 """Decorator of a compiled function that only compiled functions call: it takes less to compile."""
+
+point_kernel = njit(cache=True, nogil=True, error_model="numpy")
+"""A kernel that divides for each point of a file: division by zero is infinite or NaN, and no test for it stands in the loop."""
+
+point_inner = njit(
+    cache=True, nogil=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True
+)
+"""What such a kernel calls for each point, put into it whole: several numbers returned cost nothing then."""
 
 
 @inner

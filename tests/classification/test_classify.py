@@ -52,7 +52,8 @@ def test_a_survey_is_classed_as_the_truth(survey) -> None:
     seen = truth != PointClass.NOISE
     assert (classes == truth)[seen].mean() > 0.98
     for klass, least, own in (
-        (PointClass.GROUND, 0.99, 0.95), (PointClass.LINING, 0.99, 0.99), (PointClass.NICHE, 0.9, 0.9), (PointClass.APPENDAGE, 0.97, 0.9),
+        (PointClass.GROUND, 0.99, 0.95), (PointClass.LINING, 0.99, 0.99), (PointClass.NICHE, 0.9, 0.9),
+        (PointClass.APPENDAGE, 0.97, 0.9),
         (PointClass.OBJECT, 0.85, 0.85), (PointClass.SPHERE, 0.99, 0.9), (PointClass.RAIL, 0.3, 0.9),
     ):  # fmt: skip
         recall, precision = share(truth[seen], classes[seen], klass)

@@ -82,7 +82,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize("eye", [(-5.0, 0.0, 0.0), (-3.0, -2.0, 1.0)], ids=["level", "above"])
+@pytest.mark.parametrize("observer", [(-5.0, 0.0, 0.0), (-3.0, -2.0, 1.0)], ids=["level", "above"])
 @pytest.mark.parametrize("name", OTHERS)
 def test_nothing_else_is_taken_for_one(name: str, observer: tuple[float, float, float], seed: int) -> None:
     found, _ = look(OTHERS[name], seed, observer)

@@ -47,6 +47,11 @@ class Project:
         kept = {k: v for k, v in os.environ.items() if k not in ("TUNNELDB_DSN", "TUNNELDB_HOME")}
         self.environment = {**kept, "TUNNELDB_HOME": str(self.home), "TMPDIR": str(self.scratch)}
         self.dsn = Server(self.home).start()
+        with self._server() as conn:
+            # What is killed are processes, not the machine: what they have written stays, whether it is on the disk or not.
+            for name in ("fsync", "synchronous_commit", "full_page_writes"):
+                conn.execute(sql.SQL("ALTER SYSTEM SET {} = off").format(sql.Identifier(name)))
+            conn.execute("SELECT pg_reload_conf()")
         folder = self.home / "poses"
         folder.mkdir()
         poses = scene.write_poses(folder)

@@ -1,4 +1,4 @@
-"""The documentation against the program: links, commands, parameters and targets that it names must exist."""
+"""The documentation against the program: links, commands, parameters, paths and targets that it names must exist."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ from tunneldb.cli.main import main
 from tunneldb.pipeline.parameters import PARAMETERS
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").glob("*.md")])
+OUTSIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
+PAGES = sorted([*(ROOT / name for name in OUTSIDE), *(ROOT / "docs").glob("*.md")])
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
+FOLDERS = ("benchmarks", "docs", "migrations", "scripts", "sql", "tests", "tunneldb")
 PLACEHOLDERS = ("VERB", "…", "[OPTIONS]", "[--dsn", "DSN]", "--help", "-h")
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 
@@ -112,3 +114,29 @@ def test_classes_are_those_of_the_program() -> None:
 def test_make_targets_exist(page: Path) -> None:
     there = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
     assert set(re.findall(r"(?:^|`)make (\w+)(?![\w=])", page.read_text("utf-8"), re.MULTILINE)) <= there
+
+
+def gone(text: str) -> list[str]:
+    """Paths of the project and modules of benchmarks that a text names between backquotes, or runs, and that are not there."""
+    named = set(re.findall(rf"`((?:{'|'.join(FOLDERS)})/[^`\s]*)`", text))
+    named |= {f"{name.replace('.', '/')}.py" for name in re.findall(r"python -m (benchmarks\.\w+)", text)}
+    return sorted(path for path in named if path != "benchmarks/results/" and not (ROOT / path).exists())
+
+
+@pages
+def test_paths_exist(page: Path) -> None:
+    if page.name != "CHANGELOG.md":  # of files that have been moved since, too
+        assert gone(page.read_text("utf-8")) == []
+
+
+def test_paths_that_are_gone_are_found() -> None:
+    assert gone("`sql/install.txt`, `tunneldb/leaks/`, `python -m benchmarks.nothing --km 3`") == [
+        "benchmarks/nothing.py",
+        "tunneldb/leaks/",
+    ]
+
+
+def test_the_readme_takes_two_screens() -> None:
+    lines = (ROOT / "README.md").read_text("utf-8").splitlines()
+    assert len(lines) <= 120
+    assert all(len(line) <= 128 for line in lines if not line.startswith("|"))

@@ -19,6 +19,7 @@ from playwright.sync_api import Browser, sync_playwright
 ROOT = Path(__file__).parents[2]
 SOURCES = {page.stem: page for page in sorted((ROOT / "docs").glob("*.md"))} | {
     "overview": ROOT / "README.md",
+    "contributing": ROOT / "CONTRIBUTING.md",
     "changes": ROOT / "CHANGELOG.md",
 }
 COMPARED = {"h1", "h2", "h3", "h4", "p", "ul", "ol", "li", "table", "tr", "td", "pre", "code", "img", "a", "strong", "em"}
@@ -92,7 +93,7 @@ def test_nothing_is_fetched_from_elsewhere(site: Path) -> None:
 
 
 def test_dead_links_and_anchors_and_new_diagrams_fail(tmp_path: Path) -> None:
-    for name in ("mkdocs.yml", "README.md", "CHANGELOG.md", "LICENSE"):
+    for name in ("mkdocs.yml", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"):
         shutil.copy(ROOT / name, tmp_path)
     shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("__pycache__"))
     with (tmp_path / "docs" / "index.md").open("a") as page:
@@ -122,7 +123,7 @@ def test_read_from_the_disk(site: Path, browser: Browser) -> None:
         "request",
         lambda request: troubles.append(request.url) if not request.url.startswith(("file:", "data:", "blob:")) else None,
     )
-    page.goto((site / "overview.html").as_uri())
+    page.goto((site / "methods.html").as_uri())
     assert page.locator('img[src^="images/diagram-"]').evaluate("image => image.complete && image.naturalWidth") > 0
     page.locator("input.md-search__input").fill("leak_statistics")
     page.locator('.md-search-result__link[href*="reference-sql.html"]').first.click()
@@ -134,7 +135,7 @@ def test_read_from_the_disk(site: Path, browser: Browser) -> None:
 def test_fits_a_phone(site: Path, browser: Browser) -> None:
     page = browser.new_page(viewport={"width": 375, "height": 700})
     wide = []
-    for name in ("index", "overview", "tutorial", "decisions", "reference-cli"):
+    for name in ("index", "overview", "tutorial", "figures", "methods", "decisions", "reference-cli"):
         page.goto((site / f"{name}.html").as_uri())
         if page.evaluate("document.documentElement.scrollWidth") > 375:
             wide.append(name)

@@ -1,1 +1,1 @@
-"""Leaks: unrolled image, appendages, threshold, polygons, statistics (Xu et al., 2018)."""
+"""What is dark on the lining: background, threshold, regions, leaks among them and their geometries (Xu et al., 2018)."""

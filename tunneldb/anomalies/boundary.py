@@ -1,18 +1,19 @@
-"""The rim of dark regions, where half of their own contrast is reached."""
+"""The boundary of dark regions, where half of their own contrast is reached."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from tunneldb.anomalies.background.contrast import ContrastImage
-from tunneldb.anomalies.joints import longer
-from tunneldb.arrays import Bool, Int16, Int32, UInt8
+from tunneldb.anomalies.windows import row_blocks
+from tunneldb.arrays import Bool, Int16, Int64, UInt8
+from tunneldb.compiled import kernel
 from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
 
 BAND = 2
-"""Pixels to both sides of the rim that may change sides, each time."""
+"""Pixels to both sides of the boundary that may change sides, each time."""
 
 TIMES = 2
 """How many times they may."""
@@ -26,11 +27,11 @@ FEW = 5
 ENOUGH = 4
 """So many pixels tell whether one lies on this side or that: half of a contrast of four sigma is four of their mean's."""
 
-RIM, LISTED = 1, 2
+EMPTY, RECESS = int(PixelState.EMPTY), int(PixelState.RECESS)
 
 
-def refine_boundary(dark: Bool, relative: ContrastImage, size: int) -> Bool:
-    """Move the rim of dark regions to where half of their contrast is reached.
+def refine_boundary(dark: Bool, contrast: ContrastImage, size: int) -> Bool:
+    """Move the boundary of dark regions to where half of their contrast is reached.
 
     The threshold of three sigma lies at the outermost edge of a strongly wet patch and at the innermost of a weak one; a mean
     passes half of the contrast just where the edge is, whatever the contrast, the beam's footprint and the noise.
@@ -39,7 +40,7 @@ def refine_boundary(dark: Bool, relative: ContrastImage, size: int) -> Bool:
     ----------
     dark : (rows, columns) bool array
         Dark pixels by the threshold; changed in place.
-    relative : ContrastImage
+    contrast : ContrastImage
         Their drop.
     size : int
         Side of the median filter that they went through, pixels.
@@ -50,83 +51,83 @@ def refine_boundary(dark: Bool, relative: ContrastImage, size: int) -> Bool:
         The same array.
     """
     for _ in range(TIMES):
-        row, column, becomes = _settled(dark, relative.drop, relative.state, size // 2)
-        dark[row, column] = becomes
-    for columns, mask in mask_of_polygons(relative.grid, relative.drawn):
+        interior, near = _about_boundary(dark)
+        changed = np.zeros(len(near), np.bool_)
+        _changed(dark, interior, contrast.drop, contrast.state, near, size // 2, changed)
+        row, column = np.divmod(near[changed], dark.shape[1])
+        dark[row, column] = ~dark[row, column]
+    for columns, mask in mask_of_polygons(contrast.grid, contrast.drawn):
         dark[:, columns][mask] = False
     return dark
 
 
-@njit(cache=True, nogil=True)
-def _settled(dark: Bool, drop: Int16, state: UInt8, most: int) -> tuple[Int32, Int32, Bool]:  # pragma: no cover - compiled
-    """Pixels near the rim that change sides, and to which."""
-    near, row, column = _near(dark)
-    becomes = np.empty(len(row), np.bool_)
-    count = 0
-    for k in range(len(row)):
-        i, j = row[k], column[k]
-        if state[i, j] > 2:
+def _about_boundary(dark: Bool) -> tuple[Bool, Int64]:
+    """Tell which dark pixels lie in the interior, all four neighbours being dark, and list those within BAND of the boundary.
+
+    Returns
+    -------
+    interior : (rows, columns) bool array
+    near : (n,) int array
+        Numbers of pixels, counted row by row.
+    """
+    interior, near = np.empty_like(dark), []
+    for rows, about in row_blocks(len(dark), BAND):
+        part = dark[about]
+        edge = np.zeros_like(part)  # next to a pixel of the other kind
+        for axis in (0, 1):
+            here, there = (np.moveaxis(edge, axis, 0)[k] for k in (slice(1, None), slice(None, -1)))
+            differs = np.moveaxis(part, axis, 0)
+            differs = differs[1:] != differs[:-1]
+            here |= differs
+            there |= differs
+        inner = slice(rows.start - about.start, rows.stop - about.start)
+        np.logical_and(part[inner], ~edge[inner], out=interior[rows])
+        for axis in (0, 1):
+            edge = _dilated(edge, axis, BAND - 1)
+        near.append(np.flatnonzero(edge[inner]) + rows.start * dark.shape[1])
+    return interior, np.concatenate(near)
+
+
+def _dilated(mask: Bool, axis: int, reach: int) -> Bool:
+    """Set what lies so many pixels from a set pixel along an axis."""
+    out = mask.copy()
+    grown, given = np.moveaxis(out, axis, 0), np.moveaxis(mask, axis, 0)
+    for step in range(1, reach + 1):
+        grown[step:] |= given[:-step]
+        grown[:-step] |= given[step:]
+    return out
+
+
+@kernel
+def _changed(
+    dark: Bool, interior: Bool, drop: Int16, state: UInt8, near: Int64, most: int, changed: Bool
+) -> None:  # pragma: no cover - compiled
+    """Tell which of the pixels near the boundary change sides: ``changed`` (n,), False before.
+
+    The contrast of a region is the mean drop of its interior about a pixel, of every other pixel; the pixel is dark if the mean
+    drop of the lining next to it, within up to ``most`` pixels, is more than half of that.
+    """
+    rows, columns = dark.shape
+    for k in range(near.shape[0]):
+        i, j = near[k] // columns, near[k] % columns
+        if state[i, j] > RECESS:
             continue
-        contrast, held = _core(dark, near, drop, i, j)
+        contrast, held = 0, 0
+        for m in range(i - CONTRAST, i + CONTRAST + 1, 2):
+            for n in range(j - CONTRAST, j + CONTRAST + 1, 2):
+                if 0 <= m < rows and 0 <= n < columns and interior[m, n] and drop[m, n] != NODATA:
+                    contrast += drop[m, n]
+                    held += 1
         if held < FEW:
             continue
-        level, seen = 0.0, 0
-        for half in range(1, most + 1):
-            if seen < ENOUGH:
-                level, seen = _level(drop, state, i, j, half)
-        if seen >= ENOUGH and (2.0 * level > contrast) != dark[i, j]:
-            row[count], column[count], becomes[count] = i, j, not dark[i, j]
-            count += 1
-    return row[:count], column[:count], becomes[:count]
-
-
-@njit(cache=True, nogil=True)
-def _near(dark: Bool) -> tuple[UInt8, Int32, Int32]:  # pragma: no cover - compiled
-    """Which pixels lie within BAND of the rim (LISTED), which dark ones at it (RIM), and a list of the former."""
-    rows, columns = dark.shape
-    near = np.zeros((rows, columns), np.uint8)
-    row, column = np.empty(1024, np.int32), np.empty(1024, np.int32)
-    count = 0
-    for i in range(rows):
-        for j in range(columns):
-            if not dark[i, j]:
-                continue
-            for di, dj in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-                p, q = i + di, j + dj
-                if p < 0 or p >= rows or q < 0 or q >= columns or dark[p, q]:
-                    continue
-                near[i, j] |= RIM
-                for m in range(max(min(i, p) - BAND + 1, 0), min(max(i, p) + BAND, rows)):
-                    for n in range(max(min(j, q) - BAND + 1, 0), min(max(j, q) + BAND, columns)):
-                        if not near[m, n] & LISTED:
-                            near[m, n] |= LISTED
-                            if count == len(row):
-                                row, column = longer(row), longer(column)
-                            row[count], column[count] = m, n
-                            count += 1
-    return near, row[:count], column[:count]
-
-
-@njit(cache=True, nogil=True)
-def _core(dark: Bool, near: UInt8, drop: Int16, i: int, j: int) -> tuple[float, int]:  # pragma: no cover - compiled
-    """Mean drop of dark pixels about one, every other one, but for those at the rim, and of how many it is."""
-    rows, columns = dark.shape
-    total, held = 0.0, 0
-    for m in range(i - CONTRAST, i + CONTRAST + 1, 2):
-        for n in range(j - CONTRAST, j + CONTRAST + 1, 2):
-            if 0 <= m < rows and 0 <= n < columns and dark[m, n] and not near[m, n] & RIM and drop[m, n] != NODATA:
-                total += drop[m, n]
-                held += 1
-    return total / max(held, 1), held
-
-
-@njit(cache=True, nogil=True)
-def _level(drop: Int16, state: UInt8, i: int, j: int, half: int) -> tuple[float, int]:  # pragma: no cover - compiled
-    """Mean drop of the lining about a pixel, and of how many pixels it is."""
-    total, seen = 0.0, 0
-    for m in range(max(i - half, 0), min(i + half + 1, drop.shape[0])):
-        for n in range(max(j - half, 0), min(j + half + 1, drop.shape[1])):
-            if 1 <= state[m, n] <= 2 and drop[m, n] != NODATA:
-                total += drop[m, n]
-                seen += 1
-    return total / max(seen, 1), seen
+        level, seen, half = 0, 0, 0
+        while seen < ENOUGH and half < most:
+            half += 1
+            level, seen = 0, 0
+            for m in range(i - half, i + half + 1):
+                for n in range(j - half, j + half + 1):
+                    if 0 <= m < rows and 0 <= n < columns and EMPTY < state[m, n] <= RECESS and drop[m, n] != NODATA:
+                        level += drop[m, n]
+                        seen += 1
+        if seen >= ENOUGH:
+            changed[k] = (2.0 * (level / seen) > contrast / held) != dark[i, j]

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from tunneldb.anomalies.threshold import MEDIAN_PIXELS
-from tunneldb.arrays import Bool, Int64, Single, UInt8
+from tunneldb.anomalies.threshold import seen_lining
+from tunneldb.anomalies.windows import count_in_columns
+from tunneldb.arrays import Bool, Single, UInt8
 from tunneldb.raster.grid import Grid
+from tunneldb.raster.pixel_state import PixelState
 
 STEP = 0.1
 """Least length of a step along the tunnel, m."""
@@ -50,47 +51,19 @@ def measure_coverage(state: UInt8, dark: Bool, grid: Grid, size: int) -> Coverag
     size : int
         Side of the median filter, pixels.
     """
-    wide = _wide(grid)
     inner = grid.inner
-    enough = 0.2 * min(size * size, MEDIAN_PIXELS)
-    counts = _cover(state, dark, inner.start, inner.stop, size // 2, enough).reshape(3, -1, wide).sum(axis=2)
-    areas = (counts * grid.pixel**2).astype(np.float32)
-    return Coverage(wide * grid.pixel, areas[0], areas[1], areas[2])
+    counts = np.zeros((3, inner.stop - inner.start), np.int64)
+    for rows, seen in seen_lining(state, size):
+        for k, mask in enumerate((state[rows] <= PixelState.RECESS, seen, seen & dark[rows])):
+            counts[k] += count_in_columns(mask[:, inner])
+    columns = _columns_of_step(grid)
+    areas = (counts.reshape(3, -1, columns).sum(axis=2) * grid.pixel**2).astype(np.float32)
+    return Coverage(columns * grid.pixel, areas[0], areas[1], areas[2])
 
 
-def _wide(grid: Grid) -> int:
+def _columns_of_step(grid: Grid) -> int:
     """Columns of a step: as few as make STEP and divide a block."""
-    wide = max(1, int(np.ceil(STEP / grid.pixel - 1e-6)))
-    while grid.block_columns % wide:
-        wide += 1
-    return wide
-
-
-@njit(cache=True, nogil=True)
-def _cover(state: UInt8, dark: Bool, first: int, stop: int, half: int, enough: float) -> Int64:  # pragma: no cover - compiled
-    """Pixels of each column from ``first`` to ``stop`` that are lining, were seen, are wet."""
-    rows, columns = state.shape
-    out = np.zeros((3, stop - first), np.int64)
-    # Lining that holds points in each column, in the rows of the filter, with zeros beyond both ends.
-    held = np.zeros(columns + 2 * half + 1, np.int32)
-    for i in range(-half, rows):
-        if i + half < rows:
-            for j in range(columns):
-                held[j + half] += 1 <= state[i + half, j] <= 2
-        if i - half - 1 >= 0:
-            for j in range(columns):
-                held[j + half] -= 1 <= state[i - half - 1, j] <= 2
-        if i < 0:
-            continue
-        votes = 0
-        for j in range(first, first + 2 * half):
-            votes += held[j]
-        for j in range(first, stop):
-            votes += held[j + 2 * half]
-            if state[i, j] <= 2:
-                seen = state[i, j] > 0 or votes > enough
-                out[0, j - first] += 1
-                out[1, j - first] += seen
-                out[2, j - first] += seen and dark[i, j]
-            votes -= held[j]
-    return out
+    columns = max(1, int(np.ceil(STEP / grid.pixel - 1e-6)))
+    while grid.block_columns % columns:
+        columns += 1
+    return columns

@@ -1,4 +1,4 @@
-"""From the picture of a kilometre relative to dry lining to what is dark in it: leaks, joints and other dark spots."""
+"""From the contrast image of a kilometre to what is dark in it: leaks, joints and other dark spots."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.contrast import ContrastImage
@@ -15,10 +14,12 @@ from tunneldb.anomalies.boundary import refine_boundary
 from tunneldb.anomalies.joints import find_joints
 from tunneldb.anomalies.regions import Region, find_regions
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
-from tunneldb.anomalies.verdict import Verdict, judge
-from tunneldb.arrays import Bool, Float, Int32, Int64, UInt8
+from tunneldb.anomalies.verdict import Verdict, classify
+from tunneldb.anomalies.windows import count_about, count_in_columns, on_lining, row_blocks
+from tunneldb.arrays import Bool, Float, Int64, UInt8
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import WET_EDGE
+from tunneldb.raster.pixel_state import PixelState
 
 GAP = 5.0
 """Lining that is seen nowhere along more of the tunnel was not scanned there, m; profiles lie closer."""
@@ -28,7 +29,7 @@ MIN_JOINT = 0.5
 
 
 @dataclass(frozen=True)
-class Found:
+class Anomaly:
     """An anomaly in the unrolled plane.
 
     Attributes
@@ -36,9 +37,9 @@ class Found:
     outline : Polygon
         (chainage, arc), m.
     drop_mean, drop_max : float
-        Mean and greatest drop below dry lining, dB.
+        Mean and greatest drop below the background, dB.
     contrast : float
-        Mean drop in standard deviations of the dry lining about it.
+        Mean drop in standard deviations of the background about it.
     image_share : float
         Share of its pixels into which points fell, 0 to 1.
     verdict : Verdict
@@ -53,14 +54,14 @@ class Found:
     verdict: Verdict
 
     @classmethod
-    def of(cls, region: Region, min_area: float) -> Found | None:
+    def of(cls, region: Region, min_area: float) -> Anomaly | None:
         """Make an anomaly of a region; None if it holds no point or is too small.
 
         Leaks and dark spots must not be smaller than ``min_area``, m², joints no shorter than MIN_JOINT.
         """
         if not region.filled:
             return None
-        verdict = judge(region)
+        verdict = classify(region)
         if verdict.kind == "joint":
             if max(region.mask.shape) * region.pixel < MIN_JOINT:
                 return None
@@ -76,7 +77,7 @@ class Detection:
 
     Attributes
     ----------
-    found : list of Found
+    anomalies : list of Anomaly
         Anomalies within the kilometre, in order of chainage.
     cut : list of Region
         Dark regions that reach an end of the kilometre, whatever their size.
@@ -90,7 +91,7 @@ class Detection:
         Lining pixels of the kilometre, and how many of them are in leaks.
     """
 
-    found: list[Found]
+    anomalies: list[Anomaly]
     cut: list[Region]
     dark: Bool
     wet: Bool
@@ -99,61 +100,63 @@ class Detection:
     wet_pixels: int
 
 
-def find_anomalies(relative: ContrastImage, dry: BackgroundMap, min_area: float) -> Detection:
+def find_anomalies(contrast: ContrastImage, background: BackgroundMap, min_area: float) -> Detection:
     """Find what is dark in a kilometre.
 
     Parameters
     ----------
-    relative : ContrastImage
+    contrast : ContrastImage
         State and drop of its pixels.
-    dry : BackgroundMap
+    background : BackgroundMap
         What they are relative to.
     min_area : float
         Smaller leaks are left out, m² in the unrolled plane.
     """
-    grid, state = relative.grid, relative.state
-    lining, could = _columns(state, grid.inner.start, grid.inner.stop)
-    size = filter_size(_filled(lining, could, round(GAP / grid.pixel)))
+    grid, state = contrast.grid, contrast.state
+    lining, possible = _lining_in_columns(state, grid.inner)
+    size = filter_size(_scanned_share(lining, possible, round(GAP / grid.pixel)))
     pixels = int(lining.sum())
     wet = np.zeros(state.shape, np.bool_)
-    if not dry.count:
+    if not background.count:
         return Detection([], [], wet.copy(), wet, size, pixels, 0)
-    dark = refine_boundary(dark_pixels(relative, size), relative, size)
-    found, cut, leaks = [], [], []
+    dark = refine_boundary(dark_pixels(contrast, size), contrast, size)
+    anomalies, cut, leaks = [], [], []
     ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
-    for region in _regions(dark, relative, min_area):
-        anomaly = Found.of(region, min_area)
+    for region in _regions(dark, contrast, min_area):
+        anomaly = Anomaly.of(region, min_area)
         if region.column == ends[0] or region.stop == ends[1]:
             cut.append(region)
         elif anomaly is not None:
-            found.append(anomaly)
+            anomalies.append(anomaly)
         if anomaly is not None and anomaly.verdict.kind == "leak":
             leaks.append(region)
     _draw(wet, leaks, grid)
     wet &= dark
-    return Detection(found, cut, dark, wet, size, pixels, sum(region.filled for region in leaks))
+    return Detection(anomalies, cut, dark, wet, size, pixels, sum(region.filled for region in leaks))
 
 
-def _regions(dark: Bool, relative: ContrastImage, min_area: float) -> list[Region]:
+def _regions(dark: Bool, contrast: ContrastImage, min_area: float) -> list[Region]:
     """Regions of the dark pixels, joints cut off from what they run through."""
-    inner = relative.grid.inner
-    joints = find_joints(dark, inner.start, inner.stop, relative.grid.pixel)
+    inner = contrast.grid.inner
+    joints = find_joints(dark, inner.start, inner.stop, contrast.grid.pixel)
     if not joints.any():
-        return find_regions(dark, dark, relative, min_area, _may_drip)
-    parts = [find_regions(part, dark, relative, min_area, _may_drip) for part in (dark & ~joints, joints)]
+        return find_regions(dark, dark, contrast, min_area, _may_drip)
+    parts = [find_regions(part, dark, contrast, min_area, _may_drip) for part in (dark & ~joints, joints)]
     return sorted([*parts[0], *parts[1]], key=lambda region: (region.column, region.row))
 
 
 def _may_drip(region: Region) -> bool:
-    return bool(region.filled) and judge(region).kind == "leak"
+    return bool(region.filled) and classify(region).kind == "leak"
 
 
-def dry_places(relative: ContrastImage, found: Detection, chainage: Float, arc: Float) -> Bool:
+def background_places(contrast: ContrastImage, detection: Detection, chainage: Float, arc: Float) -> Bool:
     """Tell which places (n,) in the unrolled plane, m, lie on lining of the kilometre that is neither dark nor next to it."""
-    row, column = relative.grid.place(chainage, arc)
-    inner = relative.grid.inner
-    dry: Bool = _dry(relative.state, found.dark, row, column, inner.start, inner.stop)
-    return dry
+    inner = contrast.grid.inner
+    clear = np.zeros(contrast.state.shape, np.bool_)
+    for rows, about in row_blocks(len(clear), WET_EDGE):
+        bare = count_about(detection.dark[about], rows, about, WET_EDGE) == 0
+        clear[rows, inner] = (bare & on_lining(contrast.state[rows]))[:, inner]
+    return contrast.grid.pick(clear, chainage, arc)
 
 
 def _draw(image: Bool, drawn: Iterable[Region], grid: Grid) -> None:
@@ -164,45 +167,31 @@ def _draw(image: Bool, drawn: Iterable[Region], grid: Grid) -> None:
         image[top : top + rows, left : left + columns] |= region.mask[::-1]
 
 
-def _filled(lining: Int64, could: Int64, gap: int) -> float:
-    """Share of the pixels that could show lining that do, where the tunnel was scanned: without gaps of more columns."""
+def _scanned_share(lining: Int64, possible: Int64, gap: int) -> float:
+    """Share of the pixels that could show lining that do, where the tunnel was scanned: without gaps of more columns.
+
+    Parameters
+    ----------
+    lining, possible : (columns,) int arrays
+        Pixels of each column that show lining, and that could.
+    gap : int
+        Columns.
+    """
     columns = np.flatnonzero(lining)
     if len(columns) == 0:
         return 1.0
-    until = np.concatenate([[0], np.cumsum(could)])
+    until = np.concatenate([[0], np.cumsum(possible)])
     step = np.diff(columns, append=columns[-1] + 1)
     scanned = np.where(step > gap, 1, step)
     # Floor and niches are marked whether or not they hold points.
     return float(lining.sum() / (until[columns + scanned] - until[columns]).sum())
 
 
-@njit(cache=True, nogil=True)
-def _columns(state: UInt8, first: int, stop: int) -> tuple[Int64, Int64]:  # pragma: no cover - compiled
-    """Pixels of each column that show lining, and that could."""
-    lining, could = np.zeros(stop - first, np.int64), np.zeros(stop - first, np.int64)
-    for i in range(state.shape[0]):
-        for j in range(first, stop):
-            lining[j - first] += 1 <= state[i, j] <= 2
-            could[j - first] += state[i, j] <= 2
-    return lining, could
-
-
-@njit(cache=True, nogil=True)
-def _dry(
-    state: UInt8,
-    dark: Bool,
-    row: Int32,
-    column: Int32,
-    first: int,
-    stop: int,
-) -> Bool:  # pragma: no cover - compiled
-    dry = np.zeros(len(row), np.bool_)
-    for k in range(len(row)):
-        i, j = row[k], column[k]
-        if first <= j < stop and 1 <= state[i, j] <= 2:
-            dry[k] = True
-            for m in range(max(i - WET_EDGE, 0), min(i + WET_EDGE + 1, state.shape[0])):
-                for n in range(max(j - WET_EDGE, 0), min(j + WET_EDGE + 1, state.shape[1])):
-                    if dark[m, n]:
-                        dry[k] = False
-    return dry
+def _lining_in_columns(state: UInt8, columns: slice) -> tuple[Int64, Int64]:
+    """Pixels of some columns that show lining, and that could."""
+    lining, possible = np.zeros((2, columns.stop - columns.start), np.int64)
+    for rows, _ in row_blocks(len(state), 0):
+        here = state[rows, columns]
+        lining += count_in_columns(on_lining(here))
+        possible += count_in_columns(here <= PixelState.RECESS)
+    return lining, possible

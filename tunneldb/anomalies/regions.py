@@ -1,4 +1,4 @@
-"""Connected dark regions: cut out of the image of a kilometre, with their drips, and put together across its ends."""
+"""Connected dark regions: cut out of the image of a kilometre, with their drips, and merged across its ends."""
 
 from __future__ import annotations
 
@@ -7,23 +7,22 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from scipy import sparse
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.contrast import ContrastImage
-from tunneldb.anomalies.drips import Dark, attach_drips
-from tunneldb.anomalies.joints import beside
-from tunneldb.anomalies.straight_edges import SHARP, straight
-from tunneldb.arrays import Bool, Float, Int16, Int64, Single, UInt8
+from tunneldb.anomalies.drips import attach_drips
+from tunneldb.anomalies.region_edges import Edges, Sides
+from tunneldb.anomalies.runs import Components, connected, pixels_of, row_runs
+from tunneldb.arrays import Bool, Float, Int64, Intp
 from tunneldb.raster.geotiff import NODATA, STEP
+from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import outline
-
-ACROSS = 0.06
-"""The step over a rim is measured so far inside and outside, m: a wet patch ends within it, soot doesn't."""
 
 LONG = 0.5
 """Regions that are longer are kept even if they are small, m: joints."""
+
+PIXELS = 1_000_000
+"""Pixels whose sums are made at a time, about."""
 
 
 class RegionProperties(NamedTuple):
@@ -32,25 +31,25 @@ class RegionProperties(NamedTuple):
     Attributes
     ----------
     sigma : float
-        Local standard deviation of dry lining, dB, over the pixels with points.
+        Local standard deviation of the background, dB, over the pixels with points.
     recess : float
         Pixels on lining set back behind the wall.
-    rim, rim_off, rim_recess : float
-        Sides, of them those towards an appendage or the floor, and those towards dry lining set back behind the wall.
+    perimeter, perimeter_off, perimeter_recess : float
+        Sides, of them those towards an appendage or the floor, and those towards lining set back behind the wall.
     steps : float
-        Sides at which the drop was measured on both, ACROSS from them.
+        Sides at which the drop was measured on both, :data:`tunneldb.anomalies.region_edges.ACROSS` from them.
     inside, outside : float
         Sum of the drop there, dB.
     sharp, straight : float
         Sides over which half of the region's drop is lost, and those of them that lie on straight lines
-        (:func:`tunneldb.anomalies.straight_edges.straight`).
+        (:meth:`tunneldb.anomalies.region_edges.Edges.straight`).
     """
 
     sigma: float = 0.0
     recess: float = 0.0
-    rim: float = 0.0
-    rim_off: float = 0.0
-    rim_recess: float = 0.0
+    perimeter: float = 0.0
+    perimeter_off: float = 0.0
+    perimeter_recess: float = 0.0
     steps: float = 0.0
     inside: float = 0.0
     outside: float = 0.0
@@ -60,7 +59,7 @@ class RegionProperties(NamedTuple):
 
 @dataclass(frozen=True)
 class Region:
-    """Dark pixels that hang together by their sides, and what they show.
+    """Dark pixels that are connected by their sides, and what they show.
 
     Attributes
     ----------
@@ -73,8 +72,8 @@ class Region:
     filled : int
         How many of them hold points.
     drop_sum, drop_max : float
-        Sum over those and greatest of the drop below dry lining, dB.
-    traits : RegionProperties
+        Sum over those and greatest of the drop below the background, dB.
+    properties : RegionProperties
         Further sums.
     """
 
@@ -85,7 +84,7 @@ class Region:
     filled: int
     drop_sum: float
     drop_max: float
-    traits: RegionProperties
+    properties: RegionProperties
 
     @property
     def stop(self) -> int:
@@ -104,8 +103,8 @@ class Region:
 
     @property
     def contrast(self) -> float:
-        """Mean drop in standard deviations of the dry lining about it."""
-        return self.drop_sum / self.traits.sigma if self.traits.sigma > 0 else 0.0
+        """Mean drop in standard deviations of the background about it."""
+        return self.drop_sum / self.properties.sigma if self.properties.sigma > 0 else 0.0
 
     @property
     def outline(self) -> Polygon:
@@ -114,76 +113,101 @@ class Region:
 
 
 def find_regions(
-    part: Bool, dark: Bool, relative: ContrastImage, min_area: float, drips: Callable[[Region], bool]
+    part: Bool, dark: Bool, contrast: ContrastImage, min_area: float, may_drip: Callable[[Region], bool]
 ) -> list[Region]:
     """Connected dark regions of a kilometre that are large or long enough, or are cut by its ends and may be a part of one.
 
-    Drips that hang below a region are a part of it.
+    Drips below a region are a part of it.
 
     Parameters
     ----------
     part : (rows, columns) bool array
         Dark pixels that may belong to a region; those beyond the ends of the kilometre don't count.
     dark : (rows, columns) bool array
-        All dark pixels; sides towards these are no rim.
-    relative : ContrastImage
+        All dark pixels; regions don't end at these.
+    contrast : ContrastImage
         Their drop.
     min_area : float
         Smaller regions within the kilometre are left out, m².
-    drips : callable
+    may_drip : callable
         Tells whether a region may have drips.
     """
-    grid = relative.grid
+    grid = contrast.grid
     inner = grid.inner
-    runs = _runs(part, inner.start, inner.stop)
+    runs = row_runs(part, inner.start, inner.stop)
     if not len(runs):
         return []
-    count, label = sparse.csgraph.connected_components(_beside(runs), directed=False)
-    pieces = Dark.of(runs, label.astype(np.int64), count)
-    ends = pieces.touches(inner.start, inner.stop)
-    wanted = ends | (pieces.pixels * grid.pixel**2 >= min_area * (1 - 1e-12)) | (pieces.extent * grid.pixel >= LONG)
-    whole, bridges = attach_drips(pieces, wanted, ends, grid)
-    alone = _by_label(runs, label, count)
-    for k in np.unique(whole[whole != np.arange(count)]).tolist():
-        if not drips(_cut_out(alone(k), dark, relative)):
-            whole[whole == k] = np.flatnonzero(whole == k)
-            bridges = bridges[bridges[:, 3] != k]
-    chosen = _by_label(np.concatenate([runs, bridges[:, :3]]), np.concatenate([whole[label], bridges[:, 3]]), count)
-    found = [_cut_out(chosen(k), dark, relative) for k in np.unique(whole[wanted]).tolist()]
+    components = Components.of(runs)
+    ends = components.touching(inner.start, inner.stop)
+    large = components.pixels * grid.pixel**2 >= min_area * (1 - 1e-12)
+    wanted = ends | large | (components.extent * grid.pixel >= LONG)
+    whole, bridges = attach_drips(components, wanted, ends, grid)
+    roots = np.unique(whole[whole != np.arange(len(whole))])
+    for root, region in zip(roots.tolist(), _regions(runs, components.label, roots, dark, contrast), strict=True):
+        if not may_drip(region):
+            whole[whole == root] = np.flatnonzero(whole == root)
+            bridges = bridges[bridges[:, 3] != root]
+    label = np.concatenate([whole[components.label], bridges[:, 3]])
+    found = _regions(np.concatenate([runs, bridges[:, :3]]), label, np.unique(whole[wanted]), dark, contrast)
     return sorted(found, key=lambda region: (region.column, region.row))
 
 
-def _by_label(runs: Int64, label: Int64, count: int) -> Callable[[int], Int64]:
-    """What gives the runs of a label."""
-    order = np.argsort(label, kind="stable")
-    stops = np.concatenate([[0], np.cumsum(np.bincount(label, minlength=count))])
-    return lambda k: runs[order[stops[k] : stops[k + 1]]]
+def _regions(runs: Int64, label: Intp, chosen: Intp, dark: Bool, contrast: ContrastImage) -> list[Region]:
+    """Cut out the regions whose runs have the chosen labels, which are in order, and sum up what they show."""
+    if not len(chosen):
+        return []
+    grid = contrast.grid
+    number = np.searchsorted(chosen, label)
+    held = chosen[np.minimum(number, len(chosen) - 1)] == label
+    order = np.flatnonzero(held)[np.argsort(number[held], kind="stable")]
+    runs, number = runs[order], number[order]
+    starts = np.searchsorted(number, np.arange(len(chosen)))
+    low, high = np.minimum.reduceat(runs, starts), np.maximum.reduceat(runs, starts)
+    sums = _sums(runs, number, len(chosen), dark, contrast)
+    regions = []
+    for k, of in enumerate(np.split(runs, starts[1:])):
+        mask = np.zeros((high[k, 0] + 1 - low[k, 0], high[k, 2] - low[k, 1]), np.bool_)
+        row, column = pixels_of(of)
+        mask[high[k, 0] - row, column - low[k, 1]] = True
+        filled, drop_sum, drop_max, *properties = sums[k].tolist()
+        corner = grid.first_column + int(low[k, 1]), grid.bottom + grid.rows - 1 - int(high[k, 0])
+        regions.append(Region(grid.pixel, *corner, mask, int(filled), drop_sum, drop_max, RegionProperties(*properties)))
+    return regions
 
 
-def _cut_out(runs: Int64, dark: Bool, relative: ContrastImage) -> Region:
-    grid = relative.grid
-    top, bottom = int(runs[:, 0].min()), int(runs[:, 0].max())
-    first = int(runs[:, 1].min())
-    mask = np.zeros((bottom - top + 1, int(runs[:, 2].max()) - first), np.bool_)
-    across = max(1, round(ACROSS / grid.pixel))
-    sums = _read(
-        runs, dark, relative.drop, relative.state, relative.sigma, relative.tile, mask, top, first, across, STEP["corrected"]
+def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastImage) -> Float:
+    """Pixels with points, sum and maximum of the drop over these, dB, and the properties of each of so many regions.
+
+    Of the runs (row, first column, column behind the last one) the numbers of the regions are in order.
+    """
+    edges, found = Edges(dark, contrast), []
+    pixels, recess, steps, sigma = (np.zeros(count) for _ in range(4))
+    most = np.full(count, NODATA, np.int16)
+    until = np.cumsum(runs[:, 2] - runs[:, 1])
+    for part in np.split(np.arange(len(runs)), np.searchsorted(until, np.arange(PIXELS, until[-1], PIXELS))):
+        row, column = pixels_of(runs[part])
+        label = np.repeat(number[part], (runs[:, 2] - runs[:, 1])[part])
+        is_dark = dark[row, column]  # all but those between a drip and what lies above it
+        row, column, label = row[is_dark], column[is_dark], label[is_dark]
+        found.append(edges.sides(label, row, column))
+        recess += np.bincount(label[contrast.state[row, column] == PixelState.RECESS], minlength=count)
+        drop = contrast.drop[row, column]
+        held = drop != NODATA
+        row, column, label, drop = row[held], column[held], label[held], drop[held]
+        pixels += np.bincount(label, minlength=count)
+        steps += np.bincount(label, drop, count)
+        np.maximum.at(most, label, drop)
+        sigma += np.bincount(label, contrast.sigma[row // contrast.tile, column // contrast.tile], count)
+    sides = Sides(*map(np.concatenate, zip(*found, strict=True)))
+    drop_sum = steps * STEP["corrected"]
+    straight = edges.straight(sides, drop_sum / np.maximum(pixels, 1))
+    drop_max = np.where(pixels > 0, most * STEP["corrected"], -np.inf)
+    return np.column_stack(
+        [pixels, drop_sum, drop_max, sigma, recess, edges.perimeter(sides, count), edges.steps(sides, count), straight]
     )
-    least = SHARP * float(sums[1]) / max(float(sums[0]), 1.0) / STEP["corrected"]
-    sides = straight(runs, dark, relative.drop, relative.state, across, least)
-    return Region(
-        grid.pixel,
-        grid.first_column + first,
-        grid.bottom + grid.rows - 1 - bottom,
-        mask[::-1],
-        int(sums[0]),
-        float(sums[1]),
-        float(sums[2]),
-        RegionProperties(*sums[3:].tolist(), *map(float, sides)),
-    )
 
 
-def unite(parts: Sequence[Region]) -> Region:
+def merge_regions(parts: Sequence[Region]) -> Region:
     """Make one region of several that touch one another."""
     if len(parts) == 1:
         return parts[0]
@@ -199,11 +223,11 @@ def unite(parts: Sequence[Region]) -> Region:
         sum(part.filled for part in parts),
         float(sum(part.drop_sum for part in parts)),
         max(part.drop_max for part in parts),
-        RegionProperties(*(float(sum(sums)) for sums in zip(*(part.traits for part in parts), strict=True))),
+        RegionProperties(*(float(sum(sums)) for sums in zip(*(part.properties for part in parts), strict=True))),
     )
 
 
-def together(parts: Sequence[Region]) -> list[list[int]]:
+def touching_groups(parts: Sequence[Region]) -> list[list[int]]:
     """Which of the parts touch, at their first and last columns: groups of their numbers, in order of chainage."""
     pairs = [
         (a, b)
@@ -211,9 +235,7 @@ def together(parts: Sequence[Region]) -> list[list[int]]:
         for b, after in enumerate(parts)
         if before.stop == after.column and _touch(before, after)
     ]
-    first, second = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
-    graph = sparse.coo_array((np.ones(len(pairs)), (first, second)), shape=(len(parts), len(parts)))
-    count, label = sparse.csgraph.connected_components(graph, directed=False)
+    count, label = connected(len(parts), *np.array(pairs, dtype=np.int64).reshape(-1, 2).T)
     # In order of place, whatever order the kilometres came in.
     places = sorted(range(len(parts)), key=lambda k: (parts[k].column, parts[k].row))
     groups: list[list[int]] = [[] for _ in range(count)]
@@ -230,82 +252,3 @@ def _touch(before: Region, after: Region) -> bool:
     return low < high and bool(
         (before.mask[low - before.row : high - before.row, -1] & after.mask[low - after.row : high - after.row, 0]).any()
     )
-
-
-def _beside(runs: Int64) -> sparse.coo_array:
-    """Pairs of runs of neighbouring rows that share sides."""
-    first, second = beside(runs)
-    return sparse.coo_array((np.ones(len(first), np.int8), (first, second)), shape=(len(runs), len(runs)))
-
-
-@njit(cache=True, nogil=True)
-def _runs(wet: Bool, first: int, stop: int) -> Int64:  # pragma: no cover - compiled
-    """Row, first column and column behind the last one of each unbroken run of wet pixels, row by row."""
-    count = 0
-    for i in range(wet.shape[0]):
-        before = False
-        for j in range(first, stop):
-            count += wet[i, j] and not before
-            before = wet[i, j]
-    runs = np.empty((count, 3), np.int64)
-    count = 0
-    for i in range(wet.shape[0]):
-        before = False
-        for j in range(first, stop):
-            if wet[i, j] and not before:
-                runs[count, 0], runs[count, 1] = i, j
-                count += 1
-            if wet[i, j]:
-                runs[count - 1, 2] = j + 1
-            before = wet[i, j]
-    return runs
-
-
-@njit(cache=True, nogil=True)
-def _read(
-    runs: Int64,
-    dark: Bool,
-    drop: Int16,
-    state: UInt8,
-    sigma: Single,
-    tile: int,
-    mask: Bool,
-    top: int,
-    left: int,
-    across: int,
-    step: float,
-) -> Float:  # pragma: no cover - compiled
-    """Draw a region's runs into its mask and sum up what they show: filled, drop's sum and maximum, and the traits."""
-    sums = np.zeros(11)
-    sums[2] = -np.inf
-    rows, columns = dark.shape
-    for k in range(runs.shape[0]):
-        i = runs[k, 0]
-        for j in range(runs[k, 1], runs[k, 2]):
-            mask[i - top, j - left] = True
-            if not dark[i, j]:
-                continue  # between a drip and what it hangs below
-            sums[4] += state[i, j] == 2
-            if drop[i, j] != NODATA:
-                value = drop[i, j] * step
-                sums[0] += 1
-                sums[1] += value
-                sums[2] = max(sums[2], value)
-                sums[3] += sigma[i // tile, j // tile]
-            for di, dj in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-                m, n = i + di, j + dj
-                if m < 0 or m >= rows or n < 0 or n >= columns or dark[m, n]:
-                    continue
-                sums[5] += 1
-                sums[6] += state[m, n] >= 3
-                sums[7] += state[m, n] == 2
-                # The step: what is dark there behind the rim, and what is not before it.
-                m, n = i + across * di, j + across * dj
-                p, q = i - (across - 1) * di, j - (across - 1) * dj
-                if m < 0 or m >= rows or n < 0 or n >= columns or p < 0 or p >= rows or q < 0 or q >= columns:
-                    continue
-                if dark[p, q] and not dark[m, n] and drop[p, q] != NODATA and 1 <= state[m, n] <= 2:
-                    sums[8] += 1
-                    sums[9] += drop[p, q] * step
-                    sums[10] += drop[m, n] * step
-    return sums

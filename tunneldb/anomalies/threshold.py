@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
-from numba import njit
 
-from tunneldb.arrays import Bool, Int16, Int32, UInt8
+from tunneldb.anomalies.background.contrast import ContrastImage
+from tunneldb.anomalies.windows import count_about, on_lining, row_blocks
+from tunneldb.arrays import Bool, UInt8
 from tunneldb.raster.geotiff import STEP
 from tunneldb.raster.image import MAX_MEDIAN
+from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
-
-if TYPE_CHECKING:
-    from tunneldb.anomalies.background.contrast import ContrastImage
-
 
 MEDIAN = 5
 """Side of the median filter where every pixel holds points, pixels."""
 
 MEDIAN_PIXELS = 12
 """The filter is widened until it holds so many pixels with points on average."""
+
+ENOUGH = 0.2
+"""Share of those pixels from which the filter tells whether its middle is dark."""
 
 
 def filter_size(filled: float) -> int:
@@ -35,17 +36,17 @@ def filter_size(filled: float) -> int:
     return size
 
 
-def dark_pixels(relative: ContrastImage, size: int) -> Bool:
+def dark_pixels(contrast: ContrastImage, size: int) -> Bool:
     """Mark dark pixels.
 
-    A lining pixel that lies more than three local standard deviations below the local level of dry lining is dark
+    A lining pixel that lies more than three local standard deviations below the local level of the background is dark
     (eq. 20). The median of the dark and other ones about each pixel then decides: single ones go, and pixels without a
     point take the state of those about them. Appendages and floor are never dark, nor is what lies in a drawn dry region.
 
     Parameters
     ----------
-    relative : ContrastImage
-        The picture relative to dry lining.
+    contrast : ContrastImage
+        The picture relative to its background.
     size : int
         Side of the median filter, pixels.
 
@@ -53,55 +54,43 @@ def dark_pixels(relative: ContrastImage, size: int) -> Bool:
     -------
     (rows, columns) bool array
     """
-    limit = np.minimum(np.floor(3.0 * relative.sigma / STEP["corrected"]), 32767).astype(np.int16)
-    enough = 0.2 * min(size * size, MEDIAN_PIXELS)
-    dark: Bool = _dark(relative.state, relative.drop, limit, relative.tile, size // 2, enough)
-    for columns, mask in mask_of_polygons(relative.grid, relative.drawn):
-        dark[:, columns][mask] = False
-    return dark
-
-
-@njit(cache=True, nogil=True)
-def _dark(state: UInt8, drop: Int16, limit: Int16, tile: int, half: int, enough: float) -> Bool:  # pragma: no cover - compiled
-    rows, columns = state.shape
-    out = np.zeros((rows, columns), np.bool_)
-    # Lining and dark pixels of each column in the rows of the filter, with zeros beyond both ends.
-    lining, dark = np.zeros(columns + 2 * half + 1, np.int32), np.zeros(columns + 2 * half + 1, np.int32)
-    for i in range(-half, rows):
-        if i + half < rows:
-            _vote(state[i + half], drop[i + half], limit[(i + half) // tile], tile, 1, lining, dark, half)
-        if i - half - 1 >= 0:
-            _vote(state[i - half - 1], drop[i - half - 1], limit[(i - half - 1) // tile], tile, -1, lining, dark, half)
-        if i < 0:
-            continue
-        votes, dark_votes = 0, 0
-        for j in range(2 * half):
-            votes += lining[j]
-            dark_votes += dark[j]
-        for j in range(columns):
-            votes += lining[j + 2 * half]
-            dark_votes += dark[j + 2 * half]
-            out[i, j] = 2 * dark_votes > votes and votes > enough and state[i, j] <= 2
-            votes -= lining[j]
-            dark_votes -= dark[j]
+    state, drop, tile = contrast.state, contrast.drop, contrast.tile
+    limit = np.minimum(np.floor(3.0 * contrast.sigma / STEP["corrected"]), 32767).astype(np.int16)
+    limit = np.repeat(limit, tile, axis=1)[:, : state.shape[1]]
+    out = np.empty(state.shape, np.bool_)
+    for rows, about in row_blocks(len(state), size // 2):
+        lining = on_lining(state[about])
+        dark = lining & (drop[about] > limit[np.arange(about.start, about.stop) // tile])
+        votes, dark_votes = (count_about(mask, rows, about, size // 2) for mask in (lining, dark))
+        out[rows] = (2 * dark_votes > votes) & (votes > _least_votes(size)) & (state[rows] <= PixelState.RECESS)
+    for columns, mask in mask_of_polygons(contrast.grid, contrast.drawn):
+        out[:, columns][mask] = False
     return out
 
 
-@njit(cache=True, nogil=True)
-def _vote(
-    state: UInt8,
-    drop: Int16,
-    limit: Int16,
-    tile: int,
-    sign: int,
-    lining: Int32,
-    dark: Int32,
-    half: int,
-) -> None:  # pragma: no cover - compiled
-    """Add a row to the sums of columns, or take it away; of the limits of its tiles."""
-    step = np.int32(sign)
-    for t in range(limit.shape[0]):
-        for j in range(t * tile, min((t + 1) * tile, state.shape[0])):
-            here = step if 1 <= state[j] <= 2 else np.int32(0)
-            lining[j + half] += here
-            dark[j + half] += here if drop[j] > limit[t] else np.int32(0)
+def seen_lining(state: UInt8, size: int) -> Iterator[tuple[slice, Bool]]:
+    """Tell which lining was seen: holds points, or has enough about it that does for the median filter to tell if it is dark.
+
+    Parameters
+    ----------
+    state : (rows, columns) uint8 array
+        Values of :class:`tunneldb.raster.pixel_state.PixelState`.
+    size : int
+        Side of the median filter, pixels.
+
+    Yields
+    ------
+    rows : slice
+        Some of the rows, in order.
+    seen : (rows, columns) bool array
+    """
+    for rows, about in row_blocks(len(state), size // 2):
+        lining = on_lining(state[about])
+        votes = count_about(lining, rows, about, size // 2)
+        empty = state[rows] == PixelState.EMPTY
+        yield rows, lining[rows.start - about.start :][: len(empty)] | (empty & (votes > _least_votes(size)))
+
+
+def _least_votes(size: int) -> int:
+    """So many pixels of a filter, or fewer, don't tell whether its middle is dark."""
+    return int(ENOUGH * min(size * size, MEDIAN_PIXELS))

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from tunneldb.anomalies.region_shape import Shape, measure
+from tunneldb.anomalies.region_shape import Shape, measure_shape
 from tunneldb.anomalies.regions import Region
 
 STRONG_CONTRAST, STRONG_DROP = 8.0, 3.0
@@ -39,12 +39,12 @@ class Verdict:
     confidence: float
 
 
-def judge(region: Region) -> Verdict:
+def classify(region: Region) -> Verdict:
     """Tell what a region is, by its shape and its sums.
 
     Each reason why it may be dry gets a degree between 0 and 1; the region is a leak unless one is above 1/2.
     """
-    shape = measure(region.mask, region.pixel)
+    shape = measure_shape(region.mask, region.pixel)
     degrees = {
         "faint": _ramp(region.contrast, 3.4, 3.0),
         "thin": _thin(region, shape),
@@ -57,12 +57,12 @@ def judge(region: Region) -> Verdict:
     against = sorted((name for name in degrees if degrees[name] > 0.0), key=lambda name: -degrees[name])
     worst = max(degrees.values())
     if worst <= 0.5:
-        return Verdict("leak", tuple(against), evidence(region) * (1.0 - worst))
+        return Verdict("leak", tuple(against), detectability(region) * (1.0 - worst))
     reasons = tuple(name for name in against if degrees[name] > 0.5)
     return Verdict("joint" if "thin" in reasons else "dark", reasons, worst)
 
 
-def evidence(region: Region) -> float:
+def detectability(region: Region) -> float:
     """How sure it is that a region is darker than dry lining, 0 to 1: by contrast, size and support."""
     area = region.area
     share = region.filled * region.pixel**2 / area
@@ -73,20 +73,20 @@ def evidence(region: Region) -> float:
 def _thin(region: Region, shape: Shape) -> float:
     """Joints are at most 2 cm wide, which the beam, the pixels and the median filter widen, straight, not as dark as water."""
     pixel = region.pixel
-    wander = shape.wander_along if shape.along > shape.across else shape.wander_across
+    deviation = shape.deviation_along if shape.along > shape.across else shape.deviation_across
     return min(
         _ramp(shape.mean_width, 0.10, 0.07),
         _ramp(shape.length / max(shape.mean_width, pixel), 4.0, 8.0),
-        _ramp(wander, 2.0 * pixel, pixel),
+        _ramp(deviation, 2.0 * pixel, pixel),
         _ramp(region.drop_mean, DARKEST_JOINT + 0.5, DARKEST_JOINT),
     )
 
 
 def _recess(region: Region) -> float:
     """A bolt pocket is dark as a whole, and small: it is set back, and what is about it is not."""
-    traits, pixels = region.traits, np.count_nonzero(region.mask)
-    about = traits.rim_recess / traits.rim if traits.rim else 0.0
-    return min(_ramp(traits.recess / pixels, 0.3, 0.7), _ramp(about, 0.4, 0.2), _ramp(region.area, 0.12, 0.08))
+    properties, pixels = region.properties, np.count_nonzero(region.mask)
+    about = properties.perimeter_recess / properties.perimeter if properties.perimeter else 0.0
+    return min(_ramp(properties.recess / pixels, 0.3, 0.7), _ramp(about, 0.4, 0.2), _ramp(region.area, 0.12, 0.08))
 
 
 def _gradual(region: Region, shape: Shape) -> float:
@@ -94,10 +94,10 @@ def _gradual(region: Region, shape: Shape) -> float:
 
     Grime beneath a cable lies in a band along the tunnel, which water does not: there less softness is enough.
     """
-    traits = region.traits
-    if traits.steps < 10 or region.drop_sum <= 0:
+    properties = region.properties
+    if properties.steps < 10 or region.drop_sum <= 0:
         return 0.0
-    step = (traits.inside - traits.outside) / traits.steps / region.drop_mean
+    step = (properties.inside - properties.outside) / properties.steps / region.drop_mean
     band = _ramp(shape.along / shape.across, 4.0, 8.0)
     return _ramp(step, 0.6 + 0.25 * band, 0.3 + 0.25 * band)
 
@@ -107,16 +107,16 @@ def _rectangular(region: Region, shape: Shape) -> float:
 
     However joints and appendages cut it up. Of a small blob or a narrow band along a joint more sides do by chance.
     """
-    traits = region.traits
-    shown = traits.rim - traits.rim_off
-    if not traits.sharp or not shown:
+    properties = region.properties
+    shown = properties.perimeter - properties.perimeter_off
+    if not properties.sharp or not shown:
         return 0.0
     width, pixels = shape.mean_width / region.pixel, region.area / region.pixel**2
     most = 0.71 + 0.15 * _ramp(width, 17.5, 10.0) + 0.12 * _ramp(pixels, 750.0, 250.0)
-    lines = _ramp(traits.straight / traits.sharp, most, most + 0.08)
+    lines = _ramp(properties.straight / properties.sharp, most, most + 0.08)
     # Water that fills a panel between joints is rectangular too, and darker than repairs are, and so are small blobs.
     panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), _ramp(width, 22.5, 15.0))
-    return min(lines, _ramp(traits.sharp / shown, 0.15, 0.25), _ramp(width, 8.0, 11.0), 1.0 - panel)
+    return min(lines, _ramp(properties.sharp / shown, 0.15, 0.25), _ramp(width, 8.0, 11.0), 1.0 - panel)
 
 
 def _strong(region: Region) -> float:
@@ -127,19 +127,19 @@ def _strong(region: Region) -> float:
 def _stripe(shape: Shape, pixel: float) -> float:
     """A painted stripe: a band along the tunnel, straight and as wide at its ends; water along a joint keeps to no edge."""
     neat = min(
-        _ramp(shape.wander_box, pixel, 0.6 * pixel),
-        _ramp(shape.fill, 0.85, 0.93),
+        _ramp(shape.deviation_box, pixel, 0.6 * pixel),
+        _ramp(shape.rectangularity, 0.85, 0.93),
         _ramp(shape.corners, 0.4, 0.7),
     )
     # Ragged ones are as long as no leak along the tunnel.
-    long = min(_ramp(shape.along, 2.0, 2.5), _ramp(shape.wander_along, 2.0 * pixel, pixel))
-    return min(_ramp(shape.slender, 6.0, 10.0), max(neat, long))
+    long = min(_ramp(shape.along, 2.0, 2.5), _ramp(shape.deviation_along, 2.0 * pixel, pixel))
+    return min(_ramp(shape.aspect_ratio, 6.0, 10.0), max(neat, long))
 
 
 def _shadow(region: Region, shape: Shape) -> float:
     """A narrow band beside a cable or a pipe; or what shows between appendages and ends nowhere on dry lining."""
-    traits = region.traits
-    beside = traits.rim_off / traits.rim if traits.rim else 0.0
+    properties = region.properties
+    beside = properties.perimeter_off / properties.perimeter if properties.perimeter else 0.0
     return max(min(_ramp(beside, 0.25, 0.45), _ramp(shape.width, 0.14, 0.08)), _ramp(beside, 0.8, 0.9))
 
 

@@ -29,8 +29,7 @@ from tunneldb.radiometry.roughness import (
 )
 from tunneldb.raster.observation import ObservedPoints, Observer, Radiometer, RangeSpan
 from tunneldb.store.images import load_reference
-from tunneldb.store.poses import load_poses
-from tunneldb.store.sources import sample
+from tunneldb.store.sources import load_poses, sample
 from tunneldb.store.survey import Survey
 
 CORNER = 0.1

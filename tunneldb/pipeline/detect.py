@@ -34,8 +34,8 @@ from tunneldb.store.images import (
     load_regions,
     save_coverage,
     save_radiometry,
+    save_range_curve,
 )
-from tunneldb.store.range_curve import save_range_curve
 from tunneldb.store.scene import load_arcs
 from tunneldb.store.sources import sources
 from tunneldb.store.surface import load_surface

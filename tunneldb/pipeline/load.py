@@ -21,9 +21,16 @@ from tunneldb.pipeline.read import Begin, Counts, Reading, silent
 from tunneldb.pointcloud.reader import ScanHeader, read_header
 from tunneldb.pointcloud.selection import MEMORY, FilterSettings
 from tunneldb.pointcloud.spool import Spool
-from tunneldb.store.fragment import drop_fragments, read_fragment
 from tunneldb.store.ledger import Run, lock, stage_run
-from tunneldb.store.partition import partition_exists, read_partition, rows_in, swap_partition, write_partition
+from tunneldb.store.partition import (
+    drop_fragments,
+    partition_exists,
+    read_fragment,
+    read_partition,
+    rows_in,
+    swap_partition,
+    write_partition,
+)
 from tunneldb.store.scan_files import COUNTED, Loaded, change_counts, outcome, recorded_files, unchanged
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey

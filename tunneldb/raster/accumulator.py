@@ -1,7 +1,7 @@
 """The unrolled image of a kilometre, gathered from points in any order in bounded memory.
 
 A pixel holds weighted sums over the points that fall into it: several stations are blended by the weights of their views
-(:func:`tunneldb.raster.projection.weight_of`). Only the blocks used last lie in memory; the others in a file of the temporary
+(:func:`tunneldb.raster.projection.pixel_weight`). Only the blocks used last lie in memory; the others in a file of the temporary
 folder.
 """
 

@@ -1,4 +1,4 @@
-"""What a stage reads: the scan files of a kilometre, and its points of survey density."""
+"""What a stage reads: the scan files of a kilometre, its points of survey density, and where the scanner was."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from psycopg import sql
 
 from tunneldb.database.fetch import fetch_array
 from tunneldb.errors import UserError
+from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import Points, ScanSource
 from tunneldb.store.partition import partition, rows_in
 from tunneldb.store.scan_files import checksum
@@ -103,3 +104,25 @@ def sample(conn: psycopg.Connection[Any], survey: Survey, km: int, count: int = 
         rows["intensity"],
         np.zeros(len(rows), np.uint8),
     )
+
+
+def load_poses(conn: psycopg.Connection[Any], survey: Survey) -> PoseModel:
+    """Read the trajectory of a mobile survey, or the stations of a static one.
+
+    Raises
+    ------
+    UserError
+        If the survey has none.
+    """
+    table, key = ("pose", "time") if survey.platform == "mobile" else ("station", "scan_id")
+    fields: list[tuple[str, str, sql.Composable]] = [(key, "f8", sql.SQL("{}::float8").format(sql.Identifier(key)))]
+    fields += [("x", "f8", sql.SQL("ST_X(geom)")), ("y", "f8", sql.SQL("ST_Y(geom)")), ("z", "f8", sql.SQL("ST_Z(geom)"))]
+    source = sql.SQL("FROM {} WHERE survey_id = %(survey)s").format(sql.Identifier("tunnel", table))
+    rows = fetch_array(conn, fields, source, {"survey": survey.id})
+    if len(rows) == 0:
+        kind = "trajectory" if survey.platform == "mobile" else "stations"
+        raise UserError(f"survey {survey.name} has no {kind}: add the survey again with --{kind}")
+    xyz = np.column_stack([rows["x"], rows["y"], rows["z"]])
+    if survey.platform == "mobile":
+        return PoseModel.from_trajectory(rows["time"], xyz)
+    return PoseModel.from_stations(rows["scan_id"].astype(np.int64), xyz)

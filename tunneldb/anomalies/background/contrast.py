@@ -1,4 +1,4 @@
-"""The picture of a kilometre relative to dry lining: by how much each pixel is darker."""
+"""The picture of a kilometre relative to its background: by how much each pixel is darker."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.histogram import take_levels
 from tunneldb.anomalies.background.level_map import BackgroundMap
 from tunneldb.arrays import Int16, Single, UInt8
 from tunneldb.raster.grid import Grid
@@ -17,7 +16,7 @@ from tunneldb.raster.polygons import mask_of_polygons
 
 @dataclass(frozen=True)
 class ContrastImage:
-    """State of all pixels of a picture, and how much darker than dry lining they are.
+    """State of all pixels of a picture, and how much darker than the background they are.
 
     Attributes
     ----------
@@ -26,12 +25,12 @@ class ContrastImage:
     state : (rows, columns) uint8 array
         Values of :class:`tunneldb.raster.pixel_state.PixelState`.
     drop : (rows, columns) int16 array
-        Level of dry lining there less that of the pixel, in steps of 0.01 dB, positive where it is darker; NODATA where
+        Level of the background there less that of the pixel, in steps of 0.01 dB, positive where it is darker; NODATA where
         there is no point. What lies in drawn dry regions is at most 0.
     tile : int
         Side of the tiles of ``sigma``, pixels.
     sigma : (tiles down, tiles along) float32 array
-        Standard deviation of dry lining, dB; of pixel (i, j) in tile (i // tile, j // tile).
+        Standard deviation of the background, dB; of pixel (i, j) in tile (i // tile, j // tile).
     drawn : tuple of Polygon
         Dry regions that the user drew, in the unrolled plane, m.
     """
@@ -44,11 +43,11 @@ class ContrastImage:
     drawn: tuple[Polygon, ...] = ()
 
 
-def contrast_image(picture: LiningImage, dry: BackgroundMap) -> ContrastImage:
-    """Take the level of dry lining from that of all pixels, in the memory of ``picture.level``, which is lost."""
+def contrast_image(picture: LiningImage, background: BackgroundMap) -> ContrastImage:
+    """Take the level of the background from that of all pixels, in the memory of ``picture.level``, which is lost."""
     drop = picture.level
-    take_levels(dry.base, dry.rings, dry.bands, dry.smooth, dry.tile, drop)
-    for block, mask in mask_of_polygons(picture.grid, dry.drawn):
+    background.level.subtract(drop)
+    for block, mask in mask_of_polygons(picture.grid, background.drawn):
         here = drop[:, block]
         here[mask] = np.minimum(here[mask], 0)
-    return ContrastImage(picture.grid, picture.state, drop, dry.tile, dry.sigma, dry.drawn)
+    return ContrastImage(picture.grid, picture.state, drop, background.level.tile, background.sigma, background.drawn)

@@ -1,18 +1,19 @@
-"""Level and standard deviation of dry lining everywhere in the picture of a kilometre."""
+"""Level and standard deviation of the background, lining that is dry, everywhere in the picture of a kilometre."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.histogram import fill_levels
+from tunneldb.anomalies.background.level import BackgroundLevel
 from tunneldb.anomalies.background.model import BackgroundFit
-from tunneldb.arrays import Int32, Single, UInt8
+from tunneldb.arrays import Int64, Single, UInt8
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import LiningImage
+from tunneldb.raster.pixel_state import PixelState
 
 TILE = 0.5
 """Side of a tile, about, m."""
@@ -26,56 +27,36 @@ SHOWN = 2_000_000
 
 @dataclass(frozen=True)
 class BackgroundMap:
-    """Level and standard deviation of dry lining, locally.
-
-    The level is a sum: that of the kilometre, of each column (rings of other concrete), of each row by blocks of 50 m
-    (soot, grime, stripes), and what changes slowly, by tiles; the last two are interpolated.
+    """Level and standard deviation of the background, locally.
 
     Attributes
     ----------
     grid : Grid
         The pixels.
-    tile : int
-        Side of a tile, pixels; divides a block.
+    level : BackgroundLevel
+        The level: that of the kilometre, of each column (rings of other concrete), of each row by blocks of 50 m (soot,
+        grime, stripes), and what changes slowly, by tiles.
     sigma : (tiles down, tiles along) float32 array
-        Standard deviation, dB, above 0; of pixel (i, j) in tile (i // tile, j // tile).
+        Standard deviation, dB, above 0; of pixel (i, j) in tile (i // level.tile, j // level.tile).
     mean, spread : float
         Medians over the lining of level and standard deviation, dB; NaN without lining.
     count : int
         Pixels that it rests on; 0: there is no lining.
-    base : float
-        Level of the kilometre, dB.
-    rings : (columns,) float32 array
-        Level of each column beyond it, dB.
-    bands : (rows, blocks) float32 array
-        Level of each row beyond those at the middle of each block, dB.
-    smooth : (tiles down, tiles along) float32 array
-        Level at the middle of each tile beyond those, dB.
     drawn : tuple of Polygon
         Dry regions that the user drew, in the unrolled plane, m.
     """
 
     grid: Grid
-    tile: int
+    level: BackgroundLevel
     sigma: Single
     mean: float
     spread: float
     count: int
-    base: float
-    rings: Single
-    bands: Single
-    smooth: Single
     drawn: tuple[Polygon, ...] = ()
-
-    def levels(self, rows: slice, columns: slice) -> Single:
-        """Level of dry lining in some rows and columns, dB."""
-        out = np.empty((rows.stop - rows.start, columns.stop - columns.start), np.float32)
-        fill_levels(self.base, self.rings, self.bands, self.smooth, self.tile, rows.start, columns.start, out)
-        return out
 
 
 def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) -> BackgroundMap:
-    """Map the dry lining of a picture.
+    """Map the background of a picture.
 
     Level and standard deviation are those of the dry part of the lining (`radiometry.robust_statistics`):
     of a column, of a row along 150 m, of windows of tiles. As long as no more than half of each is wet, leaks don't count.
@@ -90,7 +71,7 @@ def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) ->
         and standard deviation (Xu et al., 2018, eq. 19) of the pixels in it, however dark these are; others are left alone.
     """
     grid, state = picture.grid, picture.state
-    tile, count = _tile_side(grid), int(np.count_nonzero(state == 1))
+    tile, count = _tile_side(grid), int(np.count_nonzero(state == PixelState.LINING))
     if count == 0:
         return _nothing(grid, tile, tuple(dry_regions))
     fit = BackgroundFit(picture, tile, count, dry_regions)
@@ -98,9 +79,9 @@ def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) ->
         fit.add_bands()
         fit.add_rings()
         fit.add_smooth()
-    sigma = fit.sigma()
-    dry = BackgroundMap(grid, tile, sigma, 0.0, 0.0, count, *fit.parts[:4], tuple(dry_regions))
-    return replace(dry, mean=_mean_level(dry, state), spread=_weighted_median(sigma, fit.lining))
+    sigma, level = fit.sigma(), fit.level
+    spread = _weighted_median(sigma, fit.lining)
+    return BackgroundMap(grid, level, sigma, _mean_level(level, state), spread, count, tuple(dry_regions))
 
 
 def _tile_side(grid: Grid) -> int:
@@ -113,19 +94,23 @@ def _tile_side(grid: Grid) -> int:
 def _nothing(grid: Grid, tile: int, drawn: tuple[Polygon, ...]) -> BackgroundMap:
     """Map of a picture without lining."""
     shape = -(-grid.rows // tile), grid.columns // tile
-    flat = np.zeros(grid.columns, np.float32), np.zeros((grid.rows, grid.blocks), np.float32), np.zeros(shape, np.float32)
-    return BackgroundMap(grid, tile, np.ones(shape, np.float32), np.nan, np.nan, 0, 0.0, *flat, drawn)
+    parts = np.zeros(grid.columns, np.float32), np.zeros((grid.rows, grid.blocks), np.float32), np.zeros(shape, np.float32)
+    level = BackgroundLevel(tile, 0.0, *parts)
+    return BackgroundMap(grid, level, np.ones(shape, np.float32), np.nan, np.nan, 0, drawn)
 
 
-def _mean_level(dry: BackgroundMap, state: UInt8) -> float:
-    """Median over the lining of the level of dry lining, from some of its rows, dB."""
+def _mean_level(level: BackgroundLevel, state: UInt8) -> float:
+    """Median over the lining of the level of the background, from some of its rows, dB."""
     rows, columns = state.shape
     every = max(1, rows * columns // SHOWN)
-    levels = [dry.levels(slice(row, row + 1), slice(0, columns))[0, state[row] == 1] for row in range(every // 2, rows, every)]
+    levels = []
+    for row in range(every // 2, rows, every):
+        here = state[row] == PixelState.LINING
+        levels.append(level.levels(slice(row, row + 1), slice(0, columns))[0, here])
     return float(np.median(np.concatenate(levels)))
 
 
-def _weighted_median(values: Single, weights: Int32) -> float:
+def _weighted_median(values: Single, weights: Int64) -> float:
     """Median of values that count so often."""
     order = np.argsort(values, axis=None)
     until = np.cumsum(weights.ravel()[order])

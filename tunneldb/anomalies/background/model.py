@@ -1,20 +1,23 @@
-"""Model of dry lining, fitted to a picture step by step: base, rings, bands and what changes slowly."""
+"""Model of the background, fitted to a picture step by step: base, rings, bands and what changes slowly."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from numba import njit
 from scipy import ndimage
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.histogram import column_modes, fill_levels, row_modes, settle_windows, tile_histograms
-from tunneldb.anomalies.background.smooth import fill, slow
-from tunneldb.arrays import Bool, Float, Int16, Int32, Single, UInt8, UInt16
+from tunneldb.anomalies.background.histogram import Residuals, window_statistics
+from tunneldb.anomalies.background.level import BackgroundLevel
+from tunneldb.anomalies.background.smooth import extrapolate, smooth_level
+from tunneldb.anomalies.windows import count_in_columns
+from tunneldb.arrays import Bool, Float, Int16, Int64, Single, UInt8, UInt16
 from tunneldb.radiometry.robust_statistics import robust_statistics
 from tunneldb.raster.geotiff import STEP
 from tunneldb.raster.image import LiningImage
+from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
 
 SAMPLE, LINES = 15_000_000, 6_000_000
@@ -33,7 +36,7 @@ NARROW = 0.6
 """Rings are longer, m: a darker one is a joint that leaks all round."""
 
 ENOUGH = 100
-"""Values that tell the level of dry lining to a tenth of their standard deviation, about."""
+"""Values that tell the level of the background to a tenth of their standard deviation, about."""
 
 FEW = 10
 """From fewer values no level is told."""
@@ -50,9 +53,12 @@ LEAST = 10.0
 DRAWN = 0.5
 """Part of a tile's lining that must lie in drawn dry regions for them to rule it."""
 
+VALUES = 4_000_000
+"""So many values at most are sorted at a time."""
+
 
 class BackgroundFit:
-    """Model of dry lining of a picture that holds lining; see `BackgroundMap` for its parts.
+    """Model of the background of a picture that holds lining; see `BackgroundLevel` for its parts.
 
     Parameters
     ----------
@@ -76,26 +82,26 @@ class BackgroundFit:
         self.rings = np.zeros(grid.columns, np.float32)
         self.bands = np.zeros((grid.rows, grid.blocks), np.float32)
         self.smooth = np.zeros(shape, np.float32)
-        self.odd = np.zeros(shape, np.bool_)
-        self.lining = _lining(picture.state, tile, np.zeros(shape, np.int32))
+        self.outlying = np.zeros(shape, np.bool_)
+        self.lining = _lining_pixels(picture.state, tile)
         scanned = self.lining[:, self.lining.any(axis=0)]
         self.per_tile = float(scanned.mean())
-        self.pinned = np.zeros(shape, np.bool_)
+        self.fixed = np.zeros(shape, np.bool_)
         if drawn:
             number = self._drawn_moments(self.smooth)[0]
-            self.pinned = (number >= DRAWN * self.lining) & (number > 0)
+            self.fixed = (number >= DRAWN * self.lining) & (number > 0)
 
     @property
-    def parts(self) -> tuple[float, Single, Single, Single, int]:
-        """The model as compiled functions take it."""
-        return self.base, self.rings, self.bands, self.smooth, self.tile
+    def level(self) -> BackgroundLevel:
+        """The model as far as it is known."""
+        return BackgroundLevel(self.tile, self.base, self.rings, self.bands, self.smooth)
 
     def add_bands(self) -> None:
         """Add what each row shows: about each block, or where too little is seen of it, in the whole kilometre."""
         scanned, per_block = int(self.lining.any(axis=0).sum()), self.smooth.shape[1] // self.bands.shape[1]
         along = min(scanned, (2 * BESIDE + 1) * per_block)
         enough = max(FEW, round(PART * along * self.per_tile / self.tile / self.apart))
-        found, whole = row_modes(*self._plain, *self.parts, self.apart, BESIDE, enough)
+        found, whole = Residuals(self.picture, self.level, self._plain, self.apart).of_rows(BESIDE, enough)
         found = np.where(np.isfinite(found), found, whole[:, None])
         rows = np.flatnonzero(np.isfinite(whole))
         if not len(rows):
@@ -109,7 +115,8 @@ class BackgroundFit:
         """Add what each column shows, without joints."""
         pixel = self.grid.pixel
         per_column = self.per_tile * self.lining.shape[0] / self.tile
-        found = column_modes(*self._plain, *self.parts, self.apart, max(FEW, round(PART * per_column / self.apart)))
+        enough = max(FEW, round(PART * per_column / self.apart))
+        found = Residuals(self.picture, self.level, self._plain, self.apart).of_columns(enough)
         # Where columns hold little, more of them are taken together.
         size = _odd(max(RING / pixel, 10.0 * ENOUGH / max(per_column, 1.0)))
         found = _running_median(found, size // 2)
@@ -126,15 +133,15 @@ class BackgroundFit:
         half = int(np.ceil((np.sqrt(ENOUGH / held) - 1) / 2)) if held < ENOUGH else 0
         histograms = self._histograms()
         used = np.ones(self.smooth.shape, np.bool_)
-        mean, sigma, count = settle_windows(histograms, used, half)
+        mean, sigma, count = window_statistics(histograms, used, half)
         mean[(count == 0) | (self.lining == 0)] = np.nan
         level = self.smooth + mean
-        if self.pinned.any():
+        if self.fixed.any():
             number, total, _ = self._drawn_moments(np.zeros_like(self.smooth))
-            level[self.pinned] = (total / np.maximum(number, 1))[self.pinned]
+            level[self.fixed] = (total / np.maximum(number, 1))[self.fixed]
         if np.isfinite(sigma).any():
             self.spread = max(float(np.nanmedian(sigma)), STEP["corrected"])
-        self.smooth, self.odd = slow(level, self.smooth, self.spread, self.pinned)
+        self.smooth, self.outlying = smooth_level(level, self.smooth, self.spread, self.fixed)
 
     def sigma(self) -> Single:
         """Standard deviation about the model, by tiles, dB: of pixels, and of what whole tiles differ by beyond it."""
@@ -142,21 +149,21 @@ class BackgroundFit:
         while (2 * half + 1) ** 2 * self.per_tile / self.every < 4 * ENOUGH and half < 10:
             half += 1
         histograms = self._histograms()
-        _, sigma, count = settle_windows(histograms, ~self.odd, half)
+        _, sigma, count = window_statistics(histograms, ~self.outlying, half)
         sigma[count < ENOUGH] = np.nan
         known = np.isfinite(sigma) & (sigma > 0)
         seen = known & (self.lining > 0)
         if not seen.any():
             return np.full_like(sigma, self.spread)
-        sigma = fill(np.where(known, np.maximum(sigma, np.percentile(sigma[seen], LEAST)), np.nan).astype(np.float32))
+        sigma = extrapolate(np.where(known, np.maximum(sigma, np.percentile(sigma[seen], LEAST)), np.nan).astype(np.float32))
         sigma = np.hypot(sigma, self._between(histograms))
-        if self.pinned.any():
+        if self.fixed.any():
             number, total, squares = (
-                ndimage.uniform_filter(m * self.pinned, 2 * half + 1) for m in self._drawn_moments(self.smooth)
+                ndimage.uniform_filter(m * self.fixed, 2 * half + 1) for m in self._drawn_moments(self.smooth)
             )
             number = np.maximum(number, 1e-9)
             plain = np.sqrt(np.maximum(squares / number - (total / number) ** 2, STEP["corrected"] ** 2))
-            sigma[self.pinned] = plain[self.pinned]
+            sigma[self.fixed] = plain[self.fixed]
         return sigma
 
     def _between(self, histograms: UInt16) -> np.float32:
@@ -164,17 +171,17 @@ class BackgroundFit:
 
         Wet ones don't count, for the bright half alone is looked at: 95 % of half a normal distribution lie within 1.96 σ.
         """
-        level, _, count = settle_windows(histograms, np.ones(self.smooth.shape, np.bool_), 0)
-        bright = level[(count >= ENOUGH) & (level > 0.0) & ~self.pinned]
+        level, _, count = window_statistics(histograms, np.ones(self.smooth.shape, np.bool_), 0)
+        bright = level[(count >= ENOUGH) & (level > 0.0) & ~self.fixed]
         return np.float32(np.percentile(bright, 95.0) / 1.96 if len(bright) >= ENOUGH else 0.0)
 
     def _histograms(self) -> UInt16:
-        return tile_histograms(self.picture.state, self.picture.level, self.lining > 0, *self.parts, self.every)
+        return Residuals(self.picture, self.level, self.lining > 0, self.every).of_tiles()
 
     @property
-    def _plain(self) -> tuple[UInt8, Int16, Bool]:
-        """State, level and the tiles that nothing sets off."""
-        return self.picture.state, self.picture.level, (self.lining > 0) & ~self.odd
+    def _plain(self) -> Bool:
+        """Tiles with lining that nothing sets off."""
+        return (self.lining > 0) & ~self.outlying
 
     def _drawn_moments(self, smooth: Single) -> tuple[Float, Float, Float]:
         """Of the lining pixels in drawn regions, by tiles: number, sum and squares of what they show beyond the model.
@@ -184,9 +191,8 @@ class BackgroundFit:
         tile, shape = self.tile, self.smooth.shape
         moments = np.zeros((3, *shape))
         for columns, mask in mask_of_polygons(self.grid, self.drawn):
-            row, column = np.nonzero(mask & (self.picture.state[:, columns] == 1))
-            level = np.empty(mask.shape, np.float32)
-            fill_levels(self.base, self.rings, self.bands, smooth, self.tile, 0, columns.start, level)
+            row, column = np.nonzero(mask & (self.picture.state[:, columns] == PixelState.LINING))
+            level = replace(self.level, smooth=smooth).levels(slice(0, self.grid.rows), columns)
             beyond = self.picture.level[:, columns][row, column] * STEP["corrected"] - level[row, column]
             where = row // tile * shape[1] + (column + columns.start) // tile
             for k in range(3):
@@ -199,44 +205,35 @@ def _odd(length: float) -> int:
     return 2 * int(length / 2) + 1
 
 
-@njit(cache=True, nogil=True)
-def _sample(state: UInt8, level: Int16, every: int) -> Int16:  # pragma: no cover - compiled
-    """Level of every n-th lining pixel."""
-    count = 0
-    for i in range(state.shape[0]):
-        for j in range(state.shape[1]):
-            count += state[i, j] == 1
-    kept = np.empty(count // every + 1, np.int16)
-    seen, held = 0, 0
-    for i in range(state.shape[0]):
-        for j in range(state.shape[1]):
-            if state[i, j] == 1:
-                if seen % every == 0:
-                    kept[held] = level[i, j]
-                    held += 1
-                seen += 1
-    return kept[:held]
+def _sample(state: UInt8, level: Int16, every: int) -> Int16:
+    """Level of every n-th lining pixel, row by row."""
+    kept, seen = [], 0
+    for row in range(len(state)):
+        lining = np.flatnonzero(state[row] == PixelState.LINING)
+        kept.append(level[row, lining[-seen % every :: every]])
+        seen += len(lining)
+    return np.concatenate(kept)
 
 
-@njit(cache=True, nogil=True)
-def _lining(state: UInt8, tile: int, out: Int32) -> Int32:  # pragma: no cover - compiled
-    """Lining pixels of each tile."""
-    for i in range(state.shape[0]):
-        for t in range(out.shape[1]):
-            held = np.int32(0)
-            for j in range(t * tile, (t + 1) * tile):
-                held += np.int32(state[i, j] == 1)
-            out[i // tile, t] += held
-    return out
+def _lining_pixels(state: UInt8, tile: int) -> Int64:
+    """Lining pixels of each tile (tiles down, tiles along)."""
+    tiles = state.shape[1] // tile
+    return np.array(
+        [
+            count_in_columns(state[top : top + tile, : tiles * tile] == PixelState.LINING).reshape(tiles, tile).sum(axis=1)
+            for top in range(0, len(state), tile)
+        ]
+    )
 
 
-@njit(cache=True, nogil=True)
-def _running_median(values: Single, half: int) -> Single:  # pragma: no cover - compiled
+def _running_median(values: Single, half: int) -> Single:
     """Median of the known values (not NaN) within so many places; NaN where there are none."""
-    out = np.full(len(values), np.float32(np.nan))
-    for j in range(len(values)):
-        about = values[max(j - half, 0) : j + half + 1]
-        known = about[~np.isnan(about)]
-        if len(known):
-            out[j] = np.median(known)
+    padded = np.pad(values, half, constant_values=np.nan)
+    size, out = 2 * half + 1, np.empty_like(values)
+    for start in range(0, len(values), max(1, VALUES // size)):
+        part = padded[start : start + max(1, VALUES // size) + 2 * half]
+        about = np.sort(np.lib.stride_tricks.sliding_window_view(part, size), axis=1)  # NaNs come last
+        known = np.count_nonzero(~np.isnan(about), axis=1)
+        middle = (np.take_along_axis(about, k[:, None], axis=1)[:, 0] for k in (np.maximum(known - 1, 0) // 2, known // 2))
+        out[start : start + len(about)] = sum(middle) / 2
     return out

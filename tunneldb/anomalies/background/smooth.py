@@ -6,8 +6,9 @@ import numpy as np
 from scipy import ndimage
 
 from tunneldb.arrays import Bool, Float, Single
+from tunneldb.robust import MAD_TO_SIGMA
 
-ASIDE = 3.0
+LIMIT = 3.0
 """A tile stands out when it differs by so many standard deviations of the tiles at like arcs."""
 
 BAND = 4
@@ -29,45 +30,45 @@ FEW = 20
 """So many tiles tell by how much they differ."""
 
 
-def slow(level: Single, before: Single, spread: float, pinned: Bool) -> tuple[Single, Bool]:
+def smooth_level(level: Single, before: Single, spread: float, fixed: Bool) -> tuple[Single, Bool]:
     """Follow what changes slowly, and nothing that is set off by a sharp edge.
 
     Dry lining differs from place to place as much towards dark as towards bright, and wet lining is only ever darker. So
     the brighter half of the tiles at like arcs tells by how much tiles may differ (at least ``spread``). Tiles that stand
-    out in one piece are followed when their rim is soft: soot fades over metres, a leak or a patch ends within a
+    out in one piece are followed when their boundary is soft: soot fades over metres, a leak or a patch ends within a
     decimetre. Otherwise the level about them is laid over them.
 
     Parameters
     ----------
     level : (tiles down, tiles along) float32 array
-        Level of dry lining in each tile beyond base, rings and bands, dB; NaN where it is unknown.
+        Level of the background in each tile beyond base, rings and bands, dB; NaN where it is unknown.
     before : (tiles down, tiles along) float32 array
         What is known already to change slowly, dB; what is found is added to it.
     spread : float
-        Standard deviation of the pixels of dry lining, dB.
-    pinned : (tiles down, tiles along) bool array
+        Standard deviation of the pixels of the background, dB.
+    fixed : (tiles down, tiles along) bool array
         Tiles whose level is known, and kept.
 
     Returns
     -------
     smooth : (tiles down, tiles along) float32 array
         dB; 0 everywhere if nothing is known.
-    odd : (tiles down, tiles along) bool array
-        Tiles set off by a sharp edge; pinned ones too.
+    outlying : (tiles down, tiles along) bool array
+        Tiles set off by a sharp edge; fixed ones too.
     """
     known = np.isfinite(level)
-    odd = _odd(level, known, spread)
+    outlying = _outlying(level, known, spread)
     # Soot that comes and goes hides leaks until it is taken off.
-    about = ndimage.uniform_filter(fill(np.where(odd | pinned, np.nan, level)), WIDE, mode="nearest")
-    odd |= _odd(level - about, known & ~odd, spread)
-    rest = fill(np.where(odd | pinned, np.nan, level - before))
-    smooth = before + ndimage.uniform_filter(ndimage.median_filter(rest, SMOOTH, mode="nearest"), 3, mode="nearest")
-    smooth[pinned] = level[pinned]
-    return smooth.astype(np.float32), odd
+    about = ndimage.uniform_filter(extrapolate(np.where(outlying | fixed, np.nan, level)), WIDE, mode="nearest")
+    outlying |= _outlying(level - about, known & ~outlying, spread)
+    residual = extrapolate(np.where(outlying | fixed, np.nan, level - before))
+    smooth = before + ndimage.uniform_filter(ndimage.median_filter(residual, SMOOTH, mode="nearest"), 3, mode="nearest")
+    smooth[fixed] = level[fixed]
+    return smooth.astype(np.float32), outlying
 
 
-def fill(values: Single) -> Single:
-    """Fill unknown tiles (NaN) with the mean of known ones in ever larger windows; 0 where nothing is known at all."""
+def extrapolate(values: Single) -> Single:
+    """Give unknown tiles (NaN) the mean of known ones in ever larger windows; 0 where nothing is known at all."""
     out = np.asarray(values, dtype=np.float32).copy()
     known = np.isfinite(out)
     if not known.any():
@@ -84,15 +85,15 @@ def fill(values: Single) -> Single:
     return out
 
 
-def _odd(level: Single, free: Bool, spread: float) -> Bool:
-    """Tiles that stand out in pieces with a sharp rim, and those that lie partly in them."""
+def _outlying(level: Single, free: Bool, spread: float) -> Bool:
+    """Tiles that stand out in pieces with a sharp boundary, and those that lie partly in them."""
     limit = _limits(level, free, spread)
-    odd = np.zeros(level.shape, np.bool_)
+    outlying = np.zeros(level.shape, np.bool_)
     for sign in (1.0, -1.0):
         with np.errstate(invalid="ignore"):
             out = free & (sign * level > limit[:, None])
-        odd |= _sharp(level, out)
-    grown: Bool = ndimage.binary_dilation(odd, np.ones((3, 3), np.bool_))
+        outlying |= _sharp(level, out)
+    grown: Bool = ndimage.binary_dilation(outlying, np.ones((3, 3), np.bool_))
     return grown
 
 
@@ -104,27 +105,26 @@ def _limits(level: Single, used: Bool, spread: float) -> Float:
         bright = level[about][used[about]]
         bright = bright[bright > 0.0]
         if len(bright) >= FEW:
-            limit[row] = ASIDE * 1.4826 * float(np.median(bright))
-    rest = np.nanmedian(limit) if np.isfinite(limit).any() else 0.0
-    return np.maximum(np.where(np.isfinite(limit), limit, rest), spread)
+            limit[row] = LIMIT * MAD_TO_SIGMA * float(np.median(bright))
+    usual = np.nanmedian(limit) if np.isfinite(limit).any() else 0.0
+    return np.maximum(np.where(np.isfinite(limit), limit, usual), spread)
 
 
 def _sharp(level: Single, out: Bool) -> Bool:
-    """Of tiles that stand out from the level, those in pieces whose rim is sharp; pieces without a rim are."""
+    """Of tiles that stand out from the level, those in pieces whose boundary is sharp; pieces without one are."""
     pieces, count = ndimage.label(out)
     if not count:
         return out
-    rim = out & ndimage.binary_dilation(np.isfinite(level) & ~out)
-    steep = (_span(level, EDGE)[rim] / np.maximum(_span(level, ABOUT)[rim], 1e-6)).astype(np.float64)
-    part = ndimage.labeled_comprehension(steep, pieces[rim], np.arange(1, count + 1), np.median, float, 1.0)
+    boundary = out & ndimage.binary_dilation(np.isfinite(level) & ~out)
+    steep = (_range(level, EDGE)[boundary] / np.maximum(_range(level, ABOUT)[boundary], 1e-6)).astype(np.float64)
+    part = ndimage.labeled_comprehension(steep, pieces[boundary], np.arange(1, count + 1), np.median, float, 1.0)
     sharp: Bool = np.concatenate([[False], part > SHARP])[pieces]
     return sharp
 
 
-def _span(level: Single, size: int) -> Single:
+def _range(level: Single, size: int) -> Single:
     """By how much known tiles differ in windows of so many tiles to a side."""
     known = np.isfinite(level)
     highest = ndimage.maximum_filter(np.where(known, level, -np.inf), size, mode="nearest")
     lowest = ndimage.minimum_filter(np.where(known, level, np.inf), size, mode="nearest")
-    span: Single = highest - lowest
-    return span
+    return highest - lowest

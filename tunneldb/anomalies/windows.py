@@ -1,0 +1,76 @@
+"""Counts of pixels in windows and in columns, block by block of the rows of an image."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeVar
+
+import numpy as np
+
+from tunneldb.arrays import Bool, Int64, UInt8, UInt16
+from tunneldb.raster.pixel_state import PixelState
+
+Counts = TypeVar("Counts", UInt8, UInt16)
+
+ROWS = 64
+"""Rows that are worked on at a time: what is made of them stays in a processor's cache."""
+
+
+def row_blocks(count: int, half: int) -> Iterator[tuple[slice, slice]]:
+    """Blocks of so many rows, and the rows of each with up to ``half`` more to either side."""
+    size = max(ROWS, 2 * half)
+    for top in range(0, count, size):
+        stop = min(top + size, count)
+        yield slice(top, stop), slice(max(top - half, 0), min(stop + half, count))
+
+
+def on_lining(state: UInt8) -> Bool:
+    """Which pixels hold points on lining, set back in a recess or not."""
+    lining: Bool = (state == PixelState.LINING) | (state == PixelState.RECESS)
+    return lining
+
+
+def count_about(mask: Bool, rows: slice, about: slice, half: int) -> UInt16:
+    """Count the pixels of a mask in the square about each pixel.
+
+    Parameters
+    ----------
+    mask : (m, columns) bool array
+        Rows ``about`` of an image, beyond which nothing counts.
+    rows, about : slice
+        Rows to be counted about, and those of the mask, as `row_blocks` gives them.
+    half : int
+        The square reaches so many pixels to either side, at most 127.
+
+    Returns
+    -------
+    (n, columns) uint16 array
+    """
+    size, above = 2 * half + 1, half - (rows.start - about.start)
+    held = np.zeros((rows.stop - rows.start + 2 * half, mask.shape[1]), np.uint8)
+    held[above : above + len(mask)] = mask
+    columns = np.zeros((rows.stop - rows.start, mask.shape[1] + 2 * half), np.uint16)
+    columns[:, half : half + mask.shape[1]] = _sum_along(held, size)
+    # Of the transposed image, so that one function does for both axes.
+    return _sum_along(columns.T, size).T
+
+
+def count_in_columns(mask: Bool) -> Int64:
+    """Pixels of each column of a mask (rows, columns)."""
+    counts = np.zeros(mask.shape[1], np.int64)
+    for top in range(0, len(mask), 255):  # as many as a byte can count
+        counts += np.add.reduce(mask[top : top + 255].view(np.uint8), axis=0, dtype=np.uint8)
+    return counts
+
+
+def _sum_along(values: Counts, size: int) -> Counts:
+    """Sum of each value and the next ``size`` - 1 (even) along the first axis, from sums of 1, 2, 4 … of them."""
+    count = len(values) - size + 1
+    total, at, power = values[:count].copy(order="K"), 1, 1
+    while 2 * power <= size:
+        values = values[:-power] + values[power:]
+        power *= 2
+        if size & power:
+            total += values[at : at + count]
+            at += power
+    return total
