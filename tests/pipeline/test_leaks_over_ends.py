@@ -18,7 +18,7 @@ from tunneldb.anomalies import detect as detection
 from tunneldb.anomalies.background.contrast import contrast_image
 from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
 from tunneldb.anomalies.regions import Region, RegionProperties
-from tunneldb.geometry.section_outliers import SectionOutliers
+from tunneldb.geometry.section_outliers import MOST, SectionOutliers
 from tunneldb.pipeline import calibration as radiometry
 from tunneldb.pipeline import detect as job
 from tunneldb.pipeline.parameters import settings
@@ -103,7 +103,7 @@ def uncut(sections: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> list
     with Accumulator(grid) as image:
         rasterize(observer, files, image, ROUGHNESS.sigma, lambda share: None)
         picture = lining_image(
-            image, observer.floor, SectionOutliers.of(surface), values["appendage.distance"], lambda window: None
+            image, observer.floor, SectionOutliers.of(surface, MOST), values["appendage.distance"], lambda window: None
         )
     dry = map_background(picture)
     mean, spread = dry.mean, dry.spread

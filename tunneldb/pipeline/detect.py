@@ -13,7 +13,7 @@ from tunneldb.anomalies.background.level_map import map_background
 from tunneldb.anomalies.coverage import measure_coverage
 from tunneldb.anomalies.detect import find_anomalies
 from tunneldb.errors import UserError
-from tunneldb.geometry.section_outliers import SectionOutliers
+from tunneldb.geometry.section_outliers import MOST, SectionOutliers
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.calibration import calibrate, dry_sigma, find_radiometer
@@ -75,7 +75,9 @@ def detect(
         observer, view, roughness = known.observer, known.view, known.roughness
         counts = _gather(observer, files, image, roughness.sigma, progress)
         images = ImageStore(conn, survey, grid, KINDS)
-        picture = lining_image(image, observer.floor, SectionOutliers.of(surface), values["appendage.distance"], images.save)
+        picture = lining_image(
+            image, observer.floor, SectionOutliers.of(surface, MOST), values["appendage.distance"], images.save
+        )
     dry_regions = load_regions(conn, survey, km, "dry")
     dry = map_background(picture, dry_regions)
     darker = contrast_image(picture, dry)
