@@ -285,8 +285,8 @@ def _project(
                 dx, dy, dz = position_at(trajectory, track, t, moment)
             else:
                 if station < 0 or scan_id[k] != scan:
-                    scan = scan_id[k]
-                    station, stop_at = 0, known_scans.shape[0]
+                    scan = np.int64(scan_id[k])
+                    station, stop_at = np.int64(0), np.int64(known_scans.shape[0])
                     while station < stop_at:
                         middle = (station + stop_at) >> 1
                         if known_scans[middle] < scan:
@@ -294,7 +294,7 @@ def _project(
                         else:
                             stop_at = middle
                     if station == known_scans.shape[0] or known_scans[station] != scan:
-                        station = -1
+                        station = np.int64(-1)
                 if station < 0:
                     lost += 1
                     continue
