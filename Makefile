@@ -3,7 +3,7 @@
 # make test   lint, types and all tests, against the wheel as a user would install it
 # make faults 100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
 # make docs   the documentation as a site, in ./site
-# make bench  the figures of the README and the docs
+# make bench  the main figures of docs/figures.md
 # Each installs what it lacks: PostgreSQL with PostGIS by apt, and a virtual environment in .venv.
 
 PYTHON ?= python3

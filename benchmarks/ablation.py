@@ -103,8 +103,8 @@ def corrected_by(law: str) -> list[Replacement]:
     """Intensity left raw, or corrected by Lambert's law."""
     calibrate, loss = stage.calibrate, gather.incidence_db
 
-    def raw(*arguments: Any) -> Any:
-        known = calibrate(*arguments)
+    def raw(*arguments: Any, **options: Any) -> Any:
+        known = calibrate(*arguments, **options)
         radiometer = replace(known.observer.radiometer, kind="reflectance", reference=None)
         return replace(known, observer=replace(known.observer, radiometer=radiometer))
 

@@ -111,7 +111,7 @@ def jump(surface: Surface, start: float, end: float) -> float:
     apart = 1e-6
     largest = 0.0
     for plane in np.arange(np.floor(start / SPACING) + 1, np.ceil(end / SPACING)) * SPACING:
-        arc_from, arc_to = surface.arc_range(float(plane))
+        arc_from, arc_to = surface.arc_range(plane)
         arcs = np.arange(arc_from + 0.05, arc_to - 0.05, 0.05)
         before = surface.to_space(np.full_like(arcs, plane - apart), arcs, np.zeros_like(arcs))
         after = surface.to_space(np.full_like(arcs, plane + apart), arcs, np.zeros_like(arcs))

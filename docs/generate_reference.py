@@ -239,7 +239,7 @@ def generate() -> None:
         admin.execute(sql.SQL("CREATE DATABASE {}").format(name))
         try:
             with open_connection(make_conninfo(server, dbname=f"tunneldb_reference_{os.getpid()}")) as conn:
-                install(conn)
+                install(conn, STAGES)
                 for page, write in PAGES.items():
                     (FOLDER / page).write_text(write(conn), encoding="utf-8")
         finally:

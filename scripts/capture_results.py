@@ -13,6 +13,7 @@ import os
 import shutil
 import struct
 import subprocess
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
@@ -21,6 +22,21 @@ from typing import Any
 import numpy as np
 import psycopg
 from psycopg import sql
+
+csv.field_size_limit(sys.maxsize)
+
+
+QUERIES = {
+    "waterproof": "SELECT w.* FROM tunnel_api.survey s, tunnel_api.waterproof_class('s', s.chainage_from, s.chainage_to) w",
+    "sections": "SELECT c, a.* FROM tunnel_api.survey s, generate_series(ceil(s.chainage_from)::int, s.chainage_to::int, 7) c, "
+    "tunnel_api.section_at(s.id, c) a",
+    "unroll": "SELECT v.n, u.* FROM tunnel_api.axis_vertex v, "
+    "tunnel_api.unroll(v.survey_id, ST_Translate(v.geom, 1, -2, 0.5)) u ORDER BY v.n",
+    "roll": "SELECT v.n, ST_AsEWKT(r) FROM tunnel_api.axis_vertex v, "
+    "tunnel_api.roll(v.survey_id, v.chainage + 3, 2.5, 0.1) r ORDER BY v.n",
+    "rings": "SELECT r.* FROM tunnel_api.survey s, tunnel_api.ring_statistics('s', 10, s.chainage_from) r",
+}
+"""Functions at places of the survey, with all digits."""
 
 
 class Scene:
@@ -32,10 +48,12 @@ class Scene:
         Folder of the scene; emptied.
     tunneldb : Path
         The program.
+    scans : Path or None
+        Folder of another capture, whose simulated scans are taken in place of new ones.
     """
 
-    def __init__(self, folder: Path, tunneldb: Path) -> None:
-        self.folder, self.tunneldb = folder, tunneldb
+    def __init__(self, folder: Path, tunneldb: Path, scans: Path | None = None) -> None:
+        self.folder, self.tunneldb, self.former = folder, tunneldb, scans and scans / folder.name
         shutil.rmtree(folder, ignore_errors=True)
         for name in ("scan", "out", "said", "tables"):
             (folder / name).mkdir(parents=True)
@@ -49,9 +67,17 @@ class Scene:
         if done.returncode not in codes:
             raise SystemExit(f"{self.folder.name}: {' '.join(command)}\n{done.stdout}{done.stderr}")
         if said:
-            code = "" if said.endswith("json") else f"exit {done.returncode}\n"
-            (self.folder / "said" / said).write_text(done.stdout + code)
+            rest = "" if said.endswith("json") else (done.stderr if done.returncode else "") + f"exit {done.returncode}\n"
+            (self.folder / "said" / said).write_text(done.stdout + rest)
         return done.stdout
+
+    def simulate(self, *words: object) -> None:
+        """Make the scan in the folder ``scan``, or copy it from the other capture."""
+        if self.former is None:
+            self.run("simulate", "scan", *words, said="simulate.txt")
+        else:
+            shutil.copytree(self.former / "scan", self.folder / "scan", dirs_exist_ok=True)
+            shutil.copyfile(self.former / "said" / "simulate.txt", self.folder / "said" / "simulate.txt")
 
     def query(self, said: str, statement: str) -> None:
         """Run an SQL statement; keep its rows."""
@@ -84,13 +110,14 @@ class Scene:
             "axis.txt": ["axis", "s"],
             "axis.json": ["axis", "s", "-o", "out/axis.csv", "--json"],
             "unroll.json": ["unroll", "s", "scan/points.csv", "-o", "out/unrolled.csv", "--json"],
-            "roll.json": ["unroll", "s", "out/unrolled.csv", "--inverse", "-o", "out/rolled.csv", "--json"],
         }.items():  # fmt: skip
             self.run(*words, said=name)
-        self.query("waterproof.txt", "SELECT w.* FROM tunnel_api.survey s, tunnel_api.waterproof_class('s', s.chainage_from,"
-                   " s.chainage_to) w")  # fmt: skip
-        self.query("sections.txt", "SELECT c, a.* FROM tunnel_api.survey s, generate_series(ceil(s.chainage_from)::int,"
-                   " s.chainage_to::int, 7) c, tunnel_api.section_at(s.id, c) a")  # fmt: skip
+        rows = list(csv.DictReader((self.folder / "out" / "unrolled.csv").open()))
+        inside = [f"{row['chainage']},{row['arc']},{row['offset']}\n" for row in rows if row["chainage"]]
+        (self.folder / "out" / "inside.csv").write_text("chainage,arc,offset\n" + "".join(inside))
+        self.run("unroll", "s", "out/inside.csv", "--inverse", "-o", "out/rolled.csv", said="rolled.txt")
+        for name, query in QUERIES.items():
+            self.query(f"{name}.txt", query)
 
     def export(self) -> None:
         """Write all kinds of files."""
@@ -107,11 +134,11 @@ class Scene:
 
 def demo(scene: Scene) -> None:
     """Take the scan of scripts/demo.sh through all stages."""
-    scene.run("simulate", "scan", "--preset", "demo", "--name", "demo", "--lining", "segments", "--soot", 2, "--paint", 4,
-              "--patches", 4, "--joint-leaks", 2, "--drips", said="simulate.txt")  # fmt: skip
+    scene.simulate("--preset", "demo", "--name", "demo", "--lining", "segments", "--soot", 2, "--paint", 4,
+                   "--patches", 4, "--joint-leaks", 2, "--drips")  # fmt: skip
     scene.register(25830, 12300, "--trajectory", "scan/demo.trajectory.csv", "--reference", "scan/demo.reference.csv",
                    "--intensity", "Amplitude", "--intensity-kind", "amplitude")  # fmt: skip
-    scene.run("load", "s", *scene.scans(), said="load.txt")
+    scene.run("load", "s", *scene.scans(), "--json", said="load.json")
     scene.run("run", "s", said="run.txt")
     scene.look()
     scene.export()
@@ -121,6 +148,9 @@ def demo(scene: Scene) -> None:
               4765000, 642, said="intensity-file.txt")  # fmt: skip
     scene.run("leaks", "s", "--from", "12+330", "--to", "12+400", "--clock", "10-2", said="leaks-crown.txt")
 
+
+DESIGNS = {"j-landxml.xml": 6676, "indot-twin-branch.xml": 6458, "indot-twin-branch.ifc": 6458, "aplitop-3.ifc": 25830}
+"""Design alignments among the data of the tests, with the coordinate system in which each is read."""
 
 EDITS = """
 UPDATE tunnel_api.leak SET review = 'confirmed', remark = 'drips' WHERE id = (SELECT min(id) FROM tunnel_api.leak);
@@ -133,16 +163,16 @@ SELECT s.id, 'dry', ST_MakeEnvelope(12975, -2, 12979, 2) FROM tunnel_api.survey 
 
 def static(scene: Scene) -> None:
     """Take a dirty tunnel, scanned from stations, through all stages; edit by hand and run again what is stale."""
-    scene.run("simulate", "scan", "--name", "dirty", "--length", 60, "--section", "horseshoe", "--scanner", "static",
+    scene.simulate("--name", "dirty", "--length", 60, "--section", "horseshoe", "--scanner", "static",
               "--station-spacing", 12, "--angular-step", 0.18, "--start-chainage", 12970, "--slope", 2, "--radius", 300,
               "--lining", "cast", "--ring", 8, "--ring-step", 0.003, "--roughness", 10, "--relief", 0.002, "--beam", 0.3,
               "--leaks", 8, "--leak-area", 0.1, 2.5, "--leak-drop", 1.5, 8, "--leak-edge", 0.03, "--joint-leaks", 3,
               "--niche-leaks", 1, "--drips", "--soot", 2, "--grime", 2, "--patches", 5, "--paint", 5, "--clutter", 3,
               "--people", 2, "--equipment", 3, "--bollards", 1, "--globes", 2, "--spheres", 6, "--free-cables", 1,
-              "--ballast", 0.02, "--sleepers", "--catenary", "--seed", 5, said="simulate.txt")  # fmt: skip
+              "--ballast", 0.02, "--sleepers", "--catenary", "--seed", 5)  # fmt: skip
     scene.register(25830, 12970, "--stations", "scan/dirty.stations.csv", "--reference", "auto", "--intensity", "Amplitude",
                    "--intensity-kind", "amplitude")  # fmt: skip
-    scene.run("load", "s", *scene.scans(), said="load.txt")
+    scene.run("load", "s", *scene.scans(), "--json", said="load.json")
     scene.run("run", "s", said="run.txt")
     scene.run("spheres", "s", "--radius", 0.0725, "--control", "scan/dirty.spheres.csv", "--report", "out/spheres.md",
               said="spheres.txt")  # fmt: skip
@@ -164,7 +194,7 @@ def ringo(scene: Scene, source: Path) -> None:
     for name in ("ringo.laz", "ringo.axis.csv", "ringo.trajectory.csv"):
         shutil.copyfile(source / name, scene.folder / "scan" / name)
     scene.register(3794, 511746.75, "--trajectory", "scan/ringo.trajectory.csv", "--intensity-kind", "none")
-    scene.run("load", "s", *scene.scans(), said="load.txt")
+    scene.run("load", "s", *scene.scans(), "--json", said="load.json")
     scene.run("run", "s", said="run.txt")
     scene.look()
     scene.export()
@@ -173,9 +203,8 @@ def ringo(scene: Scene, source: Path) -> None:
 
 def batch(scene: Scene) -> None:
     """Take three kilometres through a batch of two workers, at low density; then give them a stationing of their own."""
-    scene.run("simulate", "scan", "--name", "long", "--length", 3000, "--radius", 4000, "--s-curve", "--slope", 1.7,
-              "--scanner", "profiler", "--density", 25, "--no-truth", "--leaks", 120, "--leak-area", 2, 20,
-              said="simulate.txt")  # fmt: skip
+    scene.simulate("--name", "long", "--length", 3000, "--radius", 4000, "--s-curve", "--slope", 1.7,
+              "--scanner", "profiler", "--density", 25, "--no-truth", "--leaks", 120, "--leak-area", 2, 20)  # fmt: skip
     scene.register(25830, 0, "--trajectory", "scan/long.trajectory.csv", "--reference", "scan/long.reference.csv",
                    "--intensity", "Amplitude", "--intensity-kind", "amplitude")  # fmt: skip
     scene.run("batch", "s", *scene.scans(), "--workers", 2, "--density", "all", "--set", "image.pixel=0.25")
@@ -187,6 +216,24 @@ def batch(scene: Scene) -> None:
     scene.run("leaks", "s", "--geometry", "3d", "-o", "out/leaks.gpkg")
     scene.run("image", "s", "--km", "1", "-o", "out/images")
     scene.run("export", "s", "-o", "out/s.gpkg")
+
+
+def files(scene: Scene, real: Path | None) -> None:
+    """Read the design alignments of the tests, and the real scan files each by itself."""
+    scene.run("init")
+    tests = Path(__file__).resolve().parent.parent / "tests"
+    for name, srid in DESIGNS.items():
+        shutil.copyfile(next(tests.rglob(name)), scene.folder / "scan" / name)
+        scene.run("tunnel", "add", name, "--srid", srid, "--axis", f"scan/{name}", said=f"add-{name}.txt", codes=(0, 2))
+    scene.run("tunnel", "stationing", "j-landxml.xml", "--show", said="stationing.txt")
+    scene.run("tunnel", "list", said="tunnels.txt")
+    for name in ("pump.e57", "lone-star.laz", "extra-bytes.laz"):
+        if real is not None and (real / name).exists():
+            shutil.copyfile(real / name, scene.folder / "scan" / name)
+            scene.run("ground", f"scan/{name}", "-o", f"out/{name}.laz", said=f"ground-{name}.txt")
+            scene.run("intensity", f"scan/{name}", "--intensity", "intensity", "--intensity-kind", "linear",
+                      "--scanner", 0, 0, 1.5, "-o", f"out/{name}.png", said=f"intensity-{name}.txt",
+                      codes=(0, 1, 2))  # fmt: skip
 
 
 RELATIONS = """
@@ -205,13 +252,12 @@ SELECT n.nspname, c.relname,
 CATALOG = """
 WITH own AS (SELECT oid, nspname FROM pg_namespace WHERE nspname IN ('tunnel', 'tunnel_audit', 'tunnel_api', 'tunnel_queue'))
 SELECT 'column' AS kind, a.attrelid::regclass || '.' || a.attname AS name,
-       format_type(a.atttypid, a.atttypmod) || ' ' || a.attnotnull || coalesce(' ' || pg_get_expr(d.adbin, d.adrelid), '')
-       AS what,
+       concat_ws(' ', format_type(a.atttypid, a.atttypmod), a.attnotnull, pg_get_expr(d.adbin, d.adrelid)) AS what,
        col_description(a.attrelid, a.attnum) AS comment
   FROM pg_attribute a JOIN pg_class c ON c.oid = a.attrelid JOIN own ON own.oid = c.relnamespace
   LEFT JOIN pg_attrdef d ON d.adrelid = a.attrelid AND d.adnum = a.attnum
  WHERE a.attnum > 0 AND c.relkind IN ('r', 'p', 'v')
-UNION ALL SELECT 'view', c.oid::regclass::text, pg_get_viewdef(c.oid) || ' ' || coalesce(c.relacl::text, ''),
+UNION ALL SELECT 'view', c.oid::regclass::text, concat_ws(' ', pg_get_viewdef(c.oid), c.relacl),
        obj_description(c.oid, 'pg_class') FROM pg_class c JOIN own ON own.oid = c.relnamespace WHERE c.relkind = 'v'
 UNION ALL SELECT 'constraint', k.conrelid::regclass || '.' || k.conname, pg_get_constraintdef(k.oid), NULL
   FROM pg_constraint k JOIN own ON own.oid = k.connamespace
@@ -220,9 +266,9 @@ UNION ALL SELECT 'index', indexrelid::regclass::text, pg_get_indexdef(indexrelid
 UNION ALL SELECT 'trigger', t.tgrelid::regclass || '.' || t.tgname, pg_get_triggerdef(t.oid),
        obj_description(t.oid, 'pg_trigger')
   FROM pg_trigger t JOIN pg_class c ON c.oid = t.tgrelid JOIN own ON own.oid = c.relnamespace WHERE NOT t.tgisinternal
-UNION ALL SELECT 'function', p.oid::regprocedure::text, pg_get_function_arguments(p.oid) || ' -> '
-       || coalesce(pg_get_function_result(p.oid), '') || ' ' || p.provolatile || p.proparallel || p.prosecdef || p.proisstrict
-       || coalesce(p.proacl::text, ''), obj_description(p.oid, 'pg_proc') FROM pg_proc p JOIN own ON own.oid = p.pronamespace
+UNION ALL SELECT 'function', p.oid::regprocedure::text, concat_ws(' ', pg_get_function_arguments(p.oid), '->',
+       pg_get_function_result(p.oid), p.provolatile, p.proparallel, p.prosecdef, p.proisstrict, p.proacl),
+       obj_description(p.oid, 'pg_proc') FROM pg_proc p JOIN own ON own.oid = p.pronamespace
 """
 
 

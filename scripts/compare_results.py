@@ -1,18 +1,17 @@
 #!/usr/bin/env python
-"""Captures all results of the program on four scenes, and compares two captures: before and after a change of the code.
+"""Captures all results of the program on five scenes, and compares two captures: before and after a change of the code.
 
     .venv/bin/python scripts/compare_results.py capture before --tunneldb .venv/bin/tunneldb --ringo scans
     .venv/bin/python scripts/compare_results.py compare before after
 
 Scenes: demo (as scripts/demo.sh), static (stations, dirt, target spheres, edits by hand, over the end of a kilometre), ringo (a
-real scan, where its folder is given) and batch (three kilometres by two workers). What a run of the same code changes by itself
-is named in VOLATILE, CHANGING and SAID.
+real scan, where its folder is given), batch (three kilometres by two workers) and files (design alignments and real scan files
+by themselves). What a run of the same code changes by itself is named in VOLATILE, CHANGING and SAID.
 """
 
 from __future__ import annotations
 
 import base64
-import csv
 import datetime as dt
 import json
 import re
@@ -30,7 +29,7 @@ from typing import Any
 import click
 import laspy
 import numpy as np
-from capture_results import Scene, batch, demo, dump, ringo, static
+from capture_results import Scene, batch, demo, dump, files, ringo, static
 from measure_results import (
     IDENTITIES,
     VOLATILE,
@@ -40,14 +39,17 @@ from measure_results import (
     clean_json,
     compare_tables,
     distance_of,
+    excerpt,
     gaps_of_images,
     measure,
     one_to_one,
     read_table,
-    shorten,
 )
 
+SCENES = ("demo", "static", "ringo", "batch", "files")
+
 CHANGING = (
+    (re.compile(r"(?s)(\n *2\r?\nCLASSES\r?\n).*?(?=\n *0\r?\nENDSEC)"), r"\1"),  # of DXF, in any order
     (re.compile(r"\$(TDU?CREATE|TDU?UPDATE|FINGERPRINTGUID|VERSIONGUID)\r?\n\s*\d+\r?\n.*"), r"$\1"),  # of DXF
     (re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d(:\d\d(\.\d+)?)?( ?(Z|UTC|[+-]\d\d(:?\d\d)?))?"), "TIME"),
     (re.compile(r"\{?\b[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\b\}?", re.IGNORECASE), "UUID"),
@@ -150,7 +152,7 @@ def compare_texts(findings: Findings, item: str, before: str, after: str) -> Non
     for first, second in zip_longest(*lines, fillvalue=""):
         same, greatest = distance_of(first, second)
         if not same and not gap.rows:
-            gap.example = f", as {shorten(first)} | {shorten(second)}"
+            gap.example = f", as {excerpt(first, second)}"
         gap.rows, gap.greatest = gap.rows + (not same), max(gap.greatest, greatest)
     findings.values(item, {"text": gap})
 
@@ -200,10 +202,10 @@ class Capture:
         rules = CHANGING + (SAID if path.parent.name == "said" else ())
 
         def clean(text: str) -> str:
-            text = text.replace(self.about["folder"], "FOLDER").replace(self.about["day"][scene], "DAY")
+            text = text.replace(self.about["folder"], "FOLDER")
             for pattern, word in rules:
                 text = pattern.sub(word, text)
-            return text
+            return text.replace(self.about["day"][scene], "DAY")
 
         return clean
 
@@ -244,30 +246,35 @@ def main() -> None:
 @main.command()
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
 @click.option("--tunneldb", required=True, type=click.Path(path_type=Path, exists=True), help="The program to run.")
-@click.option("--ringo", "real", envvar="RINGO", type=click.Path(path_type=Path), help="Folder of the real scan. [env: RINGO]")
-@click.option("--only", multiple=True, type=click.Choice(["demo", "static", "ringo", "batch"]), help="Only this scene.")
+@click.option("--ringo", "real", envvar="RINGO", type=click.Path(path_type=Path), help="Folder of real scans. [env: RINGO]")
+@click.option("--only", multiple=True, type=click.Choice(SCENES), help="Only this scene.")
+@click.option("--scans", type=click.Path(path_type=Path, exists=True), help="Capture of which the simulated scans are taken.")
 @click.option("--keep", is_flag=True, help="Keep the databases.")
-def capture(folder: Path, tunneldb: Path, real: Path | None, only: Sequence[str], keep: bool) -> None:
+def capture(folder: Path, tunneldb: Path, real: Path | None, only: Sequence[str], scans: Path | None, keep: bool) -> None:
     """Run the scenes, and keep all their results in FOLDER; scenes that are there are done anew."""
     folder.mkdir(parents=True, exist_ok=True)
     folder, note = folder.resolve(), folder / "capture.txt"
-    about = {"folder": str(folder), "seconds": {}, "day": {}} | (json.loads(note.read_text()) if note.exists() else {})
-    scenes = {"demo": demo, "static": static, "ringo": lambda scene: ringo(scene, real or Path()), "batch": batch}
-    for name, run in scenes.items():
+    for name in SCENES:
         if only and name not in only:
             continue
         if name == "ringo" and (real is None or not (real / "ringo.laz").exists()):
             click.echo("ringo: left out, no folder with ringo.laz is given (--ringo)")
             continue
-        scene, start = Scene(folder / name, tunneldb.absolute()), time.monotonic()
+        scene, start = Scene(folder / name, tunneldb.absolute(), scans), time.monotonic()
         try:
-            run(scene)
+            if name == "files":
+                files(scene, real)
+            elif name == "ringo" and real is not None:
+                ringo(scene, real)
+            else:
+                {"demo": demo, "static": static, "batch": batch}[name](scene)
             took = time.monotonic() - start
             dump(scene)
         finally:
             scene.run("server", "stop")
         if not keep:
             shutil.rmtree(scene.folder / "home")
+        about = {"folder": str(folder), "seconds": {}, "day": {}} | (json.loads(note.read_text()) if note.exists() else {})
         about["seconds"][name], about["day"][name] = round(took, 1), dt.datetime.now(dt.UTC).date().isoformat()
         note.write_text(json.dumps(about, indent=1))
         click.echo(f"{name}: {took:.0f} s, and {time.monotonic() - start - took:.0f} s to write its tables")
@@ -279,20 +286,22 @@ def capture(folder: Path, tunneldb: Path, real: Path | None, only: Sequence[str]
 @click.option("--only", multiple=True, help="Only this scene.")
 def compare(before: Path, after: Path, only: Sequence[str]) -> None:
     """Compare two captures; exit code 1 where anything differs."""
-    csv.field_size_limit(sys.maxsize)
     findings, sides = Findings(), (Capture(before), Capture(after))
     for scene in sorted(set().union(*(side.about["seconds"] for side in sides))):
         if only and scene not in only:
             continue
         findings.scene = scene
-        files = [side.files(scene) for side in sides]
-        for item in sorted(files[0].keys() | files[1].keys()):
-            paths = [side[item] for side in files if item in side]
+        if any(scene not in side.about["seconds"] for side in sides):
+            findings.say("differs", "all", "files", "the scene is in one capture only")
+            continue
+        captured = [side.files(scene) for side in sides]
+        for item in sorted(captured[0].keys() | captured[1].keys()):
+            paths = [side[item] for side in captured if item in side]
             if len(paths) == 1:
-                findings.say("differs", item, "file", "only before" if item in files[0] else "only after")
+                findings.say("differs", item, "file", "only before" if item in captured[0] else "only after")
             elif paths[0].read_bytes() != paths[1].read_bytes():
                 compare_files(findings, item, sides, paths)
-        click.echo(f"{scene}: {len(files[0])} files before, {len(files[1])} after")
+        click.echo(f"{scene}: {len(captured[0])} files before, {len(captured[1])} after")
     click.echo(", ".join(f"{count} {what}" for what, count in findings.count.items()))
     sys.exit(findings.count["differs"] > 0)
 

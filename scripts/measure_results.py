@@ -28,14 +28,26 @@ WIDEST = 1e-6
 
 TIMES = {
     "at", "backend_start", "created_at", "detected_at", "done_at", "drawn_at", "duration", "edited_at", "failed_at",
-    "finished_at", "heartbeat", "input_at", "last_change", "loaded_at", "read_at", "requested_at", "retry_after",
-    "reviewed_at", "seconds", "since", "started_at", "update_time",
+    "finished_at", "found_at", "heartbeat", "input_at", "last_change", "left", "loaded_at", "now", "points_per_second", "rate",
+    "read_at", "requested_at", "retry_after", "reviewed_at", "seconds", "since", "started_at", "update_time",
 }  # fmt: skip
-MACHINES = {"backend_pid", "dsn", "host", "job_id", "path", "pid", "versions", "worker", "worker_id"}
+MACHINES = {"backend_pid", "dsn", "host", "job_id", "path", "pid", "versions", "who", "worker", "worker_id"}
 VOLATILE = TIMES | MACHINES | {"checksum"}  # a LAZ file holds its day
 """Columns and keys of JSON of which only is compared whether they are NULL."""
 
-IDENTITIES = {"id", "anomaly_id", "cluster_id", "file_id", "fid", "largest_leak", "row_id", "run_id", "survey_id", "tunnel_id"}
+IDENTITIES = {
+    "id",
+    "anomaly_id",
+    "cluster_id",
+    "file_id",
+    "fid",
+    "largest_leak",
+    "row_id",
+    "run_id",
+    "section_id",
+    "survey_id",
+    "tunnel_id",
+}
 """Columns of numbers in order of insertion: said where they differ, an error only where the new ones are not one to one."""
 
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
@@ -73,13 +85,15 @@ class Findings:
     def same(self, item: str, column: str, before: Any, after: Any) -> None:
         """Print a line where two values are not the same."""
         if before != after:
-            self.say("differs", item, column, f"{shorten(before)} | {shorten(after)}")
+            self.say("differs", item, column, excerpt(before, after))
 
 
-def shorten(value: Any) -> str:
-    """Return a value as one short line."""
-    text = " ".join(str(value).split())
-    return text if len(text) <= 80 else text[:77] + "..."
+def excerpt(before: Any, after: Any) -> str:
+    """Return where two texts begin to differ, in one line."""
+    texts = [" ".join(str(value).split()) for value in (before, after)]
+    unlike = (n for n, (first, second) in enumerate(zip(*texts, strict=False)) if first != second)
+    begin = max(next(unlike, min(map(len, texts))) - 30, 0)
+    return " | ".join(("..." if begin else "") + text[begin : begin + 80] for text in texts)
 
 
 def allowed(before: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -223,7 +237,7 @@ def compare_tables(findings: Findings, item: str, before: Table, after: Table) -
             same, greatest = compare_cells(before.kinds[name], first, second)
             gap = gaps[name]
             if not same and not gap.rows:
-                gap.example = f", as {shorten(first)} | {shorten(second)}"
+                gap.example = f", as {example_of(before.kinds[name], first, second)}"
             gap.rows, gap.greatest = gap.rows + (not same), max(gap.greatest, greatest)
     findings.values(item, gaps)
 
@@ -231,6 +245,15 @@ def compare_tables(findings: Findings, item: str, before: Table, after: Table) -
 def one_to_one(pairs: set[tuple[Any, Any]]) -> bool:
     """Return whether each number before has one after, and the other way round."""
     return len({first for first, _ in pairs}) == len(pairs) == len({second for _, second in pairs})
+
+
+def example_of(kind: str, before: str, after: str) -> str:
+    """Return two cells that differ as one line."""
+    if kind == "image":
+        return f"{len(before)} | {len(after)} hexadecimal digits"
+    if kind == "geometry" and "\\N" not in (before, after):
+        return excerpt(*(shapely.to_wkt(shapely.from_wkb(cell), rounding_precision=-1) for cell in (before, after)))
+    return excerpt(before, after)
 
 
 def compare_cells(kind: str, before: str, after: str) -> tuple[bool, float]:
@@ -259,7 +282,7 @@ def raster_gaps(before: rasterio.DatasetReader, after: rasterio.DatasetReader) -
         )
     for name in said[0].keys() | said[1].keys():
         if (old := said[0].get(name)) != (new := said[1].get(name)):
-            gaps[name] = Gap(1, math.inf, f", {shorten(old)} | {shorten(new)}")
+            gaps[name] = Gap(1, math.inf, f", {excerpt(old, new)}")
     if (before.count, before.shape) == (after.count, after.shape):
         for n in range(1, before.count + 1):
             gaps[f"pixels of band {n}"] = measure(before.read(n).ravel(), after.read(n).ravel())

@@ -21,6 +21,7 @@ from support.system import missing
 
 from tunneldb.database import connect, install, open_connection
 from tunneldb.database.server import Server
+from tunneldb.pipeline.stages import STAGES
 
 pytest_plugins = ["support.example_survey"]
 
@@ -85,7 +86,7 @@ def template(server_dsn: str) -> str:
     """Name of the database that is migrated and installed, to be copied."""
     create_database(server_dsn, TEMPLATE)
     with open_connection(make_conninfo(server_dsn, dbname=TEMPLATE)) as connection:
-        install(connection)
+        install(connection, STAGES)
     return TEMPLATE
 
 

@@ -93,6 +93,35 @@ COMMENT ON FUNCTION tunnel_api.segment_plan(int, int) IS
 'The segments of one kilometre as they follow from the axis vertices: number, chainage of both planes (m, in plan), and vertex_from, vertex_to, tangent_from, tangent_to (12 numbers, tunnel''s SRID). Source: Gonçalves et al. (2012), stage 3.';
 
 
+-- Whether the planes of a segment are not those of the axis any more: a vertex at one of its ends has moved by more than 0.1 mm
+-- since it was made, or a plane has turned because of the vertex beyond, by as much there. A plane at the axis' end has no
+-- vertex beyond: it turns with the vertices of the other plane.
+-- What the neighbouring segments were made of says nothing: they may be of another kilometre, and made anew since.
+CREATE OR REPLACE FUNCTION tunnel_api.segment_moved(survey_id int, n int, segment float8[])
+RETURNS boolean
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER
+SET search_path = pg_catalog, pg_temp
+AS $$
+    WITH vertex AS MATERIALIZED (
+        SELECT v.n - $2 AS i, public.st_x(v.geom) AS x, public.st_y(v.geom) AS y, public.st_z(v.geom) AS z
+          FROM tunnel.axis_vertex v WHERE v.survey_id = $1 AND v.n BETWEEN $2 - 1 AND $2 + 2
+    )
+    SELECT EXISTS (
+        SELECT FROM vertex v
+         WHERE v.i IN (0, 1)
+           AND (v.x - $3[3 * v.i + 1]) ^ 2 + (v.y - $3[3 * v.i + 2]) ^ 2 + (v.z - $3[3 * v.i + 3]) ^ 2 > 1e-8
+    ) OR EXISTS (
+        SELECT FROM vertex a
+          JOIN vertex b ON b.i = a.i + 2
+         CROSS JOIN LATERAL (SELECT sqrt((b.x - a.x) ^ 2 + (b.y - a.y) ^ 2 + (b.z - a.z) ^ 2) AS length) c
+         WHERE (b.x - a.x - c.length * $3[3 * a.i + 10]) ^ 2 + (b.y - a.y - c.length * $3[3 * a.i + 11]) ^ 2
+               + (b.z - a.z - c.length * $3[3 * a.i + 12]) ^ 2 > 1e-8
+    )
+$$;
+COMMENT ON FUNCTION tunnel_api.segment_moved(int, int, float8[]) IS
+'Whether the axis has moved under a segment since it was made, so that its planes are others now. n: its number; segment: vertex_from, vertex_to, tangent_from, tangent_to, 3 numbers each.';
+
+
 -- Writes the segments of a kilometre to tunnel.segment, replacing those there; returns how many.
 CREATE OR REPLACE FUNCTION tunnel_api.segment_build(survey_id int, km int)
 RETURNS int

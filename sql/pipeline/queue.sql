@@ -19,8 +19,8 @@ COMMENT ON FUNCTION tunnel_api.queue_lock(integer) IS
 --            asked to try again (goal.retry_after); or, for load, a file that touches the kilometre failed
 --   blocked  an earlier stage of the kilometre failed
 --   empty    the kilometre holds no points, and awaits none
--- A neighbour that is failed, blocked or empty, or of which the stage is not wanted, is not waited for. Six stages reach no
--- farther than five kilometres: a range is judged with six more on both sides.
+-- A neighbour that is failed, blocked or empty, or of which the stage is not wanted, is not waited for. Stages reach no farther
+-- than as many kilometres as there are stages after the first: a range is judged with one more than these on both sides.
 CREATE OR REPLACE FUNCTION tunnel_api.queue_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS TABLE (km integer, step integer, stage text, state text, message text)
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000
@@ -28,12 +28,23 @@ SET search_path = pg_catalog, pg_temp
 SET jit = off
 SET enable_nestloop = off  -- how few or many rows there are is not known when it is planned
 AS $$
-    WITH RECURSIVE goal AS (
-        SELECT g.km, array_position('{load,axis,segments,sections,ground,detect}', g.stage) AS target, g.parameters, g.retry_after
-          FROM tunnel.goal g WHERE g.survey_id = $1 AND g.km BETWEEN $2 - 6 AND $3 + 6
-    ), family (prefix, step) AS (  -- parameters by stage; load's are those of its files
-        VALUES ('axis', 2), ('section', 4), ('ground', 5), ('cluster', 5), ('lining', 6), ('image', 6), ('intensity', 6), ('appendage', 6),
-               ('leak', 6)
+    WITH RECURSIVE stage AS MATERIALIZED (  -- the stages that each waits for, by their numbers: here, and on both neighbours
+        SELECT s.step, s.name, s.parameters,
+               ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads)) AS here,
+               ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads_beside)) AS beside
+          FROM tunnel.stage s
+    ), need AS MATERIALIZED (
+        SELECT s.step, w.way, n.source
+          FROM stage s CROSS JOIN (VALUES (-1), (0), (1)) AS w (way)
+         CROSS JOIN LATERAL unnest(CASE w.way WHEN 0 THEN s.here ELSE s.beside END) AS n (source)
+    ), span AS MATERIALIZED (
+        SELECT $2 - count(*)::integer AS first, $3 + count(*)::integer AS last FROM stage
+    ), goal AS (
+        SELECT g.km, s.step AS target, g.parameters, g.retry_after
+          FROM tunnel.goal g CROSS JOIN span p JOIN stage s ON s.name = g.stage
+         WHERE g.survey_id = $1 AND g.km BETWEEN p.first AND p.last
+    ), family AS (  -- parameters by stage; load's are those of its files
+        SELECT p.prefix, s.step FROM stage s CROSS JOIN LATERAL unnest(s.parameters) AS p (prefix)
     ), wish AS (
         SELECT p.parameters, f.step, jsonb_object_agg(e.key, e.value) AS part
           FROM (SELECT DISTINCT g.parameters FROM goal g) AS p
@@ -45,7 +56,8 @@ AS $$
                min(CASE WHEN strpos(i.message, i.name) = 0 THEN format('file %s: %s', i.name, i.message) ELSE i.message END)
                    FILTER (WHERE i.failed_at IS NOT NULL) AS message
           FROM tunnel.incoming i
-         CROSS JOIN LATERAL generate_series(greatest(i.km_from, $2 - 6), least(i.km_to, $3 + 6)) AS k (km)
+         CROSS JOIN span p
+         CROSS JOIN LATERAL generate_series(greatest(i.km_from, p.first), least(i.km_to, p.last)) AS k (km)
          WHERE i.survey_id = $1 AND i.km_from IS NOT NULL  -- a file without kilometres fails none
          GROUP BY k.km
     ), job AS (
@@ -60,7 +72,7 @@ AS $$
                AND to_regclass(format('tunnel.point_s%s_km%s', $1, s.km)) IS NULL AS empty,
                CASE s.step WHEN 1 THEN s.input_at IS NOT NULL OR coalesce(f.awaited, false)
                            ELSE s.done_at IS NULL OR s.outdated OR NOT s.done_parameters @> coalesce(w.part, '{}') END AS due
-          FROM tunnel_api.stage_state($1, $2 - 6, $3 + 6) s
+          FROM tunnel_api.stage_state($1, (SELECT p.first FROM span p), (SELECT p.last FROM span p)) s
           JOIN goal g ON g.km = s.km
           LEFT JOIN wish w ON w.parameters = g.parameters AND w.step = s.step
           LEFT JOIN file f ON f.km = s.km
@@ -81,8 +93,9 @@ AS $$
         SELECT c.km, c.step FROM cell c WHERE c.due AND NOT c.hopeless
          UNION
         SELECT c.km, c.step
-          FROM open o CROSS JOIN (VALUES (-1), (0), (1)) AS way (way)
-          JOIN cell c ON c.km = o.km + way AND c.step = o.step + 1 AND NOT c.hopeless
+          FROM open o
+          JOIN need n ON n.source = o.step
+          JOIN cell c ON c.km = o.km - n.way AND c.step = n.step AND NOT c.hopeless
     ), ahead AS (
         SELECT o.km, array_agg(o.step) AS steps FROM open o GROUP BY o.km
     )
@@ -94,11 +107,12 @@ AS $$
                 WHEN c.hopeless THEN 'blocked'
                 WHEN here.steps IS NULL OR c.step <> ALL (here.steps) THEN 'done'
                 WHEN NOT c.due OR j.queueing_lock IS NOT NULL OR c.step = 1 AND c.awaited
-                  OR c.step - 1 = ANY (here.steps) OR c.step - 1 = ANY (before.steps) OR c.step - 1 = ANY (after.steps)
+                  OR here.steps && s.here OR before.steps && s.beside OR after.steps && s.beside
                 THEN 'waits'
                 ELSE 'ready' END,
            c.failure
       FROM cell c
+      JOIN stage s ON s.step = c.step
       LEFT JOIN job j ON j.queueing_lock = format('s%s.km%s', $1, c.km)
       LEFT JOIN ahead here ON here.km = c.km
       LEFT JOIN ahead before ON before.km = c.km - 1
@@ -108,11 +122,19 @@ $$;
 COMMENT ON FUNCTION tunnel_api.queue_state(integer, integer, integer) IS
     'What becomes of each stage that is wanted of each kilometre of a survey: done, running, queued, ready, waits, failed, blocked or empty';
 
+-- How far a result reaches: to so many kilometres on both sides the readiness of a stage may depend on it.
+CREATE OR REPLACE FUNCTION tunnel_api.queue_reach() RETURNS integer
+LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER SET search_path = pg_catalog, pg_temp
+AS $$ SELECT count(*)::integer - 1 FROM tunnel.stage $$;
+COMMENT ON FUNCTION tunnel_api.queue_reach() IS
+    'To how many kilometres on both sides a stage may become ready by what has been done in one: one for each stage after the first';
+
 -- Defers a job for each file to be read and for each stage of the kilometres that is ready; returns how many. Whoever commits
--- a result calls it last, for the kilometre and five to both sides, so that the jobs come to be with what made them ready.
+-- a result calls it last, for the kilometre and queue_reach to both sides, so that the jobs come to be with what made them
+-- ready.
 --
 -- A kilometre goes before the next one, and in it a later stage before an earlier one, so that kilometres are finished one
--- after the other and few fragments wait. Detection lags by eight kilometres: it holds up nothing, and fills the workers'
+-- after the other and few fragments wait. The last stage lags by eight kilometres: it holds up nothing, and fills the workers'
 -- time at the end, when each of the other stages waits for the one before.
 CREATE OR REPLACE FUNCTION tunnel_api.queue_plan(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS integer
@@ -130,7 +152,7 @@ BEGIN
           FROM tunnel.incoming i
          WHERE i.survey_id = queue_plan.survey_id AND i.failed_at IS NULL
          UNION ALL
-        SELECT 'stage', CASE s.step WHEN 6 THEN -10 * (s.km + 8) ELSE -10 * s.km END + s.step,
+        SELECT 'stage', -10 * (s.km + CASE s.step WHEN (SELECT max(t.step) FROM tunnel.stage t) THEN 8 ELSE 0 END) + s.step,
                format('s%s.km%s', queue_plan.survey_id, s.km),
                jsonb_build_object('survey_id', queue_plan.survey_id, 'km', s.km, 'stage', s.stage)
           FROM tunnel_api.queue_state(queue_plan.survey_id, queue_plan.km_from, queue_plan.km_to) s
@@ -170,12 +192,13 @@ DECLARE
     args constant jsonb := (SELECT j.args FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
     survey constant integer := (args ->> 'survey_id')::integer;
     km constant integer := (args ->> 'km')::integer;
+    reach constant integer := tunnel_api.queue_reach();
     first integer;
     last integer;
 BEGIN
     PERFORM tunnel_queue.procrastinate_finish_job_v1(job_id, 'succeeded', false);
     IF km IS NOT NULL THEN
-        PERFORM tunnel_api.queue_plan(survey, km - 5, km + 5);
+        PERFORM tunnel_api.queue_plan(survey, km - reach, km + reach);
         RETURN;
     END IF;
     INSERT INTO tunnel.goal (survey_id, km, stage, parameters)
@@ -186,7 +209,7 @@ BEGIN
      WHERE i.survey_id = survey AND i.name = args ->> 'file'
         ON CONFLICT DO NOTHING;
     -- those that the file may touch, and those that were read anew
-    SELECT least(min(i.km_from), min(k.km)) - 5, greatest(max(i.km_to), max(k.km)) + 5
+    SELECT least(min(i.km_from), min(k.km)) - reach, greatest(max(i.km_to), max(k.km)) + reach
       INTO first, last
       FROM tunnel.incoming i
       LEFT JOIN tunnel.scan_file f ON f.survey_id = i.survey_id
@@ -207,6 +230,7 @@ AS $$
 DECLARE
     args constant jsonb := (SELECT j.args FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
     survey constant integer := (args ->> 'survey_id')::integer;
+    reach constant integer := tunnel_api.queue_reach();
     first integer;
     last integer;
 BEGIN
@@ -216,7 +240,7 @@ BEGIN
     RETURNING i.km_from, i.km_to INTO first, last;
     first := coalesce(first, (args ->> 'km')::integer, -1000000);
     last := coalesce(last, (args ->> 'km')::integer, 1000000);
-    PERFORM tunnel_api.queue_plan(survey, first - 5, last + 5);
+    PERFORM tunnel_api.queue_plan(survey, first - reach, last + reach);
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.queue_fail(bigint, text) IS

@@ -25,16 +25,11 @@ COMMENT ON COLUMN tunnel_api.run.worker IS 'Machine and process that it ran on';
 COMMENT ON COLUMN tunnel_api.run.job_id IS 'Job of the queue that it was (tunnel_api.job); NULL when run by hand';
 
 -- Last run of each stage on each kilometre of a survey that was ever loaded or worked on, waits to be loaded or is wanted,
--- and whether its result is out of date. A result rests on
---   load        the files that touch the kilometre,
---   axis        load here and on both neighbours,
---   segments    axis here and on both neighbours, and load,
---   sections    segments here and on both neighbours,
---   ground      sections here and on both neighbours,
---   detect      ground here and on both neighbours, and all before here;
--- segments and what follows also on the axis' vertices moved by hand, in the kilometre or at most two beyond its ends.
--- It is stale when one of these came to be since its run began, is stale itself, or never ran here, as ground in a database
--- that was made before there was that stage. Runs are put in order by their times:
+-- and whether its result is out of date. Load rests on the files that touch the kilometre; what the others rest on, here and on
+-- both neighbours, is in tunnel.stage. Those that rest on the axis do so also on its vertices moved by hand, in the kilometre or
+-- at most two beyond its ends.
+-- A result is stale when one of these came to be since its run began, is stale itself, or is of a stage that never ran here, as
+-- ground in a database that was made before there was that stage. Runs are put in order by their times:
 -- a result commits under a lock that each run takes just before it begins (see queue_lock), so that none which it did not
 -- see bears an earlier time.
 CREATE OR REPLACE FUNCTION tunnel_api.stage_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
@@ -46,16 +41,22 @@ SET search_path = pg_catalog, pg_temp
 SET jit = off
 SET enable_nestloop = off  -- how few or many rows there are is not known when it is planned
 AS $$
-    WITH RECURSIVE names (stages) AS (
-        VALUES ('{load,axis,segments,sections,ground,detect}'::text[])
+    WITH RECURSIVE stage AS MATERIALIZED (  -- the stages that each rests on, by their numbers: here, and on both neighbours
+        SELECT s.step, s.name, 'axis' = ANY (s.reads) AS of_axis,
+               ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads) ORDER BY 1) AS here,
+               ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads_beside) ORDER BY 1) AS beside
+          FROM tunnel.stage s
+    ), need AS MATERIALIZED (
+        SELECT s.step, w.way, n.source
+          FROM stage s CROSS JOIN (VALUES (-1), (0), (1)) AS w (way)
+         CROSS JOIN LATERAL unnest(CASE w.way WHEN 0 THEN s.here ELSE s.beside END) AS n (source)
     ), attempt AS MATERIALIZED (
-        SELECT r.km, array_position(n.stages, r.stage) AS step, r.id, r.outcome, r.started_at, r.finished_at, r.message,
-               r.parameters, r.backend_pid, r.backend_start
-          FROM tunnel.run r, names n
-         WHERE r.survey_id = $1 AND r.km BETWEEN $2 AND $3 AND r.stage = ANY (n.stages)
+        SELECT r.km, s.step, r.id, r.outcome, r.started_at, r.finished_at, r.message, r.parameters, r.backend_pid, r.backend_start
+          FROM tunnel.run r JOIN stage s ON s.name = r.stage
+         WHERE r.survey_id = $1 AND r.km BETWEEN $2 AND $3
     ), last AS (
         SELECT DISTINCT ON (a.km, a.step) a.* FROM attempt a ORDER BY a.km, a.step, a.started_at DESC, a.id DESC
-    ), success AS (
+    ), success AS MATERIALIZED (
         SELECT DISTINCT ON (a.km, a.step) a.* FROM attempt a WHERE a.outcome = 'done'
          ORDER BY a.km, a.step, a.started_at DESC, a.id DESC
     ), pending AS (
@@ -76,65 +77,69 @@ AS $$
                                              floor((v.n + 2) * t.spacing / 1000)::integer) AS k (km)
          WHERE s.id = $1
          GROUP BY k.km
-    ), whole AS (  -- a row a kilometre: begin and end of the last success of each stage
-        SELECT k.km, array_agg(d.started_at ORDER BY g.step) AS begun, array_agg(d.finished_at ORDER BY g.step) AS ended
-          FROM kilometre k CROSS JOIN generate_series(1, 6) AS g (step)
-          LEFT JOIN success d ON d.km = k.km AND d.step = g.step
-         GROUP BY k.km
+    ), cell AS MATERIALIZED (
+        SELECT k.km, s.step, d.started_at, d.finished_at
+          FROM kilometre k CROSS JOIN stage s
+          LEFT JOIN success d ON d.km = k.km AND d.step = s.step
+    ), input AS (  -- the newest of what each rests on; as late, the first that came since or never ran: here, before, after
+        SELECT c.km, c.step, max(i.finished_at) AS finished_at,
+               min(CASE WHEN i.finished_at > c.started_at THEN (3 * n.way * n.way + n.way) * 1000
+                        WHEN i.finished_at IS NULL AND n.way = 0 AND n.source > 1 THEN 1000 END + n.source) AS late
+          FROM cell c
+          JOIN need n ON n.step = c.step
+          LEFT JOIN cell i ON i.km = c.km + n.way AND i.step = n.source
+         GROUP BY c.km, c.step
     ), direct AS MATERIALIZED (
-        SELECT w.km, g.step, w.begun[g.step] IS NOT NULL AS done,
-               CASE g.step
-                   WHEN 1 THEN p.read_at
-                   ELSE greatest(w.ended[1], CASE WHEN g.step > 2 THEN w.ended[2] END, CASE WHEN g.step > 3 THEN w.ended[3] END,
-                                 CASE WHEN g.step > 4 THEN w.ended[4] END, CASE WHEN g.step > 5 THEN w.ended[5] END,
-                                 b.ended[g.step - 1], a.ended[g.step - 1], CASE WHEN g.step > 2 THEN e.edited_at END)
-               END AS input_at,
+        SELECT c.km, c.step, c.started_at IS NOT NULL AS done,
+               CASE c.step WHEN 1 THEN p.read_at ELSE greatest(i.finished_at, CASE WHEN s.of_axis THEN e.edited_at END) END AS input_at,
                CASE
-                   WHEN w.begun[g.step] IS NULL THEN NULL
-                   WHEN g.step = 1 THEN p.name || ' read since'
-                   WHEN w.ended[1] > w.begun[g.step] THEN 'load ran since'
-                   WHEN g.step > 2 AND w.ended[2] > w.begun[g.step] THEN 'axis ran since'
-                   WHEN g.step > 3 AND w.ended[3] > w.begun[g.step] THEN 'segments ran since'
-                   WHEN g.step > 4 AND w.ended[4] > w.begun[g.step] THEN 'sections ran since'
-                   WHEN g.step > 5 AND w.ended[5] > w.begun[g.step] THEN 'ground ran since'
-                   WHEN g.step > 5 AND w.ended[5] IS NULL THEN 'ground never ran'
-                   WHEN b.ended[g.step - 1] > w.begun[g.step]
-                       THEN format('%s of kilometre %s ran since', n.stages[g.step - 1], w.km - 1)
-                   WHEN a.ended[g.step - 1] > w.begun[g.step]
-                       THEN format('%s of kilometre %s ran since', n.stages[g.step - 1], w.km + 1)
-                   WHEN g.step > 2 AND e.edited_at > w.begun[g.step] THEN 'axis edited since'
+                   WHEN c.started_at IS NULL THEN NULL
+                   WHEN c.step = 1 THEN p.name || ' read since'
+                   WHEN i.late IS NOT NULL THEN
+                       CASE i.late / 1000
+                           WHEN 0 THEN format('%s ran since', l.name)
+                           WHEN 1 THEN format('%s never ran', l.name)
+                           ELSE format('%s of kilometre %s ran since', l.name, c.km + i.late / 1000 - 3)
+                       END
+                   WHEN s.of_axis AND e.edited_at > c.started_at THEN 'axis edited since'
                END AS reason
-          FROM names n
-         CROSS JOIN whole w
-         CROSS JOIN generate_series(1, 6) AS g (step)
-          LEFT JOIN whole b ON b.km = w.km - 1
-          LEFT JOIN whole a ON a.km = w.km + 1
-          LEFT JOIN pending p ON p.km = w.km
-          LEFT JOIN edit e ON e.km = w.km
+          FROM cell c
+          JOIN stage s ON s.step = c.step
+          LEFT JOIN input i ON i.km = c.km AND i.step = c.step
+          LEFT JOIN stage l ON l.step = i.late % 1000
+          LEFT JOIN pending p ON p.km = c.km
+          LEFT JOIN edit e ON e.km = c.km
     ), ripple AS (  -- what is stale, and what rests on it
         SELECT d.km, d.step FROM direct d WHERE d.reason IS NOT NULL
          UNION
         SELECT d.km, d.step
-          FROM ripple r CROSS JOIN (VALUES (-1), (0), (1)) AS o (way)
-          JOIN direct d ON d.km = r.km + o.way AND d.step = r.step + 1 AND d.done
-    ), stale AS (
+          FROM ripple r
+          JOIN need n ON n.source = r.step
+          JOIN direct d ON d.km = r.km - n.way AND d.step = n.step AND d.done
+    ), stale AS MATERIALIZED (
         SELECT r.km, array_agg(r.step ORDER BY r.step) AS steps FROM ripple r GROUP BY r.km
     )
-    SELECT d.km, d.step, n.stages[d.step], l.id,
+    SELECT d.km, d.step, s.name, l.id,
            CASE WHEN l.outcome = 'running' AND NOT tunnel_api.session_lives(l.backend_pid, l.backend_start)
                 THEN 'interrupted' ELSE coalesce(l.outcome, 'never') END,
-           l.started_at, l.finished_at, l.message, l.parameters, s.finished_at, s.parameters, d.input_at,
+           l.started_at, l.finished_at, l.message, l.parameters, b.finished_at, b.parameters, d.input_at,
            d.reason IS NOT NULL,
            CASE
                WHEN d.reason IS NOT NULL OR NOT d.done THEN d.reason
-               WHEN here.steps[1] < d.step THEN format('%s is stale', n.stages[here.steps[1]])
-               WHEN d.step - 1 = ANY (before.steps) THEN format('%s of kilometre %s is stale', n.stages[d.step - 1], d.km - 1)
-               WHEN d.step - 1 = ANY (after.steps) THEN format('%s of kilometre %s is stale', n.stages[d.step - 1], d.km + 1)
+               WHEN here.steps && s.here THEN
+                   (SELECT format('%s is stale', o.name) FROM stage o
+                     WHERE o.step = ANY (here.steps) AND o.step = ANY (s.here) ORDER BY o.step LIMIT 1)
+               WHEN before.steps && s.beside THEN
+                   (SELECT format('%s of kilometre %s is stale', o.name, d.km - 1) FROM stage o
+                     WHERE o.step = ANY (before.steps) AND o.step = ANY (s.beside) ORDER BY o.step LIMIT 1)
+               WHEN after.steps && s.beside THEN
+                   (SELECT format('%s of kilometre %s is stale', o.name, d.km + 1) FROM stage o
+                     WHERE o.step = ANY (after.steps) AND o.step = ANY (s.beside) ORDER BY o.step LIMIT 1)
            END
-      FROM names n
-     CROSS JOIN direct d
+      FROM direct d
+      JOIN stage s ON s.step = d.step
       LEFT JOIN last l ON l.km = d.km AND l.step = d.step
-      LEFT JOIN success s ON s.km = d.km AND s.step = d.step
+      LEFT JOIN success b ON b.km = d.km AND b.step = d.step
       LEFT JOIN stale here ON here.km = d.km
       LEFT JOIN stale before ON before.km = d.km - 1
       LEFT JOIN stale after ON after.km = d.km + 1
@@ -150,7 +155,7 @@ SELECT (s.id::bigint * 1000000 + 500000 + t.km) * 10 + t.step AS id, s.id AS sur
  CROSS JOIN LATERAL tunnel_api.stage_state(s.id) t
   LEFT JOIN tunnel.run r ON r.id = t.run_id;
 COMMENT ON VIEW tunnel_api.stage_status IS 'How far each kilometre of each survey has come: one row per stage';
-COMMENT ON COLUMN tunnel_api.stage_status.step IS 'Order of the stages: load, axis, segments, sections, ground, detect';
+COMMENT ON COLUMN tunnel_api.stage_status.step IS 'Number of the stage in their order';
 COMMENT ON COLUMN tunnel_api.stage_status.outcome IS 'Of the last run: running, done, failed, interrupted (its session is gone) or never';
 COMMENT ON COLUMN tunnel_api.stage_status.done_at IS 'End of the last successful run, whose result is in the database';
 COMMENT ON COLUMN tunnel_api.stage_status.counts IS 'What the last run counted';

@@ -93,22 +93,14 @@ COMMENT ON COLUMN tunnel_api.axis_vertex.source IS 'measured, interpolated or ed
 COMMENT ON COLUMN tunnel_api.axis_vertex.edited_by IS 'Who moved it last, set by the database';
 COMMENT ON COLUMN tunnel_api.axis_vertex.edited_at IS 'When it was moved last, set by the database';
 
--- A segment is stale when a vertex that its planes depend on (the two of its ends and the next on either side) is not
--- where the segments were built.
+-- A segment is stale when its planes are not those of the axis any more (segment_moved).
 CREATE OR REPLACE VIEW tunnel_api.segment AS
 SELECT g.id, g.survey_id, s.name AS survey, g.n, g.km, g.chainage_from, g.chainage_to,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, g.chainage_from) l) AS label_from,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, g.chainage_to) l) AS label_to,
        g.points,
        100 * (g.vertex_to[3] - g.vertex_from[3]) / nullif(g.chainage_to - g.chainage_from, 0) AS slope,
-       EXISTS (SELECT FROM tunnel.segment o
-                 JOIN tunnel.axis_vertex v ON v.survey_id = o.survey_id AND v.n BETWEEN o.n AND o.n + 1
-                WHERE o.survey_id = g.survey_id AND o.n BETWEEN g.n - 1 AND g.n + 1
-                  AND public.st_3ddistance(v.geom, public.st_setsrid(public.st_makepoint(
-                        (CASE v.n WHEN o.n THEN o.vertex_from ELSE o.vertex_to END)[1],
-                        (CASE v.n WHEN o.n THEN o.vertex_from ELSE o.vertex_to END)[2],
-                        (CASE v.n WHEN o.n THEN o.vertex_from ELSE o.vertex_to END)[3]),
-                      public.st_srid(v.geom))) > 1e-4) AS stale,
+       tunnel_api.segment_moved(g.survey_id, g.n, g.vertex_from || g.vertex_to || g.tangent_from || g.tangent_to) AS stale,
        g.geom::public.geometry AS geom
   FROM tunnel.segment g
   JOIN tunnel.survey s ON s.id = g.survey_id;

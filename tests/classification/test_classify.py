@@ -11,6 +11,7 @@ from tunneldb.classification.objects.clusters import CELL, NEAR, Cluster, Lookup
 from tunneldb.classification.objects.objects import ClusterSettings, bars
 from tunneldb.classification.objects.spacing import Spacing
 from tunneldb.classification.scene import Scene
+from tunneldb.compiled import kernel
 from tunneldb.geometry.centreline import centreline_through
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.pipeline.parameters import settings
@@ -118,13 +119,18 @@ def test_defaults_are_those_of_the_parameters() -> None:
     assert GroundSettings() == GroundSettings.of(settings([]))
 
 
+@kernel
+def classes_of(x, first, last, keys, klass):
+    return look_up(x, 0.05, 0.05, first, last, keys, klass)
+
+
 def test_a_point_finds_the_nearest_cluster() -> None:
     near = Cluster.of(PointClass.OBJECT, np.array([[0.05, 0.05, 0.05]]), np.zeros(1), np.zeros(1))
     far = Cluster.of(PointClass.APPENDAGE, np.array([[0.35, 0.05, 0.05]]), np.zeros(1), np.zeros(1))
     for order in ([near, far], [far, near]):
         lookup = Lookup.of(order)
         x = (np.arange(-6, 10) + 0.5) * CELL
-        found = [look_up(at, 0.05, 0.05, lookup.first, lookup.last, lookup.keys, lookup.klass) for at in x]
+        found = [classes_of(at, lookup.first, lookup.last, lookup.keys, lookup.klass) for at in x]
         cells = np.floor(x / CELL).astype(int)
         expected = [
             PointClass.OBJECT if abs(c) <= min(NEAR, abs(c - 3)) else PointClass.APPENDAGE if abs(c - 3) <= NEAR else 0

@@ -22,6 +22,7 @@ from tunneldb.database.health import examine
 from tunneldb.database.schema import HEAD, alembic_config, install_api, sql_files
 from tunneldb.database.server import Server
 from tunneldb.errors import UserError
+from tunneldb.pipeline.stages import STAGES
 
 
 def dump(dsn: str, *options: str) -> str:
@@ -50,7 +51,7 @@ def test_each_upgrade_from_the_first_revision_equals_a_fresh_install(dsn: str, e
         session.exec_driver_sql("CREATE EXTENSION postgis")
         command.upgrade(alembic_config(session), revisions()[0])
     with open_connection(empty_dsn) as connection:
-        install(connection)
+        install(connection, STAGES)
     assert dump(empty_dsn, "--schema-only") == dump(dsn, "--schema-only")
 
 
@@ -68,7 +69,7 @@ def test_images_of_the_first_revision_are_kept(empty_dsn: str) -> None:
             """
         )
     with open_connection(empty_dsn) as connection:
-        install(connection)
+        install(connection, STAGES)
         query = "SELECT s.name, convert_from(i.tiff, 'UTF8') FROM tunnel.image i JOIN tunnel.survey s ON s.id = i.survey_id"
         assert sorted(connection.execute(query)) == [(name, f"{name}{b}") for name in "ab" for b in range(3)]
         connection.execute("DELETE FROM tunnel.survey WHERE name = 'a'")
@@ -78,8 +79,19 @@ def test_images_of_the_first_revision_are_kept(empty_dsn: str) -> None:
 def test_a_second_install_changes_nothing(dsn: str) -> None:
     before = dump(dsn, "--schema-only")
     with open_connection(dsn) as connection:
-        install(connection)
+        install(connection, STAGES)
     assert dump(dsn, "--schema-only") == before
+
+
+def test_the_stages_in_the_database_are_those_of_the_program(dsn: str, conn: psycopg.Connection) -> None:
+    query = "SELECT name, reads, reads_beside, parameters FROM tunnel.stage ORDER BY step"
+    stages = [(stage.name, list(stage.reads), list(stage.reads_beside), list(stage.parameters)) for stage in STAGES]
+    assert conn.execute(query).fetchall() == stages
+    conn.execute("UPDATE tunnel.stage SET step = step + 10, parameters = '{old}'")
+    conn.execute("INSERT INTO tunnel.stage VALUES (1, 'of another version', '{}', '{}', '{}')")
+    conn.commit()
+    install(conn, STAGES)
+    assert conn.execute(query).fetchall() == stages
 
 
 def test_install_is_whole_or_not_at_all(empty_dsn: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -87,7 +99,7 @@ def test_install_is_whole_or_not_at_all(empty_dsn: str, monkeypatch: pytest.Monk
     broken.write_text("CREATE TABLE tunnel_api.half ();\nSELECT nonsense;")
     monkeypatch.setattr("tunneldb.database.schema.sql_files", lambda: [broken])
     with open_connection(empty_dsn) as connection, pytest.raises(psycopg.errors.UndefinedColumn) as caught:
-        install(connection)
+        install(connection, STAGES)
     assert caught.value.__notes__ == [f"in {broken}, line 2"]
     with open_connection(empty_dsn) as connection:
         assert connection.execute("SELECT to_regnamespace('tunnel'), to_regnamespace('tunnel_api')").fetchone() == (None, None)
@@ -99,7 +111,7 @@ def test_the_functions_are_made_anew_and_data_stay(example: str, dsn: str, conn:
     conn.commit()
     leaks = conn.execute("SELECT count(*) FROM tunnel.anomaly").fetchone()
     conn.commit()
-    install(conn)
+    install(conn, STAGES)
     assert conn.execute("SELECT tunnel_api.chainage_label(12345.678)").fetchone() == ("12+345.678",)
     assert conn.execute("SELECT to_regproc('tunnel_api.left_over')").fetchone() == (None,)
     assert conn.execute("SELECT count(*) FROM tunnel.anomaly").fetchone() == leaks
@@ -226,7 +238,7 @@ def test_a_dump_restored_on_another_server_needs_one_init(example: str, dsn: str
         subprocess.run([*restore, str(archive)], check=True)
         assert [finding.subject for finding in examine(other) if finding.level == "wrong"] == ["roles"]
         with open_connection(other) as connection:
-            install(connection)
+            install(connection, STAGES)
         assert not [finding for finding in examine(other) if finding.level == "wrong"]
         with connect(other) as connection:
             connection.execute("SET ROLE tunnel_viewer")
@@ -240,7 +252,7 @@ def test_init_does_not_wait_for_ever_for_others(conn: psycopg.Connection, dsn: s
     monkeypatch.setattr("tunneldb.database.schema._PATIENCE", "100ms")
     conn.execute("SELECT * FROM tunnel_api.leak")  # and stays in its transaction
     with open_connection(dsn) as connection, pytest.raises(UserError, match="close QGIS"):
-        install(connection)
+        install(connection, STAGES)
 
 
 def test_postgis_in_another_schema_is_refused(empty_dsn: str) -> None:
@@ -248,7 +260,7 @@ def test_postgis_in_another_schema_is_refused(empty_dsn: str) -> None:
         connection.execute("CREATE SCHEMA gis")
         connection.execute("CREATE EXTENSION postgis SCHEMA gis")
     with open_connection(empty_dsn) as connection, pytest.raises(UserError, match="in schema gis"):
-        install(connection)
+        install(connection, STAGES)
 
 
 def test_a_deleted_survey_takes_its_rows_along(example: str, conn: psycopg.Connection) -> None:
@@ -257,7 +269,7 @@ def test_a_deleted_survey_takes_its_rows_along(example: str, conn: psycopg.Conne
         "SELECT relname FROM pg_class WHERE relnamespace = 'tunnel'::regnamespace AND relkind IN ('r', 'p')"
     ).fetchall()
     for (table,) in tables:
-        if table != "alembic_version":
+        if table not in ("alembic_version", "stage"):  # of no survey
             count = conn.execute(sql.SQL("SELECT count(*) FROM {}").format(sql.Identifier("tunnel", table))).fetchone()
             assert count == (0,), table
 
@@ -268,7 +280,7 @@ def test_a_newer_database_is_refused(conn: psycopg.Connection, dsn: str) -> None
     with pytest.raises(UserError, match="newer version"):
         connect(dsn)
     with pytest.raises(UserError, match="newer version"):
-        install(conn)
+        install(conn, STAGES)
 
 
 def test_a_database_without_postgis_or_schema_is_refused(empty_dsn: str) -> None:

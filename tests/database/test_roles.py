@@ -8,6 +8,7 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
 from tunneldb.database import install, open_connection
+from tunneldb.pipeline.stages import STAGES
 
 REVIEW = "UPDATE tunnel_api.leak_unrolled SET review = 'confirmed'"
 JUDGE = "UPDATE tunnel_api.anomaly_map SET kind = 'leak' WHERE kind = 'joint'"
@@ -227,7 +228,7 @@ def test_operator_leaves_the_functions_alone(person: psycopg.Connection) -> None
 @pytest.mark.parametrize("person", ["otto"], indirect=True)
 def test_operator_forges_no_entry_of_the_audit(person: psycopg.Connection, conn: psycopg.Connection) -> None:
     """By a view of his own that says what was before and after, with the trigger that notes it; nor by the function itself."""
-    install(conn)  # once more, over what was granted before
+    install(conn, STAGES)  # once more, over what was granted before
     conn.commit()
     person.execute("CREATE TEMP VIEW mine AS SELECT * FROM tunnel_api.leak")
     for function in ("review_anomaly", "edit_axis_vertex", "edit_region"):
@@ -267,7 +268,7 @@ def test_roles_need_a_superuser_where_the_owner_may_not_make_them(server_dsn: st
     said: list[str] = []
     with open_connection(make_conninfo(server_dsn, dbname="landlords", user="landlord")) as owner:
         owner.add_notice_handler(lambda notice: said.append(notice.message_primary or ""))
-        install(owner)
+        install(owner, STAGES)
         assert owner.execute("SELECT count(*) FROM tunnel_api.leak").fetchone() == (0,)
     # here the roles exist already, made for the other databases, so only the membership is lacking
     assert any("GRANT tunnel_operator TO landlord" in message for message in said)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
-from tunneldb.geometry.frame import frame_at, plan_lengths, segment_rows, tangents
+from tunneldb.geometry.frame import frames_at, plan_lengths, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
 
 ORIGIN = np.array([512_000.0, 4_104_000.0, 414.0])
@@ -161,15 +161,13 @@ def test_gap_between_sections_is_off_the_tunnel() -> None:
 
 def test_frame_is_orthonormal_and_on_its_plane() -> None:
     vertices = Helix(300.0, 0.04).position(np.arange(0.0, 31.0, 10.0))
-    segment = segment_rows(vertices, tangents(vertices))[1]
-    frame = np.empty((4, 3))
-    for f in (0.0, 0.3, 1.0):
-        frame_at(segment, f, frame)
+    segments = segment_rows(vertices, tangents(vertices))
+    frames = frames_at(segments, np.ones(3, int), np.array([0.0, 0.3, 1.0]))
+    for frame in frames:
         np.testing.assert_allclose(frame[1:] @ frame[1:].T, np.eye(3), atol=1e-12)
         assert frame[2, 2] == 0.0
         assert frame[3, 2] > 0.99
-    frame_at(segment, 0.0, frame)
-    np.testing.assert_allclose(frame[0], vertices[1], atol=1e-9)
+    np.testing.assert_allclose(frames[0, 0], vertices[1], atol=1e-9)
 
 
 class TestAlignment:

@@ -17,7 +17,7 @@ from tunneldb.pipeline.load import load_kilometre, parameters_of, settings_of
 from tunneldb.pipeline.read import read_file
 from tunneldb.pointcloud.selection import FilterSettings
 from tunneldb.pointcloud.spool import ROW, Rows, Spool
-from tunneldb.store.fragment import read_fragment, write_fragments
+from tunneldb.store.partition import read_fragment, write_fragments
 from tunneldb.store.survey import get_survey
 
 SETTINGS = FilterSettings()

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import csv
+import subprocess
+import sys
 import threading
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +16,9 @@ from click.testing import CliRunner, Result
 
 from tunneldb.cli.main import main
 from tunneldb.errors import UserError
+from tunneldb.pipeline.parameters import PARAMETERS
 from tunneldb.pipeline.run import parse_km
+from tunneldb.pipeline.stages import STAGE_NAMES, STAGES
 from tunneldb.simulate import Parameters, Simulation, write
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey, get_survey
@@ -424,3 +429,22 @@ def test_shapes_there_and_back(curve: tuple[psycopg.Connection, Survey, Path]) -
 def test_a_stage_whose_forerunner_is_missing(loaded_curve: psycopg.Connection, stage: str, says: str) -> None:
     result = CliRunner().invoke(main, ["run", NAME, "--km", "1", "--from", stage, "--to", stage])
     assert (result.exit_code, says in result.output) == (2, True), result.output
+
+
+def test_each_stage_reads_earlier_ones_and_is_done_by_a_function_that_is_there() -> None:
+    for n, stage in enumerate(STAGES):
+        assert {*stage.reads, *stage.reads_beside} <= set(STAGE_NAMES[:n])
+        assert set(stage.reads_beside) <= set(stage.reads)
+        if stage.function:
+            module, _, name = stage.function.partition(":")
+            assert callable(getattr(import_module(module), name))
+
+
+def test_each_parameter_is_of_one_stage() -> None:
+    prefixes = [prefix for stage in STAGES for prefix in stage.parameters]
+    assert sorted(prefixes) == sorted({name.partition(".")[0] for name in PARAMETERS})
+
+
+def test_showing_the_stages_imports_nothing_that_computes() -> None:
+    code = "import sys, tunneldb.pipeline.stages; sys.exit(any(name in sys.modules for name in ('numpy', 'numba', 'psycopg')))"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0

@@ -110,3 +110,25 @@ def test_part_of_it_can_be_chosen_but_not_before_points_that_wait(surveyed: psyc
     assert result.stderr.count("\n") == 1
     assert f"tunneldb batch {NAME}" in result.stderr
     assert runs(conn, since) == []
+
+
+def test_a_segment_stays_stale_when_only_those_of_the_next_kilometre_are_made_anew(surveyed: psycopg.Connection) -> None:
+    """The last plane of kilometre 0 turns with a vertex of kilometre 1, whose segments know where it is now."""
+    conn = surveyed
+    conn.execute(MOVE, [101])
+    segments = "SELECT n FROM tunnel_api.segment WHERE stale ORDER BY n"
+    assert conn.execute(segments).fetchall() == [(99,), (100,), (101,), (102,)]
+    command("run", NAME, "--from", "segments", "--to", "segments", "--km", 1)
+    assert conn.execute(segments).fetchall() == [(99,)]
+    assert ("segments", 0) in conn.execute(STALE).fetchall()
+    command("run", NAME, "--from", "segments", "--to", "segments", "--km", 0)
+    assert conn.execute(segments).fetchall() == []
+
+
+def test_a_vertex_that_is_moved_back_leaves_its_segments_as_they_are(surveyed: psycopg.Connection) -> None:
+    """The ledger cannot know that: it goes by times, and has the kilometre done again."""
+    conn = surveyed
+    conn.execute(MOVE, [100])
+    conn.execute(MOVE.replace("0.05", "-0.05"), [100])
+    assert conn.execute("SELECT count(*) FROM tunnel_api.segment WHERE stale").fetchone() == (0,)
+    assert ("segments", 0) in conn.execute(STALE).fetchall()

@@ -4,7 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from tunneldb.pointcloud.noise import CellCounts, is_noise, noise_filter, search_radii
+from tunneldb.pointcloud.noise import is_noise, noise_filter, search_radii
+from tunneldb.pointcloud.voxels import CellCounts
 
 ORIGIN = np.array([500_000.0, 4_500_000.0, 100.0])
 

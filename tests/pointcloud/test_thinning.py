@@ -97,7 +97,7 @@ def test_what_is_picked_of_chunks_holds_the_first_good_one(xyz: np.ndarray, poin
         cloud = np.ascontiguousarray(xyz[part])
         none = np.zeros(len(part))
         numbers, certain = pick(
-            cloud, none, none.astype("f4"), none.astype("i4"), none.astype("u1"), none == 0, edge, limit, points, 1024
+            cloud, none, none.astype("f4"), none.astype("i4"), none.astype("u1"), none == 0, edge, limit, points
         )
         assert good[part[numbers[certain]]].all()
         found.append(part[numbers][good[part[numbers]]])

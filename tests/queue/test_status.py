@@ -20,7 +20,7 @@ from support.queue_rows import add_file, add_goal, add_job, add_run, add_worker,
 from tunneldb.cli.main import main
 from tunneldb.cli.overview import render
 from tunneldb.cli.watch import Watch
-from tunneldb.pipeline.order import STAGES
+from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.queue.progress import Overview, overview
 
 TUNNELDB = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
@@ -55,7 +55,7 @@ def batch(conn: psycopg.Connection, example: str) -> str:
     for km in (1, 3):
         add_run(conn, example, km, "axis", 10, ago=800)
     add_run(conn, example, 2, "axis", 4, "too few points", ago=800)
-    for number, stage in enumerate(STAGES[2:]):
+    for number, stage in enumerate(STAGE_NAMES[2:]):
         add_run(conn, example, 1, stage, 20, ago=700 - 100 * number)
     worker = add_worker(conn, "calc-1", 4711)
     begin(conn, example, 3, "segments", "calc-1/4711")

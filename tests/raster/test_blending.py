@@ -15,7 +15,7 @@ from tunneldb.raster.floor import Floor
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.observation import Observer, Radiometer
 from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
-from tunneldb.raster.projection import WEIGHT, weight_of
+from tunneldb.raster.projection import WEIGHT, pixel_weight
 from tunneldb.raster.rasterize import Projector
 
 PIXEL, RADIUS, ROUGHNESS = 0.05, 4.0, 12.0
@@ -81,10 +81,11 @@ def test_what_is_seen_beyond_the_limits_only_is_not_seen() -> None:
 @pytest.mark.parametrize("far", [5.0, 40.0])
 def test_weights_fall_from_the_greatest_to_one_at_either_limit(far: float) -> None:
     least = np.cos(np.radians(75.0))
-    assert weight_of(1.0, 0.0, least, far) == WEIGHT
-    assert weight_of(least, 0.0, least, far) == weight_of(1.0, far, least, far) == 1
-    slanting = [weight_of(np.cos(angle), far / 4, least, far) for angle in np.radians(np.arange(0.0, 75.0))]
-    distant = [weight_of(0.9, r, least, far) for r in np.linspace(0.0, far, 100)]
+    weight = pixel_weight.py_func
+    assert weight(1.0, 0.0, least, far) == WEIGHT
+    assert weight(least, 0.0, least, far) == weight(1.0, far, least, far) == 1
+    slanting = [weight(np.cos(angle), far / 4, least, far) for angle in np.radians(np.arange(0.0, 75.0))]
+    distant = [weight(0.9, r, least, far) for r in np.linspace(0.0, far, 100)]
     assert (np.diff(slanting) <= 0).all()
     assert (np.diff(distant) <= 0).all()
     # Nowhere does a weight change by much at once.

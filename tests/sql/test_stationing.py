@@ -15,7 +15,7 @@ from tests.qgis.test_project import act
 from tunneldb.cli.main import main
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import Equation, Stationing, chainage_label
-from tunneldb.store.stationing import load_stationing, save_equations
+from tunneldb.store.alignment import load_stationing, save_equations
 
 AXIS = "x,y,z\n500000,4640000,100\n500000,4641000,104\n"
 EQUATIONS = "chainage,station,direction\n100,12100,1\n400,12350,1\n700,13000,1\n900,20000,-1\n"

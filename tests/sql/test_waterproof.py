@@ -9,6 +9,7 @@ from shapely.geometry import box
 
 from tests.sql.test_statistics import add_coverage, add_leak, add_survey, ask
 from tunneldb.database import connect, install
+from tunneldb.pipeline.stages import STAGES
 
 NAMES = (
     "chainage_from", "chainage_to", "lining_area", "seen_share", "wet_area", "wet_ratio", "patches", "largest_area",
@@ -231,7 +232,7 @@ def test_where_nothing_can_be_kept_one_row_stands_for_all_changes(conn: psycopg.
         conn.commit()
     assert ask(conn, "SELECT count(*)::int AS n FROM tunnel.waterproof WHERE km = 3") == [{"n": 1}]
     assert differences(conn) == []
-    install(conn)
+    install(conn, STAGES)
     assert ask(conn, "SELECT count(*)::int AS n FROM tunnel.waterproof WHERE km = 3") == [{"n": 1}]
     conn.execute("UPDATE tunnel.segment SET chainage_to = 4000 WHERE km = 3 AND chainage_to = 4002")
     conn.execute("UPDATE tunnel_api.leak SET review = 'open' WHERE km = 3")
@@ -281,6 +282,6 @@ def test_an_upgrade_keeps_what_was_not(conn: psycopg.Connection, survey: int) ->
     conn.execute("DELETE FROM tunnel.waterproof")
     assert differences(conn) == []
     conn.commit()
-    install(conn)
+    install(conn, STAGES)
     assert kept(conn) == [3, 4, 5]
     assert differences(conn) == []

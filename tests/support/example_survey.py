@@ -15,8 +15,9 @@ from shapely.geometry import Polygon, box
 from support.example_objects import CORNER, HALF_FLOOR, SPHERES, THINGS, beside, boxed, relief
 from tunneldb.anomalies.geometries import shapes
 from tunneldb.database import install, open_connection
-from tunneldb.geometry.frame import frame_at, segment_rows, tangents
+from tunneldb.geometry.frame import frames_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
+from tunneldb.pipeline.stages import STAGES
 from tunneldb.raster.geotiff import KINDS, Raster, decode, encode
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.pixel_state import PixelState
@@ -86,7 +87,7 @@ def example_template(server_dsn: str) -> str:
     with psycopg.connect(server_dsn, autocommit=True) as connection:
         connection.execute(sql.SQL("CREATE DATABASE {} TEMPLATE template0").format(sql.Identifier(DATABASE)))
     with open_connection(make_conninfo(server_dsn, dbname=DATABASE)) as connection:
-        install(connection)
+        install(connection, STAGES)
         _fill(connection)
     return DATABASE
 
@@ -197,12 +198,8 @@ def _axis(conn: psycopg.Connection, survey_id: int, vertices: np.ndarray) -> Non
 
 
 def _segments(conn: psycopg.Connection, survey_id: int, surface: Surface) -> None:
-    frame = np.empty((4, 3))
     for n, row, (start, end) in zip(surface.number, surface.segments, surface.ends, strict=True):
-        line = []
-        for part in range(5):
-            frame_at(row, part / 4, frame)
-            line.append(frame[0].copy())
+        line = frames_at(row[None], np.zeros(5, int), np.linspace(0.0, 1.0, 5))[:, 0]
         conn.execute(
             "INSERT INTO tunnel.segment (survey_id, n, km, chainage_from, chainage_to, vertex_from, vertex_to, "
             "tangent_from, tangent_to, geom, points) "

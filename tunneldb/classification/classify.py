@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numba import njit, prange
 from scipy import ndimage
 
-from tunneldb.arrays import Float, Int64
+from tunneldb.arrays import Float
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.lining_relief import Relief, Wall
 from tunneldb.classification.objects.clusters import Cluster
@@ -57,14 +56,14 @@ def find_scene(
     plane, tolerance = relief.level(chainage, arc)
     depth = offset - plane
     with np.errstate(invalid="ignore"):
-        find_lining = np.abs(depth) <= tolerance
+        lining = np.abs(depth) <= tolerance
     unrolled = np.column_stack([chainage, arc])
-    spacing = Spacing.of(unrolled[find_lining]) or Spacing.of(unrolled)
+    spacing = Spacing.of(unrolled[lining]) or Spacing.of(unrolled)
     clusters: list[Cluster] = []
     if spacing is not None:
-        height = heights(ground, along, across, points[:, 2])
-        top = settings.region * tops(along, height)
-        residual = ~find_lining
+        height = heights_above_ground(ground, along, across, points[:, 2])
+        top = settings.region * tunnel_heights(along, height)
+        residual = ~lining
         left = ResidualPoints(
             points[residual], along[residual], across[residual], height[residual], depth[residual], top[residual]
         )
@@ -103,11 +102,11 @@ def find_bare_scene(points: Float, line: PlanLine, ground: Ground | None, settin
     along, across = line.place(points)
     z = points[:, 2]
     floor = np.zeros(len(points), np.bool_) if ground is None else ground.is_ground(along, across, z)
-    height = heights(ground, along, across, z)
+    height = heights_above_ground(ground, along, across, z)
     spacing = Spacing.of(np.column_stack([along, across, z])[~floor])
     if spacing is None:
         return Scene(line, ground, [], None, None)
-    top = settings.region * tops(along, height)
+    top = settings.region * tunnel_heights(along, height)
     off = np.flatnonzero(~floor)
     residual = ResidualPoints(points[off], along[off], across[off], height[off], np.full(len(off), np.nan), top[off])
     kept = floor.copy()
@@ -118,13 +117,13 @@ def find_bare_scene(points: Float, line: PlanLine, ground: Ground | None, settin
     return find_scene(points, line, surface, ground, settings)
 
 
-def heights(ground: Ground | None, along: Float, across: Float, z: Float) -> Float:
+def heights_above_ground(ground: Ground | None, along: Float, across: Float, z: Float) -> Float:
     """Height of points (n,) above the ground, m, or above the lowest point of their metre where there is no ground.
 
     Where the ground has a gap, or ends, it goes on level from its nearest place in the row.
     """
     if ground is None or not np.isfinite(ground.height).any():
-        return z - _of_metre(along, z, 0.0)
+        return z - _quantile_of_metre(along, z, 0.0)
     hidden = np.isnan(ground.height)
     nearest = ndimage.distance_transform_edt(hidden, sampling=(10.0, 1.0), return_distances=False, return_indices=True)
     whole = replace(ground, height=ground.height[tuple(nearest)])
@@ -134,33 +133,23 @@ def heights(ground: Ground | None, along: Float, across: Float, z: Float) -> Flo
     return z - whole.height_at(inside, np.maximum(beside, ground.first * COLUMN))
 
 
-def tops(along: Float, height: Float) -> Float:
+def tunnel_heights(along: Float, height: Float) -> Float:
     """Height of the tunnel at each point (n,), m: that of all but the highest thousandth of points of its metre."""
-    return _of_metre(along, height, 0.999)
+    return _quantile_of_metre(along, height, 0.999)
 
 
-def _of_metre(along: Float, value: Float, share: float) -> Float:
+def _quantile_of_metre(along: Float, value: Float, share: float) -> Float:
     """Quantile of the values of each point's metre along the tunnel."""
     if len(along) == 0:
         return np.empty(0)
     metre = np.floor(along).astype(np.int64)
     metre -= metre.min()
-    first = np.concatenate([[0], np.cumsum(np.bincount(metre))])
-    return np.asarray(_quantiles(metre, value, first, share)[metre], dtype=np.float64)
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _quantiles(metre: Int64, value: Float, first: Int64, share: float) -> Float:  # pragma: no cover - compiled
-    """Quantile of the values of each metre, NaN where it has none; ``first`` tells how many come before it."""
-    held = np.empty(len(value))
-    end = first[:-1].copy()
-    for i in range(len(value)):
-        held[end[metre[i]]] = value[i]
-        end[metre[i]] += 1
-    out = np.full(len(end), np.nan)
-    for m in prange(len(end)):
-        count = first[m + 1] - first[m]
-        if count > 0:
-            at = int(np.floor(share * (count - 1)))
-            out[m] = np.partition(held[first[m] : first[m + 1]], at)[at]
-    return out
+    # Few bits: NumPy sorts these in linear time.
+    order = np.argsort(metre.astype(np.min_scalar_type(metre.max())), kind="stable")
+    value, count = value[order], np.bincount(metre)
+    ends = np.cumsum(count)
+    quantile = np.full(len(count), np.nan)
+    for m in np.flatnonzero(count).tolist():
+        at = int(share * (count[m] - 1))
+        quantile[m] = np.partition(value[ends[m] - count[m] : ends[m]], at)[at]
+    return quantile[metre]

@@ -8,19 +8,21 @@ large, it is laid across from the cells about it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 from scipy import ndimage
 
 from tunneldb.arrays import Bool, Float, Int64, Single
 from tunneldb.classification.ground.model import Ground
 from tunneldb.classification.ground.wall_arcs import foot_arcs
+from tunneldb.compiled import inner, kernel
 from tunneldb.geometry.plan_line import PlanLine
-from tunneldb.geometry.robust_plane import DELTA
+from tunneldb.geometry.robust_plane import DELTA, central_mode, plane_of_moments
 from tunneldb.geometry.section_outliers import OutlierOffsets
 from tunneldb.geometry.surface import Surface
+from tunneldb.threads import in_blocks
 
 CELL = 0.25
 """Edge of a cell, m."""
@@ -41,7 +43,10 @@ _FINE, _FINES = 0.002, 128  # of the histogram that finds the spread
 _TUKEY = 4.685  # Tukey's weights end at so many standard deviations
 _FIRST, _FITS = 0.12, 5  # width of the first fit's weights, m
 _REST = 2e-4  # the fit rests when a cell moves by less, m
+_FLATTEST = 0.05  # determinant of the covariance of x and y, in cells, of points on a line: that of a full part is 4.3
 _ALONG, _ROUND = 12, 4  # cells to each side that a cell's offset is compared with: 6 m by 2 m
+_SAMPLE = 1024  # points of a part: survey density fills it with 150, but voxels may with more
+_COLUMNS, _POINTS = 64, 1 << 16  # columns of cells, and points, at a time
 
 
 @dataclass(frozen=True)
@@ -100,7 +105,7 @@ class Relief:
         place = (i - row) * shape[1] + j - column
         order = np.argsort(place, kind="stable")
         starts = np.searchsorted(place[order], np.arange(shape[0] * shape[1] + 1))
-        found, spread = _fit(chainage[order] / CELL - column, arc[order] / CELL - row, offset[order], starts, expected, *shape)
+        found, spread = _planes(chainage[order] / CELL - column, arc[order] / CELL - row, offset[order], starts, expected)
         found[_apart(found, expected)] = np.nan
         spread[np.isnan(found)] = np.nan
         inside = np.ones(shape, np.bool_) if wall is None else wall.holds(columns, rows)
@@ -116,8 +121,11 @@ class Relief:
 
         The tolerance is Xu's δ (3 cm), or three standard deviations of the lining there when that is more.
         """
-        level = _levels(chainage, arc, self.cell, self.column, self.row, self.offset, self.spread)
-        return level[0], level[1]
+        chainage, arc = np.ascontiguousarray(chainage, np.float64), np.ascontiguousarray(arc, np.float64)
+        level, tolerance = np.empty(len(chainage)), np.empty(len(chainage))
+        grid = float(self.cell), int(self.column), int(self.row), self.offset, self.spread
+        in_blocks(lambda begin, end: _levels(chainage, arc, *grid, level, tolerance, begin, end), len(chainage), _POINTS)
+        return level, tolerance
 
 
 @dataclass(frozen=True)
@@ -187,137 +195,125 @@ def _whole(found: Float, spread: Float, expected: Float, inside: Bool) -> tuple[
     return offset.astype(np.float32), np.where(inside, spread, np.nan).astype(np.float32)
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _median(grid: Float, along: int, across: int) -> Float:  # pragma: no cover - compiled
+def _median(grid: Float, along: int, across: int) -> Float:
     """Median of the cells about each, NaN left out; of some of them, evenly chosen, which is enough."""
     rows, columns = grid.shape
-    out = np.full(grid.shape, np.nan)
     step = max(2, along // 3)
-    for j in prange(columns):
-        values = np.empty((2 * along // step + 1) * (across + 1))
-        for i in range(rows):
-            count = 0
-            for m in range(i - across, i + across + 1, 2):
-                for n in range(j - along, j + along + 1, step):
-                    if 0 <= m < rows and 0 <= n < columns and not np.isnan(grid[m, n]):
-                        values[count] = grid[m, n]
-                        count += 1
-            if count > 0:
-                out[i, j] = np.median(values[:count])
+    padded = np.pad(grid, ((across, across), (along, along)), constant_values=np.nan)
+    out = np.empty(grid.shape)
+
+    def work(begin: int, end: int) -> None:
+        about = [
+            padded[m : m + rows, n + begin : n + end]
+            for m in range(0, 2 * across + 1, 2)
+            for n in range(0, 2 * along + 1, step)
+        ]
+        values = np.sort(np.stack(about, axis=-1), axis=-1)  # NaN come last
+        count = np.isfinite(values).sum(axis=-1, keepdims=True)
+        middle = [np.take_along_axis(values, k, axis=-1)[..., 0] for k in ((count - 1) // 2, count // 2)]
+        out[:, begin:end] = (middle[0] + middle[1]) / 2.0
+
+    in_blocks(work, columns, _COLUMNS)
     return out
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _fit(
-    x: Float, y: Float, z: Float, starts: Int64, expected: Float, rows: int, columns: int
-) -> tuple[Float, Float]:  # pragma: no cover - compiled
+def _planes(x: Float, y: Float, z: Float, starts: Int64, expected: Float) -> tuple[Float, Float]:
     """Offset and spread of each cell; x and y in cells, z and the results in m, NaN where there are too few points."""
-    offset, spread = np.full((rows, columns), np.nan), np.full((rows, columns), np.nan)
-    for j in prange(columns):
-        part = np.empty((1024, 3))
-        counts = np.empty(2 * _BINS + 1)
-        fine = np.empty(_FINES, np.int64)
+    offset, spread = np.full(expected.shape, np.nan), np.full(expected.shape, np.nan)
+
+    def work(begin: int, end: int) -> None:
+        part = np.empty((_SAMPLE, 3))
+        counts, fine = np.empty(2 * _BINS + 1), np.empty(_FINES, np.int64)
+        _fit_planes(x, y, z, starts, expected, part, counts, fine, offset, spread, begin, end)
+
+    in_blocks(work, expected.shape[1], _COLUMNS)
+    return offset, spread
+
+
+@kernel
+def _fit_planes(
+    x: Float, y: Float, z: Float, starts: Int64, expected: Float, part: Float, counts: Float, fine: Int64,
+    offset: Float, spread: Float, begin: int, end: int,
+) -> None:  # fmt: skip  # pragma: no cover - compiled
+    """Fit the planes of the columns of cells from begin to end; part, counts and fine are room to work in."""
+    rows, columns = expected.shape
+    for j in range(begin, end):
+        left, right = max(j - _PART, 0), min(j + _PART, columns - 1)
         for i in range(rows):
+            below, above = max(i - _PART, 0), min(i + _PART + 1, rows)
             total = 0
-            for m in range(max(i - _PART, 0), min(i + _PART + 1, rows)):
-                left, right = max(j - _PART, 0), min(j + _PART, columns - 1)
+            for m in range(below, above):
                 total += starts[m * columns + right + 1] - starts[m * columns + left]
             if total < _MIN_POINTS:
                 continue
-            every = 1 + total // part.shape[0]  # survey density fills a part with 150 points, but voxels may with more
-            count, seen = 0, 0
-            for m in range(max(i - _PART, 0), min(i + _PART + 1, rows)):
-                left, right = max(j - _PART, 0), min(j + _PART, columns - 1)
+            every = 1 + total // _SAMPLE
+            count, seen = np.int64(0), 0  # no literal: what is called with one is compiled for it once more
+            for k in range(counts.shape[0]):
+                counts[k] = 0.0
+            for m in range(below, above):
                 for k in range(starts[m * columns + left], starts[m * columns + right + 1]):
                     if seen % every == 0:
                         part[count, 0], part[count, 1] = x[k] - j - 0.5, y[k] - i - 0.5
                         part[count, 2] = z[k] - expected[i, j]
+                        b = math.floor(part[count, 2] / _BIN + 0.5) + _BINS
+                        if 0 <= b <= 2 * _BINS:
+                            counts[b] += 1.0
                         count += 1
                     seen += 1
-            level = _level(part[:count], counts)
-            a, sigma = _plane(part[:count], level, fine)
-            offset[i, j], spread[i, j] = a + expected[i, j], sigma
-    return offset, spread
+            mode = central_mode(counts, 2 * _BINS + 1, _SMOOTH)
+            if mode >= 0:
+                level, sigma = _fit_plane(part, count, (mode - _BINS) * _BIN, fine)
+                offset[i, j], spread[i, j] = level + expected[i, j], sigma
 
 
-@njit(cache=True, nogil=True)
-def _level(part: Float, counts: Float) -> float:  # pragma: no cover - compiled
-    """Offset near which most points lie, those near the surface counting more."""
-    counts[:] = 0.0
-    for k in range(part.shape[0]):
-        b = int(np.floor(part[k, 2] / _BIN + 0.5)) + _BINS
-        if 0 <= b <= 2 * _BINS:
-            counts[b] += 1.0
-    best, level = 0.0, np.nan
-    for b in range(2 * _BINS + 1):
-        score = 0.0
-        for m in range(max(b - _SMOOTH, 0), min(b + _SMOOTH, 2 * _BINS) + 1):
-            score += counts[m]
-        score *= 1.0 - abs(b - _BINS) / (2.0 * _BINS)
-        if score > best:
-            best, level = score, (b - _BINS) * _BIN
-    return level
-
-
-@njit(cache=True, nogil=True)
-def _plane(part: Float, level: float, fine: Int64) -> tuple[float, float]:  # pragma: no cover - compiled
+@inner
+def _fit_plane(part: Float, count: int, level: float, fine: Int64) -> tuple[float, float]:  # pragma: no cover - compiled
     """Height in the middle of the plane through points, fitted from a level on, and their spread about it; NaN: none."""
     a, b, c, scale, sigma = level, 0.0, 0.0, _FIRST, np.nan
     for _ in range(_FITS):
-        used, s0, sx, sy, sxx, sxy, syy, sz, sxz, syz = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for k in range(part.shape[0]):
-            u = (part[k, 2] - a - b * part[k, 0] - c * part[k, 1]) / scale
+        used, s, sx, sy, sxx, sxy, syy, sz, sxz, syz = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(count):
+            x, y, z = part[k, 0], part[k, 1], part[k, 2]
+            u = (z - a - b * x - c * y) / scale
             if abs(u) < 1.0:
                 used += 1
                 w = (1.0 - u * u) ** 2
-                wx, wy = w * part[k, 0], w * part[k, 1]
-                s0 += w
+                wx, wy = w * x, w * y
+                s += w
                 sx += wx
                 sy += wy
-                sxx += wx * part[k, 0]
-                sxy += wx * part[k, 1]
-                syy += wy * part[k, 1]
-                sz += w * part[k, 2]
-                sxz += wx * part[k, 2]
-                syz += wy * part[k, 2]
+                sxx += wx * x
+                sxy += wx * y
+                syy += wy * y
+                sz += w * z
+                sxz += wx * z
+                syz += wy * z
         if used < _MIN_POINTS:
             return np.nan, np.nan
-        xx, xy, yy = sxx - sx * sx / s0, sxy - sx * sy / s0, syy - sy * sy / s0
-        xz, yz = sxz - sx * sz / s0, syz - sy * sz / s0
-        determinant = xx * yy - xy * xy
         before, lean, slant = a, b, c
-        b, c = 0.0, 0.0
-        if determinant > 0.05 * s0 * s0:  # spread in both directions: that of a full part is 4.3
-            b = (xz * yy - yz * xy) / determinant
-            c = (yz * xx - xz * xy) / determinant
-        a = (sz - b * sx - c * sy) / s0
-        rests = max(abs(a - before), abs(b - lean), abs(c - slant)) < _REST
-        sigma = _spread(part, a, b, c, fine)
-        if rests:
+        a, b, c = plane_of_moments(s, sx, sy, sxx, sxy, syy, sz, sxz, syz, _FLATTEST)
+        # Standard deviation about the plane, from the median of the distances.
+        for f in range(_FINES):
+            fine[f] = 0
+        total = 0
+        for k in range(count):
+            f = int(abs(part[k, 2] - a - b * part[k, 0] - c * part[k, 1]) / _FINE)
+            if f < _FINES:
+                fine[f] += 1
+                total += 1
+        below, sigma = 0, np.nan
+        for f in range(_FINES):
+            if 2 * (below + fine[f]) >= total and fine[f] > 0:
+                sigma = 1.4826 * (f + (0.5 * total - below) / fine[f]) * _FINE
+                break
+            below += fine[f]
+        if max(abs(a - before), abs(b - lean), abs(c - slant)) < _REST:
             break
         scale = min(max(_TUKEY * sigma, DELTA), 2.0 * _FIRST)
     return a, sigma
 
 
-@njit(cache=True, nogil=True)
-def _spread(part: Float, a: float, b: float, c: float, fine: Int64) -> float:  # pragma: no cover - compiled
-    """Standard deviation of the points about a plane, from the median of their distances."""
-    fine[:] = 0
-    total = 0
-    for k in range(part.shape[0]):
-        f = int(abs(part[k, 2] - a - b * part[k, 0] - c * part[k, 1]) / _FINE)
-        if f < _FINES:
-            fine[f] += 1
-            total += 1
-    below = 0
-    for f in range(_FINES):
-        if 2 * (below + fine[f]) >= total and fine[f] > 0:
-            return 1.4826 * (f + (0.5 * total - below) / fine[f]) * _FINE
-        below += fine[f]
-    return np.nan
-
-
-@njit(cache=True, nogil=True)
+@inner
 def level_at(
     chainage: float, arc: float, cell: float, column: int, row: int, relief: Single, spread: Single
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -333,7 +329,7 @@ def level_at(
     for m in range(2):
         for n in range(2):
             p, q = i + m, j + n
-            if 0 <= p < rows and 0 <= q < columns and not np.isnan(relief[p, q]):
+            if 0 <= p < rows and 0 <= q < columns and not math.isnan(relief[p, q]):
                 weight = (fy if m else 1.0 - fy) * (fx if n else 1.0 - fx)
                 total += weight
                 plane += weight * relief[p, q]
@@ -343,11 +339,10 @@ def level_at(
     return plane / total, max(DELTA, SIGMAS * sigma / total)
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@kernel
 def _levels(
-    chainage: Float, arc: Float, cell: float, column: int, row: int, relief: Single, spread: Single
-) -> Float:  # pragma: no cover - compiled
-    out = np.empty((2, chainage.shape[0]))
-    for i in prange(chainage.shape[0]):
-        out[0, i], out[1, i] = level_at(chainage[i], arc[i], cell, column, row, relief, spread)
-    return out
+    chainage: Float, arc: Float, cell: float, column: int, row: int, relief: Single, spread: Single,
+    level: Float, tolerance: Float, begin: int, end: int,
+) -> None:  # fmt: skip  # pragma: no cover - compiled
+    for i in range(begin, end):
+        level[i], tolerance[i] = level_at(chainage[i], arc[i], cell, column, row, relief, spread)

@@ -7,15 +7,16 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numba import njit, prange
 
-from tunneldb.arrays import Bool, Float, Int64, Single, UInt8
+from tunneldb.arrays import Float, Int64, Single, UInt8
 from tunneldb.classification.classes import PointClass
 from tunneldb.classification.ground.model import Ground
 from tunneldb.classification.lining_relief import Relief, level_at
 from tunneldb.classification.objects.clusters import Cluster, Lookup, look_up
+from tunneldb.compiled import kernel
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.surface import Surface
+from tunneldb.threads import in_blocks
 
 SPHERE_SKIN = 0.01
 """Points up to this far outside a target sphere are its own, m: three times a scanner's noise."""
@@ -23,7 +24,8 @@ SPHERE_SKIN = 0.01
 BEHIND = (PointClass.NICHE, PointClass.LINING)
 """Classes of clusters that lie behind the lining's plane."""
 
-_BLOCK = 4096
+_BLOCK = 1 << 16  # points
+_BOX = 4096  # points whose box is compared with the spheres
 _UNASSIGNED, _GROUND, _LINING = int(PointClass.UNASSIGNED), int(PointClass.GROUND), int(PointClass.LINING)
 _SPHERE, _NOISE = int(PointClass.SPHERE), int(PointClass.NOISE)
 
@@ -35,7 +37,7 @@ class Scene:
     Attributes
     ----------
     line : PlanLine
-        PlanLine along the tunnel, in whose frame the ground stands.
+        Line along the tunnel, in whose frame the ground stands.
     ground : Ground or None
         The ground, if there is one.
     clusters : sequence of Cluster
@@ -63,18 +65,19 @@ class Scene:
         that the surface does not reach are unassigned.
         """
         xyz = np.ascontiguousarray(xyz, dtype=np.float64)
-        spheres = np.ascontiguousarray(self.spheres, dtype=np.float64)
         if self.ground is None:
-            return self._off_ground(xyz, spheres)
-        along, across = self.line.place(xyz)
-        ground = self.ground.is_ground(along, across, xyz[:, 2])
-        out = np.full(len(xyz), _GROUND, np.uint8)
-        out[~ground] = self._off_ground(xyz[~ground], spheres)
+            out = self._off_ground(xyz)
+        else:
+            along, across = self.line.place(xyz)
+            ground = self.ground.is_ground(along, across, xyz[:, 2])
+            out = np.full(len(xyz), _GROUND, np.uint8)
+            out[~ground] = self._off_ground(xyz[~ground])
+        spheres = np.ascontiguousarray(self.spheres, dtype=np.float64)
         if len(spheres):
-            out[ground & _in_spheres(xyz, spheres)] = _SPHERE
+            in_blocks(lambda begin, end: _mark_spheres(xyz, spheres, begin, end, out), len(xyz), _BLOCK)
         return out
 
-    def _off_ground(self, xyz: Float, spheres: Float) -> UInt8:
+    def _off_ground(self, xyz: Float) -> UInt8:
         """Class of points that are not ground; these alone need to be unrolled."""
         if self.surface is None or self.relief is None:
             unrolled, relief = np.zeros((3, len(xyz))), Relief.none()
@@ -82,12 +85,18 @@ class Scene:
             places, relief = self.surface.unroll(xyz), self.relief
             unrolled = np.stack([places.chainage, places.arc, places.offset])
         inner, outer = self._lookups
-        return np.asarray(
+        out = np.empty(len(xyz), np.uint8)
+
+        def work(begin: int, end: int) -> None:
             _classes(
                 xyz, unrolled, relief.cell, relief.column, relief.row, relief.offset, relief.spread,
-                inner.first, inner.last, inner.keys, inner.klass, outer.first, outer.last, outer.keys, outer.klass, spheres,
-            )
-        )  # fmt: skip
+                inner.first, inner.last, inner.keys, inner.klass,
+                outer.first, outer.last, outer.keys, outer.klass,
+                begin, end, out,
+            )  # fmt: skip
+
+        in_blocks(work, len(xyz), _BLOCK)
+        return out
 
     @cached_property
     def _lookups(self) -> tuple[Lookup, Lookup]:
@@ -98,83 +107,49 @@ class Scene:
         return Lookup.of([cluster for cluster in self.clusters if cluster.klass != PointClass.NICHE]), Lookup.of(behind)
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@kernel
 def _classes(
     xyz: Float, unrolled: Float, cell: float, column: int, row: int,
     relief: Single, spread: Single,
     inner_first: Int64, inner_last: Int64, inner_keys: Int64, inner_klass: UInt8,
-    outer_first: Int64, outer_last: Int64, outer_keys: Int64, outer_klass: UInt8, spheres: Float,
-) -> UInt8:  # fmt: skip  # pragma: no cover - compiled
-    count = xyz.shape[0]
-    out = np.empty(count, np.uint8)
-    for block in prange((count + _BLOCK - 1) // _BLOCK):
-        first, last = block * _BLOCK, min(count, (block + 1) * _BLOCK)
-        near = _spheres_near(xyz, first, last, spheres)
-        for i in range(first, last):
-            x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-            if _in_sphere(x, y, z, spheres, near):
-                out[i] = _SPHERE
-                continue
-            if np.isnan(unrolled[0, i]):
-                out[i] = _UNASSIGNED
-                continue
-            plane, tolerance = level_at(unrolled[0, i], unrolled[1, i], cell, column, row, relief, spread)
-            off = (unrolled[2, i] - plane) / tolerance
-            if abs(off) <= 1.0:
-                out[i] = _LINING
-                continue
-            if off < 0.0:
-                klass = look_up(x, y, z, outer_first, outer_last, outer_keys, outer_klass)
-            else:
-                klass = look_up(x, y, z, inner_first, inner_last, inner_keys, inner_klass)
-            if klass == 0:  # no cluster: of the lining's rough edge, or in the air
-                klass = _LINING if abs(off) <= 2.0 else _NOISE
-            out[i] = klass
-    return out
+    outer_first: Int64, outer_last: Int64, outer_keys: Int64, outer_klass: UInt8,
+    begin: int, end: int, out: UInt8,
+) -> None:  # fmt: skip  # pragma: no cover - compiled
+    for i in range(begin, end):
+        if np.isnan(unrolled[0, i]):
+            out[i] = _UNASSIGNED
+            continue
+        plane, tolerance = level_at(unrolled[0, i], unrolled[1, i], cell, column, row, relief, spread)
+        off = (unrolled[2, i] - plane) / tolerance
+        if abs(off) <= 1.0:
+            out[i] = _LINING
+            continue
+        x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+        if off < 0.0:
+            klass = look_up(x, y, z, outer_first, outer_last, outer_keys, outer_klass)
+        else:
+            klass = look_up(x, y, z, inner_first, inner_last, inner_keys, inner_klass)
+        if klass == 0:  # no cluster: of the lining's rough edge, or in the air
+            klass = _LINING if abs(off) <= 2.0 else _NOISE
+        out[i] = klass
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _in_spheres(xyz: Float, spheres: Float) -> Bool:  # pragma: no cover - compiled
-    """Tell which points lie within a target sphere."""
-    count = xyz.shape[0]
-    out = np.zeros(count, np.bool_)
-    for block in prange((count + _BLOCK - 1) // _BLOCK):
-        first, last = block * _BLOCK, min(count, (block + 1) * _BLOCK)
-        near = _spheres_near(xyz, first, last, spheres)
-        if near.shape[0] > 0:
+@kernel
+def _mark_spheres(xyz: Float, spheres: Float, begin: int, end: int, out: UInt8) -> None:  # pragma: no cover - compiled
+    """Class the points that lie within a target sphere; only spheres that reach into the box of some points are looked at."""
+    for first in range(begin, end, _BOX):
+        last = min(first + _BOX, end)
+        x0, y0, z0 = xyz[first, 0], xyz[first, 1], xyz[first, 2]
+        x1, y1, z1 = x0, y0, z0
+        for i in range(first + 1, last):
+            x0, y0, z0 = min(x0, xyz[i, 0]), min(y0, xyz[i, 1]), min(z0, xyz[i, 2])
+            x1, y1, z1 = max(x1, xyz[i, 0]), max(y1, xyz[i, 1]), max(z1, xyz[i, 2])
+        for k in range(spheres.shape[0]):
+            x, y, z, reach = spheres[k, 0], spheres[k, 1], spheres[k, 2], spheres[k, 3] + SPHERE_SKIN
+            apart = x + reach < x0 or x - reach > x1 or y + reach < y0 or y - reach > y1 or z + reach < z0 or z - reach > z1
+            if apart:
+                continue
             for i in range(first, last):
-                out[i] = _in_sphere(xyz[i, 0], xyz[i, 1], xyz[i, 2], spheres, near)
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _spheres_near(xyz: Float, first: int, last: int, spheres: Float) -> Int64:  # pragma: no cover - compiled
-    """Numbers of the spheres that reach into the box of a block of points."""
-    near = np.empty(spheres.shape[0], np.int64)
-    if spheres.shape[0] == 0:
-        return near
-    low, high = xyz[first].copy(), xyz[first].copy()
-    for i in range(first + 1, last):
-        for axis in range(3):
-            low[axis] = min(low[axis], xyz[i, axis])
-            high[axis] = max(high[axis], xyz[i, axis])
-    count = 0
-    for k in range(spheres.shape[0]):
-        reach = spheres[k, 3] + SPHERE_SKIN
-        apart = False
-        for axis in range(3):
-            apart |= spheres[k, axis] + reach < low[axis] or spheres[k, axis] - reach > high[axis]
-        if not apart:
-            near[count] = k
-            count += 1
-    return near[:count]
-
-
-@njit(cache=True, nogil=True)
-def _in_sphere(x: float, y: float, z: float, spheres: Float, near: Int64) -> bool:  # pragma: no cover - compiled
-    for k in near:
-        dx, dy, dz = x - spheres[k, 0], y - spheres[k, 1], z - spheres[k, 2]
-        reach = spheres[k, 3] + SPHERE_SKIN
-        if dx * dx + dy * dy + dz * dz <= reach * reach:
-            return True
-    return False
+                dx, dy, dz = xyz[i, 0] - x, xyz[i, 1] - y, xyz[i, 2] - z
+                if dx * dx + dy * dy + dz * dz <= reach * reach:
+                    out[i] = _SPHERE

@@ -30,7 +30,7 @@ def axis(settings: Settings, survey: str, start: str | None, end: str | None, ou
     marked, or a table (.csv, metres) of all vertices.
     """
     from tunneldb.export.figures.axis_deviation import check_format, write_deviation
-    from tunneldb.store.design import load_deviation
+    from tunneldb.store.alignment import load_deviation
 
     if output is not None:
         check_format(output)

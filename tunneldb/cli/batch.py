@@ -70,10 +70,11 @@ def batch(
     Ctrl-C ends the stages that are under way, and stops; a second one stops at once.
     """
     from tunneldb.pipeline.run import km_range
-    from tunneldb.queue.batch import STEPS, plan, register
+    from tunneldb.pipeline.stages import STAGE_NAMES
+    from tunneldb.queue.batch import plan, register
 
-    if last is not None and last not in STEPS:
-        raise UserError(f"there is no stage {last!r}; the stages are {', '.join(STEPS)}")
+    if last is not None and last not in STAGE_NAMES:
+        raise UserError(f"there is no stage {last!r}; the stages are {', '.join(STAGE_NAMES)}")
     values = settings(assignments)
     kilometres = None if km is None else km_range(km)
     chosen = {name: values[name] for name in (text.partition("=")[0] for text in assignments) if name in PARAMETERS}

@@ -9,11 +9,11 @@ import click
 import numpy as np
 import psycopg
 
-from tunneldb.cli.classes import print_classes
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
+from tunneldb.cli.tables import print_classes
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import make_folder, replacing, told_to_end

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from tunneldb.cli.classes import print_classes
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.run import parameter_table
+from tunneldb.cli.tables import print_classes
 from tunneldb.errors import UserError
 from tunneldb.files import told_to_end
 from tunneldb.pipeline.parameters import PARAMETERS, settings

@@ -8,6 +8,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.database import open_connection
 from tunneldb.database.schema import install, schema_revision
+from tunneldb.pipeline.stages import STAGES
 
 
 @verb(examples=["tunneldb init", 'tunneldb --dsn "host=gis.example.org dbname=tunnels user=anna" init'])
@@ -28,7 +29,7 @@ def init(settings: Settings) -> None:
                 else None
             )
         )
-        install(connection)
+        install(connection, STAGES)
         after = schema_revision(connection)
     change = "created" if before is None else "is up to date" if before == after else f"upgraded from {before}"
     tell(before=before, revision=after)

@@ -11,7 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from tunneldb.pipeline.order import STAGES
+from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.queue.progress import TO_DO, Cell, File, Overview, Worker
 
 STYLES = {
@@ -53,12 +53,14 @@ def render(seen: Overview) -> RenderableType:
 
 def _kilometres(seen: Overview) -> FittedTable:
     """Return a row a kilometre, or for several in a row of which the same is to be said."""
-    entries = [(km, tuple(cells[stage].state for stage in STAGES), remark(km, seen)) for km, cells in seen.kilometres.items()]
+    entries = [
+        (km, tuple(cells[stage].state for stage in STAGE_NAMES), remark(km, seen)) for km, cells in seen.kilometres.items()
+    ]
     rows = [
         [Text(spans([km for km, *_ in group])), *(Text(state, STYLES[state]) for state in states), Text(said)]
         for (states, said), group in ((key, list(group)) for key, group in groupby(entries, key=lambda entry: entry[1:]))
     ]
-    return FittedTable(("km", *STAGES, ""), rows, elastic=len(STAGES) + 1)
+    return FittedTable(("km", *STAGE_NAMES, ""), rows, elastic=len(STAGE_NAMES) + 1)
 
 
 @dataclass(frozen=True)
@@ -171,8 +173,8 @@ def advise(seen: Overview) -> list[Advice]:
             found[key] = _range(file)
     read = {file.message for file in seen.files}
     for km, cells in seen.kilometres.items():
-        last = STAGES.index(seen.targets.get(km, STAGES[-1]))
-        wanted = [(stage, cells[stage]) for stage in STAGES[: last + 1]]
+        last = STAGE_NAMES.index(seen.targets.get(km, STAGE_NAMES[-1]))
+        wanted = [(stage, cells[stage]) for stage in STAGE_NAMES[: last + 1]]
         entry = next(((stage, cell) for stage, cell in wanted if cell.state not in ("done", "empty", *TO_DO)), None)
         if entry is None or (entry[1].state == "failed" and entry[1].reason in read):
             continue

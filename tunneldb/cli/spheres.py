@@ -81,7 +81,7 @@ def spheres(
     from tunneldb.files import replacing
     from tunneldb.pipeline.target_control import compare, read_control
     from tunneldb.pipeline.targets import search
-    from tunneldb.store.stationing import load_stationing
+    from tunneldb.store.alignment import load_stationing
 
     if tolerance >= radius / 4.0:
         raise UserError(f"--tolerance {tolerance:g} is too much for a radius of {radius:g} m: give less than a quarter of it")

@@ -15,7 +15,7 @@ from tunneldb.cli.output import records, tell, verb, wants_json
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.pipeline.order import STAGES
+from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.store.survey import get_survey
 
 
@@ -78,12 +78,12 @@ def _all(connection: psycopg.Connection[Any]) -> None:
                         GROUP BY t.step) d) k ON true
          ORDER BY s.tunnel, s.date, s.name
         """,
-        [list(STAGES)],
+        [list(STAGE_NAMES)],
     ).fetchall()
     names = ("name", "tunnel", "date", "files", "points", "label_from", "label_to", "kilometres", "done")
-    tell(surveys=[row | {"done": dict(zip(STAGES, row["done"] or (), strict=False))} for row in records(names, rows)])
-    table = [[*fixed, there, *(done or [None] * len(STAGES))] for *fixed, there, done in rows]
-    print_table(["survey", "tunnel", "date", "files", "points", "from", "to", "km", *STAGES], table, right=range(3, 14))
+    tell(surveys=[row | {"done": dict(zip(STAGE_NAMES, row["done"] or (), strict=False))} for row in records(names, rows)])
+    table = [[*fixed, there, *(done or [None] * len(STAGE_NAMES))] for *fixed, there, done in rows]
+    print_table(["survey", "tunnel", "date", "files", "points", "from", "to", "km", *STAGE_NAMES], table, right=range(3, 14))
     if not rows:
         click.echo("there is no survey yet: tunneldb tunnel add, then tunneldb survey add")
 

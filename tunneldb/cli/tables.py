@@ -1,4 +1,4 @@
-"""Tables on the terminal."""
+"""Tables on the terminal, those of classes of points among them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+
+from tunneldb.arrays import Int64
+from tunneldb.classification.classes import PointClass
+from tunneldb.cli.output import tell
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[Any]], right: Sequence[int] = ()) -> None:
@@ -21,3 +25,15 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[Any]], right: Seq
     if not console.is_terminal:
         console = Console(width=1000)  # a pipe has no width: let nothing be cut there
     console.print(table, soft_wrap=True)
+
+
+def print_classes(counts: Int64) -> None:
+    """Print a table of the classes that points (256,) have, and tell of them."""
+    total = int(counts.sum())
+    tell(points=total, classes={klass.name.lower(): int(counts[klass]) for klass in PointClass if counts[klass]})
+    rows = [
+        (int(klass), klass.name.lower(), f"{int(counts[klass]):,}".replace(",", " "), f"{100.0 * counts[klass] / total:.2f} %")
+        for klass in PointClass
+        if counts[klass]
+    ]
+    print_table(("class", "", "points", "share"), rows, right=(0, 2, 3))

@@ -68,8 +68,8 @@ def add(
     the axis follows them to a millimetre. Lengths in feet are turned into metres when the file says that they are feet.
     """
     from tunneldb.alignment.given import read_given
+    from tunneldb.store.alignment import read_equations, save_equations
     from tunneldb.store.catalog import add_tunnel, get_tunnel
-    from tunneldb.store.stationing import read_equations, save_equations
 
     given = read_given(axis, start_chainage, alignment, profile)
     own = read_equations(equations) if equations else None
@@ -101,8 +101,8 @@ def stationing(settings: Settings, name: str, file: Path | None, show: bool, cle
     the next row; before the first row it is reckoned back from that. Nothing else is changed: all is stored in chainage,
     and the labels of views, lists and pictures (12+345.678) are stations from then on.
     """
+    from tunneldb.store.alignment import read_equations, save_equations
     from tunneldb.store.catalog import get_tunnel
-    from tunneldb.store.stationing import read_equations, save_equations
 
     if [file is not None, show, clear].count(True) != 1:
         raise UserError("give either a FILE, or --show, or --clear")

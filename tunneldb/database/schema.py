@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import psycopg
 from psycopg import sql
@@ -18,22 +19,38 @@ if TYPE_CHECKING:
     import sqlalchemy
     from alembic.config import Config
 
-HEAD = "0007"
+HEAD = "0008"
 """The newest migration. Known here so that a command whose database is up to date need not import Alembic."""
 
 _LOCK = 7088630451  # any number: two installations of one database wait for each other
 _PATIENCE = "30s"  # how long to wait for others that use what is to be changed
 
 
-def install(connection: psycopg.Connection[Any], revision: str = "head") -> None:
-    """Create or upgrade everything, in one transaction; what is up to date stays, tunnel_api is made anew.
+class StageRow(Protocol):
+    """A row of tunnel.stage: what the table's columns of these names hold."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def reads(self) -> Sequence[str]: ...  # noqa: D102
+
+    @property
+    def reads_beside(self) -> Sequence[str]: ...  # noqa: D102
+
+    @property
+    def parameters(self) -> Sequence[str]: ...  # noqa: D102
+
+
+def install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> None:
+    """Create or upgrade everything, in one transaction; what is up to date stays, tunnel_api and tunnel.stage are made anew.
 
     Parameters
     ----------
     connection
         Idle connection as the database's owner.
-    revision
-        Migration to stop at; tests use it.
+    stages
+        The stages of a kilometre, in their order, which tunnel_api goes by: `tunneldb.pipeline.stages.STAGES`.
 
     Raises
     ------
@@ -43,7 +60,7 @@ def install(connection: psycopg.Connection[Any], revision: str = "head") -> None
     import sqlalchemy
 
     try:
-        _install(connection, revision)
+        _install(connection, stages)
     except (psycopg.errors.LockNotAvailable, sqlalchemy.exc.OperationalError) as error:
         cause = error.orig if isinstance(error, sqlalchemy.exc.OperationalError) else error
         if not isinstance(cause, psycopg.errors.LockNotAvailable):
@@ -53,7 +70,7 @@ def install(connection: psycopg.Connection[Any], revision: str = "head") -> None
         ) from None
 
 
-def _install(connection: psycopg.Connection[Any], revision: str) -> None:
+def _install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> None:
     from alembic import command
 
     with engine_on(connection).begin() as session:
@@ -63,8 +80,21 @@ def _install(connection: psycopg.Connection[Any], revision: str) -> None:
         present = schema_revision(connection)
         if present is not None and present not in revisions():
             raise UserError(_newer(present))
-        command.upgrade(alembic_config(session), revision)
+        command.upgrade(alembic_config(session), "head")
+        _fill_stages(connection, stages)
         install_api(connection)
+
+
+def _fill_stages(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> None:
+    connection.execute("DELETE FROM tunnel.stage")
+    with connection.cursor() as cursor:
+        cursor.executemany(
+            "INSERT INTO tunnel.stage (step, name, reads, reads_beside, parameters) VALUES (%s, %s, %s, %s, %s)",
+            [
+                (step, stage.name, list(stage.reads), list(stage.reads_beside), list(stage.parameters))
+                for step, stage in enumerate(stages, 1)
+            ],
+        )
 
 
 def install_api(connection: psycopg.Connection[Any]) -> None:

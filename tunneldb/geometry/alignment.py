@@ -5,13 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 from scipy.interpolate import CubicSpline
 
-from tunneldb.arrays import Float, Int64
+from tunneldb.arrays import Float, Int32, Int64
+from tunneldb.compiled import point_kernel
 from tunneldb.errors import UserError
-from tunneldb.geometry.frame import frame_at, locate, nearest_segment, segment_rows, tangents
+from tunneldb.geometry.frame import frame_of, locate, nearest_segment, segment_rows, tangents
 from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.threads import in_blocks
+
+BLOCK = 1 << 14
+"""Points that are located at a time."""
 
 MILLIMETRE = 0.001
 DENSE = 2.0  # m between vertices
@@ -92,8 +96,19 @@ class Alignment:
     def locate(self, points: Float) -> tuple[Float, Float]:
         """Chainage and distance from the axis of points (n, 3), both (n,), m; NaN beyond the ends."""
         segments = segment_rows(self.vertices, tangents(self.vertices))
-        chainage, distance = _locate_all(segments, self.number, self.spacing, np.ascontiguousarray(points, np.float64))
-        beyond = (chainage < self.start) | (chainage > self.end)
+        points = np.ascontiguousarray(points, np.float64)
+        start, segment = np.full(len(points), -1, np.int32), np.empty(len(points), np.int32)
+        chainage, distance = np.empty(len(points)), np.empty(len(points))
+
+        def block(begin: int, end: int) -> None:
+            part = slice(begin, end)
+            locate_points(
+                segments, self.number, float(self.spacing), points[part],
+                start[part], chainage[part], distance[part], segment[part],
+            )  # fmt: skip
+
+        in_blocks(block, len(points), BLOCK)
+        beyond = np.isinf(distance) | (chainage < self.start) | (chainage > self.end)
         chainage[beyond] = np.nan
         distance[beyond] = np.nan
         return chainage, distance
@@ -114,27 +129,49 @@ def _curve(xyz: Float, chord: Float) -> tuple[Float, Float, CubicSpline]:
     return parameter, np.concatenate([[0.0], np.cumsum(length)]), position
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _locate_all(
-    segments: Float, number: Int64, spacing: float, points: Float
-) -> tuple[Float, Float]:  # pragma: no cover - compiled
-    count = points.shape[0]
-    chainage = np.empty(count)
-    distance = np.empty(count)
-    block = 4096
-    for b in prange((count + block - 1) // block):
-        frame = np.empty((4, 3))
-        k = -1
-        for i in range(b * block, min(count, (b + 1) * block)):
-            x, y, z = points[i, 0], points[i, 1], points[i, 2]
-            if k < 0:
-                k = nearest_segment(segments, x, y, z)
-            k, f = locate(segments, number, k, x, y, z)
-            if k < 0:
-                chainage[i] = np.nan
-                distance[i] = np.nan
-                continue
-            frame_at(segments[k], f, frame)
-            chainage[i] = (number[k] + f) * spacing
-            distance[i] = np.sqrt((x - frame[0, 0]) ** 2 + (y - frame[0, 1]) ** 2 + (z - frame[0, 2]) ** 2)
-    return chainage, distance
+@point_kernel
+def locate_points(
+    segments: Float,
+    number: Int64,
+    spacing: float,
+    points: Float,
+    start: Int32,
+    chainage: Float,
+    distance: Float,
+    segment: Int32,
+) -> None:  # pragma: no cover - compiled
+    """Find where along the axis a block of points lies.
+
+    Parameters
+    ----------
+    segments, number, spacing
+        Rows of :func:`tunneldb.geometry.frame.segment_rows`, their numbers, and their length in plan, m.
+    points : (n, 3) float array
+        m.
+    start : (n,) int32 array
+        Segment from which to look for each point; -1 for that of the point before.
+    chainage, distance : (n,) float arrays
+        Overwritten: chainage and distance from the axis in the point's plane, m; beyond the ends those of the nearest end,
+        infinitely far.
+    segment : (n,) int32 array
+        Overwritten: place of the segment, beyond the ends of the nearest one.
+    """
+    k = np.int64(-1)
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        if start[i] >= 0:
+            k = np.int64(start[i])
+        elif k < 0:
+            k = nearest_segment(segments, x, y, z)
+        k, f = locate(segments, number, k, x, y, z)
+        if k < 0:
+            nearest = nearest_segment(segments, x, y, z)
+            last = 2 * nearest >= segments.shape[0]
+            chainage[i] = (number[nearest] + (1 if last else 0)) * spacing
+            distance[i] = np.inf
+            segment[i] = nearest
+            continue
+        ox, oy, oz, _, _, _, _, _ = frame_of(segments, k, f)
+        chainage[i] = (number[k] + f) * spacing
+        distance[i] = np.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2)
+        segment[i] = k

@@ -16,13 +16,13 @@ from tunneldb.geometry.plan_line import PlanLine
 
 _CELL = 1.0  # m in plan
 _REACH = 3.0  # cells closer than this are neighbours, m: profiles may lie apart
-_SHORT = 40.0  # m; below, a tunnel may be wider than long, and the way it looks from its end tells its direction
+_SHORT = 40.0  # m; below, a tunnel may be wider than long, and its projection tells its direction
 _STEP = 5.0  # m between vertices
-_SAMPLE = 10_000  # points that are looked at from all sides
-_PICTURE = 0.2  # edge of a cell of the picture, m
+_SAMPLE = 10_000  # points that are projected in all directions
+_PIXEL = 0.2  # edge of a cell of the projection, m
 _SLICE = 1.0  # m, across the line
 _HELD = 10  # cells that make a slice
-_ASTRAY = 0.02  # of a slice's cells may lie beyond each wall
+_OUTLYING = 0.02  # of a slice's cells may lie beyond each wall
 _FAR = 1 << 24  # cells; more than any tunnel is long
 
 
@@ -47,9 +47,9 @@ def centreline_through(points: ArrayLike) -> PlanLine:
 def centreline(points: Float) -> Float:
     """Vertices (k, 2) of a line along a tunnel, from the end that lies farther west.
 
-    A long tunnel's points are strung out by the way to one of its ends, through neighbouring cells of the plan. A
-    short piece is looked at from all sides: seen along the tunnel, its points hide one another the most. The line
-    is then moved to the middle between the walls and smoothed.
+    A long tunnel's points are ordered by the shortest path to one of its ends, through neighbouring cells of the plan.
+    A short piece is projected in all directions: along the tunnel its points fill the fewest cells. The line is then
+    moved to the middle between the walls and smoothed.
 
     Parameters
     ----------
@@ -66,26 +66,26 @@ def centreline(points: Float) -> Float:
         raise ValueError("there are no points to lay a line through")
     origin = np.floor(points.mean(axis=0))
     local = points - origin
-    cells = _cells(local[:, :2])
-    way = _way(cells)
-    vertices = _strung(cells, way) if way.max() > _SHORT else _seen(local)
+    cells = _connected_cells(local[:, :2])
+    path = _path_lengths(cells)
+    vertices = _vertices_along_path(cells, path) if path.max() > _SHORT else _ends_by_projection(local)
     if vertices[-1, 0] < vertices[0, 0]:
         vertices = vertices[::-1]
     # Spread evenly: a scanner's own surroundings would outweigh the walls.
-    spaced = _filled_cells(local[:, :2], _PICTURE)
+    spaced = _occupied_cells(local[:, :2], _PIXEL)
     for _ in range(3):
-        vertices = _centred(vertices, spaced)
+        vertices = _between_walls(vertices, spaced)
     return np.asarray(vertices + origin[:2])
 
 
-def _cells(plan: Float) -> Float:
+def _connected_cells(plan: Float) -> Float:
     """Middles (m, 2) of the plan's cells that hold points and hang together; single stray points don't count."""
-    middle = _filled_cells(plan, _CELL)
+    middle = _occupied_cells(plan, _CELL)
     _, label = connected_components(_graph(middle), directed=False)
     return np.asarray(middle[label == np.argmax(np.bincount(label))], dtype=np.float64)
 
 
-def _filled_cells(plan: Float, edge: float) -> Float:
+def _occupied_cells(plan: Float, edge: float) -> Float:
     """Middles (m, 2) of the cells of the plan that hold points, but for those that hold far fewer than most."""
     key = np.floor(plan / edge).astype(np.int64)
     key, count = np.unique(key[:, 0] * _FAR + key[:, 1] + _FAR // 2, return_counts=True)
@@ -99,8 +99,8 @@ def _graph(middle: Float) -> coo_array:
     return coo_array((length, (pairs[:, 0], pairs[:, 1])), shape=(len(middle), len(middle)))
 
 
-def _way(cells: Float) -> Float:
-    """Length of the way from one end of the cells to each of them, m."""
+def _path_lengths(cells: Float) -> Float:
+    """Length of the path from one end of the cells to each of them, m."""
     graph = _graph(cells).tocsr()
     start = 0
     for _ in range(2):
@@ -108,35 +108,35 @@ def _way(cells: Float) -> Float:
     return np.asarray(dijkstra(graph, directed=False, indices=start))
 
 
-def _strung(cells: Float, way: Float) -> Float:
-    """Mean of the cells of every 5 m of the way; the fronts of the first and last ones are skew."""
-    count = max(2, int(way.max() / (2 * _STEP)))
-    piece = np.minimum((way / way.max() * count).astype(int), count - 1)
+def _vertices_along_path(cells: Float, path: Float) -> Float:
+    """Mean of the cells of every 5 m of the path; the fronts of the first and last ones are skew."""
+    count = max(2, int(path.max() / (2 * _STEP)))
+    piece = np.minimum((path / path.max() * count).astype(int), count - 1)
     number = np.bincount(piece, minlength=count)
     mean = np.column_stack([np.bincount(piece, cells[:, k], minlength=count) / number for k in range(2)])
     mean = mean[1:-1] if count > 4 else mean
     step = np.diff(mean, axis=0)
     unit = step / np.hypot(*step.T)[:, None]
-    ends = [_end(cells, mean[0], -unit[0]), _end(cells, mean[-1], unit[-1])]
+    ends = [_end_of_cells(cells, mean[0], -unit[0]), _end_of_cells(cells, mean[-1], unit[-1])]
     return np.vstack([ends[0], mean, ends[1]])
 
 
-def _end(cells: Float, at: Float, unit: Float) -> Float:
+def _end_of_cells(cells: Float, at: Float, unit: Float) -> Float:
     """Where the cells end, straight on from a place."""
     near = cells - at
     near = near[np.hypot(*near.T) < 6 * _STEP]
     return np.asarray(at + max(float((near @ unit).max()), 0.5) * unit)
 
 
-def _seen(local: Float) -> Float:
-    """Both ends of a short piece: along the direction in which its points fill the fewest cells of the picture."""
+def _ends_by_projection(local: Float) -> Float:
+    """Both ends of a short piece: along the direction in which its points fill the fewest cells of the projection."""
     local = local[np.abs(local - np.median(local, axis=0)).max(axis=1) < _SHORT]
     sample = local[:: max(1, len(local) // _SAMPLE)]
     sample = sample - sample.mean(axis=0)
     best, step = 0.0, np.pi / 90
     angles = np.arange(0.0, np.pi, step)
     for _ in range(3):
-        filled = [_filled(sample, angle) for angle in angles.tolist()]
+        filled = [_cells_in_projection(sample, angle) for angle in angles.tolist()]
         best = float(angles[int(np.argmin(filled))])
         angles, step = best + step * np.linspace(-1.0, 1.0, 11), step / 5
     unit = np.array([np.cos(best), np.sin(best)])
@@ -149,14 +149,14 @@ def _seen(local: Float) -> Float:
     return np.vstack([middle + low * unit, middle + high * unit])
 
 
-def _filled(sample: Float, angle: float) -> int:
-    """How many cells of 0.2 m the points fill, seen in a direction of the plan."""
+def _cells_in_projection(sample: Float, angle: float) -> int:
+    """How many cells of 0.2 m the points fill, projected in a direction of the plan."""
     across = sample[:, 0] * np.sin(angle) - sample[:, 1] * np.cos(angle)
-    column, row = (np.floor((v - v.min()) / _PICTURE).astype(np.int64) for v in (across, sample[:, 2]))
+    column, row = (np.floor((v - v.min()) / _PIXEL).astype(np.int64) for v in (across, sample[:, 2]))
     return int(np.count_nonzero(np.bincount(column * (row.max() + 1) + row)))
 
 
-def _centred(vertices: Float, plan: Float) -> Float:
+def _between_walls(vertices: Float, plan: Float) -> Float:
     """The line again, with vertices every 5 m, in the middle between the walls, and smooth."""
     step = np.hypot(*np.diff(vertices, axis=0).T)
     line = PlanLine.of(vertices, np.concatenate([[0.0], np.cumsum(step)]))
@@ -182,7 +182,7 @@ def _walls(along: Float, across: Float, count: int) -> Float:
     first, stop = (np.searchsorted(number, np.arange(count), side=side) for side in ("left", "right"))
     walls = np.full((count, 2), np.nan)
     held = stop - first >= _HELD
-    spare = np.floor(_ASTRAY * (stop - first - 1)).astype(np.int64)
+    spare = np.floor(_OUTLYING * (stop - first - 1)).astype(np.int64)
     walls[held, 0] = across[(first + spare)[held]]
     walls[held, 1] = across[(stop - 1 - spare)[held]]
     return walls

@@ -13,9 +13,9 @@ arc of radius 300 m by less than 0.2 mm in a segment of 10 m. The same formulas 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from tunneldb.arrays import Float, Int64
+from tunneldb.arrays import Float, Int64, Intp
+from tunneldb.compiled import inner, point_inner
 
 
 def tangents(vertices: Float) -> Float:
@@ -63,7 +63,7 @@ def plan_lengths(vertices: Float, tangent: Float) -> Float:
     return np.asarray(chord / np.sinc(half / np.pi), dtype=np.float64)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@point_inner
 def fraction(segments: Float, k: int, x: float, y: float, z: float) -> float:
     """Fraction of segment ``k`` at which a point lies; below 0 before it, 1 or more after it.
 
@@ -82,7 +82,7 @@ def fraction(segments: Float, k: int, x: float, y: float, z: float) -> float:
     return before / (before + after)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@point_inner
 def frame_of(segments: Float, k: int, f: float) -> tuple[float, float, float, float, float, float, float, float]:
     """Plane at fraction ``f`` of segment ``k``: its origin (3), tangent (3) and the horizontal direction to the right (2).
 
@@ -97,9 +97,7 @@ def frame_of(segments: Float, k: int, f: float) -> tuple[float, float, float, fl
     scale = 1.0 / np.sqrt(flat + nz * nz)
     flat = 1.0 / np.sqrt(flat)
     ux, uy = ny * flat, -nx * flat
-    nx *= scale
-    ny *= scale
-    nz *= scale
+    nx, ny, nz = nx * scale, ny * scale, nz * scale
     # From the first vertex on: coordinates of millions of metres would cost digits.
     cx, cy, cz = segments[k, 3] - segments[k, 0], segments[k, 4] - segments[k, 1], segments[k, 5] - segments[k, 2]
     length = np.sqrt(cx * cx + cy * cy + cz * cz)
@@ -114,14 +112,12 @@ def frame_of(segments: Float, k: int, f: float) -> tuple[float, float, float, fl
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
-def frame_at(segment: Float, f: float, out: Float) -> None:
-    """Write origin, tangent, right and up (4 × 3 numbers) of the plane at fraction ``f`` of a segment into ``out``."""
-    x, y, z, nx, ny, nz, ux, uy = frame_of(segment.reshape(1, 12), 0, f)
-    out[0, 0], out[0, 1], out[0, 2] = x, y, z
-    out[1, 0], out[1, 1], out[1, 2] = nx, ny, nz
-    out[2, 0], out[2, 1], out[2, 2] = ux, uy, 0.0
-    out[3, 0], out[3, 1], out[3, 2] = uy * nz, -ux * nz, ux * ny - uy * nx
+def frames_at(segments: Float, segment: Intp | Int64, f: Float) -> Float:
+    """Origin, tangent, right and up, (n, 4, 3), of the planes at fractions (n,) of segments, given by their places (n,)."""
+    x, y, z, nx, ny, nz, ux, uy = frame_of.py_func(segments, segment, f)  # its formulas hold for arrays, too
+    level = np.zeros_like(x)
+    frames = [x, y, z, nx, ny, nz, ux, uy, level, uy * nz, -ux * nz, ux * ny - uy * nx]
+    return np.stack(frames, axis=-1).reshape(-1, 4, 3)
 
 
 def segment_rows(vertices: Float, tangent: Float) -> Float:
@@ -129,7 +125,7 @@ def segment_rows(vertices: Float, tangent: Float) -> Float:
     return np.ascontiguousarray(np.hstack([vertices[:-1], vertices[1:], tangent[:-1], tangent[1:]]))
 
 
-@njit(cache=True, nogil=True)
+@inner
 def nearest_segment(segments: Float, x: float, y: float, z: float) -> int:
     """Index of the segment whose middle is nearest to a point."""
     best, which = np.inf, 0
@@ -143,7 +139,7 @@ def nearest_segment(segments: Float, x: float, y: float, z: float) -> int:
     return which
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@point_inner
 def locate(segments: Float, number: Int64, start: int, x: float, y: float, z: float) -> tuple[int, float]:
     """Segment that holds a point and the fraction in it, walking from the segment ``start``; (-1, 0) if none does.
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Float, Int32
+from tunneldb.compiled import kernel
+from tunneldb.threads import in_blocks
 
 _APRON = 30.0  # m around the line in which the search begins at the nearest segment
 _MOST_CELLS = 1 << 20
+_BLOCK = 1 << 16  # points
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class PlanLine:
 
     @classmethod
     def of(cls, vertices: ArrayLike, along: ArrayLike) -> PlanLine:
-        """PlanLine through given vertices.
+        """Line through given vertices.
 
         Parameters
         ----------
@@ -74,9 +76,13 @@ class PlanLine:
 
     def place(self, xyz: Float) -> tuple[Float, Float]:
         """Distance along the line and to its right, (n,) each, of points (n, 2 or 3), m."""
-        points = np.asarray(xyz, dtype=np.float64)
+        points = np.ascontiguousarray(xyz, dtype=np.float64)
         along, across = np.empty(len(points)), np.empty(len(points))
-        _place_all(self._segments, self._grid, self._corner, points, along, across)
+
+        def work(begin: int, end: int) -> None:
+            _place(self._segments, self._grid, self._corner, points, begin, end, along, across)
+
+        in_blocks(work, len(points), _BLOCK)
         return along, across
 
     def point(self, along: ArrayLike, across: ArrayLike) -> Float:
@@ -106,35 +112,33 @@ def _nearest_segments(vertices: Float, length: Float) -> tuple[Int32, Float]:
     return grid, np.array([low[0], low[1], edge])
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _place(s: Float, grid: Int32, corner: Float, x: float, y: float) -> tuple[float, float]:
-    """Along and across of a point: from the segment nearest to its cell to the one between whose ends it lies."""
-    column = min(max(int((x - corner[0]) / corner[2]), 0), grid.shape[1] - 1)
-    row = min(max(int((y - corner[1]) / corner[2]), 0), grid.shape[0] - 1)
-    i = grid[row, column]
-    last = s.shape[0] - 1
-    way = 0
-    while True:
-        dx, dy = x - s[i, 0], y - s[i, 1]
-        ahead = dx * s[i, 2] + dy * s[i, 3]
-        across = dx * s[i, 3] - dy * s[i, 2]
-        begin, end = across * s[i, 5], s[i, 4] + across * s[i, 6]
-        if end - begin < 0.1 * s[i, 4]:  # beyond the centre of the bend
-            begin, end = 0.0, s[i, 4]
-        share = (ahead - begin) / (end - begin)
-        if share < 0.0 and i > 0 and way <= 0:
-            i -= 1
-            way = -1
-        elif share > 1.0 and i < last and way >= 0:
-            i += 1
-            way = 1
-        else:
-            return s[i, 7] + share * (s[i, 8] - s[i, 7]), across
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _place_all(
-    s: Float, grid: Int32, corner: Float, points: Float, along: Float, across: Float
+@kernel
+def _place(
+    s: Float, grid: Int32, corner: Float, points: Float, begin: int, end: int, along: Float, across: Float
 ) -> None:  # pragma: no cover - compiled
-    for k in prange(points.shape[0]):
-        along[k], across[k] = _place(s, grid, corner, points[k, 0], points[k, 1])
+    """Place points: from the segment nearest to the cell of each to the one between whose ends it lies."""
+    last = s.shape[0] - 1
+    for n in range(begin, end):
+        x, y = points[n, 0], points[n, 1]
+        column = min(max(int((x - corner[0]) / corner[2]), 0), grid.shape[1] - 1)
+        row = min(max(int((y - corner[1]) / corner[2]), 0), grid.shape[0] - 1)
+        i = int(grid[row, column])
+        way = 0
+        while True:
+            dx, dy = x - s[i, 0], y - s[i, 1]
+            ahead = dx * s[i, 2] + dy * s[i, 3]
+            right = dx * s[i, 3] - dy * s[i, 2]
+            low, high = right * s[i, 5], s[i, 4] + right * s[i, 6]
+            if high - low < 0.1 * s[i, 4]:  # beyond the centre of the bend
+                low, high = 0.0, s[i, 4]
+            share = (ahead - low) / (high - low)
+            if share < 0.0 and i > 0 and way <= 0:
+                i -= 1
+                way = -1
+            elif share > 1.0 and i < last and way >= 0:
+                i += 1
+                way = 1
+            else:
+                along[n] = s[i, 7] + share * (s[i, 8] - s[i, 7])
+                across[n] = right
+                break

@@ -7,8 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunneldb.arrays import Float, Int64
-from tunneldb.geometry.frame import frame_at
-from tunneldb.geometry.unrolling import NODES, bracket, to_plane_all, to_space_all
+from tunneldb.geometry.frame import frames_at
+from tunneldb.geometry.unrolling import NODES, sections_about, to_plane, to_space
+from tunneldb.threads import in_blocks
+
+BLOCK = 1 << 14
+"""Points that are unrolled, or brought back, at a time."""
+
+_ANYWHERE = np.full(3, -np.inf), np.full(3, np.inf)
 
 APART = 0.06
 """A section that stands apart from those beside it by more was not measured on the wall, m."""
@@ -69,19 +75,30 @@ class Surface:
 
     def unroll(self, points: Float) -> Unrolled:
         """Chainage, arc, offset and surface normal of points (n, 3) in the tunnel's SRID."""
-        unrolled, normal = to_plane_all(
-            self.segments, self.number, self.ends, self.chainages, self.radius, self.arcs, self.reach,
-            np.ascontiguousarray(points, dtype=np.float64),
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        unrolled, normal = np.empty_like(points), np.empty_like(points)
+        in_blocks(
+            lambda begin, end: to_plane(
+                *self.arrays, *_ANYWHERE, points[begin:end], unrolled[begin:end], normal[begin:end]
+            ), len(points), BLOCK,
         )  # fmt: skip
         return Unrolled(unrolled[:, 0], unrolled[:, 1], unrolled[:, 2], normal)
 
+    @property
+    def arrays(self) -> tuple[Float, Int64, Float, Float, Float, Float, float]:
+        """What :func:`tunneldb.geometry.unrolling.to_plane` takes of the surface."""
+        return self.segments, self.number, self.ends, self.chainages, self.radius, self.arcs, self.reach
+
     def to_space(self, chainage: Float, arc: Float, offset: Float) -> Float:
         """Points (n, 3) of coordinates in the unrolled plane (n,); NaN where they lie off the tunnel."""
-        unrolled = np.ascontiguousarray(np.column_stack(np.broadcast_arrays(chainage, arc, offset)), dtype=np.float64)
+        unrolled = np.column_stack(np.broadcast_arrays(chainage, arc, offset)).astype(np.float64, copy=False)
         which = self.segment_index(unrolled[:, 0])
-        return np.asarray(
-            to_space_all(self.segments, which, self.ends, self.chainages, self.radius, self.arcs, self.reach, unrolled)
-        )
+        points = np.empty_like(unrolled)
+        segments, _, *others = self.arrays
+        for begin in range(0, len(points), BLOCK):
+            part = slice(begin, begin + BLOCK)
+            points[part] = to_space(segments, which[part], *others, unrolled[part])
+        return points
 
     def segment_index(self, chainage: Float) -> Int64:
         """Index of the segment at each chainage, -1 where there is none."""
@@ -92,20 +109,20 @@ class Surface:
     def frames(self, chainage: Float) -> Float:
         """Origin, tangent, right and up, (n, 4, 3), of the plane at each chainage (n,); NaN where there is no segment."""
         index = self.segment_index(np.asarray(chainage, dtype=np.float64))
+        held = index >= 0
+        k, at = index[held], np.asarray(chainage, dtype=np.float64)[held]
         frames = np.full((len(index), 4, 3), np.nan)
-        for row, (k, at) in enumerate(zip(index, chainage, strict=True)):
-            if k >= 0:
-                first, second = self.ends[k]
-                frame_at(self.segments[k], (at - first) / (second - first), frames[row])
+        frames[held] = frames_at(self.segments, k, (at - self.ends[k, 0]) / (self.ends[k, 1] - self.ends[k, 0]))
         return frames
 
-    def arc_range(self, chainage: float) -> tuple[float, float]:
-        """Arc at the two ends of the section, straight below the axis (-180° and 180°), m; NaN where there is none."""
-        a, b, g = bracket(self.chainages, chainage, self.reach)
-        if a < 0:
-            return float("nan"), float("nan")
-        ends = (1.0 - g) * self.arcs[a, [0, -1]] + g * self.arcs[b, [0, -1]]
-        return float(ends[0]), float(ends[1])
+    def arc_range(self, chainage: Float) -> tuple[Float, Float]:
+        """Arcs (n,) at the two ends of the sections at places along the axis (n,), straight below the axis (-180° and 180°), m.
+
+        NaN where there is no section.
+        """
+        a, b, g = sections_about(self.chainages, np.asarray(chainage, dtype=np.float64), self.reach)
+        low, high = ((1.0 - g) * self.arcs[a, end] + g * self.arcs[b, end] for end in (0, -1))
+        return np.where(a >= 0, low, np.nan), np.where(a >= 0, high, np.nan)
 
     def section_outliers(self) -> Float:
         """How far each section stands apart from those beside it, (k, 361), m; 0 where it is on the lining.

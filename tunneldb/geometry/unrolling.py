@@ -10,59 +10,91 @@ back is exact.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 
-from tunneldb.arrays import Float, Int64
-from tunneldb.geometry.frame import frame_at, frame_of, locate, nearest_segment
+from tunneldb.arrays import Float, Int64, Intp
+from tunneldb.compiled import point_inner, point_kernel
+from tunneldb.geometry.frame import frame_of, frames_at, locate, nearest_segment
 
 NODES = 361
 CROWN = 180
 MAX_OUTSIDE = 3.0
 """Farther outside the surface than this, m, a point is off the tunnel (a refuge niche is up to 2-3 m deep)."""
 
-Near = tuple[int, int, int]
-NOWHERE: Near = (-1, -1, 0)
-"""Segment, section and degree of a point before the first one."""
-
 _STEPS = 180
+_RADIAN = np.pi / 180.0
 _SIN = np.sin(np.radians(np.arange(NODES) - 180.0))
 _COS = np.cos(np.radians(np.arange(NODES) - 180.0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def bracket(chainages: Float, chainage: float, reach: float, hint: int = -1) -> tuple[int, int, float]:
-    """Sections before and after a chainage and the weight of the second; (-1, -1, 0) where none is near.
+def sections_about(chainages: Float, chainage: Float, reach: float) -> tuple[Intp, Intp, Float]:
+    """Sections before and after places along the axis, and the weight of the second.
 
     Two sections bound a stretch when at most ``reach`` apart; beyond the last one it goes on unchanged for half of that.
-    ``hint`` is where to look first for the section before.
+
+    Parameters
+    ----------
+    chainages : (k,) float array
+        Of the sections, growing, m.
+    chainage : (n,) float array
+        The places, m.
+    reach : float
+        m.
+
+    Returns
+    -------
+    before, after : (n,) int arrays
+        Numbers of sections; -1 where none is near.
+    weight : (n,) float array
+        Of the section after the place, 0 to 1.
     """
+    count = len(chainages)
+    if count == 0:
+        nowhere = np.full(np.shape(chainage), -1)
+        return nowhere, nowhere, np.zeros(nowhere.shape)
+    before = np.searchsorted(chainages, chainage, side="right") - 1
+    after = before + 1
+    first, second = chainages[np.maximum(before, 0)], chainages[np.minimum(after, count - 1)]
+    gap = second - first
+    with np.errstate(divide="ignore", invalid="ignore"):
+        between = (before >= 0) & (after < count) & (gap <= reach)
+        behind = ~between & (before >= 0) & (chainage - first <= reach / 2)
+        ahead = ~between & ~behind & (after < count) & (second - chainage <= reach / 2)
+        weight = np.where(between, (chainage - first) / gap, 0.0)
+    nearest = np.where(behind, before, np.where(ahead, after, -1))
+    return np.where(between, before, nearest), np.where(between, after, nearest), weight
+
+
+@point_inner
+def _sections_about(
+    chainages: Float, chainage: float, reach: float, hint: int
+) -> tuple[int, int, float]:  # pragma: no cover - compiled
+    """What :func:`sections_about` says of one place; ``hint`` is where to look first for the section before."""
     count = chainages.shape[0]
     if 0 <= hint < count - 1 and chainages[hint] <= chainage < chainages[hint + 1]:
         before = hint
     else:
         low, high = 0, count
         while low < high:
-            middle = (low + high) // 2
+            middle = (low + high) >> 1
             if chainages[middle] <= chainage:
                 low = middle + 1
             else:
                 high = middle
         before = low - 1
     after = before + 1
-    has_after = after < count
-    if before >= 0 and has_after:
+    if before >= 0 and after < count:
         gap = chainages[after] - chainages[before]
         if gap <= reach:
             return before, after, (chainage - chainages[before]) / gap
     if before >= 0 and chainage - chainages[before] <= reach / 2:
         return before, before, 0.0
-    if has_after and chainages[after] - chainage <= reach / 2:
+    if after < count and chainages[after] - chainage <= reach / 2:
         return after, after, 0.0
     return -1, -1, 0.0
 
 
-@njit(cache=True, nogil=True, forceinline=True)
-def _node(radius: Float, a: int, b: int, g: float, k: int) -> tuple[float, float]:
+@point_inner
+def _node(radius: Float, a: int, b: int, g: float, k: int) -> tuple[float, float]:  # pragma: no cover - compiled
     """Node ``k`` (-1 to 361, taken round the circle) of the blended section: right and up, m."""
     if k < 0:
         k += 360
@@ -72,14 +104,8 @@ def _node(radius: Float, a: int, b: int, g: float, k: int) -> tuple[float, float
     return r * _SIN[k], r * _COS[k]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _unit(u: float, w: float) -> tuple[float, float]:
-    length = 1.0 / np.sqrt(u * u + w * w)
-    return u * length, w * length
-
-
-@njit(cache=True, nogil=True, forceinline=True)
-def _degree(u: float, w: float, hint: int) -> int:
+@point_inner
+def _degree(u: float, w: float, hint: int) -> int:  # pragma: no cover - compiled
     """Interval (its first node, 0-359) whose angles hold the direction of (u, w), looked for near a hint."""
     k = hint
     for _ in range(4):
@@ -92,8 +118,10 @@ def _degree(u: float, w: float, hint: int) -> int:
     return int(np.floor(np.degrees(np.arctan2(u, w)) + 180.0)) % 360
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def foot(radius: Float, a: int, b: int, g: float, u: float, w: float, k: int) -> tuple[int, float, float, float, float, float]:
+@point_inner
+def _foot(
+    radius: Float, a: int, b: int, g: float, u: float, w: float, k: int
+) -> tuple[int, float, float, float, float, float]:  # pragma: no cover - compiled
     """Place on the blended section whose normal passes through (u, w), looked for from interval ``k`` on.
 
     Returns the interval (its first node, 0-359), the share of it, the point (u, w) and the inward unit normal there.
@@ -124,21 +152,20 @@ def foot(radius: Float, a: int, b: int, g: float, u: float, w: float, k: int) ->
                 break
         else:
             break
-    du0, dw0 = _unit(u1 - ub, w1 - wb)
-    du1, dw1 = _unit(ua - u0, wa - w0)
-    s = _share(u - u0, w - w0, u1 - u0, w1 - w0, du0, dw0, du1 - du0, dw1 - dw0, here >= 0.0 and following < 0.0)
-    du, dw = _unit(du0 + s * (du1 - du0), dw0 + s * (dw1 - dw0))
-    return k, s, u0 + s * (u1 - u0), w0 + s * (w1 - w0), dw, -du
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _share(qu: float, qw: float, bu: float, bw: float, du: float, dw: float, eu: float, ew: float, between: bool) -> float:
-    """Solve (q - s b) · (d + s e) = 0 for the share of the interval, 0 to 1; ``between``: the ends have different signs."""
+    # Directions of the section at the two nodes, d and d + e, and the share s with (q - s b) · (d + s e) = 0.
+    bu, bw = u1 - u0, w1 - w0
+    du, dw = u1 - ub, w1 - wb
+    length = 1.0 / np.sqrt(du * du + dw * dw)
+    du, dw = du * length, dw * length
+    eu, ew = ua - u0, wa - w0
+    length = 1.0 / np.sqrt(eu * eu + ew * ew)
+    eu, ew = eu * length - du, ew * length - dw
+    qu, qw = u - u0, w - w0
     c0 = qu * du + qw * dw
     c1 = qu * eu + qw * ew - bu * du - bw * dw
     c2 = -(bu * eu + bw * ew)
     root = c1 * c1 - 4.0 * c0 * c2
-    if between and c1 < 0.0 and root >= 0.0:
+    if here >= 0.0 and following < 0.0 and c1 < 0.0 and root >= 0.0:
         s = 2.0 * c0 / (np.sqrt(root) - c1)
     else:
         # Far from the surface there may be no root: Newton's steps end at an end.
@@ -148,38 +175,14 @@ def _share(qu: float, qw: float, bu: float, bw: float, du: float, dw: float, eu:
             if slope == 0.0:
                 break
             s -= (c0 + s * (c1 + s * c2)) / slope
-    return min(max(s, 0.0), 1.0)
+    s = 0.0 if s < 0.0 else (1.0 if s > 1.0 else s)
+    du, dw = du + s * eu, dw + s * ew
+    length = 1.0 / np.sqrt(du * du + dw * dw)
+    return k, s, u0 + s * bu, w0 + s * bw, dw * length, -(du * length)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def surface_at(radius: Float, a: int, b: int, g: float, k: int, s: float) -> tuple[float, float, float, float]:
-    """Point of the blended section at share ``s`` of interval ``k`` and the inward unit normal there: u, w, nu, nw."""
-    u0, w0 = _node(radius, a, b, g, k)
-    u1, w1 = _node(radius, a, b, g, k + 1)
-    ub, wb = _node(radius, a, b, g, k - 1)
-    ua, wa = _node(radius, a, b, g, k + 2)
-    du0, dw0 = _unit(u1 - ub, w1 - wb)
-    du1, dw1 = _unit(ua - u0, wa - w0)
-    du, dw = _unit(du0 + s * (du1 - du0), dw0 + s * (dw1 - dw0))
-    return u0 + s * (u1 - u0), w0 + s * (w1 - w0), dw, -du
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _longitudinal(radius: Float, chainages: Float, a: int, b: int, k: int, s: float, nu: float, nw: float) -> float:
-    """Component along the axis of the surface normal, for sections that change with chainage (unnormalised)."""
-    if a == b:
-        return 0.0
-    change = ((1.0 - s) * (radius[b, k] - radius[a, k]) + s * (radius[b, k + 1] - radius[a, k + 1])) / (
-        chainages[b] - chainages[a]
-    )
-    # Sine and cosine of k + s degrees, from those of k and the first terms of their series for less than a degree.
-    t = np.radians(s)
-    sine, cosine = t * (1.0 - t * t / 6.0), 1.0 - t * t / 2.0 * (1.0 - t * t / 12.0)
-    return -change * (nu * (_SIN[k] * cosine + _COS[k] * sine) + nw * (_COS[k] * cosine - _SIN[k] * sine))
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def unroll_point(
+@point_kernel
+def to_plane(
     segments: Float,
     number: Int64,
     ends: Float,
@@ -187,139 +190,90 @@ def unroll_point(
     radius: Float,
     arcs: Float,
     reach: float,
-    x: float,
-    y: float,
-    z: float,
-    near: Near,
-) -> tuple[Near, float, float, float, float, float, float]:
-    """Unroll one point.
+    low: Float,
+    high: Float,
+    points: Float,
+    unrolled: Float,
+    normals: Float,
+) -> None:  # pragma: no cover - compiled
+    """Unroll a block of points.
 
-    A point that is off the tunnel, looked for from another point on, has to be looked for again from NOWHERE on: not
-    done here, for the code would be there twice, which costs a quarter of the speed.
+    What is known of the point before (segment, section, degree) shortens the search for the next and does not change what is
+    found.
 
     Parameters
     ----------
     segments, number, ends, chainages, radius, arcs, reach
         The surface, see :class:`tunneldb.geometry.surface.Surface`.
-    x, y, z : float
-        The point, m.
-    near : (segment, section, degree)
-        What this function returned for a point near by, or NOWHERE: it shortens the search and does not change what is
-        found.
-
-    Returns
-    -------
-    near : (segment, section, degree)
-        For the next point; the segment is -1 when this one is off the tunnel.
-    chainage, arc, offset : float
-        m; NaN off the tunnel.
-    nx, ny, nz : float
-        Unit normal of the surface at the point's foot, into the tunnel.
+    low, high : (3,) float arrays
+        Points outside this box count as off the tunnel, m.
+    points : (n, 3) float array
+        m.
+    unrolled, normals : (n, 3) float arrays
+        Overwritten: chainage, arc and offset, m, and the unit normal of the surface at the point's foot, into the tunnel;
+        NaN off the tunnel.
     """
-    off = (-1, near[1], near[2]), np.nan, np.nan, np.nan, np.nan, np.nan, np.nan
-    k = near[0] if near[0] >= 0 else nearest_segment(segments, x, y, z)
-    k, f = locate(segments, number, k, x, y, z)
-    if k < 0:
-        return off
-    chainage = ends[k, 0] + f * (ends[k, 1] - ends[k, 0])
-    a, b, g = bracket(chainages, chainage, reach, near[1])
-    if a < 0:
-        return off
-    ox, oy, oz, tx, ty, tz, rx, ry = frame_of(segments, k, f)
-    upx, upy, upz = ry * tz, -rx * tz, rx * ty - ry * tx
-    u = (x - ox) * rx + (y - oy) * ry
-    w = (x - ox) * upx + (y - oy) * upy + (z - oz) * upz
-    degree = _degree(u, w, near[2])
-    node, s, fu, fw, nu, nw = foot(radius, a, b, g, u, w, degree)
-    offset = (u - fu) * nu + (w - fw) * nw
-    if offset < -MAX_OUTSIDE:
-        return off
-    arc = (1.0 - g) * ((1.0 - s) * arcs[a, node] + s * arcs[a, node + 1]) + g * (
-        (1.0 - s) * arcs[b, node] + s * arcs[b, node + 1]
-    )
-    nt = _longitudinal(radius, chainages, a, b, node, s, nu, nw)
-    scale = 1.0 / np.sqrt(1.0 + nt * nt)
-    return (
-        (k, a, degree), chainage, arc, offset,
-        (nu * rx + nw * upx + nt * tx) * scale, (nu * ry + nw * upy + nt * ty) * scale, (nw * upz + nt * tz) * scale,
-    )  # fmt: skip
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def to_plane_all(
-    segments: Float,
-    number: Int64,
-    ends: Float,
-    chainages: Float,
-    radius: Float,
-    arcs: Float,
-    reach: float,
-    points: Float,
-) -> tuple[Float, Float]:
-    """Unroll points (n, 3): (chainage, arc, offset) and normals, both (n, 3); NaN off the tunnel."""
-    count = points.shape[0]
-    unrolled = np.empty((count, 3))
-    normals = np.empty((count, 3))
-    block = 4096
-    for part in prange((count + block - 1) // block):
-        near = NOWHERE
-        i, end = part * block, min(count, (part + 1) * block)
-        while i < end:
-            afresh = near[0] < 0
-            near, chainage, arc, offset, nx, ny, nz = unroll_point(
-                segments, number, ends, chainages, radius, arcs, reach, points[i, 0], points[i, 1], points[i, 2], near
-            )
-            if near[0] < 0 and not afresh:
-                continue
-            unrolled[i, 0], unrolled[i, 1], unrolled[i, 2] = chainage, arc, offset
-            normals[i, 0], normals[i, 1], normals[i, 2] = nx, ny, nz
+    k, section, degree = np.int64(-1), np.int64(-1), np.int64(0)  # not literals, with which what is called compiles twice
+    i = 0
+    while i < points.shape[0]:
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        if x < low[0] or x > high[0] or y < low[1] or y > high[1] or z < low[2] or z > high[2]:
+            for axis in range(3):
+                unrolled[i, axis] = normals[i, axis] = np.nan
             i += 1
-    return unrolled, normals
+            continue
+        afresh = k < 0
+        if afresh:
+            k = nearest_segment(segments, x, y, z)
+        k, f = locate(segments, number, k, x, y, z)
+        found = False
+        if k >= 0:
+            chainage = ends[k, 0] + f * (ends[k, 1] - ends[k, 0])
+            a, b, g = _sections_about(chainages, chainage, reach, section)
+            if a >= 0:
+                ox, oy, oz, tx, ty, tz, rx, ry = frame_of(segments, k, f)
+                upx, upy, upz = ry * tz, -rx * tz, rx * ty - ry * tx
+                u = (x - ox) * rx + (y - oy) * ry
+                w = (x - ox) * upx + (y - oy) * upy + (z - oz) * upz
+                degree_here = _degree(u, w, degree)
+                node, s, fu, fw, nu, nw = _foot(radius, a, b, g, u, w, degree_here)
+                offset = (u - fu) * nu + (w - fw) * nw
+                if not offset < -MAX_OUTSIDE:
+                    found = True
+                    section, degree = a, degree_here
+                    unrolled[i, 0] = chainage
+                    unrolled[i, 1] = (1.0 - g) * ((1.0 - s) * arcs[a, node] + s * arcs[a, node + 1]) + g * (
+                        (1.0 - s) * arcs[b, node] + s * arcs[b, node + 1]
+                    )
+                    unrolled[i, 2] = offset
+                    # Component of the normal along the axis, for sections that change with chainage.
+                    nt = 0.0
+                    if a != b:
+                        change = (
+                            (1.0 - s) * (radius[b, node] - radius[a, node]) + s * (radius[b, node + 1] - radius[a, node + 1])
+                        ) / (chainages[b] - chainages[a])
+                        # Sine and cosine of node + s degrees, from those of the node and the first terms of their series.
+                        t = s * _RADIAN
+                        sine, cosine = t * (1.0 - t * t / 6.0), 1.0 - t * t / 2.0 * (1.0 - t * t / 12.0)
+                        nt = -change * (
+                            nu * (_SIN[node] * cosine + _COS[node] * sine) + nw * (_COS[node] * cosine - _SIN[node] * sine)
+                        )
+                    scale = 1.0 / np.sqrt(1.0 + nt * nt)
+                    normals[i, 0] = (nu * rx + nw * upx + nt * tx) * scale
+                    normals[i, 1] = (nu * ry + nw * upy + nt * ty) * scale
+                    normals[i, 2] = (nw * upz + nt * tz) * scale
+        if not found:
+            k = -1
+            if not afresh:
+                continue  # the same point again, looked for everywhere
+            for axis in range(3):
+                unrolled[i, axis] = normals[i, axis] = np.nan
+        i += 1
 
 
-@njit(cache=True, nogil=True)
-def _roll_one(
-    segment: Float,
-    ends: Float,
-    chainages: Float,
-    radius: Float,
-    arcs: Float,
-    reach: float,
-    unrolled: Float,
-    frame: Float,
-    out: Float,
-) -> None:
-    out[:] = np.nan
-    a, b, g = bracket(chainages, unrolled[0], reach)
-    if a < 0:
-        return
-    arc = unrolled[1]
-    low, high = 0, NODES - 1
-    if arc < (1.0 - g) * arcs[a, low] + g * arcs[b, low] - 1e-6:
-        return
-    if arc > (1.0 - g) * arcs[a, high] + g * arcs[b, high] + 1e-6:
-        return
-    while high - low > 1:
-        middle = (low + high) // 2
-        if (1.0 - g) * arcs[a, middle] + g * arcs[b, middle] <= arc:
-            low = middle
-        else:
-            high = middle
-    first = (1.0 - g) * arcs[a, low] + g * arcs[b, low]
-    second = (1.0 - g) * arcs[a, low + 1] + g * arcs[b, low + 1]
-    s = (arc - first) / (second - first)
-    u, w, nu, nw = surface_at(radius, a, b, g, low, s)
-    u += unrolled[2] * nu
-    w += unrolled[2] * nw
-    frame_at(segment, (unrolled[0] - ends[0]) / (ends[1] - ends[0]), frame)
-    for axis in range(3):
-        out[axis] = frame[0, axis] + u * frame[2, axis] + w * frame[3, axis]
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def to_space_all(
+def to_space(
     segments: Float,
-    which: Int64,
+    which: Intp | Int64,
     ends: Float,
     chainages: Float,
     radius: Float,
@@ -328,13 +282,42 @@ def to_space_all(
     unrolled: Float,
 ) -> Float:
     """Points (n, 3) of (chainage, arc, offset) rows (n, 3), each in the segment ``which``; NaN off the tunnel (-1)."""
-    count = unrolled.shape[0]
-    points = np.empty((count, 3))
-    for i in prange(count):
-        frame = np.empty((4, 3))
-        k = which[i]
-        if k < 0:
-            points[i, :] = np.nan
-        else:
-            _roll_one(segments[k], ends[k], chainages, radius, arcs, reach, unrolled[i], frame, points[i])
+    points = np.full((len(unrolled), 3), np.nan)
+    a, b, g = sections_about(chainages, unrolled[:, 0], reach)
+    held = np.flatnonzero((which >= 0) & (a >= 0))
+    chainage, arc, offset = unrolled[held].T
+    k, a, b, g = which[held], a[held], b[held], g[held]
+    h = 1.0 - g
+    on_section = ~(arc < h * arcs[a, 0] + g * arcs[b, 0] - 1e-6) & ~(arc > h * arcs[a, -1] + g * arcs[b, -1] + 1e-6)
+    if not on_section.all():
+        held, chainage, arc, offset = held[on_section], chainage[on_section], arc[on_section], offset[on_section]
+        k, a, b, g, h = k[on_section], a[on_section], b[on_section], g[on_section], h[on_section]
+    low, high = np.zeros(len(arc), np.intp), np.full(len(arc), NODES - 1)
+    for _ in range(int(NODES - 1).bit_length()):
+        middle = (low + high) >> 1
+        within = h * arcs[a, middle] + g * arcs[b, middle] <= arc
+        within |= middle == 0
+        low, high = np.where(within, middle, low), np.where(within, high, middle)
+    first = h * arcs[a, low] + g * arcs[b, low]
+    s = (arc - first) / (h * arcs[a, low + 1] + g * arcs[b, low + 1] - first)
+    (u0, w0), (u1, w1), (ub, wb), (ua, wa) = (_nodes(radius, a, b, g, low + step) for step in (0, 1, -1, 2))
+    du, dw = _unit(u1 - ub, w1 - wb)
+    eu, ew = _unit(ua - u0, wa - w0)
+    du, dw = _unit(du + s * (eu - du), dw + s * (ew - dw))
+    u = u0 + s * (u1 - u0) + offset * dw
+    w = w0 + s * (w1 - w0) - offset * du
+    frame = frames_at(segments, k, (chainage - ends[k, 0]) / (ends[k, 1] - ends[k, 0]))
+    points[held] = frame[:, 0] + u[:, None] * frame[:, 2] + w[:, None] * frame[:, 3]
     return points
+
+
+def _nodes(radius: Float, a: Intp, b: Intp, g: Float, k: Intp) -> tuple[Float, Float]:
+    """Nodes (n,) of blended sections, taken round the circle: right and up, m."""
+    k = k % 360
+    r = (1.0 - g) * radius[a, k] + g * radius[b, k]
+    return r * _SIN[k], r * _COS[k]
+
+
+def _unit(u: Float, w: Float) -> tuple[Float, Float]:
+    length = 1.0 / np.sqrt(u * u + w * w)
+    return u * length, w * length

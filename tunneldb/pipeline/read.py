@@ -21,8 +21,7 @@ from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
 from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
 from tunneldb.pointcloud.spool import Spool
-from tunneldb.store.fragment import drop_fragments, write_fragments
-from tunneldb.store.poses import load_poses
+from tunneldb.store.partition import drop_fragments, write_fragments
 from tunneldb.store.scan_files import (
     Content,
     Recorded,
@@ -33,6 +32,7 @@ from tunneldb.store.scan_files import (
     recorded_files,
     unchanged,
 )
+from tunneldb.store.sources import load_poses
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 

@@ -71,7 +71,8 @@ def choose_stages(first: str | None, last: str | None) -> list[Stage]:
     UserError
         If a name is unknown or the two are in the wrong order.
     """
-    names = [stage.name for stage in STAGES]
+    there = [stage for stage in STAGES if stage.function]
+    names = [stage.name for stage in there]
     for name in (first, last):
         if name is not None and name not in names:
             raise UserError(f"there is no stage {name!r}; the stages are {', '.join(names)}")
@@ -79,7 +80,7 @@ def choose_stages(first: str | None, last: str | None) -> list[Stage]:
     end = names.index(last) if last else len(names) - 1
     if end < begin:
         raise UserError(f"stage {last} comes before {first}")
-    return list(STAGES[begin : end + 1])
+    return there[begin : end + 1]
 
 
 class Task(NamedTuple):

@@ -1,20 +1,20 @@
-"""The stages of the pipeline: each does one kilometre, inside a transaction that the caller holds."""
+"""The stages of a kilometre: their order, what each rests on and what it is done by. The one place that says so.
+
+`tunneldb init` writes STAGES to the table `tunnel.stage`, from which the database's functions and views know them. This module
+imports nothing that computes, so that what only shows stages starts at once.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, LiteralString
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-import psycopg
+if TYPE_CHECKING:
+    import psycopg
 
-from tunneldb.errors import UserError
-from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.store.surface import load_alignment
-from tunneldb.store.survey import Survey
-
-FEW_POINTS = 10_000
-"""A kilometre with fewer points than this, at the end of a tunnel, may be without a section of its own."""
+    from tunneldb.store.survey import Survey
 
 Counts = dict[str, Any]
 Progress = Callable[[float], None]
@@ -23,140 +23,63 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Stage:
-    """A step of the pipeline.
+    """A step of the pipeline: a row of `tunnel.stage`, and the function that does it.
 
     Attributes
     ----------
     name : str
-    work : callable
-        Does one kilometre: connection, survey, km, values of the parameters and progress go in, counts come out.
+    function : str
+        ``module:function`` that does one kilometre; connection, survey, km, values of the parameters and progress go in, counts
+        come out. Empty for ``load``, which goes by the files (`tunneldb.pipeline.load`).
+    reads : tuple of str
+        Stages whose results in the kilometre itself it rests on, directly or through another.
+    reads_beside : tuple of str
+        Stages whose results in the kilometres before and after it rests on.
     parameters : tuple of str
-        Prefixes of the parameters that it depends on.
+        Prefixes of the parameters that it depends on. Those of ``load`` are kept with the files.
     """
 
     name: str
-    work: Callable[[psycopg.Connection[Any], Survey, int, Mapping[str, float], Progress], Counts]
+    function: str
+    reads: tuple[str, ...]
+    reads_beside: tuple[str, ...]
     parameters: tuple[str, ...]
 
-
-def axis(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
-    """Stage 1 of Gonçalves et al. (2012): the axis; vertices edited by hand (stage 2) stay."""
-    _plant(conn, survey)
-    passes = conn.execute(
-        "SELECT moved, measured FROM tunnel_api.axis_refine(%s, %s, %s, %s, %s, %s)",
-        [
-            survey.id,
-            km,
-            values["axis.half_width"],
-            values["axis.angle_step"],
-            values["axis.tolerance"],
-            int(values["axis.max_iterations"]),
-        ],
-    ).fetchall()
-    moved = float(passes[-1][0])
-    if moved >= values["axis.tolerance"]:
-        raise UserError(
-            f"the axis of kilometre {km} does not come to rest: it still moves by {moved:.3f} m after {len(passes)} passes;"
-            " look at the points and the given axis there, or set axis.tolerance or axis.max_iterations"
-        )
-    vertices = dict(
-        conn.execute(
-            "SELECT source, count(*) FROM tunnel.axis_vertex WHERE survey_id = %s AND km = %s GROUP BY source",
-            [survey.id, km],
-        ).fetchall()
-    )
-    if not passes[-1][1] and not vertices.get("edited"):
-        raise UserError(f"kilometre {km} has too few points near the axis' vertices to find the tunnel's centre")
-    return {"iterations": len(passes), "moved": moved, **vertices}
-
-
-def _plant(conn: psycopg.Connection[Any], survey: Survey) -> None:
-    """Set the survey's vertices on the given axis, if they are not there yet."""
-    alignment = load_alignment(conn, survey)
-    chainage = alignment.number * alignment.spacing
-    x, y, z = alignment.vertices.T.tolist()
-    conn.execute(
-        """
-        INSERT INTO tunnel.axis_vertex (survey_id, n, km, geom, given, points, source)
-        SELECT %(survey)s, v.n, v.km, p.point, p.point, 0, 'interpolated'
-        FROM unnest(%(n)s::int[], %(km)s::int[], %(x)s::float8[], %(y)s::float8[], %(z)s::float8[]) AS v (n, km, x, y, z),
-             ST_SetSRID(ST_MakePoint(v.x, v.y, v.z), %(srid)s) AS p (point)
-        ON CONFLICT (survey_id, n) DO NOTHING
-        """,
-        {
-            "survey": survey.id,
-            "srid": survey.srid,
-            "n": alignment.number.tolist(),
-            "km": (chainage // KILOMETRE).astype(int).tolist(),
-            "x": x,
-            "y": y,
-            "z": z,
-        },
-    )
-
-
-def segments(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
-    """Stage 3: segments, and the segment and chainage of every point."""
-    built = _one(conn, "SELECT tunnel_api.segment_build(%s, %s)", survey.id, km)
-    if not built:
-        raise UserError(f"kilometre {km} has no axis yet: tunneldb run {survey.name} --km {km} --from axis")
-    progress(0.1)
-    return {"segments": built, "points": _one(conn, "SELECT tunnel_api.segment_tag(%s, %s)", survey.id, km)}
-
-
-def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
-    """Stage 4: two cross-sections a segment."""
-    if not _one(conn, "SELECT count(*) FROM tunnel.segment WHERE survey_id = %s AND km = %s", survey.id, km):
-        raise UserError(f"kilometre {km} has no segments yet: tunneldb run {survey.name} --km {km} --from segments")
-    built = _one(
-        conn,
-        "SELECT tunnel_api.section_build(%s, %s, %s, %s, %s, %s, %s)",
-        survey.id,
-        km,
-        values["section.angle_step"],
-        values["section.half_width"],
-        values["section.max_half_width"],
-        int(values["section.min_points"]),
-        values["section.protrusion"],
-    )
-    points = _one(conn, "SELECT coalesce(sum(points), 0) FROM tunnel.segment WHERE survey_id = %s AND km = %s", survey.id, km)
-    if not built and points >= FEW_POINTS:
-        raise UserError(
-            f"kilometre {km} has no section: the {points} points in its segments fill no section"
-            f" (tunneldb run {survey.name} --km {km} --from segments, or load more)"
-        )
-    classes = conn.execute(
-        "SELECT c.state, count(*) FROM tunnel.section s JOIN tunnel.section_class c ON c.section_id = s.id"
-        " WHERE s.survey_id = %s AND s.km = %s GROUP BY c.state",
-        [survey.id, km],
-    ).fetchall()
-    return {"sections": built, **{f"classes_{state}": count for state, count in classes}}
-
-
-def ground(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
-    """Ground, lining, what else there is, and the class of each point (Li et al., 2023)."""
-    from tunneldb.pipeline.ground import ground as work  # brings compiled code along, which the stages before can do without
-
-    return work(conn, survey, km, values, progress)
-
-
-def detect(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
-    """Unrolled images at full density, and leaks (Xu et al., 2018)."""
-    from tunneldb.pipeline.detect import detect as work  # brings GDAL along, which the other stages can do without
-
-    return work(conn, survey, km, values, progress)
-
-
-def _one(conn: psycopg.Connection[Any], query: LiteralString, *arguments: Any) -> int:
-    row = conn.execute(query, arguments).fetchone()
-    assert row is not None
-    return int(row[0])
+    def work(
+        self,
+        conn: psycopg.Connection[Any],
+        survey: Survey,
+        km: int,
+        values: Mapping[str, float],
+        progress: Progress,
+    ) -> Counts:
+        """Do one kilometre, inside a transaction that the caller holds; what computes is imported only now."""
+        module, _, name = self.function.partition(":")
+        counts: Counts = getattr(import_module(module), name)(conn, survey, km, values, progress)
+        return counts
 
 
 STAGES: tuple[Stage, ...] = (
-    Stage("axis", axis, ("axis",)),
-    Stage("segments", segments, ()),
-    Stage("sections", sections, ("section",)),
-    Stage("ground", ground, ("ground", "cluster")),
-    Stage("detect", detect, ("lining", "image", "intensity", "appendage", "leak")),
+    Stage("load", "", (), (), ()),
+    Stage("axis", "tunneldb.pipeline.geometry:axis", ("load",), ("load",), ("axis",)),
+    Stage("segments", "tunneldb.pipeline.geometry:segments", ("load", "axis"), ("axis",), ()),
+    Stage("sections", "tunneldb.pipeline.geometry:sections", ("load", "axis", "segments"), ("segments",), ("section",)),
+    Stage(
+        "ground",
+        "tunneldb.pipeline.ground:ground",
+        ("load", "axis", "segments", "sections"),
+        ("sections",),
+        ("ground", "cluster"),
+    ),
+    Stage(
+        "detect",
+        "tunneldb.pipeline.detect:detect",
+        ("load", "axis", "segments", "sections", "ground"),
+        ("ground",),
+        ("lining", "image", "intensity", "appendage", "leak"),
+    ),
 )
+"""Stages of a kilometre, in their order."""
+
+STAGE_NAMES: tuple[str, ...] = tuple(stage.name for stage in STAGES)
+"""Their names, in their order."""

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
+import math
 
-from tunneldb.arrays import Float, Int32, Int64, Intp, Single, UInt8
+import numpy as np
+
+from tunneldb.arrays import Float, Int32, Int64, Intp
+from tunneldb.compiled import kernel
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.frame import frame_of, locate, nearest_segment, segment_rows, tangents
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.pointcloud.noise import CellCounts
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.spool import BINS_PER_METRE, ROW, Rows
+from tunneldb.pointcloud.voxels import CellCounts
 
 # A distance in space is at most this many times as long in chainage: a point 25 m inside a curve of 75 m radius.
 STRETCHING = 1.5
+
+_BLOCK = 8192  # points whose rows are filled at a time: they stay in the processor's cache
 
 
 class ChainageLookup:
@@ -49,7 +53,7 @@ class ChainageLookup:
             return
         new = centres[known:]
         a = self.alignment
-        chainage, distance, segment = _locate(self.segments, a.number, a.spacing, new)
+        chainage, distance, segment = self._located(new, np.full(len(new), -1, np.int32), True)
         near = (distance + self.slack <= self.limit) & (chainage - self.slack >= a.start) & (chainage + self.slack <= a.end)
         chainage = np.clip(chainage, a.start, a.end)
         self.chainage = np.concatenate([self.chainage, chainage])
@@ -76,80 +80,64 @@ class ChainageLookup:
 
     def span(self, number: Int64, cell: Int32, block: int) -> tuple[Int64, Float, Float]:
         """Blocks of so many point numbers that points with growing numbers (n,) lie in, and chainage from and to of each, m."""
-        found, low, high = _span(number, cell, self.chainage, block)
+        found = np.arange(number[0] // block, number[-1] // block + 1)
+        starts = np.searchsorted(number, found * block)
+        found, starts = found[(held := np.diff(starts, append=len(number)) > 0)], starts[held]
+        chainage = self.chainage[cell]
+        low, high = np.minimum.reduceat(chainage, starts), np.maximum.reduceat(chainage, starts)
         return found, low - self.slack, high + self.slack
 
     def rows(self, points: Points, cell: Int32, picked: Int32, tag: Int32) -> Rows:
         """Rows of the picked points (k,), with their chainage, m, and these tags (k,)."""
         rows: Rows = np.empty(len(picked), ROW)
-        _fill(
-            rows, points.xyz, points.time, points.intensity, points.scan_id, points.classification, cell, picked, tag,
-            self.segments, self.alignment.number, self.alignment.spacing, self.segment,
-        )  # fmt: skip
-        np.clip(rows["chainage"], self.alignment.start, self.alignment.end, out=rows["chainage"])
+        for begin in range(0, len(picked), _BLOCK):
+            part, chosen = rows[begin : begin + _BLOCK], picked[begin : begin + _BLOCK]
+            xyz = points.xyz.take(chosen, axis=0)
+            chainage, _, _ = self._located(xyz, self.segment.take(cell.take(chosen)), False)
+            part["x"], part["y"], part["z"] = xyz.T
+            part["chainage"] = np.clip(chainage, self.alignment.start, self.alignment.end)
+            part["time"] = points.time.take(chosen)
+            part["intensity"] = points.intensity.take(chosen)
+            part["scan_id"] = points.scan_id.take(chosen)
+            part["tag"] = tag[begin : begin + _BLOCK]
+            part["classification"] = points.classification.take(chosen)
         return rows
 
+    def _located(self, xyz: Float, start: Int32, distances: bool) -> tuple[Float, Float, Int32]:
+        """Chainage, distance from the axis (if wanted) and segment of points (n, 3), looked for from segments (n,) on."""
+        chainage, distance, segment = np.empty(len(xyz)), np.empty(len(xyz) if distances else 0), np.empty(len(xyz), np.int32)
+        a = self.alignment
+        _locate(self.segments, a.number, float(a.spacing), xyz, start, chainage, distance, segment)
+        return chainage, distance, segment
 
-@njit(cache=True, nogil=True)
+
+@kernel
 def _locate(
-    segments: Float, number: Int64, spacing: float, xyz: Float
-) -> tuple[Float, Float, Int32]:  # pragma: no cover - compiled
-    """Chainage, distance from the axis and segment of points; beyond the ends the nearest end, infinitely far."""
-    n = len(xyz)
-    chainage, distance, segment = np.empty(n), np.empty(n), np.empty(n, np.int32)
+    segments: Float, number: Int64, spacing: float, xyz: Float, start: Int32, chainage: Float, distance: Float, segment: Int32
+) -> None:  # pragma: no cover - compiled
+    """Write chainage, distance from the axis and segment of points; beyond the ends the nearest end, infinitely far.
+
+    The segment is looked for from the one that start says on; from the last point's where it says -1. No distances are
+    written, and computed, if there is no room for them.
+    """
     k = -1
-    for i in range(n):
+    for i in range(xyz.shape[0]):
         x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-        if k < 0:
+        if start[i] >= 0:
+            k = start[i]
+        elif k < 0:
             k = nearest_segment(segments, x, y, z)
         k, f = locate(segments, number, k, x, y, z)
         if k < 0:
             nearest = nearest_segment(segments, x, y, z)
             last = 2 * nearest >= segments.shape[0]
             chainage[i] = (number[nearest] + (1 if last else 0)) * spacing
-            distance[i] = np.inf
             segment[i] = nearest
+            if distance.shape[0] > 0:
+                distance[i] = np.inf
             continue
-        plane = frame_of(segments, k, f)
         chainage[i] = (number[k] + f) * spacing
-        distance[i] = np.sqrt((x - plane[0]) ** 2 + (y - plane[1]) ** 2 + (z - plane[2]) ** 2)
         segment[i] = k
-    return chainage, distance, segment
-
-
-@njit(cache=True, nogil=True)
-def _span(number: Int64, cell: Int32, chainage: Float, block: int) -> tuple[Int64, Float, Float]:  # pragma: no cover - compiled
-    most = (number[-1] - number[0]) // block + 2
-    found, low, high = np.empty(most, np.int64), np.empty(most), np.empty(most)
-    used = -1
-    end = -1
-    for i in range(len(number)):
-        c = chainage[cell[i]]
-        if number[i] >= end:
-            used += 1
-            found[used] = number[i] // block
-            end = (found[used] + 1) * block
-            low[used] = high[used] = c
-        low[used] = min(low[used], c)
-        high[used] = max(high[used], c)
-    return found[: used + 1], low[: used + 1], high[: used + 1]
-
-
-@njit(cache=True, nogil=True)
-def _fill(
-    rows: Rows, xyz: Float, time: Float, intensity: Single, scan_id: Int32,
-    classification: UInt8, cell: Int32, picked: Int32, tag: Int32,
-    segments: Float, number: Int64, spacing: float, segment: Int32,
-) -> None:  # fmt: skip  # pragma: no cover - compiled
-    for k in range(len(picked)):
-        i = picked[k]
-        row = rows[k]
-        x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-        row.x, row.y, row.z = x, y, z
-        s, f = locate(segments, number, segment[cell[i]], x, y, z)
-        row.chainage = (number[s] + f) * spacing
-        row.time = time[i]
-        row.intensity = intensity[i]
-        row.scan_id = scan_id[i]
-        row.tag = tag[k]
-        row.classification = classification[i]
+        if distance.shape[0] > 0:
+            plane = frame_of(segments, k, f)
+            distance[i] = math.sqrt((x - plane[0]) ** 2 + (y - plane[1]) ** 2 + (z - plane[2]) ** 2)

@@ -24,11 +24,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from tunneldb.arrays import Bool, Float, Int32, Int64
+from tunneldb.compiled import kernel
+from tunneldb.pointcloud.voxels import CellCounts, column_hash
 
-CELL = 0.5
 EXPECTED = 20
 SPARSE_SHARE = 0.05
 
@@ -36,61 +36,6 @@ SELECTIVE = 4  # with this many times as many points as are to be judged it pays
 
 POINTS = 5
 DIAMETER = 0.05
-
-
-class CellCounts:
-    """Number of points in each cubic cell of space, gathered chunk by chunk.
-
-    Attributes
-    ----------
-    edge : float
-        Edge of a cell, m; cells lie at whole multiples of it.
-    """
-
-    def __init__(self, edge: float = CELL) -> None:
-        self.edge = edge
-        self._used = 0
-        self._cells = np.empty((1024, 3), np.int64)
-        self._counts = np.zeros(1024, np.int64)
-        self._table = np.full(4096, -1, np.int32)
-
-    def add(self, xyz: Float) -> Int32:
-        """Count points (n, 3); returns the number of the cell of each, (n,), good for `counts` and `centres`."""
-        numbers = np.empty(len(xyz), np.int32)
-        done = 0
-        while True:
-            done, self._used = _count(xyz, 1.0 / self.edge, done, self._used, self._cells, self._counts, self._table, numbers)
-            if done == len(xyz):
-                return numbers
-            self._grow()
-
-    @property
-    def counts(self) -> Int64:
-        """Points in each cell, (k,)."""
-        return self._counts[: self._used]
-
-    @property
-    def centres(self) -> Float:
-        """Centre of each cell, (k, 3), m."""
-        centres: Float = np.multiply(self._cells[: self._used] + 0.5, self.edge, dtype=np.float64)
-        return centres
-
-    def find(self, xyz: Float) -> Int32:
-        """Number of the cell of each point (n, 3), (n,); -1 where none was ever counted."""
-        return _find(xyz, 1.0 / self.edge, self._cells, self._table)
-
-    def remove(self, numbers: Int32) -> None:
-        """Take points out of the count of their cells (n,)."""
-        np.subtract.at(self._counts, numbers, 1)
-
-    def _grow(self) -> None:
-        size = 2 * len(self._cells)
-        self._cells = np.resize(self._cells, (size, 3))
-        counts = np.zeros(size, np.int64)
-        counts[: self._used] = self.counts
-        self._counts = counts
-        self._table = np.full(4 * size, -1, np.int32)
-        _rehash(self._cells, self._used, self._table)
 
 
 def search_radii(
@@ -151,11 +96,15 @@ def is_noise(cloud: Float, xyz: Float, radius: Float, points: int = POINTS) -> B
     noise = np.zeros(len(xyz), np.bool_)
     if len(xyz) == 0 or points <= 1:
         return noise
+    cloud, xyz, radius = (np.ascontiguousarray(part, np.float64) for part in (cloud, xyz, radius))
     widest = float(radius.max())
     if SELECTIVE * len(xyz) < len(cloud):
-        cloud = _near(cloud, _marks(xyz, radius, 2.0 * widest, 1 << max(8, math.ceil(math.log2(32 * len(xyz))))), 2.0 * widest)
+        near = np.empty(len(cloud), np.bool_)
+        marks = np.zeros(1 << max(8, math.ceil(math.log2(32 * len(xyz)))), np.bool_)
+        _mark_near(cloud, xyz, radius, 2.0 * widest, marks, near)
+        cloud = cloud[near]
     ordered, start, origin = _sort_by_cell(cloud, widest)
-    _judge(ordered, xyz, radius, start, widest, origin, points, noise)
+    _count_neighbours(ordered, xyz, radius, start, widest, origin, int(points), noise)
     return noise
 
 
@@ -180,81 +129,66 @@ def _sort_by_cell(xyz: Float, edge: float) -> tuple[Float, Int32, Float]:
     """Order the points by the bucket of their cell; start[b] is the first place of bucket b. Also the cells' origin."""
     origin = xyz.min(axis=0)
     buckets = 1 << max(8, math.ceil(math.log2(len(xyz) + 1)))
-    ordered, start = _bucket_sort(xyz, origin, 1.0 / edge, buckets)
-    return ordered, start, origin
+    bucket, ordered = np.empty(len(xyz), np.int32), np.empty((len(xyz), 3))
+    start = np.zeros(buckets + 2, np.int32)
+    _bucket_sort(xyz, origin, 1.0 / edge, bucket, start, ordered)
+    return ordered, start[:-1], origin
 
 
-@njit(inline="always")
-def _column(ix: int, iy: int) -> int:  # pragma: no cover - compiled
-    # Cells above each other get buckets beside each other: the three of a column are one run of memory.
-    return (ix * 73856093) ^ (iy * 19349663)
+# Cells above each other get buckets beside each other: the three of a column are one run of memory.
 
 
-@njit(cache=True, nogil=True)
-def _bucket_sort(xyz: Float, origin: Float, scale: float, buckets: int) -> tuple[Float, Int32]:  # pragma: no cover - compiled
-    n = xyz.shape[0]
-    mask = buckets - 1
-    bucket = np.empty(n, np.int32)
-    start = np.zeros(buckets + 1, np.int32)
-    for i in range(n):
+@kernel
+def _bucket_sort(
+    xyz: Float, origin: Float, scale: float, bucket: Int32, start: Int32, ordered: Float
+) -> None:  # pragma: no cover - compiled
+    """Sort points by their bucket; of start, two longer than there are buckets and 0, the first entry of each is made."""
+    mask = start.shape[0] - 3
+    for i in range(xyz.shape[0]):
         ix = math.floor((xyz[i, 0] - origin[0]) * scale)
         iy = math.floor((xyz[i, 1] - origin[1]) * scale)
         iz = math.floor((xyz[i, 2] - origin[2]) * scale)
-        b = (_column(ix, iy) + iz) & mask
+        b = (column_hash(ix, iy) + iz) & mask
         bucket[i] = b
-        start[b + 1] += 1
-    for b in range(buckets):
-        start[b + 1] += start[b]
-    place = start[:-1].copy()
-    ordered = np.empty((n, 3))
-    for i in range(n):
-        k = place[bucket[i]]
+        start[b + 2] += 1
+    for b in range(2, start.shape[0]):
+        start[b] += start[b - 1]
+    # Where the next point of bucket b goes is start[b + 1], which in the end is where the bucket after it begins.
+    for i in range(xyz.shape[0]):
+        k = start[bucket[i] + 1]
         ordered[k, 0], ordered[k, 1], ordered[k, 2] = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-        place[bucket[i]] += 1
-    return ordered, start
+        start[bucket[i] + 1] += 1
 
 
-@njit(cache=True, nogil=True)
-def _marks(xyz: Float, radius: Float, edge: float, buckets: int) -> Bool:  # pragma: no cover - compiled
-    """Mark the cells, by their hash, that the spheres around points reach into; edge is at least a diameter."""
-    marks = np.zeros(buckets, np.bool_)
-    mask = buckets - 1
+@kernel
+def _mark_near(
+    cloud: Float, xyz: Float, radius: Float, edge: float, marks: Bool, near: Bool
+) -> None:  # pragma: no cover - compiled
+    """Tell which points of a cloud lie in cells that the spheres around points reach into; some others share their hash.
+
+    The edge of the cells is at least a diameter; marks are those of the cells, by their hash, and False to begin with.
+    """
+    mask = marks.shape[0] - 1
     scale = 1.0 / edge
     for i in range(xyz.shape[0]):
         r = radius[i] * (1.0 + 1e-9) + 1e-9  # rounding must not leave out a neighbour
         for ix in range(math.floor((xyz[i, 0] - r) * scale), math.floor((xyz[i, 0] + r) * scale) + 1):
             for iy in range(math.floor((xyz[i, 1] - r) * scale), math.floor((xyz[i, 1] + r) * scale) + 1):
-                column = _column(ix, iy)
+                column = column_hash(ix, iy)
                 for iz in range(math.floor((xyz[i, 2] - r) * scale), math.floor((xyz[i, 2] + r) * scale) + 1):
                     marks[(column + iz) & mask] = True
-    return marks
-
-
-@njit(cache=True, nogil=True)
-def _near(cloud: Float, marks: Bool, edge: float) -> Float:  # pragma: no cover - compiled
-    """Points of a cloud that lie in marked cells; also some others, whose cells share a hash with them."""
-    mask = len(marks) - 1
-    scale = 1.0 / edge
-    chosen = np.empty(len(cloud), np.int32)
-    count = 0
-    for i in range(len(cloud)):
+    for i in range(cloud.shape[0]):
         ix = math.floor(cloud[i, 0] * scale)
         iy = math.floor(cloud[i, 1] * scale)
         iz = math.floor(cloud[i, 2] * scale)
-        if marks[(_column(ix, iy) + iz) & mask]:
-            chosen[count] = i
-            count += 1
-    near = np.empty((count, 3))
-    for k in range(count):
-        for c in range(3):
-            near[k, c] = cloud[chosen[k], c]
-    return near
+        near[i] = marks[(column_hash(ix, iy) + iz) & mask]
 
 
-@njit(cache=True, nogil=True)
-def _judge(
+@kernel
+def _count_neighbours(
     cloud: Float, xyz: Float, radius: Float, start: Int32, edge: float, origin: Float, points: int, noise: Bool
 ) -> None:  # pragma: no cover - compiled
+    """Mark points with fewer neighbours than wanted; as soon as there are enough, no more are looked for."""
     mask = start.shape[0] - 2
     scale = 1.0 / edge
     for i in range(xyz.shape[0]):
@@ -268,7 +202,7 @@ def _judge(
             # The point's own column of cells first: on a dense wall it holds enough already.
             dx, dy = (c + 1) % 3 - 1, (c // 3 + 1) % 3 - 1
             dx, dy = (0, 0) if c == 0 else ((1, 1) if dx == 0 and dy == 0 else (dx, dy))
-            column = _column(ix + dx, iy + dy)
+            column = column_hash(ix + dx, iy + dy)
             for dz in range(-1, 2):
                 b = (column + iz + dz) & mask
                 for j in range(start[b], start[b + 1]):
@@ -289,71 +223,3 @@ def _judge(
             if found >= points:
                 break
         noise[i] = found < points
-
-
-@njit(cache=True, nogil=True)
-def _count(
-    xyz: Float,
-    scale: float,
-    done: int,
-    used: int,
-    cells: Int64,
-    counts: Int64,
-    table: Int32,
-    numbers: Int32,
-) -> tuple[int, int]:  # pragma: no cover - compiled
-    """Count points from `done` on until the list of cells is full; returns how far it came."""
-    mask = table.shape[0] - 1
-    last = -1
-    lx, ly, lz = 0, 0, 0
-    for i in range(done, xyz.shape[0]):
-        ix = math.floor(xyz[i, 0] * scale)
-        iy = math.floor(xyz[i, 1] * scale)
-        iz = math.floor(xyz[i, 2] * scale)
-        if last < 0 or ix != lx or iy != ly or iz != lz:
-            slot = ((ix * 73856093) ^ (iy * 19349663) ^ (iz * 83492791)) & mask
-            while True:
-                k = table[slot]
-                if k < 0:
-                    if used == cells.shape[0]:
-                        return i, used
-                    k = used
-                    cells[k, 0], cells[k, 1], cells[k, 2] = ix, iy, iz
-                    table[slot] = k
-                    used += 1
-                    break
-                if cells[k, 0] == ix and cells[k, 1] == iy and cells[k, 2] == iz:
-                    break
-                slot = (slot + 1) & mask
-            last, lx, ly, lz = k, ix, iy, iz
-        counts[last] += 1
-        numbers[i] = last
-    return xyz.shape[0], used
-
-
-@njit(cache=True, nogil=True)
-def _find(xyz: Float, scale: float, cells: Int64, table: Int32) -> Int32:  # pragma: no cover - compiled
-    mask = table.shape[0] - 1
-    numbers = np.empty(xyz.shape[0], np.int32)
-    for i in range(xyz.shape[0]):
-        ix = math.floor(xyz[i, 0] * scale)
-        iy = math.floor(xyz[i, 1] * scale)
-        iz = math.floor(xyz[i, 2] * scale)
-        slot = ((ix * 73856093) ^ (iy * 19349663) ^ (iz * 83492791)) & mask
-        while True:
-            k = table[slot]
-            if k < 0 or (cells[k, 0] == ix and cells[k, 1] == iy and cells[k, 2] == iz):
-                break
-            slot = (slot + 1) & mask
-        numbers[i] = k
-    return numbers
-
-
-@njit(cache=True, nogil=True)
-def _rehash(cells: Int64, used: int, table: Int32) -> None:  # pragma: no cover - compiled
-    mask = table.shape[0] - 1
-    for k in range(used):
-        slot = ((cells[k, 0] * 73856093) ^ (cells[k, 1] * 19349663) ^ (cells[k, 2] * 83492791)) & mask
-        while table[slot] >= 0:
-            slot = (slot + 1) & mask
-        table[slot] = k

@@ -5,14 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 
 from tunneldb.arrays import Float, Int32, Int64
+from tunneldb.compiled import inner, kernel
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.reader import Points
+from tunneldb.threads import in_blocks
 
 # Times in a CSV are rounded; beyond the ends of the trajectory they may be off by this much, s.
 TIME_TOLERANCE = 0.001
+
+_BLOCK = 1 << 18  # points at a time
 
 
 @dataclass
@@ -144,7 +147,9 @@ class PoseModel:
         if faults:
             raise faults.error(name)
         if self.mobile:
-            return _interpolate(self.time, self.track, points.time)
+            out = np.empty((len(points), 3))
+            in_blocks(lambda begin, end: _interpolate(self.time, self.track, points.time, out, begin, end), len(points), _BLOCK)
+            return out
         return self.station[np.searchsorted(self.scan_id, points.scan_id)]
 
 
@@ -158,25 +163,31 @@ def _count_scans(scan_id: Int32) -> tuple[Int64, Int64]:
     return present + low, counts[present]
 
 
-@njit(cache=True, nogil=True, forceinline=True)
-def interval(time: Float, wanted: float, hint: int) -> int:
+@inner
+def interval(time: Float, wanted: float, hint: int) -> int:  # pragma: no cover - compiled
     """Number of the last of growing times that is not later than the one wanted, or 0; looked for from a hint on."""
-    last = len(time) - 1
-    k = hint
+    last = time.shape[0] - 1
     # Points come nearly in order of time, so the last interval, or the next, is mostly the right one.
-    if time[k] <= wanted and (k == last or wanted < time[k + 1]):
-        return k
-    if k + 2 <= last and time[k + 1] <= wanted < time[k + 2]:
-        return k + 1
-    return max(int(np.searchsorted(time, wanted, side="right")) - 1, 0)
+    if time[hint] <= wanted and (hint == last or wanted < time[hint + 1]):
+        return hint
+    if hint + 2 <= last and time[hint + 1] <= wanted < time[hint + 2]:
+        return hint + 1
+    low, high = 0, last + 1
+    while low < high:
+        middle = (low + high) >> 1
+        if wanted < time[middle]:
+            high = middle
+        else:
+            low = middle + 1
+    return max(low - 1, 0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def position_at(time: Float, track: Float, wanted: float, k: int) -> tuple[float, float, float]:
+@inner
+def position_at(time: Float, track: Float, wanted: float, k: int) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Place of the trajectory at a time in its interval ``k``."""
-    j = min(k + 1, len(time) - 1)
-    share = (wanted - time[k]) / (time[j] - time[k]) if j > k else 0.0
-    share = min(max(share, 0.0), 1.0)
+    j = min(k + 1, time.shape[0] - 1)
+    length = time[j] - time[k]
+    share = min(max((wanted - time[k]) / length, 0.0), 1.0) if length > 0.0 else 0.0
     return (
         track[k, 0] + share * (track[j, 0] - track[k, 0]),
         track[k, 1] + share * (track[j, 1] - track[k, 1]),
@@ -184,11 +195,11 @@ def position_at(time: Float, track: Float, wanted: float, k: int) -> tuple[float
     )
 
 
-@njit(cache=True, nogil=True)
-def _interpolate(time: Float, track: Float, wanted: Float) -> Float:  # pragma: no cover - compiled
-    out = np.empty((len(wanted), 3))
-    k = 0
-    for i in range(len(wanted)):
+@kernel
+def _interpolate(
+    time: Float, track: Float, wanted: Float, out: Float, begin: int, end: int
+) -> None:  # pragma: no cover - compiled
+    k = np.int64(0)
+    for i in range(begin, end):
         k = interval(time, wanted[i], k)
         out[i, 0], out[i, 1], out[i, 2] = position_at(time, track, wanted[i], k)
-    return out

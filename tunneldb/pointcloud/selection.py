@@ -22,13 +22,14 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pointcloud.chainage_lookup import STRETCHING, ChainageLookup
-from tunneldb.pointcloud.noise import DIAMETER, POINTS, CellCounts, is_noise, search_radii
+from tunneldb.pointcloud.noise import DIAMETER, POINTS, is_noise, search_radii
 from tunneldb.pointcloud.points import CHUNK, Points
 from tunneldb.pointcloud.poses import PoseFaults, PoseModel
 from tunneldb.pointcloud.prefetch import in_order, prefetch
 from tunneldb.pointcloud.reader import read_chunks
 from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, PLACE, Rows, Spool, bin_of, rows_xyz, windows
 from tunneldb.pointcloud.thinning import first_of_voxels, pick, voxel_edge
+from tunneldb.pointcloud.voxels import CellCounts
 from tunneldb.threads import threads
 
 Progress = Callable[[int], None]
@@ -251,7 +252,6 @@ class _Filter:
         return pick(
             points.xyz, points.time, points.intensity, points.scan_id, points.classification, self.places.whole[cell],
             self.settings.edge, (self.settings.noise_diameter / 2) ** 2, self.settings.noise_points,
-            1 << max(8, math.ceil(math.log2(2 * len(points) + 1))),
         )  # fmt: skip
 
     def judge(self, progress: Progress) -> Iterator[Rows]:

@@ -12,10 +12,10 @@ from types import TracebackType
 from typing import IO, Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from tunneldb.arrays import Float, Int64, Intp
+from tunneldb.arrays import Float, Int64, Intp, UInt8
+from tunneldb.compiled import kernel
 from tunneldb.errors import UserError
 
 # One row a point. `tag` is the noise filter's cell while a file is filtered, its file's number afterwards.
@@ -109,8 +109,7 @@ class Spool:
         if len(rows) == 0:
             return
         bins = bin_of(rows["chainage"]) if bins is None else bins
-        first = int(bins.min())
-        ordered, start = _sort_by_bin(rows, bins, first, int(bins.max()) - first + 1)
+        ordered, first, start = _sort_by_bin(rows, bins)
         run = _Run(first, start, ordered, 0)
         if self._held + rows.nbytes > self.memory:
             self._spill(run)
@@ -229,17 +228,31 @@ def _write_all(file: IO[bytes], view: memoryview) -> None:
         done += file.write(view[done:])
 
 
-@njit(cache=True, nogil=True)
-def _sort_by_bin(rows: Rows, bins: Int64, first: int, count: int) -> tuple[Rows, Int64]:  # pragma: no cover - compiled
-    start = np.zeros(count + 1, np.int64)
-    for i in range(len(bins)):
-        start[bins[i] - first + 1] += 1
-    for b in range(count):
-        start[b + 1] += start[b]
-    place = start[:-1].copy()
+def _sort_by_bin(rows: Rows, bins: Int64) -> tuple[Rows, int, Int64]:
+    """Rows in order of their bins; the first bin, and where each one from it on begins."""
+    first = int(bins.min())
+    start = np.zeros(int(bins.max()) - first + 3, np.int64)
     ordered = np.empty_like(rows)
-    for i in range(len(bins)):
-        b = bins[i] - first
-        ordered[place[b]] = rows[i]
-        place[b] += 1
-    return ordered, start
+    _move_rows(_table(rows), np.ascontiguousarray(bins), first, start, _table(ordered))
+    return ordered, first, start[:-1]
+
+
+def _table(rows: Rows) -> UInt8:
+    """Bytes of rows, one after the other: (n, bytes of a row)."""
+    return np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), rows.dtype.itemsize)
+
+
+@kernel
+def _move_rows(rows: UInt8, bins: Int64, first: int, start: Int64, ordered: UInt8) -> None:  # pragma: no cover - compiled
+    """Move rows to where their bins begin; of start, two longer than there are bins and 0, the first entry of each is made."""
+    for i in range(bins.shape[0]):
+        start[bins[i] - first + 2] += 1
+    for b in range(2, start.shape[0]):
+        start[b] += start[b - 1]
+    # Where the next row of bin b goes is start[b + 1], which in the end is where the bin after it begins.
+    for i in range(bins.shape[0]):
+        b = bins[i] - first + 1
+        at = start[b]
+        for k in range(rows.shape[1]):
+            ordered[at, k] = rows[i, k]
+        start[b] = at + 1

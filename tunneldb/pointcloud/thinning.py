@@ -13,14 +13,22 @@ on their order, nor on whether they were thinned in parts before.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
-from tunneldb.arrays import Bool, Float, Int32, Single, UInt8
+from tunneldb.arrays import Bool, Float, Int32, Int64, Intp, Single, UInt8
+from tunneldb.compiled import kernel
 from tunneldb.pointcloud.spool import ROW, Rows
+from tunneldb.pointcloud.voxels import CellCounts
 
 CUTS = 1.5
+TIES = ("x", "y", "z", "time", "intensity", "scan_id", "classification", "tag")
+"""What decides between rows that are equally near to the centre of their voxel: the lowest, of these one after the other."""
+
+Columns = Sequence[NDArray[Any]]
 
 
 def voxel_edge(density: float) -> float:
@@ -68,79 +76,24 @@ def first_of_voxels(rows: Rows, edge: float, good: Bool) -> tuple[Bool, Bool]:
     before : (n,) bool array
         Rows that are not good and would have stood before it; all of a voxel without good rows.
     """
-    slots = 1 << max(8, math.ceil(math.log2(2 * len(rows) + 1)))
-    chosen, before = _first(rows, edge, good, slots)
+    xyz = np.empty((len(rows), 3))
+    for column, name in enumerate("xyz"):
+        xyz[:, column] = rows[name]
+    voxel, count = _voxels(xyz, edge)
+    ties = [rows[name] for name in TIES]
+    distance, least, leader = _leaders(xyz, voxel, count, edge, good, ties)
+    chosen = np.zeros(len(rows), np.bool_)
+    chosen[leader[leader >= 0]] = True
+    before = ~good & (distance < least[voxel])
+    tied = np.flatnonzero(~good & (distance == least[voxel]))
+    before[tied] = _is_lower(ties, tied, leader[voxel[tied]])
     return chosen, before
 
 
-@njit(cache=True, nogil=True)
-def _first(rows: Rows, edge: float, good: Bool, slots: int) -> tuple[Bool, Bool]:  # pragma: no cover - compiled
-    n = len(rows)
-    mask = slots - 1
-    table = np.full(slots, -1, np.int32)  # a point of the voxel: its best good one so far, if it has one
-    voxel = np.empty(n, np.int32)
-    for i in range(n):
-        row = rows[i]
-        ix, iy, iz = math.floor(row.x / edge), math.floor(row.y / edge), math.floor(row.z / edge)
-        slot = ((int(ix) * 73856093) ^ (int(iy) * 19349663) ^ (int(iz) * 83492791)) & mask
-        while True:
-            j = table[slot]
-            if j < 0:
-                table[slot] = i
-                break
-            other = rows[j]
-            if math.floor(other.x / edge) == ix and math.floor(other.y / edge) == iy and math.floor(other.z / edge) == iz:
-                if good[i] and (not good[j] or _before(rows, edge, i, j)):
-                    table[slot] = i
-                break
-            slot = (slot + 1) & mask
-        voxel[i] = slot
-    chosen = np.zeros(n, np.bool_)
-    before = np.zeros(n, np.bool_)
-    for i in range(n):
-        j = table[voxel[i]]
-        if j == i:
-            chosen[i] = good[i]
-        if not good[i]:
-            before[i] = not good[j] or _before(rows, edge, i, j)
-    return chosen, before
-
-
-@njit(cache=True, nogil=True)
-def _before(rows: Rows, edge: float, i: int, j: int) -> bool:  # pragma: no cover - compiled
-    """Tell whether row i stands before row j of the same voxel: nearer to the centre, else lower in its values."""
-    a, b = rows[i], rows[j]
-    cx, cy, cz = (
-        (math.floor(a.x / edge) + 0.5) * edge,
-        (math.floor(a.y / edge) + 0.5) * edge,
-        (math.floor(a.z / edge) + 0.5) * edge,
-    )
-    da = (a.x - cx) ** 2 + (a.y - cy) ** 2 + (a.z - cz) ** 2
-    db = (b.x - cx) ** 2 + (b.y - cy) ** 2 + (b.z - cz) ** 2
-    if da != db:
-        return bool(da < db)
-    if a.x != b.x:
-        return bool(a.x < b.x)
-    if a.y != b.y:
-        return bool(a.y < b.y)
-    if a.z != b.z:
-        return bool(a.z < b.z)
-    if a.time != b.time:
-        return bool(a.time < b.time)
-    if a.intensity != b.intensity:
-        return bool(a.intensity < b.intensity)
-    if a.scan_id != b.scan_id:
-        return bool(a.scan_id < b.scan_id)
-    if a.classification != b.classification:
-        return bool(a.classification < b.classification)
-    return bool(a.tag < b.tag)
-
-
-@njit(cache=True, nogil=True)
 def pick(
-    rows_xyz: Float, time: Float, intensity: Single, scan_id: Int32, classification: UInt8,
-    whole: Bool, edge: float, limit: float, points: int, slots: int,
-) -> tuple[Int32, Bool]:  # fmt: skip  # pragma: no cover - compiled
+    xyz: Float, time: Float, intensity: Single, scan_id: Int32, classification: UInt8,
+    whole: Bool, edge: float, limit: float, points: int,
+) -> tuple[Int32, Bool]:  # fmt: skip
     """Of a chunk of points, those that may be the first good one of their voxel.
 
     The point of a voxel that stands before the others of the chunk is certain to be no noise when `points` of them,
@@ -155,80 +108,92 @@ def pick(
     certain : (k,) bool array
         Which of them are certain to be no noise.
     """
-    n = len(rows_xyz)
-    mask = slots - 1
-    table = np.full(slots, -1, np.int32)
-    voxel = np.empty(n, np.int32)
-    best = np.empty(n, np.int32)
-    nearest = np.empty(n)
-    used = 0
-    v = -1
-    lx, ly, lz = 0.0, 0.0, 0.0
-    cx, cy, cz = 0.0, 0.0, 0.0
-    for i in range(n):
-        voxel[i] = -1
-        if not whole[i]:
-            continue
-        x, y, z = rows_xyz[i, 0], rows_xyz[i, 1], rows_xyz[i, 2]
-        ix, iy, iz = math.floor(x / edge), math.floor(y / edge), math.floor(z / edge)
-        if v < 0 or ix != lx or iy != ly or iz != lz:
-            lx, ly, lz = ix, iy, iz
-            cx, cy, cz = (ix + 0.5) * edge, (iy + 0.5) * edge, (iz + 0.5) * edge
-            slot = ((int(ix) * 73856093) ^ (int(iy) * 19349663) ^ (int(iz) * 83492791)) & mask
-            while True:
-                v = table[slot]
-                if v < 0:
-                    table[slot] = v = used
-                    best[v] = i
-                    nearest[v] = np.inf
-                    used += 1
-                    break
-                j = best[v]
-                if (
-                    math.floor(rows_xyz[j, 0] / edge) == ix
-                    and math.floor(rows_xyz[j, 1] / edge) == iy
-                    and math.floor(rows_xyz[j, 2] / edge) == iz
-                ):
-                    break
-                slot = (slot + 1) & mask
-        voxel[i] = v
-        distance = (x - cx) ** 2 + (y - cy) ** 2 + (z - cz) ** 2
-        if distance < nearest[v]:
-            best[v], nearest[v] = i, distance
-        elif distance == nearest[v]:
-            j = best[v]
-            if x != rows_xyz[j, 0]:
-                ahead = x < rows_xyz[j, 0]
-            elif y != rows_xyz[j, 1]:
-                ahead = y < rows_xyz[j, 1]
-            elif z != rows_xyz[j, 2]:
-                ahead = z < rows_xyz[j, 2]
-            elif time[i] != time[j]:
-                ahead = time[i] < time[j]
-            elif intensity[i] != intensity[j]:
-                ahead = intensity[i] < intensity[j]
-            elif scan_id[i] != scan_id[j]:
-                ahead = scan_id[i] < scan_id[j]
-            else:
-                ahead = classification[i] < classification[j]
-            if ahead:
-                best[v] = i
-    found = np.zeros(used, np.int32)
-    for i in range(n):
-        v = voxel[i]
-        if v < 0:
-            continue
-        j = best[v]
-        ex, ey, ez = rows_xyz[i, 0] - rows_xyz[j, 0], rows_xyz[i, 1] - rows_xyz[j, 1], rows_xyz[i, 2] - rows_xyz[j, 2]
-        if ex * ex + ey * ey + ez * ez <= limit:
-            found[v] += 1
-    picked = np.empty(n, np.int32)
-    certain = np.empty(n, np.bool_)
-    count = 0
-    for i in range(n):
-        v = voxel[i]
-        sure = v >= 0 and found[v] >= points
-        if not sure or best[v] == i:
-            picked[count], certain[count] = i, sure
-            count += 1
-    return picked[:count], certain[:count]
+    voxel, count = _voxels(xyz, edge)
+    voxel[~whole] = -1
+    _, _, leader = _leaders(xyz, voxel, count, edge, whole, (*xyz.T, time, intensity, scan_id, classification))
+    found = np.zeros(count, np.int32)
+    _count_near(xyz, voxel, leader, limit, found)
+    crowded = (found >= points) & (leader >= 0)
+    sure = whole & crowded[voxel]
+    staying = ~sure
+    staying[leader[crowded]] = True
+    picked = np.flatnonzero(staying).astype(np.int32)
+    return picked, sure[picked]
+
+
+def _voxels(xyz: Float, edge: float) -> tuple[Int32, int]:
+    """Number of the voxel of each point, (n,), and how many voxels there are."""
+    voxels = CellCounts(edge, max(1024, len(xyz) // 2))
+    return voxels.add(xyz), len(voxels.counts)
+
+
+def _leaders(xyz: Float, voxel: Int32, count: int, edge: float, good: Bool, ties: Columns) -> tuple[Float, Float, Int64]:
+    """Good point nearest to the centre of each voxel.
+
+    Parameters
+    ----------
+    xyz, voxel, good : (n, 3), (n,), (n,) arrays
+        Points, m, the number of the voxel of each, below the count (-1: none), and which may lead.
+    ties : sequence of (n,) arrays
+        What decides between points equally near.
+
+    Returns
+    -------
+    distance : (n,) float array
+        From the centre of the voxel, squared, m².
+    least : (count,) float array
+        Least distance of the good points of each voxel; infinite where there is none.
+    leader : (count,) int array
+        Number of the point; -1 for none.
+    """
+    distance, least = np.empty(len(xyz)), np.full(count, np.inf)
+    _find_nearest(xyz, voxel, edge, good, distance, least)
+    first = np.flatnonzero(good & (distance == least[voxel]))
+    several = np.bincount(voxel[first], minlength=count)[voxel[first]] > 1
+    if several.any():
+        tied = first[several]
+        # The last key counts most, and of equal ones the first stays first.
+        tied = tied[np.lexsort([column[tied] for column in reversed(ties)])]
+        first = np.concatenate([tied, first[~several]])
+    leader = np.full(count, -1, np.int64)
+    leader[voxel[first[::-1]]] = first[::-1]  # of several the last one stays: the first of the order
+    return distance, least, leader
+
+
+def _is_lower(ties: Columns, one: Intp, other: Intp) -> Bool:
+    """Tell which points stand before others by what decides between points equally near."""
+    lower, equal = np.zeros(len(one), np.bool_), np.ones(len(one), np.bool_)
+    for column in ties:
+        a, b = column[one], column[other]
+        lower |= equal & (a < b)
+        equal &= a == b
+    return lower
+
+
+@kernel
+def _find_nearest(
+    xyz: Float, voxel: Int32, edge: float, good: Bool, distance: Float, least: Float
+) -> None:  # pragma: no cover - compiled
+    """Write the squared distance of each point from the centre of its voxel, and the least of the good ones of each."""
+    for i in range(voxel.shape[0]):
+        x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+        cx, cy, cz = (
+            (math.floor(x / edge) + 0.5) * edge,
+            (math.floor(y / edge) + 0.5) * edge,
+            (math.floor(z / edge) + 0.5) * edge,
+        )
+        away = (x - cx) ** 2 + (y - cy) ** 2 + (z - cz) ** 2
+        distance[i] = away
+        if good[i] and away < least[voxel[i]]:
+            least[voxel[i]] = away
+
+
+@kernel
+def _count_near(xyz: Float, voxel: Int32, leader: Int64, limit: float, found: Int32) -> None:  # pragma: no cover - compiled
+    """Count the points of each voxel whose squared distance from its leader is within a limit."""
+    for i in range(voxel.shape[0]):
+        if voxel[i] >= 0:
+            j = leader[voxel[i]]
+            x, y, z = xyz[i, 0] - xyz[j, 0], xyz[i, 1] - xyz[j, 1], xyz[i, 2] - xyz[j, 2]
+            if x * x + y * y + z * z <= limit:
+                found[voxel[i]] += 1

@@ -1,11 +1,21 @@
-"""Points gathered in voxels: an even, thin picture of a cloud of any size, in one pass (Li et al. 2023, section 2.1)."""
+"""Voxels and cells of space: which of them a point lies in, found in a hash table, and what each of them holds.
+
+`CellCounts` numbers the cells of a cloud of any extent and counts their points. `Voxels` keeps an even, thin picture of a
+cloud in one pass (Li et al., 2023, section 2.1). Both take the cloud chunk by chunk.
+"""
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit, prange
+import math
 
-from tunneldb.arrays import Float, Int64, UInt32, UInt64
+import numpy as np
+
+from tunneldb.arrays import Float, Int32, Int64, UInt8, UInt32, UInt64
+from tunneldb.compiled import inner, kernel
+from tunneldb.threads import in_blocks
+
+CELL = 0.5
+"""Edge of the cells in which the density of a scan is measured, m."""
 
 _BITS = 21  # of a voxel's number along each axis
 _HALF = 1 << (_BITS - 1)
@@ -13,6 +23,81 @@ _FINE = 1024  # steps of a voxel's edge in which places are summed: exact whole 
 _MOST = (1 << 22) - 1  # points of a voxel that are summed; more would not move its centroid
 _ROOM = 1 << 16  # voxels, to begin with
 _EMPTY = np.uint32(0xFFFFFFFF)
+_BLOCK = 1 << 16  # points at a time
+
+
+class CellCounts:
+    """Number of points in each cubic cell of space, gathered chunk by chunk.
+
+    Parameters
+    ----------
+    edge : float
+        Edge of a cell, m; cells lie at whole multiples of it.
+    room : int
+        Cells to begin with.
+
+    Attributes
+    ----------
+    edge : float
+        As given, m.
+    """
+
+    def __init__(self, edge: float = CELL, room: int = 1024) -> None:
+        self.edge = float(edge)
+        self._used = 0
+        self._cells = np.empty((room, 3), np.int64)
+        self._counts = np.zeros(room, np.int64)
+        self._table = _table(4 * room)
+
+    def add(self, xyz: Float) -> Int32:
+        """Count points (n, 3); returns the number of the cell of each, (n,), good for `counts` and `centres`."""
+        return self._number(xyz, True)
+
+    def find(self, xyz: Float) -> Int32:
+        """Number of the cell of each point (n, 3), (n,); -1 where none was ever counted."""
+        return self._number(xyz, False)
+
+    @property
+    def counts(self) -> Int64:
+        """Points in each cell, (k,)."""
+        return self._counts[: self._used]
+
+    @property
+    def centres(self) -> Float:
+        """Centre of each cell, (k, 3), m."""
+        return np.asarray(np.multiply(self._cells[: self._used] + 0.5, self.edge, dtype=np.float64))
+
+    def remove(self, numbers: Int32) -> None:
+        """Take points out of the count of their cells (n,)."""
+        np.subtract.at(self._counts, numbers, 1)
+
+    def _number(self, xyz: Float, adding: bool) -> Int32:
+        xyz = np.ascontiguousarray(xyz, np.float64)
+        numbers = np.empty(len(xyz), np.int32)
+        done = 0
+        while True:
+            done, self._used = _number(
+                xyz, self.edge, adding, done, self._used, self._cells, self._counts, self._table, numbers
+            )
+            if done == len(xyz):
+                return numbers
+            self._grow()
+
+    def _grow(self) -> None:
+        size = 2 * len(self._cells)
+        known = self._cells[: self._used] + 0.5
+        self._cells = np.empty((size, 3), np.int64)
+        self._table = _table(4 * size)
+        counts = np.zeros(size, np.int64)
+        # The cells enter the larger table as points in their middles would.
+        _number(known, 1.0, True, 0, 0, self._cells, counts, self._table, np.empty(len(known), np.int32))
+        counts[: self._used] = self.counts
+        self._counts = counts
+
+
+def _table(least: int) -> Int32:
+    """Make an empty table of a power of two of slots."""
+    return np.full(1 << (least - 1).bit_length(), -1, np.int32)
 
 
 class Voxels:
@@ -30,7 +115,7 @@ class Voxels:
     def __init__(self, edge: float) -> None:
         if not edge > 0.0:
             raise ValueError(f"edge of a voxel is {edge:g} m: it must be above 0")
-        self.edge = edge
+        self.edge = float(edge)
         self._base: Int64 | None = None
         self._size = 0
         self._key = np.empty(_ROOM, np.int64)
@@ -50,7 +135,7 @@ class Voxels:
         ValueError
             A point lies more than a million voxels from the first.
         """
-        points = np.asarray(xyz, dtype=np.float64)
+        points = np.ascontiguousarray(xyz, dtype=np.float64)
         if self._base is None:
             finite = np.flatnonzero(np.isfinite(points).all(axis=1))
             if not len(finite):
@@ -70,10 +155,12 @@ class Voxels:
     def centroids(self) -> Float:
         """Mean of the points in each voxel, (n, 3), m, in the order in which the voxels were first met."""
         n = self._size
-        if self._base is None:
-            return np.empty((0, 3))
         out = np.empty((n, 3))
-        _centroids(self._key[:n], self._count[:n], self._sum[:n], self.edge, self._base, out)
+        if self._base is not None:
+            count, mask = np.minimum(self._count[:n], np.uint32(_MOST)), (1 << _BITS) - 1
+            for axis in range(3):
+                cell = ((self._key[:n] >> (_BITS * (2 - axis))) & mask) - _HALF + self._base[axis]
+                out[:, axis] = (cell + (self._sum[:n, axis] / count + 0.5) / _FINE) * self.edge
         return out
 
     def counts(self) -> Int64:
@@ -90,10 +177,12 @@ class Voxels:
 
     def index(self, xyz: Float) -> Int64:
         """Number of the voxel that holds each of the points (n, 3), -1 where there is none."""
-        points = np.asarray(xyz, dtype=np.float64)
+        points = np.ascontiguousarray(xyz, dtype=np.float64)
         out = np.full(len(points), -1, np.int64)
-        if self._base is not None:
-            _index(points, self.edge, self._base, self._key, self._table, out)
+        if (base := self._base) is not None:
+            in_blocks(
+                lambda begin, end: _index(points, self.edge, base, self._key, self._table, out, begin, end), len(points), _BLOCK
+            )
         return out
 
     def _grow(self) -> None:
@@ -109,47 +198,111 @@ class Voxels:
             size *= 2
         if size > len(self._table):
             self._table = np.full(size, _EMPTY, np.uint32)
-            _rehash(self._key, self._size, self._table)
+            _enter_keys(self._key, self._size, self._table)
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _key_of(x: float, y: float, z: float, edge: float, base: Int64) -> int:
-    """Number of a point's voxel, -1 beyond what can be numbered, -2 where the point is not finite."""
-    fx, fy, fz = np.floor(x / edge), np.floor(y / edge), np.floor(z / edge)
-    if not (np.isfinite(fx) and np.isfinite(fy) and np.isfinite(fz)):
+def value_table(keys: Int64, values: UInt8) -> tuple[Int64, UInt8]:
+    """Slots for keys (n,), all different and not negative, and their values (n,): `key_slot` finds a key at one glance."""
+    slots = np.full(1 << max(10, (2 * len(keys)).bit_length()), -1, np.int64)
+    held = np.zeros(len(slots), np.uint8)
+    _enter_values(keys, values, slots, held)
+    return slots, held
+
+
+@inner
+def column_hash(ix: int, iy: int) -> int:  # pragma: no cover - compiled
+    """Hash of a column of cells (Teschner et al., 2003)."""
+    return (ix * 73856093) ^ (iy * 19349663)
+
+
+@kernel
+def _number(
+    xyz: Float, edge: float, adding: bool, done: int, used: int, cells: Int64, counts: Int64, table: Int32, numbers: Int32
+) -> tuple[int, int]:  # pragma: no cover - compiled
+    """Number the cells of points from `done` on, and count them, until the list of cells is full; how far it came.
+
+    If nothing is to be added, points of cells that aren't there get -1, and nothing is counted.
+    """
+    mask = table.shape[0] - 1
+    last = -1
+    lx, ly, lz = 0, 0, 0
+    for i in range(done, xyz.shape[0]):
+        ix = math.floor(xyz[i, 0] / edge)
+        iy = math.floor(xyz[i, 1] / edge)
+        iz = math.floor(xyz[i, 2] / edge)
+        if last < 0 or ix != lx or iy != ly or iz != lz:
+            slot = (column_hash(ix, iy) ^ (iz * 83492791)) & mask
+            k = table[slot]
+            while k >= 0 and (cells[k, 0] != ix or cells[k, 1] != iy or cells[k, 2] != iz):
+                slot = (slot + 1) & mask
+                k = table[slot]
+            if k < 0 and adding:
+                if used == cells.shape[0]:
+                    return i, used
+                k = used
+                cells[k, 0], cells[k, 1], cells[k, 2] = ix, iy, iz
+                table[slot] = k
+                used += 1
+            last, lx, ly, lz = k, ix, iy, iz
+        if adding:
+            counts[last] += 1
+        numbers[i] = last
+    return xyz.shape[0], used
+
+
+@inner
+def _key_of(x: float, y: float, z: float, base: Int64) -> int:  # pragma: no cover - compiled
+    """Number of the voxel of a place, in edges; -1 beyond what can be numbered, -2 where the place is not finite."""
+    if not (abs(x) < np.inf and abs(y) < np.inf and abs(z) < np.inf):
         return -2
-    i, j, k = fx - base[0] + _HALF, fy - base[1] + _HALF, fz - base[2] + _HALF
-    top = 2.0 * _HALF
-    if i < 0 or j < 0 or k < 0 or i >= top or j >= top or k >= top:
+    i, j, k = math.floor(x) - base[0] + _HALF, math.floor(y) - base[1] + _HALF, math.floor(z) - base[2] + _HALF
+    if min(i, j, k) < 0 or max(i, j, k) >= 2 * _HALF:
         return -1
-    return (int(i) << (2 * _BITS)) | (int(j) << _BITS) | int(k)
+    return (i << (2 * _BITS)) | (j << _BITS) | k
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _slot(key: int, keys: Int64, table: UInt32) -> int:
-    """Slot of the table that holds a key, or the empty one where it belongs."""
+@inner
+def _number_slot(key: int, keys: Int64, table: UInt32) -> int:  # pragma: no cover - compiled
+    """Slot of a table that holds the place of a key among keys, or the empty one where it belongs."""
     mask = np.uint64(table.shape[0] - 1)
     h = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     at = (h ^ (h >> np.uint64(32))) & mask
     while table[at] != _EMPTY and keys[table[at]] != key:
         at = (at + np.uint64(1)) & mask
-    return int(at)
+    return np.int64(at)
 
 
-@njit(cache=True, nogil=True)
+@inner
+def key_slot(key: int, slots: Int64) -> int:  # pragma: no cover - compiled
+    """Slot that holds a key, or the empty one (-1) where it belongs."""
+    mask = slots.shape[0] - 1
+    slot = np.int64((np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32)) & mask
+    while slots[slot] >= 0 and slots[slot] != key:
+        slot = (slot + 1) & mask
+    return slot
+
+
+@kernel
+def _enter_values(keys: Int64, values: UInt8, slots: Int64, held: UInt8) -> None:  # pragma: no cover - compiled
+    for i in range(keys.shape[0]):
+        slot = key_slot(keys[i], slots)
+        slots[slot], held[slot] = keys[i], values[i]
+
+
+@kernel
 def _add(
     points: Float, edge: float, base: Int64, size: int, keys: Int64, count: UInt32, total: UInt32,
     square: UInt64, table: UInt32,
 ) -> tuple[int, int]:  # pragma: no cover - compiled  # fmt: skip
     """Add points until there is no room for another voxel: how many, and the number of voxels; -1: out of bounds."""
     for n in range(points.shape[0]):
-        x, y, z = points[n, 0], points[n, 1], points[n, 2]
-        key = _key_of(x, y, z, edge, base)
+        x, y, z = points[n, 0] / edge, points[n, 1] / edge, points[n, 2] / edge
+        key = _key_of(x, y, z, base)
         if key < 0:
             if key == -1:
                 return -1, size
             continue
-        slot = _slot(key, keys, table)
+        slot = _number_slot(key, keys, table)
         if table[slot] == _EMPTY:
             if size == keys.shape[0]:
                 return n, size
@@ -161,39 +314,27 @@ def _add(
         if count[i] > _MOST:
             continue
         last = _FINE - 1
-        total[i, 0] += np.uint32(min(int((x / edge - np.floor(x / edge)) * _FINE), last))
-        total[i, 1] += np.uint32(min(int((y / edge - np.floor(y / edge)) * _FINE), last))
-        up = min(int((z / edge - np.floor(z / edge)) * _FINE), last)
+        total[i, 0] += np.uint32(min(int((x - math.floor(x)) * _FINE), last))
+        total[i, 1] += np.uint32(min(int((y - math.floor(y)) * _FINE), last))
+        up = min(int((z - math.floor(z)) * _FINE), last)
         total[i, 2] += np.uint32(up)
         square[i] += np.uint64(up * up)
     return points.shape[0], size
 
 
-@njit(cache=True, nogil=True)
-def _rehash(keys: Int64, size: int, table: UInt32) -> None:  # pragma: no cover - compiled
+@kernel
+def _enter_keys(keys: Int64, size: int, table: UInt32) -> None:  # pragma: no cover - compiled
     for i in range(size):
-        table[_slot(keys[i], keys, table)] = np.uint32(i)
+        table[_number_slot(keys[i], keys, table)] = np.uint32(i)
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _centroids(
-    keys: Int64, count: UInt32, total: UInt32, edge: float, base: Int64, out: Float
-) -> None:  # pragma: no cover - compiled
-    mask = (1 << _BITS) - 1
-    for n in prange(keys.shape[0]):
-        number = min(count[n], np.uint32(_MOST))
-        for axis in range(3):
-            cell = ((keys[n] >> (_BITS * (2 - axis))) & mask) - _HALF + base[axis]
-            out[n, axis] = (cell + (total[n, axis] / number + 0.5) / _FINE) * edge
-
-
-@njit(cache=True, nogil=True, parallel=True)
+@kernel
 def _index(
-    points: Float, edge: float, base: Int64, keys: Int64, table: UInt32, out: Int64
+    points: Float, edge: float, base: Int64, keys: Int64, table: UInt32, out: Int64, begin: int, end: int
 ) -> None:  # pragma: no cover - compiled
-    for n in prange(points.shape[0]):
-        key = _key_of(points[n, 0], points[n, 1], points[n, 2], edge, base)
+    for n in range(begin, end):
+        key = _key_of(points[n, 0] / edge, points[n, 1] / edge, points[n, 2] / edge, base)
         if key >= 0:
-            slot = _slot(key, keys, table)
+            slot = _number_slot(key, keys, table)
             if table[slot] != _EMPTY:
                 out[n] = table[slot]

@@ -18,16 +18,13 @@ from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load import chainages_near, header_kilometres, parameters_of, settings_of
 from tunneldb.pipeline.run import loaded_kilometres
-from tunneldb.pipeline.stages import STAGES
+from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.pointcloud.formats.e57 import is_e57
 from tunneldb.pointcloud.formats.las_bounds import header_box
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
-from tunneldb.store.poses import load_poses
+from tunneldb.store.sources import load_poses
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
-
-STEPS = ("load", *(stage.name for stage in STAGES))
-"""Stages of a kilometre, in their order."""
 
 
 @dataclass(frozen=True)
@@ -337,10 +334,11 @@ ON CONFLICT (survey_id, name) DO UPDATE
 
 _GOAL = """
 INSERT INTO tunnel.goal AS g (survey_id, km, stage, parameters)
-VALUES (%(survey)s, %(km)s, coalesce(%(stage)s, 'detect'), %(reading)s || %(parameters)s)
+VALUES (%(survey)s, %(km)s, coalesce(%(stage)s, %(last)s), %(reading)s || %(parameters)s)
 ON CONFLICT (survey_id, km) DO UPDATE
    SET stage = CASE WHEN (%(stage)s IS NOT NULL OR %(new)s)
-                     AND array_position(%(steps)s, excluded.stage) > array_position(%(steps)s, g.stage)
+                     AND (SELECT s.step FROM tunnel.stage s WHERE s.name = excluded.stage)
+                         > (SELECT s.step FROM tunnel.stage s WHERE s.name = g.stage)
                     THEN excluded.stage ELSE g.stage END,
        parameters = g.parameters || %(parameters)s, requested_at = excluded.requested_at
 """
@@ -365,7 +363,7 @@ def _goal(survey: Survey, km: int, asked: Plan) -> dict[str, Any]:
         "survey": survey.id,
         "km": km,
         "stage": asked.stage,
-        "steps": list(STEPS),
+        "last": STAGE_NAMES[-1],
         "reading": Jsonb(asked.reading),
         "parameters": Jsonb(asked.parameters),
         "new": bool(asked.files),

@@ -18,8 +18,9 @@ import psycopg
 from tunneldb.database.server import Server
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.parameters import PARAMETERS
+from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.pointcloud.reader import read_header
-from tunneldb.queue.batch import STEPS, Plan, extent
+from tunneldb.queue.batch import Plan, extent
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
@@ -242,7 +243,7 @@ def _disk(conn: psycopg.Connection[Any], plan: Plan, rows: float, length: float,
     row = conn.execute("SELECT pg_size_bytes(current_setting('max_wal_size'))").fetchone()
     assert row is not None
     pixel = float(plan.parameters.get("image.pixel", PARAMETERS["image.pixel"].default))
-    detects = plan.stage in (None, STEPS[-1])
+    detects = plan.stage in (None, STAGE_NAMES[-1])
     return Disk(
         ROW_BYTES * rows,
         FRAGMENT_BYTES * rows + ROW_BYTES * rows * min(workers / max(len(plan.kilometres), 1), 1.0),
@@ -266,12 +267,12 @@ def _speeds(conn: psycopg.Connection[Any]) -> tuple[Speed, ...]:
         """
     ).fetchall()
     found = {stage: Speed(stage, seconds, runs) for stage, seconds, runs in rows if seconds is not None}
-    return tuple(found[stage] for stage in ("read", *STEPS) if stage in found)
+    return tuple(found[stage] for stage in ("read", *STAGE_NAMES) if stage in found)
 
 
 def _time(speeds: Sequence[Speed], plan: Plan, points: int, workers: int) -> float | None:
     """Time of all work, shared by the workers; None if one of the stages was never measured."""
-    steps = STEPS[: STEPS.index(plan.stage or STEPS[-1]) + 1]
+    steps = STAGE_NAMES[: STAGE_NAMES.index(plan.stage or STAGE_NAMES[-1]) + 1]
     mean = {speed.stage: speed.seconds for speed in speeds}
     if not {*steps, *(("read",) if points else ())} <= mean.keys():
         return None

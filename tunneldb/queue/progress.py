@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import psycopg
 from psycopg.rows import class_row
 
-from tunneldb.pipeline.order import STAGES
+from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.queue.throughput import measure, points_per_second
 from tunneldb.queue.worker import STALLED
 
@@ -170,35 +170,35 @@ def overview(conn: psycopg.Connection[Any], survey: str) -> Overview:
     goals, files = _goals(conn, survey), _files(conn, survey)
     known = _known(conn, survey, files)
     kilometres = {
-        km: {stage: _cell(km, stage, known) for stage in STAGES}
+        km: {stage: _cell(km, stage, known) for stage in STAGE_NAMES}
         for km in sorted({*goals, *(km for km, _ in known.statuses), *_touched(files)})
     }
-    _lay_on(kilometres, files)
+    _mark_failed_files(kilometres, files)
     workers = _workers(conn)
-    pace = measure(conn, survey)
+    throughput = measure(conn, survey)
     steps = [[(stage, cell.since) for stage, cell in cells.items() if cell.state in TO_DO] for cells in kilometres.values()]
     to_read = sum(file.state != "failed" for file in files)
     asked = max((goals[km].requested_at for km in goals if _unfinished(kilometres[km])), default=None)
-    share = pace.share(steps, to_read, asked) if asked is not None else None
-    wanted = [kilometres[km][stage].state for km, goal in goals.items() for stage in STAGES[: goal.step + 1]]
+    share = throughput.share(steps, to_read, asked) if asked is not None else None
+    wanted = [kilometres[km][stage].state for km, goal in goals.items() for stage in STAGE_NAMES[: goal.step + 1]]
     return Overview(
         survey,
         now[0],
         kilometres,
-        {km: STAGES[goal.step] for km, goal in goals.items()},
+        {km: STAGE_NAMES[goal.step] for km, goal in goals.items()},
         files,
         workers,
         done=sum(state in ("done", "empty") for state in wanted),
         total=len(wanted),
         share=share,
         rate=points_per_second(conn, survey, share, asked, now[0]) if asked is not None and share is not None else None,
-        left=pace.left(steps, to_read, sum(not worker.lost for worker in workers), now[0]),
+        left=throughput.left(steps, to_read, sum(not worker.lost for worker in workers), now[0]),
     )
 
 
 def _goals(conn: psycopg.Connection[Any], survey: str) -> dict[int, _Goal]:
     rows = conn.execute("SELECT km, stage, requested_at FROM tunnel_api.goal WHERE survey = %s", [survey])
-    return {km: _Goal(STAGES.index(stage), requested_at) for km, stage, requested_at in rows}
+    return {km: _Goal(STAGE_NAMES.index(stage), requested_at) for km, stage, requested_at in rows}
 
 
 def _known(conn: psycopg.Connection[Any], survey: str, files: tuple[File, ...]) -> _Known:
@@ -273,13 +273,13 @@ def _cell(km: int, stage: str, known: _Known) -> Cell:
     return Cell("stale", status.reason) if status.outcome == "done" and status.stale else Cell(status.outcome)
 
 
-def _lay_on(kilometres: dict[int, dict[str, Cell]], files: tuple[File, ...]) -> None:
+def _mark_failed_files(kilometres: dict[int, dict[str, Cell]], files: tuple[File, ...]) -> None:
     """Show a file that failed at the kilometres that it touches, where none of them is at work."""
     for file in files:
         for cells in [kilometres[km] for km in _touched((file,)) if file.state == "failed"]:
             if cells["load"].state not in ("running", "queued"):
                 cells["load"] = Cell("failed", file.message)
-                cells.update((stage, Cell("never")) for stage in STAGES if cells[stage].state == "empty")
+                cells.update((stage, Cell("never")) for stage in STAGE_NAMES if cells[stage].state == "empty")
 
 
 def _unfinished(cells: Mapping[str, Cell]) -> bool:

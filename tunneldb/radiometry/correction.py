@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numba import njit, prange
 
 from tunneldb.arrays import Bool, Float, Single
+from tunneldb.compiled import point_inner
 from tunneldb.errors import UserError
-from tunneldb.radiometry.oren_nayar import coefficients
-from tunneldb.radiometry.reference_curve import SPAN_TOLERANCE, ReferenceCurve
+from tunneldb.radiometry.oren_nayar import incidence_db
+from tunneldb.radiometry.reference_curve import ReferenceCurve
 
 Kind = Literal["amplitude", "reflectance", "linear"]
 """What the raw intensity is: dB that fall with range, dB from which the maker removed range, or counts."""
@@ -65,8 +65,9 @@ class Observations:
 
     def corrected(self, roughness: float) -> Single:
         """Intensity corrected for distance and incidence (eq. 16), dB; NaN where cosine ≤ 0."""
-        corrected: Single = _corrected(self.distance_db, self.cosine, *coefficients(roughness))
-        return corrected
+        seen = self.cosine > 0.0
+        loss = incidence_db(np.where(seen, self.cosine, 1.0), roughness)
+        return np.where(seen, self.distance_db - loss, np.nan).astype(np.float32)
 
 
 def needs_reference(kind: Kind) -> bool:
@@ -106,29 +107,24 @@ def observe(
             f"intensity of kind {kind} needs a reference curve: add the survey with --reference CSV"
             " (columns range_m,intensity_db)"
         )
-    knots = reference.range_m if reference else np.zeros(0)
-    values = reference.intensity_db if reference else np.zeros(0)
-    return Observations(*_observe(points, scanner, normal, raw.astype(np.float32, copy=False), kind == "linear", knots, values))
+    x, y, z = (scanner - points).T
+    nx, ny, nz = normal.T
+    range_m = np.sqrt(x * x + y * y + z * z)
+    cosine = np.minimum(1.0, (x * nx + y * ny + z * nz) / np.maximum(range_m, 1e-9))
+    raw_db = to_decibel(raw, kind)
+    distance_db = raw_db - reference(range_m) if reference else raw_db
+    return Observations(*(array.astype(np.float32) for array in (range_m, cosine, raw_db, distance_db)))
 
 
 def range_span(observations: Observations, use: Bool, reference: ReferenceCurve) -> tuple[float, float, int, int]:
     """Nearest and farthest range (m) of the points to use, how many are outside the curve's span, and all."""
-    nearest, farthest, outside, count = _range_span(
-        observations.range_m, use, reference.range_m[0] - SPAN_TOLERANCE, reference.range_m[-1] + SPAN_TOLERANCE
-    )
-    return nearest, farthest, outside, count
+    used = observations.range_m[use].astype(np.float64)
+    outside = int(np.count_nonzero(reference.outside(used)))
+    return float(used.min(initial=np.inf)), float(used.max(initial=-np.inf)), outside, len(used)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def level_of(raw: float, linear: bool) -> float:
-    """Raw intensity in dB (eq. 4); NaN of counts that are not positive."""
-    if not linear:
-        return raw
-    return 10.0 * np.log10(raw) if raw > 0.0 else np.nan
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def reference_at(knots: Float, values: Float, r: float, hint: int) -> tuple[float, int]:
+@point_inner
+def reference_at(knots: Float, values: Float, r: float, hint: int) -> tuple[float, int]:  # pragma: no cover - compiled
     """Intensity of the reference target at range ``r`` (eq. 9), and the curve's interval, looked for from a hint on."""
     last = knots.shape[0] - 1
     if r <= knots[0]:
@@ -142,59 +138,3 @@ def reference_at(knots: Float, values: Float, r: float, hint: int) -> tuple[floa
         k += 1
     share = (r - knots[k]) / (knots[k + 1] - knots[k])
     return values[k] + share * (values[k + 1] - values[k]), k
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def incidence_loss(cosine: float, a: float, b: float) -> float:
-    """Loss by incidence (eq. 15), dB, of a surface with these coefficients, for a cosine above 0."""
-    return float(10.0 * np.log10(a * cosine + b * (1.0 - cosine * cosine)))
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _observe(
-    points: Float, scanner: Float, normal: Float, raw: Single, linear: bool, knots: Float, values: Float
-) -> tuple[Single, Single, Single, Single]:  # pragma: no cover - compiled
-    count = points.shape[0]
-    range_m = np.empty(count, np.float32)
-    cosine = np.empty(count, np.float32)
-    raw_db = np.empty(count, np.float32)
-    distance_db = np.empty(count, np.float32)
-    for i in prange(count):
-        x = scanner[i, 0] - points[i, 0]
-        y = scanner[i, 1] - points[i, 1]
-        z = scanner[i, 2] - points[i, 2]
-        r = np.sqrt(x * x + y * y + z * z)
-        range_m[i] = r
-        cosine[i] = min(1.0, (x * normal[i, 0] + y * normal[i, 1] + z * normal[i, 2]) / max(r, 1e-9))
-        level = level_of(raw[i], linear)
-        raw_db[i] = level
-        if knots.shape[0] > 0:
-            level -= reference_at(knots, values, r, 0)[0]
-        distance_db[i] = level
-    return range_m, cosine, raw_db, distance_db
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _corrected(distance_db: Single, cosine: Single, a: float, b: float) -> Single:  # pragma: no cover - compiled
-    corrected = np.empty(distance_db.shape[0], np.float32)
-    for i in prange(distance_db.shape[0]):
-        c = float(cosine[i])
-        corrected[i] = distance_db[i] - incidence_loss(c, a, b) if c > 0.0 else np.nan
-    return corrected
-
-
-@njit(cache=True, nogil=True)
-def _range_span(
-    range_m: Single, use: Bool, low: float, high: float
-) -> tuple[float, float, int, int]:  # pragma: no cover - compiled
-    nearest, farthest = np.inf, -np.inf
-    outside, count = 0, 0
-    for i in range(range_m.shape[0]):
-        if use[i]:
-            r = float(range_m[i])
-            count += 1
-            nearest = min(nearest, r)
-            farthest = max(farthest, r)
-            if r < low or r > high:
-                outside += 1
-    return nearest, farthest, outside, count

@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 
-from tunneldb.arrays import Bool, Float
+from tunneldb.arrays import Bool, Float, Intp
+from tunneldb.compiled import point_inner
 from tunneldb.geometry.surface import Surface, Unrolled
 
 BEND = np.cos(np.radians(25.0))
@@ -63,21 +63,25 @@ class Edges:
         """Normals (n, 3) of points (n, 3): that of the surface, or of the nearer face where it bends sharply."""
         if not self.sharp.any():
             return unrolled.normal
-        normal: Float = _normals(
-            points,
-            unrolled.chainage,
-            unrolled.arc,
-            unrolled.normal,
-            self.start,
-            self.first,
-            self.feet,
-            self.normals,
-            self.sharp,
-        )
-        return normal
+        with np.errstate(invalid="ignore"):
+            k = np.floor((unrolled.chainage - self.start) / _ALONG + 0.5)
+            m = np.floor((unrolled.arc - self.first) / _ACROSS + 0.5)
+            on_grid = np.flatnonzero((k >= 0) & (k < self.sharp.shape[0]) & (m >= 0) & (m < self.sharp.shape[1]))
+        k, m = k[on_grid].astype(np.intp), m[on_grid].astype(np.intp)
+        sharp = self.sharp[k, m]
+        at, k, m = on_grid[sharp], k[sharp], m[sharp]
+        left, right = (np.abs(self._above(points[at], k, m + side)) for side in (-_SIDE, _SIDE))
+        out = unrolled.normal.copy()
+        out[at] = self.normals[k, np.where(left <= right, m - _SIDE, m + _SIDE)]
+        return out
+
+    def _above(self, points: Float, k: Intp, m: Intp) -> Float:
+        """Distance (n,) of points (n, 3) from the planes at nodes of the grid, m, positive into the tunnel."""
+        x, y, z = ((points - self.feet[k, m]) * self.normals[k, m]).T
+        return np.asarray(x + y + z)
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@point_inner
 def face_at(
     start: float, first: float, sharp: Bool, chainage: float, arc: float
 ) -> tuple[int, int]:  # pragma: no cover - compiled
@@ -89,37 +93,21 @@ def face_at(
     return k, m
 
 
-@njit(cache=True, nogil=True)
+@point_inner
 def face_normal(
     feet: Float, normals: Float, k: int, m: int, x: float, y: float, z: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Normal of the face, to the left or to the right of a node, whose plane a point lies nearer to."""
-    left, right = 0.0, 0.0
     one, other = m - _SIDE, m + _SIDE
-    for c, at in enumerate((x, y, z)):
-        left += (at - feet[k, one, c]) * normals[k, one, c]
-        right += (at - feet[k, other, c]) * normals[k, other, c]
+    left = (
+        (x - feet[k, one, 0]) * normals[k, one, 0]
+        + (y - feet[k, one, 1]) * normals[k, one, 1]
+        + (z - feet[k, one, 2]) * normals[k, one, 2]
+    )
+    right = (
+        (x - feet[k, other, 0]) * normals[k, other, 0]
+        + (y - feet[k, other, 1]) * normals[k, other, 1]
+        + (z - feet[k, other, 2]) * normals[k, other, 2]
+    )
     side = one if abs(left) <= abs(right) else other
     return normals[k, side, 0], normals[k, side, 1], normals[k, side, 2]
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _normals(
-    points: Float,
-    chainage: Float,
-    arc: Float,
-    normal: Float,
-    start: float,
-    first: float,
-    feet: Float,
-    normals: Float,
-    sharp: Bool,
-) -> Float:  # pragma: no cover - compiled
-    out = normal.copy()
-    for i in prange(points.shape[0]):
-        if np.isnan(chainage[i]) or np.isnan(arc[i]):
-            continue
-        k, m = face_at(start, first, sharp, chainage[i], arc[i])
-        if k >= 0:
-            out[i, 0], out[i, 1], out[i, 2] = face_normal(feet, normals, k, m, points[i, 0], points[i, 1], points[i, 2])
-    return out

@@ -3,7 +3,8 @@
 The formulas are those of `Surface.unroll`, `Edges.normals_of`, `PoseModel.positions`, `observe` and `Observations.corrected`,
 whose compiled parts are called here. What is known of the point before (its segment, section and degree, interval of the
 trajectory and of the reference curve) shortens the search and changes nothing of what is found, so that neither the
-order of points nor the number of threads does.
+order of points nor the number of threads does. Points are unrolled block by block, so that what is found lies in the
+processor's cache when their pixels are looked for.
 """
 
 from __future__ import annotations
@@ -11,13 +12,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
 
 from tunneldb.arrays import Bool, Float, Int32, Int64, Single
-from tunneldb.geometry.unrolling import NOWHERE, unroll_point
+from tunneldb.compiled import point_inner, point_kernel
+from tunneldb.geometry.unrolling import to_plane
 from tunneldb.pointcloud.poses import TIME_TOLERANCE, interval, position_at
-from tunneldb.radiometry.correction import level_of, reference_at
+from tunneldb.radiometry.correction import reference_at
 from tunneldb.radiometry.edge_normals import face_at, face_normal
+from tunneldb.threads import in_blocks
 
 BLOCK = 4096
 """Points that a thread takes at a time."""
@@ -166,15 +168,28 @@ def project(
     pixels : Pixels
         Room for at least n points; overwritten.
     """
-    counts, ranges = _look(shape, faces, scanner, optics, target, xyz, time, scan_id, intensity, pixels)
-    used, lost, lining, outside = counts.sum(axis=0).tolist()
+    found: list[tuple[int, int, int, int, float, float]] = []
+
+    def block(begin: int, end: int) -> None:
+        part = slice(begin, end)
+        unrolled, normals = np.empty((end - begin, 3)), np.empty((end - begin, 3))
+        to_plane(*shape, target.low, target.high, xyz[part], unrolled, normals)
+        found.append(
+            _project(
+                *faces, *scanner, *optics, *target[2:],
+                xyz[part], unrolled, normals, time[part], scan_id[part], intensity[part], *(array[part] for array in pixels),
+            )
+        )  # fmt: skip
+
+    in_blocks(block, len(xyz), BLOCK)
+    used, lost, lining, outside, nearest, farthest = zip(*found, strict=True) if found else ((),) * 6
     return ProjectionCounts(
-        used, lost, lining, outside, float(ranges[:, 0].min(initial=np.inf)), float(ranges[:, 1].max(initial=-np.inf))
+        sum(used), sum(lost), sum(lining), sum(outside), min(nearest, default=np.inf), max(farthest, default=-np.inf)
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def weight_of(cosine: float, distance: float, least: float, far: float) -> int:
+@point_inner
+def pixel_weight(cosine: float, distance: float, least: float, far: float) -> int:  # pragma: no cover - compiled
     """Weight of a point in its pixel, 1 to WEIGHT, by the variance of its corrected intensity.
 
     An error of the normal goes into the level by the slope of the loss by incidence, for Lambert's law as tan² θ: if at 45°
@@ -196,117 +211,136 @@ def weight_of(cosine: float, distance: float, least: float, far: float) -> int:
     return 1 + int((WEIGHT - 1) * slant * fade + 0.5)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _loss_at(loss: Float, cosine: float) -> float:
-    place = cosine * COSINES
-    k = min(int(place), COSINES - 1)
-    return float(loss[k] + (place - k) * (loss[k + 1] - loss[k]))
-
-
-@njit(cache=True, nogil=True, parallel=True, error_model="numpy")
-def _look(
-    shape: SurfaceArrays,
-    faces: EdgeArrays,
-    scanner: PoseArrays,
-    optics: CorrectionArrays,
-    target: PixelTarget,
+@point_kernel
+def _project(
+    bends: bool,
+    edges_start: float,
+    edges_first: float,
+    feet: Float,
+    face_normals: Float,
+    sharp: Bool,
+    known_scans: Int64,
+    stations: Float,
+    trajectory: Float,
+    track: Float,
+    wanted: bool,
+    linear: bool,
+    knots: Float,
+    values: Float,
+    low: float,
+    high: float,
+    loss: Float,
+    least_cosine: float,
+    far: float,
+    tolerance: float,
+    recess: float,
+    west: float,
+    per_metre: float,
+    bottom: int,
+    rows: int,
+    first: int,
+    stop: int,
+    start: int,
+    end: int,
+    floor_start: float,
+    left: Float,
+    right: Float,
     xyz: Float,
+    unrolled: Float,
+    normals: Float,
     time: Float,
     scan_id: Int32,
     intensity: Single,
-    pixels: Pixels,
-) -> tuple[Int64, Float]:  # pragma: no cover - compiled
-    points = xyz.shape[0]
-    parts = (points + BLOCK - 1) // BLOCK
-    counts = np.zeros((parts, 4), np.int64)
-    ranges = np.empty((parts, 2))
-    mobile = scanner.time.shape[0] > 0
-    curve = optics.knots.shape[0] > 0
-    low, high = target.low, target.high
-    # By names of their own: Numba drops what is written to a field of a tuple inside a parallel loop.
-    row, column, weights = pixels.row, pixels.column, pixels.weight
-    offsets, raws, correcteds = pixels.offset, pixels.raw, pixels.corrected
-    for part in prange(parts):
-        near = NOWHERE
-        moment, knot = 0, 0
-        station, stands = np.int64(-1), np.int64(-1)
-        used, lost, lining, outside = 0, 0, 0, 0
-        nearest, farthest = np.inf, -np.inf
-        i, end = part * BLOCK, min(points, (part + 1) * BLOCK)
-        while i < end:
-            x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-            column[i] = -1
-            if x < low[0] or x > high[0] or y < low[1] or y > high[1] or z < low[2] or z > high[2]:
-                i += 1
-                continue
-            afresh = near[0] < 0
-            near, chainage, arc, offset, nx, ny, nz = unroll_point(
-                shape.segments, shape.number, shape.ends, shape.chainages, shape.radius, shape.arcs, shape.reach,
-                x, y, z, near,
-            )  # fmt: skip
-            if near[0] < 0 and not afresh:
-                continue  # the same point again, from nowhere on
-            k = i
-            i += 1
-            if near[0] < 0 or offset > target.tolerance or offset < -target.recess:
-                continue
-            c = np.floor((chainage - target.west) * target.per_metre)
-            r = target.rows - 1 - (np.floor(arc * target.per_metre) - target.bottom)
-            if c < target.first or c >= target.stop or r < 0 or r >= target.rows:
-                continue
-            raw, corrected, weight = 0.0, 0.0, 1
-            if optics.wanted:
-                if mobile:
-                    t = time[k]
-                    if t < scanner.time[0] - TIME_TOLERANCE or t > scanner.time[-1] + TIME_TOLERANCE:
-                        lost += 1
-                        continue
-                    moment = interval(scanner.time, t, moment)
-                    dx, dy, dz = position_at(scanner.time, scanner.track, t, moment)
-                else:
-                    if station < 0 or scan_id[k] != stands:
-                        stands = np.int64(scan_id[k])
-                        station = np.int64(np.searchsorted(scanner.scan_id, stands))
-                        if station == scanner.scan_id.shape[0] or scanner.scan_id[station] != stands:
-                            station = np.int64(-1)
-                    if station < 0:
-                        lost += 1
-                        continue
-                    dx, dy, dz = scanner.station[station, 0], scanner.station[station, 1], scanner.station[station, 2]
-                dx -= x
-                dy -= y
-                dz -= z
-                distance = np.sqrt(dx * dx + dy * dy + dz * dz)
-                if distance > optics.far:
+    row: Int32,
+    column: Int32,
+    weights: Int32,
+    offsets: Single,
+    raws: Single,
+    correcteds: Single,
+) -> tuple[int, int, int, int, float, float]:  # pragma: no cover - compiled
+    """What `project` does with a block of unrolled points; of plain arrays, which compile faster than tuples of them."""
+    mobile = trajectory.shape[0] > 0
+    curve = knots.shape[0] > 0
+    moment, knot, station, scan = np.int64(0), np.int64(0), np.int64(-1), np.int64(-1)
+    used, lost, lining, outside = 0, 0, 0, 0
+    nearest, farthest = np.inf, -np.inf
+    for k in range(xyz.shape[0]):
+        column[k] = -1
+        chainage, arc, offset = unrolled[k, 0], unrolled[k, 1], unrolled[k, 2]
+        if not (-recess <= offset <= tolerance):
+            continue
+        c = np.floor((chainage - west) * per_metre)
+        r = rows - 1 - (np.floor(arc * per_metre) - bottom)
+        if c < first or c >= stop or r < 0 or r >= rows:
+            continue
+        raw, corrected, weight = 0.0, 0.0, 1
+        if wanted:
+            x, y, z = xyz[k, 0], xyz[k, 1], xyz[k, 2]
+            if mobile:
+                t = time[k]
+                if t < trajectory[0] - TIME_TOLERANCE or t > trajectory[-1] + TIME_TOLERANCE:
+                    lost += 1
                     continue
-                if faces.any:
-                    along, across = face_at(faces.start, faces.first, faces.sharp, chainage, arc)
-                    if along >= 0:
-                        nx, ny, nz = face_normal(faces.feet, faces.normals, along, across, x, y, z)
-                cosine = min(1.0, (dx * nx + dy * ny + dz * nz) / max(distance, 1e-9))
-                raw = level_of(intensity[k], optics.linear)
-                if not cosine >= optics.cosine or not np.isfinite(raw):
+                moment = interval(trajectory, t, moment)
+                dx, dy, dz = position_at(trajectory, track, t, moment)
+            else:
+                if station < 0 or scan_id[k] != scan:
+                    scan = scan_id[k]
+                    station, stop_at = 0, known_scans.shape[0]
+                    while station < stop_at:
+                        middle = (station + stop_at) >> 1
+                        if known_scans[middle] < scan:
+                            station = middle + 1
+                        else:
+                            stop_at = middle
+                    if station == known_scans.shape[0] or known_scans[station] != scan:
+                        station = -1
+                if station < 0:
+                    lost += 1
                     continue
-                corrected = raw - _loss_at(optics.loss, cosine)
-                weight = weight_of(cosine, distance, optics.cosine, optics.far)
-                if curve:
-                    level, knot = reference_at(optics.knots, optics.values, distance, knot)
-                    corrected -= level
-                    metre = int(np.rint(chainage - target.floor))
-                    metre = min(max(metre, 0), target.left.shape[0] - 1)
-                    if target.left[metre] < arc < target.right[metre]:
-                        lining += 1
-                        nearest = min(nearest, distance)
-                        farthest = max(farthest, distance)
-                        if distance < optics.low or distance > optics.high:
-                            outside += 1
-            row[k] = int(r)
-            column[k] = int(c)
-            weights[k] = weight
-            offsets[k] = offset
-            raws[k] = raw
-            correcteds[k] = corrected
-            used += target.start <= c < target.end
-        counts[part, 0], counts[part, 1], counts[part, 2], counts[part, 3] = used, lost, lining, outside
-        ranges[part, 0], ranges[part, 1] = nearest, farthest
-    return counts, ranges
+                dx, dy, dz = stations[station, 0], stations[station, 1], stations[station, 2]
+            dx, dy, dz = dx - x, dy - y, dz - z
+            distance = np.sqrt(dx * dx + dy * dy + dz * dz)
+            if distance > far:
+                continue
+            nx, ny, nz = normals[k, 0], normals[k, 1], normals[k, 2]
+            if bends:
+                along, across = face_at(edges_start, edges_first, sharp, chainage, arc)
+                if along >= 0:
+                    nx, ny, nz = face_normal(feet, face_normals, along, across, x, y, z)
+            cosine = (dx * nx + dy * ny + dz * nz) / (distance if distance > 1e-9 else 1e-9)
+            if cosine > 1.0:
+                cosine = 1.0
+            raw = float(intensity[k])
+            if linear:
+                raw = 10.0 * np.log10(intensity[k]) if raw > 0.0 else np.nan
+            if not cosine >= least_cosine or not np.isfinite(raw):
+                continue
+            place = cosine * COSINES
+            step = int(place)
+            if step > COSINES - 1:
+                step = COSINES - 1
+            corrected = raw - (loss[step] + (place - step) * (loss[step + 1] - loss[step]))
+            weight = pixel_weight(cosine, distance, least_cosine, far)
+            if curve:
+                level, knot = reference_at(knots, values, distance, knot)
+                corrected -= level
+                metre = int(np.rint(chainage - floor_start))
+                metre = 0 if metre < 0 else (metre if metre < left.shape[0] else left.shape[0] - 1)
+                if left[metre] < arc < right[metre]:
+                    lining += 1
+                    if distance < nearest:
+                        nearest = distance
+                    if distance > farthest:
+                        farthest = distance
+                    if distance < low or distance > high:
+                        outside += 1
+        row[k] = int(r)
+        column[k] = int(c)
+        weights[k] = weight
+        offsets[k] = offset
+        raws[k] = raw
+        correcteds[k] = corrected
+        if start <= c < end:
+            used += 1
+    return used, lost, lining, outside, nearest, farthest

@@ -16,7 +16,7 @@ from shapely.geometry import Polygon
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.pipeline.order import STAGES
+from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.store.survey import Survey
 
 Row = dict[str, Any]
@@ -219,7 +219,7 @@ def read_runs(conn: psycopg.Connection[Any], survey: Survey, low: float, high: f
          GROUP BY d.stage, d.parameters, d.versions
          ORDER BY array_position(%s, d.stage), min(d.km)
         """,
-        [survey.id, *_kilometres(low, high), list(STAGES), list(STAGES)],
+        [survey.id, *_kilometres(low, high), list(STAGE_NAMES), list(STAGE_NAMES)],
     )
 
 

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Tables of the database to arrays and back; nothing is computed here."""

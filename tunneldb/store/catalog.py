@@ -24,7 +24,7 @@ from tunneldb.database.copy import PointZ, copy_binary, pack
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.pointcloud.stations import read_stations
-from tunneldb.store.design import save_design
+from tunneldb.store.alignment import save_design
 
 FARTHEST_SCANNER = 50.0  # m from the axis; a scanner that was never nearer stood in another tunnel
 

@@ -1,4 +1,4 @@
-"""Images, radiometry and coverage of a kilometre, to and from the database."""
+"""Images, radiometry, range curve and coverage of a kilometre, to and from the database."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from tunneldb.anomalies.coverage import Coverage
 from tunneldb.anomalies.detect import Detection
 from tunneldb.arrays import Bool, Single, UInt8
 from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.radiometry.range_curve import RangeCurve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.radiometry.robust_statistics import DryLevel
 from tunneldb.radiometry.roughness import Roughness
@@ -70,12 +71,13 @@ class ImageStore:
         self.conn, self.survey, self.grid, self.kinds = conn, survey, grid, kinds
         self.pixels = 0
         self._blocks: list[int] = []
-        conn.execute("DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s", (survey.id, grid.km))
 
     def save(self, window: Window) -> None:
         """Save a whole block as points fell into it."""
         grid, columns = self.grid, window.columns
         block = grid.first_block + columns.start // grid.block_columns
+        if not self._blocks:  # only now: what makes the images takes long, and others look at those that are there
+            self.conn.execute("DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s", (self.survey.id, grid.km))
         self.pixels += int(np.count_nonzero(window.weight))
         self._blocks.append(block)
         for kind in self.kinds:
@@ -165,3 +167,17 @@ def drop_radiometry(conn: psycopg.Connection[Any], survey: Survey, km: int) -> N
 
 def _null(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
+
+
+def save_range_curve(conn: psycopg.Connection[Any], survey: Survey, km: int, found: RangeCurve | None) -> None:
+    """Replace the range curve that was found on the lining of a kilometre; None takes it away.
+
+    Its deviation is NULL beyond the ranges present, where it goes on by its slope.
+    """
+    conn.execute("DELETE FROM tunnel.range_curve WHERE survey_id = %s AND km = %s", (survey.id, km))
+    if found is not None:
+        sigma = [s if there else None for s, there in zip(found.sigma_db.tolist(), found.present.tolist(), strict=True)]
+        conn.execute(
+            "INSERT INTO tunnel.range_curve (survey_id, km, range_m, intensity_db, sigma_db) VALUES (%s, %s, %s, %s, %s)",
+            (survey.id, km, found.curve.range_m.tolist(), found.curve.intensity_db.tolist(), sigma),
+        )

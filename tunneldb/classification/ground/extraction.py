@@ -10,11 +10,17 @@ import numpy as np
 from scipy import ndimage
 
 from tunneldb.arrays import Float, Int64
-from tunneldb.classification.ground.height_field import below, blended, carried_on, filled, refined
-from tunneldb.classification.ground.level_profile import is_round, level_ground, profiles
+from tunneldb.classification.ground.height_field import (
+    blend_segments,
+    extrapolate_edges,
+    fill_gaps,
+    in_lower_part,
+    refine_heights,
+)
+from tunneldb.classification.ground.level_profile import is_round, level_ground, level_profiles
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.ground.ransac import ransac_planes
-from tunneldb.classification.ground.wall_foot import steady, walls
+from tunneldb.classification.ground.wall_foot import fit_walls, replace_outliers
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.pointcloud.voxels import Voxels
 
@@ -102,29 +108,28 @@ def find_ground(
     Ground or None
         None where there is no ground: too few points, or a tunnel without a floor.
     """
-    held = _lower(points, line, settings, spread)
-    if held is None:
+    lower = _lower_part(points, line, settings, spread)
+    if lower is None:
         return None
-    centres, coefficients = _segments(held, settings, seed)
-    level = _levels(held, centres, coefficients, settings)
-    rows = held.start + np.arange(held.rows + 1, dtype=np.float64)
-    columns = (held.first + np.arange(held.columns, dtype=np.float64)) * COLUMN
-    height = filled(blended(rows, columns, centres, coefficients, level, _STEP))
+    centres, coefficients = _segment_planes(lower, settings, seed)
+    level = _segment_levels(lower, centres, coefficients, settings)
+    rows = lower.start + np.arange(lower.rows + 1, dtype=np.float64)
+    columns = (lower.first + np.arange(lower.columns, dtype=np.float64)) * COLUMN
+    height = fill_gaps(blend_segments(rows, columns, centres, coefficients, level, _STEP))
     if not np.isfinite(height).any():
         return None
-    height, gamma = _refine(held, height, settings)
-    foot, lean = walls(
-        held.along, held.across, held.z, held.cells, held.start, held.first, height, np.maximum(gamma, settings.distance), seed
-    )
-    foot, lean = steady(foot, lean)
-    height = _to_walls(height, columns, foot, gamma)
-    return Ground(held.start, held.first, height, gamma, foot, lean)
+    height, gamma = _refine(lower, height, settings)
+    low = np.maximum(gamma, settings.distance)
+    foot, lean = fit_walls(lower.along, lower.across, lower.z, lower.cells, lower.start, height, low, seed)
+    foot, lean = replace_outliers(foot, lean)
+    height = _extended_to_walls(height, columns, foot, gamma)
+    return Ground(lower.start, lower.first, height, gamma, foot, lean)
 
 
-def _lower(points: Float, line: PlanLine, settings: GroundSettings, spread: Float | None) -> _Points | None:
+def _lower_part(points: Float, line: PlanLine, settings: GroundSettings, spread: Float | None) -> _Points | None:
     """Keep the lower part of each segment's points, thin them, place them and sort them."""
     points = np.asarray(points, dtype=np.float64)
-    kept = below(*line.place(points), points[:, 2], float(_STEP))
+    kept = in_lower_part(*line.place(points), points[:, 2], float(_STEP))
     points = points[kept]
     voxels = Voxels(settings.voxel)
     voxels.add(points)
@@ -149,27 +154,27 @@ def _lower(points: Float, line: PlanLine, settings: GroundSettings, spread: Floa
     )  # fmt: skip
 
 
-def _segments(held: _Points, settings: GroundSettings, seed: int) -> tuple[Float, Float]:
+def _segment_planes(lower: _Points, settings: GroundSettings, seed: int) -> tuple[Float, Float]:
     """Middle of each segment, at multiples of 4 m, and its plane."""
-    number = np.arange(held.start // _STEP, (held.start + held.rows - 1) // _STEP + 1)
-    metre = np.clip(np.stack([number * _STEP, (number + 1) * _STEP], axis=1) - held.start, 0, held.rows)
-    bounds = held.cells[metre * held.columns]
+    number = np.arange(lower.start // _STEP, (lower.start + lower.rows - 1) // _STEP + 1)
+    metre = np.clip(np.stack([number * _STEP, (number + 1) * _STEP], axis=1) - lower.start, 0, lower.rows)
+    bounds = lower.cells[metre * lower.columns]
     centres = (number + 0.5) * _STEP
     middle = np.repeat(centres, np.diff(bounds, axis=1)[:, 0])
-    local = np.column_stack([held.along - middle, held.across, held.z])
+    local = np.column_stack([lower.along - middle, lower.across, lower.z])
     starts = (np.int64(seed) << 32) + number.astype(np.int64) + 1_000_000
     found = ransac_planes(local, bounds, settings.distance, settings.angle, settings.radius, starts)
     return np.asarray(centres, dtype=np.float64), found.coefficients
 
 
-def _levels(held: _Points, centres: Float, coefficients: Float, settings: GroundSettings) -> Float:
+def _segment_levels(lower: _Points, centres: Float, coefficients: Float, settings: GroundSettings) -> Float:
     """Levels of the ground about each segment's plane, column by column."""
-    found = profiles(
-        held.along, held.across, held.z, held.cells, held.start, held.first, held.columns,
+    found = level_profiles(
+        lower.along, lower.across, lower.z, lower.cells, lower.start, lower.columns,
         centres, coefficients, float(_STEP), settings.distance,
     )  # fmt: skip
     slope = math.tan(math.radians(settings.angle))
-    columns = (held.first + np.arange(held.columns)) * COLUMN
+    columns = (lower.first + np.arange(lower.columns)) * COLUMN
     # A floor that ends for a few metres only is not a tunnel without floor: two of three segments say it.
     bare = np.array([is_round(plane[2] * columns + level, slope) for plane, level in zip(coefficients, found, strict=True)])
     bare = ndimage.median_filter(bare.astype(np.uint8), 3, mode="nearest") > 0
@@ -178,21 +183,21 @@ def _levels(held: _Points, centres: Float, coefficients: Float, settings: Ground
     return found
 
 
-def _refine(held: _Points, height: Float, settings: GroundSettings) -> tuple[Float, Float]:
+def _refine(lower: _Points, height: Float, settings: GroundSettings) -> tuple[Float, Float]:
     """Heights that follow the points, and γ."""
     gamma = np.full(len(height), min(settings.gamma, settings.distance))
     for _ in range(_PASSES):
         # What stands on the ground spoils both less and less.
-        height, number, square = refined(
-            held.along, held.across, held.z, held.spread, held.cells, held.start, held.first, height, gamma
+        height, number, square = refine_heights(
+            lower.along, lower.across, lower.z, lower.spread, lower.cells, lower.start, lower.first, height, gamma
         )
-        height = carried_on(height, _TOUCHED)
+        height = extrapolate_edges(height, _TOUCHED)
         spread = np.sqrt(square / np.maximum(number, 1.0))
         gamma = np.where(number > 0, np.clip(_SPREADS * spread, _LEAST_GAMMA, settings.gamma), settings.gamma)
     return height, gamma
 
 
-def _to_walls(height: Float, columns: Float, foot: Float, gamma: Float) -> Float:
+def _extended_to_walls(height: Float, columns: Float, foot: Float, gamma: Float) -> Float:
     """Carry the heights on to the walls, or end them there."""
     out = height.copy()
     for i, row in enumerate(out):

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 
 import numpy as np
-from numba import njit, prange
 
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.ground.model import COLUMN
@@ -14,16 +12,18 @@ from tunneldb.classification.ground.model import COLUMN
 _LOWER = 0.4  # share of the height in which the ground lies
 _LEAST_LOWER = 1.0  # m
 _OUTERMOST = 0.005  # share of points below and above all others that are no measure of the height
-_SLICE = 0.05  # of the heights, m
+_BIN = 0.05  # of the heights, m
+_MOST_BINS = 100_000
 _WIDEST = 30.0  # m
 _ALONG = 1.0  # half of the window of a row's points, m
 _PRIOR = 4.0  # points that the segments' level counts for
 _STEP = 0.02  # between columns, m, that is no slope
+_SLOPE = 4  # columns that tell the slope at the edge
 _GAP = 20  # columns across which a hidden floor is filled in
 
 
-def below(along: Float, across: Float, z: Float, step: float) -> Bool:
-    """Tell which points lie in the lower 40 % of the heights of their segment (eq. 1), or its lowest metre.
+def in_lower_part(along: Float, across: Float, z: Float, step: float) -> Bool:
+    """Tell which points lie in the lower 40 % of the heights of their segment (Li et al. 2023, eq. 1), or its lowest metre.
 
     Parameters
     ----------
@@ -36,55 +36,35 @@ def below(along: Float, across: Float, z: Float, step: float) -> Bool:
     kept &= np.isfinite(along) & np.isfinite(z)
     if not kept.any():
         return kept
-    segment = np.where(kept, np.floor(along / step), 0.0).astype(np.int64)
-    segment -= segment[kept].min()
-    _below(segment, z, int(segment[kept].max()) + 1, kept)
+    segment = np.floor(along[kept] / step).astype(np.int64)
+    segment -= segment.min()
+    z = z[kept]
+    kept[kept] = z <= _tops_of_lower_parts(segment, z)[segment]
     return kept
 
 
-@njit(cache=True, nogil=True)
-def _below(segment: Int64, z: Float, segments: int, kept: Bool) -> None:  # pragma: no cover - compiled
-    """Keep of the points those that lie low, by histograms of heights; the outermost 0.5 % of points don't count."""
-    low, high = np.full(segments, np.inf), np.full(segments, -np.inf)
-    number = np.zeros(segments, np.int64)
-    for n in range(z.shape[0]):
-        if kept[n]:
-            k = segment[n]
-            low[k], high[k] = min(low[k], z[n]), max(high[k], z[n])
-            number[k] += 1
-    first = np.zeros(segments + 1, np.int64)
-    for k in range(segments):
-        bins = 0
-        if number[k] > 0:
-            # On whole multiples of a bin, so that what lies farther off does not move them.
-            low[k] = math.floor(low[k] / _SLICE) * _SLICE
-            bins = int(min((high[k] - low[k]) / _SLICE, 1e5)) + 1
-        first[k + 1] = first[k] + bins
-    count = np.zeros(first[segments], np.int64)
-    for n in range(z.shape[0]):
-        if kept[n]:
-            k = segment[n]
-            count[min(first[k] + int((z[n] - low[k]) / _SLICE), first[k + 1] - 1)] += 1
-    limit = np.empty(segments)
-    for k in range(segments):
-        few = _OUTERMOST * number[k]
-        i, j = first[k], first[k + 1] - 1
-        total = 0
-        while i < j and total + count[i] <= few:
-            total += count[i]
-            i += 1
-        total = 0
-        while j > i and total + count[j] <= few:
-            total += count[j]
-            j -= 1
-        bottom = low[k] + (i - first[k]) * _SLICE
-        limit[k] = bottom + max(_LOWER * (j + 1 - i) * _SLICE, _LEAST_LOWER)
-    for n in range(z.shape[0]):
-        if kept[n] and z[n] > limit[segment[n]]:
-            kept[n] = False
+def _tops_of_lower_parts(segment: Int64, z: Float) -> Float:
+    """Height of each segment up to which a point lies low, m, by histograms; the outermost 0.5 % of points don't count."""
+    number = np.bincount(segment)
+    low, high = np.full(len(number), np.inf), np.full(len(number), -np.inf)
+    np.minimum.at(low, segment, z)
+    np.maximum.at(high, segment, z)
+    held = number > 0
+    # On whole multiples of a bin, so that what lies farther off does not move them.
+    low = np.floor(np.where(held, low, 0.0) / _BIN) * _BIN
+    bins = np.where(held, np.minimum((np.where(held, high, 0.0) - low) / _BIN, _MOST_BINS).astype(np.int64) + 1, 0)
+    first = np.concatenate([[0], np.cumsum(bins)])
+    level = np.minimum((z - low[segment]) / _BIN, bins[segment] - 1).astype(np.int64)
+    below = np.concatenate([[0], np.cumsum(np.bincount(first[segment] + level, minlength=first[-1]))])
+    few = (_OUTERMOST * number).astype(np.int64)
+    begin, end = first[:-1], first[1:]
+    lowest = np.searchsorted(below[1:], below[begin] + few, side="right")
+    highest = np.maximum(np.searchsorted(below, below[end] - few, side="left") - 1, lowest)
+    bottom = low + (lowest - begin) * _BIN
+    return np.asarray(bottom + np.maximum(_LOWER * (highest + 1 - lowest) * _BIN, _LEAST_LOWER))
 
 
-def blended(rows: Float, columns: Float, centres: Float, planes: Float, level: Float, step: float) -> Float:
+def blend_segments(rows: Float, columns: Float, centres: Float, planes: Float, level: Float, step: float) -> Float:
     """Heights (rows, columns) of the segments' levels, passing evenly from each segment's middle to the next.
 
     Parameters
@@ -111,7 +91,7 @@ def blended(rows: Float, columns: Float, centres: Float, planes: Float, level: F
         return np.asarray(total / np.where(weight > 0, weight, np.nan))
 
 
-def filled(height: Float) -> Float:
+def fill_gaps(height: Float) -> Float:
     """Fill columns hidden between others of their row, up to 2 m wide."""
     out = height.copy()
     for row in out:
@@ -122,8 +102,7 @@ def filled(height: Float) -> Float:
     return out
 
 
-@njit(cache=True, nogil=True)
-def carried_on(height: Float, count: int) -> Float:  # pragma: no cover - compiled
+def extrapolate_edges(height: Float, count: int) -> Float:
     """Replace the outermost columns of each row, which the wall may touch, by those inside them, carried straight on.
 
     They keep the slope of the four columns inside, unless there is a step.
@@ -136,91 +115,93 @@ def carried_on(height: Float, count: int) -> Float:  # pragma: no cover - compil
         Columns at each end.
     """
     out = height.copy()
-    columns = height.shape[1]
-    for i in range(height.shape[0]):
-        for way in (1, -1):
-            edge = 0 if way == 1 else columns - 1
-            while 0 <= edge < columns and np.isnan(height[i, edge]):
-                edge += way
-            inner = edge + way * count
-            if 0 <= inner < columns and height[i, inner - way] - height[i, inner] > 2.0 * _STEP:
-                inner -= way  # a kerb at the wall
-            beyond = inner + way * 4
-            if beyond < 0 or beyond >= columns or np.isnan(height[i, inner]):
-                continue
-            slope = (height[i, inner] - height[i, beyond]) / 4.0
-            for k in range(4):
-                rise = height[i, inner + way * k] - height[i, inner + way * (k + 1)]
-                if not abs(rise) < _STEP:
-                    slope = 0.0
-            for k in range(1, abs(inner - edge) + 1):
-                out[i, inner - way * k] = height[i, inner] + slope * k
+    for way in (1, -1):
+        _extrapolate_left(height[:, ::way], out[:, ::way], count)
     return out
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def refined(
+def _extrapolate_left(height: Float, out: Float, count: int) -> None:
+    """Carry the heights of each row on to its first ``count`` known columns."""
+    columns = height.shape[1]
+    known = np.isfinite(height)
+    edge = known.argmax(axis=1)
+    rows = np.flatnonzero(known.any(axis=1) & (edge + count < columns))
+    edge = edge[rows]
+    inner = edge + count
+    kerb = height[rows, inner - 1] - height[rows, inner] > 2.0 * _STEP  # at the wall
+    inner = inner - kerb
+    fits = inner + _SLOPE < columns
+    rows, edge, inner = rows[fits], edge[fits], inner[fits]
+    fits = known[rows, inner]
+    rows, edge, inner = rows[fits], edge[fits], inner[fits]
+    level = height[rows[:, None], inner[:, None] + np.arange(_SLOPE + 1)]
+    even = (np.abs(level[:, :-1] - level[:, 1:]) < _STEP).all(axis=1)
+    slope = np.where(even, (level[:, 0] - level[:, -1]) / _SLOPE, 0.0)
+    for k in range(1, count + 1):
+        outer = k <= inner - edge
+        out[rows[outer], inner[outer] - k] = level[outer, 0] + slope[outer] * k
+
+
+def refine_heights(
     along: Float, across: Float, z: Float, spread: Float, cells: Int64, start: int, first: int, height: Float, gate: Float
-) -> tuple[Float, Float, Float]:  # pragma: no cover - compiled
+) -> tuple[Float, Float, Float]:
     """Heights moved to the mean of the points about them; of each row the number and sum of squares of what is left.
 
     Parameters
     ----------
     along, across, z, spread : (n,) float arrays
         Points in rows and columns, and the standard deviation of the heights that each stands for.
-    cells : (rows * columns + 1,) int array
+    cells : (metres * columns + 1,) int array
         First point of each cell.
-    height : (rows + 1, columns) float array
+    height : (metres + 1, columns) float array
         m; row i stands at ``start + i``, where the cells of row i begin.
-    gate : (rows,) float array
+    gate : (metres + 1,) float array
         Points farther off than this don't count, m.
     """
-    columns = height.shape[1]
-    metres = (cells.shape[0] - 1) // columns
-    out = height.copy()
-    number = np.zeros(height.shape[0])
-    square = np.zeros(height.shape[0])
-    for i in prange(height.shape[0]):
-        for c in range(columns):
-            if np.isnan(height[i, c]):
-                continue
-            total, weight = 0.0, _PRIOR
-            for k in range(max(c - 1, 0), min(c + 2, columns)):
-                # Columns beside it count half, but not beyond a step.
-                if not abs(height[i, k] - height[i, c]) <= _STEP:
-                    continue
-                near = 1.0 if k == c else 0.5
-                for row in range(max(i - 1, 0), min(i + 1, metres)):
-                    for n in range(cells[row * columns + k], cells[row * columns + k + 1]):
-                        e = z[n] - _at(height, along[n] - start, across[n] / COLUMN - first)
-                        if abs(e) < gate[i]:
-                            w = near * (1.0 - (abs(along[n] - start - i) / _ALONG) ** 2)
-                            total += w * e
-                            weight += w
-            out[i, c] += total / weight
-    for i in prange(height.shape[0]):
-        for row in range(max(i - 2, 0), min(i + 2, metres)):
-            for c in range(1, columns - 1):
-                if abs(out[i, c + 1] - out[i, c - 1]) > 2.0 * _STEP:
-                    continue
-                for n in range(cells[row * columns + c], cells[row * columns + c + 1]):
-                    e = z[n] - _at(out, along[n] - start, across[n] / COLUMN - first)
-                    if abs(e) < gate[i]:
-                        number[i] += 1.0
-                        square[i] += e * e + spread[n] ** 2
-    return out, number, square
+    rows, columns = height.shape
+    cell = np.repeat(np.arange(len(cells) - 1), np.diff(cells))
+    metre, column = np.divmod(cell, columns)
+    row, place = along - start, across / COLUMN - first
+    rise = z - _between(height, row, place)
+    moment, weight = np.zeros(height.shape), np.zeros(height.shape)
+    off = np.abs(rise)
+    for before in (1, 0):  # the metre before a row, and the one after it
+        near = np.flatnonzero(off < gate[metre + before])
+        i = metre[near] + before
+        share = 1.0 - (np.abs(row[near] - i) / _ALONG) ** 2
+        at = i * columns + column[near]
+        moment += np.bincount(at, share * rise[near], height.size).reshape(height.shape)
+        weight += np.bincount(at, share, height.size).reshape(height.shape)
+    total, prior = moment.copy(), _PRIOR + weight
+    # Columns beside it count half, but not beyond a step.
+    even = np.abs(np.diff(height, axis=1)) <= _STEP
+    for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[:, :-1], np.s_[:, 1:])):
+        total[one] += np.where(even, 0.5 * moment[other], 0.0)
+        prior[one] += np.where(even, 0.5 * weight[other], 0.0)
+    out = height + total / prior
+    rise = z - _between(out, row, place)
+    near = np.flatnonzero(np.abs(rise) < gate.max())
+    metre, column, rise = metre[near], column[near], rise[near]
+    off, left = np.abs(rise), rise * rise + spread[near] ** 2
+    # What a point must be nearer than, by rows and columns; 0 beside a step, before the first row and beyond the last.
+    even = np.zeros((rows + 2, columns), np.bool_)
+    even[1:-1, 1:-1] = ~(np.abs(out[:, 2:] - out[:, :-2]) > 2.0 * _STEP)
+    limit = even * np.pad(gate, 1)[:, None]
+    number, square = np.zeros(rows + 2), np.zeros(rows + 2)
+    for before in (2, 1, 0, -1):  # rows up to 2 m ahead of a metre, and up to 1 m behind it
+        i = metre + before + 1
+        held = off < limit[i, column]
+        number += np.bincount(i[held], minlength=rows + 2)
+        square += np.bincount(i[held], left[held], rows + 2)
+    return out, number[1:-1], square[1:-1]
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _at(height: Float, row: float, column: float) -> float:
-    """Height between rows and columns; NaN beside a missing one."""
-    i = min(max(int(row), 0), height.shape[0] - 2)
-    j = min(max(math.floor(column), 0), height.shape[1] - 2)
+def _between(height: Float, row: Float, column: Float) -> Float:
+    """Height at places (n,) between rows and columns, m; beside a missing one that of the other column."""
+    i = np.clip(row.astype(np.int64), 0, height.shape[0] - 2)
+    j = np.clip(np.floor(column).astype(np.int64), 0, height.shape[1] - 2)
     g, f = row - i, column - j
     one = (1.0 - g) * height[i, j] + g * height[i + 1, j]
     two = (1.0 - g) * height[i, j + 1] + g * height[i + 1, j + 1]
-    if np.isnan(one) or f > 1.0:
-        return two
-    if np.isnan(two):
-        return one
-    return (1.0 - f) * one + f * two
+    mixed = np.where(np.isnan(two), one, (1.0 - f) * one + f * two)
+    return np.where(np.isnan(one) | (f > 1.0), two, mixed)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 
-from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.arrays import Float, Int64, UInt16
 from tunneldb.classification.ground.model import COLUMN
 
 LOW, HIGH = -0.8, 1.2
@@ -13,17 +12,18 @@ LOW, HIGH = -0.8, 1.2
 
 _BIN = 0.01  # of heights, m
 _PIECE = 0.5  # along, m; longer where points are few
+_FEWEST_PIECES, _MOST_PIECES = 4, 16  # of a segment
 _SEEN = 0.5  # share of the pieces along the segment in which a level must be seen
+_LEAST = 3  # pieces, and points, that a level needs
 _RAISED = 0.04  # m; a stretch that stands higher over those on both sides of it is no ground
 _NARROW = 0.35  # m; if it is no wider: a rail, a cable
 _GRADUAL = 0.15  # of the width of the widest stretch, over which the surface grows steeper in a round tunnel
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def profiles(
-    along: Float, across: Float, z: Float, cells: Int64, start: int, first: int, columns: int,
+def level_profiles(
+    along: Float, across: Float, z: Float, cells: Int64, start: int, columns: int,
     centres: Float, planes: Float, half: float, distance: float,
-) -> Float:  # pragma: no cover - compiled  # fmt: skip
+) -> Float:  # fmt: skip
     """Level of the ground about each segment's plane in each column, (g, columns), m; NaN where there is none.
 
     A column's level is the lowest height about which, within τ, points lie in most of the pieces of the segment
@@ -32,7 +32,7 @@ def profiles(
     Parameters
     ----------
     along, across, z : (n,) float arrays
-        Points, by rows of 1 m from ``start`` and in them by columns of 0.1 m from ``first``.
+        Points, by rows of 1 m from ``start`` and in them by columns of 0.1 m.
     cells : (rows * columns + 1,) int array
         First point of each of them.
     centres, planes : (g,), (g, 3) float arrays
@@ -42,109 +42,109 @@ def profiles(
     distance : float
         τ, m.
     """
-    out = np.full((centres.shape[0], columns), np.nan)
-    bins = round((HIGH - LOW) / _BIN)
-    reach = round(distance / _BIN)
-    most = round(2 * half / _PIECE)
-    rows = (cells.shape[0] - 1) // columns
+    rows = (len(cells) - 1) // columns
+    bins, reach = round((HIGH - LOW) / _BIN), round(distance / _BIN)
+    low = np.clip(np.floor(centres - half).astype(np.int64) - start, 0, rows)
+    high = np.clip(np.ceil(centres + half).astype(np.int64) - start, low, rows)
+    windows = list(zip(low.tolist(), high.tolist(), strict=True))
+    pieces = [_pieces(cells[a * columns : b * columns + 1], columns, 2 * half) for a, b in windows]
+    shown = [
+        _pieces_with_points(along[cells[a * columns] : cells[b * columns]] - (centre - half), 2 * half, count)
+        for (a, b), centre, count in zip(windows, centres, pieces, strict=True)
+    ]
     # A piece at the tunnel's end, or beside a gap, is too short to tell ground from what stands on it.
-    window = np.empty((centres.shape[0], 4), np.int64)
-    shown_length = np.zeros(centres.shape[0])
-    for g in prange(centres.shape[0]):
-        low = max(int(np.floor(centres[g] - half)) - start, 0)
-        high = min(int(np.ceil(centres[g] + half)) - start, rows)
-        pieces = _cut(cells, columns, low, high, most)
-        length = _pieces(along, cells, columns, low, high, centres[g] - half, pieces, 2 * half / pieces)
-        window[g, 0], window[g, 1], window[g, 2], window[g, 3] = low, high, pieces, length
-        shown_length[g] = length * 2 * half / pieces
-    enough = min(half, shown_length.max())
-    for g in prange(centres.shape[0]):
-        if np.isnan(planes[g, 0]) or shown_length[g] < enough:
-            continue
-        low, high, pieces, length = window[g, 0], window[g, 1], window[g, 2], window[g, 3]
-        piece_length = 2 * half / pieces
-        count = np.empty(bins + 1, np.int64)
-        seen = np.empty((bins, pieces), np.bool_)
-        here = np.empty(pieces, np.bool_)
-        for c in range(columns):
-            count[:] = 0
-            seen[:] = False
-            here[:] = False
-            for row in range(low, high):
-                for n in range(cells[row * columns + c], cells[row * columns + c + 1]):
-                    from_middle = along[n] - centres[g]
-                    piece = int(np.floor((from_middle + half) / piece_length))
-                    if piece < 0 or piece >= pieces:
-                        continue
-                    e = z[n] - planes[g, 0] - planes[g, 1] * from_middle - planes[g, 2] * across[n]
-                    b = int(np.floor((e - LOW) / _BIN))
-                    if b >= 0 and b < bins:
-                        count[b + 1] += 1
-                        seen[b, piece] = True
-                        here[piece] = True
-            shown = here.sum()
-            if shown < max(3.0, _SEEN * length):
-                continue
-            for b in range(bins):
-                count[b + 1] += count[b]
-            out[g, c] = _lowest(count, seen, shown, reach, bins)
+    length = np.array([number * 2 * half / count for number, count in zip(shown, pieces, strict=True)])
+    out = np.full((len(centres), columns), np.nan)
+    for g in np.flatnonzero(~np.isnan(planes[:, 0]) & (length >= min(half, length.max()))).tolist():
+        a, b = windows[g]
+        inside = slice(cells[a * columns], cells[b * columns])
+        column = np.repeat(np.arange((b - a) * columns) % columns, np.diff(cells[a * columns : b * columns + 1]))
+        from_middle = along[inside] - centres[g]
+        up = z[inside] - planes[g, 0] - planes[g, 1] * from_middle - planes[g, 2] * across[inside]
+        piece = np.floor((from_middle + half) / (2 * half / pieces[g])).astype(np.int64)
+        level = np.floor((up - LOW) / _BIN)
+        kept = (piece >= 0) & (piece < pieces[g]) & (level >= 0) & (level < bins)
+        bin_ = column[kept] * bins + level[kept].astype(np.int64)
+        number = np.bincount(bin_, minlength=columns * bins).reshape(columns, bins)
+        # One bit a piece.
+        seen = np.zeros((columns, bins), np.uint16)
+        np.bitwise_or.at(seen.reshape(-1), bin_, np.left_shift(1, piece[kept]).astype(np.uint16))
+        there = _bits(np.bitwise_or.reduce(seen, axis=1))
+        full = np.flatnonzero(there >= max(float(_LEAST), _SEEN * shown[g]))
+        out[g, full] = _lowest_levels(number[full], seen[full], there[full], reach)
     return out
 
 
-@njit(cache=True, nogil=True)
-def _cut(cells: Int64, columns: int, low: int, high: int, most: int) -> int:
+def _pieces(cells: Int64, columns: int, window: float) -> int:
     """How many pieces a segment is cut into: as many as hold two points of a usual column, but four at least."""
-    number = np.zeros(columns)
-    for c in range(columns):
-        for row in range(low, high):
-            number[c] += cells[row * columns + c + 1] - cells[row * columns + c]
-    known = number[number > 0]
-    pieces = most
-    while pieces > 4 and known.size and np.median(known) < 2.0 * pieces:
+    pieces = min(round(window / _PIECE), _MOST_PIECES)
+    number = np.diff(cells).reshape(-1, columns).sum(axis=0)
+    number = number[number > 0]
+    usual = float(np.median(number)) if len(number) else np.inf
+    while pieces > _FEWEST_PIECES and usual < 2.0 * pieces:
         pieces //= 2
     return pieces
 
 
-@njit(cache=True, nogil=True)
-def _pieces(
-    along: Float, cells: Int64, columns: int, low: int, high: int, begin: float, pieces: int, piece_length: float
-) -> int:
-    """How many pieces of a segment hold points at all."""
-    seen = np.zeros(pieces, np.bool_)
-    for n in range(cells[low * columns], cells[max(high, low) * columns]):
-        piece = int(np.floor((along[n] - begin) / piece_length))
-        if 0 <= piece < pieces:
-            seen[piece] = True
-    return seen.sum()
+def _pieces_with_points(from_begin: Float, window: float, pieces: int) -> int:
+    """How many pieces of a segment hold points at all, of their distances from its beginning."""
+    piece = np.floor(from_begin / (window / pieces))
+    return len(np.unique(piece[(piece >= 0) & (piece < pieces)]))
 
 
-@njit(cache=True, nogil=True)
-def _lowest(count: Int64, seen: Bool, shown: int, reach: int, bins: int) -> float:
-    """The lowest level: where most points lie within τ, of those places where enough pieces show something."""
-    best, most = -1, 0
-    for b in range(reach, bins - reach):
-        n = count[b + reach + 1] - count[b - reach]
-        if best >= 0 and (b > best + reach):
+def _lowest_levels(number: Int64, seen: UInt16, there: UInt16, reach: int) -> Float:
+    """The lowest level of each column: where most points lie within τ, of those places where enough pieces show something.
+
+    Parameters
+    ----------
+    number : (c, bins) int array
+        Points of each bin of heights.
+    seen : (c, bins) uint16 array
+        Pieces in which it has any: a bit each.
+    there : (c,) uint16 array
+        How many pieces show anything in the column.
+    reach : int
+        τ in bins.
+    """
+    count, bins = number.shape
+    below = np.zeros((count, bins + 1), np.int64)
+    np.cumsum(number, axis=1, out=below[:, 1:])
+    middles = np.arange(reach, bins - reach)
+    points = below[:, middles + reach + 1] - below[:, middles - reach]
+    within = np.zeros((count, len(middles)), np.uint16)
+    for shift in range(2 * reach + 1):
+        within |= seen[:, shift : shift + len(middles)]
+    pieces = _bits(within)
+    points[(points < _LEAST) | (pieces < _LEAST) | (pieces < _SEEN * there[:, None])] = 0
+    out = np.full(count, np.nan)
+    found = np.flatnonzero(points.any(axis=1))
+    if not len(found):
+        return out
+    # From the lowest place on to one with more points, as long as the next lies within τ.
+    points, below = np.pad(points[found], ((0, 0), (0, reach))), below[found]
+    each = np.arange(len(found))
+    best = (points > 0).argmax(axis=1)
+    while True:
+        more = points[each[:, None], best[:, None] + np.arange(1, reach + 1)] > points[each, best][:, None]
+        climbing = more.any(axis=1)
+        if not climbing.any():
             break
-        if n > most and n >= 3:
-            pieces = 0
-            for p in range(seen.shape[1]):
-                for k in range(b - reach, b + reach + 1):
-                    if seen[k, p]:
-                        pieces += 1
-                        break
-            if pieces >= _SEEN * shown and pieces >= 3:
-                most, best = n, b
-    if best < 0:
-        return np.nan
-    # Median of what lies within τ.
-    below = count[best - reach]
-    middle = below + 0.5 * (count[best + reach + 1] - below)
-    k = best - reach
-    while count[k + 1] < middle:
-        k += 1
-    inside = count[k + 1] - count[k]
-    return LOW + _BIN * (k + (middle - count[k]) / inside)
+        best[climbing] += 1 + more[climbing].argmax(axis=1)
+    # Median of what lies within τ: `best` counts from the first place, so it is the window's first bin.
+    around = below[each[:, None], best[:, None] + np.arange(2 * reach + 2)]
+    middle = around[:, 0] + 0.5 * (around[:, -1] - around[:, 0])
+    k = (around[:, 1:] >= middle[:, None]).argmax(axis=1)
+    inside = around[each, k + 1] - around[each, k]
+    out[found] = LOW + _BIN * (best + k + (middle - around[each, k]) / inside)
+    return out
+
+
+def _bits(words: UInt16) -> UInt16:
+    """How many bits are set in each word."""
+    out = words - ((words >> 1) & 0x5555)
+    out = (out & 0x3333) + ((out >> 2) & 0x3333)
+    out = (out + (out >> 4)) & 0x0F0F
+    return (out + (out >> 8)) & 0x1F
 
 
 def level_ground(level: Float, slope: float) -> Float:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 
 from tunneldb.arrays import Bool, Float
+from tunneldb.compiled import inner, kernel
+from tunneldb.threads import in_blocks
 
 COLUMN = 0.1
 """Distance of the columns, m; rows stand 1 m apart."""
+
+_BLOCK = 1 << 16  # points
 
 
 @dataclass(frozen=True)
@@ -42,10 +46,7 @@ class Ground:
 
     def height_at(self, along: Float, across: Float) -> Float:
         """Height of the ground at places (n,), m; NaN where there is none."""
-        a, x = (np.ascontiguousarray(v, dtype=np.float64) for v in (along, across))
-        out = np.empty(len(a))
-        _heights(self.start, self.first, self.height, a, x, out)
-        return out
+        return self._at(along, across, np.full(len(along), np.nan))[0]
 
     def is_ground(self, along: Float, across: Float, z: Float) -> Bool:
         """Tell which points (n,) are ground (Li et al. 2023, section 2.1, step 4).
@@ -59,10 +60,19 @@ class Ground:
         along, across, z : (n,) float arrays
             Distance along the line and to its right, and height, m.
         """
+        return self._at(along, across, z)[1]
+
+    def _at(self, along: Float, across: Float, z: Float) -> tuple[Float, Bool]:
+        """Height of the ground at points (n,), and which of them are ground."""
         a, x, h = (np.ascontiguousarray(v, dtype=np.float64) for v in (along, across, z))
-        out = np.empty(len(a), np.bool_)
-        _grounds(self.start, self.first, self.height, self.gamma, self.foot, self.lean, a, x, h, out)
-        return out
+        grids = [np.ascontiguousarray(v) for v in (self.height, self.gamma, self.foot, self.lean)]
+        height, ground = np.empty(len(a)), np.empty(len(a), np.bool_)
+
+        def work(begin: int, end: int) -> None:
+            _compare(self.start, self.first, *grids, a, x, h, begin, end, height, ground)
+
+        in_blocks(work, len(a), _BLOCK)
+        return height, ground
 
     def rows(self, first: int, stop: int) -> Ground:
         """The rows at ``first`` m and beyond, before ``stop`` m."""
@@ -73,8 +83,8 @@ class Ground:
         )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _mix(one: float, two: float, share: float) -> float:
+@inner
+def _mix(one: float, two: float, share: float) -> float:  # pragma: no cover - compiled
     """Between two numbers; one of them where the other is missing, unless it alone counts."""
     if np.isnan(one):
         return two if share > 0.0 else np.nan
@@ -83,78 +93,48 @@ def _mix(one: float, two: float, share: float) -> float:
     return (1.0 - share) * one + share * two
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _place(start: int, first: int, height: Float, along: float, across: float) -> tuple[int, int, float, float]:
-    """Row and column before a place (-1: outside) and the shares of the way to the next ones."""
-    rows, columns = height.shape
-    row, column = along - start, across / COLUMN - first
-    if not (row >= 0.0 and row <= rows - 1 and column >= 0.0 and column <= columns - 1):
-        return -1, -1, 0.0, 0.0
-    i, j = min(int(row), max(rows - 2, 0)), min(int(column), max(columns - 2, 0))
-    return i, j, row - i, column - j
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _column(height: Float, i: int, j: int, g: float) -> float:
-    """Height in a column between two rows."""
-    return _mix(height[i, j], height[min(i + 1, height.shape[0] - 1), j], g)
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _height(height: Float, i: int, j: int, g: float, f: float) -> float:
-    return _mix(_column(height, i, j, g), _column(height, i, min(j + 1, height.shape[1] - 1), g), f)
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _reach(height: Float, i: int, j: int, g: float, mean: float, gamma: float) -> tuple[float, float]:
-    """Lowest and highest ground at a place: its own height, or from foot to top of a step beside it.
-
-    The face of a kerb stands somewhere in the column that holds it, and so up to a column beyond the place's own.
-    """
-    low, high = mean, mean
-    for k in range(max(j - 1, 0), min(j + 3, height.shape[1])):
-        h = _column(height, i, k, g)
-        if h < low - gamma:
-            low = h
-        if h > high + gamma:
-            high = h
-    return low, high
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _heights(start: int, first: int, height: Float, along: Float, across: Float, out: Float) -> None:  # pragma: no cover
-    for n in prange(along.shape[0]):
-        i, j, g, f = _place(start, first, height, along[n], across[n])
-        out[n] = _height(height, i, j, g, f) if i >= 0 else np.nan
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _grounds(
+@kernel
+def _compare(
     start: int, first: int, height: Float, gamma: Float, foot: Float, lean: Float,
-    along: Float, across: Float, z: Float, out: Bool,
+    along: Float, across: Float, z: Float, begin: int, end: int, out: Float, ground: Bool,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    for n in prange(along.shape[0]):
-        out[n] = False
-        i, j, g, f = _place(start, first, height, along[n], across[n])
-        if i < 0:
+    """Height of the ground at points from ``begin`` to ``end``, NaN where there is none, and whether they are ground."""
+    rows, columns = height.shape
+    for n in range(begin, end):
+        out[n] = np.nan
+        ground[n] = False
+        row, column = along[n] - start, across[n] / COLUMN - first
+        if not (row >= 0.0 and row <= rows - 1 and column >= 0.0 and column <= columns - 1):
             continue
-        mean = _height(height, i, j, g, f)
-        if np.isnan(mean):
+        i, j = min(int(row), max(rows - 2, 0)), min(int(column), max(columns - 2, 0))
+        after, right = min(i + 1, rows - 1), min(j + 1, columns - 1)
+        g = row - i
+        mean = _mix(_mix(height[i, j], height[after, j], g), _mix(height[i, right], height[after, right], g), column - j)
+        out[n] = mean
+        if np.isnan(mean) or np.isnan(z[n]):
             continue
-        after = min(i + 1, height.shape[0] - 1)
-        most = _mix(gamma[i], gamma[after], g)
-        low, high = _reach(height, i, j, g, mean, most)
-        if not (z[n] <= high + most and z[n] >= low - most):
+        gate = _mix(gamma[i], gamma[after], g)
+        # Its own height, or from foot to top of a step beside it: the face of a kerb stands somewhere in the column that
+        # holds it, and so up to a column beyond the place's own.
+        low, high = mean, mean
+        for k in range(max(j - 1, 0), min(j + 3, columns)):
+            level = _mix(height[i, k], height[after, k], g)
+            if level < low - gate:
+                low = level
+            if level > high + gate:
+                high = level
+        if not (z[n] <= high + gate and z[n] >= low - gate):
             continue
         up = z[n] - mean
-        out[n] = True
+        held = True
         for side in range(2):
             at = _mix(foot[i, side], foot[after, side], g)
             if np.isnan(at):
                 continue
             slant = _mix(lean[i, side], lean[after, side], g)
-            inside = (across[n] - at - slant * up) / np.sqrt(1.0 + slant * slant)
+            inside = (across[n] - at - slant * up) / math.sqrt(1.0 + slant * slant)
             if side == 1:
                 inside = -inside
-            if inside < -most or abs(inside) < abs(up):
-                out[n] = False
+            if inside < -gate or abs(inside) < abs(up):
+                held = False
+        ground[n] = held

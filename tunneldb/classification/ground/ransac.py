@@ -1,20 +1,26 @@
-"""Planes of the ground by RANSAC, whose inliers' normals must be near the vertical (Li et al. 2023, section 2.1)."""
+"""Planes by RANSAC (Fischler and Bolles, 1981), and those of the ground, whose inliers' normals must be near the vertical."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from scipy.spatial import cKDTree
 
-from tunneldb.arrays import Float, Int64, UInt64
+from tunneldb.arrays import Float, Int64
 
-_TRIALS = 1000  # at the most
+_TRIALS, _FEWEST_TRIALS = 1000, 30
 _MISS = 1e-3  # accepted chance that no sample lies on the plane alone
+_BATCH = 60  # trials that are measured together
 _SCORED = 2000  # points that a plane is measured with
-_CHECKED = 60  # inliers whose normals are estimated
+_CHECKED = 60  # points whose normals are estimated, at least
 _LEAST = 12  # inliers
+_LEAST_NEAR = 5  # points that make a normal
+_PROFILE = 0.1  # points whose second principal variance is below this share of the first lie on a line
+_LEAST_AREA = 1e-4  # of the parallelogram of three points in plan, m²
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 
 class Planes(NamedTuple):
@@ -35,7 +41,7 @@ class Planes(NamedTuple):
 def ransac_planes(
     points: Float, bounds: Int64, distance: float, angle: float, radius: float, seed: Int64, check: bool = True
 ) -> Planes:
-    """Best plane of each group of points.
+    """Best plane of each group of points (Li et al. 2023, section 2.1).
 
     A plane through three points drawn at random is better the more points lie within τ of it (step 2). A better
     one is kept only if the normals of its inliers, by principal components of the points within R, depart from the
@@ -57,157 +63,164 @@ def ransac_planes(
     out = np.full((len(bounds), 3), np.nan)
     inliers = np.zeros(len(bounds), np.int64)
     slope = math.tan(math.radians(angle))
-    _planes(
-        np.ascontiguousarray(points),
-        bounds.astype(np.int64),
-        distance,
-        slope,
-        radius,
-        seed.astype(np.uint64),
-        check,
-        out,
-        inliers,
-    )
+
+    def reach(planes: Float) -> Float:
+        steep = np.sqrt(planes[:, 1] ** 2 + planes[:, 2] ** 2)
+        return np.where(check & (steep > slope), 0.0, distance * np.sqrt(1.0 + steep * steep))
+
+    for g, (begin, end) in enumerate(bounds.tolist()):
+        group = points[begin:end]
+        if len(group) < _LEAST:
+            continue
+        normals = _Normals(group, radius)
+        accept = (lambda plane, near=normals: near.are_upright(plane, distance, slope)) if check else None
+        step = max(1, len(group) // _SCORED)
+        plane, most = best_plane(group, int(seed[g]), reach, _TRIALS, least=_LEAST, step=step, miss=_MISS, accept=accept)
+        if most:
+            for _ in range(2):
+                plane, inliers[g] = _fitted(group, plane, distance)
+            out[g] = plane
     return Planes(out, inliers)
 
 
-@njit(cache=True, nogil=True, inline="always")
-def draw(state: Int64) -> float:
-    """Next random number, from 0 to 1, of a state that is stepped (splitmix64; Steele et al., 2014)."""
-    state[0] += np.uint64(0x9E3779B97F4A7C15)
-    z = state[0]
+def best_plane(
+    points: Float, seed: int, reach: Callable[[Float], Float], trials: int, *,
+    least: int, step: int = 1, miss: float = 0.0, accept: Callable[[Float], bool] | None = None,
+) -> tuple[Float, int]:  # fmt: skip
+    """Plane w = c0 + c1 u + c2 v, of those through three points drawn at random, that has the most inliers.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        u, v, w.
+    seed : int
+        Start of the random numbers.
+    reach : callable
+        How far in w an inlier may lie from each of some planes (t, 3); 0 or NaN for one that is out of the question.
+    trials : int
+        How many planes are tried at the most.
+    least : int
+        Inliers that a plane needs.
+    step : int
+        Inliers are looked for among each ``step``-th point.
+    miss : float
+        Chance that no sample is of inliers alone with which the search may end before all trials; 0 to do them all.
+    accept : callable, optional
+        Tells whether a plane (3,) that has more inliers than any before is to be kept.
+
+    Returns
+    -------
+    plane : (3,) float array
+        Coefficients.
+    inliers : int
+        How many it has; 0 if there is no plane.
+    """
+    u, v, w = np.ascontiguousarray(points[::step].T)
+    best, most, done = np.full(3, np.nan), least - 1, 0
+    while done < trials:
+        planes = _sampled(points, seed, done, min(_BATCH, trials - done))
+        counts = np.zeros(len(planes), np.int64)
+        limit = reach(planes)
+        possible = np.flatnonzero(limit > 0.0)
+        c0, c1, c2 = planes[possible].T[:, :, None]
+        away = w - c0
+        away -= c1 * u
+        away -= c2 * v
+        counts[possible] = np.count_nonzero(np.abs(away, out=away) < limit[possible, None], axis=1)
+        for trial in np.flatnonzero(counts > most).tolist():
+            if done + trial >= trials:
+                break
+            number = int(counts[trial])
+            if number <= most or (accept is not None and not accept(planes[trial])):
+                continue
+            best, most = planes[trial], number
+            if miss > 0.0:
+                share = min(number * step / len(points), 0.999)
+                needed = int(math.log(miss) / math.log(1.0 - share**3 + 1e-12)) + 1
+                trials = min(trials, max(_FEWEST_TRIALS, needed))
+        done += len(planes)
+    return best, most if most >= least else 0
+
+
+def _sampled(points: Float, seed: int, first: int, count: int) -> Float:
+    """Planes (count, 3) through three random points each; NaN where they don't span one."""
+    index = (_uniform(seed, 3 * first, 3 * count) * len(points)).astype(np.int64).reshape(count, 3)
+    p, q, r = points[index[:, 0]], points[index[:, 1]], points[index[:, 2]]
+    (u1, v1, w1), (u2, v2, w2) = (q - p).T, (r - p).T
+    area = u1 * v2 - u2 * v1
+    area[np.abs(area) < _LEAST_AREA] = np.nan
+    c1 = (w1 * v2 - w2 * v1) / area
+    c2 = (u1 * w2 - u2 * w1) / area
+    return np.column_stack([p[:, 2] - c1 * p[:, 0] - c2 * p[:, 1], c1, c2])
+
+
+def _uniform(seed: int, first: int, count: int) -> Float:
+    """Random numbers from 0 to 1, from the ``first`` on, of a seed (splitmix64; Steele et al., 2014)."""
+    z = np.arange(first + 1, first + count + 1, dtype=np.uint64) * _GOLDEN + np.uint64(seed % (1 << 64))
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    z = z ^ (z >> np.uint64(31))
-    return float(z >> np.uint64(11)) / 9007199254740992.0
+    z ^= z >> np.uint64(31)
+    return (z >> np.uint64(11)) / 9007199254740992.0
 
 
-@njit(cache=True, nogil=True)
-def through(p: Float, q: Float, r: Float, out: Float) -> bool:
-    """Put the plane w = c0 + c1 u + c2 v through three points (u, v, w); False where they don't span it."""
-    u1, v1, w1 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    u2, v2, w2 = r[0] - p[0], r[1] - p[1], r[2] - p[2]
-    area = u1 * v2 - u2 * v1
-    if abs(area) < 1e-4:
+class _Normals:
+    """How far the normals of a group's points depart from the vertical, at evenly chosen points of it."""
+
+    def __init__(self, points: Float, radius: float) -> None:
+        self._points, self._radius = points, radius
+        self._chosen = points[:: max(1, len(points) // _CHECKED)]
+        self._tree: cKDTree | None = None
+        self._tilts: list[Float] = []
+
+    def are_upright(self, plane: Float, distance: float, slope: float) -> bool:
+        """Tell whether the normals of a plane's inliers are near the vertical, in the median of those that have one."""
+        inlier = _off(self._chosen, plane) < distance
+        for wider in range(3):
+            if wider == len(self._tilts):
+                self._tilts.append(self._tilt(self._radius * (1 << wider)))
+            tilt = self._tilts[wider][inlier]
+            known = tilt[np.isfinite(tilt)]
+            # Profiles may lie farther apart than R: look farther.
+            if 2 * len(known) > len(tilt):
+                return bool(np.median(known) < slope)
         return False
-    out[1] = (w1 * v2 - w2 * v1) / area
-    out[2] = (u1 * w2 - u2 * w1) / area
-    out[0] = p[2] - out[1] * p[0] - out[2] * p[1]
-    return True
 
+    def _tilt(self, radius: float) -> Float:
+        """Tangent of the angle between the normals and the vertical; infinite where too few points are near.
 
-@njit(cache=True, nogil=True)
-def _tilt(points: Float, at: int, radius: float) -> float:
-    """Tangent of the angle between the normal at a point and the vertical; infinite where too few points are near.
-
-    Of a surface that is not steep the principal plane is that of least squares in height.
-    """
-    square = radius * radius
-    n, su, sv, sz, suu, suv, svv, suz, svz = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    szz = 0.0
-    for k in range(points.shape[0]):
-        u, v = points[k, 0] - points[at, 0], points[k, 1] - points[at, 1]
-        if u * u + v * v > square:
-            continue
-        z = points[k, 2] - points[at, 2]
-        if u * u + v * v + z * z > square:
-            continue
-        n += 1
-        su, sv, sz = su + u, sv + v, sz + z
-        suu, suv, svv = suu + u * u, suv + u * v, svv + v * v
-        suz, svz, szz = suz + u * z, svz + v * z, szz + z * z
-    if n < 5:
-        return np.inf
-    m = np.empty((3, 3))
-    m[0, 0], m[1, 1], m[2, 2] = suu - su * su / n, svv - sv * sv / n, szz - sz * sz / n
-    m[0, 1], m[0, 2], m[1, 2] = suv - su * sv / n, suz - su * sz / n, svz - sv * sz / n
-    m[1, 0], m[2, 0], m[2, 1] = m[0, 1], m[0, 2], m[1, 2]
-    values, vectors = np.linalg.eigh(m)
-    if values[1] < 0.1 * values[2]:
-        return np.inf  # points on a line, if a rough one: one profile
-    up = abs(vectors[2, 0])
-    return math.sqrt(max(1.0 - up * up, 0.0)) / up if up > 1e-9 else np.inf
-
-
-@njit(cache=True, nogil=True)
-def _level(points: Float, plane: Float, distance: float, slope: float, radius: float) -> bool:
-    """Tell whether the normals of a plane's inliers are near the vertical, in the median of those that have one."""
-    count = points.shape[0]
-    step = max(1, count // _CHECKED)
-    tilts = np.empty(count // step + 1)
-    for wider in range(3):
-        n, alone = 0, 0
-        for k in range(0, count, step):
-            if abs(points[k, 2] - plane[0] - plane[1] * points[k, 0] - plane[2] * points[k, 1]) < distance:
-                tilt = _tilt(points, k, radius * (1 << wider))
-                if np.isinf(tilt):
-                    alone += 1
-                else:
-                    tilts[n] = tilt
-                    n += 1
-        # Profiles may lie farther apart than R: look farther.
-        if n > alone:
-            return np.median(tilts[:n]) < slope
-    return False
-
-
-@njit(cache=True, nogil=True)
-def _fitted(points: Float, plane: Float, distance: float) -> int:
-    """Fit a plane to its inliers by least squares, in place, and count them."""
-    a = np.zeros((3, 3))
-    b = np.zeros(3)
-    row = np.empty(3)
-    n = 0
-    for k in range(points.shape[0]):
-        row[0], row[1], row[2] = 1.0, points[k, 0], points[k, 1]
-        if abs(points[k, 2] - plane[0] * row[0] - plane[1] * row[1] - plane[2] * row[2]) < distance:
-            n += 1
-            for i in range(3):
-                b[i] += row[i] * points[k, 2]
-                for j in range(3):
-                    a[i, j] += row[i] * row[j]
-    if n >= _LEAST:
+        Of a surface that is not steep the principal plane is that of least squares in height.
+        """
+        if self._tree is None:
+            self._tree = cKDTree(self._points)
+        pairs = cKDTree(self._chosen).sparse_distance_matrix(self._tree, radius, output_type="ndarray")
+        at, count = pairs["i"], len(self._chosen)
+        apart = (self._points[pairs["j"]] - self._chosen[at]).T
+        number = np.bincount(at, minlength=count)
+        sums = [np.bincount(at, axis, count) for axis in apart]
+        scatter = np.empty((count, 3, 3))
         for i in range(3):
-            a[i, i] += 1e-9
-        plane[:] = np.linalg.solve(a, b)
-    return n
+            for j in range(i + 1):
+                scatter[:, i, j] = scatter[:, j, i] = np.bincount(at, apart[i] * apart[j], count) - sums[i] * sums[j] / number
+        values, vectors = np.linalg.eigh(scatter)
+        up = np.abs(vectors[:, 2, 0])
+        with np.errstate(divide="ignore"):
+            tilt = np.sqrt(np.maximum(1.0 - up * up, 0.0)) / up
+        # Points on a line, if a rough one, are one profile.
+        vague = (number < _LEAST_NEAR) | (values[:, 1] < _PROFILE * values[:, 2]) | (up <= 1e-9)
+        return np.where(vague, np.inf, tilt)
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _planes(
-    points: Float, bounds: Int64, distance: float, slope: float, radius: float, seed: UInt64, check: bool,
-    out: Float, inliers: Int64,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
-    for g in prange(bounds.shape[0]):
-        group = points[bounds[g, 0] : bounds[g, 1]]
-        count = group.shape[0]
-        if count < _LEAST:
-            continue
-        step = max(1, count // _SCORED)
-        state = seed[g : g + 1].copy()
-        plane, best = np.empty(3), np.empty(3)
-        most = _LEAST - 1
-        trials, done = _TRIALS, 0
-        while done < trials:
-            done += 1
-            i, j, k = int(draw(state) * count), int(draw(state) * count), int(draw(state) * count)
-            if not through(group[i], group[j], group[k], plane):
-                continue
-            steep = math.sqrt(plane[1] ** 2 + plane[2] ** 2)
-            if check and steep > slope:
-                continue
-            n = 0
-            reach = distance * math.sqrt(1.0 + steep * steep)
-            for m in range(0, count, step):
-                if abs(group[m, 2] - plane[0] - plane[1] * group[m, 0] - plane[2] * group[m, 1]) < reach:
-                    n += 1
-            if n <= most or (check and not _level(group, plane, distance, slope, radius)):
-                continue
-            most = n
-            best[:] = plane
-            share = min(n * step / count, 0.999)
-            trials = min(_TRIALS, max(30, int(math.log(_MISS) / math.log(1.0 - share**3 + 1e-12)) + 1))
-        if most >= _LEAST:
-            _fitted(group, best, distance)
-            inliers[g] = _fitted(group, best, distance)
-            out[g] = best
+def _off(points: Float, plane: Float) -> Float:
+    """Distance in height of points (n, 3) from a plane, m."""
+    return np.abs(points[:, 2] - plane[0] - plane[1] * points[:, 0] - plane[2] * points[:, 1])
+
+
+def _fitted(points: Float, plane: Float, distance: float) -> tuple[Float, int]:
+    """Plane fitted to the inliers of another by least squares, and how many these are."""
+    inliers = points[_off(points, plane) < distance]
+    if len(inliers) < _LEAST:
+        return plane, len(inliers)
+    design = np.column_stack([np.ones(len(inliers)), inliers[:, :2]])
+    # Not by BLAS, whose sums depend on its threads.
+    normal, right = np.einsum("ki,kj->ij", design, design), np.einsum("ki,k->i", design, inliers[:, 2])
+    return np.asarray(np.linalg.solve(normal + 1e-9 * np.eye(3), right), dtype=np.float64), len(inliers)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-from numba import njit, prange
 from scipy import ndimage
 
 from tunneldb.arrays import Float, Int64
 from tunneldb.classification.ground.model import COLUMN
-from tunneldb.classification.ground.ransac import draw, through
+from tunneldb.classification.ground.ransac import best_plane
 
 _HIGH = 0.6  # points of the wall are looked for up to this height, m
 _INWARD, _OUTWARD = 0.35, 0.9  # and so far from where the ground ends, m
@@ -18,14 +15,15 @@ _ALONG = 2  # and so many metres before and after a row
 _WITHIN = 0.02  # of the wall's plane, m
 _TRIALS = 60
 _LEAST = 15
+_SLANT_ALONG, _SLANT_UP = 0.15, 3.0  # of a wall, to the right for each metre along and up, at the most
+_FITS = 5  # with Tukey's weights
 _NEIGHBOURS = 9  # rows whose median a foot must be near
 _APART = 0.05  # m
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def walls(
-    along: Float, across: Float, z: Float, cells: Int64, start: int, first: int, height: Float, low: Float, seed: int
-) -> tuple[Float, Float]:  # pragma: no cover - compiled
+def fit_walls(
+    along: Float, across: Float, z: Float, cells: Int64, start: int, height: Float, low: Float, seed: int
+) -> tuple[Float, Float]:
     """Foot and lean of the left and the right wall at each row, (rows, 2) each; NaN where no wall is seen.
 
     The wall is the plane in which, by RANSAC, most of the points lie that stand just above the outermost ground;
@@ -45,100 +43,94 @@ def walls(
         Start of the random numbers.
     """
     rows, columns = height.shape
-    metres = (cells.shape[0] - 1) // columns
-    foot = np.full((rows, 2), np.nan)
-    lean = np.full((rows, 2), np.nan)
+    metres = (len(cells) - 1) // columns
+    walls, planes, points = [], [], []
     inward, outward = int(_INWARD / COLUMN + 0.5), int(_OUTWARD / COLUMN + 0.5)
-    for i in prange(rows):
+    known = np.isfinite(height)
+    ends = np.column_stack([known.argmax(axis=1), columns - 1 - known[:, ::-1].argmax(axis=1)])
+    for i in np.flatnonzero(known.any(axis=1)).tolist():
+        near = np.arange(max(i - _ALONG, 0), min(i + _ALONG, metres))
         for side in range(2):
-            edge = -1
-            for k in range(columns):
-                c = k if side == 0 else columns - 1 - k
-                if not np.isnan(height[i, c]):
-                    edge = c
-                    break
-            if edge < 0:
+            edge = int(ends[i, side])
+            left, right = (edge - outward, edge + inward) if side == 0 else (edge - inward, edge + outward)
+            begin, end = cells[near * columns + max(left, 0)], cells[near * columns + min(right + 1, columns)]
+            count = end - begin
+            if count.sum() < _LEAST:
                 continue
-            way = -1 if side == 0 else 1
-            one, two = edge - way * inward, edge + way * outward
-            left, right = max(min(one, two), 0), min(max(one, two) + 1, columns)
-            count = 0
-            for row in range(max(i - _ALONG, 0), min(i + _ALONG, metres)):
-                count += cells[row * columns + right] - cells[row * columns + left]
-            found = np.empty((count, 3))
-            n = 0
-            for row in range(max(i - _ALONG, 0), min(i + _ALONG, metres)):
-                for p in range(cells[row * columns + left], cells[row * columns + right]):
-                    share = along[p] - start - row
-                    base = height[row, edge] * (1.0 - share) + height[row + 1, edge] * share
-                    up = z[p] - base
-                    if up > low[i] and up < _HIGH:
-                        found[n, 0], found[n, 1], found[n, 2] = along[p] - start - i, up, across[p]
-                        n += 1
-            if n >= _LEAST:
-                state = np.empty(1, np.uint64)
-                state[0] = np.uint64(seed) + np.uint64(2 * (i + start + 1_000_000) + side)
-                foot[i, side], lean[i, side] = _wall(found[:n], state)
-    return foot, lean
-
-
-@njit(cache=True, nogil=True)
-def _wall(points: Float, state: Int64) -> tuple[float, float]:
-    """Foot and lean of the wall among points (along, up, across)."""
-    count = points.shape[0]
-    plane, best = np.empty(3), np.empty(3)
-    most = 0
-    for _ in range(_TRIALS):
-        i, j, k = int(draw(state) * count), int(draw(state) * count), int(draw(state) * count)
-        if not through(points[i], points[j], points[k], plane) or abs(plane[1]) > 0.15 or abs(plane[2]) > 3.0:
-            continue
-        reach = _WITHIN * math.sqrt(1.0 + plane[2] ** 2)
-        n = 0
-        for m in range(count):
-            if abs(points[m, 2] - plane[0] - plane[1] * points[m, 0] - plane[2] * points[m, 1]) < reach:
-                n += 1
-        if n > most:
-            most = n
-            best[:] = plane
-    if most < _LEAST:
-        return np.nan, np.nan
-    c = np.array([best[0], best[1], best[2], 0.0])
-    row = np.empty(4)
-    reach = 1.5 * _WITHIN * math.sqrt(1.0 + best[2] ** 2)
-    for _ in range(5):
-        a = np.zeros((4, 4))
-        b = np.zeros(4)
-        for m in range(count):
-            row[0], row[1], row[2], row[3] = 1.0, points[m, 0], points[m, 1], points[m, 1] ** 2
-            e = points[m, 2] - c[0] - c[1] * row[1] - c[2] * row[2] - c[3] * row[3]
-            if abs(e) >= reach:
+            at = np.repeat(begin - (np.cumsum(count) - count), count) + np.arange(count.sum())
+            metre = np.repeat(near, count)
+            share = along[at] - start - metre
+            up = z[at] - (height[metre, edge] * (1.0 - share) + height[metre + 1, edge] * share)
+            kept = (up > low[i]) & (up < _HIGH)
+            if np.count_nonzero(kept) < _LEAST:
                 continue
-            w = (1.0 - (e / reach) ** 2) ** 2
-            for p in range(4):
-                b[p] += w * row[p] * points[m, 2]
-                for q in range(4):
-                    a[p, q] += w * row[p] * row[q]
-        a[3, 3] += 0.01  # no curvature where the points don't show any
-        for p in range(4):
-            a[p, p] += 1e-9
-        c[:] = np.linalg.solve(a, b)
-    return c[0], c[2]
+            near_wall = np.column_stack([along[at] - start - i, up, across[at]])[kept]
+            draw = seed + 2 * (i + start + 1_000_000) + side
+            plane, number = best_plane(near_wall, draw, _reach, _TRIALS, least=_LEAST)
+            if number:
+                walls.append(2 * i + side)
+                planes.append(plane)
+                points.append(near_wall)
+    foot, lean = np.full(2 * rows, np.nan), np.full(2 * rows, np.nan)
+    if walls:
+        surface = _fitted(points, np.array(planes))
+        foot[walls], lean[walls] = surface[:, 0], surface[:, 2]
+    return foot.reshape(rows, 2), lean.reshape(rows, 2)
 
 
-def steady(foot: Float, lean: Float) -> tuple[Float, Float]:
-    """Feet and leans again, those of niches, doors and things by the wall after the rows beside them."""
+def _fitted(points: list[Float], planes: Float) -> Float:
+    """Surfaces across = c0 + c1 along + c2 up + c3 up², (w, 4), fitted to the points of some walls with Tukey's weights.
+
+    Parameters
+    ----------
+    points : list of (n, 3) float arrays
+        Of each wall: along, up, across.
+    planes : (w, 3) float array
+        Where to begin.
+    """
+    count = len(points)
+    wall = np.repeat(np.arange(count), [len(p) for p in points])
+    along, up, across = np.concatenate(points).T
+    terms = [np.ones(len(up)), along, up, up**2, across]
+    surface = np.column_stack([planes, np.zeros(count)])
+    reach = (1.5 * _WITHIN * np.sqrt(1.0 + planes[:, 2] ** 2))[wall]
+    held = np.diag([1e-9, 1e-9, 1e-9, 0.01 + 1e-9])  # no curvature where the points don't show any
+    for _ in range(_FITS):
+        e = across - sum(c[wall] * term for c, term in zip(surface.T, terms[:4], strict=True))
+        weight = np.maximum(1.0 - (e / reach) ** 2, 0.0) ** 2
+        normal = np.empty((count, 4, 5))
+        for i in range(4):
+            for j in range(i, 5):
+                normal[:, i, j] = np.bincount(wall, weight * terms[i] * terms[j], count)
+                if j < 4:
+                    normal[:, j, i] = normal[:, i, j]
+        surface = np.linalg.solve(normal[:, :, :4] + held, normal[:, :, 4:])[:, :, 0]
+    return np.asarray(surface, dtype=np.float64)
+
+
+def _reach(planes: Float) -> Float:
+    """How far across an inlier may lie from each wall (t, 3), m; 0 for one that runs or leans too much askew."""
+    possible = (np.abs(planes[:, 1]) <= _SLANT_ALONG) & (np.abs(planes[:, 2]) <= _SLANT_UP)
+    return np.where(possible, _WITHIN * np.sqrt(1.0 + planes[:, 2] ** 2), 0.0)
+
+
+def replace_outliers(foot: Float, lean: Float) -> tuple[Float, Float]:
+    """Feet and leans of the walls, (rows, 2) each, without those of niches, doors and objects by the wall.
+
+    A foot that lies off the running median of the rows is replaced by it; leans are the running median of the others'.
+    """
     foot, lean = foot.copy(), lean.copy()
     for side in range(2):
-        usual = _median(foot[:, side])
+        median = _running_median(foot[:, side])
         with np.errstate(invalid="ignore"):
-            astray = ~(np.abs(foot[:, side] - usual) < _APART)
-        slant = _median(np.where(astray, np.nan, lean[:, side]))
-        foot[astray, side] = usual[astray]
-        lean[:, side] = slant
+            outlier = ~(np.abs(foot[:, side] - median) < _APART)
+        leaning = _running_median(np.where(outlier, np.nan, lean[:, side]))
+        foot[outlier, side] = median[outlier]
+        lean[:, side] = leaning
     return foot, lean
 
 
-def _median(values: Float) -> Float:
+def _running_median(values: Float) -> Float:
     """Median of each value and those beside it that are known; NaN where fewer than three are."""
 
     def middle(window: Float) -> float:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
-from numba import njit
 
 from tunneldb.arrays import Float, Int32, Int64, UInt8
+from tunneldb.compiled import inner
+from tunneldb.pointcloud.voxels import key_slot, value_table
 
 CELL = 0.1
 """Edge of a cell, m."""
@@ -105,9 +107,9 @@ class Lookup:
     first, last : (3,) int arrays
         The box that holds all cells.
     keys : (slots,) int array
-        Number of the cell in the box, -1 for an empty slot; slots are a power of two.
+        Numbers of the cells in the box, where `tunneldb.pointcloud.voxels.key_slot` finds them; -1 for an empty slot.
     klass : (slots,) uint8 array
-        Its class.
+        Their classes.
     """
 
     first: Int64
@@ -127,68 +129,37 @@ class Lookup:
             np.array([cluster.klass for cluster in ordered], np.uint8), [len(cluster.cells) for cluster in ordered]
         )
         if len(cells) == 0:
-            return cls(np.zeros(3, np.int64), np.full(3, -1, np.int64), np.full(1, -1, np.int64), np.zeros(1, np.uint8))
+            return cls(np.zeros(3, np.int64), np.full(3, -1, np.int64), *value_table(np.empty(0, np.int64), klass))
         first, last = cells.min(axis=0) - NEAR, cells.max(axis=0) + NEAR
-        keys, found = _filled(cells, klass, _steps(), first, last - first + 1)
-        return cls(first, last, keys, found)
+        _, wide, tall = last - first + 1
+        place = cells - first
+        keys, lowest = np.unique((place[:, 0] * wide + place[:, 1]) * tall + place[:, 2], return_index=True)
+        classes = klass[lowest]
+        centres, own = keys, classes
+        for step in _shells():
+            about = ((step[:, 0] * wide + step[:, 1]) * tall + step[:, 2])[:, None] + centres
+            found, nearest = np.unique(about, return_index=True)
+            free = ~np.isin(found, keys, assume_unique=True)
+            keys, classes = np.append(keys, found[free]), np.append(classes, own[nearest[free] % len(own)])
+        return cls(first, last, *value_table(keys, classes))
 
 
-def _steps() -> Int64:
-    """Steps to the cells within ``NEAR``, the shortest first."""
+def _shells() -> list[Int64]:
+    """Steps (k, 3) to the cells within ``NEAR``, those of one length together, the shortest first."""
     side = np.arange(-NEAR, NEAR + 1)
     steps = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
     length = (steps**2).sum(axis=1)
-    order = np.argsort(length, kind="stable")
-    return np.ascontiguousarray(steps[order][length[order] <= NEAR**2])
+    return [steps[length == square] for square in range(1, NEAR**2 + 1)]
 
 
-@njit(cache=True, nogil=True)
-def _slot(keys: Int64, key: int) -> int:  # pragma: no cover - compiled
-    """Slot that holds a key, or the empty one where it belongs."""
-    mask = keys.shape[0] - 1
-    mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
-    slot = np.int64(mixed >> np.uint64(32)) & mask
-    while keys[slot] >= 0 and keys[slot] != key:
-        slot = (slot + 1) & mask
-    return slot
-
-
-@njit(cache=True, nogil=True)
-def _filled(
-    cells: Int64, klass: UInt8, steps: Int64, first: Int64, shape: Int64
-) -> tuple[Int64, UInt8]:  # pragma: no cover - compiled
-    slots = 1024
-    keys, found, used = np.full(slots, -1, np.int64), np.zeros(slots, np.uint8), 0
-    for s in range(steps.shape[0]):
-        for i in range(cells.shape[0]):
-            x, y, z = cells[i, 0] + steps[s, 0], cells[i, 1] + steps[s, 1], cells[i, 2] + steps[s, 2]
-            key = ((x - first[0]) * shape[1] + y - first[1]) * shape[2] + z - first[2]
-            slot = _slot(keys, key)
-            if keys[slot] >= 0:
-                continue
-            keys[slot], found[slot] = key, klass[i]
-            used += 1
-            if 2 * used > slots:
-                slots *= 2
-                wider, classes = np.full(slots, -1, np.int64), np.zeros(slots, np.uint8)
-                for old in range(keys.shape[0]):
-                    if keys[old] >= 0:
-                        new = _slot(wider, keys[old])
-                        wider[new], classes[new] = keys[old], found[old]
-                keys, found = wider, classes
-    return keys, found
-
-
-@njit(cache=True, nogil=True)
+@inner
 def look_up(
     x: float, y: float, z: float, first: Int64, last: Int64, keys: Int64, klass: UInt8
 ) -> int:  # pragma: no cover - compiled
     """Class of the cluster that a point lies in; 0 for none."""
-    cx, cy, cz = np.floor(x / CELL), np.floor(y / CELL), np.floor(z / CELL)
-    inside = first[0] <= cx <= last[0] and first[1] <= cy <= last[1] and first[2] <= cz <= last[2]
-    if not inside:
+    cx, cy, cz = math.floor(x / CELL), math.floor(y / CELL), math.floor(z / CELL)
+    if not (first[0] <= cx <= last[0] and first[1] <= cy <= last[1] and first[2] <= cz <= last[2]):
         return 0
     wide, tall = last[1] - first[1] + 1, last[2] - first[2] + 1
-    key = ((np.int64(cx) - first[0]) * wide + np.int64(cy) - first[1]) * tall + np.int64(cz) - first[2]
-    slot = _slot(keys, key)
-    return int(klass[slot]) if keys[slot] >= 0 else 0
+    slot = key_slot(((cx - first[0]) * wide + cy - first[1]) * tall + cz - first[2], keys)
+    return np.int64(klass[slot]) if keys[slot] >= 0 else np.int64(0)

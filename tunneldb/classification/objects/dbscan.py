@@ -1,4 +1,4 @@
-"""DBSCAN: clusters of points by their density (Ester et al., 1996; Li et al., 2023, eq. 2–4), compiled.
+"""DBSCAN: clusters of points by their density (Ester et al., 1996; Li et al., 2023, eq. 2–4).
 
 Neighbours are looked up when they are needed and never kept, so memory grows with the number of points alone, whatever
 their density. Points are sorted into cells whose diagonal is the radius: all core points of a cell belong together, so
@@ -8,12 +8,15 @@ clusters are joined cell by cell, and one pair of core points near enough joins 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 
 from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.compiled import inner, kernel, lower_bound
+from tunneldb.threads import in_blocks
 
 _EDGE = 0.577  # of the radius: a little less than 1/√3, the edge of a cube whose diagonal is the radius
 _NEAR = 2  # cells to each side that can hold a neighbour
+_RUNS = (2 * _NEAR + 1) ** 2  # runs of cells about a cell
+_BLOCK = 4096  # cells at a time
 
 
 def dbscan(points: Float, radius: float, min_points: int) -> Int64:
@@ -49,84 +52,102 @@ def dbscan(points: Float, radius: float, min_points: int) -> Int64:
         raise ValueError(f"points must be (n, 3), not {points.shape}")
     if len(points) == 0:
         return np.empty(0, np.int64)
+    limit = float(radius) * float(radius)
     low = points.min(axis=0)
-    edge = radius * _EDGE
-    shape = np.floor((points.max(axis=0) - low) / edge).astype(np.int64) + 1 + 2 * _NEAR
-    keys = _keys(points, low, edge, shape)
+    keys, row, layer = _keys(points, low, radius * _EDGE)
     order = np.argsort(keys, kind="stable")
     placed = points[order] - low
     keys = keys[order]
     starts = np.flatnonzero(np.concatenate([[True], keys[1:] != keys[:-1], [True]]))
     cells = keys[starts[:-1]]
-    core = _cores(placed, starts, cells, shape, radius, min_points)
-    roots = _joined(placed, starts, cells, shape, radius, core)
-    found = _members(placed, order, starts, cells, shape, radius, core, roots)
+    core = np.zeros(len(points), np.bool_)
+    in_blocks(
+        lambda begin, end: _find_core(placed, starts, cells, row, layer, limit, int(min_points), _runs(), core, begin, end),
+        len(cells),
+        _BLOCK,
+    )
+    parent = np.where(np.logical_or.reduceat(core, starts[:-1]), np.arange(len(cells)), -1)
+    _join_cells(placed, starts, cells, row, layer, limit, _runs(), core, parent)
+    found = np.full(len(points), -1, np.int64)
+    in_blocks(
+        lambda begin, end: _label(placed, order, starts, cells, row, layer, limit, _runs(), core, parent, found, begin, end),
+        len(cells),
+        _BLOCK,
+    )
     labels = np.empty(len(points), np.int64)
     labels[order] = found
-    return _numbered(labels, len(cells))
+    return _in_order(labels, len(cells))
 
 
-@njit(cache=True, nogil=True)
-def _keys(points: Float, low: Float, edge: float, shape: Int64) -> Int64:  # pragma: no cover - compiled
-    keys = np.empty(points.shape[0], np.int64)
-    for i in range(points.shape[0]):
-        x = np.int64((points[i, 0] - low[0]) / edge) + _NEAR
-        y = np.int64((points[i, 1] - low[1]) / edge) + _NEAR
-        z = np.int64((points[i, 2] - low[2]) / edge) + _NEAR
-        keys[i] = (z * shape[1] + y) * shape[0] + x
-    return keys
+def _keys(points: Float, low: Float, edge: float) -> tuple[Int64, int, int]:
+    """Number of the cell of each point (n,), and by how much it grows from a row and from a layer of cells to the next."""
+    keys = np.zeros(len(points), np.int64)
+    steps = []
+    for axis in (2, 1, 0):
+        place = ((points[:, axis] - low[axis]) / edge).astype(np.int64) + _NEAR
+        steps.append(int(place.max()) + 1 + _NEAR)
+        keys = keys * steps[-1] + place
+    return keys, steps[2], steps[2] * steps[1]
 
 
-@njit(cache=True, nogil=True)
-def _near(placed: Float, i: int, j: int, limit: float) -> bool:  # pragma: no cover - compiled
-    dx, dy, dz = placed[i, 0] - placed[j, 0], placed[i, 1] - placed[j, 1], placed[i, 2] - placed[j, 2]
-    return bool(dx * dx + dy * dy + dz * dz <= limit)
+def _runs() -> Int64:
+    """Room for the runs of cells about a cell."""
+    return np.empty((_RUNS, 2), np.int64)
 
 
-@njit(cache=True, nogil=True)
-def _runs(cells: Int64, shape: Int64, c: int, out: Int64) -> int:  # pragma: no cover - compiled
-    """First and last + 1 of the runs of filled cells about a cell, itself included; how many runs there are."""
-    count = 0
+def _in_order(labels: Int64, count: int) -> Int64:
+    """Number the clusters (labels below a count, -1 for none) in the order of their first points."""
+    members = np.flatnonzero(labels >= 0)
+    first = np.full(count, len(labels), np.int64)
+    first[labels[members[::-1]]] = members[::-1]  # of several the last one stays: the first point
+    number = np.empty(count, np.int64)
+    number[np.argsort(first, kind="stable")] = np.arange(count)
+    labels[members] = number[labels[members]]
+    return labels
+
+
+@inner
+def _neighbours(cells: Int64, row: int, layer: int, c: int, runs: Int64) -> int:  # pragma: no cover - compiled
+    """Write the first and last + 1 of the runs of filled cells about a cell, itself included; how many runs there are."""
+    count, first = 0, np.int64(0)  # no literal: what is called with one is compiled for it once more
     for dz in range(-_NEAR, _NEAR + 1):
         for dy in range(-_NEAR, _NEAR + 1):
-            key = cells[c] + (dz * shape[1] + dy) * shape[0]
-            first = np.searchsorted(cells, key - _NEAR)
+            key = cells[c] + dz * layer + dy * row
+            first = lower_bound(cells, key - _NEAR, first, cells.shape[0])
             last = first
             while last < cells.shape[0] and cells[last] <= key + _NEAR:
                 last += 1
             if last > first:
-                out[count, 0], out[count, 1] = first, last
+                runs[count, 0], runs[count, 1] = first, last
                 count += 1
     return count
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _cores(
-    placed: Float, starts: Int64, cells: Int64, shape: Int64, radius: float, min_points: int
-) -> Bool:  # pragma: no cover - compiled
-    core = np.zeros(placed.shape[0], np.bool_)
-    limit = radius * radius
-    for c in prange(cells.shape[0]):
-        if starts[c + 1] - starts[c] >= min_points:
-            core[starts[c] : starts[c + 1]] = True
-            continue
-        runs = np.empty(((2 * _NEAR + 1) ** 2, 2), np.int64)
-        count = _runs(cells, shape, c, runs)
+@kernel
+def _find_core(
+    placed: Float, starts: Int64, cells: Int64, row: int, layer: int, limit: float, min_points: int, runs: Int64,
+    core: Bool, begin: int, end: int,
+) -> None:  # fmt: skip  # pragma: no cover - compiled
+    """Mark the core points of the cells from begin to end."""
+    for c in range(begin, end):
+        crowded = starts[c + 1] - starts[c] >= min_points
+        count = 0 if crowded else _neighbours(cells, row, layer, c, runs)
         for i in range(starts[c], starts[c + 1]):
-            found = 0
+            found = min_points if crowded else 0
+            x, y, z = placed[i, 0], placed[i, 1], placed[i, 2]
             for k in range(count):
                 for j in range(starts[runs[k, 0]], starts[runs[k, 1]]):
-                    if _near(placed, i, j, limit):
+                    dx, dy, dz = x - placed[j, 0], y - placed[j, 1], z - placed[j, 2]
+                    if dx * dx + dy * dy + dz * dz <= limit:
                         found += 1
                         if found >= min_points:
                             break
                 if found >= min_points:
-                    core[i] = True
                     break
-    return core
+            core[i] = found >= min_points
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _root(parent: Int64, c: int) -> int:  # pragma: no cover - compiled
     while parent[c] != c:
         parent[c] = parent[parent[c]]
@@ -134,58 +155,53 @@ def _root(parent: Int64, c: int) -> int:  # pragma: no cover - compiled
     return c
 
 
-@njit(cache=True, nogil=True)
-def _touch(placed: Float, starts: Int64, core: Bool, a: int, b: int, limit: float) -> bool:  # pragma: no cover - compiled
-    """Tell whether a core point of one cell lies within the radius of one of another."""
-    for i in range(starts[a], starts[a + 1]):
-        if core[i]:
-            for j in range(starts[b], starts[b + 1]):
-                if core[j] and _near(placed, i, j, limit):
-                    return True
-    return False
-
-
-@njit(cache=True, nogil=True)
-def _joined(placed: Float, starts: Int64, cells: Int64, shape: Int64, radius: float, core: Bool) -> Int64:  # pragma: no cover
-    """First cell of the cluster of each cell's core points; -1 without one."""
-    parent = np.full(cells.shape[0], -1, np.int64)
-    for c in range(cells.shape[0]):
-        if core[starts[c] : starts[c + 1]].any():
-            parent[c] = c
-    runs = np.empty(((2 * _NEAR + 1) ** 2, 2), np.int64)
-    limit = radius * radius
+@kernel
+def _join_cells(
+    placed: Float, starts: Int64, cells: Int64, row: int, layer: int, limit: float, runs: Int64, core: Bool, parent: Int64
+) -> None:  # pragma: no cover - compiled
+    """Make the parent of each cell with core points (else -1) the first cell of its cluster."""
     for c in range(cells.shape[0]):
         if parent[c] < 0:
             continue
-        for k in range(_runs(cells, shape, c, runs)):
+        for k in range(_neighbours(cells, row, layer, c, runs)):
             for other in range(runs[k, 0], min(runs[k, 1], c)):  # the pairs with later cells are theirs
                 if parent[other] < 0:
                     continue
                 a, b = _root(parent, c), _root(parent, other)
-                if a != b and _touch(placed, starts, core, c, other, limit):
-                    parent[max(a, b)] = min(a, b)
+                if a == b:
+                    continue
+                touch = False
+                for i in range(starts[c], starts[c + 1]):
+                    if not core[i]:
+                        continue
+                    for j in range(starts[other], starts[other + 1]):
+                        dx, dy, dz = placed[i, 0] - placed[j, 0], placed[i, 1] - placed[j, 1], placed[i, 2] - placed[j, 2]
+                        if core[j] and dx * dx + dy * dy + dz * dz <= limit:
+                            touch = True
+                            break
+                    if touch:
+                        parent[max(a, b)] = min(a, b)
+                        break
     for c in range(cells.shape[0]):
         if parent[c] >= 0:
             parent[c] = _root(parent, c)
-    return parent
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _members(
-    placed: Float, order: Int64, starts: Int64, cells: Int64, shape: Int64, radius: float, core: Bool, roots: Int64
-) -> Int64:  # pragma: no cover - compiled
-    """Root of each point's cluster, -1 for noise."""
-    found = np.full(placed.shape[0], -1, np.int64)
-    for c in prange(cells.shape[0]):
-        runs = np.empty(((2 * _NEAR + 1) ** 2, 2), np.int64)
+@kernel
+def _label(
+    placed: Float, order: Int64, starts: Int64, cells: Int64, row: int, layer: int, limit: float, runs: Int64,
+    core: Bool, roots: Int64, found: Int64, begin: int, end: int,
+) -> None:  # fmt: skip  # pragma: no cover - compiled
+    """Write the first cell of each point's cluster, for the points of the cells from begin to end; noise is left as it is."""
+    for c in range(begin, end):
         count = -1
         for i in range(starts[c], starts[c + 1]):
             if core[i]:
                 found[i] = roots[c]
                 continue
             if count < 0:
-                count = _runs(cells, shape, c, runs)
-            best, first = radius * radius, np.int64(-1)
+                count = _neighbours(cells, row, layer, c, runs)
+            best, first = limit, -1
             for k in range(count):
                 for other in range(runs[k, 0], runs[k, 1]):
                     for j in range(starts[other], starts[other + 1]):
@@ -196,19 +212,3 @@ def _members(
                         if distance < best or (distance == best and (first < 0 or order[j] < first)):
                             best, first = distance, order[j]
                             found[i] = roots[other]
-    return found
-
-
-@njit(cache=True, nogil=True)
-def _numbered(labels: Int64, count: int) -> Int64:  # pragma: no cover - compiled
-    """Number the clusters in the order of their first points."""
-    number = np.full(count, -1, np.int64)
-    used = 0
-    for i in range(labels.shape[0]):
-        root = labels[i]
-        if root >= 0:
-            if number[root] < 0:
-                number[root] = used
-                used += 1
-            labels[i] = number[root]
-    return labels

@@ -15,7 +15,7 @@ from numba import njit, prange
 
 from tunneldb.arrays import Bool, Float, Int32, Int64, Single
 from tunneldb.geometry.normals import eigenvalues
-from tunneldb.pointcloud.noise import CellCounts
+from tunneldb.pointcloud.voxels import CellCounts
 
 FLAT = 0.08
 """Windows whose points scatter less about their best plane, in radii, hold no sphere: a fifth of one scatters by 0.11."""

@@ -10,7 +10,7 @@ from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
 from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
 from tunneldb.database.models.ground import Cluster, Ground, Lining, TargetSphere
 from tunneldb.database.models.leak import Anomaly, AnomalyPart, Coverage, Image, Radiometry, RangeCurve, Region, Waterproof
-from tunneldb.database.models.work import Audit, Goal, Run, Worker
+from tunneldb.database.models.work import Audit, Goal, Run, Stage, Worker
 
 __all__ = [
     "AUDIT_SCHEMA",
@@ -40,6 +40,7 @@ __all__ = [
     "Section",
     "SectionClass",
     "Segment",
+    "Stage",
     "Station",
     "StationEquation",
     "Survey",

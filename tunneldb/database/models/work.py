@@ -5,10 +5,25 @@ from __future__ import annotations
 import datetime as dt
 from typing import Any
 
-from sqlalchemy import BigInteger, Identity, Index, text
+from sqlalchemy import ARRAY, BigInteger, Identity, Index, Text, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from tunneldb.database.models.base import AUDIT_SCHEMA, CLOCK, KM, SURVEY, Base, one_of, parent
+
+
+class Stage(Base):
+    """A stage of a kilometre."""
+
+    __tablename__ = "stage"
+    __table_args__ = {"comment": "Stages of a kilometre, in their order; tunneldb init fills it anew"}  # noqa: RUF012
+
+    step: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment="Its number in their order, from 1")
+    name: Mapped[str] = mapped_column(unique=True, comment="Name")
+    reads: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Stages whose results in the kilometre itself it rests on")
+    reads_beside: Mapped[list[str]] = mapped_column(
+        ARRAY(Text), comment="Stages whose results in the kilometres before and after it rests on"
+    )
+    parameters: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Prefixes of the parameters that it depends on")
 
 
 class Goal(Base):

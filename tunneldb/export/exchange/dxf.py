@@ -30,8 +30,8 @@ from tunneldb.export.exchange.lines import (
 from tunneldb.export.exchange.sheet import draw_profiles, draw_unrolled
 from tunneldb.export.exchange.table import Table, read_table
 from tunneldb.geometry.surface import Surface
+from tunneldb.store.alignment import labels
 from tunneldb.store.catalog import crs_text
-from tunneldb.store.stationing import labels
 from tunneldb.store.survey import Survey
 
 MARGIN = 50.0

@@ -20,8 +20,8 @@ from tunneldb.export.qgis.layer import LAYERS, VectorLayer
 from tunneldb.export.qgis.styles import STYLE_NAME, style_text
 from tunneldb.export.tables.leaks import UNDEFINED_CARTESIAN
 from tunneldb.geometry.surface import Surface
+from tunneldb.store.alignment import labels
 from tunneldb.store.catalog import crs_text
-from tunneldb.store.stationing import labels
 from tunneldb.store.survey import Survey
 
 VERSION = {"VERSION": "1.2"}

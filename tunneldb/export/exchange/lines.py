@@ -86,7 +86,7 @@ def is_hundred(chainages: Float) -> Bool:
 
 def edges(surface: Surface, chainages: Float) -> tuple[Float, Float]:
     """Left and right edge of the unrolled lining, (n, 2) rows of chainage and arc, m, where there are sections."""
-    arcs = np.array([surface.arc_range(chainage) for chainage in chainages], dtype=np.float64).reshape(-1, 2)
+    arcs = np.column_stack(surface.arc_range(chainages))
     there = np.isfinite(arcs[:, 0])
     left, right = (np.column_stack([chainages, arcs[:, k]])[there] for k in (0, 1))
     return left, right

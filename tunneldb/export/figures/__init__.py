@@ -1,1 +1,1 @@
-"""TODO."""
+"""Figures: how far the axis lies from its design, how intensity depends on range and incidence."""

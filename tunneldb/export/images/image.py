@@ -24,7 +24,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.raster.gap_fill import FILL, TOLD, fill_blocks
 from tunneldb.raster.geotiff import KINDS, Raster, decode
 from tunneldb.raster.grid import BLOCK
-from tunneldb.store.stationing import load_stationing
+from tunneldb.store.alignment import load_stationing
 from tunneldb.store.survey import Survey
 
 

@@ -15,13 +15,12 @@ from pathlib import Path
 import psycopg
 
 from tunneldb import __version__
-from tunneldb.export.qgis.action import RECOMPUTED_FROM, recompute
 from tunneldb.export.qgis.crs import crs_element, no_crs
 from tunneldb.export.qgis.extent import Extent, View, first_window, largest_leak, map_extent, sheet_extent, unrolled_extents
 from tunneldb.export.qgis.layer import LAYERS, MAP, SHEETS, SPACE, UNROLLED, VectorLayer
 from tunneldb.export.qgis.raster import FILLED, KINDS, image_kind, pipe
 from tunneldb.export.qgis.sheet import layouts
-from tunneldb.export.qgis.source import Source
+from tunneldb.export.qgis.source import RECOMPUTED_FROM, Source, recompute
 from tunneldb.export.qgis.space import docks, filled_layers, scene, viewpoint
 from tunneldb.export.qgis.styles import require_table, style_elements
 from tunneldb.files import replacing

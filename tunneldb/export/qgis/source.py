@@ -1,14 +1,19 @@
-"""Where a layer's rows come from: QGIS data source strings, which never hold a password."""
+"""Where the layers of a project get their rows, and the action by which QGIS has them recomputed after an edit of the axis."""
 
 from __future__ import annotations
 
 import getpass
+import sys
+import uuid
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass
+from pathlib import Path
 
 import psycopg
 
 from tunneldb.errors import UserError
 from tunneldb.export.qgis.layer import VectorLayer
+from tunneldb.store.survey import Survey
 
 
 def quote(value: str) -> str:
@@ -67,3 +72,26 @@ class Source:
             f'checkPrimaryKeyUnicity=\'0\' table="tunnel_api"."{layer.view}" ({layer.column}) '
             f'sql="survey" = {name}{" AND " + layer.where if layer.where else ""}'
         )
+
+
+RECOMPUTED_FROM = ("axis_vertex", "segment")
+"""Layers that offer it."""
+
+
+def recompute(survey: Survey, source: Source) -> ET.Element:
+    """Return the element ``attributeactions`` of a layer: it runs ``tunneldb run --stale`` and shows what that says.
+
+    It runs the program that writes the project, on the database that the project reads, as whoever uses QGIS.
+    """
+    beside = Path(sys.executable).with_name("tunneldb")
+    program = str(beside) if beside.exists() else "tunneldb"
+    key = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, 'tunneldb recompute')}}}"
+    actions = ET.Element("attributeactions")
+    action = ET.SubElement(
+        actions, "actionsetting", id=key, name=f"Recompute what is stale of {survey.name}", shortTitle="Recompute", type="0",
+        action=f'"{program}" --dsn "{source.connection}" run {survey.name} --stale', capture="1", icon="",
+        notificationMessage="", isEnabledOnlyWhenEditable="0",
+    )  # fmt: skip
+    for scope in ("Canvas", "Feature", "Layer"):
+        ET.SubElement(action, "actionScope", id=scope)
+    return actions

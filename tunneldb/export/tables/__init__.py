@@ -1,1 +1,1 @@
-"""TODO."""
+"""Leaks and target spheres as tables and reports."""

@@ -1,0 +1,117 @@
+"""The stages ``axis``, ``segments`` and ``sections``: they are done in the database, by the functions of sql/geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, LiteralString
+
+import psycopg
+
+from tunneldb.errors import UserError
+from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.pipeline.stages import Counts, Progress
+from tunneldb.store.surface import load_alignment
+from tunneldb.store.survey import Survey
+
+FEW_POINTS = 10_000
+"""A kilometre with fewer points than this, at the end of a tunnel, may be without a section of its own."""
+
+
+def axis(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
+    """Stage 1 of Gonçalves et al. (2012): the axis; vertices edited by hand (stage 2) stay."""
+    _place_vertices(conn, survey)
+    passes = conn.execute(
+        "SELECT moved, measured FROM tunnel_api.axis_refine(%s, %s, %s, %s, %s, %s)",
+        [
+            survey.id,
+            km,
+            values["axis.half_width"],
+            values["axis.angle_step"],
+            values["axis.tolerance"],
+            int(values["axis.max_iterations"]),
+        ],
+    ).fetchall()
+    moved = float(passes[-1][0])
+    if moved >= values["axis.tolerance"]:
+        raise UserError(
+            f"the axis of kilometre {km} does not come to rest: it still moves by {moved:.3f} m after {len(passes)} passes;"
+            " look at the points and the given axis there, or set axis.tolerance or axis.max_iterations"
+        )
+    vertices = dict(
+        conn.execute(
+            "SELECT source, count(*) FROM tunnel.axis_vertex WHERE survey_id = %s AND km = %s GROUP BY source",
+            [survey.id, km],
+        ).fetchall()
+    )
+    if not passes[-1][1] and not vertices.get("edited"):
+        raise UserError(f"kilometre {km} has too few points near the axis' vertices to find the tunnel's centre")
+    return {"iterations": len(passes), "moved": moved, **vertices}
+
+
+def _place_vertices(conn: psycopg.Connection[Any], survey: Survey) -> None:
+    """Set the survey's vertices on the given axis, if they are not there yet."""
+    alignment = load_alignment(conn, survey)
+    chainage = alignment.number * alignment.spacing
+    x, y, z = alignment.vertices.T.tolist()
+    conn.execute(
+        """
+        INSERT INTO tunnel.axis_vertex (survey_id, n, km, geom, given, points, source)
+        SELECT %(survey)s, v.n, v.km, p.point, p.point, 0, 'interpolated'
+        FROM unnest(%(n)s::int[], %(km)s::int[], %(x)s::float8[], %(y)s::float8[], %(z)s::float8[]) AS v (n, km, x, y, z),
+             ST_SetSRID(ST_MakePoint(v.x, v.y, v.z), %(srid)s) AS p (point)
+        ON CONFLICT (survey_id, n) DO NOTHING
+        """,
+        {
+            "survey": survey.id,
+            "srid": survey.srid,
+            "n": alignment.number.tolist(),
+            "km": (chainage // KILOMETRE).astype(int).tolist(),
+            "x": x,
+            "y": y,
+            "z": z,
+        },
+    )
+
+
+def segments(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
+    """Stage 3: segments, and the segment and chainage of every point."""
+    built = _one(conn, "SELECT tunnel_api.segment_build(%s, %s)", survey.id, km)
+    if not built:
+        raise UserError(f"kilometre {km} has no axis yet: tunneldb run {survey.name} --km {km} --from axis")
+    progress(0.1)
+    return {"segments": built, "points": _one(conn, "SELECT tunnel_api.segment_tag(%s, %s)", survey.id, km)}
+
+
+def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
+    """Stage 4: two cross-sections a segment."""
+    if not _one(conn, "SELECT count(*) FROM tunnel.segment WHERE survey_id = %s AND km = %s", survey.id, km):
+        raise UserError(f"kilometre {km} has no segments yet: tunneldb run {survey.name} --km {km} --from segments")
+    built = _one(
+        conn,
+        "SELECT tunnel_api.section_build(%s, %s, %s, %s, %s, %s, %s)",
+        survey.id,
+        km,
+        values["section.angle_step"],
+        values["section.half_width"],
+        values["section.max_half_width"],
+        int(values["section.min_points"]),
+        values["section.protrusion"],
+    )
+    points = _one(conn, "SELECT coalesce(sum(points), 0) FROM tunnel.segment WHERE survey_id = %s AND km = %s", survey.id, km)
+    if not built and points >= FEW_POINTS:
+        raise UserError(
+            f"kilometre {km} has no section: the {points} points in its segments fill no section"
+            f" (tunneldb run {survey.name} --km {km} --from segments, or load more)"
+        )
+    classes = conn.execute(
+        "SELECT c.state, count(*) FROM tunnel.section s JOIN tunnel.section_class c ON c.section_id = s.id"
+        " WHERE s.survey_id = %s AND s.km = %s GROUP BY c.state",
+        [survey.id, km],
+    ).fetchall()
+    return {"sections": built, **{f"classes_{state}": count for state, count in classes}}
+
+
+def _one(conn: psycopg.Connection[Any], query: LiteralString, *arguments: Any) -> int:
+    row = conn.execute(query, arguments).fetchone()
+    assert row is not None
+    return int(row[0])
