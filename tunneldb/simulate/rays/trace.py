@@ -68,7 +68,7 @@ class Echoes(NamedTuple):
 
     def take(self, rows: Int64) -> Echoes:
         """Some of them."""
-        return Echoes(*(column[rows] for column in self))
+        return Echoes._make(column[rows] for column in self)
 
 
 @dataclass(frozen=True)
