@@ -125,7 +125,7 @@ class Accumulator:
         UserError
             If the temporary folder has no room for what memory doesn't hold.
         """
-        pixels = Pixels._make(array[:count] for array in pixels)
+        pixels = pixels.first(count)
         width = self.grid.block_columns
         marked = np.zeros(self.grid.columns // width, np.bool_)
         _touched(pixels.column, width, marked)

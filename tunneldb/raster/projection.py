@@ -128,6 +128,13 @@ class Pixels(NamedTuple):
         whole, single = np.empty((3, count), np.int32), np.empty((3, count), np.float32)
         return cls(whole[0], whole[1], whole[2], single[0], single[1], single[2])
 
+    def first(self, count: int) -> Pixels:
+        """Those of the first so many points."""
+        return Pixels(
+            self.row[:count], self.column[:count], self.weight[:count],
+            self.offset[:count], self.raw[:count], self.corrected[:count],
+        )  # fmt: skip
+
 
 class ProjectionCounts(NamedTuple):
     """What `project` counts.
