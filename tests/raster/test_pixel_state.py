@@ -8,7 +8,7 @@ from scipy import ndimage
 from shapely.geometry import box as rectangle
 from support.straight_tunnel import LENGTH, straight
 
-from tunneldb.anomalies.geometries import shapes
+from tunneldb.anomalies.geometries import anomaly_geometries
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.ground.wall_arcs import foot_arcs
 from tunneldb.geometry.plan_line import PlanLine
@@ -247,12 +247,12 @@ def test_a_wider_stretch_is_no_niche():
 def test_clock_area_and_coordinates_of_a_patch(degrees, hours):
     arc = 4.0 * np.radians(degrees)
 
-    shaped = shapes(rectangle(30.0, arc - 0.5, 32.0, arc + 0.5), ROUND)
+    shaped = anomaly_geometries(rectangle(30.0, arc - 0.5, 32.0, arc + 0.5), ROUND)
     assert min(abs(shaped.clock - hours), 12 - abs(shaped.clock - hours)) < 0.01
     assert 0 < shaped.clock <= 12
     assert shaped.area == pytest.approx(2.0, rel=1e-3)
     # The strip lies right of the axis, towards −y, for positive arcs.
-    assert shaped.strip.bounds == pytest.approx((30.0, -arc - 0.5, 32.0, -arc + 0.5), abs=1e-6)
+    assert shaped.map.bounds == pytest.approx((30.0, -arc - 0.5, 32.0, -arc + 0.5), abs=1e-6)
     points = np.array(shaped.surface.exterior.coords)
     np.testing.assert_allclose(np.hypot(points[:, 1], points[:, 2] - 100.0), 4.0, atol=1e-3)
     assert np.hypot(*np.diff(points[:, :2], axis=0).T).max() < 0.11

@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.detect import Anomaly
-from tunneldb.anomalies.geometries import shapes
+from tunneldb.anomalies.geometries import anomaly_geometries
 from tunneldb.anomalies.matching import match, match_parts
 from tunneldb.anomalies.regions import Region
 from tunneldb.geometry.stationing import KILOMETRE
@@ -207,7 +207,7 @@ def _write(conn: psycopg.Connection[Any], survey: Survey, values: dict[str, Any]
 
 def _row(anomaly: Anomaly, surface: Surface, srid: int) -> dict[str, Any]:
     west, south, east, north = anomaly.outline.bounds
-    shaped = shapes(anomaly.outline, surface)
+    geometries = anomaly_geometries(anomaly.outline, surface)
     return {
         "km": int((west + east) / 2 // KILOMETRE),
         "kind": anomaly.verdict.kind,
@@ -218,13 +218,13 @@ def _row(anomaly: Anomaly, surface: Surface, srid: int) -> dict[str, Any]:
         "chainage_to": east,
         "arc_from": south,
         "arc_to": north,
-        "clock": shaped.clock,
-        "area": shaped.area,
+        "clock": geometries.clock,
+        "area": geometries.area,
         "drop_mean": anomaly.drop_mean,
         "drop_max": anomaly.drop_max,
         "image_share": anomaly.image_share,
         "unrolled": shapely.to_wkb(anomaly.outline),
-        "map": shapely.to_wkb(shaped.strip),
-        "surface": shapely.to_wkb(shaped.surface),
+        "map": shapely.to_wkb(geometries.map),
+        "surface": shapely.to_wkb(geometries.surface),
         "srid": srid,
     }
