@@ -14,6 +14,7 @@ from shapely.geometry import Polygon
 from support.loaded_survey import SURVEY, add_survey
 
 from tests.pipeline.test_detect import APPENDAGE, FLOOR, NAME, command, counts, outlines, parameters, prepare, share_of
+from tunneldb.anomalies.background.level import BackgroundLevel
 from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
 from tunneldb.anomalies.regions import Region, RegionProperties
 from tunneldb.pipeline import calibration as radiometry
@@ -75,7 +76,8 @@ def flat(grid: Grid, mean: float, spread: float) -> BackgroundMap:
     """Dry lining that is everywhere alike."""
     rings, bands = np.zeros(grid.columns, np.float32), np.zeros((grid.rows, grid.blocks), np.float32)
     smooth = np.zeros((-(-grid.rows // 25), grid.columns // 25), np.float32)
-    return BackgroundMap(grid, 25, np.full_like(smooth, spread), mean, spread, 1, mean, rings, bands, smooth)
+    level = BackgroundLevel(25, mean, rings, bands, smooth)
+    return BackgroundMap(grid, level, np.full_like(smooth, spread), mean, spread, 1)
 
 
 @pytest.fixture
