@@ -10,7 +10,6 @@ from typing import Any, Literal
 
 import numpy as np
 import psycopg
-from numba import njit
 from PIL import Image
 from scipy import ndimage
 
@@ -29,8 +28,6 @@ KEPT = 7
 
 NO_STATE = 255
 """Where a block has no state."""
-
-EMPTY, OFF, FLOOR_CODE = int(PixelState.EMPTY), int(PixelState.OFF), int(PixelState.FLOOR)
 
 HELD = 0.2
 """Lining is shown as seen where at least this share of its pixels holds points: the same share as the median filter needs to
@@ -171,7 +168,7 @@ class Lining:
         for number in range(int(np.floor(about.west / BLOCK)), int(np.ceil(about.east / BLOCK))):
             place = _Place.of(self._block(number), about, side) if number in self._km else None
             if place is not None:
-                sums[:, *place.there] += place.gathered()[:2]
+                sums[:, *place.there] += place.sums()[:2]
         return fill_gaps(_ratio(sums[1], sums[0]), FILL / side)[edge:-edge, edge:-edge]
 
     def _block(self, number: int) -> _Block:
@@ -240,10 +237,9 @@ class _Place:
         there = slice(row[0], row[-1] + 1), slice(column[0], column[-1] + 1)
         return cls(there, block.shown.values[part], block.state[part], row - row[0], column - column[0])
 
-    def gathered(self) -> Single:
-        """Tally the block's pixels, see :func:`_gathered`."""
-        tally: Single = _gathered(self.values, self.state, self.row, self.column)
-        return tally
+    def sums(self) -> Single:
+        """Sum up the block's pixels, see :func:`_accumulate`."""
+        return _accumulate(self.values, self.state, self.row, self.column)
 
 
 def _inside(place: Intp, count: int) -> slice:
@@ -261,7 +257,7 @@ def _grey(values: Single, kilometre: _Kilometre) -> UInt8:
 
 def _seen(place: _Place, side: float, kilometre: _Kilometre) -> UInt8:
     """Colours of corrected intensity and of lining that was not seen, is hidden or no lining."""
-    held, level, lining, empty, off, floor = place.gathered()
+    held, level, lining, empty, off, floor = place.sums()
     about = 2 * round(FILLED / side / 2) + 1
 
     def smooth(what: Single) -> Single:
@@ -277,28 +273,25 @@ def _seen(place: _Place, side: float, kilometre: _Kilometre) -> UInt8:
     return grey.astype(np.uint8)
 
 
-@njit(cache=True, nogil=True)
-def _gathered(values: Single, state: UInt8, row: Intp, column: Intp) -> Single:  # pragma: no cover - compiled
-    """Tally the pixels that fall into each coarser one.
+def _accumulate(values: Single, state: UInt8, row: Intp, column: Intp) -> Single:
+    """Sum up the pixels that fall into each coarser one.
 
     How many hold points, their intensities added up, how many are lining, lining without points, what hangs before it, floor.
+    (6, rows, columns).
     """
-    out = np.zeros((6, row[-1] + 1, column[-1] + 1), np.float32)
-    for i in range(values.shape[0]):
-        for j in range(values.shape[1]):
-            r, c, code = row[i], column[j], state[i, j]
-            if np.isfinite(values[i, j]):
-                out[0, r, c] += 1
-                out[1, r, c] += values[i, j]
-            if code == OFF:
-                out[4, r, c] += 1
-            elif code in (FLOOR_CODE, NO_STATE):
-                out[5, r, c] += 1
-            else:
-                out[2, r, c] += 1
-                if code == EMPTY:
-                    out[3, r, c] += 1
-    return out
+    floor = (state == PixelState.FLOOR) | (state == NO_STATE)
+    off = state == PixelState.OFF
+    held = np.isfinite(values)
+    layers = (held, np.where(held, values, 0.0), ~(floor | off), state == PixelState.EMPTY, off, floor)
+    first = [np.flatnonzero(np.diff(place, prepend=-1)) for place in (row, column)]
+    sums = np.empty((len(layers), len(first[0]), len(first[1])), np.float32)
+    for k, layer in enumerate(layers):
+        kind = np.float64 if layer.dtype == np.float32 else np.float32  # whole numbers are exact in both
+        for axis, starts in enumerate(first):
+            if len(starts) < layer.shape[axis]:
+                layer = np.add.reduceat(layer, starts, axis, kind)
+        sums[k] = layer
+    return sums
 
 
 def _ratio(part: Single, whole: Single) -> Single:
