@@ -126,7 +126,7 @@ def intersect_ground(
         ox, oy = origin[i, 0], origin[i, 1]
         dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
         _, _, u, w, c, n, k, g, q, det = foot(
-            plan, profile, ox + r * dx, oy + r * dy, origin[i, 2] + r * dz, found[1, i], 0.0, 1
+            plan, profile, ox + r * dx, oy + r * dy, origin[i, 2] + r * dz, found[1, i], 0.0, np.int64(1)
         )
         gx, gy, gz = gradient(0.0, 1.0, u, w, c, n, k, g, q, det)
         # Near its end the tunnel's frame hardly turns along a ray: it moves by du and dw a metre.

@@ -117,7 +117,7 @@ def _gap(
     relief: LiningRelief, plan: Float, profile: Float, parts: Float, x: float, y: float, z: float, s: float
 ) -> tuple[float, float, float, float, tuple[float, ...]]:
     """Arc of a place, its distance to the lining along the normal, gradient (u, w) of its offset; :func:`foot` of it."""
-    found = foot(plan, profile, x, y, z, s, 1e-3, 2)
+    found = foot(plan, profile, x, y, z, s, 1e-3, np.int64(2))
     arc, offset, gu, gw = nearest(parts, found[2], found[3])
     return arc, offset - height(relief, found[0], arc), gu, gw, found
 

@@ -67,14 +67,14 @@ def intersect_lining(
     for i in range(origin.shape[0]):
         x, y, z = origin[i, 0], origin[i, 1], origin[i, 2]
         dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
-        s = foot(plan, profile, x, y, z, hint[i], 1e-9, 20)[0]
+        s = foot(plan, profile, x, y, z, hint[i], 1e-9, np.int64(20))[0]
         found[0, i] = np.nan
         found[3, i] = 0.0
         found[5, i] = s
         arc = 0.0
         r = 0.0
         for j in range(80):
-            s, step, u, w, c, n, k, g, q, det = foot(plan, profile, x, y, z, s, LOOSE, 2)
+            s, step, u, w, c, n, k, g, q, det = foot(plan, profile, x, y, z, s, LOOSE, np.int64(2))
             arc, offset, gu, gw = nearest(parts, u, w)
             nx, ny, nz = gradient(gu, gw, u, w, c, n, k, g, q, det)
             slope = nx * dx + ny * dy + nz * dz
@@ -140,10 +140,10 @@ def intersect_appendages(
         at = begin
         for _ in range(200):
             x, y, z = origin[i, 0] + at * dx, origin[i, 1] + at * dy, origin[i, 2] + at * dz
-            s, _, u, w, c, n, k, g, q, det = foot(plan, profile, x, y, z, s, LOOSE, 2)
+            s, _, u, w, c, n, k, g, q, det = foot(plan, profile, x, y, z, s, LOOSE, np.int64(2))
             b = bin_of(s, start, bins)
             gap = 0.8  # below the REACH of a bin's list
-            nearby = -1
+            nearby = np.int64(-1)
             for j in range(bins[b], bins[b + 1]):
                 to = distance(items, listed[j], s, u, w)
                 if to < gap:

@@ -23,6 +23,7 @@ MINIMUM_COSINE = 0.087
 MIXED = 0.1
 # Least range of the scanner, m.
 NEAREST = 1.0
+PIECE = 1 << 16  # rays that are traced at a time
 BUMP = 0.12  # half the wavelength of the small-scale relief, m
 
 
@@ -68,7 +69,7 @@ class Echoes(NamedTuple):
 
     def take(self, rows: Int64) -> Echoes:
         """Some of them."""
-        return Echoes._make(column[rows] for column in self)
+        return Echoes(*(column[rows] for column in self))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,15 @@ class Tracer:
         chance : (n, 2)
             Uniform numbers that decide on outliers and where they fall.
         """
+        pieces = []
+        for begin in range(0, max(len(origin), 1), PIECE):
+            some = slice(begin, begin + PIECE)
+            piece = self._trace(origin[some], direction[some], hint[some], noise[some], chance[some])
+            pieces.append(piece._replace(ray=piece.ray + begin))
+        return Echoes(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))  # type: ignore[arg-type]
+
+    def _trace(self, origin: Float, direction: Float, hint: Float, noise: Float, chance: Float) -> Echoes:
+        """Shoot rays, as many at a time as their arrays stay in the processor's cache."""
         scene, n = self.scene, len(origin)
         start, end, floor_arc, reach, _, _ = scene.ends.tolist()
         shape = scene.plan, scene.profile, scene.parts
@@ -195,7 +205,7 @@ class Tracer:
             thing,
         )
         within = (measured >= NEAREST) & (measured <= self.furthest) & (place.chainage >= start) & (place.chainage <= end)
-        return echoes.take(np.flatnonzero(within))
+        return echoes if within.all() else echoes.take(np.flatnonzero(within))
 
     def _niches(
         self,

@@ -25,7 +25,8 @@ def foot(
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
     """Foot of the perpendicular from a point to the axis: Newton's method from chainage ``s``, ``most`` steps.
 
-    It ends with a step of less than ``tolerance`` m. Returns the chainage and the last step, then, as they are before
+    It ends with a step of less than ``tolerance`` m. ``most`` is a ``np.int64``: of each literal number Numba would compile
+    a version of its own. Returns the chainage and the last step, then, as they are before
     that step: u, w, cos and sin of the direction, curvature, grade, the length q of the unnormalised tangent, and D, by
     which (cos, sin, grade) is divided to give the gradient of chainage.
     """
@@ -65,7 +66,9 @@ def _unroll(plan: Float, profile: Float, parts: Float, xyz: Float, s: Float, tol
     ``s`` (n,) are chainages near them; the chainage found is good to the square of ``tolerance`` over the bend's radius.
     """
     for i in range(xyz.shape[0]):
-        chainage, _, u, w, c, n, k, g, q, d = foot(plan, profile, xyz[i, 0], xyz[i, 1], xyz[i, 2], s[i], tolerance, 20)
+        chainage, _, u, w, c, n, k, g, q, d = foot(
+            plan, profile, xyz[i, 0], xyz[i, 1], xyz[i, 2], s[i], tolerance, np.int64(20)
+        )
         arc, offset, gu, gw = nearest(parts, u, w)
         nx, ny, nz = gradient(gu, gw, u, w, c, n, k, g, q, d)
         norm = math.sqrt(nx * nx + ny * ny + nz * nz)
