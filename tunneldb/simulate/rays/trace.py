@@ -69,7 +69,7 @@ class Echoes(NamedTuple):
 
     def take(self, rows: Int64) -> Echoes:
         """Some of them."""
-        return Echoes(*(column[rows] for column in self))  # type: ignore[arg-type]
+        return Echoes._make(column[rows] for column in self)
 
 
 @dataclass(frozen=True)
