@@ -30,6 +30,7 @@ from benchmarks.leaks import HEADER, Outcome, chosen, plain, row, values
 from benchmarks.scene import Scene
 from tunneldb.anomalies import detect as detection
 from tunneldb.anomalies import regions as region
+from tunneldb.anomalies.background.level import BackgroundLevel
 from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
 from tunneldb.anomalies.verdict import Verdict
 from tunneldb.cli.main import main as command
@@ -93,18 +94,17 @@ def one_level(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) -> Back
     """One mean and one standard deviation for all of the lining (eq. 19)."""
     local = map_background(picture)
     dry = robust_statistics(picture.level[picture.state == PixelState.LINING][::7] * STEP["corrected"])
-    flat = [np.zeros_like(part) for part in (local.rings, local.bands, local.smooth)]
-    return BackgroundMap(
-        local.grid, local.tile, np.full_like(local.sigma, dry.sigma), dry.mean, dry.sigma, local.count, dry.mean, *flat
-    )
+    flat = [np.zeros_like(part) for part in (local.level.rings, local.level.bands, local.level.smooth)]
+    level = BackgroundLevel(local.level.tile, dry.mean, *flat)
+    return BackgroundMap(local.grid, level, np.full_like(local.sigma, dry.sigma), dry.mean, dry.sigma, local.count)
 
 
 def corrected_by(law: str) -> list[Replacement]:
     """Intensity left raw, or corrected by Lambert's law."""
     calibrate, loss = stage.calibrate, gather.incidence_db
 
-    def raw(*arguments: Any) -> Any:
-        known = calibrate(*arguments)
+    def raw(*arguments: Any, **options: Any) -> Any:
+        known = calibrate(*arguments, **options)
         radiometer = replace(known.observer.radiometer, kind="reflectance", reference=None)
         return replace(known, observer=replace(known.observer, radiometer=radiometer))
 
@@ -157,11 +157,15 @@ def law(name: str) -> str:
     return Part.points if given == "Oren-Nayar" else given
 
 
-GLOBAL: list[Replacement] = [(stage, "map_dry", one_level)]
+GLOBAL: list[Replacement] = [(stage, "map_background", one_level)]
 
 
 def nothing_off(distance: np.ndarray, *others: Any) -> np.ndarray:
     return np.zeros(distance.shape, np.bool_)
+
+
+def no_drips(components: Any, *others: Any) -> tuple[np.ndarray, np.ndarray]:
+    return np.arange(len(components.pixels)), np.empty((0, 4), int)
 
 
 LAWS = {
@@ -181,13 +185,11 @@ PARTS = (
         points="without limits",
     ),
     Part("removal of appendages: none", [(lining.appendage, "off_plane", nothing_off)]),
-    Part("recesses: taken for appendages", [(stage, "develop", after(stage.develop, recess_is_off))]),
+    Part("recesses: taken for appendages", [(stage, "lining_image", after(stage.lining_image, recess_is_off))]),
     Part("steps of the radius: left in", [(lining.step, "steps", lambda offset, *others: np.zeros_like(offset))]),
-    Part("judging: all that is dark is a leak", [(detection, "judge", lambda region: Verdict("leak", (), 1.0))]),
-    Part("edges: where three sigma lie", [(detection, "settle", lambda dark, relative, size: dark)]),
-    Part(
-        "drips: left alone", [(region, "hang", lambda pieces, wanted, *others: (np.arange(len(wanted)), np.empty((0, 4), int)))]
-    ),
+    Part("judging: all that is dark is a leak", [(detection, "classify", lambda region: Verdict("leak", (), 1.0))]),
+    Part("edges: where three sigma lie", [(detection, "refine_boundary", lambda dark, contrast, size: dark)]),
+    Part("drips: left alone", [(region, "attach_drips", no_drips)]),
     Part("range curve: auto for measured, and the other way round", swap_curve=True, points="by the other curve"),
 )
 

@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.common import scratch_database
 from benchmarks.scene import Scene
-from tunneldb.anomalies.detect import Found
+from tunneldb.anomalies.detect import Anomaly
 from tunneldb.database import connect
 from tunneldb.pipeline import detect as stage
 from tunneldb.pipeline.parameters import settings
@@ -54,23 +54,21 @@ class Steps:
     def __init__(self) -> None:
         self.arrays: dict[str, NDArray[Any]] = {}
         self.raw: dict[int, NDArray[Any]] = {}
-        self.found: list[Found] = []
+        self.found: list[Anomaly] = []
         self.extent: tuple[float, float, float, float] = (0, 0, 0, 0)
 
     def watch(self) -> None:
         """Look at what goes in and comes out of each step."""
-        self._after("develop", self._picture)
-        self._after(
-            "map_dry", lambda dry, picture, *_: self._keep("dry", dry.levels(slice(0, picture.grid.rows), self.columns))
-        )
-        self._after("relative", self._relative)
+        self._after("lining_image", self._picture)
+        self._after("map_background", self._background)
+        self._after("contrast_image", self._contrast)
         self._after("find_anomalies", self._anomalies)
 
     def _after(self, name: str, look: Callable[..., None]) -> None:
         work = getattr(stage, name)
 
         def both(*arguments: Any) -> Any:
-            if name == "develop":
+            if name == "lining_image":
                 arguments = (*arguments[:-1], self._raw(arguments[-1]))
             result = work(*arguments)
             look(result, *arguments)
@@ -100,19 +98,19 @@ class Steps:
         self._keep("state", picture.state[:, self.columns])
         self._keep("corrected", decibel(picture.level[:, self.columns]))
 
-    def _dry(self, dry: Any, picture: Any, *_: Any) -> None:
-        self._keep("dry", dry.levels(slice(0, picture.grid.rows), self.columns))
+    def _background(self, background: Any, picture: Any, *_: Any) -> None:
+        self._keep("dry", background.level.levels(slice(0, picture.grid.rows), self.columns))
 
-    def _relative(self, relative: Any, *_: Any) -> None:
-        self._keep("drop", decibel(relative.drop[:, self.columns]))
-        tile = relative.tile
-        row = np.arange(relative.state.shape[0]) // tile
+    def _contrast(self, contrast: Any, *_: Any) -> None:
+        self._keep("drop", decibel(contrast.drop[:, self.columns]))
+        tile = contrast.tile
+        row = np.arange(contrast.state.shape[0]) // tile
         column = np.arange(self.columns.start, self.columns.stop) // tile
-        self._keep("sigma", relative.sigma[row[:, None], column[None, :]])
+        self._keep("sigma", contrast.sigma[row[:, None], column[None, :]])
 
     def _anomalies(self, detection: Any, *_: Any) -> None:
         self._keep("dark", detection.dark[:, self.columns])
-        self.found = detection.found
+        self.found = detection.anomalies
 
 
 def decibel(steps: NDArray[np.int16]) -> NDArray[np.float32]:

@@ -49,6 +49,7 @@ from measure_results import (
 SCENES = ("demo", "static", "ringo", "batch", "files")
 
 CHANGING = (
+    (re.compile(r"(?s)(\n *2\r?\nCLASSES\r?\n).*?(?=\n *0\r?\nENDSEC)"), r"\1"),  # of DXF, in any order
     (re.compile(r"\$(TDU?CREATE|TDU?UPDATE|FINGERPRINTGUID|VERSIONGUID)\r?\n\s*\d+\r?\n.*"), r"$\1"),  # of DXF
     (re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d(:\d\d(\.\d+)?)?( ?(Z|UTC|[+-]\d\d(:?\d\d)?))?"), "TIME"),
     (re.compile(r"\{?\b[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\b\}?", re.IGNORECASE), "UUID"),

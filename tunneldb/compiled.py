@@ -17,7 +17,7 @@ inner = njit(cache=True, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=T
 """Decorator of a compiled function that only compiled functions call: it takes less to compile."""
 
 point_kernel = njit(cache=True, nogil=True, error_model="numpy")
-"""A kernel that divides for each point of a file: division by zero is infinite or NaN, not tested for in the loop."""
+"""A kernel that divides for each point or pixel: division by zero is infinite or NaN, so no test for it is in the loop."""
 
 point_inner = njit(
     cache=True, nogil=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True

@@ -45,8 +45,8 @@ class Lining:
     def map(self, drawn=(), **how):
         """Error of the level, dB, and the standard deviation, (rows, columns) of the lining; and the map."""
         dry = map_background(self.picture(**how), drawn)
-        error = dry.levels(slice(0, self.grid.rows), self.columns) - self.dry
-        sigma = np.kron(dry.sigma, np.ones((dry.tile, dry.tile)))[: self.grid.rows, self.columns]
+        error = dry.level.levels(slice(0, self.grid.rows), self.columns) - self.dry
+        sigma = np.kron(dry.sigma, np.ones((dry.level.tile, dry.level.tile)))[: self.grid.rows, self.columns]
         return error, sigma, dry
 
 
@@ -212,7 +212,7 @@ def test_recesses_do_not_count():
     picture.level[:, lining.columns][recess] -= 400
     picture.state[:, lining.columns][recess] = PixelState.RECESS
     dry = map_background(picture)
-    level = dry.levels(slice(0, lining.grid.rows), lining.columns)
+    level = dry.level.levels(slice(0, lining.grid.rows), lining.columns)
     assert np.abs(level - 2.0).max() < 0.1
     assert dry.count == recess.size - recess.sum()
 
@@ -233,7 +233,7 @@ def test_the_map_is_the_same_on_both_sides_of_the_end_of_a_kilometre():
         state[:, here - far[0] : here + far[1]] = whole.state[:, end - far[0] : end + far[1]]
         level[:, here - far[0] : here + far[1]] = whole.level[:, end - far[0] : end + far[1]]
         dry = map_background(LiningImage(grid, state, level))
-        levels.append(dry.levels(slice(0, grid.rows), slice(here - 25, here + 25)))
+        levels.append(dry.level.levels(slice(0, grid.rows), slice(here - 25, here + 25)))
     np.testing.assert_allclose(levels[0], levels[1], atol=0.15)
 
 
@@ -244,7 +244,7 @@ def test_drawn_dry_regions_rule_what_lies_in_them_and_nothing_else():
     region = box(420.0, -2.0, 424.0, 0.0)
     picture = drawn.picture()
     dry = map_background(picture, [region])
-    level = dry.levels(slice(0, drawn.grid.rows), drawn.columns)
+    level = dry.level.levels(slice(0, drawn.grid.rows), drawn.columns)
     core = drawn.within(421.0, 423.0, -1.5, -0.5)
     assert np.abs(level[core] - (2.0 - 3.0)).max() < 0.1
     other = ~drawn.within(419.0, 425.0, -3.0, 1.0)
@@ -255,7 +255,7 @@ def test_drawn_dry_regions_rule_what_lies_in_them_and_nothing_else():
     assert dark[drawn.within(420.0, 424.0, 0.6, 2.0)].mean() > 0.97
 
 
-def test_drop_is_dry_level_less_level_in_the_memory_of_the_picture():
+def test_drop_is_the_level_of_the_background_less_level_in_the_memory_of_the_picture():
     lining = Lining(10.0)
     lining.held[np.random.default_rng(2).random(lining.held.shape) < 0.2] = False
     picture = lining.picture()
@@ -265,6 +265,6 @@ def test_drop_is_dry_level_less_level_in_the_memory_of_the_picture():
     assert found.drop is picture.level
     assert found.state is picture.state
     held = level != NODATA
-    expected = dry.levels(slice(0, lining.grid.rows), slice(0, lining.grid.columns)) * 100 - level
+    expected = dry.level.levels(slice(0, lining.grid.rows), slice(0, lining.grid.columns)) * 100 - level
     np.testing.assert_allclose(found.drop[held], expected[held], atol=0.51)
     assert (found.drop[~held] == NODATA).all()

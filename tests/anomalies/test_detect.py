@@ -7,7 +7,7 @@ import shapely.affinity
 from shapely.geometry import Polygon, box
 
 from tunneldb.anomalies.background.contrast import ContrastImage
-from tunneldb.anomalies.detect import _columns, _filled
+from tunneldb.anomalies.detect import _lining_in_columns, _scanned_share
 from tunneldb.anomalies.matching import match, match_parts
 from tunneldb.anomalies.regions import find_regions
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
@@ -349,7 +349,7 @@ def test_gap_in_the_scan_is_not_taken_for_a_sparse_scan() -> None:
     state = np.full((10, 400), PixelState.EMPTY, np.uint8)
     state[:, 20:60] = state[:, 300:350] = PixelState.LINING
     state[:, 30:40:3] = PixelState.EMPTY
-    columns = _columns(state, 0, 400)
-    assert _filled(*columns, 50) == pytest.approx(86 / 90)
-    assert _filled(*columns, 400) == pytest.approx(86 / 330)
-    assert _filled(*_columns(state, 20, 60), 50) == pytest.approx(36 / 40)
+    columns = _lining_in_columns(state, slice(0, 400))
+    assert _scanned_share(*columns, 50) == pytest.approx(86 / 90)
+    assert _scanned_share(*columns, 400) == pytest.approx(86 / 330)
+    assert _scanned_share(*_lining_in_columns(state, slice(20, 60)), 50) == pytest.approx(36 / 40)

@@ -6,7 +6,7 @@ import shapely
 from shapely.geometry import box
 from support.simulated_scenes import exact
 
-from tunneldb.anomalies.geometries import shapes
+from tunneldb.anomalies.geometries import anomaly_geometries
 from tunneldb.simulate.generate import Simulation
 from tunneldb.simulate.parameters import Parameters
 
@@ -23,9 +23,9 @@ def test_an_outline_a_pixel_beyond_the_end_lies_on_the_surface(surface, side, be
     end = surface.ends[0, 0] if side == 0 else surface.ends[-1, 1]
     inward = 1.0 if side == 0 else -1.0
     first, last = sorted([end - inward * beyond, end + inward * 0.5])
-    made = shapes(box(first, 0.0, last, 0.5), surface)
+    made = anomaly_geometries(box(first, 0.0, last, 0.5), surface)
     space = shapely.get_coordinates(made.surface, include_z=True)
     assert np.isfinite(space).all()
-    assert np.isfinite(shapely.get_coordinates(made.strip)).all()
-    assert made.strip.area == pytest.approx(0.25, abs=0.001)
+    assert np.isfinite(shapely.get_coordinates(made.map)).all()
+    assert made.map.area == pytest.approx(0.25, abs=0.001)
     assert made.area == pytest.approx(0.5 * (0.5 + beyond), abs=0.001)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from tunneldb.anomalies.background.contrast import ContrastImage
-from tunneldb.anomalies.detect import Found
-from tunneldb.anomalies.regions import Region, RegionProperties, find_regions, together, unite
+from tunneldb.anomalies.detect import Anomaly
+from tunneldb.anomalies.regions import Region, RegionProperties, find_regions, merge_regions, touching_groups
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
 
@@ -34,17 +34,17 @@ def cut_by_kilometre(mask: np.ndarray, level: np.ndarray, first: int, bottom: in
         wet[here], levels[here] = mask[there], level[there]
         drop = np.where(levels == NODATA, NODATA, 100 * DRY - levels).astype(np.int16)
         sigma = np.full((len(wet), grid.columns), 0.25, np.float32)
-        relative = ContrastImage(grid, (drop != NODATA).astype(np.uint8), drop, 1, sigma)
-        found += [(km, region) for region in find_regions(wet, wet, relative, 0.0, lambda _: True)]
+        contrast = ContrastImage(grid, (drop != NODATA).astype(np.uint8), drop, 1, sigma)
+        found += [(km, region) for region in find_regions(wet, wet, contrast, 0.0, lambda _: True)]
     return found
 
 
-def leaks(parts: list[Region], min_area: float) -> list[Found]:
-    united = [unite([parts[k] for k in group]) for group in together(parts)]
-    return [leak for region in united if (leak := Found.of(region, min_area)) is not None]
+def leaks(parts: list[Region], min_area: float) -> list[Anomaly]:
+    united = [merge_regions([parts[k] for k in group]) for group in touching_groups(parts)]
+    return [leak for region in united if (leak := Anomaly.of(region, min_area)) is not None]
 
 
-def assert_same(one: list[Found], other: list[Found]) -> None:
+def assert_same(one: list[Anomaly], other: list[Anomaly]) -> None:
     assert len(one) == len(other)
     for a, b in zip(one, other, strict=True):
         assert a.outline.equals_exact(b.outline, 1e-9)
@@ -93,8 +93,8 @@ def test_regions_that_touch_by_a_corner_or_have_other_pixels_stay_apart() -> Non
     def part(column: int, row: int, pixel: float = PIXEL) -> Region:
         return Region(pixel, column, row, np.ones((2, 3), bool), 6, 1.0, 1.0, RegionProperties())
 
-    assert together([part(0, 0), part(3, 1)]) == [[0, 1]]
-    assert together([part(3, 1), part(0, 0)]) == [[1, 0]]
-    assert together([part(0, 0), part(3, 2)]) == [[0], [1]]
-    assert together([part(0, 0), part(4, 0)]) == [[0], [1]]
-    assert together([part(0, 0), part(3, 1, 0.25)]) == [[0], [1]]
+    assert touching_groups([part(0, 0), part(3, 1)]) == [[0, 1]]
+    assert touching_groups([part(3, 1), part(0, 0)]) == [[1, 0]]
+    assert touching_groups([part(0, 0), part(3, 2)]) == [[0], [1]]
+    assert touching_groups([part(0, 0), part(4, 0)]) == [[0], [1]]
+    assert touching_groups([part(0, 0), part(3, 1, 0.25)]) == [[0], [1]]

@@ -29,13 +29,13 @@ def spotted(seed=5):
 
 @pytest.mark.parametrize("size", [5, 7, 11])
 def test_a_pixel_is_dark_by_the_vote_of_the_lining_about_it(size):
-    relative, _ = spotted()
-    state, drop = relative.state, relative.drop
+    contrast, _ = spotted()
+    state, drop = contrast.state, contrast.drop
     state[50:60, 20:90] = PixelState.OFF
     state[:30] = PixelState.FLOOR
-    found = dark_pixels(relative, size)
+    found = dark_pixels(contrast, size)
     rng, half = np.random.default_rng(1), size // 2
-    limit = 3.0 * np.kron(relative.sigma, np.ones((TILE, TILE)))
+    limit = 3.0 * np.kron(contrast.sigma, np.ones((TILE, TILE)))
     for i, j in zip(rng.integers(0, 200, 500), rng.integers(0, 300, 500), strict=True):
         about = np.s_[max(i - half, 0) : i + half + 1, max(j - half, 0) : j + half + 1]
         lining = (state[about] == PixelState.LINING) | (state[about] == PixelState.RECESS)
@@ -44,19 +44,19 @@ def test_a_pixel_is_dark_by_the_vote_of_the_lining_about_it(size):
 
 
 def test_what_is_dark_here_is_not_where_the_lining_varies_more():
-    relative, disc = spotted()
+    contrast, disc = spotted()
     for sigma, dark in ((0.4, True), (0.8, True), (1.2, False)):
-        relative.sigma[:] = sigma
-        assert (dark_pixels(relative, 5)[disc].mean() > 0.95) == dark
-        assert not dark_pixels(relative, 5)[~disc].any() or dark
+        contrast.sigma[:] = sigma
+        assert (dark_pixels(contrast, 5)[disc].mean() > 0.95) == dark
+        assert not dark_pixels(contrast, 5)[~disc].any() or dark
 
 
 def test_an_appendage_is_never_dark():
-    relative, disc = spotted()
-    relative.sigma[:] = 0.4
-    relative.state[:, 140:145] = PixelState.OFF
-    found = dark_pixels(relative, 5)
-    closed = relative.state == PixelState.OFF
+    contrast, disc = spotted()
+    contrast.sigma[:] = 0.4
+    contrast.state[:, 140:145] = PixelState.OFF
+    found = dark_pixels(contrast, 5)
+    closed = contrast.state == PixelState.OFF
     assert not found[closed].any()
     assert found[disc & ~closed].mean() > 0.95
 

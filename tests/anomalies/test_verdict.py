@@ -9,9 +9,9 @@ from scipy import ndimage
 from shapely.geometry import Polygon, box
 
 from tunneldb.anomalies.background.contrast import ContrastImage
-from tunneldb.anomalies.detect import Detection, Found, find_anomalies
+from tunneldb.anomalies.detect import Anomaly, Detection, find_anomalies
 from tunneldb.anomalies.regions import Region, RegionProperties
-from tunneldb.anomalies.verdict import evidence, judge
+from tunneldb.anomalies.verdict import classify, detectability
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.pixel_state import PixelState
@@ -47,7 +47,7 @@ class Canvas:
     def paint(self, shape: Polygon, drop: float) -> None:
         self.drop = np.maximum(self.drop, drop * ndimage.gaussian_filter(self.inside(shape), 0.4))
 
-    def find_anomalies(self) -> Detection:
+    def detect(self) -> Detection:
         noisy = self.drop + self.rng.normal(0, SIGMA, self.drop.shape)
         empty = self.rng.random(self.drop.shape) > self.filled
         drop = np.full((self.grid.rows, self.grid.columns), NODATA, np.int16)
@@ -68,8 +68,8 @@ def blob(chainage: float, arc: float, area: float, seed: int = 0) -> Polygon:
     return shapely.affinity.scale(shape, np.sqrt(area / shape.area), np.sqrt(area / shape.area))
 
 
-def of_kind(found: Detection, kind: str) -> list[Found]:
-    return [anomaly for anomaly in found.found if anomaly.verdict.kind == kind]
+def of_kind(found: Detection, kind: str) -> list[Anomaly]:
+    return [anomaly for anomaly in found.anomalies if anomaly.verdict.kind == kind]
 
 
 @pytest.mark.parametrize("filled", [0.9, 0.4])
@@ -81,10 +81,10 @@ def test_edges_areas_and_holes_of_leaks_hold_whatever_their_contrast(contrast: f
     for leak in true:
         canvas.paint(leak, contrast * SIGMA)
     found = canvas.detect()
-    assert len(found.found) == len(of_kind(found, "leak")) == len(true)
+    assert len(found.anomalies) == len(of_kind(found, "leak")) == len(true)
     errors = []
     for leak in true:
-        (same,) = (anomaly for anomaly in found.found if anomaly.outline.intersects(leak))
+        (same,) = (anomaly for anomaly in found.anomalies if anomaly.outline.intersects(leak))
         assert same.outline.intersection(leak).area / same.outline.union(leak).area > 0.8
         assert leak.boundary.hausdorff_distance(same.outline.boundary) < 0.08
         assert len(same.outline.interiors) == len(leak.interiors)
@@ -112,7 +112,7 @@ def test_drips_are_a_part_of_the_patch_above_them() -> None:
         strangers.append(shapely.Point(middle, patch.centroid.y - down * 0.65).buffer(0.05))
     for shape in (*patches, *drips, *strangers):
         canvas.paint(shape, 3.0)
-    found = canvas.detect().found
+    found = canvas.detect().anomalies
     assert len(found) == 2
     for patch, anomaly in zip(patches, found, strict=True):
         assert anomaly.verdict.kind == "leak"
@@ -150,7 +150,7 @@ def test_a_leak_that_runs_along_a_joint_is_a_leak() -> None:
         canvas.paint(box(middle - 0.01, -HALF, middle + 0.01, HALF), 3.0)
         canvas.paint(Polygon([*zip(middle - half, y, strict=True), *zip((middle + half)[::-1], y[::-1], strict=True)]), 2.5)
     found = canvas.detect()
-    assert [anomaly.verdict.kind for anomaly in found.found] == ["leak"] * 3
+    assert [anomaly.verdict.kind for anomaly in found.anomalies] == ["leak"] * 3
 
 
 @pytest.mark.parametrize("drop", [1.2, 2.0])
@@ -159,7 +159,7 @@ def test_repairs_and_stripes_have_straight_sides(drop: float) -> None:
     for k, (along, across) in enumerate([(1.2, 0.8), (0.5, 0.6), (0.4, 1.5), (1.0, 1.0)]):
         canvas.paint(box(1 + 3 * k, 0.5, 1 + 3 * k + along, 0.5 + across), drop)
     canvas.paint(box(1.0, -2.0, 9.0, -1.89), 3.5)
-    found = canvas.detect().found
+    found = canvas.detect().anomalies
     assert len(found) == 5
     assert all(anomaly.verdict.kind == "dark" for anomaly in found)
     assert sum("rectangular" in anomaly.verdict.reasons for anomaly in found) == 4
@@ -175,7 +175,7 @@ def test_repairs_that_joints_and_appendages_cut_up_have_straight_sides_still(dro
     canvas.paint(box(2.2, -HALF, 2.22, HALF), 3.0)  # a joint through the first
     for hidden in (box(2.3, 1.2, 2.65, 1.6), box(4.0, 0.8, 8.0, 0.95), box(9.9, 0.2, 10.2, 0.5), box(8.9, 1.1, 9.3, 1.5)):
         canvas.state[canvas.inside(hidden) > 0] = PixelState.OFF
-    found = [anomaly for anomaly in canvas.detect().found if anomaly.verdict.kind != "joint"]
+    found = [anomaly for anomaly in canvas.detect().anomalies if anomaly.verdict.kind != "joint"]
     assert len(found) == 4
     assert all(anomaly.verdict.reasons[0] == "rectangular" for anomaly in found)
 
@@ -186,7 +186,7 @@ def test_a_segment_of_a_darker_shade_of_which_a_part_is_dark_enough_is_no_leak()
     canvas.paint(box(4.0, -1.0, 5.5, 2.0), 1.2)
     canvas.drop -= canvas.inside(box(4.0, -1.0, 5.5, 2.0)) * 0.5 * np.clip((canvas.arc + 1.0) / 2.0, 0.0, 1.0)
     found = canvas.detect()
-    assert found.found
+    assert found.anomalies
     assert not of_kind(found, "leak")
 
 
@@ -205,7 +205,7 @@ def test_what_shows_between_appendages_only_is_no_leak() -> None:
     canvas.state[canvas.inside(box(3.0, 0.0, 6.0, 1.2)) > 0] = PixelState.OFF
     canvas.state[canvas.inside(box(3.3, 0.4, 5.7, 0.8)) > 0] = PixelState.LINING
     canvas.paint(box(3.3, 0.4, 5.7, 0.8), 4.0)
-    (only,) = canvas.detect().found
+    (only,) = canvas.detect().anomalies
     assert only.verdict.kind == "dark"
     assert "shadow" in only.verdict.reasons
 
@@ -215,7 +215,7 @@ def test_soot_fades_out() -> None:
     canvas.drop += 2.2 * np.exp(-((canvas.arc / 1.2) ** 2) - ((canvas.chainage - 7) / 4) ** 2)
     found = canvas.detect()
     assert not of_kind(found, "leak")
-    assert {reason for anomaly in found.found for reason in anomaly.verdict.reasons} >= {"gradual"}
+    assert {reason for anomaly in found.anomalies for reason in anomaly.verdict.reasons} >= {"gradual"}
 
 
 def test_a_bolt_pocket_is_dark_and_a_leak_on_the_back_of_a_niche_is_a_leak() -> None:
@@ -241,13 +241,13 @@ def test_a_dark_line_beside_a_cable_is_its_shadow() -> None:
     canvas.state[np.abs(canvas.arc[:, 0] - 1.0) < 0.04] = PixelState.OFF
     canvas.paint(box(2.0, 1.04, 12.0, 1.13), 3.0)
     found = canvas.detect()
-    assert found.found
+    assert found.anomalies
     assert not of_kind(found, "leak")
 
 
 def test_dry_lining_shows_nothing() -> None:
     for filled in (1.0, 0.5, 0.2):
-        assert not Canvas(9, filled).detect().found
+        assert not Canvas(9, filled).detect().anomalies
 
 
 def _region(side: int, drop: float, share: float = 1.0, pixel: float = PIXEL) -> Region:
@@ -255,8 +255,8 @@ def _region(side: int, drop: float, share: float = 1.0, pixel: float = PIXEL) ->
     row, column = np.mgrid[:side, :side]
     mask = np.hypot(row - side / 2 + 0.5, column - side / 2 + 0.5) < side / 2
     filled = round(share * mask.sum())
-    traits = RegionProperties(sigma=filled * SIGMA, rim=4.0 * side, steps=4.0 * side, inside=4.0 * side * drop)
-    return Region(pixel, 0, 0, mask, filled, filled * drop, drop, traits)
+    properties = RegionProperties(sigma=filled * SIGMA, perimeter=4.0 * side, steps=4.0 * side, inside=4.0 * side * drop)
+    return Region(pixel, 0, 0, mask, filled, filled * drop, drop, properties)
 
 
 def test_confidence_grows_with_contrast_size_and_support() -> None:
@@ -265,9 +265,9 @@ def test_confidence_grows_with_contrast_size_and_support() -> None:
         [_region(side, 1.5) for side in (13, 20, 30, 50, 90)],
         [_region(30, 1.5, share) for share in (0.05, 0.1, 0.3, 0.6, 1.0)],
     ):
-        told = [judge(region).confidence for region in grown]
-        assert all(judge(region).kind == "leak" for region in grown)
+        told = [classify(region).confidence for region in grown]
+        assert all(classify(region).kind == "leak" for region in grown)
         assert told == sorted(told)
         assert len(set(told)) == len(told)
         assert 0 < told[0] < told[-1] < 1
-    assert judge(_region(30, 3.0)).confidence == evidence(_region(30, 3.0))
+    assert classify(_region(30, 3.0)).confidence == detectability(_region(30, 3.0))

@@ -120,8 +120,8 @@ def test_defaults_are_those_of_the_parameters() -> None:
 
 
 @kernel
-def classes_of(x, first, last, keys, table, klass):
-    return look_up(x, 0.05, 0.05, first, last, keys, table, klass)
+def classes_of(x, first, last, keys, klass):
+    return look_up(x, 0.05, 0.05, first, last, keys, klass)
 
 
 def test_a_point_finds_the_nearest_cluster() -> None:
@@ -130,7 +130,7 @@ def test_a_point_finds_the_nearest_cluster() -> None:
     for order in ([near, far], [far, near]):
         lookup = Lookup.of(order)
         x = (np.arange(-6, 10) + 0.5) * CELL
-        found = [classes_of(at, lookup.first, lookup.last, lookup.keys, lookup.table, lookup.klass) for at in x]
+        found = [classes_of(at, lookup.first, lookup.last, lookup.keys, lookup.klass) for at in x]
         cells = np.floor(x / CELL).astype(int)
         expected = [
             PointClass.OBJECT if abs(c) <= min(NEAR, abs(c - 3)) else PointClass.APPENDAGE if abs(c - 3) <= NEAR else 0

@@ -17,7 +17,7 @@ from tunneldb.classification.classes import PointClass
 from tunneldb.pipeline import ground as stage
 from tunneldb.pipeline.parameters import settings
 from tunneldb.simulate import Simulation, write
-from tunneldb.store.scene import line_of, load_ground, load_scene
+from tunneldb.store.scene import load_ground, load_scene
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import get_survey
 
@@ -177,9 +177,8 @@ def test_at_the_end_of_a_kilometre_neighbours_find_what_one_whole_shows(sections
     command("run", NAME, "--from", "ground", "--to", "ground")
     survey = get_survey(conn, NAME)
     surface = load_surface(conn, survey)
-    line = line_of(surface)
     xyz, found = points(conn)
-    whole = stage.find(xyz, line, surface, settings())
+    whole = stage.compute_scene(xyz, surface, np.empty((0, 4)), settings())
     assert (whole.classes(xyz) == found).mean() > 0.999
     stored = load_ground(conn, survey, START, START + 40)
     assert whole.ground is not None

@@ -14,26 +14,21 @@ from shapely.geometry import Polygon
 from support.loaded_survey import SURVEY, add_survey
 
 from tests.pipeline.test_detect import APPENDAGE, FLOOR, NAME, command, counts, outlines, parameters, prepare, share_of
-from tunneldb.anomalies import detect as detection
-from tunneldb.anomalies.background.contrast import contrast_image
+from tunneldb.anomalies.background.level import BackgroundLevel
 from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
 from tunneldb.anomalies.regions import Region, RegionProperties
-from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.pipeline import calibration as radiometry
 from tunneldb.pipeline import detect as job
 from tunneldb.pipeline.parameters import settings
 from tunneldb.radiometry.roughness import Roughness
-from tunneldb.raster.accumulator import Accumulator
 from tunneldb.raster.floor import Floor
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.image import lining_image
+from tunneldb.raster.image import LiningImage
 from tunneldb.raster.observation import Observer
-from tunneldb.raster.rasterize import rasterize
 from tunneldb.simulate import Simulation, generate, write
 from tunneldb.simulate.lining.leaks import Leak
 from tunneldb.store.anomaly_parts import replace_parts
 from tunneldb.store.scene import load_arcs
-from tunneldb.store.sources import sources
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import get_survey
 
@@ -81,7 +76,8 @@ def flat(grid: Grid, mean: float, spread: float) -> BackgroundMap:
     """Dry lining that is everywhere alike."""
     rings, bands = np.zeros(grid.columns, np.float32), np.zeros((grid.rows, grid.blocks), np.float32)
     smooth = np.zeros((-(-grid.rows // 25), grid.columns // 25), np.float32)
-    return BackgroundMap(grid, 25, np.full_like(smooth, spread), mean, spread, 1, mean, rings, bands, smooth)
+    level = BackgroundLevel(25, mean, rings, bands, smooth)
+    return BackgroundMap(grid, level, np.full_like(smooth, spread), mean, spread, 1)
 
 
 @pytest.fixture
@@ -91,28 +87,31 @@ def uncut(sections: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> list
     survey = get_survey(conn, NAME)
     there = load_surface(conn, survey)
     surface = replace(there, ends=there.ends - SHIFT, chainages=there.chainages - SHIFT)
-    grid = job._grid(surface, 12, PIXEL)
-    first = int(START - SHIFT)
+    first, values = int(START - SHIFT), settings()
+    inputs = job.load_inputs(conn, survey, 12, values)
+    assert inputs.sample is not None
     floor = Floor.of(first, *load_arcs(conn, survey, int(START), int(START) + 24))
-    values = settings()
-    radiometer = radiometry.find_radiometer(conn, survey, values["intensity.max_incidence"], values["intensity.max_range"])
     depth = values["lining.tolerance"], values["lining.recess"]
-    observer = Observer.of(surface, 12, depth, radiometer, floor, grid.halo * PIXEL)
+    grid = job.kilometre_grid(surface, 12, PIXEL)
     (points,) = conn.execute("SELECT points FROM tunnel.scan_file").fetchone()
-    files = [replace(file, ranges=[(0, points)]) for file in sources(conn, survey, 12)]
-    with Accumulator(grid) as image:
-        rasterize(observer, files, image, ROUGHNESS.sigma, lambda share: None)
-        picture = lining_image(
-            image, observer.floor, SectionOutliers.of(surface), values["appendage.distance"], lambda window: None
-        )
-    dry = map_background(picture)
-    mean, spread = dry.mean, dry.spread
-    even = flat(grid, mean, spread)
-    found = detection.detect(contrast_image(picture, even), even, 0.05)
+    elsewhere = replace(
+        inputs,
+        observer=Observer.of(surface, 12, depth, inputs.observer.radiometer, floor, grid.halo * PIXEL),
+        grid=grid,
+        files=[replace(file, ranges=[(0, points)]) for file in inputs.files],
+    )
     conn.rollback()
-    monkeypatch.setattr(job, "map_dry", lambda picture, _: flat(picture.grid, mean, spread))
+
+    def even(picture: LiningImage, _: object) -> BackgroundMap:
+        dry = map_background(picture)
+        return flat(picture.grid, dry.mean, dry.spread)
+
     monkeypatch.setattr(radiometry, "roughness_of", lambda *_: ROUGHNESS)
-    return [shapely.affinity.translate(anomaly.outline, SHIFT) for anomaly in found.found]
+    monkeypatch.setattr(job, "map_background", even)
+    result = job.compute_detection(elsewhere, inputs.sample, values, lambda window: None, lambda share: None)
+    dry = result.background
+    monkeypatch.setattr(job, "map_background", lambda picture, _: flat(picture.grid, dry.mean, dry.spread))
+    return [shapely.affinity.translate(anomaly.outline, SHIFT) for anomaly in result.anomalies.anomalies]
 
 
 def assert_same(found: dict[int, Polygon], expected: list[Polygon]) -> None:
@@ -200,7 +199,14 @@ def test_pixels_of_two_sizes_are_not_put_together(sections: psycopg.Connection, 
 
 def region(first: int, last: int, row: int = 0) -> Region:
     return Region(
-        0.5, first, row, np.ones((2, last - first), bool), 2 * (last - first), 1.0, float(first), RegionProperties(rim=1.0)
+        0.5,
+        first,
+        row,
+        np.ones((2, last - first), bool),
+        2 * (last - first),
+        1.0,
+        float(first),
+        RegionProperties(perimeter=1.0),
     )
 
 
@@ -227,7 +233,7 @@ def test_any_order_of_kilometres_puts_the_same_together(conn: psycopg.Connection
             made = cluster.region
             box = (made.column, made.row, made.stop, made.row + len(made.mask))
             assert seen.setdefault(box, made).mask.tolist() == made.mask.tolist()
-            assert made.traits == RegionProperties(rim=float(len(cluster.parts)))
+            assert made.properties == RegionProperties(perimeter=float(len(cluster.parts)))
             assert (made.filled, made.drop_max) == (made.mask.sum(), max(part.region.drop_max for part in cluster.parts))
     assert sorted(seen) == [
         (25_500, 9, 26_000, 11), (25_990, 0, 28_020, 2), (26_000, 20, 26_007, 22), (28_000, -9, 28_020, -7),

@@ -16,9 +16,8 @@ from psycopg.conninfo import make_conninfo
 
 from tunneldb.cli.main import _describe_database_error
 from tunneldb.database import connect, copy_binary, pack
-from tunneldb.pipeline.ground import read_points
 from tunneldb.store.catalog import remove_survey
-from tunneldb.store.sources import sample
+from tunneldb.store.sources import load_points, sample
 from tunneldb.store.survey import get_survey
 
 DATABASE = "tunneldb_growth"
@@ -217,7 +216,7 @@ def test_the_ground_holds_up_none_of_its_neighbours_however_many_a_worker_has_do
     """Neighbours read each other's points: were they to keep their locks, none could swap in what it has made."""
     survey = get_survey(conn, "short")
     for _ in range(REPEATS):
-        points, own = read_points(conn, survey, KM, 1000.0 * KM - 30.0, 1000.0 * (KM + 1) + 30.0)
+        points, own = load_points(conn, survey, KM, 1000.0 * KM - 30.0, 1000.0 * (KM + 1) + 30.0)
         assert (own, len(points)) == (1000, 1030)
         assert locked(conn) == set()
         conn.execute("SELECT tunnel_api.class_write(%s, %s, %b)", [survey.id, KM, bytes(own)])

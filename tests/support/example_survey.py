@@ -13,7 +13,7 @@ from psycopg.conninfo import make_conninfo
 from shapely.geometry import Polygon, box
 
 from support.example_objects import CORNER, HALF_FLOOR, SPHERES, THINGS, beside, boxed, relief
-from tunneldb.anomalies.geometries import shapes
+from tunneldb.anomalies.geometries import anomaly_geometries
 from tunneldb.database import install, open_connection
 from tunneldb.geometry.frame import frames_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
@@ -21,7 +21,6 @@ from tunneldb.pipeline.stages import STAGES
 from tunneldb.raster.geotiff import KINDS, Raster, decode, encode
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.pixel_state import PixelState
-from tunneldb.store.images import DARK
 
 DATABASE = "tunneldb_example"
 NAME, SRID, SPACING = "demo-2024", 25830, 10.0
@@ -248,7 +247,7 @@ def _anomaly(
     conn: psycopg.Connection, survey_id: int, surface: Surface, outline: Polygon, kind: str, reasons: list[str],
     confidence: float, drop: float, review: str,
 ) -> None:  # fmt: skip
-    shaped = shapes(outline, surface)
+    shaped = anomaly_geometries(outline, surface)
     west, south, east, north = outline.bounds
     conn.execute(
         "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, "
@@ -257,7 +256,7 @@ def _anomaly(
         "ST_GeomFromWKB(%s, 0), ST_GeomFromWKB(%s, %s), ST_GeomFromWKB(%s, %s), %s)",
         (
             survey_id, KM, west, east, south, north, shaped.clock, kind, reasons, confidence, drop / 0.6, shaped.area, drop,
-            shapely.to_wkb(outline), shapely.to_wkb(shaped.strip), SRID, shapely.to_wkb(shaped.surface), SRID, review,
+            shapely.to_wkb(outline), shapely.to_wkb(shaped.map), SRID, shapely.to_wkb(shaped.surface), SRID, review,
         ),
     )  # fmt: skip
 
@@ -290,7 +289,7 @@ def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines
             _lay(offset, grid, columns, surface, thing)
         values = {
             "corrected": shade, "raw": shade - 0.08 * (x % 20 - 10) ** 2 / 2, "offset": offset,
-            "state": np.where(wet & (np.abs(y) < CORNER), DARK, _states(x, y)),
+            "state": np.where(wet & (np.abs(y) < CORNER), PixelState.DARK, _states(x, y)),
         }  # fmt: skip
         for kind in (*KINDS, "state"):
             held = np.where((np.abs(y) < 9.0) | (kind in ("offset", "state")), values[kind], np.nan).astype(np.float32)

@@ -22,13 +22,13 @@ _STEP = 0.01
 
 
 @dataclass(frozen=True)
-class Shapes:
+class Geometries:
     """A leak in space.
 
     Attributes
     ----------
-    strip : Polygon
-        In the map strip: each vertex lies beside the axis, at its chainage, by its arc (Gonçalves et al.,
+    map : Polygon
+        In the map: each vertex lies beside the axis, at its chainage, by its arc (Gonçalves et al.,
         2012, eq. 1); the tunnel's SRID.
     surface : Polygon
         On the surface, with Z.
@@ -38,13 +38,13 @@ class Shapes:
         Area on the surface, m².
     """
 
-    strip: Polygon
+    map: Polygon
     surface: Polygon
     clock: float
     area: float
 
 
-def shapes(outline: Polygon, surface: Surface) -> Shapes:
+def anomaly_geometries(outline: Polygon, surface: Surface) -> Geometries:
     """Lay an outline in the unrolled plane on the map and on the surface.
 
     Parameters
@@ -55,9 +55,9 @@ def shapes(outline: Polygon, surface: Surface) -> Shapes:
         The tunnel.
     """
     dense = _within(shapely.segmentize(outline, DENSIFY), surface)
-    return Shapes(
-        strip=shapely.transform(dense, lambda unrolled: strip(surface, unrolled)),
-        surface=_roll(dense, surface),
+    return Geometries(
+        map=shapely.transform(dense, lambda unrolled: to_map(surface, unrolled)),
+        surface=_to_space(dense, surface),
         clock=_clock(outline, surface),
         area=_area(outline, surface),
     )
@@ -84,13 +84,13 @@ def _off(unrolled: Float, surface: Surface) -> Bool:
     return np.isnan(surface.to_space(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled)))[:, 0])
 
 
-def strip(surface: Surface, unrolled: Float) -> Float:
-    """Map-strip coordinates (n, 2) of (chainage, arc) rows (n, 2): axis in plan + arc · right."""
+def to_map(surface: Surface, unrolled: Float) -> Float:
+    """Map coordinates (n, 2) of (chainage, arc) rows (n, 2): axis in plan + arc · right."""
     frames = surface.frames(unrolled[:, 0])
     return np.asarray(frames[:, 0, :2] + unrolled[:, 1, None] * frames[:, 2, :2], dtype=np.float64)
 
 
-def _roll(outline: Polygon, surface: Surface) -> Polygon:
+def _to_space(outline: Polygon, surface: Surface) -> Polygon:
     def ring(line: shapely.LinearRing) -> Float:
         unrolled = shapely.get_coordinates(line)
         return surface.to_space(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled)))

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tunneldb.arrays import Float, Int64, Single, UInt8, UInt32
+from tunneldb.arrays import Float, Int64, Single, UInt8
 from tunneldb.classification.classes import PointClass
 from tunneldb.classification.ground.model import Ground
 from tunneldb.classification.lining_relief import Relief, level_at
@@ -90,8 +90,8 @@ class Scene:
         def work(begin: int, end: int) -> None:
             _classes(
                 xyz, unrolled, relief.cell, relief.column, relief.row, relief.offset, relief.spread,
-                inner.first, inner.last, inner.keys, inner.table, inner.klass,
-                outer.first, outer.last, outer.keys, outer.table, outer.klass,
+                inner.first, inner.last, inner.keys, inner.klass,
+                outer.first, outer.last, outer.keys, outer.klass,
                 begin, end, out,
             )  # fmt: skip
 
@@ -111,8 +111,8 @@ class Scene:
 def _classes(
     xyz: Float, unrolled: Float, cell: float, column: int, row: int,
     relief: Single, spread: Single,
-    inner_first: Int64, inner_last: Int64, inner_keys: Int64, inner_table: UInt32, inner_klass: UInt8,
-    outer_first: Int64, outer_last: Int64, outer_keys: Int64, outer_table: UInt32, outer_klass: UInt8,
+    inner_first: Int64, inner_last: Int64, inner_keys: Int64, inner_klass: UInt8,
+    outer_first: Int64, outer_last: Int64, outer_keys: Int64, outer_klass: UInt8,
     begin: int, end: int, out: UInt8,
 ) -> None:  # fmt: skip  # pragma: no cover - compiled
     for i in range(begin, end):
@@ -126,9 +126,9 @@ def _classes(
             continue
         x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
         if off < 0.0:
-            klass = look_up(x, y, z, outer_first, outer_last, outer_keys, outer_table, outer_klass)
+            klass = look_up(x, y, z, outer_first, outer_last, outer_keys, outer_klass)
         else:
-            klass = look_up(x, y, z, inner_first, inner_last, inner_keys, inner_table, inner_klass)
+            klass = look_up(x, y, z, inner_first, inner_last, inner_keys, inner_klass)
         if klass == 0:  # no cluster: of the lining's rough edge, or in the air
             klass = _LINING if abs(off) <= 2.0 else _NOISE
         out[i] = klass

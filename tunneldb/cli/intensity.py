@@ -59,11 +59,11 @@ def intensity(
     if survey.lower().endswith(_FILES):
         if km is not None:
             raise UserError("--km is of a survey, not of a file")
-        look = _look_at_file(Path(survey), intensity, intensity_kind, scanner)
+        look = _diagnose_file(Path(survey), intensity, intensity_kind, scanner)
     else:
         if intensity is not None or intensity_kind is not None or scanner is not None:
             raise UserError(f"--intensity, --intensity-kind and --scanner are for a file; the survey {survey} has its own")
-        look = _look_at_survey(settings, survey, km)
+        look = _diagnose_survey(settings, survey, km)
     tell(title=look.title, dependence=look.dependence, verdict=look.dependence.verdict(), notes=look.notes, file=output)
     _print(look)
     if output is not None:
@@ -71,19 +71,21 @@ def intensity(
         click.echo(f"figure to {output}", err=True)
 
 
-def _look_at_file(path: Path, dimension: str | None, kind: str | None, scanner: tuple[float, float, float] | None) -> Diagnosis:
-    from tunneldb.pipeline.intensity_diagnosis import look_at_file
+def _diagnose_file(
+    path: Path, dimension: str | None, kind: str | None, scanner: tuple[float, float, float] | None
+) -> Diagnosis:
+    from tunneldb.pipeline.intensity_diagnosis import diagnose_file
 
     if dimension is None:
         raise UserError(f"{path}: say which dimension holds the intensity: --intensity DIMENSION")
     if kind is None:
         raise UserError(f"{path}: say what {dimension} is: --intensity-kind {'|'.join(get_args(Kind))}")
     with bar("points") as progress:
-        return look_at_file(path, dimension, cast(Kind, kind), scanner, step(progress))
+        return diagnose_file(path, dimension, cast(Kind, kind), scanner, step(progress))
 
 
-def _look_at_survey(settings: Settings, name: str, km: str | None) -> Diagnosis:
-    from tunneldb.pipeline.intensity_diagnosis import look_at_survey
+def _diagnose_survey(settings: Settings, name: str, km: str | None) -> Diagnosis:
+    from tunneldb.pipeline.intensity_diagnosis import diagnose_survey
     from tunneldb.pipeline.parameters import settings as defaults
     from tunneldb.pipeline.run import loaded_kilometres, parse_km
 
@@ -91,7 +93,7 @@ def _look_at_survey(settings: Settings, name: str, km: str | None) -> Diagnosis:
         survey = get_survey(conn, name)
         kilometres = parse_km(km, loaded_kilometres(conn, survey))
         with bar("km") as progress:
-            return look_at_survey(conn, survey, kilometres, defaults(), step(progress)("intensity", len(kilometres)))
+            return diagnose_survey(conn, survey, kilometres, defaults(), step(progress)("intensity", len(kilometres)))
 
 
 def _print(look: Diagnosis) -> None:

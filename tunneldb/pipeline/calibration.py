@@ -1,21 +1,20 @@
-"""What the intensity of a kilometre is corrected with: scanner positions, range curve, roughness, found on a sample."""
+"""What the intensity of a kilometre is corrected with: range curve and roughness, found on a sample of its points."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, cast
 
 import numpy as np
-import psycopg
 import shapely
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.contrast import ContrastImage
-from tunneldb.anomalies.detect import Detection, dry_places
+from tunneldb.anomalies.detect import Detection, background_places
 from tunneldb.arrays import Bool, Int32, Int64
 from tunneldb.errors import UserError
+from tunneldb.pointcloud.points import Points
 from tunneldb.radiometry.cells import IntensitySamples
-from tunneldb.radiometry.correction import Kind, Observations, needs_reference, range_span
+from tunneldb.radiometry.correction import Observations, range_span
 from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.radiometry.robust_statistics import DryLevel, plain_statistics
@@ -27,10 +26,7 @@ from tunneldb.radiometry.roughness import (
     drawn_regions,
     find_roughness,
 )
-from tunneldb.raster.observation import ObservedPoints, Observer, Radiometer, RangeSpan
-from tunneldb.store.images import load_reference
-from tunneldb.store.sources import load_poses, sample
-from tunneldb.store.survey import Survey
+from tunneldb.raster.observation import ObservedPoints, Observer, RangeSpan
 
 CORNER = 0.1
 """Points that serve for the roughness lie farther above the foot of the wall, m: there sections are rounded, and the incidence
@@ -114,30 +110,9 @@ class Calibration:
         return "hardly any lining was seen by two scans: the range curve rests on its being alike along the tunnel, within 5 m"
 
 
-def find_radiometer(conn: psycopg.Connection[Any], survey: Survey, max_incidence: float, max_range: float) -> Radiometer | None:
-    """Gather what a survey's intensity is corrected with; None when it has none.
-
-    A range curve that is to be found on the lining is UNKNOWN at first: see :func:`calibrate`.
-    """
-    if survey.intensity_kind == "none":
-        return None
-    kind = cast(Kind, survey.intensity_kind)
-    reference = None
-    if needs_reference(kind):
-        reference = UNKNOWN if survey.reference == "auto" else load_reference(conn, survey)
-    if needs_reference(kind) and reference is None:
-        raise UserError(
-            f"survey {survey.name} has no reference curve, without which intensity of kind {kind} can't be corrected for"
-            " distance: add the survey with --reference CSV (range_m,intensity_db), or with --reference auto to have it"
-            " found on the lining, or take a reflectance dimension"
-        )
-    return Radiometer(kind, load_poses(conn, survey), reference, max_incidence, max_range)
-
-
-def take_sample(conn: psycopg.Connection[Any], survey: Survey, observer: Observer) -> Sample:
-    """Look at points of survey density, and check their ranges against the reference curve before files are read."""
-    points = sample(conn, survey, observer.km)
-    seen = observer.observe(points, f"survey {survey.name}")
+def observe_sample(points: Points, observer: Observer, survey: str) -> Sample:
+    """Observe points of survey density, and check their ranges against the reference curve before files are read."""
+    seen = observer.observe(points, f"survey {survey}")
     if not seen.lining.any():
         raise UserError(
             f"no point of kilometre {observer.km} lies on the lining: within {observer.tolerance:g} m of the sections and seen"
@@ -152,32 +127,36 @@ def take_sample(conn: psycopg.Connection[Any], survey: Survey, observer: Observe
     return Sample(seen, points.scan_id, seen.lining & ~observer.floor.covers(seen.chainage, seen.arc, CORNER))
 
 
-def calibrate(conn: psycopg.Connection[Any], survey: Survey, observer: Observer, drawn: list[Polygon]) -> Calibration:
+def calibrate(points: Points, observer: Observer, drawn: list[Polygon], survey: str, *, own_curve: bool) -> Calibration:
     """Find range curve and roughness of a kilometre on points of survey density.
 
     Parameters
     ----------
-    conn, survey
-        Where.
+    points : Points
+        Points of the kilometre.
     observer : Observer
-        Of :func:`find_radiometer`'s radiometer.
+        Its radiometer's range curve is UNKNOWN where it is to be found.
     drawn : list of Polygon
         Homogeneous regions that the user drew, if any: they decide about the roughness.
+    survey : str
+        Name of the survey, for errors.
+    own_curve : bool
+        Whether the range curve is to be found on these points.
 
     Raises
     ------
     UserError
         If nothing is seen of the lining, it lies outside the reference curve, or its own curve can't be found on it.
     """
-    view = take_sample(conn, survey, observer)
-    if survey.reference != "auto":
+    view = observe_sample(points, observer, survey)
+    if not own_curve:
         return Calibration(observer, view, roughness_of(view, drawn), None)
     assert observer.radiometer is not None
     try:
         found = find_range_curve(view, observer)
         found.require()
     except UserError as error:
-        raise UserError(f"survey {survey.name}, kilometre {observer.km}: {error}; {BORROW}") from None
+        raise UserError(f"survey {survey}, kilometre {observer.km}: {error}; {BORROW}") from None
     observer = replace(observer, radiometer=replace(observer.radiometer, reference=found.curve))
     view = view.along(found.curve)
     return Calibration(observer, view, roughness_of(view, drawn) if drawn else _roughness_found(view, found), found)
@@ -255,7 +234,7 @@ def dry_sigma(
     if dry_regions:
         dry = seen.lining & (_polygon_of(seen, dry_regions) >= 0)
     else:
-        dry = view.clear & dry_places(darker, found, seen.chainage, seen.arc)
+        dry = view.clear & background_places(darker, found, seen.chainage, seen.arc)
     return (
         plain_statistics(observations.raw_db[dry]),
         plain_statistics(observations.corrected(0.0)[dry]),

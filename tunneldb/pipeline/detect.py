@@ -3,46 +3,114 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 import psycopg
+from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.contrast import contrast_image
-from tunneldb.anomalies.background.level_map import map_background
-from tunneldb.anomalies.coverage import measure_coverage
-from tunneldb.anomalies.detect import find_anomalies
+from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
+from tunneldb.anomalies.coverage import Coverage, measure_coverage
+from tunneldb.anomalies.detect import Detection, find_anomalies
+from tunneldb.arrays import UInt8
 from tunneldb.errors import UserError
-from tunneldb.geometry.section_outliers import SectionOutliers
+from tunneldb.geometry.section_outliers import MOST, SectionOutliers
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
-from tunneldb.pipeline.calibration import calibrate, dry_sigma, find_radiometer
+from tunneldb.pipeline.calibration import UNKNOWN, Calibration, calibrate, dry_sigma
+from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.reader import ScanSource
+from tunneldb.radiometry.correction import Kind, needs_reference
+from tunneldb.radiometry.robust_statistics import DryLevel
 from tunneldb.radiometry.roughness import Roughness
-from tunneldb.raster.accumulator import Accumulator
+from tunneldb.raster.accumulator import Accumulator, Window
 from tunneldb.raster.floor import HIDDEN, Floor
 from tunneldb.raster.geotiff import KINDS
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import halo, lining_image
-from tunneldb.raster.observation import Observer
+from tunneldb.raster.observation import Observer, Radiometer
 from tunneldb.raster.rasterize import Counts, rasterize
 from tunneldb.store.anomalies import save_anomalies
 from tunneldb.store.images import (
     ImageStore,
     drop_coverage,
     drop_radiometry,
+    load_reference,
     load_regions,
     save_coverage,
     save_radiometry,
     save_range_curve,
 )
 from tunneldb.store.scene import load_arcs
-from tunneldb.store.sources import sources
+from tunneldb.store.sources import load_poses, sample, sources
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
 ASIDE = 50.0
 """Length of the surface beyond the ends that is loaded too: sections are judged by the three before and after them, m."""
+
+
+@dataclass(frozen=True)
+class DetectionInputs:
+    """What detection in a kilometre goes by.
+
+    Attributes
+    ----------
+    survey : str
+        Its name, for errors.
+    observer : Observer
+        The surface, the floor and the scanner; without a radiometer where there is no intensity.
+    grid : Grid
+        Pixels of the kilometre and its halo.
+    files : list of ScanSource
+        What is read at full density.
+    sample : Points or None
+        Points of survey density; None where there is no intensity.
+    own_curve : bool
+        Whether the range curve is to be found on the lining.
+    homogeneous, dry : list of Polygon
+        Regions that the user drew.
+    """
+
+    survey: str
+    observer: Observer
+    grid: Grid
+    files: list[ScanSource]
+    sample: Points | None
+    own_curve: bool
+    homogeneous: list[Polygon]
+    dry: list[Polygon]
+
+
+@dataclass(frozen=True)
+class DetectionResult:
+    """What detection found in a kilometre.
+
+    Attributes
+    ----------
+    counts : dict
+        Points that were read and seen.
+    calibration : Calibration
+        What the intensity was corrected with.
+    background : BackgroundMap
+        The dry lining.
+    state : (rows, columns) uint8 array
+        State of each pixel.
+    anomalies : Detection
+    dry_levels : three DryLevel
+        Dry lining points, raw and corrected by Lambert's law and Oren–Nayar.
+    coverage : Coverage
+    """
+
+    counts: Counts
+    calibration: Calibration
+    background: BackgroundMap
+    state: UInt8
+    anomalies: Detection
+    dry_levels: tuple[DryLevel, DryLevel, DryLevel]
+    coverage: Coverage
 
 
 def detect(
@@ -61,33 +129,121 @@ def detect(
     UserError
         If there are no sections, the ground was not sought, a file is gone or was changed, or intensity can't be corrected.
     """
+    inputs = load_inputs(conn, survey, km, values)
+    if inputs.sample is None:
+        images = ImageStore(conn, survey, inputs.grid, ["offset"])
+        counts = make_offset_images(inputs, images.save, progress)
+        drop_radiometry(conn, survey, km)
+        drop_coverage(conn, survey, km)
+        save_range_curve(conn, survey, km, None)
+        save_anomalies(conn, survey, km, inputs.observer.surface, [], [], 0.0)
+        return {
+            **counts,
+            "pixels": images.pixels,
+            "leaks": 0,
+            "note": "no intensity: offset image only, no leaks sought",
+        }
+    images = ImageStore(conn, survey, inputs.grid, KINDS)
+    result = compute_detection(inputs, inputs.sample, values, images.save, progress)
+    return _save(conn, survey, inputs, result, images, values["leak.min_area"])
+
+
+def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float]) -> DetectionInputs:
+    """Read what detection in a kilometre goes by.
+
+    Raises
+    ------
+    UserError
+        If there are no sections, the ground was not sought, or a file is gone or was changed.
+    """
     surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
-    grid = _grid(surface, km, values["image.pixel"])
+    grid = kilometre_grid(surface, km, values["image.pixel"])
     files = sources(conn, survey, km)
-    radiometer = find_radiometer(conn, survey, values["intensity.max_incidence"], values["intensity.max_range"])
+    radiometer = load_radiometer(conn, survey, values["intensity.max_incidence"], values["intensity.max_range"])
     beyond = grid.halo * grid.pixel
     depth = values["lining.tolerance"], values["lining.recess"]
     observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, km, beyond), beyond)
-    with Accumulator(grid) as image:
-        if radiometer is None:
-            return _offset_only(conn, survey, observer, files, image, progress)
-        known = calibrate(conn, survey, observer, load_regions(conn, survey, km, "homogeneous"))
-        observer, view, roughness = known.observer, known.view, known.roughness
-        counts = _gather(observer, files, image, roughness.sigma, progress)
-        images = ImageStore(conn, survey, grid, KINDS)
-        picture = lining_image(image, observer.floor, SectionOutliers.of(surface), values["appendage.distance"], images.save)
-    dry_regions = load_regions(conn, survey, km, "dry")
-    dry = map_background(picture, dry_regions)
-    darker = contrast_image(picture, dry)
-    found = find_anomalies(darker, dry, values["leak.min_area"])
-    images.save_states(darker.state, found.dark)
-    save_range_curve(conn, survey, km, known.found)
-    save_radiometry(conn, survey, km, roughness, dry, found, dry_sigma(view, darker, found, roughness, dry_regions))
-    coverage = measure_coverage(darker.state, found.wet, grid, found.size)
-    save_coverage(conn, survey, km, coverage)
-    matched = save_anomalies(conn, survey, km, surface, found.found, found.cut, values["leak.min_area"])
+    return DetectionInputs(
+        survey.name,
+        observer,
+        grid,
+        files,
+        None if radiometer is None else sample(conn, survey, km),
+        survey.reference == "auto",
+        load_regions(conn, survey, km, "homogeneous"),
+        load_regions(conn, survey, km, "dry"),
+    )
+
+
+def compute_detection(
+    inputs: DetectionInputs,
+    sample: Points,
+    values: Mapping[str, float],
+    save_block: Callable[[Window], None],
+    progress: Callable[[float], None],
+) -> DetectionResult:
+    """Calibrate the intensity, make the images from the files, and find what is dark in them.
+
+    Parameters
+    ----------
+    inputs : DetectionInputs
+    sample : Points
+        Points of survey density, on which the intensity is calibrated.
+    values : mapping
+        Parameters of the stage.
+    save_block : callable
+        Given each block of the images as soon as no more points fall into it.
+    progress : callable
+        Given the share of the points that were read.
+    """
+    calibration = calibrate(sample, inputs.observer, inputs.homogeneous, inputs.survey, own_curve=inputs.own_curve)
+    observer, view, roughness = calibration.observer, calibration.view, calibration.roughness
+    with Accumulator(inputs.grid) as image:
+        counts = _gather(observer, inputs.files, image, roughness.sigma, progress)
+        outliers = SectionOutliers.of(observer.surface, MOST)
+        lining = lining_image(image, observer.floor, outliers, values["appendage.distance"], save_block)
+    background = map_background(lining, inputs.dry)
+    contrast = contrast_image(lining, background)
+    found = find_anomalies(contrast, background, values["leak.min_area"])
+    return DetectionResult(
+        counts,
+        calibration,
+        background,
+        contrast.state,
+        found,
+        dry_sigma(view, contrast, found, roughness, inputs.dry),
+        measure_coverage(contrast.state, found.wet, inputs.grid, found.size),
+    )
+
+
+def make_offset_images(
+    inputs: DetectionInputs, save_block: Callable[[Window], None], progress: Callable[[float], None]
+) -> Counts:
+    """Make the offset image of a survey without intensity."""
+    with Accumulator(inputs.grid) as image:
+        counts = _gather(inputs.observer, inputs.files, image, 0.0, progress)
+        for block in image.inner_blocks():
+            save_block(image.window(block * image.grid.block_columns, (block + 1) * image.grid.block_columns))
+    return counts
+
+
+def _save(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    inputs: DetectionInputs,
+    result: DetectionResult,
+    images: ImageStore,
+    min_area: float,
+) -> Counts:
+    km, surface, found, roughness = inputs.grid.km, inputs.observer.surface, result.anomalies, result.calibration.roughness
+    images.save_states(result.state, found.dark)
+    save_range_curve(conn, survey, km, result.calibration.found)
+    save_radiometry(conn, survey, km, roughness, result.background, found, result.dry_levels)
+    save_coverage(conn, survey, km, result.coverage)
+    matched = save_anomalies(conn, survey, km, surface, found.anomalies, found.cut, min_area)
+    coverage = result.coverage
     return {
-        **counts,
+        **result.counts,
         "pixels": images.pixels,
         "lining_pixels": found.pixels,
         "wet_pixels": found.wet_pixels,
@@ -100,8 +256,28 @@ def detect(
         "leaks_again": matched.again,
         "leaks_kept_for_review": matched.kept,
         "leaks_gone": matched.gone,
-        **_report(roughness, known.note, matched.other_pixels),
+        **_report(roughness, result.calibration.note, matched.other_pixels),
     }
+
+
+def load_radiometer(conn: psycopg.Connection[Any], survey: Survey, max_incidence: float, max_range: float) -> Radiometer | None:
+    """Read what a survey's intensity is corrected with; None when it has none.
+
+    A range curve that is to be found on the lining is UNKNOWN at first: see :func:`tunneldb.pipeline.calibration.calibrate`.
+    """
+    if survey.intensity_kind == "none":
+        return None
+    kind = cast(Kind, survey.intensity_kind)
+    reference = None
+    if needs_reference(kind):
+        reference = UNKNOWN if survey.reference == "auto" else load_reference(conn, survey)
+    if needs_reference(kind) and reference is None:
+        raise UserError(
+            f"survey {survey.name} has no reference curve, without which intensity of kind {kind} can't be corrected for"
+            " distance: add the survey with --reference CSV (range_m,intensity_db), or with --reference auto to have it"
+            " found on the lining, or take a reflectance dimension"
+        )
+    return Radiometer(kind, load_poses(conn, survey), reference, max_incidence, max_range)
 
 
 def load_floor(conn: psycopg.Connection[Any], survey: Survey, km: int, halo: float) -> Floor:
@@ -118,31 +294,6 @@ def load_floor(conn: psycopg.Connection[Any], survey: Survey, km: int, halo: flo
     return Floor.of(first, *load_arcs(conn, survey, first, int((km + 1) * KILOMETRE) + beyond))
 
 
-def _offset_only(
-    conn: psycopg.Connection[Any],
-    survey: Survey,
-    observer: Observer,
-    files: list[ScanSource],
-    image: Accumulator,
-    progress: Callable[[float], None],
-) -> Counts:
-    """Make the offset image of a survey without intensity."""
-    counts = _gather(observer, files, image, 0.0, progress)
-    images = ImageStore(conn, survey, image.grid, ["offset"])
-    for block in image.inner_blocks():
-        images.save(image.window(block * image.grid.block_columns, (block + 1) * image.grid.block_columns))
-    drop_radiometry(conn, survey, observer.km)
-    drop_coverage(conn, survey, observer.km)
-    save_range_curve(conn, survey, observer.km, None)
-    save_anomalies(conn, survey, observer.km, observer.surface, [], [], 0.0)
-    return {
-        **counts,
-        "pixels": images.pixels,
-        "leaks": 0,
-        "note": "no intensity: offset image only, no leaks sought",
-    }
-
-
 def _gather(
     observer: Observer, files: list[ScanSource], image: Accumulator, roughness: float, progress: Callable[[float], None]
 ) -> Counts:
@@ -155,7 +306,7 @@ def _gather(
     return counts
 
 
-def _grid(surface: Surface, km: int, pixel: float) -> Grid:
+def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
     """Grid of a kilometre and its halo, from the lowest to the highest arc of their sections."""
     first, last = km * KILOMETRE - surface.reach, (km + 1) * KILOMETRE + surface.reach
     if not ((surface.chainages >= first) & (surface.chainages <= last)).any():

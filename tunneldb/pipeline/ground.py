@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import psycopg
-from psycopg import sql
 
 from tunneldb.arrays import Float
 from tunneldb.classification.classes import PointClass
@@ -17,21 +16,14 @@ from tunneldb.classification.ground.extraction import MARGIN, GroundSettings, fi
 from tunneldb.classification.ground.wall_arcs import foot_arcs
 from tunneldb.classification.objects.objects import ClusterSettings
 from tunneldb.classification.scene import Scene
-from tunneldb.database.fetch import fetch_array
-from tunneldb.errors import UserError
-from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
-from tunneldb.store.partition import partition, partition_exists
-from tunneldb.store.scene import line_of, load_spheres, save_clusters, save_ground, save_relief
+from tunneldb.store.scene import line_of, load_spheres, save_classes, save_clusters, save_ground, save_relief
+from tunneldb.store.sources import load_points
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
 Counts = dict[str, Any]
-
-_XYZ: tuple[tuple[str, str, sql.Composable], ...] = tuple(
-    (axis, "f8", sql.SQL("public.{}(geom)").format(sql.Identifier(f"st_{axis}"))) for axis in "xyz"
-)
 
 
 def ground(
@@ -53,53 +45,35 @@ def ground(
     """
     begin, end = km * KILOMETRE - MARGIN, (km + 1) * KILOMETRE + MARGIN
     surface = load_surface(conn, survey, begin, end)
-    points, own = read_points(conn, survey, km, begin, end)
+    points, own = load_points(conn, survey, km, begin, end)
+    spheres = load_spheres(conn, survey, km, km)
     progress(0.2)
-    line = line_of(surface)
-    scene = replace(find(points, line, surface, values), spheres=load_spheres(conn, survey, km, km))
+    scene = compute_scene(points, surface, spheres, values)
     progress(0.6)
     classes = scene.classes(points[:own])
-    metres = save_ground(conn, survey, km, line, scene.ground, foot_arcs(scene.ground, line, surface))
+    metres = save_ground(conn, survey, km, scene.line, scene.ground, foot_arcs(scene.ground, scene.line, surface))
     save_relief(conn, survey, km, scene.relief)
     clusters = save_clusters(conn, survey, km, scene.clusters)
     progress(0.8)
-    conn.execute("SELECT tunnel_api.class_write(%s, %s, %b)", [survey.id, km, classes.tobytes()])
+    save_classes(conn, survey, km, classes)
     count = np.bincount(classes, minlength=256)
     return {"metres": metres, "clusters": clusters, **{klass.name.lower(): int(count[klass]) for klass in PointClass}}
 
 
-def find(points: Float, line: PlanLine, surface: Surface, values: Mapping[str, float]) -> Scene:
-    """Find ground, lining and clusters from points (n, 3) of survey density, m."""
-    found = find_ground(points, line, GroundSettings.of(values))
-    return find_scene(points, line, surface, found, ClusterSettings.of(values))
+def compute_scene(points: Float, surface: Surface, spheres: Float, values: Mapping[str, float]) -> Scene:
+    """Find ground, lining and clusters.
 
-
-def read_points(conn: psycopg.Connection[Any], survey: Survey, km: int, begin: float, end: float) -> tuple[Float, int]:
-    """Read the points of a kilometre, in the order of its rows, and after them those of its neighbours between two chainages.
-
-    Returns
-    -------
+    Parameters
+    ----------
     points : (n, 3) float array
-        m.
-    own : int
-        How many are the kilometre's own.
-
-    Raises
-    ------
-    UserError
-        If it has none.
+        Points of survey density, m.
+    surface : Surface
+        The tunnel there.
+    spheres : (k, 4) float array
+        Centres and radii of the target spheres there, m.
+    values : mapping
+        Parameters of the stage.
     """
-    limits = {km: "true", km - 1: "chainage >= %(begin)s", km + 1: "chainage < %(end)s"}
-    parts = []
-    # Rolled back for the sake of its locks: of two neighbours that held each other's points none could swap in its own.
-    with conn.transaction(force_rollback=True):
-        conn.execute("SET LOCAL synchronize_seqscans = off")  # row by row, from the first one
-        conn.execute("SET LOCAL max_parallel_workers_per_gather = 0")
-        for part, limit in limits.items():
-            if partition_exists(conn, survey, part):
-                source = sql.SQL("FROM {} WHERE ").format(partition(survey, part)) + sql.SQL(limit)
-                rows = fetch_array(conn, _XYZ, source, {"begin": begin, "end": end})
-                parts.append(np.column_stack([rows[axis] for axis in "xyz"]))
-            elif part == km:
-                raise UserError(f"survey {survey.name} has no points in kilometre {km}")
-    return np.concatenate(parts), len(parts[0])
+    line = line_of(surface)
+    found = find_ground(points, line, GroundSettings.of(values))
+    return replace(find_scene(points, line, surface, found, ClusterSettings.of(values)), spheres=spheres)

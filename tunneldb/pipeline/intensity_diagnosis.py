@@ -1,4 +1,4 @@
-"""Whether intensity depends on range or incidence: looks at a survey, or at a scan file by itself."""
+"""Whether intensity depends on range or incidence: diagnoses of a survey, and of a scan file by itself."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from tunneldb.arrays import Float, Int32, Single
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.pipeline.calibration import UNKNOWN, find_radiometer, find_range_curve, roughness_of, take_sample
-from tunneldb.pipeline.detect import ASIDE, load_floor
+from tunneldb.pipeline.calibration import UNKNOWN, find_range_curve, observe_sample, roughness_of
+from tunneldb.pipeline.detect import ASIDE, load_floor, load_radiometer
 from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_scans
 from tunneldb.pointcloud.reader import Points, read_chunks, read_header
 from tunneldb.pointcloud.thinning import thin
@@ -28,7 +28,7 @@ from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.raster.observation import Observer
 from tunneldb.store.images import load_reference, load_regions
-from tunneldb.store.sources import SAMPLE
+from tunneldb.store.sources import SAMPLE, sample
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
@@ -39,7 +39,7 @@ MOST_POINTS = 2_000_000
 """Points of a thinned scan, at the most."""
 
 
-def look_at_survey(
+def diagnose_survey(
     conn: psycopg.Connection[Any],
     survey: Survey,
     kilometres: Sequence[int],
@@ -65,22 +65,22 @@ def look_at_survey(
     if survey.intensity_kind == "none":
         raise UserError(f"survey {survey.name} has no intensity: it was added with --intensity-kind none")
     share = max(1, SAMPLE // len(kilometres))
-    looks = []
+    diagnoses = []
     for km in kilometres:
-        looks.append(_look_at_kilometre(conn, survey, km, values, share))
+        diagnoses.append(_diagnose_kilometre(conn, survey, km, values, share))
         progress(1)
     numbers = ", ".join(map(str, kilometres))
-    return pool(f"{survey.name}, kilometre {numbers}: {survey.intensity_kind}", looks)
+    return pool(f"{survey.name}, kilometre {numbers}: {survey.intensity_kind}", diagnoses)
 
 
-def _look_at_kilometre(
+def _diagnose_kilometre(
     conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], most: int
 ) -> Diagnosis:
     kind = cast(Kind, survey.intensity_kind)
     measured = load_reference(conn, survey) if needs_reference(kind) else None
     surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
     # Without a curve the lining itself is asked, whether or not detection is to go by it.
-    radiometer = find_radiometer(
+    radiometer = load_radiometer(
         conn,
         survey if measured else replace(survey, reference="auto"),
         values["intensity.max_incidence"],
@@ -88,7 +88,7 @@ def _look_at_kilometre(
     )
     depth = values["lining.tolerance"], values["lining.recess"]
     observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, km, 0.0))
-    view = take_sample(conn, survey, observer)
+    view = observe_sample(sample(conn, survey, km), observer, survey.name)
     found, refused = _attempt(lambda: find_range_curve(view, observer), view.observations.raw_db[view.telling])
     if needs_reference(kind) and measured is None:
         roughness, note = found.roughness if found else None, None
@@ -99,7 +99,7 @@ def _look_at_kilometre(
     near = np.flatnonzero(view.telling)
     near = near[:: max(1, len(near) // most)]
     seen = view.observations
-    return _look(
+    return _diagnosis(
         f"kilometre {km}",
         kind,
         _Points(*(v[near].astype(np.float64) for v in (seen.range_m, seen.cosine, seen.raw_db, seen.distance_db))),
@@ -110,7 +110,7 @@ def _look_at_kilometre(
     )
 
 
-def look_at_file(
+def diagnose_file(
     path: Path,
     dimension: str,
     kind: Kind,
@@ -164,7 +164,7 @@ def look_at_file(
     if found and needs_reference(kind):
         distance = level - found.curve(range_m)
     roughness = found.roughness if found else None
-    return _look(path.name, kind, _Points(range_m, cosine, level, distance), roughness, found, None, [refused])
+    return _diagnosis(path.name, kind, _Points(range_m, cosine, level, distance), roughness, found, None, [refused])
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ class _Points:
     distance: Float
 
 
-def _look(
+def _diagnosis(
     title: str,
     kind: Kind,
     points: _Points,

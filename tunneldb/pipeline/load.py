@@ -31,7 +31,7 @@ from tunneldb.store.partition import (
     swap_partition,
     write_partition,
 )
-from tunneldb.store.scan_files import COUNTED, Loaded, change_counts, outcome, recorded_files, unchanged
+from tunneldb.store.scan_files import COUNTED, Loaded, change_counts, outcome, record_loaded, recorded_files, unchanged
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
@@ -130,7 +130,7 @@ def merge(
         edge = None if len(waiting) == 1 and not before.any() else settings.edge
         written = write_partition(conn, survey, km, parts, edge, file_ids, advance)
     drop_fragments(conn, survey, stored, [km])
-    _settle(conn, km, list(waiting))
+    record_loaded(conn, km, list(waiting))
     changes = {}
     for file_id, tag in tags.items():
         change = int(written[tag] - before[tag])
@@ -149,14 +149,6 @@ def finish(conn: psycopg.Connection[Any], survey: Survey, merged: Sequence[Merge
             kept, thinned = changes.get(file_id, (0, 0))
             changes[file_id] = (kept + change[0], thinned + change[1])
     change_counts(conn, changes)
-
-
-def _settle(conn: psycopg.Connection[Any], km: int, file_ids: list[int]) -> None:
-    """Enter that files are loaded into a kilometre; those that have left it are forgotten there."""
-    conn.execute(
-        "DELETE FROM tunnel.file_km WHERE file_id = ANY (%s) AND km = %s AND isempty(points) AND rows = 0", [file_ids, km]
-    )
-    conn.execute("UPDATE tunnel.file_km SET loaded_at = clock_timestamp() WHERE file_id = ANY (%s) AND km = %s", [file_ids, km])
 
 
 def load_files(

@@ -11,7 +11,7 @@ import numpy as np
 from tunneldb.arrays import Float, Int64
 from tunneldb.csvfile import read_csv
 from tunneldb.errors import UserError
-from tunneldb.pipeline.targets import Found
+from tunneldb.pipeline.targets import TargetObservation
 from tunneldb.registration.control import Match, Motion, best_motion, match
 
 SAME_PLACE = 0.001  # m
@@ -90,7 +90,7 @@ def read_control(path: Path) -> Control:
     return Control(names, table.columns(("x", "y", "z")))
 
 
-def mean_centres(rows: list[Found]) -> tuple[Int64, Float]:
+def mean_centres(rows: list[TargetObservation]) -> tuple[Int64, Float]:
     """Numbers (n,) of the spheres, and their centres (n, 3), of several scans the mean weighted by the fits' variance, m."""
     numbers = np.unique(np.array([row.number for row in rows], np.int64))
     centres = np.zeros((len(numbers), 3))
@@ -102,7 +102,7 @@ def mean_centres(rows: list[Found]) -> tuple[Int64, Float]:
     return numbers, centres
 
 
-def compare(rows: list[Found], control: Control, within: float) -> Comparison:
+def compare(rows: list[TargetObservation], control: Control, within: float) -> Comparison:
     """Compare spheres with control points, all together and by scan; ``within`` as in `tunneldb.registration.control.match`."""
     numbers, centres = mean_centres(rows)
     matched = match(centres, control.xyz, within)

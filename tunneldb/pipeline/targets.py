@@ -23,7 +23,7 @@ from tunneldb.pointcloud.poses import TIME_TOLERANCE, PoseModel
 from tunneldb.pointcloud.reader import CHUNK, Points, ScanSource, read_chunks
 from tunneldb.pointcloud.spool import BINS_PER_METRE, Spool, bin_of, windows
 from tunneldb.store.ledger import stage_run
-from tunneldb.store.scene import line_of, load_ground
+from tunneldb.store.scene import line_of, load_ground, save_spheres
 from tunneldb.store.sources import load_poses, sources
 from tunneldb.store.surface import load_alignment, load_surface
 from tunneldb.store.survey import Survey
@@ -38,7 +38,7 @@ _KEPT = np.dtype([("xyz", "f8", (3,)), ("eye", "f8", (3,)), ("chainage", "f8"), 
 
 
 @dataclass(frozen=True)
-class Found:
+class TargetObservation:
     """A target sphere as one scan saw it: a row of tunnel.target_sphere.
 
     Attributes
@@ -67,7 +67,7 @@ class Search:
 
     Attributes
     ----------
-    spheres : list of Found
+    spheres : list of TargetObservation
         By number and scan.
     refusals : list of (int, Refusal)
         What is nearly a target sphere and isn't one, and the scan that saw it.
@@ -75,7 +75,7 @@ class Search:
         Points read.
     """
 
-    spheres: list[Found]
+    spheres: list[TargetObservation]
     refusals: list[tuple[int, Refusal]]
     points: int
 
@@ -112,22 +112,23 @@ def search(
         place = _Place.of(conn, survey) if kilometres else None
     if place is None:
         raise UserError(f"survey {survey.name} holds no points yet: tunneldb load {survey.name} FILE...")
-    rows: list[Found] = []
+    rows: list[TargetObservation] = []
     refusals: list[tuple[int, Refusal]] = []
     points = 0
     for km in kilometres:
         with snapshot(conn):
             files = sources(conn, survey, km)
-            look = _Kilometre(place, km, files, radius, tolerance, _ground_of(conn, survey, km))
+            kilometre = _Kilometre(place, km, files, radius, tolerance, _ground_of(conn, survey, km))
         points += sum(file.points for file in files)
-        found, refused = look.search(begin)
+        found, refused = kilometre.search(begin)
         rows += found
         refusals += refused
     rows, weak = _numbered(rows, radius, place)
     refusals += weak
     # Begun only now: while files are read, batches of the survey go on.
     with stage_run(conn, survey.id, None, "spheres", {"radius": radius, "tolerance": tolerance}) as run:
-        _save(conn, survey, rows, radius)
+        found_spheres = [(row.km, row.number, row.scan, row.chainage, row.sphere) for row in rows]
+        save_spheres(conn, survey, found_spheres, radius)
         run.counts.update(
             kilometres=len(kilometres),
             points_read=points,
@@ -206,7 +207,7 @@ class _Kilometre:
     tolerance: float
     on_ground: Callable[[Float], Bool] | None
 
-    def search(self, begin: Callable[[str, int], Progress]) -> tuple[list[Found], list[tuple[int, Refusal]]]:
+    def search(self, begin: Callable[[str, int], Progress]) -> tuple[list[TargetObservation], list[tuple[int, Refusal]]]:
         total = sum(file.points for file in self.files)
         curved = CurvedCells(self.radius, LEAST_POINTS)
         step = begin(f"km {self.km}: what isn't flat", total)
@@ -215,7 +216,7 @@ class _Kilometre:
             step(len(points))
         curved.close()
         step = begin(f"km {self.km}: spheres", total)
-        found: list[Found] = []
+        found: list[TargetObservation] = []
         refused: list[tuple[int, Refusal]] = []
         with Spool(MEMORY, _KEPT) as spool:
             for points in self._chunks():
@@ -232,7 +233,7 @@ class _Kilometre:
                     for sphere in spheres:
                         given, chainage = self.place.chainage(sphere.centre)
                         if self._is_ours(given, low, high):
-                            found.append(Found(0, int(scan), self.km, chainage, sphere))
+                            found.append(TargetObservation(0, int(scan), self.km, chainage, sphere))
                     refused += [
                         (int(scan), refusal)
                         for refusal in refusals
@@ -263,7 +264,9 @@ class _Kilometre:
         return low <= int(bin_of(np.array([chainage]))[0]) < high
 
 
-def _numbered(rows: list[Found], radius: float, place: _Place) -> tuple[list[Found], list[tuple[int, Refusal]]]:
+def _numbered(
+    rows: list[TargetObservation], radius: float, place: _Place
+) -> tuple[list[TargetObservation], list[tuple[int, Refusal]]]:
     """Rows with the numbers of their spheres, along the tunnel, by number and scan; and what no scan saw well."""
     if not rows:
         return rows, []
@@ -284,20 +287,3 @@ def _numbered(rows: list[Found], radius: float, place: _Place) -> tuple[list[Fou
     rank[np.lexsort((np.arange(len(middle)), middle))] = np.arange(1, len(middle) + 1)
     numbered = [replace(row, number=int(rank[group[k]])) for k, row in enumerate(rows)]
     return sorted(numbered, key=lambda row: (row.number, row.scan)), weak
-
-
-def _save(conn: psycopg.Connection[Any], survey: Survey, rows: list[Found], radius: float) -> None:
-    conn.execute("DELETE FROM tunnel.target_sphere WHERE survey_id = %s", [survey.id])
-    with conn.cursor() as cursor:
-        cursor.executemany(
-            "INSERT INTO tunnel.target_sphere"
-            " (survey_id, km, number, scan_id, chainage, geom, radius, nominal, rms, sigma, coverage, points)"
-            " VALUES (%s, %s, %s, %s, %s, public.ST_SetSRID(public.ST_MakePoint(%s, %s, %s), %s), %s, %s, %s, %s, %s, %s)",
-            [
-                (
-                    survey.id, row.km, row.number, row.scan, row.chainage, *row.sphere.centre.tolist(), survey.srid,
-                    row.sphere.radius, radius, row.sphere.rms, row.sphere.sigma, row.sphere.coverage, row.sphere.points,
-                )
-                for row in rows
-            ],
-        )  # fmt: skip

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from tunneldb.arrays import Float, Int32, Int64, UInt32, UInt64
+from tunneldb.arrays import Float, Int32, Int64, UInt8, UInt32, UInt64
 from tunneldb.compiled import inner, kernel
 from tunneldb.threads import in_blocks
 
@@ -198,14 +198,15 @@ class Voxels:
             size *= 2
         if size > len(self._table):
             self._table = np.full(size, _EMPTY, np.uint32)
-            enter_keys(self._key, self._size, self._table)
+            _enter_keys(self._key, self._size, self._table)
 
 
-def key_table(keys: Int64) -> UInt32:
-    """Make the table of keys (n,), all different, in which `slot_of` finds them."""
-    table = np.full(1 << max(10, (2 * len(keys)).bit_length()), _EMPTY, np.uint32)
-    enter_keys(keys, len(keys), table)
-    return table
+def value_table(keys: Int64, values: UInt8) -> tuple[Int64, UInt8]:
+    """Slots for keys (n,), all different and not negative, and their values (n,): `key_slot` finds a key at one glance."""
+    slots = np.full(1 << max(10, (2 * len(keys)).bit_length()), -1, np.int64)
+    held = np.zeros(len(slots), np.uint8)
+    _enter_values(keys, values, slots, held)
+    return slots, held
 
 
 @inner
@@ -261,14 +262,31 @@ def _key_of(x: float, y: float, z: float, base: Int64) -> int:  # pragma: no cov
 
 
 @inner
-def slot_of(key: int, keys: Int64, table: UInt32) -> int:  # pragma: no cover - compiled
+def _number_slot(key: int, keys: Int64, table: UInt32) -> int:  # pragma: no cover - compiled
     """Slot of a table that holds the place of a key among keys, or the empty one where it belongs."""
     mask = np.uint64(table.shape[0] - 1)
     h = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     at = (h ^ (h >> np.uint64(32))) & mask
     while table[at] != _EMPTY and keys[table[at]] != key:
         at = (at + np.uint64(1)) & mask
-    return np.int64(at)
+    return np.int64(at)  # type: ignore[return-value]  # to Numba it is an int
+
+
+@inner
+def key_slot(key: int, slots: Int64) -> int:  # pragma: no cover - compiled
+    """Slot that holds a key, or the empty one (-1) where it belongs."""
+    mask = slots.shape[0] - 1
+    slot = np.int64((np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32)) & mask
+    while slots[slot] >= 0 and slots[slot] != key:
+        slot = (slot + 1) & mask
+    return slot
+
+
+@kernel
+def _enter_values(keys: Int64, values: UInt8, slots: Int64, held: UInt8) -> None:  # pragma: no cover - compiled
+    for i in range(keys.shape[0]):
+        slot = key_slot(keys[i], slots)
+        slots[slot], held[slot] = keys[i], values[i]
 
 
 @kernel
@@ -284,7 +302,7 @@ def _add(
             if key == -1:
                 return -1, size
             continue
-        slot = slot_of(key, keys, table)
+        slot = _number_slot(key, keys, table)
         if table[slot] == _EMPTY:
             if size == keys.shape[0]:
                 return n, size
@@ -305,10 +323,9 @@ def _add(
 
 
 @kernel
-def enter_keys(keys: Int64, size: int, table: UInt32) -> None:  # pragma: no cover - compiled
-    """Enter the first of some keys, all different, into an empty table."""
+def _enter_keys(keys: Int64, size: int, table: UInt32) -> None:  # pragma: no cover - compiled
     for i in range(size):
-        table[slot_of(keys[i], keys, table)] = np.uint32(i)
+        table[_number_slot(keys[i], keys, table)] = np.uint32(i)
 
 
 @kernel
@@ -318,6 +335,6 @@ def _index(
     for n in range(begin, end):
         key = _key_of(points[n, 0] / edge, points[n, 1] / edge, points[n, 2] / edge, base)
         if key >= 0:
-            slot = slot_of(key, keys, table)
+            slot = _number_slot(key, keys, table)
             if table[slot] != _EMPTY:
                 out[n] = table[slot]

@@ -114,10 +114,10 @@ def _run(dsn: str | None, context: JobContext, work: Callable[[psycopg.Connectio
     except Exception as error:
         bug = not isinstance(error, (UserError, GoneError, psycopg.OperationalError))
         log.warning("%s: %s", what, describe(error), exc_info=bug)
-        settle(dsn, job, error)
+        end_job(dsn, job, error)
 
 
-def settle(dsn: str | None, job: Job, error: Exception) -> None:
+def end_job(dsn: str | None, job: Job, error: Exception) -> None:
     """End or put back a job that its stage has left, by a session of its own.
 
     Raises

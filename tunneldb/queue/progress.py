@@ -173,13 +173,13 @@ def overview(conn: psycopg.Connection[Any], survey: str) -> Overview:
         km: {stage: _cell(km, stage, known) for stage in STAGE_NAMES}
         for km in sorted({*goals, *(km for km, _ in known.statuses), *_touched(files)})
     }
-    _lay_on(kilometres, files)
+    _mark_failed_files(kilometres, files)
     workers = _workers(conn)
-    pace = measure(conn, survey)
+    throughput = measure(conn, survey)
     steps = [[(stage, cell.since) for stage, cell in cells.items() if cell.state in TO_DO] for cells in kilometres.values()]
     to_read = sum(file.state != "failed" for file in files)
     asked = max((goals[km].requested_at for km in goals if _unfinished(kilometres[km])), default=None)
-    share = pace.share(steps, to_read, asked) if asked is not None else None
+    share = throughput.share(steps, to_read, asked) if asked is not None else None
     wanted = [kilometres[km][stage].state for km, goal in goals.items() for stage in STAGE_NAMES[: goal.step + 1]]
     return Overview(
         survey,
@@ -192,7 +192,7 @@ def overview(conn: psycopg.Connection[Any], survey: str) -> Overview:
         total=len(wanted),
         share=share,
         rate=points_per_second(conn, survey, share, asked, now[0]) if asked is not None and share is not None else None,
-        left=pace.left(steps, to_read, sum(not worker.lost for worker in workers), now[0]),
+        left=throughput.left(steps, to_read, sum(not worker.lost for worker in workers), now[0]),
     )
 
 
@@ -273,7 +273,7 @@ def _cell(km: int, stage: str, known: _Known) -> Cell:
     return Cell("stale", status.reason) if status.outcome == "done" and status.stale else Cell(status.outcome)
 
 
-def _lay_on(kilometres: dict[int, dict[str, Cell]], files: tuple[File, ...]) -> None:
+def _mark_failed_files(kilometres: dict[int, dict[str, Cell]], files: tuple[File, ...]) -> None:
     """Show a file that failed at the kilometres that it touches, where none of them is at work."""
     for file in files:
         for cells in [kilometres[km] for km in _touched((file,)) if file.state == "failed"]:

@@ -64,7 +64,7 @@ class Throughput:
 
 
 def measure(conn: psycopg.Connection[Any], survey: str) -> Throughput:
-    """Return the pace of a survey, from its ledger.
+    """Return the throughput of a survey, from its ledger.
 
     Only runs of a kilometre count, and the reading of a file; loads by ``tunneldb load`` of several files at once do not.
     """

@@ -1,1 +1,1 @@
-"""TODO."""
+"""The unrolled image: points projected, gathered by pixel, and what each pixel shows."""

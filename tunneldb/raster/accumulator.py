@@ -16,13 +16,13 @@ from types import TracebackType
 from typing import BinaryIO
 
 import numpy as np
-from numba import njit, prange
 
 from tunneldb.arrays import Bool, Int32, Single, Whole
+from tunneldb.compiled import kernel, point_inner, point_kernel
 from tunneldb.errors import UserError
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.projection import WEIGHT, Pixels
-from tunneldb.threads import threads
+from tunneldb.threads import in_blocks, threads
 
 MEMORY = 400_000_000
 """Bytes of memory for sums."""
@@ -125,13 +125,24 @@ class Accumulator:
         UserError
             If the temporary folder has no room for what memory doesn't hold.
         """
-        row, column, weight, *values = (array[:count] for array in pixels)
+        pixels = pixels.first(count)
         width = self.grid.block_columns
-        touched = np.flatnonzero(_touched(column, width, self.grid.columns // width)).tolist()
+        marked = np.zeros(self.grid.columns // width, np.bool_)
+        _touched(pixels.column, width, marked)
+        touched = np.flatnonzero(marked).tolist()
         # Blocks in memory first, lest fetching another one puts them out.
         for block in sorted(touched, key=lambda b: b not in self._blocks):
-            _add(self._fetch(block), row, column, block * width, weight, *values, self._full, threads())
+            self._add(block, pixels)
             self._changed.add(block)
+
+    def _add(self, block: int, pixels: Pixels) -> None:
+        """Add the points that fall into a block; each thread has rows of its own."""
+        sums, first, parts = self._fetch(block), block * self.grid.block_columns, threads()
+
+        def rows(part: int, _: int) -> None:
+            _add(sums, first, *pixels, self._full, part, parts)
+
+        in_blocks(rows, parts, 1)
 
     def blocks(self) -> list[int]:
         """Blocks, counted from 0, that hold points."""
@@ -194,57 +205,58 @@ class Accumulator:
         self._spilled.add(block)
 
 
-@njit(cache=True, nogil=True)
-def _touched(column: Int32, width: int, blocks: int) -> Bool:  # pragma: no cover - compiled
-    """Which blocks points fall into."""
-    touched = np.zeros(blocks, np.bool_)
+@kernel
+def _touched(column: Int32, width: int, touched: Bool) -> None:  # pragma: no cover - compiled
+    """Mark the blocks that points fall into."""
     first, stop = 0, 0  # columns of the block that the point before fell into
     for i in range(column.shape[0]):
-        if column[i] >= 0 and not first <= column[i] < stop:
-            block = column[i] // width
+        c = int(column[i])
+        if c >= 0 and not first <= c < stop:
+            block = c // width
             touched[block] = True
             first, stop = block * width, (block + 1) * width
-    return touched
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@kernel
 def _add(
     sums: Whole,
+    first: int,
     row: Int32,
     column: Int32,
-    first: int,
     weight: Int32,
     offset: Single,
     raw: Single,
     corrected: Single,
     full: int,
+    part: int,
     parts: int,
 ) -> None:  # pragma: no cover - compiled
-    """Add the points that fall into a block; each thread has rows of its own."""
+    """Add the points that fall into a block, into every ``parts``-th of its rows."""
     width = sums.shape[1]
-    for part in prange(parts):
-        for i in range(row.shape[0]):
-            r, c = row[i], column[i] - first
-            if 0 <= c < width and r % parts == part and sums[r, c, 0] <= full:
-                sums[r, c, 0] += weight[i]
-                sums[r, c, 1] += weight[i] * _multiple(offset[i] * np.float32(1.0 / OFFSET))
-                sums[r, c, 2] += weight[i] * _multiple(raw[i] * np.float32(1.0 / LEVEL))
-                sums[r, c, 3] += weight[i] * _multiple(corrected[i] * np.float32(1.0 / LEVEL))
+    for i in range(row.shape[0]):
+        r, c = row[i], column[i] - first
+        if 0 <= c < width and r % parts == part and sums[r, c, 0] <= full:
+            sums[r, c, 0] += weight[i]
+            sums[r, c, 1] += weight[i] * _multiple(offset[i] * np.float32(1.0 / OFFSET))
+            sums[r, c, 2] += weight[i] * _multiple(raw[i] * np.float32(1.0 / LEVEL))
+            sums[r, c, 3] += weight[i] * _multiple(corrected[i] * np.float32(1.0 / LEVEL))
 
 
-@njit(cache=True, nogil=True, forceinline=True)
-def _multiple(value: np.float32) -> np.int32:
-    return np.int32(np.rint(min(max(value, np.float32(-GREATEST)), np.float32(GREATEST))))
+@point_inner
+def _multiple(value: np.float32) -> np.int32:  # pragma: no cover - compiled
+    most = np.float32(GREATEST)
+    return np.int32(np.rint(most if value > most else (value if value > -most else -most)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@point_kernel
 def _means(sums: Whole, skip: int, weight: Whole, means: Single, first: int, stop: int) -> None:  # pragma: no cover - compiled
     """Divide the sums of a block, from column ``skip`` on, into columns ``first`` to ``stop`` of a window."""
     for i in range(weight.shape[0]):
         for j in range(first, stop):
-            pixel = sums[i, j - first + skip]
-            weight[i, j] = pixel[0]
-            per = 1.0 / pixel[0] if pixel[0] > 0 else np.nan
-            means[0, i, j] = pixel[1] * (per * OFFSET)
-            means[1, i, j] = pixel[2] * (per * LEVEL)
-            means[2, i, j] = pixel[3] * (per * LEVEL)
+            k = j - first + skip
+            total = sums[i, k, 0]
+            weight[i, j] = total
+            per = 1.0 / total if total > 0 else np.nan
+            means[0, i, j] = sums[i, k, 1] * (per * OFFSET)
+            means[1, i, j] = sums[i, k, 2] * (per * LEVEL)
+            means[2, i, j] = sums[i, k, 3] * (per * LEVEL)

@@ -6,10 +6,12 @@ The planes are fitted to the offset image, where a curved lining is flat.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from tunneldb.arrays import Bool, Int32, Single
-from tunneldb.geometry.robust_plane import DELTA
+from tunneldb.compiled import inner, point_inner, point_kernel
+from tunneldb.geometry.robust_plane import DELTA, central_mode, plane_of_moments
+from tunneldb.threads import in_blocks
 
 PART = 2.0
 """Side of the part of the lining that a plane is fitted to, m: signs and boxes are smaller than half of it."""
@@ -52,9 +54,27 @@ def distance_from_plane(offset: Single, pixel: float, corner: tuple[int, int] = 
     (rows, columns) float32 array
         m, positive into the tunnel, NaN where there is no point.
     """
-    distance: Single = _distance(
-        np.ascontiguousarray(offset), *_sides(pixel), _every(pixel), *corner, SCALES.astype(np.float32), MIN_PIXELS
-    )
+    step, margin = _sides(pixel)
+    every, side = _every(pixel), step + 2 * margin
+    (rows, columns), (row, column) = offset.shape, corner
+    down, across = row // step, column // step  # the first tiles, which may begin before the image
+    tall, wide = (row + rows - 1) // step - down + 1, (column + columns - 1) // step - across + 1
+    samples = _samples(
+        offset, row - down * step + margin, column - across * step + margin,
+        tall * step + 2 * margin, wide * step + 2 * margin, row - column, every,
+    )  # fmt: skip
+    x, y = _places(side, every)
+    distance: Single = np.full(offset.shape, np.nan, np.float32)
+    offset = np.ascontiguousarray(offset)
+
+    def tiles(begin: int, end: int) -> None:
+        z, counts = np.full(x.shape[1], _NONE, np.float32), np.empty((2, 2 * _BINS + 2), np.int32)
+        _distance(
+            offset, samples, x, y, SCALES.astype(np.float32), step, margin, every,
+            row, column, down, across, wide, begin, end, z, counts, distance,
+        )  # fmt: skip
+
+    in_blocks(tiles, tall, 4)
     return distance
 
 
@@ -73,7 +93,8 @@ def recessed(offset: Single, distance: Single, pixel: float, delta: float = DELT
     delta : float
         δ, m.
     """
-    marked: Bool = _recessed(offset, distance, delta, _growth(pixel), pixel)
+    marked: Bool = np.zeros(offset.shape, np.bool_)
+    _recessed(np.ascontiguousarray(offset), np.ascontiguousarray(distance), float(delta), _growth(pixel), float(pixel), marked)
     return marked
 
 
@@ -91,14 +112,15 @@ def off_plane(distance: Single, recess: Bool, pixel: float, delta: float = DELTA
     delta : float
         δ, m.
     """
-    marked: Bool = _grown(distance, recess, delta, _growth(pixel), _look(pixel))
+    marked: Bool = np.zeros(distance.shape, np.bool_)
+    _grow(np.ascontiguousarray(distance), np.ascontiguousarray(recess), float(delta), _growth(pixel), _thin(pixel), marked)
     return marked
 
 
 def reach(pixel: float) -> int:
     """How far, in pixels, what a pixel is judged by lies from it at most."""
     step, margin = _sides(pixel)
-    return step + margin + _growth(pixel) + _look(pixel)
+    return step + margin + _growth(pixel) + _thin(pixel)
 
 
 def _sides(pixel: float) -> tuple[int, int]:
@@ -117,150 +139,106 @@ def _growth(pixel: float) -> int:
     return max(1, round(0.04 / pixel))
 
 
-def _look(pixel: float) -> int:
+def _thin(pixel: float) -> int:
     """Pixels to either side in which a pixel of a thin cable has another one, though profiles are apart: 0.1 m."""
     return max(1, round(0.1 / pixel))
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _distance(
-    offset: Single, step: int, margin: int, every: int, row: int, column: int, scales: Single, min_pixels: int
-) -> Single:  # pragma: no cover - compiled
-    rows, columns = offset.shape
-    out = np.empty((rows, columns), np.float32)
-    side = step + 2 * margin
-    down, across = row // step, column // step  # the first tiles, which may begin before the image
-    tall, wide = (row + rows - 1) // step - down + 1, (column + columns - 1) // step - across + 1
-    first_row, first_column = down * step - margin, across * step - margin
-    thin = _thinned(
-        offset, row - first_row, column - first_column, tall * step + 2 * margin, wide * step + 2 * margin, row - column, every
-    )
-    x, y = _places(side, every)
+def _samples(offset: Single, skip_rows: int, skip_columns: int, rows: int, columns: int, slant: int, every: int) -> Single:
+    """Every n-th pixel of each row, in slanting lines, with a margin; _NONE where there is no point."""
+    samples = np.full((rows, columns // every + 2), _NONE, np.float32)
+    for i in range(offset.shape[0]):
+        # The columns whose number is that of the row, but for multiples of n.
+        shift = (i + slant + skip_columns) % every - skip_columns
+        skip = max(0, -(shift // every))
+        values = offset[i, shift + every * skip :: every][: samples.shape[1] - skip]
+        samples[i + skip_rows, skip : skip + len(values)] = np.where(np.isnan(values), _NONE, values)
+    return samples
+
+
+def _places(side: int, every: int) -> tuple[Single, Single]:
+    """Where the samples of a part lie in it, for each phase: x (every, n) and y (n,), in sides from its middle."""
     each = side // every
-    for tile_row in prange(tall):
-        z = np.full(x.shape[1], _NONE, np.float32)
-        counts = np.empty((2, 2 * _BINS + 2), np.int32)
+    room = (side * each + 63) // 64 * 64  # whole vectors
+    x, y = np.zeros((every, room), np.float32), np.zeros(room, np.float32)
+    row, phase = np.arange(side), np.arange(every)
+    first = (phase[:, None] + row) % every
+    x[:, : side * each] = ((first[:, :, None] + every * np.arange(each) - 0.5 * side) / side).reshape(every, -1)
+    y[: side * each] = np.repeat((row - 0.5 * side) / side, each)
+    return x, y
+
+
+@point_kernel
+def _distance(
+    offset: Single, samples: Single, x: Single, y: Single, scales: Single, step: int, margin: int, every: int,
+    row: int, column: int, down: int, across: int, wide: int, begin: int, end: int, z: Single, counts: Int32, out: Single,
+) -> None:  # fmt: skip  # pragma: no cover - compiled
+    """Write the distances of rows of tiles; ``z`` is room for the samples of a part, ``counts`` for two histograms of them."""
+    rows, columns = offset.shape
+    side = step + 2 * margin
+    each = side // every
+    total = np.empty(2 * _BINS + 1)
+    half, per_bin = np.float32(_BINS + 1.5), np.float32(1.0 / _BIN)
+    for tile_row in range(begin, end):
         top = (down + tile_row) * step - row
+        r0, r1 = top if top > 0 else 0, top + step if top + step < rows else rows
         for tile in range(wide):
             left = (across + tile) * step - column
-            r0, r1, c0, c1 = max(top, 0), min(top + step, rows), max(left, 0), min(left + step, columns)
-            if not _any(offset, r0, r1, c0, c1):
-                out[r0:r1, c0:c1] = np.nan
+            c0, c1 = left if left > 0 else 0, left + step if left + step < columns else columns
+            held = False
+            for i in range(r0, r1):
+                for j in range(c0, c1):
+                    held |= not np.isnan(offset[i, j])
+                if held:
+                    break
+            if not held:
                 continue
-            counts[:] = 0
+            for k in range(2 * _BINS + 2):
+                counts[0, k] = counts[1, k] = 0
             phase = (top + row - left - column) % every
             for i in range(side):
                 # Where the row's first sample in the part lies among all its samples.
-                begin = (tile * step + (phase + i) % every) // every
+                first = (tile * step + (phase + i) % every) // every
                 for k in range(each):
-                    value = thin[tile_row * step + i, begin + k]
+                    value = samples[tile_row * step + i, first + k]
                     z[i * each + k] = value
-                    counts[k & 1, _bin(value)] += 1
-            a, b, c = _plane(x[phase], y, z, _level(counts), scales, min_pixels)
+                    # Class of 1 cm, the last one for what lies nowhere near the section surface.
+                    place = value * per_bin + half
+                    counts[k & 1, int(place) - 1 if 1.0 <= place < 2 * _BINS + 2.0 else 2 * _BINS + 1] += 1
+            for k in range(2 * _BINS + 1):
+                total[k] = counts[0, k] + counts[1, k]
+            mode = central_mode(total, 2 * _BINS + 1, _REACH)
+            a, b, c = _plane(x[phase], y, z, (mode - _BINS) * _BIN if mode >= 0 else 0.0, scales)
             for i in range(r0, r1):
                 down_part = (i - top - 0.5 * step) / side
                 for j in range(c0, c1):
                     along = (j - left - 0.5 * step) / side
                     out[i, j] = offset[i, j] - np.float32(a + b * along + c * down_part)
-    return out
 
 
-@njit(cache=True, nogil=True)
-def _thinned(
-    offset: Single, skip_rows: int, skip_columns: int, rows: int, columns: int, slant: int, every: int
-) -> Single:  # pragma: no cover - compiled
-    """Every n-th pixel of each row, in slanting lines, with a margin; _NONE where there is no point."""
-    thin = np.full((rows, columns // every + 2), _NONE, np.float32)
-    for i in range(offset.shape[0]):
-        # The columns whose number is that of the row, but for multiples of n.
-        shift = (i + slant + skip_columns) % every
-        for m in range(thin.shape[1]):
-            j = shift + every * m - skip_columns
-            if 0 <= j < offset.shape[1] and not np.isnan(offset[i, j]):
-                thin[i + skip_rows, m] = offset[i, j]
-    return thin
-
-
-@njit(cache=True, nogil=True)
-def _places(side: int, every: int) -> tuple[Single, Single]:  # pragma: no cover - compiled
-    """Where the samples of a part lie in it, for each phase: x (every, n) and y (n,), in sides from its middle."""
-    each = side // every
-    room = (side * each + 63) // 64 * 64  # whole vectors
-    x, y = np.zeros((every, room), np.float32), np.zeros(room, np.float32)
-    for i in range(side):
-        for k in range(each):
-            for phase in range(every):
-                x[phase, i * each + k] = ((phase + i) % every + every * k - 0.5 * side) / side
-            y[i * each + k] = (i - 0.5 * side) / side
-    return x, y
-
-
-@njit(cache=True, nogil=True)
-def _any(offset: Single, r0: int, r1: int, c0: int, c1: int) -> bool:  # pragma: no cover - compiled
-    """Tell whether a tile holds points."""
-    for i in range(r0, r1):
-        for j in range(c0, c1):
-            if not np.isnan(offset[i, j]):
-                return True
-    return False
-
-
-@njit(cache=True, nogil=True)
-def _bin(z: np.float32) -> int:  # pragma: no cover - compiled
-    """Class of 1 cm of an offset, the last one for what lies nowhere near the section surface."""
-    k = (
-        np.int32(min(max(z * np.float32(1.0 / _BIN), np.float32(-_BINS - 1)), np.float32(_BINS + 1)) + np.float32(_BINS + 1.5))
-        - 1
-    )
-    return int(k) if 0 <= k <= 2 * _BINS else 2 * _BINS + 1
-
-
-@njit(cache=True, nogil=True)
-def _level(counts: Int32) -> float:  # pragma: no cover - compiled
-    """Offset near which most samples lie, those near the section surface counting more."""
-    best, level = 0.0, 0.0
-    for k in range(2 * _BINS + 1):
-        score = 0.0
-        for m in range(max(k - _REACH, 0), min(k + _REACH, 2 * _BINS) + 1):
-            score += counts[0, m] + counts[1, m]
-        score *= 1.0 - abs(k - _BINS) / (2.0 * _BINS)
-        if score > best:
-            best, level = score, (k - _BINS) * _BIN
-    return level
-
-
-@njit(cache=True, nogil=True)
+@inner
 def _plane(
-    x: Single, y: Single, z: Single, level: float, scales: Single, min_pixels: int
+    x: Single, y: Single, z: Single, level: float, scales: Single
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Plane a + b x + c y through points, fitted from a level on."""
     a, b, c = level, 0.0, 0.0
-    for scale in scales:
-        used, s0, sx, sy, sxx, sxy, syy, sz, sxz, syz = _weighted(
-            x, y, z, np.float32(a), np.float32(b), np.float32(c), np.float32(1.0) / scale
+    for k in range(scales.shape[0]):
+        used, s0, sx, sy, sxx, sxy, syy, sz, sxz, syz = _moments(
+            x, y, z, np.float32(a), np.float32(b), np.float32(c), np.float32(1.0) / scales[k]
         )
-        if used < min_pixels or s0 <= 0.0:
+        if used < MIN_PIXELS or s0 <= 0.0:
             return 0.0, 0.0, 0.0
-        xx, xy, yy = sxx - sx * sx / s0, sxy - sx * sy / s0, syy - sy * sy / s0
-        xz, yz = sxz - sx * sz / s0, syz - sy * sz / s0
-        determinant = xx * yy - xy * xy
-        if determinant > 1e-6 * s0 * s0 * 0.0069:  # spread in both directions: 1/144 is that of a full square
-            b = (xz * yy - yz * xy) / determinant
-            c = (yz * xx - xz * xy) / determinant
-        else:
-            b, c = 0.0, 0.0
-        a = (sz - b * sx - c * sy) / s0
+        # Spread in both directions: 1/144 is that of a full square.
+        a, b, c = plane_of_moments(s0, sx, sy, sxx, sxy, syy, sz, sxz, syz, 1e-6 * 0.0069)
     return a, b, c
 
 
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "nnan"})
-def _weighted(
+# Sums may be taken in any order, so that several are taken at once.
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "nnan"}, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+def _moments(
     x: Single, y: Single, z: Single, a: np.float32, b: np.float32, c: np.float32, per_scale: np.float32
 ) -> tuple[float, ...]:  # pragma: no cover - compiled
-    """Sums over points weighted by their distance from a plane: how many have weight, weight, and its moments.
-
-    Sums may be taken in any order, so that several are taken at once.
-    """
+    """Sums over points weighted by their distance from a plane (Tukey): how many have weight, weight, and its moments."""
     one, zero = np.float32(1.0), np.float32(0.0)
     used, s0, sx, sy, sxx, sxy, syy, sz, sxz, syz = zero, zero, zero, zero, zero, zero, zero, zero, zero, zero
     for k in range(x.shape[0]):
@@ -284,64 +262,70 @@ def _weighted(
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@point_kernel
 def _recessed(
-    offset: Single, distance: Single, delta: float, half: int, steepest: float
-) -> Bool:  # pragma: no cover - compiled
+    offset: Single, distance: Single, delta: float, half: int, steepest: float, out: Bool
+) -> None:  # pragma: no cover - compiled
     rows, columns = offset.shape
-    out = np.zeros((rows, columns), np.bool_)
-    enough = _SUPPORT * (2 * half + 1) ** 2
+    enough = _SUPPORT * ((2 * half + 1) * (2 * half + 1))
     for i in range(rows):
         for j in range(columns):
             if not distance[i, j] <= -delta:
                 continue
             down, along = 0.0, 0.0  # the slope, per pixel
             if half <= i < rows - half:
-                down = (offset[i + half, j] - offset[i - half, j]) / (2 * half)
+                down = (offset[i + half, j] - offset[i - half, j]) / (2.0 * half)
             if half <= j < columns - half:
-                along = (offset[i, j + half] - offset[i, j - half]) / (2 * half)
+                along = (offset[i, j + half] - offset[i, j - half]) / (2.0 * half)
             down = down if abs(down) <= steepest else 0.0  # nor where it is unknown
             along = along if abs(along) <= steepest else 0.0
             alike, other = 0, 0
-            for m in range(max(i - half, 0), min(i + half + 1, rows)):
-                for n in range(max(j - half, 0), min(j + half + 1, columns)):
+            for m in range(_from(i - half), _until(i + half + 1, rows)):
+                for n in range(_from(j - half), _until(j + half + 1, columns)):
                     gap = abs(offset[m, n] - offset[i, j] - down * (m - i) - along * (n - j))
                     alike += gap < delta
                     other += gap >= delta
                 if other > 1:
                     break
             out[i, j] = other <= 1 and alike >= enough
-    return out
 
 
-@njit(cache=True, nogil=True)
-def _goes_on(distance: Single, i: int, j: int, delta: float, look: int) -> bool:  # pragma: no cover - compiled
-    """Tell whether a pixel off the plane has others before or behind it, or above or below, that stand off alike."""
+@point_kernel
+def _grow(
+    distance: Single, recess: Bool, delta: float, growth: int, thin: int, out: Bool
+) -> None:  # pragma: no cover - compiled
+    """Mark pixels off the plane, and those about them; a pixel alone is an outlier, which has no edge."""
     rows, columns = distance.shape
-    for tall, wide in ((1, look), (look, 1)):
-        alike = 0
-        for m in range(max(i - tall, 0), min(i + tall + 1, rows)):
-            for n in range(max(j - wide, 0), min(j + wide + 1, columns)):
-                alike += abs(distance[m, n]) >= delta and abs(distance[m, n] - distance[i, j]) < delta
-        if alike > 1:
-            return True
-    return False
-
-
-@njit(cache=True, nogil=True)
-def _grown(distance: Single, recess: Bool, delta: float, growth: int, look: int) -> Bool:  # pragma: no cover - compiled
-    """Pixels off the plane, and those about them; a pixel alone is an outlier, which has no edge."""
-    rows, columns = distance.shape
-    out = np.zeros((rows, columns), np.bool_)
     for i in range(rows):
         for j in range(columns):
-            if abs(distance[i, j]) >= delta and not recess[i, j]:
-                beside = 0
-                for m in range(max(i - 1, 0), min(i + 2, rows)):
-                    for n in range(max(j - 1, 0), min(j + 2, columns)):
-                        beside += abs(distance[m, n]) >= delta
-                out[i, j] = True
-                # From the rim the growth reaches as far as from within.
-                if 1 < beside < 9 or (beside == 1 and _goes_on(distance, i, j, delta, look)):
-                    out[max(i - growth, 0) : i + growth + 1, max(j - growth, 0) : j + growth + 1] = True
-    return out
+            if not (abs(distance[i, j]) >= delta) or recess[i, j]:
+                continue
+            out[i, j] = True
+            beside = 0
+            for m in range(_from(i - 1), _until(i + 2, rows)):
+                for n in range(_from(j - 1), _until(j + 2, columns)):
+                    beside += abs(distance[m, n]) >= delta
+            # One that has others before or behind it, or above or below, that stand off alike is of a cable.
+            for turn in range(2 if beside == 1 else 0):
+                tall, wide = (1, thin) if turn == 0 else (thin, 1)
+                alike = 0
+                for m in range(_from(i - tall), _until(i + tall + 1, rows)):
+                    for n in range(_from(j - wide), _until(j + wide + 1, columns)):
+                        alike += abs(distance[m, n]) >= delta and abs(distance[m, n] - distance[i, j]) < delta
+                if alike > 1:
+                    beside = 2
+            # From the edge the growth reaches as far as from within.
+            if 1 < beside < 9:
+                for m in range(_from(i - growth), _until(i + growth + 1, rows)):
+                    for n in range(_from(j - growth), _until(j + growth + 1, columns)):
+                        out[m, n] = True
+
+
+@point_inner
+def _from(index: int) -> int:  # pragma: no cover - compiled
+    return index if index > 0 else 0
+
+
+@point_inner
+def _until(index: int, count: int) -> int:  # pragma: no cover - compiled
+    return index if index < count else count

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 from affine import Affine
-from numba import njit
 from rasterio.errors import NotGeoreferencedWarning
 from rasterio.io import MemoryFile
 
 from tunneldb.arrays import Int16, Single
+from tunneldb.compiled import kernel
 
 KINDS = ("raw", "corrected", "offset")
 """What the images of a kilometre show: raw and corrected intensity (dB), offset from the surface (m)."""
@@ -43,7 +43,8 @@ class Raster:
 
 def whole(values: Single, kind: str) -> Int16:
     """Values (rows, columns) in steps of :data:`STEP`, NODATA for NaN."""
-    steps: Int16 = _whole(values, 1.0 / STEP[kind])
+    steps = np.empty(values.shape, np.int16)
+    _whole(np.ascontiguousarray(values), 1.0 / STEP[kind], steps)
     return steps
 
 
@@ -85,14 +86,13 @@ def decode(tiff: bytes) -> Raster:
             return Raster(values, image.transform)
 
 
-@njit(cache=True, nogil=True)
-def _whole(values: Single, per_step: float) -> Int16:  # pragma: no cover - compiled
-    steps = np.empty(values.shape, np.int16)
+@kernel
+def _whole(values: Single, per_step: float, steps: Int16) -> None:  # pragma: no cover - compiled
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):
-            value = values[i, j]
-            if np.isnan(value):
-                steps[i, j] = NODATA
-            else:
-                steps[i, j] = np.int16(min(max(np.rint(value * per_step), NODATA + 1), 32767))
-    return steps
+            step = np.rint(values[i, j] * per_step)
+            if step > 32767.0:
+                step = 32767.0
+            elif not step > NODATA:  # also where it is NaN
+                step = NODATA + 1.0 if step <= NODATA else float(NODATA)
+            steps[i, j] = np.int16(step)

@@ -7,9 +7,9 @@ offset image steps instead, and does so all round the section. That is no append
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from tunneldb.arrays import Float, Int32, Single
+from tunneldb.arrays import Float, Int32, Int64, Single
+from tunneldb.compiled import point_kernel
 
 LEAST = 0.01
 """Lower steps do no harm, m: they are a third of the distance from which a pixel is off its plane."""
@@ -61,8 +61,14 @@ def steps(offset: Single, pixel: float, row: int, arc: Float, left: Float, right
         m; the same for a column farther than :func:`reach` from the ends whichever part it is seen in.
     """
     half = _half(pixel)
-    found = _found(*_differences(offset, max(1, round(_EVERY / pixel)), row, half, arc, left, right), half)
-    out = np.zeros(offset.shape[1])
+    columns = offset.shape[1]
+    counts, shown = np.zeros((columns, 2 * _BINS + 1), np.int32), np.zeros(columns, np.int32)
+    total, held = np.zeros(columns + 1, np.int64), np.zeros(columns + 1, np.int64)
+    _differences(
+        np.ascontiguousarray(offset), max(1, round(_EVERY / pixel)), row, half, arc, left, right, counts, shown, total, held
+    )
+    found = _greatest(_agreed(counts, shown), half)
+    out = np.zeros(columns)
     far = round(FADE / pixel)
     for column in np.flatnonzero(found).tolist():
         first, stop = max(column - far, 0), min(column + far, len(out))
@@ -75,19 +81,23 @@ def _half(pixel: float) -> int:
     return max(2, round(_HALF / pixel))
 
 
-@njit(cache=True, nogil=True)
+@point_kernel
 def _differences(
-    offset: Single, every: int, row: int, half: int, arc: Float, left: Float, right: Float
-) -> tuple[Int32, Int32]:  # pragma: no cover - compiled
-    """How many rows show each difference (columns, 2 BINS + 1), and how many show any (columns,)."""
+    offset: Single, every: int, row: int, half: int, arc: Float, left: Float, right: Float,
+    counts: Int32, shown: Int32, total: Int64, held: Int64,
+) -> None:  # fmt: skip  # pragma: no cover - compiled
+    """Count the rows that show each difference (columns, 2 BINS + 1), and those that show any (columns,).
+
+    ``total`` and ``held`` (columns + 1,) hold sums along a row; the first of each is 0.
+    """
     rows, columns = offset.shape
-    counts, shown = np.zeros((columns, 2 * _BINS + 1), np.int32), np.zeros(columns, np.int32)
-    total, held = np.zeros(columns + 1, np.int64), np.zeros(columns + 1, np.int64)
     for i in range((-row) % every, rows, every):
         for j in range(columns):
-            known = left[j] < arc[i] < right[j] and not np.isnan(offset[i, j])
-            total[j + 1] = total[j] + (np.int64(np.rint(offset[i, j] / _FINE)) if known else 0)
-            held[j + 1] = held[j] + known
+            value = offset[i, j]
+            if left[j] < arc[i] < right[j] and not np.isnan(value):
+                total[j + 1], held[j + 1] = total[j] + np.int64(np.rint(value / _FINE)), held[j] + 1
+            else:
+                total[j + 1], held[j + 1] = total[j], held[j]
         for j in range(half, columns - half):
             before, behind = held[j] - held[j - half], held[j + half] - held[j]
             if before > 0 and behind > 0:
@@ -96,41 +106,29 @@ def _differences(
                 shown[j] += 1
                 if 0 <= k <= 2 * _BINS:
                     counts[j, k] += 1
-    return counts, shown
 
 
-@njit(cache=True, nogil=True)
-def _found(counts: Int32, shown: Int32, half: int) -> Float:  # pragma: no cover - compiled
-    """Step at each column, m, 0 where there is none."""
-    columns = counts.shape[0]
-    step, found = np.zeros(columns), np.zeros(columns)
-    for j in range(columns):
-        if shown[j] >= _FEWEST:
-            step[j] = _agreed(counts[j], shown[j])
-    for j in range(half, columns - half):
-        if step[j] != 0.0:
-            greatest = True
-            for k in range(j - half, j + half + 1):
-                # Of equal ones the first.
-                greatest &= abs(step[k]) < abs(step[j]) or (k >= j and abs(step[k]) == abs(step[j]))
-            if greatest:
-                found[j] = step[j]
-    return found
+def _agreed(counts: Int32, shown: Int32) -> Float:
+    """Median of the differences at each column, m, 0 where it is no step or too few rows show it or share it."""
+    step = np.zeros(len(shown))
+    rows = np.flatnonzero(shown >= _FEWEST)
+    counts, shown = counts[rows], shown[rows]
+    until = np.cumsum(counts, axis=1)
+    median = np.minimum((2 * until < shown[:, None]).sum(axis=1), 2 * _BINS)
+    found = (median - _BINS) * _BIN
+    within = np.maximum(LEAST, np.abs(found) / 3.0)
+    near = np.abs(np.arange(2 * _BINS + 1) - median[:, None]) * _BIN <= within[:, None]
+    alike = (counts * near).sum(axis=1)
+    step[rows] = np.where((np.abs(found) >= LEAST) & (alike >= ALL_ROUND * shown), found, 0.0)
+    return step
 
 
-@njit(cache=True, nogil=True)
-def _agreed(counts: Int32, shown: int) -> float:  # pragma: no cover - compiled
-    """Median of the differences, 0 where it is no step or too few rows share it."""
-    k, until = 0, counts[0]
-    while 2 * until < shown and k < 2 * _BINS:
-        k += 1
-        until += counts[k]
-    step = (k - _BINS) * _BIN
-    if abs(step) < LEAST:
-        return 0.0
-    within = max(LEAST, abs(step) / 3.0)
-    alike = 0
-    for m in range(2 * _BINS + 1):
-        if abs(m - k) * _BIN <= within:
-            alike += counts[m]
-    return step if alike >= ALL_ROUND * shown else 0.0
+def _greatest(step: Float, half: int) -> Float:
+    """Steps that are the greatest within ``half`` columns, of equal ones the first; 0 elsewhere, as next to the ends."""
+    height, out = np.abs(step), np.zeros_like(step)
+    for column in np.flatnonzero(step).tolist():
+        if half <= column < len(step) - half:
+            before, behind = height[column - half : column], height[column : column + half + 1]
+            if before.max() < height[column] == behind.max():
+                out[column] = step[column]
+    return out

@@ -11,8 +11,8 @@ import psycopg
 import shapely
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.detect import Found
-from tunneldb.anomalies.geometries import shapes
+from tunneldb.anomalies.detect import Anomaly
+from tunneldb.anomalies.geometries import anomaly_geometries
 from tunneldb.anomalies.matching import match, match_parts
 from tunneldb.anomalies.regions import Region
 from tunneldb.geometry.stationing import KILOMETRE
@@ -69,7 +69,7 @@ def save_anomalies(
     survey: Survey,
     km: int,
     surface: Surface,
-    found: Sequence[Found],
+    found: Sequence[Anomaly],
     cut: Sequence[Region],
     min_area: float,
 ) -> Matched:
@@ -85,7 +85,7 @@ def save_anomalies(
         Where.
     surface : Surface
         The tunnel about the kilometre.
-    found : sequence of Found
+    found : sequence of Anomaly
         Anomalies within the kilometre.
     cut : sequence of Region
         Dark regions that reach its ends.
@@ -95,9 +95,9 @@ def save_anomalies(
     # What takes time comes before the lock.
     rows = [_row(anomaly, surface, survey.srid) for anomaly in found]
     border = replace_parts(conn, survey, km, cut)
-    over: list[tuple[Cluster, Found]] = []
+    over: list[tuple[Cluster, Anomaly]] = []
     for cluster in border.clusters:
-        anomaly = Found.of(cluster.region, min_area)
+        anomaly = Anomaly.of(cluster.region, min_area)
         if anomaly is None:
             link(conn, cluster, None)
         else:
@@ -166,7 +166,7 @@ def _near_end(outline: Polygon, km: int, border: Border) -> bool:
     return any(west - pixel <= plane * KILOMETRE <= east + pixel for plane in (km, km + 1))
 
 
-def _surface_of(conn: psycopg.Connection[Any], survey: Survey, km: int, surface: Surface, anomaly: Found) -> Surface:
+def _surface_of(conn: psycopg.Connection[Any], survey: Survey, km: int, surface: Surface, anomaly: Anomaly) -> Surface:
     """Surface under an anomaly: the kilometre's, or one that reaches on."""
     west, _, east, _ = anomaly.outline.bounds
     if km * KILOMETRE <= west and east <= (km + 1) * KILOMETRE:
@@ -205,9 +205,9 @@ def _write(conn: psycopg.Connection[Any], survey: Survey, values: dict[str, Any]
     return int(row[0])
 
 
-def _row(anomaly: Found, surface: Surface, srid: int) -> dict[str, Any]:
+def _row(anomaly: Anomaly, surface: Surface, srid: int) -> dict[str, Any]:
     west, south, east, north = anomaly.outline.bounds
-    shaped = shapes(anomaly.outline, surface)
+    geometries = anomaly_geometries(anomaly.outline, surface)
     return {
         "km": int((west + east) / 2 // KILOMETRE),
         "kind": anomaly.verdict.kind,
@@ -218,13 +218,13 @@ def _row(anomaly: Found, surface: Surface, srid: int) -> dict[str, Any]:
         "chainage_to": east,
         "arc_from": south,
         "arc_to": north,
-        "clock": shaped.clock,
-        "area": shaped.area,
+        "clock": geometries.clock,
+        "area": geometries.area,
         "drop_mean": anomaly.drop_mean,
         "drop_max": anomaly.drop_max,
         "image_share": anomaly.image_share,
         "unrolled": shapely.to_wkb(anomaly.outline),
-        "map": shapely.to_wkb(shaped.strip),
-        "surface": shapely.to_wkb(shaped.surface),
+        "map": shapely.to_wkb(geometries.map),
+        "surface": shapely.to_wkb(geometries.surface),
         "srid": srid,
     }

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from tunneldb.anomalies.regions import Region, RegionProperties, together, unite
+from tunneldb.anomalies.regions import Region, RegionProperties, merge_regions, touching_groups
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.store.survey import Survey
 
@@ -105,7 +105,7 @@ def replace_parts(conn: psycopg.Connection[Any], survey: Survey, km: int, cut: S
     anomalies = {part.anomaly for group in touched for part in group} | {row[0] for row in before}
     pixel = {part.region.pixel for part in parts if part.km == km}
     return Border(
-        [Cluster(group, unite([part.region for part in group])) for group in touched],
+        [Cluster(group, merge_regions([part.region for part in group])) for group in touched],
         {key for key in anomalies if key is not None},
         first,
         last,
@@ -125,7 +125,7 @@ def _at(part: Part, km: int) -> bool:
 
 
 def _groups(parts: Sequence[Part]) -> list[list[Part]]:
-    return [[parts[k] for k in group] for group in together([part.region for part in parts])]
+    return [[parts[k] for k in group] for group in touching_groups([part.region for part in parts])]
 
 
 def _row(survey: Survey, km: int, region: Region) -> tuple[Any, ...]:
@@ -133,7 +133,7 @@ def _row(survey: Survey, km: int, region: Region) -> tuple[Any, ...]:
     box = [region.column, region.row, columns, rows]
     return (
         survey.id, km, region.pixel, box, np.packbits(region.mask).tobytes(), region.filled, region.drop_sum, region.drop_max,
-        list(region.traits),
+        list(region.properties),
     )  # fmt: skip
 
 

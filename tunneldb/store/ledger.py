@@ -198,12 +198,12 @@ def _fail(conn: psycopg.Connection[Any], survey_id: int, run: Run, job: Job | No
                 [Jsonb(run.counts), describe(error), run.id],
             )
             if job is not None and not isinstance(error, LostError):
-                _settle(conn, job, error)
+                _end_job(conn, job, error)
     except (psycopg.OperationalError, LostError):
         return  # the server went away, or the job is another's: the run stays "running" with a backend that is gone
 
 
-def _settle(conn: psycopg.Connection[Any], job: Job, error: BaseException) -> None:
+def _end_job(conn: psycopg.Connection[Any], job: Job, error: BaseException) -> None:
     """Put a job back that may succeed another time; end it as failed if not."""
     again = retry_at(error, job.attempts)
     if again is None:

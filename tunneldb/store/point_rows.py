@@ -3,32 +3,46 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
 from tunneldb.arrays import Float, Int32, UInt8
+from tunneldb.compiled import kernel
 from tunneldb.database.copy import PointZ, pack
 from tunneldb.pointcloud.spool import ROW, Rows
 from tunneldb.store.survey import Survey
 
-COLUMNS = (
-    "survey_id",
-    "km",
-    "chainage",
-    "gps_time",
-    "geom",
-    "scan_id",
-    "file_id",
-    "intensity",
-    "classification",
+_POINT_Z = np.dtype([("head", "V9"), ("xyz", "<f8", (3,))])  # the head: byte order, type and SRID
+_FIELDS = {
+    "survey_id": ">i4",
+    "km": ">i4",
+    "chainage": ">f8",
+    "gps_time": ">f8",
+    "geom": _POINT_Z,
+    "scan_id": ">i4",
+    "file_id": ">i4",
+    "intensity": ">f4",
+    "classification": ">i2",
+}
+COLUMNS = tuple(_FIELDS)
+
+# A row of binary COPY: the number of its fields, and before each one its length.
+PACKED = np.dtype(
+    [("fields", ">i2"), *(field for name, kind in _FIELDS.items() for field in ((f"{name}_", ">i4"), (name, kind)))]
 )
 
 
-# Where values begin in a packed row: after the number of fields (2 bytes), each field has its length (4) before it.
-_CHAINAGE, _TIME, _XYZ, _SCAN, _FILE, _INTENSITY, _CLASS, _END = 22, 34, 55, 83, 91, 99, 107, 109
-_AT = {name: int(offset) for name, (_, offset, *_) in (ROW.fields or {}).items()}
-_FROM_X, _FROM_CHAINAGE, _FROM_TIME = _AT["x"], _AT["chainage"], _AT["time"]
-_FROM_INTENSITY, _FROM_SCAN, _FROM_TAG, _FROM_CLASS = _AT["intensity"], _AT["scan_id"], _AT["tag"], _AT["classification"]
+def _place(dtype: np.dtype[np.void], name: str) -> int:
+    """Byte at which a field of a record begins."""
+    assert dtype.fields is not None
+    return int(dtype.fields[name][1])
+
+
+_CHAINAGE, _TIME, _SCAN, _FILE, _INTENSITY, _CLASS = (
+    _place(PACKED, name) for name in ("chainage", "gps_time", "scan_id", "file_id", "intensity", "classification")
+)
+_XYZ, _BYTES = _place(PACKED, "geom") + _place(_POINT_Z, "xyz"), PACKED.itemsize
+_FROM_X, _FROM_CHAINAGE, _FROM_TIME, _FROM_INTENSITY, _FROM_SCAN, _FROM_TAG, _FROM_CLASS = (
+    _place(ROW, name) for name in ("x", "chainage", "time", "intensity", "scan_id", "tag", "classification")
+)
 
 
 def pack_rows(survey: Survey, km: int, rows: Rows, file_ids: Int32) -> UInt8:
@@ -43,46 +57,44 @@ def pack_rows(survey: Survey, km: int, rows: Rows, file_ids: Int32) -> UInt8:
 
     Returns
     -------
-    (n × 109,) uint8 array
+    (n × PACKED.itemsize,) uint8 array
         COLUMNS of each row.
     """
-    template = np.frombuffer(pack(_columns(survey, km, np.zeros(1, ROW), np.zeros(1, np.int32))), np.uint8)
-    packed = np.empty((len(rows), _END), np.uint8)
-    _fill(packed, rows.view(np.uint8).reshape(-1, ROW.itemsize), by_chainage(rows["chainage"]), template, _swapped(file_ids))
+    no_row = np.zeros(1, ROW)
+    template = pack(
+        [
+            np.full(1, survey.id, np.int32),
+            np.full(1, km, np.int32),
+            no_row["chainage"],
+            no_row["time"],
+            PointZ(np.zeros((1, 3)), survey.srid),
+            no_row["scan_id"],
+            np.zeros(1, np.int32),
+            no_row["intensity"],
+            no_row["classification"].astype(np.int16),
+        ]
+    )
+    packed = np.empty((len(rows), _BYTES), np.uint8)
+    swapped = np.ascontiguousarray(file_ids.astype(">i4")).view(np.uint8).reshape(-1, 4)
+    records = np.ascontiguousarray(rows).view(np.uint8).reshape(-1, ROW.itemsize)
+    _fill(packed, records, by_chainage(rows["chainage"]), np.frombuffer(template, np.uint8).copy(), swapped)
     return packed.ravel()
 
 
-def _columns(survey: Survey, km: int, rows: Rows, file_ids: Int32) -> list[NDArray[np.generic] | PointZ]:
-    count = len(rows)
-    return [
-        np.full(count, survey.id, np.int32),
-        np.full(count, km, np.int32),
-        rows["chainage"],
-        rows["time"],
-        PointZ(np.column_stack([rows["x"], rows["y"], rows["z"]]), survey.srid),
-        rows["scan_id"],
-        file_ids,
-        rows["intensity"],
-        rows["classification"].astype(np.int16),
-    ]
-
-
-def _swapped(file_ids: Int32) -> UInt8:
-    return np.ascontiguousarray(file_ids.astype(">i4")).view(np.uint8).reshape(-1, 4)
-
-
-@njit(cache=True, nogil=True)
-def by_chainage(chainage: Float) -> Int32:  # pragma: no cover - compiled
+def by_chainage(chainage: Float) -> Int32:
     """Order of growing values; equal ones stay as they come. Spread fairly evenly, they are binned and hardly compared."""
-    n = len(chainage)
-    order = np.empty(n, np.int32)
-    if n == 0:
-        return order
-    low, high = chainage[0], chainage[0]
-    for i in range(n):
-        low, high = min(low, chainage[i]), max(high, chainage[i])
+    chainage = np.ascontiguousarray(chainage)
+    order, start = np.empty(len(chainage), np.int32), np.zeros(len(chainage) + 1, np.int32)
+    if len(chainage) and not _binned(chainage, float(chainage.min()), float(chainage.max()), start, order):
+        return np.argsort(chainage, kind="stable").astype(np.int32)
+    return order
+
+
+@kernel
+def _binned(chainage: Float, low: float, high: float, start: Int32, order: Int32) -> bool:  # pragma: no cover - compiled
+    """Write the order; False where so many values crowd together that comparing all of them is quicker."""
+    n = chainage.shape[0]
     scale = (n - 1) / (high - low) if high > low else 0.0
-    start = np.zeros(n + 1, np.int32)
     for i in range(n):
         start[int((chainage[i] - low) * scale) + 1] += 1
     for b in range(n):
@@ -91,7 +103,6 @@ def by_chainage(chainage: Float) -> Int32:  # pragma: no cover - compiled
         b = int((chainage[i] - low) * scale)
         order[start[b]] = i
         start[b] += 1
-    crowded = False
     for i in range(1, n):
         j = order[i]
         k = i
@@ -99,33 +110,28 @@ def by_chainage(chainage: Float) -> Int32:  # pragma: no cover - compiled
             order[k] = order[k - 1]
             k -= 1
             if i - k > 1000:
-                crowded = True
-                break
+                return False
         order[k] = j
-        if crowded:
-            break
-    if crowded:
-        return np.argsort(chainage, kind="mergesort").astype(np.int32)
-    return order
+    return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fill(packed: UInt8, rows: UInt8, order: Int32, template: UInt8, file_ids: UInt8) -> None:  # pragma: no cover - compiled
-    for k in range(len(order)):
-        row, out = rows[order[k]], packed[k]
-        for b in range(_END):
-            out[b] = template[b]
+    for k in range(order.shape[0]):
+        i = order[k]
+        for b in range(_BYTES):
+            packed[k, b] = template[b]
         for b in range(8):  # network order, from that of this machine
-            out[_CHAINAGE + b] = row[_FROM_CHAINAGE + 7 - b]
-            out[_TIME + b] = row[_FROM_TIME + 7 - b]
+            packed[k, _CHAINAGE + b] = rows[i, _FROM_CHAINAGE + 7 - b]
+            packed[k, _TIME + b] = rows[i, _FROM_TIME + 7 - b]
         for b in range(24):  # the geometry states its own order
-            out[_XYZ + b] = row[_FROM_X + b]
+            packed[k, _XYZ + b] = rows[i, _FROM_X + b]
         tag = np.int64(0)
         for b in range(4):
-            out[_SCAN + b] = row[_FROM_SCAN + 3 - b]
-            out[_INTENSITY + b] = row[_FROM_INTENSITY + 3 - b]
-            tag |= np.int64(row[_FROM_TAG + b]) << (8 * b)
+            packed[k, _SCAN + b] = rows[i, _FROM_SCAN + 3 - b]
+            packed[k, _INTENSITY + b] = rows[i, _FROM_INTENSITY + 3 - b]
+            tag |= np.int64(rows[i, _FROM_TAG + b]) << (8 * b)
         for b in range(4):
-            out[_FILE + b] = file_ids[tag, b]
-        out[_CLASS] = 0
-        out[_CLASS + 1] = row[_FROM_CLASS]
+            packed[k, _FILE + b] = file_ids[tag, b]
+        packed[k, _CLASS] = 0
+        packed[k, _CLASS + 1] = rows[i, _FROM_CLASS]

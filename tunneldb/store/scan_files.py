@@ -185,6 +185,14 @@ def record_kilometres(
         )
 
 
+def record_loaded(conn: psycopg.Connection[Any], km: int, file_ids: list[int]) -> None:
+    """Enter that files are loaded into a kilometre; those that have left it are forgotten there."""
+    conn.execute(
+        "DELETE FROM tunnel.file_km WHERE file_id = ANY (%s) AND km = %s AND isempty(points) AND rows = 0", [file_ids, km]
+    )
+    conn.execute("UPDATE tunnel.file_km SET loaded_at = clock_timestamp() WHERE file_id = ANY (%s) AND km = %s", [file_ids, km])
+
+
 def change_counts(conn: psycopg.Connection[Any], changes: Mapping[int, tuple[int, int]]) -> None:
     """Add to the rows that files have (by id) and to those thinned.
 

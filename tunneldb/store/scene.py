@@ -10,11 +10,12 @@ import psycopg
 import shapely
 from psycopg import sql
 
-from tunneldb.arrays import Float
+from tunneldb.arrays import Float, UInt8
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.lining_relief import Relief
 from tunneldb.classification.objects.clusters import CELL, Cluster
 from tunneldb.classification.scene import Scene
+from tunneldb.classification.targets.detection import Sphere
 from tunneldb.database.copy import copy_binary, pack_array, pack_row, pack_value, unpack_array
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.stationing import KILOMETRE
@@ -214,6 +215,11 @@ def load_clusters(conn: psycopg.Connection[Any], survey: Survey, first: float, s
     ]  # fmt: skip
 
 
+def save_classes(conn: psycopg.Connection[Any], survey: Survey, km: int, classes: UInt8) -> None:
+    """Give the points of a kilometre their classes (n,), in the order of its rows."""
+    conn.execute("SELECT tunnel_api.class_write(%s, %s, %b)", [survey.id, km, classes.tobytes()])
+
+
 def load_scene(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_to: int) -> Scene:
     """What stage ``ground`` has found of kilometres ``km_from`` to ``km_to``: classes points of any density there.
 
@@ -250,6 +256,37 @@ def load_spheres(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km
         [survey.id, km_from - 1, km_to + 1],
     ).fetchall()
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
+
+
+def save_spheres(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    spheres: Sequence[tuple[int, int, int, float | None, Sphere]],
+    nominal: float,
+) -> None:
+    """Replace the target spheres of a survey.
+
+    Parameters
+    ----------
+    spheres : sequence of (int, int, int, float or None, Sphere)
+        Of each scan that saw one: kilometre, number of the sphere, scan, chainage (m) and the sphere.
+    nominal : float
+        Radius that was looked for, m.
+    """
+    conn.execute("DELETE FROM tunnel.target_sphere WHERE survey_id = %s", [survey.id])
+    with conn.cursor() as cursor:
+        cursor.executemany(
+            "INSERT INTO tunnel.target_sphere"
+            " (survey_id, km, number, scan_id, chainage, geom, radius, nominal, rms, sigma, coverage, points)"
+            " VALUES (%s, %s, %s, %s, %s, public.ST_SetSRID(public.ST_MakePoint(%s, %s, %s), %s), %s, %s, %s, %s, %s, %s)",
+            [
+                (
+                    survey.id, km, number, scan, chainage, *sphere.centre.tolist(), survey.srid,
+                    sphere.radius, nominal, sphere.rms, sphere.sigma, sphere.coverage, sphere.points,
+                )
+                for km, number, scan, chainage, sphere in spheres
+            ],
+        )  # fmt: skip
 
 
 def _forget(conn: psycopg.Connection[Any], survey: Survey, km: int, table: str) -> None:

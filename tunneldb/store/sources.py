@@ -10,11 +10,12 @@ import numpy as np
 import psycopg
 from psycopg import sql
 
+from tunneldb.arrays import Float
 from tunneldb.database.fetch import fetch_array
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import Points, ScanSource
-from tunneldb.store.partition import partition, rows_in
+from tunneldb.store.partition import partition, partition_exists, rows_in
 from tunneldb.store.scan_files import checksum
 from tunneldb.store.survey import Survey
 
@@ -126,3 +127,34 @@ def load_poses(conn: psycopg.Connection[Any], survey: Survey) -> PoseModel:
     if survey.platform == "mobile":
         return PoseModel.from_trajectory(rows["time"], xyz)
     return PoseModel.from_stations(rows["scan_id"].astype(np.int64), xyz)
+
+
+def load_points(conn: psycopg.Connection[Any], survey: Survey, km: int, begin: float, end: float) -> tuple[Float, int]:
+    """Read the points of a kilometre, in the order of its rows, and after them those of its neighbours between two chainages.
+
+    Returns
+    -------
+    points : (n, 3) float array
+        m.
+    own : int
+        How many are the kilometre's own.
+
+    Raises
+    ------
+    UserError
+        If it has none.
+    """
+    limits = {km: "true", km - 1: "chainage >= %(begin)s", km + 1: "chainage < %(end)s"}
+    parts = []
+    # Rolled back for the sake of its locks: of two neighbours that held each other's points none could swap in its own.
+    with conn.transaction(force_rollback=True):
+        conn.execute("SET LOCAL synchronize_seqscans = off")  # row by row, from the first one
+        conn.execute("SET LOCAL max_parallel_workers_per_gather = 0")
+        for part, limit in limits.items():
+            if partition_exists(conn, survey, part):
+                source = sql.SQL("FROM {} WHERE ").format(partition(survey, part)) + sql.SQL(limit)
+                rows = fetch_array(conn, _FIELDS[:3], source, {"begin": begin, "end": end})
+                parts.append(np.column_stack([rows[axis] for axis in "xyz"]))
+            elif part == km:
+                raise UserError(f"survey {survey.name} has no points in kilometre {km}")
+    return np.concatenate(parts), len(parts[0])

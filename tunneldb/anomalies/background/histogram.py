@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from tunneldb.anomalies.background.level import BackgroundLevel, level_at
+from tunneldb.anomalies.background.level import BackgroundLevel
 from tunneldb.arrays import Bool, Float, Int16, Int32, Int64, Single, UInt8, UInt16
 from tunneldb.compiled import kernel
 from tunneldb.radiometry.robust_statistics import CLIP, CLIPPED_SIGMA
@@ -105,6 +106,10 @@ class Residuals:
             found[r] = self._count(here, np.zeros(len(here), np.int64), along, 1, cells, 0, along, TILE_BINS)
         return found
 
+    @cached_property
+    def _weights(self) -> tuple[Int64, Single]:
+        return self.model.weights()
+
     def _rows(self) -> Int64:
         return np.arange(self.every // 2, len(self.picture.state), self.every)
 
@@ -122,9 +127,9 @@ class Residuals:
     ) -> Int32:
         """Histograms (count, bins) of some rows; see :func:`_add`."""
         histograms = np.zeros((count, bins), np.int32)
-        lines = self.model.lines(rows) if lines is None else lines
-        state, level, rings, tile = self.picture.state, self.picture.level, self.model.rings, self.model.tile
-        _add(state, level, self.used, lines, rings, tile, rows, begin, stop, step, *cells, stride, histograms)
+        model = self.model.lines(rows) if lines is None else lines, self.model.rings, *self._weights
+        pixels = self.picture.state, self.picture.level, self.used
+        _add(*pixels, *model, rows, begin, stop, step, *cells, stride, bins, histograms.ravel())
         return histograms
 
 
@@ -153,9 +158,9 @@ def window_statistics(histograms: UInt16, used: Bool, half: int) -> tuple[Single
     columns = np.zeros((along, bins), np.int32)
     for r in range(-half, down):
         if r + half < down:
-            columns += histograms[r + half] * used[r + half][:, None]
+            np.add(columns, histograms[r + half], out=columns, where=used[r + half][:, None])
         if r - half - 1 >= 0:
-            columns -= histograms[r - half - 1] * used[r - half - 1][:, None]
+            np.subtract(columns, histograms[r - half - 1], out=columns, where=used[r - half - 1][:, None])
         if r >= 0:
             mean[r], sigma[r], count[r] = histogram_statistics(_windows(columns, half))
     return mean, sigma, count
@@ -279,7 +284,8 @@ def _add(
     used: Bool,
     lines: Single,
     rings: Single,
-    tile: int,
+    middles: Int64,
+    weights: Single,
     rows: Int64,
     begin: Int64,
     stop: int,
@@ -287,24 +293,30 @@ def _add(
     row_cell: Int64,
     tile_cell: Int64,
     stride: int,
+    bins: int,
     histograms: Int32,
 ) -> None:  # pragma: no cover - compiled
-    """Add what lining shows beyond the model in some rows (n,) to histograms.
+    """Add what lining shows beyond the model in some rows (n,) to histograms (cells * bins,).
 
-    Every ``step``-th tile from ``begin`` (n,) to ``stop`` is looked at, if used. ``lines`` (n, tiles) is the model without
-    rings. Pixels of a tile are counted in histogram ``row_cell`` (n,) + ``tile_cell`` (tiles,), and ``stride`` further for
-    each column of the tile.
+    Every ``step``-th tile from ``begin`` (n,) to ``stop`` is looked at, if used. The model is ``rings`` and, interpolated by
+    ``middles`` and ``weights``, ``lines`` (n, tiles). Pixels of a tile are counted in the histogram of cell ``row_cell`` (n,)
+    + ``tile_cell`` (tiles,), and ``stride`` further for each column of the tile.
     """
-    per_pixel, per_bin, half = np.float32(1.0 / tile), np.float32(1.0 / BIN), histograms.shape[1] // 2
+    per_bin, half, tiles = np.float32(1.0 / BIN), bins // 2, used.shape[1]
+    tile = state.shape[1] // tiles
     for r in range(rows.shape[0]):
         i = rows[r]
         for t in range(begin[r], stop, step):
             if not used[i // tile, t]:
                 continue
-            cell = row_cell[r] + tile_cell[t]
-            for j in range(t * tile, (t + 1) * tile):
-                if state[i, j] == LINING:
-                    beyond = np.float32(level[i, j] * PER_LEVEL) - per_bin * level_at(j, lines, r, rings, per_pixel)
-                    k = math.floor(beyond) + half
-                    if 0 <= k < 2 * half:
-                        histograms[cell + stride * (j - t * tile), k] += 1
+            middle = (row_cell[r] + tile_cell[t]) * bins + half
+            for m in range(t, t + 2):  # before the middle of the tile, and behind it
+                before = lines[r, m - 1 if m > 0 else 0]
+                rise = lines[r, m if m < tiles else tiles - 1] - before
+                for j in range(max(middles[m], t * tile), min(middles[m + 1], (t + 1) * tile)):
+                    if state[i, j] == LINING:
+                        expected = rings[j] + before + weights[j] * rise
+                        k = int(np.floor(np.float32(level[i, j] * PER_LEVEL) - per_bin * expected))
+                        if -half <= k < half:
+                            histograms[middle + k] += 1
+                    middle += stride * bins

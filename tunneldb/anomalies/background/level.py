@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunneldb.arrays import Float, Int16, Int64, Single
-from tunneldb.compiled import inner, kernel
+from tunneldb.compiled import kernel
 from tunneldb.raster.geotiff import NODATA, STEP
 
 PER_DECIBEL = 1.0 / STEP["corrected"]
@@ -54,20 +54,39 @@ class BackgroundLevel:
 
     def levels(self, rows: slice, columns: slice) -> Single:
         """Level in some rows and columns, dB."""
-        column = np.arange(columns.start, columns.stop, dtype=np.float32)
-        at = (column + np.float32(0.5)) * np.float32(1.0 / self.tile) - np.float32(0.5)
-        before = np.maximum(at, np.float32(0.0)).astype(np.int64)
+        column = np.arange(columns.start, columns.stop)
+        before, w = self._place(column)
         after = np.minimum(before + 1, self.smooth.shape[1] - 1)
-        w = np.maximum(at - before.astype(np.float32), np.float32(0.0))
         lines = self.lines(np.arange(rows.start, rows.stop))
         levels: Single = (self.rings[columns] + lines[:, before]) + w * (lines[:, after] - lines[:, before])
         return levels
 
     def subtract(self, level: Int16) -> None:
         """Put the level of the background less that of the pixels in the place of these (rows, columns), steps of 0.01 dB."""
+        middles, weights = self.weights()
         for top in range(0, len(level), ROWS):
-            rows = np.arange(top, min(top + ROWS, len(level)))
-            _subtract(level[top : top + ROWS], self.lines(rows), self.rings, self.tile)
+            part = level[top : top + ROWS]
+            _subtract(part, self.lines(np.arange(top, top + len(part))), self.rings, middles, weights)
+
+    def weights(self) -> tuple[Int64, Single]:
+        """How compiled functions interpolate between the middles of tiles.
+
+        Returns
+        -------
+        middles : (tiles + 2,) int array
+            First column that lies behind the middle of each tile; before and behind these the first column and the last + 1.
+        weights : (columns,) float32 array
+            Of the tile whose middle lies behind a column, 0 to 1; that before it has the rest.
+        """
+        before, w = self._place(np.arange(len(self.rings)))
+        middles = np.searchsorted(before, np.arange(self.smooth.shape[1]))
+        return np.concatenate([[0], middles, [len(before)]]), w
+
+    def _place(self, column: Int64) -> tuple[Int64, Single]:
+        """The last tile whose middle lies before each column, the first for those before it, and the weight of the next one."""
+        at = (column.astype(np.float32) + np.float32(0.5)) * np.float32(1.0 / self.tile) - np.float32(0.5)
+        before = np.maximum(at, np.float32(0.0)).astype(np.int64)
+        return before, np.maximum(at - before.astype(np.float32), np.float32(0.0))
 
 
 def _between(place: Float, count: int) -> tuple[Int64, Int64, Single]:
@@ -76,24 +95,17 @@ def _between(place: Float, count: int) -> tuple[Int64, Int64, Single]:
     return before, np.minimum(before + 1, count - 1), np.clip(place - before, 0.0, 1.0).astype(np.float32)
 
 
-@inner
-def level_at(j: int, lines: Single, k: int, rings: Single, per_pixel: np.float32) -> np.float32:  # pragma: no cover - compiled
-    """Level of a column in row ``k`` of the lines, dB; ``per_pixel``: 1 / the side of a tile."""
-    x = (np.float32(j) + np.float32(0.5)) * per_pixel - np.float32(0.5)
-    t = int(x) if x > np.float32(0.0) else 0
-    n = t + 1 if t + 1 < lines.shape[1] else t
-    w = x - np.float32(t)
-    if w < np.float32(0.0):
-        w = np.float32(0.0)
-    return rings[j] + lines[k, t] + w * (lines[k, n] - lines[k, t])
-
-
 @kernel
-def _subtract(level: Int16, lines: Single, rings: Single, tile: int) -> None:  # pragma: no cover - compiled
+def _subtract(
+    level: Int16, lines: Single, rings: Single, middles: Int64, weights: Single
+) -> None:  # pragma: no cover - compiled
     """Level of the background less levels (rows, columns), in the place of these, steps; NODATA stays."""
-    per_pixel, per_step = np.float32(1.0 / tile), np.float32(PER_DECIBEL)
+    per_step, tiles = np.float32(PER_DECIBEL), lines.shape[1]
     for i in range(level.shape[0]):
-        for j in range(level.shape[1]):
-            if level[i, j] != NODATA:
-                drop = np.rint(level_at(j, lines, i, rings, per_pixel) * per_step) - level[i, j]
-                level[i, j] = min(max(drop, NODATA + 1), -NODATA - 1)
+        for m in range(tiles + 1):  # between the middles of tiles m - 1 and m
+            before = lines[i, m - 1 if m > 0 else 0]
+            rise = lines[i, m if m < tiles else tiles - 1] - before
+            for j in range(middles[m], middles[m + 1]):
+                if level[i, j] != NODATA:
+                    drop = np.rint((rings[j] + before + weights[j] * rise) * per_step) - level[i, j]
+                    level[i, j] = min(max(drop, NODATA + 1), -NODATA - 1)

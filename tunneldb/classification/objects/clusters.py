@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-from tunneldb.arrays import Float, Int32, Int64, UInt8, UInt32
+from tunneldb.arrays import Float, Int32, Int64, UInt8
 from tunneldb.compiled import inner
-from tunneldb.pointcloud.voxels import key_table, slot_of
+from tunneldb.pointcloud.voxels import key_slot, value_table
 
 CELL = 0.1
 """Edge of a cell, m."""
@@ -106,18 +106,15 @@ class Lookup:
     ----------
     first, last : (3,) int arrays
         The box that holds all cells.
-    keys : (n,) int array
-        Numbers of the cells in the box.
-    table : (slots,) uint32 array
-        Where `tunneldb.pointcloud.voxels.slot_of` finds them.
-    klass : (n,) uint8 array
+    keys : (slots,) int array
+        Numbers of the cells in the box, where `tunneldb.pointcloud.voxels.key_slot` finds them; -1 for an empty slot.
+    klass : (slots,) uint8 array
         Their classes.
     """
 
     first: Int64
     last: Int64
     keys: Int64
-    table: UInt32
     klass: UInt8
 
     @classmethod
@@ -132,8 +129,7 @@ class Lookup:
             np.array([cluster.klass for cluster in ordered], np.uint8), [len(cluster.cells) for cluster in ordered]
         )
         if len(cells) == 0:
-            keys = np.empty(0, np.int64)
-            return cls(np.zeros(3, np.int64), np.full(3, -1, np.int64), keys, key_table(keys), klass)
+            return cls(np.zeros(3, np.int64), np.full(3, -1, np.int64), *value_table(np.empty(0, np.int64), klass))
         first, last = cells.min(axis=0) - NEAR, cells.max(axis=0) + NEAR
         _, wide, tall = last - first + 1
         place = cells - first
@@ -145,7 +141,7 @@ class Lookup:
             found, nearest = np.unique(about, return_index=True)
             free = ~np.isin(found, keys, assume_unique=True)
             keys, classes = np.append(keys, found[free]), np.append(classes, own[nearest[free] % len(own)])
-        return cls(first, last, keys, key_table(keys), classes)
+        return cls(first, last, *value_table(keys, classes))
 
 
 def _shells() -> list[Int64]:
@@ -158,13 +154,12 @@ def _shells() -> list[Int64]:
 
 @inner
 def look_up(
-    x: float, y: float, z: float, first: Int64, last: Int64, keys: Int64, table: UInt32, klass: UInt8
+    x: float, y: float, z: float, first: Int64, last: Int64, keys: Int64, klass: UInt8
 ) -> int:  # pragma: no cover - compiled
     """Class of the cluster that a point lies in; 0 for none."""
     cx, cy, cz = math.floor(x / CELL), math.floor(y / CELL), math.floor(z / CELL)
     if not (first[0] <= cx <= last[0] and first[1] <= cy <= last[1] and first[2] <= cz <= last[2]):
         return 0
     wide, tall = last[1] - first[1] + 1, last[2] - first[2] + 1
-    key = ((cx - first[0]) * wide + cy - first[1]) * tall + cz - first[2]
-    place = table[slot_of(key, keys, table)]
-    return np.int64(klass[place]) if place < keys.shape[0] else np.int64(0)
+    slot = key_slot(((cx - first[0]) * wide + cy - first[1]) * tall + cz - first[2], keys)
+    return np.int64(klass[slot]) if keys[slot] >= 0 else np.int64(0)  # type: ignore[return-value]

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
-from tunneldb.anomalies.geometries import strip
+from tunneldb.anomalies.geometries import to_map
 from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.surface import Surface
 
@@ -100,7 +100,7 @@ def outline(surface: Surface, chainages: Float) -> Polygon | None:
 
 def on_map(surface: Surface, unrolled: Float) -> Float:
     """Places (n, 2) of the unrolled plane, laid on the map beside the axis, in the tunnel's SRID."""
-    return strip(surface, np.asarray(unrolled, dtype=np.float64))
+    return to_map(surface, np.asarray(unrolled, dtype=np.float64))
 
 
 def profiles(surface: Surface, low: float, high: float) -> list[Profile]:

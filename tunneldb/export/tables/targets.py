@@ -8,7 +8,7 @@ import numpy as np
 
 from tunneldb.geometry.stationing import Stationing
 from tunneldb.pipeline.target_control import Comparison, mean_centres
-from tunneldb.pipeline.targets import Found, Search
+from tunneldb.pipeline.targets import Search, TargetObservation
 from tunneldb.registration.control import Motion
 from tunneldb.store.survey import Survey
 
@@ -28,7 +28,7 @@ _DETERMINED = {
 HEADER = ("sphere", "scan", "chainage", "x", "y", "z", "radius mm", "rms mm", "sigma mm", "coverage", "points")
 
 
-def sphere_rows(rows: Iterable[Found], stationing: Stationing) -> list[tuple[str, ...]]:
+def sphere_rows(rows: Iterable[TargetObservation], stationing: Stationing) -> list[tuple[str, ...]]:
     """Cells of the table of spheres, under `HEADER`."""
     return [
         (
@@ -152,7 +152,7 @@ def _control(comparison: Comparison) -> list[str]:
     return parts
 
 
-def _between_scans(rows: list[Found]) -> list[str]:
+def _between_scans(rows: list[TargetObservation]) -> list[str]:
     """How far apart the scans saw each sphere: what their registration is worth."""
     numbers, centres = mean_centres(rows)
     several = [row for row in rows if sum(other.number == row.number for other in rows) > 1]
