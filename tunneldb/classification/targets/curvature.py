@@ -78,7 +78,7 @@ def _keys(place: Int64) -> tuple[Int64, int, int, int]:
     return np.asarray(((place[:, 0] + 2) * wide + place[:, 1] + 2) * tall + place[:, 2] + 2), int(wide * tall), int(tall), 1
 
 
-def _curved(place: Int64, sums: Float, points: int, limit: float) -> Bool:
+def _curved(place: Int64, sums: Single, points: int, limit: float) -> Bool:
     """Tell which cells (n,) are in a window that is not flat.
 
     Parameters

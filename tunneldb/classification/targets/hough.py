@@ -128,11 +128,11 @@ def hough_candidates(points: PointGrid, observers: Float, radius: float) -> tupl
     votes, voters, scatter = _votes(points, observers, radius)
     scatter = scatter[np.isfinite(scatter)]
     noise = float(np.quantile(scatter, 0.25)) if len(scatter) else math.inf
-    votes, voters = votes[np.isfinite(votes[:, 0])], points.xyz[voters]
+    votes, places = votes[np.isfinite(votes[:, 0])], points.xyz[voters]
     if len(votes) < VOTES:
         return np.zeros((0, 3)), math.inf
     centres, counts = _peaks(PointGrid(votes, VOTE * radius))
-    _, near = PointGrid(voters, radius).around(centres, (1.0 + 2.0 * VOTE) * radius)
+    _, near = PointGrid(places, radius).around(centres, (1.0 + 2.0 * VOTE) * radius)
     good = counts >= SHARE * np.bincount(near, minlength=len(centres))
     centres, counts = centres[good], counts[good]
     order = np.lexsort((*centres.T, -counts))

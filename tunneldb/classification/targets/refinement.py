@@ -102,7 +102,7 @@ def _equations(
     slope = [*(out / far[:, None]).T, *([np.ones(len(far))] if free else [])]
 
     def total(values: Float) -> Float:
-        return np.bincount(candidate, values, minlength=len(centre))
+        return np.asarray(np.bincount(candidate, values, minlength=len(centre)), np.float64)
 
     vector = np.stack([total(weight * one * off) for one in slope], axis=-1)
     matrix = np.stack([np.stack([total(weight * one * other) for other in slope], axis=-1) for one in slope], axis=-2)
