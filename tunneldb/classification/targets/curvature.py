@@ -97,14 +97,14 @@ def _curved(place: Int64, sums: Single, points: int, limit: float) -> Bool:
     # A window is known by the cell at its low corner, filled or not.
     windows = np.unique(np.concatenate([key - shift for shift in shifts]))
     kept = np.zeros(len(key) + 1, np.bool_)
-    sums = np.hstack([sums.T.astype(np.float64), np.zeros((10, 1))])  # the last column is that of a cell without points
+    moments: Float = np.hstack([sums.T.astype(np.float64), np.zeros((10, 1))])  # the last column is that of a cell without points
     for begin in range(0, len(windows), _BLOCK):
         low = windows[begin : begin + _BLOCK]
         total, members = np.zeros((10, len(low))), np.empty((8, len(low)), np.int64)
         for corner, shift, member in zip(_CORNERS, shifts, members, strict=True):
             at = np.minimum(np.searchsorted(key, low + shift), len(key) - 1)
             member[:] = np.where(key[at] == low + shift, at, len(key))
-            total += _moved(sums[:, member], np.array(corner) - 0.5)
+            total += _moved(moments[:, member], np.array(corner) - 0.5)
         full = np.flatnonzero(total[9] >= points)
         means = total[:, full] / total[9, full]
         x, y, z = means[:3]
