@@ -97,7 +97,7 @@ def _curved(place: Int64, sums: Single, points: int, limit: float) -> Bool:
     # A window is known by the cell at its low corner, filled or not.
     windows = np.unique(np.concatenate([key - shift for shift in shifts]))
     kept = np.zeros(len(key) + 1, np.bool_)
-    moments: Float = np.hstack([sums.T.astype(np.float64), np.zeros((10, 1))])  # the last column is that of a cell without points
+    moments: Float = np.hstack([sums.T.astype(np.float64), np.zeros((10, 1))])  # the last: a cell without points
     for begin in range(0, len(windows), _BLOCK):
         low = windows[begin : begin + _BLOCK]
         total, members = np.zeros((10, len(low))), np.empty((8, len(low)), np.int64)
