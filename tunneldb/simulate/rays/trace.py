@@ -123,7 +123,7 @@ class Tracer:
             some = slice(begin, begin + PIECE)
             piece = self._trace(origin[some], direction[some], hint[some], noise[some], chance[some])
             pieces.append(piece._replace(ray=piece.ray + begin))
-        return Echoes(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))  # type: ignore[arg-type]
+        return Echoes(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
 
     def _trace(self, origin: Float, direction: Float, hint: Float, noise: Float, chance: Float) -> Echoes:
         """Shoot rays, as many at a time as their arrays stay in the processor's cache."""
