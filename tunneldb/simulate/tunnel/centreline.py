@@ -227,7 +227,7 @@ class CentreLine:
 
     def position(self, chainage: Float) -> Float:
         """Coordinates of the axis at chainages (n,) -> (n, 3), m."""
-        return np.ascontiguousarray(self.table(chainage)[:3].T) + self.origin
+        return np.column_stack([*self.table(chainage)[:3]]) + self.origin
 
     def frame(self, chainage: Float) -> Frame:
         """Position and unit vectors t, u, w of the axis at chainages (n,)."""

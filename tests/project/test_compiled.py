@@ -1,0 +1,58 @@
+"""How the package compiles: by the decorators of `tunneldb.compiled`; and nothing inner is called from Python, which crashes."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import tunneldb
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = Path(tunneldb.__file__).parent
+INNER, KERNELS = {"inner", "point_inner"}, {"kernel", "point_kernel"}
+FILES = [*sorted(PACKAGE.rglob("*.py")), *sorted((ROOT / "tests").rglob("*.py")), *sorted((ROOT / "benchmarks").rglob("*.py"))]
+
+
+def decorators(node: ast.AST) -> set[str]:
+    names = getattr(node, "decorator_list", [])
+    return {name.id for name in names if isinstance(name, ast.Name)}
+
+
+def inner_functions() -> set[str]:
+    """Names of all inner functions; one that another function bears, too, can't be told apart and is left out."""
+    trees = [ast.parse(path.read_text("utf-8")) for path in PACKAGE.rglob("*.py")]
+    made = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    inner = {node.name for node in made if decorators(node) & INNER}
+    return inner - {node.name for node in made if not decorators(node) & INNER}
+
+
+def calls_from_python(tree: ast.AST) -> Iterator[tuple[str, int]]:
+    """Calls by name outside of compiled functions."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.FunctionDef) and decorators(node) & (INNER | KERNELS):
+            continue
+        if isinstance(node, ast.Call):
+            name = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
+            yield name, node.lineno
+        yield from calls_from_python(node)
+
+
+def test_there_are_inner_functions() -> None:
+    assert len(inner_functions()) > 10
+
+
+def test_nothing_inner_is_called_from_python() -> None:
+    inner = inner_functions()
+    found = [
+        f"{path.name}:{line} {name}"
+        for path in FILES
+        for name, line in calls_from_python(ast.parse(path.read_text("utf-8")))
+        if name in inner
+    ]
+    assert found == []
+
+
+def test_only_the_decorators_of_the_room_compile() -> None:
+    raw = [path for path in PACKAGE.rglob("*.py") if path.name != "compiled.py" and "njit" in path.read_text("utf-8")]
+    assert raw == []
