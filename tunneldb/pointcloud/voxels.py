@@ -273,7 +273,7 @@ def _number_slot(key: int, keys: Int64, table: UInt32) -> int:  # pragma: no cov
 
 
 @inner
-def key_slot(key: int, slots: Int64) -> int:  # pragma: no cover - compiled
+def key_slot(key: int, slots: Int64) -> np.int64:  # pragma: no cover - compiled
     """Slot that holds a key, or the empty one (-1) where it belongs."""
     mask = slots.shape[0] - 1
     slot = np.int64((np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32)) & mask

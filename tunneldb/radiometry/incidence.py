@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Float
+from tunneldb.geometry.normals import principal_planes
 
 NEIGHBOURS = 20
 """Points to which a plane is fitted, itself included."""
@@ -29,12 +30,10 @@ def incidence_cosine(xyz: Float, scanner: Float) -> Float:
     for first in range(0, len(xyz), BLOCK):
         part = slice(first, first + BLOCK)
         at = xyz[part]
-        near = xyz[tree.query(at, NEIGHBOURS, workers=-1)[1]]
-        near = near - near.mean(axis=1, keepdims=True)
-        values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))
+        values, normals = principal_planes(xyz[tree.query(at, NEIGHBOURS, workers=-1)[1]])
         towards = scanner[part] - at
         towards = towards / np.linalg.norm(towards, axis=1, keepdims=True)
-        seen = np.abs(np.einsum("ni,ni->n", vectors[:, :, 0], towards))
+        seen = np.abs(np.einsum("ni,ni->n", normals, towards))
         # Points on a line, as of a single profile, have no normal.
         flat = (values[:, 0] <= FLAT * values.sum(axis=1)) & (values[:, 1] > 10.0 * values[:, 0])
         cosine[part] = np.where(flat, seen, np.nan)
