@@ -24,6 +24,11 @@ point_inner = njit(
 )
 """What such a kernel calls for each point, put into it whole: several numbers returned cost nothing then."""
 
+inner_sums = njit(
+    cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "nnan"}, no_cpython_wrapper=True, no_cfunc_wrapper=True
+)
+"""What adds up many numbers in any order, several at once."""
+
 
 @inner
 def lower_bound(values: Int64, wanted: int, begin: int, end: int) -> int:  # pragma: no cover - compiled

@@ -6,10 +6,9 @@ The planes are fitted to the offset image, where a curved lining is flat.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from tunneldb.arrays import Bool, Int32, Single
-from tunneldb.compiled import inner, point_inner, point_kernel
+from tunneldb.compiled import inner, inner_sums, point_inner, point_kernel
 from tunneldb.geometry.robust_plane import DELTA, central_mode, plane_of_moments
 from tunneldb.threads import in_blocks
 
@@ -235,7 +234,7 @@ def _plane(
 
 
 # Sums may be taken in any order, so that several are taken at once.
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "nnan"}, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@inner_sums
 def _moments(
     x: Single, y: Single, z: Single, a: np.float32, b: np.float32, c: np.float32, per_scale: np.float32
 ) -> tuple[float, ...]:  # pragma: no cover - compiled

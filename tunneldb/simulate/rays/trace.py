@@ -69,7 +69,7 @@ class Echoes(NamedTuple):
 
     def take(self, rows: Int64) -> Echoes:
         """Some of them."""
-        return Echoes._make(column[rows] for column in self)
+        return Echoes(*(column[rows] for column in self))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -123,11 +123,7 @@ class Tracer:
             some = slice(begin, begin + PIECE)
             piece = self._trace(origin[some], direction[some], hint[some], noise[some], chance[some])
             pieces.append(piece._replace(ray=piece.ray + begin))
-<<<<<<< HEAD
-        return Echoes._make(np.concatenate(columns) for columns in zip(*pieces, strict=True))
-=======
         return Echoes(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
->>>>>>> e1408406bcd0cf0bd86ea0b5449151f0448fb71c
 
     def _trace(self, origin: Float, direction: Float, hint: Float, noise: Float, chance: Float) -> Echoes:
         """Shoot rays, as many at a time as their arrays stay in the processor's cache."""
