@@ -30,7 +30,6 @@ from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.report.pdf import find_browser
-from tunneldb.store.images import DARK
 
 SURVEY = "demo-2024"
 REACH = CORNER + 3.0
@@ -56,7 +55,9 @@ def images(conn: psycopg.Connection[Any], survey_id: int, kilometres: int, pixel
             near = outlines[tree.query(shapely.box(chainages[0], -REACH, chainages[-1], REACH))]
             dark = rasterize(near, noise.shape, transform=transform).astype(bool) if len(near) else np.zeros(noise.shape, bool)
             values = (-12.0 + 0.5 * np.roll(noise, 37 * n, axis=1) - 5.0 * dark).astype(np.float32)
-            state = np.where(wall[:, None], np.where(dark, DARK, PixelState.LINING), PixelState.FLOOR).astype(np.float32)
+            state = np.where(wall[:, None], np.where(dark, PixelState.DARK, PixelState.LINING), PixelState.FLOOR).astype(
+                np.float32
+            )
             hidden = (chainages % 800 < 6)[None, :] & wall[:, None]
             values[hidden], state[hidden] = np.nan, PixelState.EMPTY
             for kind, shown in (("corrected", values), ("state", state)):

@@ -48,7 +48,9 @@ from measure_results import (
 
 SCENES = ("demo", "static", "ringo", "batch", "files")
 
-CHANGING = (
+Rules = tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]
+
+CHANGING: Rules = (
     (re.compile(r"(?s)(\n *2\r?\nCLASSES\r?\n).*?(?=\n *0\r?\nENDSEC)"), r"\1"),  # of DXF, in any order
     (re.compile(r"\$(TDU?CREATE|TDU?UPDATE|FINGERPRINTGUID|VERSIONGUID)\r?\n\s*\d+\r?\n.*"), r"$\1"),  # of DXF
     (re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d(:\d\d(\.\d+)?)?( ?(Z|UTC|[+-]\d\d(:?\d\d)?))?"), "TIME"),
@@ -57,8 +59,10 @@ CHANGING = (
 )
 """What is replaced in all texts."""
 
-SAID = (
+SAID: Rules = (
     (re.compile(r"\b[\d.,]+ (s|min|h|points/s|GB free|MB/s)(?!\w)"), "TIME"),
+    (re.compile(r"^│ +\d+ (?=│)", re.MULTILINE), "│ id "),  # ids of leaks, which are compared in the tables
+    (re.compile(r"\{\d+(,\d+)*\}"), lambda found: f"{found[0].count(',') + 1} ids"),
     (re.compile(r"[ ─━-]{2,}"), " "),  # widths of columns follow from them
 )
 """And in what is printed."""
@@ -175,8 +179,17 @@ def compare_json(findings: Findings, item: str, before: str, after: str) -> None
     for text, side in zip((before, after), sides, strict=True):
         for name, value in flatten(clean_json(json.loads(text))):
             side[name].append(value)
-    for name in sides[0].keys() | sides[1].keys():
-        compare_texts(findings, f"{item}: {name}", *("\n".join(side[name]) for side in sides))
+    for name in sorted(sides[0].keys() | sides[1].keys()):
+        first, second = sides[0][name], sides[1][name]
+        if (
+            name.rpartition(".")[2] in IDENTITIES
+            and len(first) == len(second)
+            and one_to_one({*zip(first, second, strict=True)})
+        ):
+            if first != second:
+                findings.say("renumbered", item, name, "one to one: the order of insertion")
+            continue
+        compare_texts(findings, f"{item}: {name}", "\n".join(first), "\n".join(second))
 
 
 class Capture:

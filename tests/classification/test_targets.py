@@ -204,10 +204,10 @@ def test_moments_agree_with_lapack() -> None:
         matrix = np.cov(points.T)
         xx, yy, zz, xy, xz, yz = matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         values, vectors = np.linalg.eigh(matrix)
-        found = eigenvalues(xx, yy, zz, xy, xz, yz)
+        found = eigenvalues.py_func(xx, yy, zz, xy, xz, yz)
         assert found == pytest.approx(values, rel=1e-6, abs=1e-12 * values[2])
         if values[1] > 1.5 * values[0]:
-            assert abs(np.dot(normal(xx, yy, zz, xy, xz, yz, found[0]), vectors[:, 0])) == pytest.approx(1.0, abs=1e-6)
+            assert abs(np.dot(normal.py_func(xx, yy, zz, xy, xz, yz, found[0]), vectors[:, 0])) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_rows_of_several_scans_are_joined() -> None:

@@ -140,10 +140,8 @@ def test_shotcrete_is_alike_over_centimetres_and_unlike_over_metres() -> None:
     simulation = Simulation(Parameters(**{**BARE, "lining": "shotcrete"}, seed=6))
     rng = np.random.default_rng(0)
     s, arc = rng.uniform(0.0, 30.0, 3000), rng.uniform(-9.0, 9.0, 3000)
-    assert simulation.coat is not None
-    here, near, far = (
-        np.array([level_at(simulation.coat, a + d, b) for a, b in zip(s, arc, strict=True)]) for d in (0.0, 0.02, 2.0)
-    )
+    assert simulation.reflectance is not None
+    here, near, far = (level_at(simulation.reflectance, s + d, arc) for d in (0.0, 0.02, 2.0))
     assert 0.3 * 0.9 < here.std() < 0.5 * 1.1
     assert abs(here.mean()) < 0.05
     assert np.corrcoef(here, near)[0, 1] > 0.95

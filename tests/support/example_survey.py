@@ -21,7 +21,6 @@ from tunneldb.pipeline.stages import STAGES
 from tunneldb.raster.geotiff import KINDS, Raster, decode, encode
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.pixel_state import PixelState
-from tunneldb.store.images import DARK
 
 DATABASE = "tunneldb_example"
 NAME, SRID, SPACING = "demo-2024", 25830, 10.0
@@ -290,7 +289,7 @@ def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines
             _lay(offset, grid, columns, surface, thing)
         values = {
             "corrected": shade, "raw": shade - 0.08 * (x % 20 - 10) ** 2 / 2, "offset": offset,
-            "state": np.where(wet & (np.abs(y) < CORNER), DARK, _states(x, y)),
+            "state": np.where(wet & (np.abs(y) < CORNER), PixelState.DARK, _states(x, y)),
         }  # fmt: skip
         for kind in (*KINDS, "state"):
             held = np.where((np.abs(y) < 9.0) | (kind in ("offset", "state")), values[kind], np.nan).astype(np.float32)

@@ -49,10 +49,11 @@ def count_about(mask: Bool, rows: slice, about: slice, half: int) -> UInt16:
     size, above = 2 * half + 1, half - (rows.start - about.start)
     held = np.zeros((rows.stop - rows.start + 2 * half, mask.shape[1]), np.uint8)
     held[above : above + len(mask)] = mask
-    columns = np.zeros((rows.stop - rows.start, mask.shape[1] + 2 * half), np.uint16)
+    columns: UInt16 = np.zeros((rows.stop - rows.start, mask.shape[1] + 2 * half), np.uint16)
     columns[:, half : half + mask.shape[1]] = _sum_along(held, size)
     # Of the transposed image, so that one function does for both axes.
-    return _sum_along(columns.T, size).T
+    counts: UInt16 = _sum_along(columns.T, size).T
+    return counts
 
 
 def count_in_columns(mask: Bool) -> Int64:

@@ -16,7 +16,7 @@ from tunneldb.classification.objects.spacing import Spacing
 from tunneldb.classification.scene import Scene
 from tunneldb.classification.sections import find_lining, surface_through
 from tunneldb.geometry.plan_line import PlanLine
-from tunneldb.geometry.section_outliers import OutlierOffsets
+from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.geometry.surface import Surface
 
 
@@ -52,7 +52,7 @@ def find_scene(
         off &= ~ground.is_ground(along, across, points[:, 2])
     chainage, arc, offset = places.chainage[off], places.arc[off], places.offset[off]
     along, across, points = along[off], across[off], points[off]
-    relief = Relief.of(chainage, arc, offset, Wall.of(ground, line, surface), OutlierOffsets.of(surface))
+    relief = Relief.of(chainage, arc, offset, Wall.of(ground, line, surface), SectionOutliers.of(surface))
     plane, tolerance = relief.level(chainage, arc)
     depth = offset - plane
     with np.errstate(invalid="ignore"):

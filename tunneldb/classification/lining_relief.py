@@ -20,7 +20,7 @@ from tunneldb.classification.ground.wall_arcs import foot_arcs
 from tunneldb.compiled import inner, kernel
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.robust_plane import DELTA, central_mode, plane_of_moments
-from tunneldb.geometry.section_outliers import OutlierOffsets
+from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.geometry.surface import Surface
 from tunneldb.threads import in_blocks
 
@@ -73,7 +73,7 @@ class Relief:
 
     @classmethod
     def of(
-        cls, chainage: Float, arc: Float, offset: Float, wall: Wall | None = None, prior: OutlierOffsets | None = None
+        cls, chainage: Float, arc: Float, offset: Float, wall: Wall | None = None, prior: SectionOutliers | None = None
     ) -> Relief:
         """Find the relief of a lining from points of survey density.
 
@@ -83,7 +83,7 @@ class Relief:
             Points that are not ground, in the unrolled plane, m; those with NaN are left out.
         wall : Wall, optional
             Where the lining ends above the ground; without it all of the surface is lining.
-        prior : OutlierOffsets, optional
+        prior : SectionOutliers, optional
             Where the surface is known to have left the lining.
 
         Returns
@@ -101,7 +101,7 @@ class Relief:
         shape = int(i.max()) - row + 1, int(j.max()) - column + 1
         columns = np.asarray((np.arange(shape[1]) + column + 0.5) * CELL, np.float64)
         rows = np.asarray((np.arange(shape[0]) + row + 0.5) * CELL, np.float64)
-        expected = np.zeros(shape) if prior is None else prior.at(columns, rows)
+        expected = np.zeros(shape) if prior is None else prior.offset(columns, rows)
         place = (i - row) * shape[1] + j - column
         order = np.argsort(place, kind="stable")
         starts = np.searchsorted(place[order], np.arange(shape[0] * shape[1] + 1))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
@@ -11,11 +10,14 @@ from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.objects.dbscan import dbscan
 from tunneldb.classification.objects.objects import ClusterSettings, ResidualPoints
 from tunneldb.classification.objects.spacing import Spacing
+from tunneldb.compiled import kernel
 from tunneldb.geometry.frame import frame_of, locate, nearest_segment, segment_rows, tangents
+from tunneldb.geometry.normals import principal_planes
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.robust_plane import DELTA
 from tunneldb.geometry.surface import Surface
 from tunneldb.geometry.unrolling import CROWN, NODES
+from tunneldb.threads import in_blocks
 
 COHERENT = 0.8
 """Cosine of the angle between neighbouring normals that the clusters of a lining reach on the average."""
@@ -37,6 +39,7 @@ _CLASSES = 360 // _DEGREES
 _NOTCH = 5  # classes: 10 degrees, of which what hangs on the wall takes less
 _LEAST = 3  # points that fill a class
 _NEIGHBOURS = 16  # of a normal
+_BLOCK = 16_384  # points at a time
 
 
 def find_lining(residual: ResidualPoints, spacing: Spacing, settings: ClusterSettings) -> Bool:
@@ -71,29 +74,11 @@ def coherence(points: Float) -> float:
     if near < 4:
         return 0.0
     _, index = cKDTree(points).query(points, k=near)
-    return float(_coherence(points, index.astype(np.int64)))
-
-
-@njit(cache=True, nogil=True)
-def _coherence(points: Float, index: Int64) -> float:  # pragma: no cover - compiled
-    count, near = index.shape
-    normals = np.empty((count, 3))
-    for i in range(count):
-        centre = np.zeros(3)
-        for k in index[i]:
-            centre += points[k] / near
-        scatter = np.zeros((3, 3))
-        for k in index[i]:
-            d = points[k] - centre
-            for a in range(3):
-                for b in range(3):
-                    scatter[a, b] += d[a] * d[b]
-        normals[i] = np.linalg.eigh(scatter)[1][:, 0]
-    total = 0.0
-    for i in range(count):
-        for k in index[i, 1:]:
-            total += abs(normals[i, 0] * normals[k, 0] + normals[i, 1] * normals[k, 1] + normals[i, 2] * normals[k, 2])
-    return total / (count * (near - 1))
+    normals = np.concatenate(
+        [principal_planes(points[index[first : first + _BLOCK]])[1] for first in range(0, len(points), _BLOCK)]
+    )
+    cosines = [np.abs((normals * normals[neighbour]).sum(axis=1)).mean() for neighbour in index[:, 1:].T]
+    return float(np.mean(cosines))
 
 
 def surface_through(line: PlanLine, along: Float, across: Float, z: Float, wall: Bool) -> Surface | None:
@@ -109,7 +94,7 @@ def surface_through(line: PlanLine, along: Float, across: Float, z: Float, wall:
     ends = np.column_stack([at[:-1], at[1:]])
     count = max(1, round((last - first) / SECTIONS))
     sections = first + (np.arange(count) + 0.5) * (last - first) / count
-    places = _placed(rows, np.arange(segments), ends, np.column_stack([line.point(along, across), z]))
+    places = _placed(rows, ends, np.column_stack([line.point(along, across), z]))
     held = np.isfinite(places[:, 0])
     (along, u, w), wall = places[held].T, wall[held]
     angle = np.mod(np.degrees(np.arctan2(u, w)) + 180.0, 360.0)
@@ -153,11 +138,19 @@ def _middles(at: Float, along: Float, across: Float, z: Float, wall: Bool) -> Fl
     return out
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _placed(segments: Float, number: Int64, ends: Float, points: Float) -> Float:  # pragma: no cover - compiled
+def _placed(segments: Float, ends: Float, points: Float) -> Float:
     """Chainage of points (n, 3) and their place right and up of the axis, (n, 3), m; NaN beyond its ends."""
-    out = np.full((points.shape[0], 3), np.nan)
-    for i in prange(points.shape[0]):
+    out = np.full((len(points), 3), np.nan)
+    number = np.arange(len(segments))
+    in_blocks(lambda begin, end: _place(segments, number, ends, points, out, begin, end), len(points), _BLOCK)
+    return out
+
+
+@kernel
+def _place(
+    segments: Float, number: Int64, ends: Float, points: Float, out: Float, begin: int, end: int
+) -> None:  # pragma: no cover - compiled
+    for i in range(begin, end):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         k, f = locate(segments, number, nearest_segment(segments, x, y, z), x, y, z)
         if k >= 0:
@@ -165,7 +158,6 @@ def _placed(segments: Float, number: Int64, ends: Float, points: Float) -> Float
             out[i, 0] = ends[k, 0] + f * (ends[k, 1] - ends[k, 0])
             out[i, 1] = (x - ox) * rx + (y - oy) * ry
             out[i, 2] = (x - ox) * ry * tz - (y - oy) * rx * tz + (z - oz) * (rx * ty - ry * tx)
-    return out
 
 
 def _medians(key: Int64, value: Float, count: int) -> Float:

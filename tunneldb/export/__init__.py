@@ -1,1 +1,5 @@
 """What leaves the database as a file: images, point clouds, tables, figures, exchange formats and QGIS projects."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

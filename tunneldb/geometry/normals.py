@@ -1,13 +1,43 @@
-"""Directions of a set of points, from its second moments: closed forms, for loops that look at millions of neighbourhoods."""
+"""Planes of small neighbourhoods: their normals and how flat they are, from second moments (principal components)."""
 
 from __future__ import annotations
 
 import math
 
-from numba import njit
+import numpy as np
+
+from tunneldb.arrays import Float
+from tunneldb.compiled import inner, kernel
 
 
-@njit(cache=True, nogil=True)
+def principal_planes(near: Float) -> tuple[Float, Float]:
+    """Planes through neighbourhoods by their principal components.
+
+    Parameters
+    ----------
+    near : (n, k, 3) float array
+        The k points of each of n neighbourhoods, m.
+
+    Returns
+    -------
+    values : (n, 3) float array
+        Eigenvalues of the scatter matrix (sum of squares about the mean) of each, the least first, m².
+    normals : (n, 3) float array
+        Unit normals, of either sign.
+    """
+    near = near - near.mean(axis=1, keepdims=True)
+    values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))
+    return values, vectors[:, :, 0]
+
+
+def least_eigenvalues(moments: Float) -> Float:
+    """Least eigenvalue (n,) of symmetric matrices, rows (n, 6) of xx, yy, zz, xy, xz and yz."""
+    out = np.empty(len(moments))
+    _least_eigenvalues(np.ascontiguousarray(moments), out)
+    return out
+
+
+@inner
 def eigenvalues(
     xx: float, yy: float, zz: float, xy: float, xz: float, yz: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
@@ -26,22 +56,29 @@ def eigenvalues(
     return least, 3.0 * mean - greatest - least, greatest
 
 
-@njit(cache=True, nogil=True)
+@inner
 def normal(
     xx: float, yy: float, zz: float, xy: float, xz: float, yz: float, least: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Unit eigenvector of the least eigenvalue, by the longest cross product of two rows; zero where it isn't one direction."""
     a, b, c = xx - least, yy - least, zz - least
-    best, nx, ny, nz = 0.0, 0.0, 0.0, 0.0
-    for x, y, z in (
-        (xy * yz - xz * b, xz * xy - a * yz, a * b - xy * xy),  # first and second row
-        (xy * c - xz * yz, xz * xz - a * c, a * yz - xy * xz),  # first and third
-        (b * c - yz * yz, yz * xz - xy * c, xy * yz - b * xz),  # second and third
-    ):
-        length = x * x + y * y + z * z
-        if length > best:
-            best, nx, ny, nz = length, x, y, z
-    if best == 0.0:
+    nx, ny, nz = xy * yz - xz * b, xz * xy - a * yz, a * b - xy * xy  # first and second row
+    longest = nx * nx + ny * ny + nz * nz
+    x, y, z = xy * c - xz * yz, xz * xz - a * c, a * yz - xy * xz  # first and third
+    length = x * x + y * y + z * z
+    if length > longest:
+        longest, nx, ny, nz = length, x, y, z
+    x, y, z = b * c - yz * yz, yz * xz - xy * c, xy * yz - b * xz  # second and third
+    length = x * x + y * y + z * z
+    if length > longest:
+        longest, nx, ny, nz = length, x, y, z
+    if not longest > 0.0:
         return 0.0, 0.0, 0.0
-    best = math.sqrt(best)
-    return nx / best, ny / best, nz / best
+    longest = math.sqrt(longest)
+    return nx / longest, ny / longest, nz / longest
+
+
+@kernel
+def _least_eigenvalues(moments: Float, out: Float) -> None:  # pragma: no cover - compiled
+    for i in range(moments.shape[0]):
+        out[i], _, _ = eigenvalues(moments[i, 0], moments[i, 1], moments[i, 2], moments[i, 3], moments[i, 4], moments[i, 5])

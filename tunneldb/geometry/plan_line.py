@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Float, Int32
-from tunneldb.compiled import kernel
+from tunneldb.compiled import point_kernel
 from tunneldb.threads import in_blocks
 
 _APRON = 30.0  # m around the line in which the search begins at the nearest segment
@@ -80,7 +80,8 @@ class PlanLine:
         along, across = np.empty(len(points)), np.empty(len(points))
 
         def work(begin: int, end: int) -> None:
-            _place(self._segments, self._grid, self._corner, points, begin, end, along, across)
+            block = slice(begin, end)
+            _place(self._segments, self._grid, self._corner, points[block], along[block], across[block])
 
         in_blocks(work, len(points), _BLOCK)
         return along, across
@@ -112,13 +113,13 @@ def _nearest_segments(vertices: Float, length: Float) -> tuple[Int32, Float]:
     return grid, np.array([low[0], low[1], edge])
 
 
-@kernel
+@point_kernel
 def _place(
-    s: Float, grid: Int32, corner: Float, points: Float, begin: int, end: int, along: Float, across: Float
+    s: Float, grid: Int32, corner: Float, points: Float, along: Float, across: Float
 ) -> None:  # pragma: no cover - compiled
     """Place points: from the segment nearest to the cell of each to the one between whose ends it lies."""
     last = s.shape[0] - 1
-    for n in range(begin, end):
+    for n in range(points.shape[0]):
         x, y = points[n, 0], points[n, 1]
         column = min(max(int((x - corner[0]) / corner[2]), 0), grid.shape[1] - 1)
         row = min(max(int((y - corner[1]) / corner[2]), 0), grid.shape[0] - 1)

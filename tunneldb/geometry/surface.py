@@ -94,10 +94,11 @@ class Surface:
         unrolled = np.column_stack(np.broadcast_arrays(chainage, arc, offset)).astype(np.float64, copy=False)
         which = self.segment_index(unrolled[:, 0])
         points = np.empty_like(unrolled)
-        segments, _, *others = self.arrays
         for begin in range(0, len(points), BLOCK):
             part = slice(begin, begin + BLOCK)
-            points[part] = to_space(segments, which[part], *others, unrolled[part])
+            points[part] = to_space(
+                self.segments, which[part], self.ends, self.chainages, self.radius, self.arcs, self.reach, unrolled[part]
+            )
         return points
 
     def segment_index(self, chainage: Float) -> Int64:

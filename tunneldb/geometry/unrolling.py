@@ -263,7 +263,7 @@ def to_plane(
                     normals[i, 1] = (nu * ry + nw * upy + nt * ty) * scale
                     normals[i, 2] = (nw * upz + nt * tz) * scale
         if not found:
-            k = -1
+            k = np.int64(-1)
             if not afresh:
                 continue  # the same point again, looked for everywhere
             for axis in range(3):

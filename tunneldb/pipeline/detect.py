@@ -16,7 +16,7 @@ from tunneldb.anomalies.coverage import Coverage, measure_coverage
 from tunneldb.anomalies.detect import Detection, find_anomalies
 from tunneldb.arrays import UInt8
 from tunneldb.errors import UserError
-from tunneldb.geometry.section_outliers import SectionOutliers
+from tunneldb.geometry.section_outliers import MOST, SectionOutliers
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.calibration import UNKNOWN, Calibration, calibrate, dry_sigma
@@ -200,7 +200,7 @@ def compute_detection(
     observer, view, roughness = calibration.observer, calibration.view, calibration.roughness
     with Accumulator(inputs.grid) as image:
         counts = _gather(observer, inputs.files, image, roughness.sigma, progress)
-        outliers = SectionOutliers.of(observer.surface)
+        outliers = SectionOutliers.of(observer.surface, MOST)
         lining = lining_image(image, observer.floor, outliers, values["appendage.distance"], save_block)
     background = map_background(lining, inputs.dry)
     contrast = contrast_image(lining, background)

@@ -1,1 +1,5 @@
 """Laser scans on disk: reading, scanner positions, noise filter and thinning."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

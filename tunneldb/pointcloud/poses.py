@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tunneldb.arrays import Float, Int32, Int64
-from tunneldb.compiled import inner, kernel
+from tunneldb.compiled import point_inner, point_kernel
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.reader import Points
 from tunneldb.threads import in_blocks
@@ -163,7 +163,7 @@ def _count_scans(scan_id: Int32) -> tuple[Int64, Int64]:
     return present + low, counts[present]
 
 
-@inner
+@point_inner
 def interval(time: Float, wanted: float, hint: int) -> int:  # pragma: no cover - compiled
     """Number of the last of growing times that is not later than the one wanted, or 0; looked for from a hint on."""
     last = time.shape[0] - 1
@@ -182,7 +182,7 @@ def interval(time: Float, wanted: float, hint: int) -> int:  # pragma: no cover 
     return max(low - 1, 0)
 
 
-@inner
+@point_inner
 def position_at(time: Float, track: Float, wanted: float, k: int) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Place of the trajectory at a time in its interval ``k``."""
     j = min(k + 1, time.shape[0] - 1)
@@ -195,7 +195,7 @@ def position_at(time: Float, track: Float, wanted: float, k: int) -> tuple[float
     )
 
 
-@kernel
+@point_kernel
 def _interpolate(
     time: Float, track: Float, wanted: Float, out: Float, begin: int, end: int
 ) -> None:  # pragma: no cover - compiled

@@ -269,7 +269,7 @@ def _number_slot(key: int, keys: Int64, table: UInt32) -> int:  # pragma: no cov
     at = (h ^ (h >> np.uint64(32))) & mask
     while table[at] != _EMPTY and keys[table[at]] != key:
         at = (at + np.uint64(1)) & mask
-    return np.int64(at)
+    return np.int64(at)  # type: ignore[return-value]  # to Numba it is an int
 
 
 @inner

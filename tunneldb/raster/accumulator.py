@@ -125,21 +125,24 @@ class Accumulator:
         UserError
             If the temporary folder has no room for what memory doesn't hold.
         """
-        row, column, weight, *values = (array[:count] for array in pixels)
+        pixels = pixels.first(count)
         width = self.grid.block_columns
         marked = np.zeros(self.grid.columns // width, np.bool_)
-        _touched(column, width, marked)
+        _touched(pixels.column, width, marked)
         touched = np.flatnonzero(marked).tolist()
         # Blocks in memory first, lest fetching another one puts them out.
         for block in sorted(touched, key=lambda b: b not in self._blocks):
-            sums, parts = self._fetch(block), threads()
-            # Each thread has rows of its own.
-            in_blocks(
-                lambda part, _, sums=sums, first=block * width, parts=parts: _add(
-                    sums, row, column, first, weight, *values, self._full, part, parts
-                ), parts, 1,
-            )  # fmt: skip
+            self._add(block, pixels)
             self._changed.add(block)
+
+    def _add(self, block: int, pixels: Pixels) -> None:
+        """Add the points that fall into a block; each thread has rows of its own."""
+        sums, first, parts = self._fetch(block), block * self.grid.block_columns, threads()
+
+        def rows(part: int, _: int) -> None:
+            _add(sums, first, *pixels, self._full, part, parts)
+
+        in_blocks(rows, parts, 1)
 
     def blocks(self) -> list[int]:
         """Blocks, counted from 0, that hold points."""
@@ -217,9 +220,9 @@ def _touched(column: Int32, width: int, touched: Bool) -> None:  # pragma: no co
 @kernel
 def _add(
     sums: Whole,
+    first: int,
     row: Int32,
     column: Int32,
-    first: int,
     weight: Int32,
     offset: Single,
     raw: Single,

@@ -147,12 +147,13 @@ def _thin(pixel: float) -> int:
 def _samples(offset: Single, skip_rows: int, skip_columns: int, rows: int, columns: int, slant: int, every: int) -> Single:
     """Every n-th pixel of each row, in slanting lines, with a margin; _NONE where there is no point."""
     samples = np.full((rows, columns // every + 2), _NONE, np.float32)
-    for i in range(offset.shape[0]):
-        # The columns whose number is that of the row, but for multiples of n.
+    for i in range(min(every, len(offset))):
+        # The columns whose number is that of the row, but for multiples of n; the same for every n-th row.
         shift = (i + slant + skip_columns) % every - skip_columns
         skip = max(0, -(shift // every))
-        values = offset[i, shift + every * skip :: every][: samples.shape[1] - skip]
-        samples[i + skip_rows, skip : skip + len(values)] = np.where(np.isnan(values), _NONE, values)
+        values = offset[i::every, shift + every * skip :: every][:, : samples.shape[1] - skip]
+        taken = samples[i + skip_rows : skip_rows + len(offset) : every, skip : skip + values.shape[1]]
+        taken[:] = np.where(np.isnan(values), _NONE, values)
     return samples
 
 

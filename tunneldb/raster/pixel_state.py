@@ -23,6 +23,7 @@ class PixelState(IntEnum):
     RECESS = 2  # lining set back behind the wall: the back of a niche, a bolt pocket
     OFF = 3  # an appendage, or the mixed pixels of an edge
     FLOOR = 4
+    DARK = 5  # in the stored image of states only: lining that is dark
 
 
 def reach(pixel: float) -> int:
@@ -56,8 +57,8 @@ def pixel_states(window: Window, columns: slice, grid: Grid, floor: Floor, outli
     chainage, arc = grid.chainages(window.columns), grid.arcs()
     left, right = floor.bounds(chainage)
     offset, bent = window.offset, None
-    if (strayed := outliers.level(chainage, arc)) is not None:
-        offset, bent = offset - strayed[0], strayed[1]
+    if (departure := outliers.offset_and_bends(chainage, arc)) is not None:
+        offset, bent = offset - departure[0], departure[1]
     row = -grid.bottom - grid.rows
     jumps = step.steps(offset, grid.pixel, row, arc, left, right)
     if jumps.any():

@@ -128,6 +128,13 @@ class Pixels(NamedTuple):
         whole, single = np.empty((3, count), np.int32), np.empty((3, count), np.float32)
         return cls(whole[0], whole[1], whole[2], single[0], single[1], single[2])
 
+    def first(self, count: int) -> Pixels:
+        """Those of the first so many points."""
+        return Pixels(
+            self.row[:count], self.column[:count], self.weight[:count],
+            self.offset[:count], self.raw[:count], self.corrected[:count],
+        )  # fmt: skip
+
 
 class ProjectionCounts(NamedTuple):
     """What `project` counts.
@@ -285,8 +292,8 @@ def _project(
                 dx, dy, dz = position_at(trajectory, track, t, moment)
             else:
                 if station < 0 or scan_id[k] != scan:
-                    scan = scan_id[k]
-                    station, stop_at = 0, known_scans.shape[0]
+                    scan = np.int64(scan_id[k])
+                    station, stop_at = np.int64(0), np.int64(known_scans.shape[0])
                     while station < stop_at:
                         middle = (station + stop_at) >> 1
                         if known_scans[middle] < scan:
@@ -294,7 +301,7 @@ def _project(
                         else:
                             stop_at = middle
                     if station == known_scans.shape[0] or known_scans[station] != scan:
-                        station = -1
+                        station = np.int64(-1)
                 if station < 0:
                     lost += 1
                     continue

@@ -1,1 +1,5 @@
 """How coordinates of scans lie to those of others: control points and rigid motions."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

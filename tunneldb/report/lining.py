@@ -18,7 +18,6 @@ from tunneldb.raster.gap_fill import FILL, fill_gaps
 from tunneldb.raster.geotiff import Raster, decode
 from tunneldb.raster.grid import BLOCK
 from tunneldb.raster.pixel_state import PixelState
-from tunneldb.store.images import DARK
 from tunneldb.store.survey import Survey
 
 Form = Literal["WEBP", "JPEG"]
@@ -96,7 +95,7 @@ class _Block:
     shown : Raster
         Corrected intensity, dB, or offset from the surface, m.
     state : (rows, columns) uint8 array
-        Values of :class:`PixelState`, DARK or NO_STATE.
+        Values of :class:`PixelState` or NO_STATE.
     """
 
     shown: Raster
@@ -106,7 +105,7 @@ class _Block:
         """What is shown of its lining, thinned, dB or m."""
         thin = (slice(None, None, 4), slice(None, None, 4))
         values = self.shown.values[thin]
-        return values[np.isfinite(values) & np.isin(self.state[thin], (PixelState.LINING, PixelState.RECESS, DARK))]
+        return values[np.isfinite(values) & np.isin(self.state[thin], (PixelState.LINING, PixelState.RECESS, PixelState.DARK))]
 
 
 @dataclass(frozen=True)

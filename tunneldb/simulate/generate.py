@@ -15,8 +15,8 @@ from tunneldb.simulate.floor_profile import slabs
 from tunneldb.simulate.lining import ballast as ground
 from tunneldb.simulate.lining.leaks import Leak, Room, place
 from tunneldb.simulate.lining.marks import Mark, place_marks
-from tunneldb.simulate.lining.reflectance import coat
-from tunneldb.simulate.lining.relief import skin
+from tunneldb.simulate.lining.reflectance import Reflectance, lining_reflectance
+from tunneldb.simulate.lining.relief import lining_relief
 from tunneldb.simulate.lining.rings import build
 from tunneldb.simulate.lining.seepage import joint_leaks, niche_leaks, with_drips
 from tunneldb.simulate.objects.fixtures import FLOOR, RAIL, Appendage, Niche, furnish, refuges
@@ -28,8 +28,8 @@ from tunneldb.simulate.placement import stand
 from tunneldb.simulate.radiometry import counts, reference_curve
 from tunneldb.simulate.rays.beam import blur
 from tunneldb.simulate.rays.scene import scene
-from tunneldb.simulate.rays.trace import trace
-from tunneldb.simulate.scanner import BlockPlan, Rays, Scanner
+from tunneldb.simulate.rays.trace import Echoes, Tracer
+from tunneldb.simulate.scanner import BlockPlan, Scanner
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 
@@ -92,7 +92,7 @@ class Simulation:
         What is in it.
     rings : Rings
         How the lining is put together.
-    coat : Coat or None
+    reflectance : Reflectance or None
         How bright it is from place to place; None: plain.
     things : list of Primitive
         What stands or hangs free, thing i with number i + 1.
@@ -119,8 +119,10 @@ class Simulation:
         self.leaks: list[Leak] = self._leaks(Room(self.tunnel, obstacles), wet, joints, refuge, drips)
         openings = [n.footprint(self.tunnel) for n in self.niches]
         self.marks: list[Mark] = place_marks(parameters, self.tunnel, [k.polygon for k in self.leaks] + openings, marked)
-        self.coat = coat(parameters, self.tunnel, self.rings, self.appendages, self.marks, coated)
-        self._skin = skin(parameters, self.tunnel, self.rings, moved)
+        self.reflectance: Reflectance | None = lining_reflectance(
+            parameters, self.tunnel, self.rings, self.appendages, self.marks, coated
+        )
+        self._relief = lining_relief(parameters, self.tunnel, self.rings, moved)
         self._radiometry = parameters.radiometry()
         self.reference = reference_curve(parameters.max_range, np.random.default_rng(reference), self._radiometry.near_loss)
         self.scanner = Scanner(parameters, self.tunnel)
@@ -154,29 +156,6 @@ class Simulation:
         leaks = [replace(leak, id=i + 1) for i, leak in enumerate(leaks)]
         return with_drips(leaks, tunnel, room, drips) if p.drips else leaks
 
-    def _trace(self, rays: Rays, index: Int64 | slice, direction: Float, noise: Float, chance: Float) -> Float:
-        """Shoot some of the rays in given directions; rows of :func:`trace`."""
-        p = self.parameters
-        out = np.empty((len(direction), 12 if self._parts is None else 13))
-        trace(
-            self._scene,
-            self._parts,
-            self._ground,
-            self.coat,
-            self._skin,
-            rays.origin[index],
-            direction,
-            rays.hint[index],
-            noise,
-            chance,
-            p.outliers,
-            1.0 if p.beam == 0.0 else 0.0,
-            p.relief,
-            p.max_range,
-            out,
-        )
-        return out
-
     def make(self, plan: BlockPlan) -> Cloud:
         """Points of one block; the same for the same seed and index, whenever it is made."""
         p = self.parameters
@@ -184,37 +163,51 @@ class Simulation:
         rng = np.random.default_rng(sequence)
         rays = self.scanner.rays(plan, rng)
         n = len(rays.time)
-        out = self._trace(rays, slice(None), rays.direction, rng.standard_normal(n) * p.range_noise, rng.random((n, 2)))
-        keep = np.flatnonzero(~np.isnan(out[:, 0]))
-        out = out[keep]
+        tracer = self._tracer()
+        found = tracer.trace(rays.origin, rays.direction, rays.hint, rng.standard_normal(n) * p.range_noise, rng.random((n, 2)))
         radiometry = self._radiometry
-        noise = rng.standard_normal(len(out)) * p.intensity_noise
+        noise = rng.standard_normal(len(found.ray)) * p.intensity_noise
         if p.beam > 0.0:
 
-            def again(index: Int64, direction: Float) -> Float:
+            def again(index: Int64, direction: Float) -> Echoes:
                 """Without noise, and with numbers that make no stray points."""
-                return self._trace(rays, index, direction, np.zeros(len(index)), np.ones((len(index), 2)))
+                many = len(index)
+                return tracer.trace(rays.origin[index], direction, rays.hint[index], np.zeros(many), np.ones((many, 2)))
 
-            blur(out, rays, keep, p.beam, again, self.tunnel, radiometry, rng)
-        klass = out[:, 7].astype(np.uint8)
-        reflectance = radiometry.reflectance(out[:, 10], (klass == FLOOR) | (klass == RAIL), out[:, 9]) + noise
-        amplitude = radiometry.amplitude(out[:, 11], reflectance)
-        index = out[:, 8].astype(np.int32)
+            found = blur(found, rays, p.beam, again, self.tunnel, radiometry, rng)
+        is_ground = (found.klass == FLOOR) | (found.klass == RAIL)
+        reflectance = radiometry.reflectance(found.cosine, is_ground, found.drop) + noise
+        amplitude = radiometry.amplitude(found.range, reflectance)
         return Cloud(
-            xyz=out[:, 1:4] + self.tunnel.line.origin,
-            time=rays.time[keep],
-            scan_id=rays.scan_id[keep],
+            xyz=found.xyz + self.tunnel.line.origin,
+            time=rays.time[found.ray],
+            scan_id=rays.scan_id[found.ray],
             amplitude=amplitude.astype(np.float32),
             reflectance=reflectance.astype(np.float32),
             intensity=counts(amplitude, radiometry.near_loss),
-            chainage=out[:, 4].copy(),
-            arc=out[:, 5].astype(np.float32),
-            offset=out[:, 6].astype(np.float32),
-            klass=klass,
-            leak=np.where(index >= 0, index + 1, -1).astype(np.int32),
-            thing=out[:, 12].astype(np.uint16) if self._parts is not None else np.zeros(len(out), dtype=np.uint16),
-            range=out[:, 11].astype(np.float32),
-            incidence=np.arccos(out[:, 10]).astype(np.float32),
+            chainage=found.chainage,
+            arc=found.arc.astype(np.float32),
+            offset=found.offset.astype(np.float32),
+            klass=found.klass.astype(np.uint8),
+            leak=np.where(found.leak >= 0, found.leak + 1, -1).astype(np.int32),
+            thing=found.thing.astype(np.uint16),
+            range=found.range.astype(np.float32),
+            incidence=np.arccos(found.cosine).astype(np.float32),
+        )
+
+    def _tracer(self) -> Tracer:
+        p = self.parameters
+        return Tracer(
+            self.tunnel,
+            self._scene,
+            self._parts,
+            self._ground,
+            self.reflectance,
+            self._relief,
+            p.outliers,
+            1.0 if p.beam == 0.0 else 0.0,
+            p.relief,
+            p.max_range,
         )
 
     def blocks(self, workers: int | None = None) -> Iterator[tuple[BlockPlan, Cloud]]:

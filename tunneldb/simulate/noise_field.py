@@ -1,11 +1,13 @@
-"""Pseudo-random fields over a plane for the kernels: the same place has the same value, whenever it is asked for."""
+"""Pseudo-random fields over a plane: the same place has the same value, whenever it is asked for."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from numba import njit
+
+from tunneldb.arrays import Float, Int64
+from tunneldb.compiled import inner, kernel
 
 _PART = 1.0 / 65535.0
 _MASK = np.uint64(0xFFFF)
@@ -14,7 +16,7 @@ _MASK = np.uint64(0xFFFF)
 _SPREAD = 26.0 / 35.0 / math.sqrt(3.0)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inner
 def mix(i: int, j: int, salt: int) -> np.uint64:
     """Scramble a cell's numbers (splitmix64)."""
     h = np.uint64(i) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(j) * np.uint64(0xC2B2AE3D27D4EB4F) + np.uint64(salt)
@@ -23,24 +25,44 @@ def mix(i: int, j: int, salt: int) -> np.uint64:
     return h ^ (h >> np.uint64(31))
 
 
-@njit(cache=True, nogil=True)
-def normal(i: int, j: int, salt: int) -> float:
-    """Number of a cell, of the standard normal distribution (Box-Muller)."""
-    h = mix(i, j, salt)
-    one = (float(h & _MASK) + 0.5) / 65536.0
-    return math.sqrt(-2.0 * math.log(one)) * math.cos(2.0 * math.pi * _PART * float((h >> np.uint64(16)) & _MASK))
-
-
-@njit(cache=True, nogil=True)
-def clouds(x: float, y: float, salt: int) -> float:
+@inner
+def value_noise(x: float, y: float, salt: int) -> float:
     """Smooth field of mean 0 and standard deviation 1 over a plane whose cells are squares of side 1 (value noise)."""
-    fx, fy = math.floor(x), math.floor(y)
-    tx, ty = x - fx, y - fy
+    i, j = math.floor(x), math.floor(y)
+    tx, ty = x - i, y - j
     tx, ty = tx * tx * (3.0 - 2.0 * tx), ty * ty * (3.0 - 2.0 * ty)
     total = 0.0
-    for i in range(2):
-        for j in range(2):
-            h = mix(int(fx) + i, int(fy) + j, salt)
-            value = 2.0 * _PART * float((h >> np.uint64(32)) & _MASK) - 1.0
-            total += value * (tx if i else 1.0 - tx) * (ty if j else 1.0 - ty)
+    for a in range(2):
+        for b in range(2):
+            value = 2.0 * _PART * float((mix(i + a, j + b, salt) >> np.uint64(32)) & _MASK) - 1.0
+            total += value * (tx if a else 1.0 - tx) * (ty if b else 1.0 - ty)
     return total / _SPREAD
+
+
+@kernel
+def _value_noise(x: Float, y: Float, salt: int, out: Float) -> None:
+    for i in range(x.shape[0]):
+        out[i] = value_noise(x[i], y[i], salt)
+
+
+def smooth_field(x: Float, y: Float, salt: int) -> Float:
+    """Field of :func:`value_noise` at places (n,), in sides of a cell."""
+    out = np.empty(x.size)
+    _value_noise(x, y, salt, out)
+    return out
+
+
+@kernel
+def _normal(i: Int64, j: Int64, salt: int, out: Float) -> None:
+    for k in range(i.shape[0]):
+        h = mix(i[k], j[k], salt)
+        one = (float(h & _MASK) + 0.5) / 65536.0
+        angle = 2.0 * math.pi * _PART * float((h >> np.uint64(16)) & _MASK)
+        out[k] = math.sqrt(-2.0 * math.log(one)) * math.cos(angle)
+
+
+def normal_field(i: Int64, j: Int64, salt: int) -> Float:
+    """Numbers of cells (n,), of the standard normal distribution (Box and Muller, 1958)."""
+    out = np.empty(i.size)
+    _normal(i, j, salt, out)
+    return out

@@ -92,13 +92,13 @@ def joints(rings: Rings, start: float, end: float, lowest: float) -> list[Dry]:
     return [d for d in cut if d.outline.area > 0.0]
 
 
-def soot(coat: Reflectance, start: float, end: float) -> list[Dry]:
+def soot(reflectance: Reflectance, start: float, end: float) -> list[Dry]:
     """Where soot darkens by half of what was asked or more; its drop is the mean over that."""
-    asked, middle, width = coat.soot.tolist()
+    asked, middle, width = reflectance.soot.tolist()
     if asked == 0.0:
         return []
     s = np.linspace(start, end, max(2, math.ceil((end - start) / STEP) + 1))
-    amount = np.array([soot_amount(coat, float(x)) for x in s])
+    amount = soot_amount(reflectance, s)
     half = width * np.sqrt(np.log(np.maximum(2.0 * amount, 1.0 + 1e-9)))
     outline = Polygon(np.vstack([np.column_stack([s, middle - half]), np.column_stack([s, middle + half])[::-1]]))
     across = np.linspace(0.0, 1.0, 51) * half[:, None]
@@ -106,10 +106,10 @@ def soot(coat: Reflectance, start: float, end: float) -> list[Dry]:
     return [Dry(outline, "soot", float(np.average(level.mean(axis=1), weights=half)))]
 
 
-def grime(coat: Reflectance, start: float, end: float) -> list[Dry]:
+def grime(reflectance: Reflectance, start: float, end: float) -> list[Dry]:
     """Where grime darkens by half of its most or more, on average along the tunnel; the drop is the mean over that."""
     dry = []
-    for side, edge, fade, drop in coat.grime.tolist():
+    for side, edge, fade, drop in reflectance.grime.tolist():
         low, high = sorted((side * (edge - 0.5 * GRIME_RISE), side * (edge + fade * math.log(2.0))))
         dry.append(Dry(box(start, low, end, high), "grime", 0.75 * drop))
     return dry
@@ -120,8 +120,8 @@ def dry_features(simulation: Simulation) -> list[Dry]:
     line, lowest = simulation.tunnel.line, simulation.tunnel.section.floor_arc
     dry = joints(simulation.rings, line.start, line.end, lowest)
     dry += [Dry(m.polygon(), m.kind, -m.level) for m in simulation.marks if m.level < 0.0]
-    if simulation.coat is not None:
-        dry += soot(simulation.coat, line.start, line.end) + grime(simulation.coat, line.start, line.end)
+    if simulation.reflectance is not None:
+        dry += soot(simulation.reflectance, line.start, line.end) + grime(simulation.reflectance, line.start, line.end)
     return dry
 
 

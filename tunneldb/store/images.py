@@ -22,10 +22,8 @@ from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.accumulator import Window
 from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import Grid
+from tunneldb.raster.pixel_state import PixelState
 from tunneldb.store.survey import Survey
-
-DARK = 5
-"""Value of dark pixels in the image of states, beside those of :class:`tunneldb.raster.pixel_state.PixelState`."""
 
 
 def load_reference(conn: psycopg.Connection[Any], survey: Survey) -> ReferenceCurve | None:
@@ -84,12 +82,12 @@ class ImageStore:
             self._insert(kind, block, Raster(_values(window, kind), grid.transform(columns.start)))
 
     def save_states(self, state: UInt8, dark: Bool) -> None:
-        """Save what the pixels (rows, columns) of the kilometre show, in the blocks that were saved before; DARK where dark."""
+        """Save what the pixels (rows, columns) of the kilometre show, in the blocks saved before; ``DARK`` where dark."""
         grid = self.grid
         for block in self._blocks:
             first = (block - grid.first_block) * grid.block_columns
             columns = slice(first, first + grid.block_columns)
-            values = np.where(dark[:, columns], np.float32(DARK), state[:, columns].astype(np.float32))
+            values = np.where(dark[:, columns], np.float32(PixelState.DARK), state[:, columns].astype(np.float32))
             self._insert("state", block, Raster(values, grid.transform(first)))
 
     def _insert(self, kind: str, block: int, raster: Raster) -> None:

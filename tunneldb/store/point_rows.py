@@ -126,7 +126,7 @@ def _fill(packed: UInt8, rows: UInt8, order: Int32, template: UInt8, file_ids: U
             packed[k, _TIME + b] = rows[i, _FROM_TIME + 7 - b]
         for b in range(24):  # the geometry states its own order
             packed[k, _XYZ + b] = rows[i, _FROM_X + b]
-        tag = 0
+        tag = np.int64(0)
         for b in range(4):
             packed[k, _SCAN + b] = rows[i, _FROM_SCAN + 3 - b]
             packed[k, _INTENSITY + b] = rows[i, _FROM_INTENSITY + 3 - b]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunneldb.arrays import Bool, Float
-from tunneldb.compiled import inner, kernel
+from tunneldb.compiled import inner, point_kernel
 from tunneldb.threads import in_blocks
 
 COLUMN = 0.1
@@ -69,7 +69,8 @@ class Ground:
         height, ground = np.empty(len(a)), np.empty(len(a), np.bool_)
 
         def work(begin: int, end: int) -> None:
-            _compare(self.start, self.first, *grids, a, x, h, begin, end, height, ground)
+            block = slice(begin, end)
+            _compare(self.start, self.first, *grids, a[block], x[block], h[block], height[block], ground[block])
 
         in_blocks(work, len(a), _BLOCK)
         return height, ground
@@ -93,14 +94,14 @@ def _mix(one: float, two: float, share: float) -> float:  # pragma: no cover - c
     return (1.0 - share) * one + share * two
 
 
-@kernel
+@point_kernel
 def _compare(
     start: int, first: int, height: Float, gamma: Float, foot: Float, lean: Float,
-    along: Float, across: Float, z: Float, begin: int, end: int, out: Float, ground: Bool,
+    along: Float, across: Float, z: Float, out: Float, ground: Bool,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Height of the ground at points from ``begin`` to ``end``, NaN where there is none, and whether they are ground."""
+    """Height of the ground at points (n,), NaN where there is none, and whether they are ground."""
     rows, columns = height.shape
-    for n in range(begin, end):
+    for n in range(along.shape[0]):
         out[n] = np.nan
         ground[n] = False
         row, column = along[n] - start, across[n] / COLUMN - first

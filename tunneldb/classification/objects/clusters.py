@@ -162,4 +162,4 @@ def look_up(
         return 0
     wide, tall = last[1] - first[1] + 1, last[2] - first[2] + 1
     slot = key_slot(((cx - first[0]) * wide + cy - first[1]) * tall + cz - first[2], keys)
-    return np.int64(klass[slot]) if keys[slot] >= 0 else np.int64(0)
+    return np.int64(klass[slot]) if keys[slot] >= 0 else np.int64(0)  # type: ignore[return-value]

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.targets.fit import SphereFit, cells_of, coverage, fit_sphere
-from tunneldb.classification.targets.hough import NEAR, REACH, Scattered, hough_candidates
+from tunneldb.classification.targets.hough import NEAR, REACH, PointGrid, hough_candidates
 from tunneldb.classification.targets.refinement import refine_spheres
 
 LEAST_POINTS = 30
@@ -94,7 +94,7 @@ class Refusal:
 
 
 def find_spheres(
-    xyz: Float, eyes: Float, radius: float, tolerance: float, noise: float = math.inf
+    xyz: Float, observers: Float, radius: float, tolerance: float, noise: float = math.inf
 ) -> tuple[list[Sphere], list[Refusal]]:
     """Find the target spheres in one scan.
 
@@ -102,7 +102,7 @@ def find_spheres(
     ----------
     xyz : (n, 3) float64 array
         The scan's points, at least those that don't lie on walls and floor (`tunneldb.classification.targets.curvature`), m.
-    eyes : (n, 3) float64 array
+    observers : (n, 3) float64 array
         Where the scanner stood for each, m; NaN where that is not known.
     radius, tolerance : float
         Nominal radius; greatest difference of the fitted radius from it, and greatest rms, m.
@@ -113,8 +113,8 @@ def find_spheres(
     refusals : list of Refusal
         What is a ball or nearly, but no such sphere.
     """
-    points = Scattered(xyz, REACH * radius)
-    centres, noise = hough_candidates(points, eyes, radius)
+    points = PointGrid(xyz, REACH * radius)
+    centres, noise = hough_candidates(points, observers, radius)
     there = refine_spheres(points, centres, radius)
     near_radius = np.abs(there.radius - radius) <= tolerance + 3.0 * there.radius_sigma
     other_ball = (there.radius_sigma <= tolerance / 4.0) & (there.seen >= 1.5 * LEAST_COVERAGE)  # for the report
@@ -129,39 +129,41 @@ def find_spheres(
     refusals: list[Refusal] = []
     for k in likely[np.argsort(-there.on[likely], kind="stable")]:
         # Spheres are solid: there is no second one within a radius of a centre.
-        if _taken(there.centres[k], radius, spheres) or _taken(there.centres[k], radius, refusals):
+        if _is_taken(there.centres[k], radius, spheres) or _is_taken(there.centres[k], radius, refusals):
             continue
-        near = points.around(there.centres[k], 2.0 * radius)
-        found = _judge(xyz[near], eyes[near], there.centres[k], radius, tolerance, noise)
+        near = points.order[points.around(there.centres[k : k + 1], 2.0 * radius)[0]]
+        found = _fit_candidate(xyz[near], observers[near], there.centres[k], radius, tolerance, noise)
         if isinstance(found, Sphere):
-            if not _taken(found.centre, radius, spheres):
+            if not _is_taken(found.centre, radius, spheres):
                 spheres.append(found)
         elif found is not None:
             refusals.append(found)
-    return spheres, [refusal for refusal in refusals if not _taken(refusal.centre, radius, spheres)]
+    return spheres, [refusal for refusal in refusals if not _is_taken(refusal.centre, radius, spheres)]
 
 
-def _taken(centre: Float, radius: float, found: Sequence[Sphere] | Sequence[Refusal]) -> bool:
+def _is_taken(centre: Float, radius: float, found: Sequence[Sphere] | Sequence[Refusal]) -> bool:
     return any(float(np.linalg.norm(centre - other.centre)) < radius for other in found)
 
 
-def _judge(points: Float, eyes: Float, start: Float, radius: float, tolerance: float, noise: float) -> Sphere | Refusal | None:
+def _fit_candidate(
+    points: Float, observers: Float, start: Float, radius: float, tolerance: float, noise: float
+) -> Sphere | Refusal | None:
     """Fit a sphere to the points around a candidate; None for what isn't even round."""
-    fit = fit_sphere(points, eyes, start, radius, 3.0 * tolerance)
+    fit = fit_sphere(points, observers, start, radius, 3.0 * tolerance)
     if fit is None or fit.on.sum() < LEAST_POINTS or fit.radius_sigma > tolerance / 2.0:
         return None  # of a plane or a small cap, it cannot be told within the tolerance whether it is a sphere
     count, most = int(fit.used.sum()), _greatest_rms(fit, tolerance, noise)
-    towards = _towards(points[fit.on], eyes[fit.on], fit.centre)
+    towards = _scanner_direction(points[fit.on], observers[fit.on], fit.centre)
     seen = coverage(points[fit.on], fit.centre, towards)
     if seen < LEAST_COVERAGE or _share_on(points, fit, towards, radius, tolerance) < SHARE:
         return None
     if abs(fit.radius - radius) > math.hypot(tolerance, 2.0 * fit.radius_sigma):
-        return _other_ball(points, eyes, fit, radius, tolerance, noise)
+        return _other_ball(points, observers, fit, radius, tolerance, noise)
     if _is_cylinder(points, fit, radius, tolerance):
         return Refusal(fit.centre, count, "it is a cylinder, or the end of one")
     if fit.rms > most:
         return None
-    if _astray(points[fit.used], fit, radius) > tolerance / 3.0:
+    if _deformation(points[fit.used], fit, radius) > tolerance / 3.0:
         return Refusal(fit.centre, count, "it is round, but no sphere")
     firm = int(fit.on.sum()) >= FIRM_POINTS
     return Sphere(fit.centre, fit.radius, fit.radius_sigma, fit.rms, fit.sigma, seen, count, firm)
@@ -173,11 +175,13 @@ def _greatest_rms(fit: SphereFit, tolerance: float, noise: float) -> float:
     return min(tolerance, 1.1 * by_chance * noise * fit.expected)
 
 
-def _other_ball(points: Float, eyes: Float, fit: SphereFit, radius: float, tolerance: float, noise: float) -> Refusal | None:
+def _other_ball(
+    points: Float, observers: Float, fit: SphereFit, radius: float, tolerance: float, noise: float
+) -> Refusal | None:
     """What is a sphere, but of another radius: a lamp, a helmet."""
     if not radius / 2.0 < fit.radius < 2.0 * radius:
         return None
-    other = fit_sphere(points, eyes, fit.free_centre, fit.radius, 3.0 * tolerance)
+    other = fit_sphere(points, observers, fit.free_centre, fit.radius, 3.0 * tolerance)
     if other is None or other.on.sum() < LEAST_POINTS or other.rms > _greatest_rms(other, tolerance, noise):
         return None
     if abs(other.radius - radius) <= math.hypot(tolerance, 2.0 * other.radius_sigma):
@@ -186,9 +190,9 @@ def _other_ball(points: Float, eyes: Float, fit: SphereFit, radius: float, toler
     return Refusal(other.centre, int(other.used.sum()), reason)
 
 
-def _towards(points: Float, eyes: Float, centre: Float) -> Float:
+def _scanner_direction(points: Float, observers: Float, centre: Float) -> Float:
     """Direction in which the scanner is, in the mean; that of the points themselves where it isn't known."""
-    sight = eyes - centre
+    sight = observers - centre
     sight = sight[np.isfinite(sight[:, 0])]
     out = sight if len(sight) else points - centre
     mean: Float = (out / np.linalg.norm(out, axis=1)[:, None]).mean(axis=0)
@@ -202,9 +206,8 @@ def _share_on(points: Float, fit: SphereFit, towards: Float, radius: float, tole
     near = far <= NEAR * radius
     if not on.any():
         return 0.0
-    _, held = cells_of(points[on], fit.centre, towards)
-    cell, _ = cells_of(points[near], fit.centre, towards)
-    return float(on.sum()) / float(held[cell].sum())
+    held = np.unique(cells_of(points[on] - fit.centre, towards))
+    return float(on.sum()) / float(np.isin(cells_of(points[near] - fit.centre, towards), held).sum())
 
 
 def _is_cylinder(points: Float, fit: SphereFit, radius: float, tolerance: float) -> bool:
@@ -228,7 +231,7 @@ def _is_cylinder(points: Float, fit: SphereFit, radius: float, tolerance: float)
     return False
 
 
-def _astray(points: Float, fit: SphereFit, radius: float) -> float:
+def _deformation(points: Float, fit: SphereFit, radius: float) -> float:
     """By how much the surface under the noise differs from the sphere, rms, m; 0 where that can't be told from chance.
 
     Noise differs from point to point, and a shape hardly does: the correlation of the residuals of neighbours (Moran's I, 1950,

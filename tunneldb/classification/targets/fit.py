@@ -84,7 +84,7 @@ def fit_sphere(points: Float, observers: Float, start: Float, radius: float, wid
 
     Parameters
     ----------
-    points, eyes : (n, 3) float64 arrays
+    points, observers : (n, 3) float64 arrays
         What is near the sphere, and where the scanner stood for each, m; NaN where that is not known.
     start : (3,) float64 array
         Where its centre is, to a fifth of the radius, m.
@@ -137,7 +137,7 @@ def _rms(values: Float) -> float:
 
 
 def _seen(points: Float, observers: Float, centre: Float, radius: float) -> tuple[Float, Float]:
-    """Distance of each point from the sphere, outwards positive, and cosine of incidence there (NaN without an eye)."""
+    """Distance of each point from the sphere, outwards positive, and cosine of incidence there (NaN without an observer)."""
     out = points - centre
     far = np.maximum(np.linalg.norm(out, axis=1), 1e-9)
     sight = observers - points
@@ -205,23 +205,28 @@ def coverage(points: Float, centre: Float, towards: Float) -> float:
         Direction that the cells are laid out by, to the scanner: 8 bands of equal height across it, so that the hemisphere
         that faces it is 4 bands, each cut into 6 sectors of 60°.
     """
-    return float(cells_of(points, centre, towards)[1].mean())
+    return len(np.unique(cells_of(points - centre, towards))) / (BANDS * SECTORS)
 
 
-def cells_of(points: Float, centre: Float, towards: Float) -> tuple[Int64, Bool]:
-    """Cell of each point (n,), and whether each of the cells (48,) holds one; as `coverage` says."""
-    axis = towards / np.linalg.norm(towards)
-    side = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
-    side /= np.linalg.norm(side)
+def cells_of(out: Float, towards: Float) -> Int64:
+    """Cell of each point (n,), 0 to 47, as `coverage` counts them.
+
+    Parameters
+    ----------
+    out : (n, 3) float array
+        Points, from the centre of their sphere.
+    towards : (3,) or (n, 3) float array
+        Direction that the cells are laid out by.
+    """
+    axis = towards / np.linalg.norm(towards, axis=-1, keepdims=True)
+    # Any direction across the axis, and the one across both.
+    side = np.cross(axis, np.where(np.abs(axis[..., 2:]) < 0.9, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]))
+    side /= np.linalg.norm(side, axis=-1, keepdims=True)
     other = np.cross(axis, side)
-    out = points - centre
     out = out / np.maximum(np.linalg.norm(out, axis=1), 1e-12)[:, None]
-    band = np.clip(np.floor((1.0 - out @ axis) * BANDS / 2.0), 0, BANDS - 1)
-    sector = np.clip(np.floor((np.arctan2(out @ other, out @ side) / (2.0 * np.pi) + 0.5) * SECTORS), 0, SECTORS - 1)
-    cell = (band * SECTORS + sector).astype(np.int64)
-    held = np.zeros(BANDS * SECTORS, np.bool_)
-    held[cell] = True
-    return cell, held
+    band = np.clip(np.floor((1.0 - (out * axis).sum(axis=1)) * BANDS / 2.0), 0, BANDS - 1)
+    angle = np.arctan2((out * other).sum(axis=1), (out * side).sum(axis=1)) / (2.0 * np.pi) + 0.5
+    return (band * SECTORS + np.clip(np.floor(angle * SECTORS), 0, SECTORS - 1)).astype(np.int64)
 
 
 def distance_error(centre: Float, truth: Float) -> float:

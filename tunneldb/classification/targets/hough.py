@@ -11,10 +11,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
 
 from tunneldb.arrays import Float, Int64
+from tunneldb.compiled import kernel, lower_bound
 from tunneldb.geometry.normals import eigenvalues, normal
+from tunneldb.threads import in_blocks
 
 # In radii of the spheres:
 REACH = 0.6  # of the neighbourhood that gives a normal
@@ -26,10 +27,11 @@ NEIGHBOURS = 128  # points looked at around one, about
 LEAST_NEIGHBOURS = 6
 GRAZING = 0.25  # cosine of incidence below which a neighbourhood says nothing of the noise
 VOTES = 12  # that make a candidate; a fifth of a sphere of 60 points has as many
+_BLOCK = 1024  # cells at a time
 SHARE = 0.25  # of the voters near a candidate that have voted for it; of a plane 0.14 do
 
 
-class Scattered:
+class PointGrid:
     """Points in order of the cells that they lie in, so that those near a place are found at once.
 
     Parameters
@@ -45,6 +47,10 @@ class Scattered:
         Where each of the points in order comes from.
     xyz : (n, 3) array
         The points in order, from `low`.
+    key : (n,) int array
+        Number of the cell of each, in the order of x, y, z; `span` cells fit along each axis, two of them at each end empty.
+    start : (k,) int array
+        First point of each filled cell.
     """
 
     def __init__(self, xyz: Float, edge: float) -> None:
@@ -59,19 +65,52 @@ class Scattered:
         self.xyz: Float = np.ascontiguousarray(shifted[self.order])
         self.start: Int64 = np.flatnonzero(np.concatenate([[True], np.diff(self.key) > 0])) if len(xyz) else np.zeros(0, int)
 
-    def around(self, place: Float, reach: float) -> Int64:
-        """Numbers (k,) of the points, as they were given, within a distance of a place (3,)."""
-        return self.order[around(self.xyz, self.key, self.span, self.edge, place - self.low, reach)]
+    @property
+    def bounds(self) -> Int64:
+        """First point of each filled cell, and the number of all points behind them."""
+        return np.append(self.start, len(self.key))
+
+    def around(self, places: Float, reach: float) -> tuple[Int64, Int64]:
+        """Points within a distance of places (k, 3).
+
+        Returns
+        -------
+        points, place : (m,) int arrays
+            Numbers of points in order, and of the place that each is near to; place by place, growing.
+        """
+        places = places - self.low
+        low = np.maximum(np.floor((places - reach) / self.edge).astype(np.int64), -2)
+        high = np.minimum(np.floor((places + reach) / self.edge).astype(np.int64), self.span - 3)
+        steps = (high - low).max(axis=0, initial=-1) + 1
+        ix, iy = (np.arange(n) for n in steps[:2].clip(min=0))
+        # Columns of cells about each place: (k, steps along x, steps along y).
+        x, y = low[:, 0, None, None] + ix[:, None], low[:, 1, None, None] + iy
+        column = ((x + 2) * self.span[1] + y + 2) * self.span[2] + 2
+        begin = np.searchsorted(self.key, column + low[:, 2, None, None])
+        end = np.searchsorted(self.key, column + high[:, 2, None, None], side="right")
+        end[(x > high[:, 0, None, None]) | (y > high[:, 1, None, None])] = 0
+        points, run = ranges(begin.ravel(), end.ravel())
+        place = run // max(len(ix) * len(iy), 1)
+        away = self.xyz[points] - places[place]
+        near = away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1] + away[:, 2] * away[:, 2] <= reach * reach
+        return points[near], place[near]
 
 
-def hough_candidates(points: Scattered, eyes: Float, radius: float) -> tuple[Float, float]:
+def ranges(begin: Int64, end: Int64) -> tuple[Int64, Int64]:
+    """Whole numbers of ranges (n,), one range after the other, and the number of the range that each is of."""
+    length = np.maximum(end - begin, 0)
+    owner = np.repeat(np.arange(len(begin)), length)
+    return np.arange(len(owner)) + np.repeat(begin - np.cumsum(length) + length, length), owner
+
+
+def hough_candidates(points: PointGrid, observers: Float, radius: float) -> tuple[Float, float]:
     """Places where the centre of a sphere may be.
 
     Parameters
     ----------
-    points : Scattered
+    points : PointGrid
         One scan's points, in cells of `REACH` radii.
-    eyes : (n, 3) float64 array
+    observers : (n, 3) float64 array
         Where the scanner stood for each point, as they were given, m; NaN where it is not known.
     radius : float
         Of the spheres, m.
@@ -86,93 +125,85 @@ def hough_candidates(points: Scattered, eyes: Float, radius: float) -> tuple[Flo
     """
     if len(points.key) == 0:
         return np.zeros((0, 3)), math.inf
-    stop = np.append(points.start[1:], len(points.key))
-    votes, voters, scatter = _vote(
-        points.xyz, np.ascontiguousarray(eyes[points.order] - points.low), points.key, points.start, stop, points.span,
-        REACH * radius, radius,
-    )  # fmt: skip
+    votes, voters, scatter = _votes(points, observers, radius)
     scatter = scatter[np.isfinite(scatter)]
     noise = float(np.quantile(scatter, 0.25)) if len(scatter) else math.inf
-    votes, voters = votes[np.isfinite(votes[:, 0])], points.xyz[voters]
+    votes, places = votes[np.isfinite(votes[:, 0])], points.xyz[voters]
     if len(votes) < VOTES:
         return np.zeros((0, 3)), math.inf
-    cast = Scattered(votes, VOTE * radius)
-    centres, counts = _peaks(cast.xyz, cast.key, cast.start, np.append(cast.start[1:], len(votes)), cast.span)
-    centres += cast.low
-    seen = Scattered(voters, radius)
-    near = _count(seen.xyz, seen.key, seen.span, seen.edge, centres - seen.low, (1.0 + 2.0 * VOTE) * radius)
-    good = counts >= SHARE * near
+    centres, counts = _peaks(PointGrid(votes, VOTE * radius))
+    _, near = PointGrid(places, radius).around(centres, (1.0 + 2.0 * VOTE) * radius)
+    good = counts >= SHARE * np.bincount(near, minlength=len(centres))
     centres, counts = centres[good], counts[good]
     order = np.lexsort((*centres.T, -counts))
     return centres[order] + points.low, noise
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _run(key: Int64, first: int, last: int) -> tuple[int, int]:  # pragma: no cover - compiled
-    return int(np.searchsorted(key, first)), int(np.searchsorted(key, last + 1))
-
-
-@njit(cache=True, nogil=True)
-def around(xyz: Float, key: Int64, span: Int64, edge: float, place: Float, reach: float) -> Int64:  # pragma: no cover
-    """Numbers of the points in order within a distance of a place, both from their low corner."""
-    found = np.empty(64, np.int64)
-    count = 0
-    low = np.floor((place - reach) / edge).astype(np.int64)
-    high = np.floor((place + reach) / edge).astype(np.int64)
-    for ix in range(max(low[0], -2), min(high[0], span[0] - 3) + 1):
-        for iy in range(max(low[1], -2), min(high[1], span[1] - 3) + 1):
-            column = ((ix + 2) * span[1] + iy + 2) * span[2] + 2
-            begin, end = _run(key, column + max(low[2], -2), column + min(high[2], span[2] - 3))
-            for i in range(begin, end):
-                dx, dy, dz = xyz[i, 0] - place[0], xyz[i, 1] - place[1], xyz[i, 2] - place[2]
-                if dx * dx + dy * dy + dz * dz > reach * reach:
-                    continue
-                if count == len(found):
-                    more = np.empty(2 * count, np.int64)
-                    more[:count] = found
-                    found = more
-                found[count] = i
-                count += 1
-    return found[:count]
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _count(xyz: Float, key: Int64, span: Int64, edge: float, places: Float, reach: float) -> Int64:  # pragma: no cover
-    counts = np.empty(len(places), np.int64)
-    for k in prange(len(places)):
-        counts[k] = len(around(xyz, key, span, edge, places[k], reach))
-    return counts
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _vote(
-    xyz: Float, eyes: Float, key: Int64, start: Int64, stop: Int64, span: Int64, reach: float, radius: float
-) -> tuple[Float, Int64, Float]:  # pragma: no cover - compiled
+def _votes(points: PointGrid, observers: Float, radius: float) -> tuple[Float, Int64, Float]:
     """Votes (2m, 3), NaN where there is none, who cast them (m,), and the noise of the ranges there (m,), NaN for unknown."""
-    cells = len(start)
-    first = np.zeros(cells + 1, np.int64)
-    for c in range(cells):
-        first[c + 1] = first[c] + min(stop[c] - start[c], VOTERS)
-    votes = np.full((2 * first[cells], 3), np.nan)
-    voters = np.empty(first[cells], np.int64)
-    scatter = np.full(first[cells], np.nan)
-    for c in prange(cells):
-        begins, ends = np.empty(9, np.int64), np.empty(9, np.int64)
-        there = 0
+    bounds = points.bounds
+    first = np.append(0, np.cumsum(np.minimum(np.diff(bounds), VOTERS)))
+    votes = np.full((2 * first[-1], 3), np.nan)
+    voters, scatter = np.empty(first[-1], np.int64), np.full(first[-1], np.nan)
+    seen_from = np.ascontiguousarray(observers[points.order] - points.low)
+    row, layer = int(points.span[2]), int(points.span[1] * points.span[2])
+
+    def work(begin: int, end: int) -> None:
+        columns = np.empty((9, 2), np.int64)
+        _vote(
+            points.xyz, seen_from, points.key, bounds, first, row, layer, REACH * radius, float(radius), columns,
+            votes, voters, scatter, begin, end,
+        )  # fmt: skip
+
+    in_blocks(work, len(points.start), _BLOCK)
+    return votes, voters, scatter
+
+
+def _peaks(votes: PointGrid) -> tuple[Float, Int64]:
+    """Mean of the votes in the 27 cells around each cell with more votes there than its neighbours have, and their number."""
+    bounds = votes.bounds
+    keys = votes.key[votes.start]
+    columns = [(x * votes.span[1] + y) * votes.span[2] for x in (-1, 0, 1) for y in (-1, 0, 1)]
+    begin = np.stack([np.searchsorted(keys, keys + column - 1) for column in columns], axis=1)
+    end = np.stack([np.searchsorted(keys, keys + column + 1, side="right") for column in columns], axis=1)
+    total = (bounds[end] - bounds[begin]).sum(axis=1)
+    chosen = np.flatnonzero(total >= VOTES)
+    neighbours, run = ranges(begin[chosen].ravel(), end[chosen].ravel())
+    own = chosen[run // len(columns)]
+    # Of equal ones the first.
+    beaten = (total[neighbours] > total[own]) | ((total[neighbours] == total[own]) & (neighbours < own))
+    chosen = np.setdiff1d(chosen, own[beaten])
+    cast, run = ranges(bounds[begin[chosen]].ravel(), bounds[end[chosen]].ravel())
+    near = run // len(columns)
+    sums = [np.bincount(near, votes.xyz[cast, axis], minlength=len(chosen)) for axis in range(3)]
+    return np.column_stack(sums) / total[chosen, None] + votes.low, total[chosen]
+
+
+@kernel
+def _vote(
+    xyz: Float, observers: Float, key: Int64, bounds: Int64, first: Int64, row: int, layer: int, reach: float, radius: float,
+    columns: Int64, votes: Float, voters: Int64, scatter: Float, begin: int, end: int,
+) -> None:  # fmt: skip  # pragma: no cover - compiled
+    """Let points of the cells from begin to end vote; columns is room for the columns of cells about one."""
+    for c in range(begin, end):
+        at, there = np.int64(0), 0
         for column in range(9):
-            middle = key[start[c]] + ((column // 3 - 1) * span[1] + column % 3 - 1) * span[2]
-            begins[column], ends[column] = _run(key, middle - 1, middle + 1)
-            there += ends[column] - begins[column]
+            middle = key[bounds[c]] + (column // 3 - 1) * layer + (column % 3 - 1) * row
+            at = lower_bound(key, middle - 1, at, key.shape[0])
+            columns[column, 0] = at
+            at = lower_bound(key, middle + 2, at, key.shape[0])
+            columns[column, 1] = at
+            there += at - columns[column, 0]
         stride = max(1, there // NEIGHBOURS)
-        held, asked = stop[c] - start[c], first[c + 1] - first[c]
+        held, asked = bounds[c + 1] - bounds[c], first[c + 1] - first[c]
         for v in range(asked):
-            i = start[c] + v * held // asked
+            i = bounds[c] + v * held // asked
             voters[first[c] + v] = i
             x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
             n = 0
             sx, sy, sz, xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for column in range(9):
-                for j in range(begins[column], ends[column], stride):
+                for j in range(columns[column, 0], columns[column, 1], stride):
                     dx, dy, dz = xyz[j, 0] - x, xyz[j, 1] - y, xyz[j, 2] - z
                     if dx * dx + dy * dy + dz * dz > reach * reach:
                         continue
@@ -192,54 +223,17 @@ def _vote(
             nx, ny, nz = normal(xx, yy, zz, xy, xz, yz, least)
             # The middle of a cap lies below its top, by half of what its points lie from the axis, squared, over the radius.
             deep = radius - (middle + greatest) / (2.0 * radius)
-            side = nx * (eyes[i, 0] - x) + ny * (eyes[i, 1] - y) + nz * (eyes[i, 2] - z)
-            sight = math.sqrt((eyes[i, 0] - x) ** 2 + (eyes[i, 1] - y) ** 2 + (eyes[i, 2] - z) ** 2)
-            cosine = 1.0 if math.isnan(side) else abs(side) / sight
+            ox, oy, oz = observers[i, 0] - x, observers[i, 1] - y, observers[i, 2] - z
+            side = nx * ox + ny * oy + nz * oz
+            cosine = 1.0 if math.isnan(side) else abs(side) / math.sqrt(ox * ox + oy * oy + oz * oz)
             if n > 3 and cosine > GRAZING:
                 scatter[first[c] + v] = math.sqrt(max(least, 0.0) * n / (n - 3)) / cosine
             at = 2 * (first[c] + v)
-            if side <= 0.0 or math.isnan(side):
+            if not side > 0.0:
                 votes[at, 0], votes[at, 1], votes[at, 2] = x + sx + deep * nx, y + sy + deep * ny, z + sz + deep * nz
-            if side > 0.0 or math.isnan(side):
-                at += 1
-                votes[at, 0], votes[at, 1], votes[at, 2] = x + sx - deep * nx, y + sy - deep * ny, z + sz - deep * nz
-    return votes, voters, scatter
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _peaks(
-    xyz: Float, key: Int64, start: Int64, stop: Int64, span: Int64
-) -> tuple[Float, Int64]:  # pragma: no cover - compiled
-    """Mean of the votes in the 27 cells around each cell with more votes there than its neighbours have, and their number."""
-    cells = len(start)
-    keys = key[start]
-    total = np.zeros(cells, np.int64)
-    for c in prange(cells):
-        for column in range(9):
-            middle = keys[c] + ((column // 3 - 1) * span[1] + column % 3 - 1) * span[2]
-            begin, end = _run(keys, middle - 1, middle + 1)
-            for j in range(begin, end):
-                total[c] += stop[j] - start[j]
-    best = total >= VOTES
-    for c in prange(cells):
-        if total[c] >= VOTES:
-            for column in range(9):
-                middle = keys[c] + ((column // 3 - 1) * span[1] + column % 3 - 1) * span[2]
-                begin, end = _run(keys, middle - 1, middle + 1)
-                for j in range(begin, end):
-                    if total[j] > total[c] or (total[j] == total[c] and j < c):
-                        best[c] = False
-    chosen = np.flatnonzero(best)
-    centres = np.zeros((len(chosen), 3))
-    for k in prange(len(chosen)):
-        c = chosen[k]
-        for column in range(9):
-            middle = keys[c] + ((column // 3 - 1) * span[1] + column % 3 - 1) * span[2]
-            begin, end = _run(keys, middle - 1, middle + 1)
-            for j in range(begin, end):
-                for i in range(start[j], stop[j]):
-                    for a in range(3):
-                        centres[k, a] += xyz[i, a]
-        for a in range(3):
-            centres[k, a] /= total[c]
-    return centres, total[chosen]
+            if not side <= 0.0:
+                votes[at + 1, 0], votes[at + 1, 1], votes[at + 1, 2] = (
+                    x + sx - deep * nx,
+                    y + sy - deep * ny,
+                    z + sz - deep * nz,
+                )

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
 
-from tunneldb.arrays import Float, Int64
-from tunneldb.classification.targets.fit import BANDS, SECTORS
-from tunneldb.classification.targets.hough import NEAR, Scattered, around
+from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.classification.targets.fit import BANDS, SECTORS, cells_of
+from tunneldb.classification.targets.hough import NEAR, PointGrid
+from tunneldb.threads import in_blocks
 
 # In radii of the spheres:
 WIDE = 0.25  # points so near the sphere draw at first,
 NARROW = 0.1  # and at last
 PASSES = 12
+
+_BLOCK = 256  # candidates at a time
+_CELLS = BANDS * SECTORS
 
 
 class RefinedSpheres(NamedTuple):
@@ -44,135 +46,124 @@ class RefinedSpheres(NamedTuple):
     radius_sigma: Float
 
 
-def refine_spheres(points: Scattered, centres: Float, radius: float) -> RefinedSpheres:
+def refine_spheres(points: PointGrid, centres: Float, radius: float) -> RefinedSpheres:
     """Fit spheres of a radius (m) to candidates (k, 3) by Gauss-Newton steps with Tukey's weights, whose reach shrinks."""
-    settled = RefinedSpheres(*_settle(points.xyz, points.key, points.span, points.edge, centres - points.low, radius))
-    return settled._replace(centres=settled.centres + points.low)
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _settle(
-    xyz: Float, key: Int64, span: Int64, edge: float, centres: Float, radius: float
-) -> tuple[Float, Int64, Float, Float, Float, Float]:  # pragma: no cover - compiled
     count = len(centres)
-    moved = np.full((count, 3), np.nan)
-    on, share, seen = np.zeros(count, np.int64), np.zeros(count), np.zeros(count)
-    free, sigma = np.full(count, np.inf), np.full(count, np.inf)
-    for k in prange(count):
-        near = around(xyz, key, span, edge, centres[k], (NEAR + WIDE) * radius)
-        centre = centres[k].copy()
-        matrix, vector, unit = np.empty((3, 3)), np.empty(3), np.empty(3)
-        lost = False
-        for step in range(PASSES):
-            reach = radius * max(NARROW, WIDE * 0.85**step)
-            matrix[:] = 0.0
-            vector[:] = 0.0
-            for i in near:
-                far = 0.0
-                for a in range(3):
-                    unit[a] = xyz[i, a] - centre[a]
-                    far += unit[a] * unit[a]
-                far = math.sqrt(far)
-                off_by = far - radius
-                if abs(off_by) >= reach or far == 0.0:
-                    continue
-                weight = (1.0 - (off_by / reach) ** 2) ** 2
-                for a in range(3):
-                    unit[a] /= far
-                for a in range(3):
-                    vector[a] += weight * unit[a] * off_by
-                    for b in range(3):
-                        matrix[a, b] += weight * unit[a] * unit[b]
-            trace = matrix[0, 0] + matrix[1, 1] + matrix[2, 2]
-            if trace < 4.0:
-                lost = True
-                break
-            for a in range(3):  # across a nearly flat patch nothing holds the centre: let it stay there
-                matrix[a, a] += 1e-3 * trace
-            centre += np.linalg.solve(matrix, vector)
-            if np.sum((centre - centres[k]) ** 2) > radius * radius:
-                lost = True
-                break
-        if lost:
-            continue
-        moved[k] = centre
-        on[k], share[k], seen[k] = _look(xyz, near, centre, radius)
-        free[k], sigma[k] = _loosen(xyz, near, centre, radius)
-    return moved, on, share, seen, free, sigma
+    found = RefinedSpheres(
+        np.full((count, 3), np.nan), np.zeros(count, np.int64), np.zeros(count), np.zeros(count),
+        np.full(count, np.inf), np.full(count, np.inf),
+    )  # fmt: skip
+
+    def work(begin: int, end: int) -> None:
+        start = centres[begin:end]
+        near, candidate = points.around(start, (NEAR + WIDE) * radius)
+        xyz, start = points.xyz[near], start - points.low
+        centre, kept = _fit_centres(xyz, candidate, start, radius)
+        # Of those that are kept, the points and the numbers.
+        chosen = kept[candidate]
+        xyz, candidate = xyz[chosen], (np.cumsum(kept) - 1)[candidate[chosen]]
+        number, centre = begin + np.flatnonzero(kept), centre[kept]
+        found.centres[number] = centre + points.low
+        found.on[number], found.share[number], found.seen[number] = _extent(xyz, candidate, centre, radius)
+        found.radius[number], found.radius_sigma[number] = _fit_radii(xyz, candidate, centre, radius)
+
+    in_blocks(work, count, _BLOCK)
+    return found
 
 
-@njit(cache=True, nogil=True)
-def _loosen(xyz: Float, near: Int64, centre: Float, radius: float) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Radius of the best sphere of any radius near one, and its standard deviation; infinite where there is none."""
-    state = np.array([centre[0], centre[1], centre[2], radius])
-    matrix, vector, unit = np.empty((4, 4)), np.empty(4), np.empty(4)
-    reach = WIDE * radius
-    count, squares = 0, 0.0
-    for _ in range(PASSES):
-        matrix[:] = 0.0
-        vector[:] = 0.0
-        count, squares = 0, 0.0
-        for i in near:
-            far = 0.0
-            for a in range(3):
-                unit[a] = xyz[i, a] - state[a]
-                far += unit[a] * unit[a]
-            far = math.sqrt(far)
-            off_by = far - state[3]
-            if abs(off_by) >= reach or far == 0.0:
-                continue
-            weight = (1.0 - (off_by / reach) ** 2) ** 2
-            for a in range(3):
-                unit[a] /= far
-            unit[3] = 1.0
-            count += 1
-            squares += weight * off_by * off_by
-            for a in range(4):
-                vector[a] += weight * unit[a] * off_by
-                for b in range(4):
-                    matrix[a, b] += weight * unit[a] * unit[b]
-        if count < 6 or abs(np.linalg.det(matrix / matrix[3, 3])) < 1e-12:
-            return math.inf, math.inf
-        state += np.linalg.solve(matrix, vector)
-        if not 0.2 * radius < state[3] < 5.0 * radius:
-            return math.inf, math.inf
-        reach = max(0.9 * reach, NARROW * radius)
-    return state[3], math.sqrt(np.linalg.inv(matrix)[3, 3] * squares / matrix[3, 3])
+def _equations(
+    xyz: Float, candidate: Int64, centre: Float, radius: Float, reach: Float, free: bool
+) -> tuple[Float, Float, Int64, Float]:
+    """Normal equations of spheres by Tukey's weights.
+
+    Parameters
+    ----------
+    xyz, candidate : (n, 3) and (n,) arrays
+        Points, and which of the k spheres each is near to.
+    centre, radius, reach : (k, 3), (k,) and (k,) arrays
+        Spheres, and how far from them points draw, m.
+    free : bool
+        Whether the radius is unknown, too.
+
+    Returns
+    -------
+    matrix, vector : (k, m, m) and (k, m) arrays
+        m is 3, or 4 with the radius.
+    count, squares : (k,) arrays
+        Points that draw, and the weighted sum of the squares of their distances, m².
+    """
+    out = xyz - centre[candidate]
+    far = np.sqrt(out[:, 0] * out[:, 0] + out[:, 1] * out[:, 1] + out[:, 2] * out[:, 2])
+    off = far - radius[candidate]
+    drawing = (np.abs(off) < reach[candidate]) & (far > 0.0)
+    out, far, off, candidate = out[drawing], far[drawing], off[drawing], candidate[drawing]
+    weight = 1.0 - (off / reach[candidate]) ** 2
+    weight = weight * weight
+    slope = [*(out / far[:, None]).T, *([np.ones(len(far))] if free else [])]
+
+    def total(values: Float) -> Float:
+        return np.asarray(np.bincount(candidate, values, minlength=len(centre)), np.float64)
+
+    vector = np.stack([total(weight * one * off) for one in slope], axis=-1)
+    matrix = np.stack([np.stack([total(weight * one * other) for other in slope], axis=-1) for one in slope], axis=-2)
+    return matrix, vector, np.bincount(candidate, minlength=len(centre)), total(weight * off * off)
 
 
-@njit(cache=True, nogil=True)
-def _look(xyz: Float, near: Int64, centre: Float, radius: float) -> tuple[int, float, float]:  # pragma: no cover - compiled
-    """Points on a sphere, their share of those near it where it is seen, and the share of its surface that is seen."""
-    far = np.empty(len(near))
-    axis = np.zeros(3)
-    count = 0
-    for j in range(len(near)):
-        far[j] = math.sqrt(np.sum((xyz[near[j]] - centre) ** 2))
-        if abs(far[j] - radius) <= NARROW * radius:
-            count += 1
-            axis += xyz[near[j]] - centre
-    length = math.sqrt(np.sum(axis**2))
-    if count == 0 or length == 0.0:
-        return 0, 0.0, 0.0
-    axis /= length
-    # Any direction across the axis, and the one across both.
-    side = np.array([-axis[1], axis[0], 0.0]) if abs(axis[2]) < 0.9 else np.array([0.0, -axis[2], axis[1]])
-    side /= math.sqrt(np.sum(side**2))
-    other = np.cross(axis, side)
-    held, there = np.zeros(BANDS * SECTORS, np.int64), np.zeros(BANDS * SECTORS, np.int64)
-    for j in range(len(near)):
-        if far[j] > NEAR * radius or far[j] == 0.0:
-            continue
-        out = (xyz[near[j]] - centre) / far[j]
-        band = min(max(int((1.0 - np.dot(out, axis)) * BANDS / 2.0), 0), BANDS - 1)
-        angle = math.atan2(np.dot(out, other), np.dot(out, side)) / (2.0 * math.pi) + 0.5
-        cell = band * SECTORS + min(int(angle * SECTORS), SECTORS - 1)
-        there[cell] += 1
-        if abs(far[j] - radius) <= NARROW * radius:
-            held[cell] += 1
-    among, cells = 0, 0
-    for cell in range(len(held)):
-        if held[cell]:
-            among += there[cell]
-            cells += 1
-    return count, count / among, cells / len(held)
+def _fit_centres(xyz: Float, candidate: Int64, start: Float, radius: float) -> tuple[Float, Bool]:
+    """Centres (k, 3) of spheres of a radius, from a start on, and which of them are worth keeping."""
+    centre, kept = start.copy(), np.ones(len(start), np.bool_)
+    for step in range(PASSES):
+        reach = radius * max(NARROW, WIDE * 0.85**step)
+        alike = np.full(len(start), radius), np.full(len(start), reach)
+        matrix, vector, _, _ = _equations(xyz, candidate, centre, *alike, free=False)
+        trace = np.trace(matrix, axis1=1, axis2=2)
+        kept &= trace >= 4.0
+        if not kept.any():
+            break
+        # Across a nearly flat patch nothing holds the centre: let it stay there.
+        matrix = matrix[kept] + 1e-3 * trace[kept, None, None] * np.eye(3)
+        centre[kept] += np.linalg.solve(matrix, vector[kept, :, None])[..., 0]
+        kept &= ((centre - start) ** 2).sum(axis=1) <= radius * radius
+        held = kept[candidate]
+        xyz, candidate = xyz[held], candidate[held]
+    return centre, kept
+
+
+def _fit_radii(xyz: Float, candidate: Int64, centre: Float, radius: float) -> tuple[Float, Float]:
+    """Radius of the best sphere of any radius near each of some, and its standard deviation; infinite where there is none."""
+    count = len(centre)
+    state = np.column_stack([centre, np.full(count, radius)])
+    sigma, lost = np.full(count, np.inf), np.zeros(count, np.bool_)
+    reach = np.full(count, WIDE * radius)
+    for step in range(PASSES):
+        matrix, vector, drawing, squares = _equations(xyz, candidate, state[:, :3], state[:, 3], reach, free=True)
+        lost |= drawing < 6
+        total = np.where(lost, 1.0, matrix[:, 3, 3])
+        lost |= np.abs(np.linalg.det(matrix / total[:, None, None])) < 1e-12
+        kept = np.flatnonzero(~lost)
+        state[kept] += np.linalg.solve(matrix[kept], vector[kept, :, None])[..., 0]
+        lost |= ~((state[:, 3] > 0.2 * radius) & (state[:, 3] < 5.0 * radius))
+        reach = np.maximum(0.9 * reach, NARROW * radius)
+        if step == PASSES - 1:
+            kept = np.flatnonzero(~lost)
+            sigma[kept] = np.sqrt(np.linalg.inv(matrix[kept])[:, 3, 3] * squares[kept] / matrix[kept, 3, 3])
+    return np.where(lost, np.inf, state[:, 3]), sigma
+
+
+def _extent(xyz: Float, candidate: Int64, centre: Float, radius: float) -> tuple[Int64, Float, Float]:
+    """Points on each sphere, their share of those near it where it is seen, and the share of its surface that is seen."""
+    count = len(centre)
+    out = xyz - centre[candidate]
+    far = np.sqrt(out[:, 0] * out[:, 0] + out[:, 1] * out[:, 1] + out[:, 2] * out[:, 2])
+    on = np.abs(far - radius) <= NARROW * radius
+    number = np.bincount(candidate[on], minlength=count)
+    towards = np.column_stack([np.bincount(candidate[on], out[on, axis], minlength=count) for axis in range(3)])
+    known = (number > 0) & (np.linalg.norm(towards, axis=1) > 0.0)
+    near = (far <= NEAR * radius) & (far > 0.0) & known[candidate]
+    sphere, held_by = candidate[near], on[near]
+    cell = sphere * _CELLS + cells_of(out[near], towards[sphere])
+    there = np.bincount(cell, minlength=count * _CELLS).reshape(count, _CELLS)
+    held = np.bincount(cell[held_by], minlength=count * _CELLS).reshape(count, _CELLS) > 0
+    among = np.where(held, there, 0).sum(axis=1)
+    share = np.where(known, number, 0) / np.maximum(among, 1)
+    return np.where(known, number, 0), share, held.mean(axis=1)

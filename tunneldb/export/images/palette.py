@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from tunneldb.classification.classes import PointClass
 from tunneldb.raster.pixel_state import PixelState
-from tunneldb.store.images import DARK
 
 Colour = tuple[int, int, int]
 
@@ -48,7 +47,7 @@ PALETTES = {
             int(PixelState.RECESS): ("recess", COLOURS[PointClass.NICHE]),
             int(PixelState.OFF): ("appendage", COLOURS[PointClass.APPENDAGE]),
             int(PixelState.FLOOR): ("floor", COLOURS[PointClass.GROUND]),
-            DARK: ("dark", (24, 24, 34)),
+            int(PixelState.DARK): ("dark", (24, 24, 34)),
         },
         nodata=255,
     ),

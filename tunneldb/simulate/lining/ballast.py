@@ -11,12 +11,13 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from tunneldb.arrays import Float
+from tunneldb.arrays import Bool, Float
+from tunneldb.compiled import inner, kernel
 from tunneldb.simulate.noise_field import mix
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.section import Section
+from tunneldb.simulate.tunnel.tunnel import foot, gradient
 
 CELL = 0.045  # m: one stone a cell
 STONE = (0.015, 0.030)  # radii of stones, m: stones of 3 to 6 cm
@@ -41,7 +42,7 @@ class Ground(NamedTuple):
     high: float
 
 
-@njit(cache=True, nogil=True)
+@inner
 def stones(x: float, y: float, salt: int) -> float:
     """Height of the stones at a place, in heights of a dome: -1 to 1.5."""
     fx, fy = math.floor(x / CELL), math.floor(y / CELL)
@@ -60,7 +61,7 @@ def stones(x: float, y: float, salt: int) -> float:
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _many(x: Float, y: Float, salt: int, out: Float) -> None:
     for i in range(x.shape[0]):
         out[i] = stones(x[i], y[i], salt)
@@ -95,7 +96,7 @@ def lay(parameters: Parameters, section: Section, salt: int) -> Ground | None:
     )
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inner
 def height(ground: Ground, x: float, y: float, u: float) -> float:
     """Height over the section's floor at plan coordinates from the line's origin, ``u`` m right of the axis."""
     h = ground.camber * (ground.half_width - abs(u))
@@ -104,60 +105,90 @@ def height(ground: Ground, x: float, y: float, u: float) -> float:
     return h
 
 
-@njit(cache=True, nogil=True)
-def meet_ground(
-    ground: Ground, o: Float, d: Float, r: float, u: float, w: float, c: float, n: float, dw: float, on_floor: bool
-) -> tuple[float, float, bool]:
-    """Range at which a ray meets the ground, cosine there, and whether it is the ground (else the wall's foot).
+@kernel
+def intersect_ground(
+    ground: Ground, plan: Float, profile: Float, origin: Float, direction: Float, found: Float, on_floor: Bool
+) -> None:
+    """Where rays (n, 3) that meet the section meet ballast or a cambered floor.
 
-    The ray meets the section at range ``r``, at (``u``, ``w``) there, where the axis goes by (``c``, ``n``) in plan, and
-    moves by ``dw`` a metre; near its end the tunnel's frame hardly turns. NaN: it passes over the ground to the wall.
+    Parameters
+    ----------
+    found : (6, n)
+        Range and chainage where they meet the section, rows as of :func:`intersect_lining`; range and cosine of those that
+        meet the ground or the wall's foot beneath the section's corner are replaced.
+    on_floor : (n,)
+        Whether they meet the section's floor; then whether what they meet is floor.
     """
-    du = d[0] * n - d[1] * c
-    above = w - ground.floor
-    if dw > -1e-3 or (not on_floor and above > ground.high):
-        return np.nan, 0.0, False
-    flat = math.sqrt(max(1.0 - dw * dw, 1e-12))
-    step = min(0.005 / flat, 0.25 * (ground.high - ground.low) / -dw + 1e-6)
-    t = (ground.high - above) / dw
-    end = (ground.low - above) / dw + step if on_floor else 0.0
-    before = t
-    while t <= end:
-        v = u + t * du
-        if on_floor and abs(v) > ground.half_width and v * du > 0.0:
-            # Below the corner of the section the wall goes on.
-            return r + (math.copysign(ground.half_width, v) - u) / du, abs(du), False
-        if above + t * dw <= height(ground, o[0] + (r + t) * d[0], o[1] + (r + t) * d[1], v):
-            break
+    for i in range(origin.shape[0]):
+        r = found[0, i]
+        if math.isnan(r) or found[4, i] <= 0.0:
+            continue
+        ox, oy = origin[i, 0], origin[i, 1]
+        dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
+        _, _, u, w, c, n, k, g, q, det = foot(
+            plan, profile, ox + r * dx, oy + r * dy, origin[i, 2] + r * dz, found[1, i], 0.0, np.int64(1)
+        )
+        gx, gy, gz = gradient(0.0, 1.0, u, w, c, n, k, g, q, det)
+        # Near its end the tunnel's frame hardly turns along a ray: it moves by du and dw a metre.
+        dw = gx * dx + gy * dy + gz * dz
+        du = dx * n - dy * c
+        above = w - ground.floor
+        if dw > -1e-3 or (not on_floor[i] and above > ground.high):
+            continue
+        flat = math.sqrt(max(1.0 - dw * dw, 1e-12))
+        step = min(0.005 / flat, 0.25 * (ground.high - ground.low) / -dw + 1e-6)
+        t = (ground.high - above) / dw
+        end = (ground.low - above) / dw + step if on_floor[i] else 0.0
         before = t
-        t += step
-    if t > end:
-        return np.nan, 0.0, False
-    for _ in range(16):
-        middle = 0.5 * (before + t)
-        if above + middle * dw > height(ground, o[0] + (r + middle) * d[0], o[1] + (r + middle) * d[1], u + middle * du):
-            before = middle
-        else:
-            t = middle
-    r += t
-    x, y, v = o[0] + r * d[0], o[1] + r * d[1], u + t * du
-    h = 0.001
-    gx = (height(ground, x + h, y, v + h * n) - height(ground, x - h, y, v - h * n)) / (2.0 * h)
-    gy = (height(ground, x, y + h, v - h * c) - height(ground, x, y - h, v + h * c)) / (2.0 * h)
-    return r, (gx * d[0] + gy * d[1] - dw) / math.sqrt(1.0 + gx * gx + gy * gy), True
+        is_wall = False
+        while t <= end:
+            v = u + t * du
+            if on_floor[i] and abs(v) > ground.half_width and v * du > 0.0:
+                is_wall = True  # below the corner of the section the wall goes on
+                found[0, i] = r + (math.copysign(ground.half_width, v) - u) / du
+                found[3, i] = abs(du)
+                on_floor[i] = False
+                break
+            if above + t * dw <= height(ground, ox + (r + t) * dx, oy + (r + t) * dy, v):
+                break
+            before = t
+            t += step
+        if is_wall or t > end:  # or it passes over the ground to the wall
+            continue
+        for _ in range(16):
+            middle = 0.5 * (before + t)
+            if above + middle * dw > height(ground, ox + (r + middle) * dx, oy + (r + middle) * dy, u + middle * du):
+                before = middle
+            else:
+                t = middle
+        r += t
+        x, y, v = ox + r * dx, oy + r * dy, u + t * du
+        h = 0.001
+        gx = (height(ground, x + h, y, v + h * n) - height(ground, x - h, y, v - h * n)) / (2.0 * h)
+        gy = (height(ground, x, y + h, v - h * c) - height(ground, x, y - h, v + h * c)) / (2.0 * h)
+        found[0, i] = r
+        found[3, i] = (gx * dx + gy * dy - dw) / math.sqrt(1.0 + gx * gx + gy * gy)
+        on_floor[i] = True
 
 
-@njit(cache=True, nogil=True)
-def bump(s: float, arc: float, size: float) -> float:
-    """Smooth pseudo-random relief, -1 to 1, with a wavelength of about two ``size`` (value noise)."""
-    x, y = s / size, arc / size
-    fx, fy = math.floor(x), math.floor(y)
-    tx, ty = x - fx, y - fy
-    tx, ty = tx * tx * (3.0 - 2.0 * tx), ty * ty * (3.0 - 2.0 * ty)
-    total = 0.0
-    for i in range(2):
-        for j in range(2):
-            h = math.sin((fx + i) * 12.9898 + (fy + j) * 78.233) * 43758.5453
-            value = 2.0 * (h - math.floor(h)) - 1.0
-            total += value * (tx if i else 1.0 - tx) * (ty if j else 1.0 - ty)
-    return total
+@kernel
+def _bumps(s: Float, arc: Float, size: float, out: Float) -> None:
+    for k in range(s.shape[0]):
+        x, y = s[k] / size, arc[k] / size
+        fx, fy = math.floor(x), math.floor(y)
+        tx, ty = x - fx, y - fy
+        tx, ty = tx * tx * (3.0 - 2.0 * tx), ty * ty * (3.0 - 2.0 * ty)
+        total = 0.0
+        for i in range(2):
+            for j in range(2):
+                h = math.sin((fx + i) * 12.9898 + (fy + j) * 78.233) * 43758.5453
+                value = 2.0 * (h - math.floor(h)) - 1.0
+                total += value * (tx if i else 1.0 - tx) * (ty if j else 1.0 - ty)
+        out[k] = total
+
+
+def bumps(s: Float, arc: Float, size: float) -> Float:
+    """Smooth pseudo-random relief, -1 to 1, at places (n,), with a wavelength of about two ``size`` m (value noise)."""
+    out = np.empty(s.size)
+    _bumps(s, arc, size, out)
+    return out

@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from shapely import affinity
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.prepared import prep
 
 from tunneldb.arrays import Float, Int64
+from tunneldb.compiled import inner
 from tunneldb.errors import UserError
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
@@ -154,7 +154,7 @@ def edge_table(leaks: list[Leak]) -> tuple[Float, Int64, Float]:
     return np.ascontiguousarray(np.vstack(edges)), np.array(first, dtype=np.int64), rows
 
 
-@njit(cache=True, nogil=True)
+@inner
 def depth_inside(edges: Float, begin: int, end: int, x: float, y: float) -> float:
     """Distance of a point to the edges of a polygon, m, positive inside (holes are outside)."""
     best = 1e300

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tunneldb.arrays import Float, Int64
+from tunneldb.compiled import kernel
 from tunneldb.simulate.lining.marks import Mark, mark_table
 from tunneldb.simulate.lining.rings import Rings, ring_level
-from tunneldb.simulate.noise_field import clouds, normal
+from tunneldb.simulate.noise_field import normal_field, smooth_field
 from tunneldb.simulate.objects.fixtures import Appendage, bin_of, bins
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
@@ -32,7 +32,7 @@ GRIME_FADE, GRIME_RISE, GRIME_LENGTH, GRIME_CHANGE = (0.1, 0.3), 0.04, 3.0, 0.25
 
 
 class Reflectance(NamedTuple):
-    """Levels of a lining for the kernels.
+    """Levels of a lining.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Reflectance(NamedTuple):
     start: float
 
 
-def coat(
+def lining_reflectance(
     parameters: Parameters,
     tunnel: Tunnel,
     rings: Rings,
@@ -101,57 +101,63 @@ def coat(
     )
 
 
-@njit(cache=True, nogil=True)
-def soot_amount(coat: Reflectance, s: float) -> float:
-    """Soot in the middle at a chainage, as a share of what was asked."""
-    return min(max(1.0 + SOOT_CHANGE * clouds(s / SOOT_LENGTH, 0.5, coat.salt + 2), SOOT_RANGE[0]), SOOT_RANGE[1])
+def soot_amount(reflectance: Reflectance, s: Float) -> Float:
+    """Soot in the middle at chainages (n,), as a share of what was asked."""
+    change = smooth_field(s / SOOT_LENGTH, np.full(s.size, 0.5), reflectance.salt + 2)
+    return np.minimum(np.maximum(1.0 + SOOT_CHANGE * change, SOOT_RANGE[0]), SOOT_RANGE[1])
 
 
-@njit(cache=True, nogil=True)
-def _grime(coat: Reflectance, s: float, arc: float) -> float:
-    """Grime at a place, dB: the most that any band gives."""
-    most = 0.0
-    for i in range(coat.grime.shape[0]):
-        below = arc * coat.grime[i, 0] - coat.grime[i, 1]
-        fade = coat.grime[i, 2]
-        if below < -GRIME_RISE or below > 6.0 * fade:
-            continue
-        shape = math.exp(-below / fade) if below > 0.0 else 1.0 + below / GRIME_RISE
-        change = max(0.0, 1.0 + GRIME_CHANGE * clouds(s / GRIME_LENGTH, i + 0.5, coat.salt + 3))
-        most = max(most, coat.grime[i, 3] * shape * change)
+def _grime(reflectance: Reflectance, s: Float, arc: Float) -> Float:
+    """Grime at places (n,), dB: the most that any band gives."""
+    most = np.zeros(s.size)
+    for i, (side, edge, fade, drop) in enumerate(reflectance.grime.tolist()):
+        below = arc * side - edge
+        near = np.flatnonzero((below >= -GRIME_RISE) & (below <= 6.0 * fade))
+        below = below[near]
+        shape = np.where(below > 0.0, np.exp(-np.maximum(below, 0.0) / fade), 1.0 + below / GRIME_RISE)
+        change = smooth_field(s[near] / GRIME_LENGTH, np.full(near.size, i + 0.5), reflectance.salt + 3)
+        most[near] = np.maximum(most[near], drop * shape * np.maximum(0.0, 1.0 + GRIME_CHANGE * change))
     return most
 
 
-@njit(cache=True, nogil=True)
-def _mark_level(coat: Reflectance, s: float, arc: float) -> float:
-    """Level of the mark at a place, dB; 0: there is none. Strokes of a number overlap and are painted once."""
-    b = bin_of(s, coat.start, coat.mark_bins)
-    for j in range(coat.mark_bins[b], coat.mark_bins[b + 1]):
-        row = coat.marks[coat.mark_list[j]]
-        x, y = s - row[2], arc - row[3]
-        if abs(x * row[4] + y * row[5]) <= row[6] and abs(y * row[4] - x * row[5]) <= row[7]:
-            return row[8]
-    return 0.0
+@kernel
+def _mark_level(marks: Float, bins: Int64, listed: Int64, start: float, s: Float, arc: Float, out: Float) -> None:
+    """Add the level of the mark at places (n,), dB. Strokes of a number overlap and are painted once."""
+    for i in range(s.shape[0]):
+        b = bin_of(s[i], start, bins)
+        for j in range(bins[b], bins[b + 1]):
+            k = listed[j]
+            x, y = s[i] - marks[k, 2], arc[i] - marks[k, 3]
+            eu, ew = marks[k, 4], marks[k, 5]
+            if abs(x * eu + y * ew) <= marks[k, 6] and abs(y * eu - x * ew) <= marks[k, 7]:
+                out[i] += marks[k, 8]
+                break
 
 
-@njit(cache=True, nogil=True)
-def level(coat: Reflectance, s: float, arc: float) -> float:
-    """Level of the lining at a chainage and an arc, dB added to the reflectance."""
-    total = ring_level(coat.rings, s, arc)
-    if coat.texture[0] > 0.0:
-        total += coat.texture[0] * clouds(s / coat.texture[1], arc / coat.texture[1], coat.salt)
-    if coat.tile > 0.0:
-        x, y = s / coat.tile, arc / coat.tile
-        i, j = math.floor(x), math.floor(y)
-        total += TILE_LEVEL * normal(i, j, coat.salt + 1)
-        edge = min(min(x - i, i + 1.0 - x), min(y - j, j + 1.0 - y)) * coat.tile
-        if edge < 0.5 * GROUT:
-            total -= GROUT_DROP
-    if coat.soot[0] > 0.0:
-        z = (arc - coat.soot[1]) / coat.soot[2]
-        total -= coat.soot[0] * soot_amount(coat, s) * math.exp(-z * z)
-    if coat.grime.shape[0] > 0:
-        total -= _grime(coat, s, arc)
-    if coat.marks.shape[0] > 0:
-        total += _mark_level(coat, s, arc)
+def _tiles(reflectance: Reflectance, s: Float, arc: Float) -> Float:
+    """Level of tiles and of the grout between them at places (n,), dB."""
+    x, y = s / reflectance.tile, arc / reflectance.tile
+    i, j = np.floor(x), np.floor(y)
+    level = TILE_LEVEL * normal_field(i.astype(np.int64), j.astype(np.int64), reflectance.salt + 1)
+    edge = np.minimum(np.minimum(x - i, i + 1.0 - x), np.minimum(y - j, j + 1.0 - y)) * reflectance.tile
+    return level - np.where(edge < 0.5 * GROUT, GROUT_DROP, 0.0)
+
+
+def level(reflectance: Reflectance, s: Float, arc: Float) -> Float:
+    """Level of the lining at chainages and arcs (n,), dB added to the reflectance."""
+    own = reflectance
+    total = ring_level(own.rings, s, arc)
+    texture, size = own.texture.tolist()
+    if texture > 0.0:
+        total += texture * smooth_field(s / size, arc / size, own.salt)
+    if own.tile > 0.0:
+        total += _tiles(own, s, arc)
+    asked, middle, width = own.soot.tolist()
+    if asked > 0.0:
+        z = (arc - middle) / width
+        total -= asked * soot_amount(own, s) * np.exp(-z * z)
+    if len(own.grime):
+        total -= _grime(own, s, arc)
+    if len(own.marks):
+        _mark_level(own.marks, own.mark_bins, own.mark_list, own.start, s, arc, total)
     return total

@@ -10,14 +10,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from tunneldb.arrays import Float
+from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.compiled import inner, kernel
 from tunneldb.simulate.lining.rings import Rings, pocket_drop, ring_of
-from tunneldb.simulate.noise_field import clouds
+from tunneldb.simulate.noise_field import value_noise
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.section import nearest
-from tunneldb.simulate.tunnel.tunnel import Tunnel, gradient, newton_step
+from tunneldb.simulate.tunnel.tunnel import Tunnel, foot, gradient
 
 # Relief of shotcrete: wavelengths, m, and standard deviations, m; its fields lie within 2.4 standard deviations.
 ROUGH_SIZE, ROUGH = (0.25, 0.08), (0.006, 0.002)
@@ -66,7 +66,7 @@ def wider_from(tunnel: Tunnel) -> float:
     return 0.5 * (tunnel.line.start + tunnel.line.end)
 
 
-def skin(parameters: Parameters, tunnel: Tunnel, rings: Rings, seed: np.random.SeedSequence) -> LiningRelief | None:
+def lining_relief(parameters: Parameters, tunnel: Tunnel, rings: Rings, seed: np.random.SeedSequence) -> LiningRelief | None:
     """Relief as asked; None: the surface is the nominal one."""
     p = parameters
     is_rough = p.lining == "shotcrete"
@@ -88,103 +88,117 @@ def skin(parameters: Parameters, tunnel: Tunnel, rings: Rings, seed: np.random.S
     )
 
 
-@njit(cache=True, nogil=True)
-def _rough(skin: LiningRelief, s: float, arc: float) -> float:
+@inner
+def _rough(relief: LiningRelief, s: float, arc: float) -> float:
     """Height of shotcrete, m."""
     total = 0.0
     for i in range(2):
-        total += ROUGH[i] * clouds(s / ROUGH_SIZE[i], arc / ROUGH_SIZE[i], skin.salt + i)
+        total += ROUGH[i] * value_noise(s / ROUGH_SIZE[i], arc / ROUGH_SIZE[i], relief.salt + i)
     return total
 
 
-@njit(cache=True, nogil=True)
-def height(skin: LiningRelief, s: float, arc: float) -> float:
+@inner
+def height(relief: LiningRelief, s: float, arc: float) -> float:
     """Height of the lining over the nominal section at a chainage and an arc, m, positive into the tunnel."""
-    if abs(arc) > skin.floor_arc:
+    if abs(arc) > relief.floor_arc:
         return 0.0
-    total = -skin.wider[1] if s > skin.wider[0] else 0.0
-    if skin.rings.length > 0.0:
-        total += skin.step[ring_of(skin.rings, s)]
-        if pocket_drop(skin.rings, s, arc) > 0.0:
-            total -= skin.rings.pocket_depth
-    if skin.rough > 0.0:
-        total += _rough(skin, s, arc)
+    total = -relief.wider[1] if s > relief.wider[0] else 0.0
+    if relief.rings.length > 0.0:
+        total += relief.step[ring_of(relief.rings, s)]
+        if pocket_drop(relief.rings, s, arc) > 0.0:
+            total -= relief.rings.pocket_depth
+    if relief.rough > 0.0:
+        total += _rough(relief, s, arc)
     return total
 
 
-@njit(cache=True, nogil=True)
-def meet_skin(
-    skin: LiningRelief, plan: Float, profile: Float, parts: Float, o: Float, d: Float, r: float, s: float, cosine: float
-) -> tuple[float, float, float, float, bool]:
-    """Range at which a ray that meets the nominal section at range r, chainage s, meets the lining.
-
-    Also chainage, arc and cosine there, and whether it is the floor that goes on where the lining stands back.
-    """
-    slant = max(cosine, 0.1)
-    back = skin.high / slant + SHORTEST
-    before = t = r - back
-    end = r + 2.0 * (SHORTEST - skin.low) / slant + 0.2
-    s1, a1, gap, w, found = _gap(skin, plan, profile, parts, o, d, t, s)
-    for _ in range(6):
-        if gap > 0.0:
-            break
-        # The section bends away: begin farther back.
-        back *= 2.0
-        before = t = r - back
-        s1, a1, gap, w, found = _gap(skin, plan, profile, parts, o, d, t, s)
-    above = gap
-    while gap > 0.0 and w > skin.floor and t < end:
-        before, above = t, gap
-        t += min(max(SHARE * gap / slant, SHORTEST), LONGEST)
-        s1, a1, gap, w, found = _gap(skin, plan, profile, parts, o, d, t, s1)
-    for i in range(HALVINGS):
-        if t - before < CLOSE or (-CLOSE < gap <= 0.0):
-            break
-        # A smooth surface is found where the chord crosses it, a step in it by halving.
-        share = above / (above - gap) if i < 3 and gap < 0.0 else 0.5
-        middle = before + share * (t - before) + (0.5 * CLOSE if i < 3 else 0.0)
-        s2, a2, gap2, w2, found2 = _gap(skin, plan, profile, parts, o, d, middle, s1)
-        if gap2 > 0.0 and w2 > skin.floor:
-            before, above = middle, gap2
-        else:
-            t, s1, a1, gap, w, found = middle, s2, a2, gap2, w2, found2
-    _, u, _, c, n, k, g, q, det = found
-    tx, ty, tz = c / q, n / q, g / q
-    if gap > 0.0 and w <= skin.floor:
-        gx, gy, gz = gradient(0.0, 1.0, u, w, c, n, k, g, q, det)
-        norm = math.sqrt(gx * gx + gy * gy + gz * gz)
-        return t, s1, a1, -(gx * d[0] + gy * d[1] + gz * d[2]) / norm, True
-    _, _, gu, gw = nearest(parts, u, w)
-    nx, ny, nz = gradient(gu, gw, u, w, c, n, k, g, q, det)
-    norm = math.sqrt(nx * nx + ny * ny + nz * nz)
-    nx, ny, nz = nx / norm, ny / norm, nz / norm
-    # Into the direction of growing arc.
-    ax, ay, az = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
-    if gap < -SIDE:
-        s0, a0, _, _, _ = _gap(skin, plan, profile, parts, o, d, before, s1)
-        is_end = abs(height(skin, s1, a0) - height(skin, s0, a0)) > SIDE
-        fx, fy, fz = (tx, ty, tz) if is_end else (ax, ay, az)
-        return t, s1, a1, abs(fx * d[0] + fy * d[1] + fz * d[2]), False
-    if skin.rough > 0.0:
-        h = 0.005
-        hs = (_rough(skin, s1 + h, a1) - _rough(skin, s1 - h, a1)) / (2.0 * h)
-        ha = (_rough(skin, s1, a1 + h) - _rough(skin, s1, a1 - h)) / (2.0 * h)
-        nx, ny, nz = nx - hs * tx - ha * ax, ny - hs * ty - ha * ay, nz - hs * tz - ha * az
-        norm = math.sqrt(nx * nx + ny * ny + nz * nz)
-        nx, ny, nz = nx / norm, ny / norm, nz / norm
-    return t, s1, a1, -(nx * d[0] + ny * d[1] + nz * d[2]), False
-
-
-@njit(cache=True, nogil=True)
+@inner
 def _gap(
-    skin: LiningRelief, plan: Float, profile: Float, parts: Float, o: Float, d: Float, t: float, s: float
-) -> tuple[float, float, float, float, tuple[float, float, float, float, float, float, float, float, float]]:
-    """At range t: chainage, arc, gap to the lining, height over the axis; what :func:`newton_step` found."""
-    x, y, z = o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]
-    found = newton_step(plan, profile, x, y, z, s)
-    s += found[0]
-    if abs(found[0]) > 1e-3:
-        found = newton_step(plan, profile, x, y, z, s)
-        s += found[0]
-    arc, offset, _, _ = nearest(parts, found[1], found[2])
-    return s, arc, offset - height(skin, s, arc), found[2], found
+    relief: LiningRelief, plan: Float, profile: Float, parts: Float, x: float, y: float, z: float, s: float
+) -> tuple[float, float, float, float, tuple[float, ...]]:
+    """Arc of a place, its distance to the lining along the normal, gradient (u, w) of its offset; :func:`foot` of it."""
+    found = foot(plan, profile, x, y, z, s, 1e-3, np.int64(2))
+    arc, offset, gu, gw = nearest(parts, found[2], found[3])
+    return arc, offset - height(relief, found[0], arc), gu, gw, found
+
+
+@kernel
+def intersect_relief(
+    relief: LiningRelief,
+    plan: Float,
+    profile: Float,
+    parts: Float,
+    origin: Float,
+    direction: Float,
+    rays: Int64,
+    found: Float,
+    is_floor: Bool,
+) -> None:
+    """Where some ``rays`` (m,) that meet the nominal section meet the lining.
+
+    Replaces range, chainage, arc and cosine in ``found`` (6, n), rows as of :func:`intersect_lining`; ``is_floor`` (m,) says
+    of each whether it meets the floor that goes on where the lining stands back.
+    """
+    for m in range(rays.shape[0]):
+        i = rays[m]
+        x, y, z = origin[i, 0], origin[i, 1], origin[i, 2]
+        dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
+        r, s = found[0, i], found[1, i]
+        slant = max(found[3, i], 0.1)
+        back = relief.high / slant + SHORTEST
+        end = r + 2.0 * (SHORTEST - relief.low) / slant + 0.2
+        t = r
+        for _ in range(7):
+            t = r - back
+            arc, gap, gu, gw, at = _gap(relief, plan, profile, parts, x + t * dx, y + t * dy, z + t * dz, s)
+            if gap > 0.0:
+                break
+            back *= 2.0  # the section bends away: begin farther back
+        before, above = t, gap
+        while gap > 0.0 and at[3] > relief.floor and t < end:
+            before, above = t, gap
+            t += min(max(SHARE * gap / slant, SHORTEST), LONGEST)
+            arc, gap, gu, gw, at = _gap(relief, plan, profile, parts, x + t * dx, y + t * dy, z + t * dz, at[0])
+        for j in range(HALVINGS):
+            if t - before < CLOSE or (-CLOSE < gap <= 0.0):
+                break
+            # A smooth surface is found where the chord crosses it, a step in it by halving.
+            share = above / (above - gap) if j < 3 and gap < 0.0 else 0.5
+            middle = before + share * (t - before) + (0.5 * CLOSE if j < 3 else 0.0)
+            there = _gap(relief, plan, profile, parts, x + middle * dx, y + middle * dy, z + middle * dz, at[0])
+            if there[1] > 0.0 and there[4][3] > relief.floor:
+                before, above = middle, there[1]
+            else:
+                t = middle
+                arc, gap, gu, gw, at = there
+        s, _, u, w, c, n, k, g, q, det = at
+        found[0, i] = t
+        found[1, i] = s
+        found[2, i] = arc
+        is_floor[m] = gap > 0.0 and w <= relief.floor
+        if is_floor[m]:
+            gu, gw = 0.0, 1.0
+        nx, ny, nz = gradient(gu, gw, u, w, c, n, k, g, q, det)
+        norm = math.sqrt(nx * nx + ny * ny + nz * nz)
+        if is_floor[m]:
+            found[3, i] = -(nx * dx + ny * dy + nz * dz) / norm
+            continue
+        nx, ny, nz = nx / norm, ny / norm, nz / norm
+        tx, ty, tz = c / q, n / q, g / q
+        # Into the direction of growing arc.
+        ax, ay, az = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+        if gap < -SIDE:
+            beside = _gap(relief, plan, profile, parts, x + before * dx, y + before * dy, z + before * dz, s)
+            is_end = abs(height(relief, s, beside[0]) - height(relief, beside[4][0], beside[0])) > SIDE
+            if is_end:
+                ax, ay, az = tx, ty, tz
+            found[3, i] = abs(ax * dx + ay * dy + az * dz)
+            continue
+        if relief.rough > 0.0:
+            h = 0.005
+            hs = (_rough(relief, s + h, arc) - _rough(relief, s - h, arc)) / (2.0 * h)
+            ha = (_rough(relief, s, arc + h) - _rough(relief, s, arc - h)) / (2.0 * h)
+            nx, ny, nz = nx - hs * tx - ha * ax, ny - hs * ty - ha * ay, nz - hs * tz - ha * az
+            norm = math.sqrt(nx * nx + ny * ny + nz * nz)
+            nx, ny, nz = nx / norm, ny / norm, nz / norm
+        found[3, i] = -(nx * dx + ny * dy + nz * dz)

@@ -6,9 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tunneldb.arrays import Float
+from tunneldb.compiled import inner, kernel
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
@@ -98,13 +98,13 @@ def build(parameters: Parameters, tunnel: Tunnel, seed: np.random.SeedSequence) 
     )
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inner
 def ring_of(rings: Rings, s: float) -> int:
     """Number of the ring at a chainage, the first or last one beyond the ends."""
     return min(max(math.floor((s - rings.first) / rings.length), 0), rings.level.shape[0] - 1)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def pocket_drop(rings: Rings, s: float, arc: float) -> float:
     """Drop of the bolt pocket at a place, dB; 0: there is none."""
     if rings.pocket_depth == 0.0:
@@ -120,22 +120,28 @@ def pocket_drop(rings: Rings, s: float, arc: float) -> float:
     return 0.0
 
 
-@njit(cache=True, nogil=True)
-def ring_level(rings: Rings, s: float, arc: float) -> float:
-    """Level of rings, segments, joints and pockets at a place of the lining, dB."""
-    if rings.length == 0.0:
-        return 0.0
-    i = ring_of(rings, s)
-    total = rings.level[i]
+@kernel
+def _ring_level(rings: Rings, s: Float, arc: Float, out: Float) -> None:
     m = rings.segment_level.shape[1]
-    x = (s - rings.first) / rings.length
-    j = min(max(math.floor(x + 0.5), 0), rings.level.shape[0])
-    drop = rings.joint_drop[j] if abs(x - j) * rings.length <= 0.5 * rings.joint_width[j] else 0.0
-    if m > 0:
-        y = (arc - rings.shift[i]) / rings.period
-        total += rings.segment_level[i, math.floor(y) % m]
-        k = math.floor(y + 0.5)
-        if abs(y - k) * rings.period <= 0.5 * rings.seam_width[i, k % m]:
-            drop = max(drop, rings.seam_drop[i, k % m])
-        drop = max(drop, pocket_drop(rings, s, arc))
-    return total - drop
+    for p in range(s.shape[0]):
+        i = ring_of(rings, s[p])
+        total = rings.level[i]
+        x = (s[p] - rings.first) / rings.length
+        j = min(max(math.floor(x + 0.5), 0), rings.level.shape[0])
+        drop = rings.joint_drop[j] if abs(x - j) * rings.length <= 0.5 * rings.joint_width[j] else 0.0
+        if m > 0:
+            y = (arc[p] - rings.shift[i]) / rings.period
+            total += rings.segment_level[i, math.floor(y) % m]
+            k = math.floor(y + 0.5)
+            if abs(y - k) * rings.period <= 0.5 * rings.seam_width[i, k % m]:
+                drop = max(drop, rings.seam_drop[i, k % m])
+            drop = max(drop, pocket_drop(rings, s[p], arc[p]))
+        out[p] = total - drop
+
+
+def ring_level(rings: Rings, s: Float, arc: Float) -> Float:
+    """Level of rings, segments, joints and pockets at places (n,) of the lining, dB."""
+    out = np.zeros(s.size)
+    if rings.length > 0.0:
+        _ring_level(rings, s, arc, out)
+    return out

@@ -10,10 +10,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from shapely.geometry import Polygon, box
 
 from tunneldb.arrays import Float, Int64
+from tunneldb.compiled import inner
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 TUBE, BAR = 0.0, 1.0
@@ -148,25 +148,33 @@ def bins(low: Float, high: Float, start: float, end: float) -> tuple[Int64, Int6
     return offsets, (np.concatenate(lists) if lists else np.empty(0)).astype(np.int64)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inner
 def bin_of(s: float, start: float, offsets: Int64) -> int:
     """Bin of a chainage, the first or last one beyond the ends."""
-    return min(max(int((s - start) / BIN), 0), offsets.shape[0] - 2)
+    return min(max(math.floor((s - start) / BIN), 0), offsets.shape[0] - 2)
 
 
-@njit(cache=True, nogil=True, inline="always")
-def distance(row: Float, s: float, u: float, w: float) -> float:
-    """Signed distance to an appendage, positive outside; m in (chainage, u, w)."""
-    half = 0.5 * (row[2] - row[1])
-    a = abs(s - row[1] - half) - half
-    du, dw = u - row[3], w - row[4]
-    if row[0] == TUBE:
-        b = math.sqrt(du * du + dw * dw) - row[7]
+def listed_pairs(s: Float, start: float, offsets: Int64, listed: Int64) -> tuple[Int64, Int64]:
+    """Places at chainages (n,) and what is listed in their bins, as pairs: numbers of the place, and of what is listed."""
+    b = np.clip(np.floor((s - start) / BIN), 0, len(offsets) - 2).astype(np.int64)
+    count = offsets[b + 1] - offsets[b]
+    place = np.repeat(np.arange(len(s)), count)
+    return place, listed[np.arange(len(place)) + np.repeat(offsets[b] - (np.cumsum(count) - count), count)]
+
+
+@inner
+def distance(items: Float, k: int, s: float, u: float, w: float) -> float:
+    """Signed distance to row k of :func:`appendage_table`, positive outside; m in (chainage, u, w)."""
+    half = 0.5 * (items[k, 2] - items[k, 1])
+    a = abs(s - items[k, 1] - half) - half
+    du, dw = u - items[k, 3], w - items[k, 4]
+    if items[k, 0] == TUBE:
+        b = math.sqrt(du * du + dw * dw) - items[k, 7]
         if a <= 0.0 or b <= 0.0:
             return max(a, b)
         return math.sqrt(a * a + b * b)
-    b = abs(du * row[5] + dw * row[6]) - row[7]
-    c = abs(-du * row[6] + dw * row[5]) - row[8]
+    b = abs(du * items[k, 5] + dw * items[k, 6]) - items[k, 7]
+    c = abs(-du * items[k, 6] + dw * items[k, 5]) - items[k, 8]
     if a <= 0.0 and b <= 0.0 and c <= 0.0:
         return max(a, max(b, c))
     a, b, c = max(a, 0.0), max(b, 0.0), max(c, 0.0)

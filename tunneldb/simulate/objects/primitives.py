@@ -1,4 +1,4 @@
-"""Things that stand free in the tunnel, of balls, rods and bricks: people, equipment, target spheres, loose cables.
+"""Things that stand free in the tunnel, made of balls, rods and bricks: people, equipment, target spheres, loose cables.
 
 A ball is a sphere, a rod a straight tube with round ends, a brick an oriented box. They lie in space, not in the
 frame of the tunnel, so that a sphere is a sphere in a curve too, and rays meet them by closed formulas.
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tunneldb.arrays import Float, Int64
+from tunneldb.compiled import inner, kernel
 from tunneldb.simulate.objects.fixtures import bin_of, bins
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
@@ -127,10 +127,10 @@ def parts_table(tunnel: Tunnel, things: Sequence[Primitive]) -> Parts:
     return Parts(rows, hulls, labels, *bins(s - hulls[:, 3], s + hulls[:, 3], line.start, line.end))
 
 
-@njit(cache=True, nogil=True)
-def _meet_ball(ox: float, oy: float, oz: float, d: Float, radius: float) -> tuple[float, float]:
+@inner
+def _intersect_ball(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, radius: float) -> tuple[float, float]:
     """Range to a sphere about 0 from (ox, oy, oz) (1e300: missed), and distance of the ray inside its outline."""
-    b = ox * d[0] + oy * d[1] + oz * d[2]
+    b = ox * dx + oy * dy + oz * dz
     past = ox * ox + oy * oy + oz * oz - b * b
     root = radius * radius - past
     if root < 0.0:
@@ -138,14 +138,16 @@ def _meet_ball(ox: float, oy: float, oz: float, d: Float, radius: float) -> tupl
     return -b - math.sqrt(root), radius - math.sqrt(max(past, 0.0))
 
 
-@njit(cache=True, nogil=True)
-def _meet_rod(row: Float, o: Float, d: Float) -> tuple[float, float, float, float, float]:
-    """Range to a rod (1e300: missed), distance inside its outline, and the normal there."""
-    radius = row[7]
-    bx, by, bz = row[4] - row[1], row[5] - row[2], row[6] - row[3]
-    ax, ay, az = o[0] - row[1], o[1] - row[2], o[2] - row[3]
+@inner
+def _intersect_rod(
+    rows: Float, k: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
+) -> tuple[float, float, float]:
+    """Range to a rod (1e300: missed), distance inside its outline, cosine there."""
+    radius = rows[k, 7]
+    bx, by, bz = rows[k, 4] - rows[k, 1], rows[k, 5] - rows[k, 2], rows[k, 6] - rows[k, 3]
+    ax, ay, az = ox - rows[k, 1], oy - rows[k, 2], oz - rows[k, 3]
     length2 = bx * bx + by * by + bz * bz
-    bd = bx * d[0] + by * d[1] + bz * d[2]
+    bd = bx * dx + by * dy + bz * dz
     ba = bx * ax + by * ay + bz * az
     best = 1e300
     inside = 0.0
@@ -153,7 +155,7 @@ def _meet_rod(row: Float, o: Float, d: Float) -> tuple[float, float, float, floa
     # The tube: the ray's distance to its axis, both seen along the axis.
     a = length2 - bd * bd
     if a > 1e-12 * length2:
-        da = d[0] * ax + d[1] * ay + d[2] * az
+        da = dx * ax + dy * ay + dz * az
         b = length2 * da - ba * bd
         c = length2 * (ax * ax + ay * ay + az * az - radius * radius) - ba * ba
         root = b * b - a * c
@@ -165,31 +167,33 @@ def _meet_rod(row: Float, o: Float, d: Float) -> tuple[float, float, float, floa
                 share = y
                 inside = radius - math.sqrt(max(radius * radius - root / (a * length2), 0.0))
     for end in range(2):
-        x, y, z = ax - end * bx, ay - end * by, az - end * bz
-        t, gap = _meet_ball(x, y, z, d, radius)
+        t, gap = _intersect_ball(ax - end * bx, ay - end * by, az - end * bz, dx, dy, dz, radius)
         if t < best:
             best = t
             share = float(end)
             inside = gap
     if best > 1e299:
-        return best, 0.0, 0.0, 0.0, 0.0
-    nx = (ax + best * d[0] - share * bx) / radius
-    ny = (ay + best * d[1] - share * by) / radius
-    nz = (az + best * d[2] - share * bz) / radius
-    return best, inside, nx, ny, nz
+        return best, 0.0, 0.0
+    nx = (ax + best * dx - share * bx) / radius
+    ny = (ay + best * dy - share * by) / radius
+    nz = (az + best * dz - share * bz) / radius
+    return best, inside, -(nx * dx + ny * dy + nz * dz)
 
 
-@njit(cache=True, nogil=True)
-def _meet_brick(row: Float, o: Float, d: Float) -> tuple[float, float, float]:
+@inner
+def _intersect_brick(
+    rows: Float, k: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
+) -> tuple[float, float, float]:
     """Range to a brick (1e300: missed), distance inside its outline, cosine there."""
     enter = -1e300
     leave = 1e300
     cosine = 0.0
     for axis in range(3):
-        k = 8 + 3 * axis
-        at = (o[0] - row[1]) * row[k] + (o[1] - row[2]) * row[k + 1] + (o[2] - row[3]) * row[k + 2]
-        rate = d[0] * row[k] + d[1] * row[k + 1] + d[2] * row[k + 2]
-        half = row[4 + axis]
+        first = 8 + 3 * axis
+        ex, ey, ez = rows[k, first], rows[k, first + 1], rows[k, first + 2]
+        at = (ox - rows[k, 1]) * ex + (oy - rows[k, 2]) * ey + (oz - rows[k, 3]) * ez
+        rate = dx * ex + dy * ey + dz * ez
+        half = rows[k, 4 + axis]
         if abs(rate) < 1e-12:
             if abs(at) > half:
                 return 1e300, 0.0, 0.0
@@ -207,37 +211,48 @@ def _meet_brick(row: Float, o: Float, d: Float) -> tuple[float, float, float]:
     return enter, 0.5 * (leave - enter), cosine
 
 
-@njit(cache=True, nogil=True)
-def meet_parts(
-    parts: Parts, start: float, o: Float, d: Float, s0: float, s1: float, r: float
-) -> tuple[float, int, float, float]:
-    """First part that a ray meets before range ``r``: range, which (-1: none), cosine, distance inside its outline.
+@kernel
+def intersect_parts(
+    parts: Parts, start: float, origin: Float, direction: Float, found: Float, r: Float, which: Int64, inside: Float
+) -> None:
+    """The first part that rays (n, 3) meet before they meet something else.
 
-    ``s0`` and ``s1`` are the chainages at the ray's start and at ``r``, ``start`` that of the tunnel's start.
+    Parameters
+    ----------
+    start : float
+        Chainage of the tunnel's start, m.
+    found : (6, n)
+        What the rays meet without parts, rows as of :func:`intersect_lining`; the cosine is replaced.
+    r : (n,)
+        Range to it, replaced.
+    which : (n,)
+        Which part; left alone where none is met.
+    inside : (n,)
+        Distance of the ray inside the part's outline, m; left alone where none is met.
     """
-    best = r
-    which = -1
-    cosine = 0.0
-    inside = 0.0
-    one, other = bin_of(s0, start, parts.bins), bin_of(s1, start, parts.bins)
-    step = 1 if other >= one else -1
-    for b in range(one, other + step, step):
-        for j in range(parts.bins[b], parts.bins[b + 1]):
-            i = parts.list[j]
-            x, y, z = o[0] - parts.hulls[i, 0], o[1] - parts.hulls[i, 1], o[2] - parts.hulls[i, 2]
-            along = x * d[0] + y * d[1] + z * d[2]
-            radius = parts.hulls[i, 3]
-            if x * x + y * y + z * z - along * along > radius * radius or -along - radius > best or along > radius:
-                continue
-            row = parts.rows[i]
-            if row[0] == BALL:
-                t, gap = _meet_ball(x, y, z, d, row[7])
-                c = math.sqrt(max(0.0, 1.0 - ((row[7] - gap) / row[7]) ** 2)) if t < 1e299 else 0.0
-            elif row[0] == ROD:
-                t, gap, nx, ny, nz = _meet_rod(row, o, d)
-                c = -(nx * d[0] + ny * d[1] + nz * d[2])
-            else:
-                t, gap, c = _meet_brick(row, o, d)
-            if 0.0 < t < best:
-                best, which, cosine, inside = t, i, c, gap
-    return best, which, cosine, inside
+    for i in range(origin.shape[0]):
+        if found[4, i] <= 0.0:
+            continue
+        ox, oy, oz = origin[i, 0], origin[i, 1], origin[i, 2]
+        dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
+        one, other = bin_of(found[5, i], start, parts.bins), bin_of(found[1, i], start, parts.bins)
+        step = 1 if other >= one else -1
+        for b in range(one, other + step, step):
+            for j in range(parts.bins[b], parts.bins[b + 1]):
+                k = parts.list[j]
+                x, y, z = ox - parts.hulls[k, 0], oy - parts.hulls[k, 1], oz - parts.hulls[k, 2]
+                along = x * dx + y * dy + z * dz
+                radius = parts.hulls[k, 3]
+                if x * x + y * y + z * z - along * along > radius * radius or -along - radius > r[i] or along > radius:
+                    continue
+                if parts.rows[k, 0] == BALL:
+                    radius = parts.rows[k, 7]
+                    t, gap = _intersect_ball(x, y, z, dx, dy, dz, radius)
+                    share = (radius - gap) / radius
+                    c = math.sqrt(max(0.0, 1.0 - share * share))
+                elif parts.rows[k, 0] == ROD:
+                    t, gap, c = _intersect_rod(parts.rows, k, ox, oy, oz, dx, dy, dz)
+                else:
+                    t, gap, c = _intersect_brick(parts.rows, k, ox, oy, oz, dx, dy, dz)
+                if 0.0 < t < r[i]:
+                    r[i], which[i], found[3, i], inside[i] = t, k, c, gap

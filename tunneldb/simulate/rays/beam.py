@@ -1,4 +1,4 @@
-"""The beam's footprint: where its edge of a thing, a recess or a lip passes through, the echo is a mixture of two surfaces.
+"""The beam's footprint: where the edge of a thing, a recess or a step passes through it, the echo is a mixture of two surfaces.
 
 A second ray is shot at random within the footprint of each. Where it meets another surface, the edge between is found by
 halving, and the footprint's share beyond it is that of a circle's segment. The echo is the mean of both by power, as a
@@ -8,17 +8,19 @@ phase-shift scanner or one that does not tell close echoes apart has it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from tunneldb.arrays import Float, Int64
+from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.simulate.objects.fixtures import FLOOR, OUTLIER, RAIL
 from tunneldb.simulate.radiometry import SYSTEM_CONSTANT, Radiometry, range_term
+from tunneldb.simulate.rays.trace import Echoes
 from tunneldb.simulate.scanner import Rays
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
-# Rows as of :func:`trace` for rays (by index) in other directions, without noise and stray points.
-Shoot = Callable[[Int64, Float], Float]
+# Echoes of rays (by index) in other directions, without noise and stray points.
+Shoot = Callable[[Int64, Float], Echoes]
 
 EXIT = 0.006  # diameter of the beam at the scanner, m
 STEP = 0.005  # least difference of range between two surfaces, m
@@ -42,74 +44,97 @@ def segment_share(distance: Float) -> Float:
     return np.asarray((np.arccos(x) - x * np.sqrt(1.0 - x * x)) / np.pi)
 
 
-def _level(radiometry: Radiometry, rows: Float) -> tuple[Float, Float]:
-    """Range-free part and amplitude of echoes, dB."""
-    ground = (rows[:, 7] == FLOOR) | (rows[:, 7] == RAIL)
-    level = radiometry.reflectance(rows[:, 10], ground, rows[:, 9])
-    return level, radiometry.amplitude(rows[:, 11], level)
+class _Spot(NamedTuple):
+    """What a ray meets, (n,) each: range (NaN: no echo), cosine of incidence, class, drop."""
+
+    range: Float
+    cosine: Float
+    klass: Float
+    drop: Float
+
+    def amplitude(self, radiometry: Radiometry) -> Float:
+        """Amplitude of the echo, dB."""
+        is_ground = (self.klass == FLOOR) | (self.klass == RAIL)
+        return radiometry.amplitude(self.range, radiometry.reflectance(self.cosine, is_ground, self.drop))
+
+    def take(self, rows: Int64 | Bool) -> _Spot:
+        """Some of them."""
+        return _Spot(*(column[rows] for column in self))
 
 
 def blur(
-    out: Float,
+    echoes: Echoes,
     rays: Rays,
-    index: Int64,
     divergence: float,
     shoot: Shoot,
     tunnel: Tunnel,
     radiometry: Radiometry,
     rng: np.random.Generator,
-) -> None:
-    """Mix the echoes at edges, in place.
+) -> Echoes:
+    """Mix the echoes at edges.
 
     Parameters
     ----------
-    out : (n, 12 or 13)
-        Rows of :func:`trace` with an echo.
-    rays, index : Rays, (n,)
-        All rays, and which of them each row is of.
+    echoes : Echoes
+        Of single rays.
+    rays : Rays
+        All rays.
     divergence : float
         Full angle of the beam, mrad.
     shoot : callable
         Shoots rays in other directions.
     """
-    direction = rays.direction[index]
+    direction = rays.direction[echoes.ray]
     across, beside = aside(direction, rng)
-    radius = 0.5 * (EXIT + 1e-3 * divergence * out[:, 11])
+    radius = 0.5 * (EXIT + 1e-3 * divergence * echoes.range)
 
-    def at(rows: Int64, share: Float | float) -> Float:
+    def at(rows: Int64, share: Float | float) -> _Spot:
         """Shoot towards a share of the way to the place beside the middle."""
-        turned = direction[rows] * out[rows, 11:12] + np.reshape(share, (-1, 1)) * radius[rows, None] * across[rows]
-        there = shoot(index[rows], turned / np.linalg.norm(turned, axis=1)[:, None])
-        there[np.isnan(there[:, 0])] = np.nan  # no echo: the other columns are not set
-        return there
+        turned = direction[rows] * echoes.range[rows, None] + np.reshape(share, (-1, 1)) * radius[rows, None] * across[rows]
+        there = shoot(echoes.ray[rows], turned / np.linalg.norm(turned, axis=1)[:, None])
+        spots = np.full((4, len(rows)), np.nan)
+        spots[:, there.ray] = there.range, there.cosine, there.klass, there.drop
+        return _Spot(*spots)
 
-    candidates = np.flatnonzero(out[:, 7] != OUTLIER)
+    candidates = np.flatnonzero(echoes.klass != OUTLIER)
     second = at(candidates, 1.0)
-    slant = np.minimum(out[candidates, 10], second[:, 10])
+    slant = np.minimum(echoes.cosine[candidates], second.cosine)
     plane = 1.5 * radius[candidates] * np.sqrt(1.0 - slant**2) / slant
-    is_edge = np.abs(second[:, 11] - out[candidates, 11]) > STEP + plane  # False without an echo
-    rows, second = candidates[is_edge], second[is_edge]
+    is_edge = np.abs(second.range - echoes.range[candidates]) > STEP + plane  # False without an echo
+    rows, second = candidates[is_edge], second.take(is_edge)
     if not len(rows):
-        return
+        return echoes
     low, high = np.zeros(len(rows)), np.ones(len(rows))
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        there = at(rows, middle)[:, 11]
-        is_first = np.abs(there - out[rows, 11]) < np.abs(there - second[:, 11])
+        there = at(rows, middle).range
+        is_first = np.abs(there - echoes.range[rows]) < np.abs(there - second.range)
         low, high = np.where(is_first, middle, low), np.where(is_first, high, middle)
     share = segment_share(0.5 * (low + high) * beside[rows])
     mixed = share >= LEAST
-    rows, second, share = rows[mixed], second[mixed], share[mixed]
-    first = out[rows]
-    one = (1.0 - share) * 10.0 ** (0.1 * _level(radiometry, first)[1])
-    two = share * 10.0 ** (0.1 * _level(radiometry, second)[1])
-    distance = (one * first[:, 11] + two * second[:, 11]) / (one + two)
+    rows, second, share = rows[mixed], second.take(mixed), share[mixed]
+    before = echoes.take(rows)
+    first = _Spot(before.range, before.cosine, before.klass.astype(float), before.drop)
+    one = (1.0 - share) * 10.0 ** (0.1 * first.amplitude(radiometry))
+    two = share * 10.0 ** (0.1 * second.amplitude(radiometry))
+    distance = (one * first.range + two * second.range) / (one + two)
     level = 10.0 * np.log10(one + two) - SYSTEM_CONSTANT - range_term(distance, radiometry.near_loss)
-    measured = distance + first[:, 0] - first[:, 11]
-    xyz = rays.origin[index[rows]] + measured[:, None] * direction[rows]
+    measured = distance + before.measured - before.range
+    xyz = rays.origin[before.ray] + measured[:, None] * direction[rows]
     place = tunnel.unroll(xyz + tunnel.line.origin)
-    plain = radiometry.reflectance(first[:, 10], np.zeros(len(rows), dtype=bool), np.zeros(len(rows)))
-    out[rows, 0], out[rows, 1:4] = measured, xyz
-    out[rows, 4], out[rows, 5], out[rows, 6] = place.chainage, place.arc, place.offset
-    out[rows, 7], out[rows, 8], out[rows, 9], out[rows, 11] = OUTLIER, -1.0, plain - level, distance
-    out[rows, 12:] = 0.0
+    plain = radiometry.reflectance(first.cosine, np.zeros(len(rows), dtype=bool), np.zeros(len(rows)))
+    after = before._replace(
+        measured=measured,
+        xyz=xyz,
+        chainage=place.chainage,
+        arc=place.arc,
+        offset=place.offset,
+        klass=np.full(len(rows), OUTLIER),
+        leak=np.full(len(rows), -1),
+        drop=plain - level,
+        range=distance,
+        thing=np.zeros(len(rows), dtype=np.int64),
+    )
+    for column, values in zip(echoes, after, strict=True):
+        column[rows] = values
+    return echoes

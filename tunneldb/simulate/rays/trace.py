@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from tunneldb.arrays import Float
-from tunneldb.simulate.lining.ballast import Ground, bump
+from tunneldb.arrays import Float, Int64
+from tunneldb.simulate.lining.ballast import Ground, bumps, intersect_ground
 from tunneldb.simulate.lining.reflectance import Reflectance, level
-from tunneldb.simulate.lining.relief import LiningRelief, meet_skin
+from tunneldb.simulate.lining.relief import LiningRelief, intersect_relief
 from tunneldb.simulate.objects.fixtures import APPENDAGE, FLOOR, LINING, NICHE, OUTLIER
-from tunneldb.simulate.objects.primitives import BEAM, Parts, meet_parts
-from tunneldb.simulate.rays.intersect import meet_item, meet_lining, meet_niche, meet_uneven, unrolled, wetness
+from tunneldb.simulate.objects.primitives import BEAM, Parts, intersect_parts
+from tunneldb.simulate.rays.intersect import intersect_appendages, intersect_lining, intersect_niches, wetness
 from tunneldb.simulate.rays.scene import Scene
-from tunneldb.simulate.tunnel.section import nearest
-from tunneldb.simulate.tunnel.tunnel import newton_step
+from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 # Beyond this incidence the echo is lost, as scanners lose it.
 MINIMUM_COSINE = 0.087
@@ -24,41 +23,66 @@ MINIMUM_COSINE = 0.087
 MIXED = 0.1
 # Least range of the scanner, m.
 NEAREST = 1.0
+PIECE = 1 << 16  # rays that are traced at a time
+BUMP = 0.12  # half the wavelength of the small-scale relief, m
 
 
-@njit(cache=True, nogil=True)
-def trace(
-    sc: Scene,
-    parts: Parts | None,
-    ground: Ground | None,
-    coat: Reflectance | None,
-    skin: LiningRelief | None,
-    origin: Float,
-    direction: Float,
-    hint: Float,
-    noise: Float,
-    chance: Float,
-    outliers: float,
-    stray: float,
-    relief: float,
-    furthest: float,
-    out: Float,
-) -> None:
-    """Shoot rays.
+class Echoes(NamedTuple):
+    """What rays measure that come back, (m,) each.
 
-    Parameters
+    Attributes
     ----------
-    parts, ground, coat, skin
+    ray
+        Number of the ray.
+    measured
+        Range with its error, m.
+    xyz : (m, 3)
+        The stored point, from the line's origin, m.
+    chainage, arc, offset
+        Of the stored point, m.
+    klass
+        Class of what the laser met.
+    leak
+        Number of the leak that it met, -1 for none.
+    drop
+        How much darker the spot is, dB.
+    cosine
+        Of incidence.
+    range
+        Without error, m.
+    thing
+        Number of the free-standing thing that it met, 0 for none.
+    """
+
+    ray: Int64
+    measured: Float
+    xyz: Float
+    chainage: Float
+    arc: Float
+    offset: Float
+    klass: Int64
+    leak: Int64
+    drop: Float
+    cosine: Float
+    range: Float
+    thing: Int64
+
+    def take(self, rows: Int64) -> Echoes:
+        """Some of them."""
+        return Echoes._make(column[rows] for column in self)
+
+
+@dataclass(frozen=True)
+class Tracer:
+    """A tunnel with its contents, and what a scanner measures of it.
+
+    Attributes
+    ----------
+    tunnel, scene
+        The tunnel, what is fixed to it and how wet it is.
+    parts, ground, reflectance, lining_relief
         What stands free, the uneven floor, how bright the lining is from place to place, and where it departs from
-        the section. Without them (None) the kernel is compiled without what they need.
-    origin, direction : (n, 3)
-        From the line's origin, m; unit vectors.
-    hint : (n,)
-        Chainage near each origin, m.
-    noise : (n,)
-        Range error, m.
-    chance : (n, 2)
-        Uniform numbers that decide on outliers and where they fall.
+        the section; None: nothing, level, plain, nowhere.
     outliers : float
         Share of rays that become isolated points.
     stray : float
@@ -67,110 +91,156 @@ def trace(
         Height of small-scale relief of the lining, m.
     furthest : float
         Greatest range, m.
-    out : (n, 13), without ``parts`` (n, 12)
-        range (NaN: no echo), x, y, z, chainage, arc, offset, class, leak (-1: none), drop (dB), cosine of
-        incidence, true range, thing (0: none). Chainage, arc and offset are those of the stored point; leak, drop
-        and cosine those of the spot that the laser met.
     """
-    for i in range(origin.shape[0]):
-        o, d = origin[i], direction[i]
-        wall, s, arc, cosine, offset0, s0 = meet_lining(sc, o, d, hint[i], 2.0 * furthest)
-        out[i, 0] = np.nan
-        is_open = math.isnan(wall)
-        if offset0 <= 0.0:
-            continue
-        if parts is None and is_open:
-            continue
-        klass = FLOOR if abs(arc) > sc.ends[2] else LINING
-        leak = -1
-        drop = 0.0
-        height = 0.0
-        thing = 0
-        edge = 1.0
-        if is_open:
-            wall = 2.0 * furthest
-        elif ground is not None:
-            hit, c, is_floor = meet_uneven(sc, ground, o, d, s, wall, klass == FLOOR)
-            if not math.isnan(hit):
-                wall, cosine, klass = hit, c, FLOOR if is_floor else LINING
-        r = wall
-        if not is_open and sc.items.shape[0] > 0:
-            # The offset is concave along the ray, so it cannot fall below the appendages' reach before here.
-            begin = wall * max(0.0, 1.0 - sc.ends[3] / offset0)
-            hit, which, c = meet_item(sc, o, d, s0 + (s - s0) * begin / wall, begin, wall)
-            if which >= 0:
-                r, cosine = hit, c
-                klass = int(sc.items[which, 9])
-                drop = sc.items[which, 10]
-        if r == wall and klass == LINING and not is_open:
-            hit, c, is_back = meet_niche(sc, o, d, s, wall)
-            if not math.isnan(hit):
-                r, cosine, klass = hit, c, NICHE
-                if is_back and sc.ends[5] > 0.0:
-                    leak, drop = wetness(sc, *unrolled(sc, o, d, r, s))
-            else:
-                if skin is not None:
-                    r, s, arc, cosine, is_floor = meet_skin(skin, sc.plan, sc.profile, sc.parts, o, d, wall, s, cosine)
-                    wall = r
-                    klass = FLOOR if is_floor else LINING
-                if klass == LINING:
-                    leak, drop = wetness(sc, s, arc)
-                    if coat is not None:
-                        drop -= level(coat, s, arc)
-                if relief > 0.0:
-                    height = relief * bump(s, arc, 0.12)
+
+    tunnel: Tunnel
+    scene: Scene
+    parts: Parts | None
+    ground: Ground | None
+    reflectance: Reflectance | None
+    lining_relief: LiningRelief | None
+    outliers: float
+    stray: float
+    relief: float
+    furthest: float
+
+    def trace(self, origin: Float, direction: Float, hint: Float, noise: Float, chance: Float) -> Echoes:
+        """Shoot rays.
+
+        Parameters
+        ----------
+        origin, direction : (n, 3)
+            From the line's origin, m; unit vectors.
+        hint : (n,)
+            Chainage near each origin, m.
+        noise : (n,)
+            Range error, m.
+        chance : (n, 2)
+            Uniform numbers that decide on outliers and where they fall.
+        """
+        pieces = []
+        for begin in range(0, max(len(origin), 1), PIECE):
+            some = slice(begin, begin + PIECE)
+            piece = self._trace(origin[some], direction[some], hint[some], noise[some], chance[some])
+            pieces.append(piece._replace(ray=piece.ray + begin))
+        return Echoes._make(np.concatenate(columns) for columns in zip(*pieces, strict=True))
+
+    def _trace(self, origin: Float, direction: Float, hint: Float, noise: Float, chance: Float) -> Echoes:
+        """Shoot rays, as many at a time as their arrays stay in the processor's cache."""
+        scene, n = self.scene, len(origin)
+        start, end, floor_arc, reach, _, _ = scene.ends.tolist()
+        shape = scene.plan, scene.profile, scene.parts
+        found = np.empty((6, n))
+        intersect_lining(*shape, origin, direction, hint, 2.0 * self.furthest, found)
+        wall, s, arc, cosine, offset0, s0 = found
+        klass = np.where(np.abs(arc) > floor_arc, FLOOR, LINING)
+        leak, drop, height, thing, edge = np.full(n, -1), np.zeros(n), np.zeros(n), np.zeros(n, np.int64), np.ones(n)
+        if self.ground is not None:
+            on_floor = klass == FLOOR
+            intersect_ground(self.ground, *shape[:2], origin, direction, found, on_floor)
+            klass = np.where(on_floor, FLOOR, LINING)
+        is_open = np.isnan(wall)
+        inside = offset0 > 0.0
+        r = wall.copy()
+        which = np.full(n, -1)
+        if len(scene.items):
+            intersect_appendages(
+                *shape[:2], start, reach, scene.items, scene.item_bins, scene.item_list, origin, direction, found, r, which
+            )
+            met = np.flatnonzero(which >= 0)
+            klass[met] = scene.items[which[met], 9]
+            drop[met] = scene.items[which[met], 10]
+        bare = np.flatnonzero((klass == LINING) & inside & ~is_open)
+        if len(scene.niches):
+            bare = self._niches(bare, origin, direction, found, r, klass, leak, drop)
+        if self.lining_relief is not None:
+            on_floor = np.empty(len(bare), dtype=bool)
+            intersect_relief(self.lining_relief, *shape, origin, direction, bare, found, on_floor)
+            r[bare] = wall[bare]
+            klass[bare[on_floor]] = FLOOR
+        if self.relief > 0.0:
+            height[bare] = self.relief * bumps(s[bare], arc[bare], BUMP)
+        bare = bare[klass[bare] == LINING]
+        at = s[bare], arc[bare]
+        leak[bare], drop[bare] = wetness(scene, *at)
+        if self.reflectance is not None:
+            drop[bare] -= level(self.reflectance, *at)
         behind = wall
-        if parts is not None:
-            hit, which, c, inside = meet_parts(parts, sc.ends[0], o, d, s0, s, r)
-            if which >= 0:
-                s = s0 + (s - s0) * hit / r
-                behind = r
-                r, cosine, edge, height, leak = hit, c, inside, 0.0, -1
-                klass = int(parts.labels[which, 0])
-                drop = parts.labels[which, 1]
-                thing = int(parts.labels[which, 2])
-            elif is_open:
-                continue
-        if r > furthest or cosine < MINIMUM_COSINE:
-            continue
-        true_range = r
-        r += noise[i] - height / max(cosine, 0.3)
-        v = chance[i, 1]
-        if chance[i, 0] < outliers:
-            # Most isolated points hang in the air, some lie behind the wall (multipath).
-            r = NEAREST + v / 0.7 * (0.95 * r - NEAREST) if v < 0.7 else r * (1.0 + 0.5 * (v - 0.7))
-            klass = OUTLIER
-        elif (klass == APPENDAGE and thing == 0 and chance[i, 0] < outliers + 0.01 * stray) or (
-            thing > 0 and edge < BEAM and chance[i, 0] < outliers + MIXED * stray
-        ):
-            r += v * (behind - r)  # a mixed pixel: the beam meets an edge and what lies behind it
-            klass = OUTLIER
-        if r < NEAREST or r > furthest:
-            continue
-        if klass == OUTLIER:
-            leak = -1
-            thing = 0
-            drop += 3.0
-        x, y, z = o[0] + r * d[0], o[1] + r * d[1], o[2] + r * d[2]
-        for _ in range(10):
-            found = newton_step(sc.plan, sc.profile, x, y, z, s)
-            s += found[0]
-            if abs(found[0]) < 1e-3:
-                break
-        arc, offset, _, _ = nearest(sc.parts, found[1], found[2])
-        if s < sc.ends[0] or s > sc.ends[1]:
-            continue
-        out[i, 0] = r
-        out[i, 1] = x
-        out[i, 2] = y
-        out[i, 3] = z
-        out[i, 4] = s
-        out[i, 5] = arc
-        out[i, 6] = offset
-        out[i, 7] = klass
-        out[i, 8] = leak
-        out[i, 9] = drop
-        out[i, 10] = min(cosine, 1.0)
-        out[i, 11] = true_range
-        if parts is not None:
-            out[i, 12] = thing
+        if self.parts is not None:
+            r[is_open] = 2.0 * self.furthest
+            behind = wall.copy()
+            far = r.copy()
+            which = np.full(n, -1)
+            intersect_parts(self.parts, start, origin, direction, found, r, which, edge)
+            met = np.flatnonzero(which >= 0)
+            s[met] = s0[met] + (s[met] - s0[met]) * r[met] / far[met]
+            behind[met], height[met], leak[met] = far[met], 0.0, -1
+            kind, darker, number = self.parts.labels[which[met]].T
+            klass[met], drop[met], thing[met] = kind, darker, number
+            is_open &= which < 0
+        # Not the contrary of both: where incidence is undefined, the echo is kept.
+        keep = np.flatnonzero(inside & ~is_open & ~((r > self.furthest) | (cosine < MINIMUM_COSINE)))
+        true = r[keep]
+        measured = true + noise[keep]
+        if self.relief > 0.0:
+            measured = true + (noise[keep] - height[keep] / np.maximum(cosine[keep], 0.3))
+        klass, drop, leak, thing = klass[keep], drop[keep], leak[keep], thing[keep]
+        is_stray = self._stray(measured, klass, thing, behind[keep], edge[keep], chance[keep])
+        klass[is_stray], leak[is_stray], thing[is_stray] = OUTLIER, -1, 0
+        drop[is_stray] += 3.0
+        xyz = origin[keep] + measured[:, None] * direction[keep]
+        place = self.tunnel.unroll_near(xyz, s[keep], 1e-3)
+        echoes = Echoes(
+            keep,
+            measured,
+            xyz,
+            place.chainage,
+            place.arc,
+            place.offset,
+            klass,
+            leak,
+            drop,
+            np.minimum(cosine[keep], 1.0),
+            true,
+            thing,
+        )
+        within = (measured >= NEAREST) & (measured <= self.furthest) & (place.chainage >= start) & (place.chainage <= end)
+        return echoes if within.all() else echoes.take(np.flatnonzero(within))
+
+    def _niches(
+        self,
+        bare: Int64,
+        origin: Float,
+        direction: Float,
+        found: Float,
+        r: Float,
+        klass: Int64,
+        leak: Int64,
+        drop: Float,
+    ) -> Int64:
+        """Take the rays through the lining that meet niches, among those that meet it; return the others."""
+        wall, s, _, cosine, _, _ = found
+        into, hit, c, is_back = intersect_niches(self.scene, origin, direction, bare, s[bare], wall[bare])
+        rays = bare[into]
+        r[rays], cosine[rays], klass[rays] = hit, c, NICHE
+        if self.scene.ends[5] > 0.0:
+            back = rays[is_back]
+            place = self.tunnel.unroll_near(origin[back] + r[back, None] * direction[back], s[back], 1e-6)
+            leak[back], drop[back] = wetness(self.scene, place.chainage, place.arc)
+        return np.delete(bare, into)
+
+    def _stray(self, measured: Float, klass: Int64, thing: Int64, behind: Float, edge: Float, chance: Float) -> Int64:
+        """Move isolated points and mixed pixels; return their numbers."""
+        candidates = np.flatnonzero(chance[:, 0] < self.outliers + max(MIXED, 0.01) * self.stray)
+        u, v = chance[candidates].T
+        is_isolated = u < self.outliers
+        kind, number = klass[candidates], thing[candidates]
+        is_mixed = (kind == APPENDAGE) & (number == 0) & (u < self.outliers + 0.01 * self.stray)
+        is_mixed |= (number > 0) & (edge[candidates] < BEAM)
+        r = measured[candidates]
+        # Most isolated points hang in the air, some lie behind the wall (multipath).
+        isolated = np.where(v < 0.7, NEAREST + v / 0.7 * (0.95 * r - NEAREST), r * (1.0 + 0.5 * (v - 0.7)))
+        # A mixed pixel: the beam meets an edge and what lies behind it.
+        mixed = r + v * (behind[candidates] - r)
+        measured[candidates] = np.where(is_isolated, isolated, np.where(is_mixed, mixed, r))
+        return candidates[is_isolated | is_mixed]

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tunneldb.arrays import Float
+from tunneldb.compiled import inner, kernel
 from tunneldb.errors import UserError
 
 # 8-point Gauss-Legendre rule on [0, 1]; on the clothoids used here (turning by far less than 1 rad) it is exact
@@ -27,30 +27,7 @@ PLAN_COLUMNS = 6  # chainage, x, y, direction (rad from east, anticlockwise), cu
 PROFILE_COLUMNS = 4  # chainage, z, grade, change of grade per m
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _plan_at(row: Float, sigma: float) -> tuple[float, float, float, float, float]:
-    """Advance x, y from the start of a plan element, cos and sin of the direction there, and curvature."""
-    direction, curvature, change = row[3], row[4], row[5]
-    if change == 0.0:
-        half = 0.5 * curvature * sigma
-        chord = sigma if abs(half) < 1e-12 else sigma * math.sin(half) / half
-        dx = chord * math.cos(direction + half)
-        dy = chord * math.sin(direction + half)
-    else:
-        dx = 0.0
-        dy = 0.0
-        for i in range(8):
-            r = sigma * _GAUSS_X[i]
-            angle = direction + r * (curvature + 0.5 * change * r)
-            dx += _GAUSS_W[i] * math.cos(angle)
-            dy += _GAUSS_W[i] * math.sin(angle)
-        dx *= sigma
-        dy *= sigma
-    end = direction + sigma * (curvature + 0.5 * change * sigma)
-    return dx, dy, math.cos(end), math.sin(end), curvature + change * sigma
-
-
-@njit(cache=True, nogil=True, inline="always")
+@inner
 def axis_at(plan: Float, profile: Float, s: float) -> tuple[float, float, float, float, float, float, float, float]:
     """Axis at chainage ``s``: x, y, z, cos and sin of direction, curvature, grade, change of grade.
 
@@ -59,27 +36,53 @@ def axis_at(plan: Float, profile: Float, s: float) -> tuple[float, float, float,
     i = 0
     while i + 1 < plan.shape[0] and s >= plan[i + 1, 0]:
         i += 1
-    dx, dy, c, n, k = _plan_at(plan[i], s - plan[i, 0])
+    sigma = s - plan[i, 0]
+    direction, curvature, change = plan[i, 3], plan[i, 4], plan[i, 5]
+    dx = 0.0
+    dy = 0.0
+    if change == 0.0:
+        half = 0.5 * curvature * sigma
+        chord = sigma if abs(half) < 1e-12 else sigma * math.sin(half) / half
+        dx = chord * math.cos(direction + half)
+        dy = chord * math.sin(direction + half)
+    else:
+        for node in range(8):
+            r = sigma * _GAUSS_X[node]
+            angle = direction + r * (curvature + 0.5 * change * r)
+            dx += _GAUSS_W[node] * math.cos(angle)
+            dy += _GAUSS_W[node] * math.sin(angle)
+        dx *= sigma
+        dy *= sigma
+    end = direction + sigma * (curvature + 0.5 * change * sigma)
     j = 0
     while j + 1 < profile.shape[0] and s >= profile[j + 1, 0]:
         j += 1
     h = s - profile[j, 0]
-    z = profile[j, 1] + h * (profile[j, 2] + 0.5 * profile[j, 3] * h)
-    return plan[i, 1] + dx, plan[i, 2] + dy, z, c, n, k, profile[j, 2] + profile[j, 3] * h, profile[j, 3]
+    grade, rise = profile[j, 2], profile[j, 3]
+    z = profile[j, 1] + h * (grade + 0.5 * rise * h)
+    k = curvature + change * sigma
+    return plan[i, 1] + dx, plan[i, 2] + dy, z, math.cos(end), math.sin(end), k, grade + rise * h, rise
 
 
-@njit(cache=True, nogil=True)
-def _axis_many(plan: Float, profile: Float, s: Float, out: Float) -> None:
+@kernel
+def _axis(plan: Float, profile: Float, s: Float, out: Float) -> None:
+    """Columns of :func:`axis_at` at chainages (n,), into ``out`` (8, n)."""
     for i in range(s.shape[0]):
         x, y, z, c, n, k, g, dg = axis_at(plan, profile, s[i])
-        out[i, 0] = x
-        out[i, 1] = y
-        out[i, 2] = z
-        out[i, 3] = c
-        out[i, 4] = n
-        out[i, 5] = k
-        out[i, 6] = g
-        out[i, 7] = dg
+        out[0, i] = x
+        out[1, i] = y
+        out[2, i] = z
+        out[3, i] = c
+        out[4, i] = n
+        out[5, i] = k
+        out[6, i] = g
+        out[7, i] = dg
+
+
+def _axis_table(plan: Float, profile: Float, s: Float) -> Float:
+    out = np.empty((8, s.size))
+    _axis(plan, profile, s, out)
+    return out
 
 
 class Frame(NamedTuple):
@@ -140,10 +143,10 @@ class CentreLine:
         rows, s, x, y, direction = [], start_chainage, 0.0, 0.0, math.radians(90.0 - azimuth)
         for e in elements:
             change = (e.curvature_to - e.curvature_from) / e.length
-            row = np.array([s, x, y, direction, e.curvature_from, change])
-            rows.append(row)
-            dx, dy, _, _, _ = _plan_at(row, e.length)
-            s, x, y = s + e.length, x + dx, y + dy
+            element = [x, y, direction, e.curvature_from, change]
+            rows.append([s, *element])
+            x, y = _axis_table(np.array([[0.0, *element]]), np.zeros((1, 4)), np.array([float(e.length)]))[:2, 0].tolist()
+            s += e.length
             direction += 0.5 * e.length * (e.curvature_from + e.curvature_to)
         length = s - start_chainage
         if slope_end is None or slope_end == slope:
@@ -218,26 +221,22 @@ class CentreLine:
             origin=origin,
         )
 
-    def _rows(self, chainage: Float) -> Float:
-        s = np.ascontiguousarray(np.atleast_1d(chainage), dtype=np.float64)
-        out = np.empty((s.size, 8))
-        _axis_many(self.plan, self.profile, s, out)
-        return out
+    def table(self, chainage: Float) -> Float:
+        """Columns of :func:`axis_at` at chainages (n,) -> (8, n), positions from ``origin``."""
+        return _axis_table(self.plan, self.profile, np.ascontiguousarray(np.atleast_1d(chainage), dtype=np.float64))
 
     def position(self, chainage: Float) -> Float:
         """Coordinates of the axis at chainages (n,) -> (n, 3), m."""
-        return self._rows(chainage)[:, :3] + self.origin
+        return np.ascontiguousarray(self.table(chainage)[:3].T) + self.origin
 
     def frame(self, chainage: Float) -> Frame:
         """Position and unit vectors t, u, w of the axis at chainages (n,)."""
-        row = self._rows(chainage)
-        c, n, g = row[:, 3], row[:, 4], row[:, 6]
+        x, y, z, c, n, _, g, _ = self.table(chainage)
         q = np.sqrt(1.0 + g * g)
-        zero = np.zeros_like(c)
         return Frame(
-            row[:, :3] + self.origin,
+            np.column_stack([x, y, z]) + self.origin,
             np.column_stack([c / q, n / q, g / q]),
-            np.column_stack([n, -c, zero]),
+            np.column_stack([n, -c, np.zeros_like(c)]),
             np.column_stack([-g * c / q, -g * n / q, 1.0 / q]),
         )
 

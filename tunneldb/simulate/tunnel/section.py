@@ -12,9 +12,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from tunneldb.arrays import Float
+from tunneldb.compiled import inner, kernel
 from tunneldb.errors import UserError
 
 LINE, ARC = 0.0, 1.0
@@ -24,7 +24,7 @@ LINE, ARC = 0.0, 1.0
 # Centres of arcs lie on the axis of symmetry, so that angles of the right half run from 0 to pi.
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inner
 def nearest(parts: Float, u: float, w: float) -> tuple[float, float, float, float]:
     """Nearest point of a section: arc, offset (positive inside) and the gradient (u, w) of the offset.
 
@@ -75,37 +75,29 @@ def nearest(parts: Float, u: float, w: float) -> tuple[float, float, float, floa
     return side * arc, offset, side * gu, gw
 
 
-@njit(cache=True, nogil=True)
-def _nearest_many(parts: Float, u: Float, w: Float, out: Float) -> None:
-    for i in range(u.shape[0]):
-        arc, offset, gu, gw = nearest(parts, u[i], w[i])
-        out[i, 0] = arc
-        out[i, 1] = offset
-        out[i, 2] = gu
-        out[i, 3] = gw
-
-
-@njit(cache=True, nogil=True, inline="always")
-def on_section(parts: Float, arc: float) -> tuple[float, float, float, float]:
-    """Position (u, w) and inward unit normal (u, w) of a section at an arc."""
-    side = 1.0 if arc >= 0.0 else -1.0
-    a = abs(arc)
-    i = 0
-    while i + 1 < parts.shape[0] and a >= parts[i + 1, 1]:
-        i += 1
-    along = a - parts[i, 1]
-    if parts[i, 0] == LINE:
-        eu, ew = parts[i, 5], parts[i, 6]
-        return side * (parts[i, 3] + along * eu), parts[i, 4] + along * ew, side * ew, -eu
-    angle = parts[i, 6] + along / parts[i, 5]
-    sn, cs = math.sin(angle), math.cos(angle)
-    return side * (parts[i, 3] + parts[i, 5] * sn), parts[i, 4] + parts[i, 5] * cs, -side * sn, -cs
-
-
-@njit(cache=True, nogil=True)
-def _on_section_many(parts: Float, arc: Float, out: Float) -> None:
-    for i in range(arc.shape[0]):
-        out[i] = on_section(parts, arc[i])
+@kernel
+def _points(parts: Float, arc: Float, out: Float) -> None:
+    """Positions (u, w) and inward unit normals (u, w) of a section at arcs (n,), into ``out`` (4, n)."""
+    for k in range(arc.shape[0]):
+        side = 1.0 if arc[k] >= 0.0 else -1.0
+        a = abs(arc[k])
+        i = 0
+        while i + 1 < parts.shape[0] and a >= parts[i + 1, 1]:
+            i += 1
+        along = a - parts[i, 1]
+        if parts[i, 0] == LINE:
+            nu, nw = parts[i, 6], -parts[i, 5]
+            u = parts[i, 3] + along * parts[i, 5]
+            w = parts[i, 4] + along * parts[i, 6]
+        else:
+            angle = parts[i, 6] + along / parts[i, 5]
+            nu, nw = -math.sin(angle), -math.cos(angle)
+            u = parts[i, 3] - parts[i, 5] * nu
+            w = parts[i, 4] - parts[i, 5] * nw
+        out[0, k] = side * u
+        out[1, k] = w
+        out[2, k] = side * nu
+        out[3, k] = nw
 
 
 @dataclass(frozen=True)
@@ -138,16 +130,15 @@ class Section:
     def point(self, arc: Float) -> tuple[Float, Float]:
         """Positions (n, 2) and inward unit normals (n, 2) in (u, w) at arcs (n,)."""
         a = np.ascontiguousarray(np.atleast_1d(arc), dtype=np.float64)
-        out = np.empty((a.size, 4))
-        _on_section_many(self.parts, a, out)
-        return out[:, :2], out[:, 2:]
+        out = np.empty((4, a.size))
+        _points(self.parts, a, out)
+        return out[:2].T, out[2:].T
 
     def project(self, u: Float, w: Float) -> tuple[Float, Float, Float]:
-        """Arc (n,), offset (n,) (positive inside) and gradient of the offset (n, 2) of points (u, w)."""
-        pu = np.ascontiguousarray(np.atleast_1d(u), dtype=np.float64)
-        pw = np.ascontiguousarray(np.atleast_1d(w), dtype=np.float64)
-        out = np.empty((pu.size, 4))
-        _nearest_many(self.parts, pu, pw, out)
+        """Arc (n,), offset (n,) (positive inside) and gradient of the offset (n, 2) of a few points (u, w)."""
+        # Interpreted: what is asked of many points is asked by compiled loops.
+        rows = [nearest.py_func(self.parts, a, b) for a, b in zip(np.atleast_1d(u), np.atleast_1d(w), strict=True)]
+        out = np.array(rows).reshape(-1, 4)
         return out[:, 0], out[:, 1], out[:, 2:]
 
 

@@ -11,34 +11,42 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Float
+from tunneldb.compiled import inner, kernel
 from tunneldb.simulate.tunnel.centreline import CentreLine, axis_at
-from tunneldb.simulate.tunnel.section import Section, nearest, on_section
+from tunneldb.simulate.tunnel.section import Section, nearest
 
 
-@njit(cache=True, nogil=True, inline="always")
-def newton_step(
-    plan: Float, profile: Float, x: float, y: float, z: float, s: float
-) -> tuple[float, float, float, float, float, float, float, float, float]:
-    """One Newton step towards the chainage whose perpendicular plane holds the point.
+@inner
+def foot(
+    plan: Float, profile: Float, x: float, y: float, z: float, s: float, tolerance: float, most: int
+) -> tuple[float, float, float, float, float, float, float, float, float, float]:
+    """Foot of the perpendicular from a point to the axis: Newton's method from chainage ``s``, ``most`` steps.
 
-    Returns the step, then at ``s``: u, w, cos and sin of the direction, curvature, grade, the length q of the
-    unnormalised tangent, and D, by which (cos, sin, grade) is divided to give the gradient of chainage.
+    It ends with a step of less than ``tolerance`` m. ``most`` is a ``np.int64``: of each literal number Numba would compile
+    a version of its own. Returns the chainage and the last step, then, as they are before
+    that step: u, w, cos and sin of the direction, curvature, grade, the length q of the unnormalised tangent, and D, by
+    which (cos, sin, grade) is divided to give the gradient of chainage.
     """
-    ax, ay, az, c, n, k, g, dg = axis_at(plan, profile, s)
-    dx, dy, dz = x - ax, y - ay, z - az
-    q = math.sqrt(1.0 + g * g)
-    along = dx * c + dy * n
-    u = dx * n - dy * c
-    w = (dz - g * along) / q
-    d = q * q + k * u - dz * dg
-    return (along + dz * g) / d, u, w, c, n, k, g, q, d
+    step, u, w, c, n, k, g, q, d = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for _ in range(most):
+        ax, ay, az, c, n, k, g, dg = axis_at(plan, profile, s)
+        dx, dy, dz = x - ax, y - ay, z - az
+        q = math.sqrt(1.0 + g * g)
+        along = dx * c + dy * n
+        u = dx * n - dy * c
+        w = (dz - g * along) / q
+        d = q * q + k * u - dz * dg
+        step = (along + dz * g) / d
+        s += step
+        if abs(step) < tolerance:
+            break
+    return s, step, u, w, c, n, k, g, q, d
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inner
 def gradient(
     gu: float, gw: float, u: float, w: float, c: float, n: float, k: float, g: float, q: float, d: float
 ) -> tuple[float, float, float]:
@@ -51,37 +59,25 @@ def gradient(
     return gu * n - gw * g * c / q + s * c, -gu * c - gw * g * n / q + s * n, gw / q + s * g
 
 
-@njit(cache=True, nogil=True)
-def _unroll_many(plan: Float, profile: Float, parts: Float, xyz: Float, s: Float, out: Float) -> None:
+@kernel
+def _unroll(plan: Float, profile: Float, parts: Float, xyz: Float, s: Float, tolerance: float, out: Float) -> None:
+    """Chainage, arc, offset and unit normal of points (n, 3) from the line's origin, into ``out`` (6, n).
+
+    ``s`` (n,) are chainages near them; the chainage found is good to the square of ``tolerance`` over the bend's radius.
+    """
     for i in range(xyz.shape[0]):
-        x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-        chainage = s[i]
-        for _ in range(20):
-            step, u, w, c, n, k, g, q, d = newton_step(plan, profile, x, y, z, chainage)
-            chainage += step
-            if abs(step) < 1e-10:
-                break
+        chainage, _, u, w, c, n, k, g, q, d = foot(
+            plan, profile, xyz[i, 0], xyz[i, 1], xyz[i, 2], s[i], tolerance, np.int64(20)
+        )
         arc, offset, gu, gw = nearest(parts, u, w)
         nx, ny, nz = gradient(gu, gw, u, w, c, n, k, g, q, d)
         norm = math.sqrt(nx * nx + ny * ny + nz * nz)
-        out[i, 0] = chainage
-        out[i, 1] = arc
-        out[i, 2] = offset
-        out[i, 3] = nx / norm
-        out[i, 4] = ny / norm
-        out[i, 5] = nz / norm
-
-
-@njit(cache=True, nogil=True)
-def _roll_many(plan: Float, profile: Float, parts: Float, s: Float, arc: Float, offset: Float, out: Float) -> None:
-    for i in range(s.shape[0]):
-        ax, ay, az, c, n, _, g, _ = axis_at(plan, profile, s[i])
-        pu, pw, nu, nw = on_section(parts, arc[i])
-        u, w = pu + offset[i] * nu, pw + offset[i] * nw
-        q = math.sqrt(1.0 + g * g)
-        out[i, 0] = ax + u * n - w * g * c / q
-        out[i, 1] = ay - u * c - w * g * n / q
-        out[i, 2] = az + w / q
+        out[0, i] = chainage
+        out[1, i] = arc
+        out[2, i] = offset
+        out[3, i] = nx / norm
+        out[4, i] = ny / norm
+        out[5, i] = nz / norm
 
 
 class Unrolled(NamedTuple):
@@ -103,27 +99,29 @@ class Tunnel:
     def to_space(self, chainage: Float, arc: Float, offset: Float | float = 0.0) -> Float:
         """Coordinates (n, 3) of points of the unrolled plane, ``offset`` m off the surface into the tunnel."""
         given = np.atleast_1d(chainage), np.asarray(arc), np.asarray(offset)
-        s, a, o = (np.array(x, dtype=float) for x in np.broadcast_arrays(*given))
-        out = np.empty((s.size, 3))
-        _roll_many(self.line.plan, self.line.profile, self.section.parts, s, a, o, out)
-        return out + self.line.origin
+        s, a, o = np.broadcast_arrays(*given)
+        x, y, z, c, n, _, g, _ = self.line.table(s)
+        point, normal = self.section.point(a)
+        u, w = (point + o[:, None] * normal).T
+        q = np.sqrt(1.0 + g * g)
+        return np.column_stack([x + u * n - w * g * c / q, y - u * c - w * g * n / q, z + w / q]) + self.line.origin
 
     def unroll(self, xyz: Float) -> Unrolled:
         """Chainage, arc, offset and normal of points (n, 3) within the bend's radius of the axis."""
         points = np.atleast_2d(np.asarray(xyz, float))
-        out = np.empty((len(points), 6))
         guess = np.linspace(self.line.start, self.line.end, max(2, int((self.line.end - self.line.start) / 5)))
         # The nearest of a few axis points is a start from which Newton's method converges.
         _, index = cKDTree(self.line.position(guess)).query(points)
-        _unroll_many(
-            self.line.plan,
-            self.line.profile,
-            self.section.parts,
-            np.ascontiguousarray(points - self.line.origin),
-            guess[index],
-            out,
-        )
-        return Unrolled(out[:, 0], out[:, 1], out[:, 2], out[:, 3:])
+        return self.unroll_near(np.ascontiguousarray(points - self.line.origin), guess[index], 1e-10)
+
+    def unroll_near(self, points: Float, chainage: Float, tolerance: float) -> Unrolled:
+        """Chainage, arc, offset and normal of points (n, 3) from the line's origin, by chainages (n,) near them.
+
+        The last step of Newton's method is shorter than ``tolerance``, m; its square over the bend's radius is the error.
+        """
+        out = np.empty((6, len(points)))
+        _unroll(self.line.plan, self.line.profile, self.section.parts, points, chainage, tolerance, out)
+        return Unrolled(out[0], out[1], out[2], out[3:].T)
 
     def area_factor(self, chainage: Float, arc: Float) -> Float:
         """Area on the surface for a unit of area in the unrolled plane, at points (n,)."""

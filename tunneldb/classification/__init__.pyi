@@ -1,0 +1,10 @@
+from .classes import PointClass as PointClass
+from .classify import find_bare_scene as find_bare_scene
+from .classify import find_scene as find_scene
+from .ground.extraction import GroundSettings as GroundSettings
+from .ground.extraction import find_ground as find_ground
+from .ground.model import Ground as Ground
+from .lining_relief import Relief as Relief
+from .scene import Scene as Scene
+from .targets.detection import Sphere as Sphere
+from .targets.detection import find_spheres as find_spheres

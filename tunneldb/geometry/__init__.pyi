@@ -1,0 +1,9 @@
+from .alignment import Alignment as Alignment
+from .centreline import centreline_through as centreline_through
+from .plan_line import PlanLine as PlanLine
+from .section_outliers import SectionOutliers as SectionOutliers
+from .stationing import KILOMETRE as KILOMETRE
+from .stationing import Stationing as Stationing
+from .stationing import chainage_label as chainage_label
+from .surface import Surface as Surface
+from .surface import Unrolled as Unrolled

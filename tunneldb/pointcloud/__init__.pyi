@@ -1,0 +1,10 @@
+from .noise import noise_filter as noise_filter
+from .points import Points as Points
+from .points import ScanHeader as ScanHeader
+from .poses import PoseModel as PoseModel
+from .reader import ScanSource as ScanSource
+from .reader import read_chunks as read_chunks
+from .reader import read_header as read_header
+from .thinning import thin as thin
+from .thinning import voxel_edge as voxel_edge
+from .voxels import Voxels as Voxels

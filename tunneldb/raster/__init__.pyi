@@ -1,0 +1,12 @@
+from .accumulator import Accumulator as Accumulator
+from .accumulator import Window as Window
+from .geotiff import Raster as Raster
+from .geotiff import decode as decode
+from .geotiff import encode as encode
+from .grid import Grid as Grid
+from .image import LiningImage as LiningImage
+from .image import lining_image as lining_image
+from .observation import ObservedPoints as ObservedPoints
+from .observation import Observer as Observer
+from .observation import Radiometer as Radiometer
+from .pixel_state import PixelState as PixelState
