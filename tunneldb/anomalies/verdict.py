@@ -18,8 +18,12 @@ DARKEST_JOINT = 3.0
 """A joint of up to 1 cm takes no more than half of the light from 2 cm, by which pixels and beam blur it, dB; what is darker is
 wet. Finer pixels are seen by a beam that is no finer."""
 
+RESOLVED = 0.02
+"""Limits of widths, areas and straightness hold in metres for pixels up to this size, m, and grow with larger ones: of few
+pixels sides look straight by chance, and leaks would be taken for something built."""
+
 STRAIGHT = 0.02
-"""Standard deviation of the sides of what was built about straight lines, m, at most; or a pixel, where these are larger."""
+"""Standard deviation of the sides of what was built about straight lines, m, at most."""
 
 LEAST_STEPS = 0.2
 """Length of the boundary of a region along which the step over it must be known to tell that it is soft, m."""
@@ -102,7 +106,7 @@ def _gradual(region: Region, shape: Shape) -> float:
     Grime beneath a cable lies in a band along the tunnel, which water does not: there less softness is enough.
     """
     properties = region.properties
-    if properties.steps * region.pixel < LEAST_STEPS * (1 - 1e-12) or region.drop_sum <= 0:
+    if properties.steps * region.pixel < LEAST_STEPS * _coarseness(region) * (1 - 1e-12) or region.drop_sum <= 0:
         return 0.0
     step = (properties.inside - properties.outside) / properties.steps / region.drop_mean
     band = _ramp(shape.along / shape.across, 4.0, 8.0)
@@ -118,8 +122,8 @@ def _rectangular(region: Region, shape: Shape) -> float:
     shown = properties.perimeter - properties.perimeter_off
     if not properties.sharp or not shown:
         return 0.0
-    width = shape.mean_width
-    most = 0.71 + 0.15 * _ramp(width, 0.35, 0.2) + 0.12 * _ramp(region.area, 0.3, 0.1)
+    width, area = shape.mean_width / _coarseness(region), region.area / _coarseness(region) ** 2
+    most = 0.71 + 0.15 * _ramp(width, 0.35, 0.2) + 0.12 * _ramp(area, 0.3, 0.1)
     lines = _ramp(properties.straight / properties.sharp, most, most + 0.08)
     # Water that fills a panel between joints is rectangular too, and darker than repairs are, and so are small blobs.
     panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), _ramp(width, 0.45, 0.3))
@@ -151,8 +155,13 @@ def _shadow(region: Region, shape: Shape) -> float:
 
 
 def _straight(region: Region) -> float:
-    """Standard deviation up to which sides are straight, m: pixels of the region's size can't tell what is less."""
-    return max(STRAIGHT, region.pixel)
+    """Standard deviation up to which sides are straight, m."""
+    return STRAIGHT * _coarseness(region)
+
+
+def _coarseness(region: Region) -> float:
+    """How much larger the pixels are than those for which the limits hold in metres; 1 if they are not."""
+    return max(1.0, region.pixel / RESOLVED)
 
 
 def _ramp(value: float, none: float, full: float) -> float:
