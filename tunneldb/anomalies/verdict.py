@@ -15,7 +15,18 @@ STRONG_CONTRAST, STRONG_DROP = 8.0, 3.0
 of shades of concrete and mortar neither is expected, water takes away half of the light and more."""
 
 DARKEST_JOINT = 3.0
-"""A joint of up to 1 cm takes no more than half of the light from a pixel of 2 cm, dB; what is darker is wet."""
+"""A joint of up to 1 cm takes no more than half of the light from 2 cm, by which pixels and beam blur it, dB; what is darker is
+wet. Finer pixels are seen by a beam that is no finer."""
+
+RESOLVED = 0.02
+"""Limits of widths, areas and straightness hold in metres for pixels up to this size, m, and grow with larger ones: of few
+pixels sides look straight by chance, and leaks would be taken for something built."""
+
+STRAIGHT = 0.02
+"""Standard deviation of the sides of what was built about straight lines, m, at most."""
+
+LEAST_STEPS = 0.2
+"""Length of the boundary of a region along which the step over it must be known to tell that it is soft, m."""
 
 Kind = Literal["leak", "joint", "dark"]
 
@@ -51,7 +62,7 @@ def classify(region: Region) -> Verdict:
         "recess": _recess(region),
         "gradual": _gradual(region, shape),
         "rectangular": _rectangular(region, shape),
-        "stripe": _stripe(shape, region.pixel),
+        "stripe": _stripe(shape, _straight(region)),
         "shadow": _shadow(region, shape),
     }
     against = sorted((name for name in degrees if degrees[name] > 0.0), key=lambda name: -degrees[name])
@@ -72,12 +83,12 @@ def detectability(region: Region) -> float:
 
 def _thin(region: Region, shape: Shape) -> float:
     """Joints are at most 2 cm wide, which the beam, the pixels and the median filter widen, straight, not as dark as water."""
-    pixel = region.pixel
+    straight = _straight(region)
     deviation = shape.deviation_along if shape.along > shape.across else shape.deviation_across
     return min(
         _ramp(shape.mean_width, 0.10, 0.07),
-        _ramp(shape.length / max(shape.mean_width, pixel), 4.0, 8.0),
-        _ramp(deviation, 2.0 * pixel, pixel),
+        _ramp(shape.length / max(shape.mean_width, region.pixel), 4.0, 8.0),
+        _ramp(deviation, 2.0 * straight, straight),
         _ramp(region.drop_mean, DARKEST_JOINT + 0.5, DARKEST_JOINT),
     )
 
@@ -95,7 +106,7 @@ def _gradual(region: Region, shape: Shape) -> float:
     Grime beneath a cable lies in a band along the tunnel, which water does not: there less softness is enough.
     """
     properties = region.properties
-    if properties.steps < 10 or region.drop_sum <= 0:
+    if properties.steps * region.pixel < LEAST_STEPS * _coarseness(region) * (1 - 1e-12) or region.drop_sum <= 0:
         return 0.0
     step = (properties.inside - properties.outside) / properties.steps / region.drop_mean
     band = _ramp(shape.along / shape.across, 4.0, 8.0)
@@ -111,12 +122,12 @@ def _rectangular(region: Region, shape: Shape) -> float:
     shown = properties.perimeter - properties.perimeter_off
     if not properties.sharp or not shown:
         return 0.0
-    width, pixels = shape.mean_width / region.pixel, region.area / region.pixel**2
-    most = 0.71 + 0.15 * _ramp(width, 17.5, 10.0) + 0.12 * _ramp(pixels, 750.0, 250.0)
+    width, area = shape.mean_width / _coarseness(region), region.area / _coarseness(region) ** 2
+    most = 0.71 + 0.15 * _ramp(width, 0.35, 0.2) + 0.12 * _ramp(area, 0.3, 0.1)
     lines = _ramp(properties.straight / properties.sharp, most, most + 0.08)
     # Water that fills a panel between joints is rectangular too, and darker than repairs are, and so are small blobs.
-    panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), _ramp(width, 22.5, 15.0))
-    return min(lines, _ramp(properties.sharp / shown, 0.15, 0.25), _ramp(width, 8.0, 11.0), 1.0 - panel)
+    panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), _ramp(width, 0.45, 0.3))
+    return min(lines, _ramp(properties.sharp / shown, 0.15, 0.25), _ramp(width, 0.16, 0.22), 1.0 - panel)
 
 
 def _strong(region: Region) -> float:
@@ -124,15 +135,15 @@ def _strong(region: Region) -> float:
     return _ramp(min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP), 0.8, 1.0)
 
 
-def _stripe(shape: Shape, pixel: float) -> float:
+def _stripe(shape: Shape, straight: float) -> float:
     """A painted stripe: a band along the tunnel, straight and as wide at its ends; water along a joint keeps to no edge."""
     neat = min(
-        _ramp(shape.deviation_box, pixel, 0.6 * pixel),
+        _ramp(shape.deviation_box, straight, 0.6 * straight),
         _ramp(shape.rectangularity, 0.85, 0.93),
         _ramp(shape.corners, 0.4, 0.7),
     )
     # Ragged ones are as long as no leak along the tunnel.
-    long = min(_ramp(shape.along, 2.0, 2.5), _ramp(shape.deviation_along, 2.0 * pixel, pixel))
+    long = min(_ramp(shape.along, 2.0, 2.5), _ramp(shape.deviation_along, 2.0 * straight, straight))
     return min(_ramp(shape.aspect_ratio, 6.0, 10.0), max(neat, long))
 
 
@@ -141,6 +152,16 @@ def _shadow(region: Region, shape: Shape) -> float:
     properties = region.properties
     beside = properties.perimeter_off / properties.perimeter if properties.perimeter else 0.0
     return max(min(_ramp(beside, 0.25, 0.45), _ramp(shape.width, 0.14, 0.08)), _ramp(beside, 0.8, 0.9))
+
+
+def _straight(region: Region) -> float:
+    """Standard deviation up to which sides are straight, m."""
+    return STRAIGHT * _coarseness(region)
+
+
+def _coarseness(region: Region) -> float:
+    """How much larger the pixels are than those for which the limits hold in metres; 1 if they are not."""
+    return max(1.0, region.pixel / RESOLVED)
 
 
 def _ramp(value: float, none: float, full: float) -> float:

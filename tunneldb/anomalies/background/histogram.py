@@ -27,8 +27,12 @@ TILE_BINS = 160
 """Bins of the histograms of tiles."""
 
 SHORTH = 0.25
-"""Share of all values in the shortest run of bins that marks where the background lies: it may be less than half of them, and
-is still denser than what is wet to several degrees."""
+"""Share of all values in the shortest run of bins that marks where the background lies.
+
+It is less than that of `radiometry.robust_statistics`, 0.4, for a column, a row or a tile may be half wet, all values of a
+kilometre are not. Up to 30 % of darker pixels both give the same from some hundred values on; of a hundred, 0.4 scatters less;
+at 50 % the mean is less wrong with 0.25, by LONGER still less. At 60 % nothing helps.
+"""
 
 LONGER = 1.5
 """Of runs of bins up to so much longer than the shortest the brightest is taken: where half is wet, it is the dry one."""
