@@ -24,7 +24,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -121,7 +121,8 @@ def installation(command: Sequence[str], perf: bool) -> Iterator[Installation]:
         try:
             yield made
         finally:
-            made.run("server", "stop")
+            with suppress(SystemExit):  # what went wrong before is what matters
+                made.run("server", "stop")
 
 
 def main() -> None:
