@@ -138,9 +138,10 @@ def test_disk_full_during_copy(survey: psycopg.Connection, dsn: str, tmp_path: P
 KILLED = """
 import os, sys
 from pathlib import Path
-from tunneldb.database import connect, get_survey
+from tunneldb.database import connect
 from tunneldb.pipeline.load import load_files
 from tunneldb.pointcloud.selection import FilterSettings
+from tunneldb.store import get_survey
 
 def begin(text, total):
     return lambda done: os.kill(os.getpid(), 9) if text == sys.argv[2] else None
