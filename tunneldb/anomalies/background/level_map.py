@@ -100,14 +100,15 @@ def _nothing(grid: Grid, tile: int, drawn: tuple[Polygon, ...]) -> BackgroundMap
 
 
 def _mean_level(level: BackgroundLevel, state: UInt8) -> float:
-    """Median over the lining of the level of the background, from some of its rows, dB."""
+    """Median over the lining of the level of the background, from some of its rows, dB; NaN without lining there."""
     rows, columns = state.shape
     every = max(1, rows * columns // SHOWN)
     levels = []
     for row in range(every // 2, rows, every):
         here = state[row] == PixelState.LINING
         levels.append(level.levels(slice(row, row + 1), slice(0, columns))[0, here])
-    return float(np.median(np.concatenate(levels)))
+    values = np.concatenate(levels)
+    return float(np.median(values)) if len(values) else np.nan
 
 
 def _weighted_median(values: Single, weights: Int64) -> float:
