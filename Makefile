@@ -1,5 +1,5 @@
 # make demo   a simulated tunnel from its scan to leaks in QGIS, in ./demo
-# make quick  those of the tests that need no server
+# make quick  those of the tests that need no server and are over soon
 # make test   lint, types and all tests, against the wheel as a user would install it
 # make faults 100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
 # make docs   the documentation as a site, in ./site
@@ -53,7 +53,7 @@ tests: $(VENV)/wheel $(VENV)/tests
 	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -rs
 
 quick: $(VENV)/wheel
-	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not server" -rs
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not server and not slow" -rs
 
 test: $(VENV)/wheel $(VENV)/tests
 	$(MAKE) -j 2 lint tests

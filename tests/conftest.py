@@ -46,7 +46,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the tests that need a server, by whatever fixture, and say which run on one worker, and in which order."""
     for item in items:
         fixtures = getattr(item, "fixturenames", ())
-        if "server_dsn" in fixtures:
+        if "server_dsn" in fixtures or item.path.parent.name == "faults" or item.path.name == "test_server.py":
             item.add_marker("server")
         group = next((name for name in SHARED if name in fixtures and "faults" in item.path.parts), item.path.name)
         item.add_marker(pytest.mark.xdist_group(f"{item.path.parent.name}/{group}"))

@@ -12,6 +12,8 @@ from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import LiningImage
 from tunneldb.raster.pixel_state import PixelState
 
+pytestmark = pytest.mark.slow
+
 PIXEL = 0.02
 NOISE = 0.35
 

@@ -16,6 +16,8 @@ from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.pixel_state import PixelState
 
+pytestmark = pytest.mark.slow
+
 PIXEL, SIGMA = 0.02, 0.3
 WIDTH, HALF = 14.0, 4.0  # of the canvas: from chainage 0, and from arc -HALF to HALF, m
 

@@ -19,6 +19,8 @@ from tunneldb.pointcloud.thinning import thin, voxel_edge
 from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate.parameters import Parameters
 
+pytestmark = pytest.mark.slow
+
 THINGS = {
     "people": 3, "equipment": 4, "bollards": 1, "globes": 2, "spheres": 4, "free_cables": 1, "ballast": 0.01,
     "sleepers": True, "catenary": True, "leaks": 1,

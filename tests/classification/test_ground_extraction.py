@@ -13,6 +13,8 @@ from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate import Cloud, Parameters, rise, simulate
 
+pytestmark = pytest.mark.slow
+
 FLOOR, NICHE, RAIL = 1, 3, 5
 SETTINGS = GroundSettings()
 SCENE = {"length": 24.0, "straight": 6.0, "leaks": 1, "people": 3, "equipment": 2, "spheres": 2, "free_cables": 1}

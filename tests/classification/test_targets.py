@@ -14,6 +14,8 @@ from tunneldb.classification.targets.detection import Refusal, Sphere, confirmed
 from tunneldb.classification.targets.fit import coverage, distance_error, fit_ratio, fit_sphere
 from tunneldb.geometry.normals import eigenvalues, normal
 
+pytestmark = pytest.mark.slow
+
 R = 0.0725
 TOLERANCE = 0.005
 AT = (272_005.0, 4_765_000.0, 641.0)  # as large as coordinates are

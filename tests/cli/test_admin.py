@@ -21,6 +21,8 @@ from psycopg.conninfo import make_conninfo
 from tunneldb.cli.main import COMMANDS, main
 from tunneldb.database.server import Server
 
+pytestmark = pytest.mark.slow
+
 TUNNELDB = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
 
 

@@ -11,6 +11,8 @@ from tunneldb.radiometry.range_curve import MOST_UNCERTAIN
 from tunneldb.simulate import Parameters, Simulation, write
 from tunneldb.simulate.radiometry import range_term
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def scan(tmp_path_factory) -> tuple[Path, list[str]]:

@@ -17,6 +17,8 @@ from support.loaded_survey import SURVEY, add_survey, tube, write
 
 from tunneldb.cli.main import main
 
+pytestmark = pytest.mark.slow
+
 TUNNELDB = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
 
 

@@ -19,6 +19,8 @@ from tunneldb.cli.main import main
 from tunneldb.export.pointcloud import single_file as bare
 from tunneldb.simulate import Parameters, Simulation, write
 
+pytestmark = pytest.mark.slow
+
 FLOOR, LINING = 1, 0  # of the truth
 ORIGIN = np.array([500_000.0, 4_500_000.0, 100.0])
 

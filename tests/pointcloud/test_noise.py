@@ -7,6 +7,8 @@ from scipy.spatial import cKDTree
 from tunneldb.pointcloud.noise import is_noise, noise_filter, search_radii
 from tunneldb.pointcloud.voxels import CellCounts
 
+pytestmark = pytest.mark.slow
+
 ORIGIN = np.array([500_000.0, 4_500_000.0, 100.0])
 
 

@@ -16,6 +16,8 @@ from tunneldb.pointcloud.formats import laz
 from tunneldb.pointcloud.reader import read_header
 from tunneldb.pointcloud.rewrite import read_coordinates, rewrite
 
+pytestmark = pytest.mark.slow
+
 NAMES = {2: "ground", 64: "lining"}
 COUNT = 120_001
 

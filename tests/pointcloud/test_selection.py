@@ -19,6 +19,8 @@ from tunneldb.pointcloud.selection import FilterCounts, FilterSettings, filter_f
 from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, ROW, Rows, Spool, windows
 from tunneldb.pointcloud.thinning import thin, voxel_edge
 
+pytestmark = pytest.mark.slow
+
 ORIGIN = np.array([500_000.0, 4_500_000.0, 100.0])
 
 

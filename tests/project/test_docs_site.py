@@ -16,6 +16,8 @@ import pytest
 from markdown_it import MarkdownIt
 from playwright.sync_api import Browser, sync_playwright
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 SOURCES = {page.stem: page for page in sorted((ROOT / "docs").glob("*.md"))} | {
     "overview": ROOT / "README.md",

@@ -8,8 +8,11 @@ from pathlib import Path
 from types import ModuleType
 
 import psycopg
+import pytest
 from support.cookbook_survey import prepare
 from support.queue_rows import add_file, add_job, add_worker
+
+pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```sql\n(.*?)^```$", re.MULTILINE | re.DOTALL)

@@ -20,6 +20,8 @@ from tunneldb.errors import UserError
 from tunneldb.simulate import Parameters, Simulation, write
 from tunneldb.store.ledger import BusyError, Job, LostError, describe, retry_at, stage_run
 
+pytestmark = pytest.mark.slow
+
 KM = 12
 
 

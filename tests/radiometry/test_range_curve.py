@@ -12,6 +12,8 @@ from tunneldb.radiometry.range_spline import RangeSpline, one_maximum
 from tunneldb.simulate import Parameters, simulate
 from tunneldb.simulate.radiometry import range_term
 
+pytestmark = pytest.mark.slow
+
 
 def _inverse_square(range_m):
     return -20.0 * np.log10(range_m)

@@ -8,6 +8,8 @@ from scipy.spatial import cKDTree
 
 from tunneldb.simulate import Cloud, Parameters, Simulation, rise, simulate
 
+pytestmark = pytest.mark.slow
+
 FEW: dict[str, Any] = {
     "length": 20.0,
     "straight": 3.0,

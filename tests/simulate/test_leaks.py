@@ -7,6 +7,8 @@ import shapely
 from tunneldb.errors import UserError
 from tunneldb.simulate import Parameters, Simulation, simulate
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def simulation() -> Simulation:

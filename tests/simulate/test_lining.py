@@ -17,6 +17,8 @@ from tunneldb.simulate.lining.reflectance import level as level_at
 from tunneldb.simulate.radiometry import oren_nayar
 from tunneldb.simulate.truth import dry_features
 
+pytestmark = pytest.mark.slow
+
 BARE: dict[str, Any] = {
     "length": 30.0, "straight": 5.0, "scanner": "profiler", "profile_spacing": 0.04, "profile_points": 700, "leaks": 0,
     "appendages": False, "niches": False, "range_noise": 0.0, "outliers": 0.0, "intensity_noise": 0.0,

@@ -9,6 +9,8 @@ from tunneldb.errors import UserError
 from tunneldb.simulate import Cloud, Parameters, Simulation, TargetSphere, simulate
 from tunneldb.simulate.objects.primitives import BALL, BEAM, ROD
 
+pytestmark = pytest.mark.slow
+
 FEW: dict[str, Any] = {
     "length": 30.0,
     "straight": 3.0,

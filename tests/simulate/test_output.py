@@ -17,6 +17,8 @@ from tunneldb.simulate import PRESETS, Files, Parameters, Simulation, simulate, 
 from tunneldb.simulate import output as output_module
 from tunneldb.simulate import scanner as scanner_module
 
+pytestmark = pytest.mark.slow
+
 SMALL = Parameters(**{**PRESETS["small"], "profile_spacing": 0.4})
 
 

@@ -8,6 +8,8 @@ import pytest
 from tunneldb.simulate import Cloud, Parameters, Simulation, simulate
 from tunneldb.simulate.objects.fixtures import appendage_table, distance
 
+pytestmark = pytest.mark.slow
+
 FEW: dict[str, Any] = {
     "length": 40.0,
     "straight": 5.0,

@@ -14,6 +14,8 @@ from tunneldb.simulate.radiometry import oren_nayar
 from tunneldb.simulate.rays.beam import segment_share
 from tunneldb.simulate.truth import as_built, dry_features
 
+pytestmark = pytest.mark.slow
+
 BARE: dict[str, Any] = {
     "length": 24.0, "straight": 5.0, "scanner": "profiler", "profile_spacing": 0.03, "profile_points": 600, "leaks": 0,
     "appendages": False, "niches": False, "range_noise": 0.0, "outliers": 0.0, "intensity_noise": 0.0,
