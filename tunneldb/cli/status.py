@@ -83,7 +83,11 @@ def _all(connection: psycopg.Connection[Any]) -> None:
     names = ("name", "tunnel", "date", "files", "points", "label_from", "label_to", "kilometres", "done")
     tell(surveys=[row | {"done": dict(zip(STAGE_NAMES, row["done"] or (), strict=False))} for row in records(names, rows)])
     table = [[*fixed, there, *(done or [None] * len(STAGE_NAMES))] for *fixed, there, done in rows]
-    print_table(["survey", "tunnel", "date", "files", "points", "from", "to", "km", *STAGE_NAMES], table, right=range(3, 14))
+    print_table(
+        ["survey", "tunnel", "date", "files", "points", "from", "to", "km", *STAGE_NAMES],
+        table,
+        right=range(3, 8 + len(STAGE_NAMES)),
+    )
     if not rows:
         click.echo("there is no survey yet: tunneldb tunnel add, then tunneldb survey add")
 
