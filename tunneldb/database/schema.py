@@ -95,6 +95,8 @@ def _fill_stages(connection: psycopg.Connection[Any], stages: Sequence[StageRow]
                 for step, stage in enumerate(stages, 1)
             ],
         )
+    # Of a table that was never analysed the planner expects a thousand rows: status and queue then take seconds.
+    connection.execute("ANALYZE tunnel.stage")
 
 
 def install_api(connection: psycopg.Connection[Any]) -> None:
