@@ -22,6 +22,7 @@ from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.robust_plane import DELTA, central_mode, plane_of_moments
 from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.geometry.surface import Surface
+from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.threads import in_blocks
 
 CELL = 0.25
@@ -165,7 +166,7 @@ def _apart(found: Float, expected: Float) -> Bool:
     """Cells whose plane lies apart from those about them: the floor of a shallow niche, the front of a large box."""
     level = _median(found - expected, _ALONG, _ROUND)
     off = np.abs(found - expected - level)
-    usual = 5.0 * 1.4826 * _median(off, _ALONG, _ROUND)
+    usual = 5.0 * MAD_TO_SIGMA * _median(off, _ALONG, _ROUND)
     with np.errstate(invalid="ignore"):
         return np.asarray(off > np.maximum(usual, APART))
 
@@ -304,7 +305,7 @@ def _fit_plane(part: Float, count: int, level: float, fine: Int64) -> tuple[floa
         below, sigma = 0, np.nan
         for f in range(_FINES):
             if 2 * (below + fine[f]) >= total and fine[f] > 0:
-                sigma = 1.4826 * (f + (0.5 * total - below) / fine[f]) * _FINE
+                sigma = MAD_TO_SIGMA * (f + (0.5 * total - below) / fine[f]) * _FINE
                 break
             below += fine[f]
         if max(abs(a - before), abs(b - lean), abs(c - slant)) < _REST:

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.plan_line import PlanLine
+from tunneldb.robust import MAD_TO_SIGMA
 
 _CELL = 1.0  # m in plan
 _REACH = 3.0  # cells closer than this are neighbours, m: profiles may lie apart
@@ -203,6 +204,6 @@ def _smooth(places: Float, seen: Bool) -> Float:
     for _ in range(5):
         out = solve(np.diag(weight) + bend + 1e-9 * np.eye(count), (weight + 1e-9)[:, None] * places, assume_a="pos")
         away = np.hypot(*(places - out).T)
-        usual = max(3.0 * 1.4826 * float(np.median(away[seen])), 0.02)
+        usual = max(3.0 * MAD_TO_SIGMA * float(np.median(away[seen])), 0.02)
         weight = np.where(seen, 1.0 / (1.0 + (away / usual) ** 2), 0.0)
     return np.asarray(out)

@@ -9,6 +9,7 @@ import numpy as np
 from tunneldb.arrays import Float, Int64
 from tunneldb.geometry.frame import frames_at
 from tunneldb.geometry.unrolling import NODES, sections_about, to_plane, to_space
+from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.threads import in_blocks
 
 BLOCK = 1 << 14
@@ -138,5 +139,5 @@ class Surface:
         first = np.clip(np.arange(count) - 3, 0, max(count - 7, 0))
         beside = np.array([[n for n in range(f, f + min(7, count)) if n != k] for k, f in enumerate(first.tolist())])
         apart = self.radius - np.median(self.radius[beside], axis=1)
-        usual = 3.0 * 1.4826 * np.median(np.abs(apart), axis=1)
+        usual = 3.0 * MAD_TO_SIGMA * np.median(np.abs(apart), axis=1)
         return np.where(np.abs(apart) > np.maximum(usual, APART)[:, None], apart, 0.0)

@@ -19,6 +19,7 @@ from scipy.interpolate import CubicSpline
 from tunneldb.arrays import Float, Int64
 from tunneldb.radiometry.cells import CELL, ROUGHNESS, STRETCH, Cells
 from tunneldb.radiometry.range_spline import RangeSpline, one_maximum
+from tunneldb.robust import MAD_TO_SIGMA
 
 TUKEY = 4.685
 """Residuals of so many standard deviations have no weight: 95 % efficient on normal ones (Holland and Welsch, 1977)."""
@@ -379,7 +380,7 @@ def _outer(rows: Float) -> Float:
 
 def _deviation(values: Float) -> float:
     """Standard deviation by the median deviation from 0."""
-    return 1.4826 * float(np.median(np.abs(values)))
+    return MAD_TO_SIGMA * float(np.median(np.abs(values)))
 
 
 def _tukey(scaled: Float) -> Float:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tunneldb.robust import MAD_TO_SIGMA
+
 SHORTH = 0.4
 """Share of all values in the shortest interval that marks where dry lining lies."""
 
@@ -62,7 +64,7 @@ def robust_statistics(values: NDArray[np.floating]) -> DryLevel:
     start = int(np.argmin(ordered[width - 1 :] - ordered[: count - width + 1]))
     mean = float(np.median(ordered[start : start + width]))
     above = ordered[np.searchsorted(ordered, mean, side="right") :]
-    sigma = 1.4826 * float(np.median(above - mean)) if len(above) else 0.0
+    sigma = MAD_TO_SIGMA * float(np.median(above - mean)) if len(above) else 0.0
     total = np.concatenate([[0.0], np.cumsum(ordered)])
     squares = np.concatenate([[0.0], np.cumsum(ordered**2)])
     first, last = 0, count

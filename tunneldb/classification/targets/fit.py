@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.robust import MAD_TO_SIGMA
 
 GRAZING = 0.25
 """Cosine of incidence (75.5°) below which a point isn't used where the scanner's place is known: at the limb of a sphere
@@ -108,7 +109,7 @@ def fit_sphere(points: Float, observers: Float, start: Float, radius: float, wid
         distance, cosine = _seen(points, observers, centre, radius)
         near = (np.abs(distance) <= widest) & ~(cosine < GRAZING)
         # From all that is near, not only from what is within the band: that would be less from turn to turn.
-        spread = max(1.4826 * float(np.median(np.abs(distance[near]))), LEAST_SPREAD) if near.any() else widest
+        spread = max(MAD_TO_SIGMA * float(np.median(np.abs(distance[near]))), LEAST_SPREAD) if near.any() else widest
         used = near & (np.abs(distance) <= band)
         if used.sum() < 6:
             return None
