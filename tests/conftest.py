@@ -42,7 +42,8 @@ SHARED = ("long", "short")
 """Fixtures of the session that take minutes to make: what asks for them runs on one worker, whatever its module."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+@pytest.hookimpl(wrapper=True)  # before pytest-xdist reads the groups
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> Iterator[None]:
     """Mark the tests that need a server, by whatever fixture, and say which run on one worker, and in which order."""
     for item in items:
         fixtures = getattr(item, "fixturenames", ())
@@ -52,6 +53,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         item.add_marker(pytest.mark.xdist_group(f"{item.path.parent.name}/{group}"))
     place = {name: n for n, name in enumerate(LONG)}
     items.sort(key=lambda item: place.get(item.path.parent.name, len(LONG)))
+    yield
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -129,15 +129,53 @@ COMMENT ON FUNCTION tunnel_api.axis_shift(int, int[], float8[], float8[], float8
 'One pass of stage 1: how far each vertex lies from the tunnel''s centre, to the right and up in its plane, m, from the points within half_width of the plane, averaged by angular class. After Gonçalves et al. (2012), stage 1.';
 
 
+-- How far each vertex lies off where its neighbours lead, m.
+--
+-- The lesser of two: how far its shift from the given axis is from the mean of its neighbours' shifts, and how far its place is
+-- from the parabola or the cubic through its neighbours' places. A given axis that bends where the tunnel does not makes the
+-- first great, a curve of the tunnel that begins at once the second; a vertex that is out of place both. At an end the first
+-- compares with the one neighbour, the second continues the parabola through three.
+-- x, y, z: places; gx, gy, gz: where the given axis has them, m. Neighbours are the next in the arrays.
+CREATE OR REPLACE FUNCTION tunnel_api.axis_deviation(
+    n int[], x float8[], y float8[], z float8[], gx float8[], gy float8[], gz float8[])
+RETURNS TABLE (n int, deviation float8)
+LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
+ROWS 100
+AS $$
+    WITH axis AS (  -- of each coordinate: its place p, and its shift d from the given axis
+        SELECT v.n, c.p, c.p - c.g AS d, c.k
+        FROM unnest($1, $2, $3, $4, $5, $6, $7) AS v (n, x, y, z, gx, gy, gz)
+        CROSS JOIN LATERAL (VALUES (1, v.x, v.gx), (2, v.y, v.gy), (3, v.z, v.gz)) AS c (k, p, g)
+    ), residual AS (
+        SELECT a.n,
+            a.d - coalesce((lag(a.d) OVER along + lead(a.d) OVER along) / 2, lag(a.d) OVER along, lead(a.d) OVER along) AS shift,
+            a.p - coalesce(
+                (4 * (lag(a.p) OVER along + lead(a.p) OVER along) - lag(a.p, 2) OVER along - lead(a.p, 2) OVER along) / 6,
+                (lag(a.p) OVER along + lead(a.p) OVER along) / 2,
+                3 * lag(a.p) OVER along - 3 * lag(a.p, 2) OVER along + lag(a.p, 3) OVER along,
+                3 * lead(a.p) OVER along - 3 * lead(a.p, 2) OVER along + lead(a.p, 3) OVER along) AS place
+        FROM axis a
+        WINDOW along AS (PARTITION BY a.k ORDER BY a.n)
+    )
+    SELECT r.n, sqrt(least(sum(r.shift ^ 2), sum(r.place ^ 2))) FROM residual r GROUP BY r.n ORDER BY r.n
+$$;
+COMMENT ON FUNCTION tunnel_api.axis_deviation(int[], float8[], float8[], float8[], float8[], float8[], float8[]) IS
+'How far each vertex of an axis lies off where its neighbours lead, m: the lesser of what its shift from the given axis differs from theirs, and its distance from the curve through their places.';
+
+
 -- Moves the vertices of a kilometre onto the tunnel's centre, pass by pass, and writes them to tunnel.axis_vertex.
 --
 -- Every run starts from the given axis (or the vertex as edited by hand, which stays), and the vertices two spacings beyond
 -- the kilometre are found along with it, so the result doesn't depend on which neighbours were done before.
--- A vertex without points takes the shift of its neighbours, and is marked interpolated.
+-- A vertex without points takes the shift of its neighbours, and is marked interpolated. So is one that does not come to rest
+-- in max_iterations passes, or lies farther than max_deviation off where its neighbours lead (axis_deviation); of several side
+-- by side the worst first, then the others are asked again. axis_vertex.remark says why. It ends when all others rest, or when
+-- a greater share than max_rejected (and more than one) was taken out.
 CREATE OR REPLACE FUNCTION tunnel_api.axis_refine(
     survey_id int, km int,
     half_width float8 DEFAULT 1.0, angle_step float8 DEFAULT 5.0,
-    tolerance float8 DEFAULT 0.002, max_iterations int DEFAULT 20, min_points int DEFAULT 100)
+    tolerance float8 DEFAULT 0.002, max_iterations int DEFAULT 20, min_points int DEFAULT 100,
+    max_deviation float8 DEFAULT 0.5, max_rejected float8 DEFAULT 0.3)
 RETURNS TABLE (iteration int, moved float8, measured int)
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
 ROWS 10
@@ -149,7 +187,11 @@ DECLARE
     share float8;
     vn int[]; vx float8[]; vy float8[]; vz float8[];
     gx float8[]; gy float8[]; gz float8[];
-    fixed boolean[]; counts bigint[];
+    fixed boolean[]; counts bigint[]; moves float8[];
+    why text[];  -- why a vertex was rejected, NULL for others
+    rejected int := 0;
+    since int := 0;  -- pass in which the last one was
+    worse text[];
 BEGIN
     SELECT t.spacing INTO STRICT spacing
     FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = axis_refine.survey_id;
@@ -166,14 +208,15 @@ BEGIN
         RAISE EXCEPTION 'survey % has no axis in kilometre %', axis_refine.survey_id, axis_refine.km;
     END IF;
     gx := vx; gy := vy; gz := vz;
+    why := array_fill(NULL::text, ARRAY[cardinality(vn)]);
 
-    FOR pass IN 1 .. axis_refine.max_iterations LOOP
+    FOR pass IN 1 .. axis_refine.max_iterations * cardinality(vn) LOOP
         -- a few millimetres may go to and fro for ever as points enter and leave the slab: later passes go a part of the way
         share := least(1.0, 5.0 / pass);
         WITH frame AS (
-            SELECT f.*, g.gx, g.gy, g.gz, g.fixed
+            SELECT f.*, g.gx, g.gy, g.gz, g.fixed, g.why
             FROM tunnel_api.axis_frame(vn, vx, vy, vz) f
-            JOIN unnest(vn, gx, gy, gz, fixed) AS g (n, gx, gy, gz, fixed) ON g.n = f.n
+            JOIN unnest(vn, gx, gy, gz, fixed, why) AS g (n, gx, gy, gz, fixed, why) ON g.n = f.n
         ), shifted AS (
             SELECT f.n, f.gx, f.gy, f.gz, f.fixed, f.x, f.y, f.z, s.points,
                 -- in its plane, so that the given axis keeps its chainage
@@ -182,7 +225,8 @@ BEGIN
                 f.z + share * s.up * f.wz AS sz
             FROM frame f
             LEFT JOIN tunnel_api.axis_shift(axis_refine.survey_id, vn, vx, vy, vz,
-                axis_refine.half_width, axis_refine.angle_step, axis_refine.min_points) s ON s.vertex = f.n AND NOT f.fixed
+                axis_refine.half_width, axis_refine.angle_step, axis_refine.min_points) s
+                ON s.vertex = f.n AND NOT f.fixed AND f.why IS NULL
         ), bounded AS (
             SELECT f.*,
                 max(f.n) FILTER (WHERE f.sx IS NOT NULL) OVER (ORDER BY f.n) AS before,
@@ -203,24 +247,57 @@ BEGIN
         )
         SELECT array_agg(p.nx ORDER BY p.n), array_agg(p.ny ORDER BY p.n), array_agg(p.nz ORDER BY p.n),
             array_agg(coalesce(p.points, 0) ORDER BY p.n), count(p.points)::int,
-            max(sqrt((p.nx - p.x) ^ 2 + (p.ny - p.y) ^ 2 + (p.nz - p.z) ^ 2))
-        INTO vx, vy, vz, counts, measured, moved
+            array_agg(sqrt((p.nx - p.x) ^ 2 + (p.ny - p.y) ^ 2 + (p.nz - p.z) ^ 2) ORDER BY p.n)
+        INTO vx, vy, vz, counts, measured, moves
         FROM placed p;
         iteration := pass;
+        moved := (SELECT max(m) FROM unnest(moves) m);
         RETURN NEXT;
-        EXIT WHEN moved < axis_refine.tolerance;
+        CONTINUE WHEN moved >= axis_refine.tolerance AND pass - since < axis_refine.max_iterations;
+
+        WITH measured_vertex AS (
+            SELECT v.* FROM unnest(vn, vx, vy, vz, gx, gy, gz, moves, counts, fixed)
+                AS v (n, x, y, z, gx, gy, gz, moved, points, fixed)
+            WHERE v.points > 0 OR v.fixed
+        ), deviating AS (
+            SELECT d.n, d.deviation
+            FROM (SELECT array_agg(v.n ORDER BY v.n) AS n, array_agg(v.x ORDER BY v.n) AS x, array_agg(v.y ORDER BY v.n) AS y,
+                      array_agg(v.z ORDER BY v.n) AS z, array_agg(v.gx ORDER BY v.n) AS gx,
+                      array_agg(v.gy ORDER BY v.n) AS gy, array_agg(v.gz ORDER BY v.n) AS gz
+                  FROM measured_vertex v) a
+            CROSS JOIN LATERAL tunnel_api.axis_deviation(a.n, a.x, a.y, a.z, a.gx, a.gy, a.gz) d
+        ), fault AS (  -- how many times the limit
+            SELECT v.n, v.moved, d.deviation, d.deviation > axis_refine.max_deviation AS off,
+                greatest(v.moved / axis_refine.tolerance, d.deviation / axis_refine.max_deviation) AS times
+            FROM measured_vertex v LEFT JOIN deviating d ON d.n = v.n
+            WHERE NOT v.fixed AND (v.moved >= axis_refine.tolerance OR d.deviation > axis_refine.max_deviation)
+        ), worst AS (
+            SELECT f.n, CASE WHEN f.off THEN format('lies %s m off where its neighbours lead', round(f.deviation::numeric, 2))
+                ELSE format('still moves by %s m after %s passes', round(f.moved::numeric, 4), pass - since) END AS why
+            FROM fault f
+            WHERE NOT EXISTS (SELECT FROM fault g WHERE g.n <> f.n AND abs(g.n - f.n) <= 2
+                                AND (g.off, g.times, g.n) > (f.off, f.times, f.n))
+        )
+        SELECT array_agg(coalesce(o.why, w.why) ORDER BY o.n), count(w.n) + rejected
+        INTO worse, rejected
+        FROM unnest(vn, why) AS o (n, why) LEFT JOIN worst w ON w.n = o.n;
+        EXIT WHEN worse IS NOT DISTINCT FROM why;
+        why := worse;
+        since := pass;
+        EXIT WHEN rejected > greatest(1, axis_refine.max_rejected * measured);
     END LOOP;
 
     UPDATE tunnel.axis_vertex v
     SET geom = ST_SetSRID(ST_MakePoint(p.x, p.y, p.z), ST_SRID(v.given)),
         points = p.points,
-        source = CASE WHEN p.points > 0 THEN 'measured' ELSE 'interpolated' END
-    FROM unnest(vn, vx, vy, vz, counts) AS p (n, x, y, z, points)
+        source = CASE WHEN p.points > 0 THEN 'measured' ELSE 'interpolated' END,
+        remark = p.why
+    FROM unnest(vn, vx, vy, vz, counts, why) AS p (n, x, y, z, points, why)
     -- vertices next door go along where that kilometre holds no points; else it places them itself, first or last
     WHERE v.survey_id = axis_refine.survey_id AND v.n = p.n AND v.source <> 'edited'
       AND (v.km = axis_refine.km
            OR to_regclass(format('tunnel.%I', tunnel_api.partition_name(v.survey_id, v.km))) IS NULL);
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.axis_refine(int, int, float8, float8, float8, int, int) IS
-'Stage 1 for one kilometre: moves the axis vertices onto the tunnel''s centre until none moves by tolerance (m) in a pass; returns each pass with its greatest move, m. Vertices edited by hand stay. After Gonçalves et al. (2012), stages 1 and 2.';
+COMMENT ON FUNCTION tunnel_api.axis_refine(int, int, float8, float8, float8, int, int, float8, float8) IS
+'Stage 1 for one kilometre: moves the axis vertices onto the tunnel''s centre until none moves by tolerance (m) in a pass; returns each pass with its greatest move, m. Vertices edited by hand stay; one that does not rest in max_iterations passes, or lies farther than max_deviation (m) off where its neighbours lead, is interpolated, with a remark, as long as they are no greater share than max_rejected. After Gonçalves et al. (2012), stages 1 and 2.';

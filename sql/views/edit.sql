@@ -11,9 +11,9 @@ DECLARE
     was tunnel.axis_vertex;
 BEGIN
     IF (NEW.id, NEW.survey_id, NEW.survey, NEW.n, NEW.km, NEW.chainage, NEW.label, NEW.points, NEW.source,
-        NEW.edited_by, NEW.edited_at) IS DISTINCT FROM
+        NEW.edited_by, NEW.edited_at, NEW.remark) IS DISTINCT FROM
        (OLD.id, OLD.survey_id, OLD.survey, OLD.n, OLD.km, OLD.chainage, OLD.label, OLD.points, OLD.source,
-        OLD.edited_by, OLD.edited_at) THEN
+        OLD.edited_by, OLD.edited_at, OLD.remark) THEN
         RAISE EXCEPTION 'of an axis vertex only the position (geom) can be edited'
             USING ERRCODE = 'feature_not_supported';
     END IF;
@@ -49,8 +49,9 @@ BEGIN
     NEW.source := 'edited';
     NEW.edited_by := session_user;
     NEW.edited_at := clock_timestamp();
+    NEW.remark := NULL;
     UPDATE tunnel.axis_vertex
-       SET geom = NEW.geom, source = NEW.source, edited_by = NEW.edited_by, edited_at = NEW.edited_at
+       SET geom = NEW.geom, source = NEW.source, edited_by = NEW.edited_by, edited_at = NEW.edited_at, remark = NEW.remark
      WHERE id = OLD.id;
     PERFORM tunnel_api.note_edit(OLD.survey, 'axis_vertex', OLD.id,
                                  jsonb_build_object('geom', ST_AsEWKT(was.geom), 'source', was.source),

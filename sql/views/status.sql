@@ -26,12 +26,13 @@ COMMENT ON COLUMN tunnel_api.run.job_id IS 'Job of the queue that it was (tunnel
 
 -- Last run of each stage on each kilometre of a survey that was ever loaded or worked on, waits to be loaded or is wanted,
 -- and whether its result is out of date. Load rests on the files that touch the kilometre; what the others rest on, here and on
--- both neighbours, is in tunnel.stage. Those that rest on the axis do so also on its vertices moved by hand, in the kilometre or
--- at most two beyond its ends.
+-- both neighbours, is in tunnel.stage.
 -- A result is stale when one of these came to be since its run began, is stale itself, or is of a stage that never ran here, as
 -- ground in a database that was made before there was that stage. Runs are put in order by their times:
 -- a result commits under a lock that each run takes just before it begins (see queue_lock), so that none which it did not
--- see bears an earlier time.
+-- see bears an earlier time. An edit of a vertex takes no such lock; it shows in the segments, whose planes are not those
+-- of the axis any more (segment_moved), and what rests on them is stale with them. Only those that a vertex moved by hand
+-- can turn are looked at: what a run has moved, its time tells.
 CREATE OR REPLACE FUNCTION tunnel_api.stage_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS TABLE (km integer, step integer, stage text, run_id bigint, outcome text, started_at timestamptz,
                finished_at timestamptz, message text, parameters jsonb, done_at timestamptz, done_parameters jsonb,
@@ -42,7 +43,7 @@ SET jit = off
 SET enable_nestloop = off  -- how few or many rows there are is not known when it is planned
 AS $$
     WITH RECURSIVE stage AS MATERIALIZED (  -- the stages that each rests on, by their numbers: here, and on both neighbours
-        SELECT s.step, s.name, 'axis' = ANY (s.reads) AS of_axis,
+        SELECT s.step, s.name, s.name = 'segments' AS of_segments, 'axis' = ANY (s.reads) AS of_axis,
                ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads) ORDER BY 1) AS here,
                ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads_beside) ORDER BY 1) AS beside
           FROM tunnel.stage s
@@ -77,6 +78,16 @@ AS $$
                                              floor((v.n + 2) * t.spacing / 1000)::integer) AS k (km)
          WHERE s.id = $1
          GROUP BY k.km
+    ), near AS MATERIALIZED (
+        SELECT DISTINCT v.n + i AS n
+          FROM tunnel.axis_vertex v CROSS JOIN generate_series(-2, 1) AS i
+         WHERE v.survey_id = $1 AND v.edited_at IS NOT NULL
+    ), turned AS MATERIALIZED (  -- apart from moved, lest the planner ask segment_moved of all segments first
+        SELECT g.km, g.n, g.vertex_from || g.vertex_to || g.tangent_from || g.tangent_to AS planes
+          FROM near JOIN tunnel.segment g ON g.survey_id = $1 AND g.n = near.n
+         WHERE g.km BETWEEN $2 AND $3
+    ), moved AS (
+        SELECT DISTINCT t.km FROM turned t WHERE tunnel_api.segment_moved($1, t.n, t.planes)
     ), cell AS MATERIALIZED (
         SELECT k.km, s.step, d.started_at, d.finished_at
           FROM kilometre k CROSS JOIN stage s
@@ -101,7 +112,7 @@ AS $$
                            WHEN 1 THEN format('%s never ran', l.name)
                            ELSE format('%s of kilometre %s ran since', l.name, c.km + i.late / 1000 - 3)
                        END
-                   WHEN s.of_axis AND e.edited_at > c.started_at THEN 'axis edited since'
+                   WHEN s.of_segments AND m.km IS NOT NULL THEN 'axis edited since'
                END AS reason
           FROM cell c
           JOIN stage s ON s.step = c.step
@@ -109,6 +120,7 @@ AS $$
           LEFT JOIN stage l ON l.step = i.late % 1000
           LEFT JOIN pending p ON p.km = c.km
           LEFT JOIN edit e ON e.km = c.km
+          LEFT JOIN moved m ON m.km = c.km
     ), ripple AS (  -- what is stale, and what rests on it
         SELECT d.km, d.step FROM direct d WHERE d.reason IS NOT NULL
          UNION
@@ -161,3 +173,31 @@ COMMENT ON COLUMN tunnel_api.stage_status.done_at IS 'End of the last successful
 COMMENT ON COLUMN tunnel_api.stage_status.counts IS 'What the last run counted';
 COMMENT ON COLUMN tunnel_api.stage_status.stale IS 'True when what the result rests on has changed since it was made';
 COMMENT ON COLUMN tunnel_api.stage_status.reason IS 'Why it is stale';
+
+-- What a reader of the results is to know: notes of the stages whose results are in the database, and points that were left out
+-- of files. A fifth of a scan's points is noise only where the filter does not suit the scan: it is made for those that strike
+-- nothing (dust, edges, people), which are a few percent.
+CREATE OR REPLACE VIEW tunnel_api.remark AS
+SELECT 4 * r.id AS id, r.survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file, r.counts ->> 'note' AS remark
+  FROM (SELECT DISTINCT ON (d.survey_id, d.km, d.stage) d.*
+          FROM tunnel.run d
+         WHERE d.outcome = 'done' AND d.km IS NOT NULL
+         ORDER BY d.survey_id, d.km, d.stage, d.started_at DESC, d.id DESC) r
+  JOIN tunnel.survey s ON s.id = r.survey_id
+ WHERE r.counts ? 'note'
+ UNION ALL
+SELECT 4 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, format('%s points (%s %%) left out: %s', w.points,
+       round(100 * w.points / greatest(f.points - f.outside, 1)::numeric, 2), w.why)
+  FROM tunnel.scan_file f
+  JOIN tunnel.survey s ON s.id = f.survey_id
+ CROSS JOIN LATERAL (VALUES
+       (1, f.invalid, 0.0, 'a coordinate, their time or their intensity is no number'),
+       (2, f.unposed, 0.0, 'the scanner''s position is not known'),
+       (3, f.noise, 0.2, 'they count as noise; is the scan too sparse for load --noise-points?')) AS w (k, points, share, why)
+ WHERE w.points > w.share * (f.points - f.outside);
+COMMENT ON VIEW tunnel_api.remark IS
+    'What a reader of the results is to know: notes of the stages by kilometre, and points that were left out by file';
+COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file';
+COMMENT ON COLUMN tunnel_api.remark.stage IS 'Stage that says so';
+COMMENT ON COLUMN tunnel_api.remark.file IS 'Name of the scan file; NULL for a kilometre';
+COMMENT ON COLUMN tunnel_api.remark.remark IS 'What is to be known';

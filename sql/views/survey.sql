@@ -33,14 +33,17 @@ COMMENT ON COLUMN tunnel_api.survey.reference IS
 
 CREATE OR REPLACE VIEW tunnel_api.file AS
 SELECT f.id, f.survey_id, s.name AS survey, f.name, f.path, f.checksum, f.bytes, f.points, f.noise, f.outside, f.thinned,
-       f.kept, f.chainage_from, f.chainage_to, f.extent, f.srid, f.loaded_at
+       f.kept, f.chainage_from, f.chainage_to, f.extent, f.srid, f.loaded_at, f.invalid, f.unposed
   FROM tunnel.scan_file f
   JOIN tunnel.survey s ON s.id = f.survey_id;
 COMMENT ON VIEW tunnel_api.file IS 'Scan files loaded, with what was dropped of each';
 COMMENT ON COLUMN tunnel_api.file.checksum IS 'SHA-256 of the file';
-COMMENT ON COLUMN tunnel_api.file.points IS 'Points in the file = noise + outside + thinned + kept';
+COMMENT ON COLUMN tunnel_api.file.points IS 'Points in the file = invalid + outside + unposed + noise + thinned + kept';
 COMMENT ON COLUMN tunnel_api.file.noise IS 'Points dropped as isolated (Xu et al., 2018, section II-D)';
 COMMENT ON COLUMN tunnel_api.file.outside IS 'Points dropped as too far from the axis or beyond its ends';
+COMMENT ON COLUMN tunnel_api.file.invalid IS 'Points dropped as their coordinates, time or intensity are no numbers';
+COMMENT ON COLUMN tunnel_api.file.unposed IS
+    'Points dropped as the scanner''s position is not known: outside the trajectory, in its gaps, or of a scan without a station';
 COMMENT ON COLUMN tunnel_api.file.thinned IS 'Points dropped by thinning to survey density';
 
 -- The key is the row's place in its partition: loading or a stage that rewrites the kilometre deals it out anew.
@@ -81,7 +84,7 @@ COMMENT ON COLUMN tunnel_api.axis.edited IS 'Vertices placed by hand';
 CREATE OR REPLACE VIEW tunnel_api.axis_vertex AS
 SELECT v.id, v.survey_id, s.name AS survey, v.n, v.km, v.n * t.spacing AS chainage,
        (SELECT l.label FROM tunnel_api.stationing(t.id, v.n * t.spacing) l) AS label, v.points, v.source, v.edited_by, v.edited_at,
-       v.geom::public.geometry AS geom
+       v.geom::public.geometry AS geom, v.remark
   FROM tunnel.axis_vertex v
   JOIN tunnel.survey s ON s.id = v.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id;
@@ -90,6 +93,8 @@ COMMENT ON VIEW tunnel_api.axis_vertex IS
 COMMENT ON COLUMN tunnel_api.axis_vertex.n IS 'Number: the vertex stands at chainage n × spacing of the given axis';
 COMMENT ON COLUMN tunnel_api.axis_vertex.points IS 'Points averaged';
 COMMENT ON COLUMN tunnel_api.axis_vertex.source IS 'measured, interpolated or edited (by hand)';
+COMMENT ON COLUMN tunnel_api.axis_vertex.remark IS
+    'Why the place that was measured is not taken, if it is not: it did not come to rest, or lies off where its neighbours lead';
 COMMENT ON COLUMN tunnel_api.axis_vertex.edited_by IS 'Who moved it last, set by the database';
 COMMENT ON COLUMN tunnel_api.axis_vertex.edited_at IS 'When it was moved last, set by the database';
 

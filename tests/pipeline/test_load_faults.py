@@ -48,11 +48,31 @@ class TestBadInput:
         xyz = tube(980, 1020, 100, seed=1)
         path = write(tmp_path / "a.laz", xyz)
         las = laspy.read(path)
-        las.gps_time[:7] += 100.0
-        las.gps_time[7:10] = -12.5
+        las.gps_time[:700] += 100.0
+        las.gps_time[700:1000] = -12.5
         las.write(path)
-        self.refused(conn, [path], r"gps_time of 10 points .* 12\.500 s before its start and up to .* s after its end")
+        self.refused(
+            conn, [path], r"gps_time of 1000 points .* 12\.500 s before its start and up to .* s after its end.*--max-left"
+        )
         load(conn, [write(path, xyz)])
+
+    def test_a_few_points_of_unknown_scanner_or_without_a_number_are_left_out(
+        self, conn: psycopg.Connection, tmp_path: Path
+    ) -> None:
+        add_survey(conn, platform="mobile")
+        path = write(tmp_path / "a.laz", tube(980, 1020, 100, seed=1))
+        las = laspy.read(path)
+        las.gps_time[:7] += 100.0
+        las.gps_time[7] = np.nan
+        las.Amplitude[8:12] = np.nan
+        las.write(path)
+        (loaded,) = load(conn, [path])
+        assert (loaded.unposed, loaded.invalid) == (7, 5)
+        assert loaded.points == sum((loaded.noise, loaded.outside, loaded.invalid, loaded.unposed, loaded.thinned, loaded.kept))
+        remarks = conn.execute("SELECT file, remark FROM tunnel_api.remark ORDER BY remark").fetchall()
+        assert [name for name, _ in remarks] == ["a.laz", "a.laz"]
+        assert remarks[0][1].startswith("5 points") and "no number" in remarks[0][1]  # noqa: PT018
+        assert remarks[1][1].startswith("7 points") and "position is not known" in remarks[1][1]  # noqa: PT018
 
     def test_scan_without_a_station(self, survey: psycopg.Connection, tmp_path: Path) -> None:
         path = write(tmp_path / "a.laz", tube(980, 1020, 50, seed=1), scan_id=9)

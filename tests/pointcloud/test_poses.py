@@ -1,7 +1,7 @@
-import numpy as np
-import pytest
+import re
 
-from tunneldb.errors import UserError
+import numpy as np
+
 from tunneldb.pointcloud.poses import PoseFaults, PoseModel
 from tunneldb.pointcloud.reader import Points
 
@@ -34,8 +34,25 @@ def test_stations_by_scan() -> None:
 
 
 def test_times_outside_say_how_much_and_how_many() -> None:
-    with pytest.raises(UserError, match=r"a\.laz: gps_time of 3 points .* 2\.500 s before .* 10\.000 s after"):
-        TRACK.positions(points([7.5, 9.0, 15.0, 50.0]), "a.laz")
+    outside = points([7.5, 9.0, 15.0, 50.0, np.nan])
+    faults = TRACK.faults(outside)
+    assert re.search(r"gps_time of 4 points .* 2\.500 s before .* 10\.000 s after", faults.text())
+    assert faults.points == 4
+    assert TRACK.known(outside).tolist() == [False, False, True, False, False]
+    np.testing.assert_array_equal(np.isnan(TRACK.positions(outside)).all(axis=1), ~TRACK.known(outside))
+
+
+def test_nothing_is_interpolated_over_a_gap() -> None:
+    time = np.concatenate([np.arange(0.0, 5.0, 0.1), np.arange(9.0, 12.0, 0.1)])
+    model = PoseModel.from_trajectory(time, np.column_stack([time, time, time]))
+    np.testing.assert_allclose(model.gaps, [[4.9, 9.0]])
+    within = points([4.85, 4.9, 5.0, 8.9, 9.0, 11.0])
+    assert model.known(within).tolist() == [True, True, False, False, True, True]
+    assert (model.faults(within).gap, model.faults(within).outside) == (2, 0)
+    assert "2 points were measured in gaps" in model.faults(within).text()
+    # a trajectory of a pose each two seconds has no gap of four
+    slow = PoseModel.from_trajectory(np.array([0.0, 2, 4, 6, 10, 12]), np.zeros((6, 3)))
+    assert len(slow.gaps) == 0
 
 
 def test_rounding_of_times_is_borne() -> None:
@@ -43,8 +60,9 @@ def test_rounding_of_times_is_borne() -> None:
 
 
 def test_unknown_scan_is_named() -> None:
-    with pytest.raises(UserError, match=r"no station for scan_id 4 \(1 points\), 9 \(2 points\)"):
-        STATIONS.positions(points([0] * 4, [9, 3, 4, 9]))
+    unknown = points([0] * 4, [9, 3, 4, 9])
+    assert "no station for scan_id 4 (1 points), 9 (2 points)" in STATIONS.faults(unknown).text()
+    assert np.isnan(STATIONS.positions(unknown)[:, 0]).tolist() == [True, False, True, True]
 
 
 def test_scan_numbers_far_apart() -> None:

@@ -234,8 +234,10 @@ def test_nan_intensity(tmp_path: Path) -> None:
     values = np.ones(100)
     values[[41, 60]] = np.nan
     write(tmp_path / "a.laz", 100, amplitude=values)
-    with pytest.raises(UserError, match="Amplitude is NaN or infinite at point 42 and at 1 more"):
-        list(read_chunks(tmp_path / "a.laz", "Amplitude"))
+    (points,) = read_chunks(tmp_path / "a.laz", "Amplitude")
+    assert np.flatnonzero(np.isnan(points.intensity)).tolist() == [41, 60]
+    assert np.flatnonzero(~points.finite(time=True, intensity=True)).tolist() == [41, 60]
+    assert points.finite(time=True, intensity=False) is None
 
 
 def test_nan_coordinates(tmp_path: Path) -> None:

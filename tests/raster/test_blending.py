@@ -41,7 +41,7 @@ def scan(stations: list[float], lean: float, max_range: float = 40.0) -> tuple[W
     points = Points(xyz, np.zeros(count), which.astype(np.int32), raw, np.zeros(count, np.uint8))
     place = np.column_stack([stations, np.zeros(len(stations)), np.full(len(stations), 100.0)])
     poses = PoseModel.from_stations(np.arange(len(stations)), place)
-    observer = Observer.of(ROUND, 0, (0.5, 1.2), Radiometer("reflectance", poses, None, 75.0, max_range), FLOOR)
+    observer = Observer.of(ROUND, 0, (0.5, 1.2), Radiometer("reflectance", poses, None, 75.0, max_range, 0.0), FLOOR)
     with Accumulator(GRID) as image:
         pixels, _ = Projector.of(observer, GRID, ROUGHNESS).project(points)
         image.add(pixels, count)

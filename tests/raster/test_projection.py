@@ -29,7 +29,7 @@ ORIGIN = np.array([512_000.0, 4_104_000.0, 414.0])
 CURVE = ReferenceCurve.from_rows(np.array([0.5, 2.0, 3.0, 4.5, 9.0]), np.array([31.0, 36.0, 34.0, 30.0, 22.0]))
 FAR = ReferenceCurve.from_rows(np.array([0.5, 2.0, 5.0, 60.0]), np.array([31.0, 36.0, 30.0, 5.0]))
 ROUGHNESS = 14.0
-MAX_INCIDENCE, MAX_RANGE = 70.0, 8.0
+MAX_INCIDENCE, MAX_RANGE, MAX_OUTSIDE = 70.0, 8.0, 0.05
 DEPTH = 0.3, 0.4
 
 
@@ -103,7 +103,9 @@ def observer(kind: str, mobile: bool, curve: ReferenceCurve = FAR) -> Observer:
         return Observer.of(SURFACE, KM, DEPTH, None, FLOOR)
     reference = None if kind == "reflectance" else curve
     typed: Kind = kind  # type: ignore[assignment]
-    return Observer.of(SURFACE, KM, DEPTH, Radiometer(typed, poses(mobile), reference, MAX_INCIDENCE, MAX_RANGE), FLOOR)
+    return Observer.of(
+        SURFACE, KM, DEPTH, Radiometer(typed, poses(mobile), reference, MAX_INCIDENCE, MAX_RANGE, MAX_OUTSIDE), FLOOR
+    )
 
 
 def grid(pixel: float = 0.02) -> Grid:
@@ -141,7 +143,9 @@ def test_each_point_is_what_the_steps_in_numpy_make_of_it(kind: str, mobile: boo
             corrected -= CURVE(distance)
             lining = use & ~look.floor.covers(unrolled.chainage, unrolled.arc)
             assert tally.lining == lining.sum()
-            assert tally.outside == CURVE.outside(distance[lining]).sum()
+            beyond = lining & CURVE.outside(distance)
+            assert tally.outside == beyond.sum()
+            use &= ~beyond
             assert (tally.nearest, tally.farthest) == pytest.approx((distance[lining].min(), distance[lining].max()))
     assert 5_000 < use.sum() < 55_000
     assert tally.used == use.sum()
@@ -227,14 +231,18 @@ def test_a_pixel_is_the_weighted_mean_of_its_points(monkeypatch: pytest.MonkeyPa
     assert window.corrected[row, column] == pytest.approx(np.average(pixels.corrected[inside], weights=weight), abs=LEVEL)
 
 
-def test_points_of_unknown_scanner_position_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("mobile", [True, False])
+def test_points_of_unknown_scanner_position_go_nowhere(mobile: bool) -> None:
     points = cloud(20_000, 7)
-    points.time[15_000:] += 2.5
-    with pytest.raises(UserError, match=r"0\.laz: gps_time of \d+ points is outside the trajectory, up to 2\.[45]\d\d s after"):
-        read(monkeypatch, observer("amplitude", True), [[points]])
-    points.scan_id[points.scan_id == 12] = 13
-    with pytest.raises(UserError, match=r"0\.laz: no station for scan_id 13 \(\d+ points\)"):
-        read(monkeypatch, observer("amplitude", False), [[points]])
+    known, _ = Projector.of(observer("amplitude", mobile), grid(), ROUGHNESS).project(points)
+    lost = np.zeros(len(points), bool)
+    lost[15_000:15_010] = True
+    points.time[lost] = [LENGTH + 2.5] * 5 + [np.nan] * 5
+    points.scan_id[lost] = 13
+    expected = np.where(lost, -1, known.column[: len(points)].copy())
+    pixels, tally = Projector.of(observer("amplitude", mobile), grid(), ROUGHNESS).project(points)
+    np.testing.assert_array_equal(pixels.column[: len(points)], expected)
+    assert 0 < tally.lost <= 10
 
 
 def test_a_time_just_beyond_the_trajectory_is_that_of_its_end(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,9 +13,11 @@ from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.store.survey import get_survey
+from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
+    import psycopg
+
     from tunneldb.store.scan_files import Loaded
 
 
@@ -56,6 +58,14 @@ if TYPE_CHECKING:
     metavar="M",
     help="Points farther from the given axis are left out.",
 )
+@click.option(
+    "--max-left-out",
+    type=click.FloatRange(0.0, 100.0),
+    default=5.0,
+    show_default=True,
+    metavar="PERCENT",
+    help="Points of unknown scanner position, or whose time or intensity is NaN, are left out; a file with more is refused.",
+)
 @click.pass_obj
 def load(
     settings: Settings,
@@ -65,6 +75,7 @@ def load(
     noise_points: int,
     noise_diameter: float,
     max_distance: float,
+    max_left_out: float,
 ) -> None:
     """Load LAS, LAZ and E57 FILES into SURVEY.
 
@@ -74,7 +85,7 @@ def load(
     from tunneldb.pipeline.load import load_files
     from tunneldb.pointcloud.selection import FilterSettings
 
-    chosen = FilterSettings(density_of(density), noise_points, noise_diameter, max_distance)
+    chosen = FilterSettings(density_of(density), noise_points, noise_diameter, max_distance, max_left_out / 100.0)
     done: list[Loaded] = []
     tell(survey=survey, files=done)
     with connect(settings.dsn) as connection:
@@ -85,7 +96,7 @@ def load(
                     done.append(file)  # noqa: PERF402 - those before a failure are in the summary too
         finally:
             if done:
-                _summary(done)
+                _summary(connection, found, done)
 
 
 def density_of(text: str) -> float | None:
@@ -101,18 +112,24 @@ def density_of(text: str) -> float | None:
     return value
 
 
-def _summary(done: list[Loaded]) -> None:
-    header = ["file", "", "points", "points/s", "noise", "outside", "thinned", "kept"]
+def _summary(connection: psycopg.Connection[Any], survey: Survey, done: list[Loaded]) -> None:
+    header = ["file", "", "points", "points/s", "noise", "outside", "left out", "thinned", "kept"]
     rows = [
         [
             file.name,
             file.state,
             *map(_number, (file.points, file.points / file.seconds if file.seconds else None)),
-            *map(_number, (file.noise, file.outside, file.thinned, file.kept)),
+            *map(_number, (file.noise, file.outside, file.invalid + file.unposed, file.thinned, file.kept)),
         ]
         for file in done
     ]
-    print_table(header, rows, right=range(2, 8))
+    print_table(header, rows, right=range(2, 9))
+    for name, remark in connection.execute(
+        "SELECT file, remark FROM tunnel_api.remark WHERE survey_id = %s AND file = ANY (%s) ORDER BY file, remark",
+        [survey.id, [file.name for file in done]],
+    ).fetchall():
+        click.echo(f"{name}: {remark}", err=True)
+    connection.rollback()
 
 
 def _number(value: float | None) -> str:

@@ -77,6 +77,7 @@ def examine(dsn: str | None) -> Iterator[Finding]:
         yield from _work(connection)
         yield from _queue(connection)
         yield from _stale(connection)
+        yield from _remarks(connection)
         if dsn is None:
             yield _space()
 
@@ -219,6 +220,15 @@ def _queue(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
     queued, workers = row
     if queued and not workers:
         yield Finding("note", "queue", f"{queued} jobs wait, and no worker serves them", "tunneldb worker")
+
+
+def _remarks(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+    """What a reader of the results is to know."""
+    for survey, where, remark in connection.execute(
+        "SELECT survey, coalesce(file, format('km %s, %s', km, stage)), remark FROM tunnel_api.remark"
+        " ORDER BY survey, km, stage, file"
+    ).fetchall():
+        yield Finding("note", "results", f"{survey}, {where}: {remark}")
 
 
 def _stale(connection: psycopg.Connection[Any]) -> Iterator[Finding]:

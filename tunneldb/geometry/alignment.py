@@ -152,7 +152,7 @@ def locate_points(
         Segment from which to look for each point; -1 for that of the point before.
     chainage, distance : (n,) float arrays
         Overwritten: chainage and distance from the axis in the point's plane, m; beyond the ends those of the nearest end,
-        infinitely far.
+        infinitely far. No distances are computed where the array is empty.
     segment : (n,) int32 array
         Overwritten: place of the segment, beyond the ends of the nearest one.
     """
@@ -168,10 +168,12 @@ def locate_points(
             nearest = nearest_segment(segments, x, y, z)
             last = 2 * nearest >= segments.shape[0]
             chainage[i] = (number[nearest] + (1 if last else 0)) * spacing
-            distance[i] = np.inf
             segment[i] = nearest
+            if distance.shape[0] > 0:
+                distance[i] = np.inf
             continue
-        ox, oy, oz, _, _, _, _, _ = frame_of(segments, k, f)
         chainage[i] = (number[k] + f) * spacing
-        distance[i] = np.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2)
         segment[i] = k
+        if distance.shape[0] > 0:
+            ox, oy, oz, _, _, _, _, _ = frame_of(segments, k, f)
+            distance[i] = np.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2)

@@ -110,9 +110,9 @@ class Calibration:
         return "hardly any lining was seen by two scans: the range curve rests on its being alike along the tunnel, within 5 m"
 
 
-def observe_sample(points: Points, observer: Observer, survey: str) -> Sample:
+def observe_sample(points: Points, observer: Observer) -> Sample:
     """Observe points of survey density, and check their ranges against the reference curve before files are read."""
-    seen = observer.observe(points, f"survey {survey}")
+    seen = observer.observe(points)
     if not seen.lining.any():
         raise UserError(
             f"no point of kilometre {observer.km} lies on the lining: within {observer.tolerance:g} m of the sections and seen"
@@ -123,7 +123,9 @@ def observe_sample(points: Points, observer: Observer, survey: str) -> Sample:
         span = RangeSpan()
         assert seen.observations is not None
         span.add(*range_span(seen.observations, seen.lining, observer.radiometer.reference))
-        span.require(observer.radiometer.reference)
+        span.require(observer.radiometer)
+        within = ~observer.radiometer.reference.outside(seen.observations.range_m.astype(np.float64))
+        seen = replace(seen, use=seen.use & within, lining=seen.lining & within)
     return Sample(seen, points.scan_id, seen.lining & ~observer.floor.covers(seen.chainage, seen.arc, CORNER))
 
 
@@ -148,7 +150,7 @@ def calibrate(points: Points, observer: Observer, drawn: list[Polygon], survey: 
     UserError
         If nothing is seen of the lining, it lies outside the reference curve, or its own curve can't be found on it.
     """
-    view = observe_sample(points, observer, survey)
+    view = observe_sample(points, observer)
     if not own_curve:
         return Calibration(observer, view, roughness_of(view, drawn), None)
     assert observer.radiometer is not None

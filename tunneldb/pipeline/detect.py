@@ -159,7 +159,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
     surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
     grid = kilometre_grid(surface, km, values["image.pixel"])
     files = sources(conn, survey, km)
-    radiometer = load_radiometer(conn, survey, values["intensity.max_incidence"], values["intensity.max_range"])
+    radiometer = load_radiometer(conn, survey, values)
     beyond = grid.halo * grid.pixel
     depth = values["lining.tolerance"], values["lining.recess"]
     observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, km, beyond), beyond)
@@ -260,8 +260,8 @@ def _save(
     }
 
 
-def load_radiometer(conn: psycopg.Connection[Any], survey: Survey, max_incidence: float, max_range: float) -> Radiometer | None:
-    """Read what a survey's intensity is corrected with; None when it has none.
+def load_radiometer(conn: psycopg.Connection[Any], survey: Survey, values: Mapping[str, float]) -> Radiometer | None:
+    """Read what a survey's intensity is corrected with, by the stages' parameters; None when it has none.
 
     A range curve that is to be found on the lining is UNKNOWN at first: see :func:`tunneldb.pipeline.calibration.calibrate`.
     """
@@ -277,7 +277,8 @@ def load_radiometer(conn: psycopg.Connection[Any], survey: Survey, max_incidence
             " distance: add the survey with --reference CSV (range_m,intensity_db), or with --reference auto to have it"
             " found on the lining, or take a reflectance dimension"
         )
-    return Radiometer(kind, load_poses(conn, survey), reference, max_incidence, max_range)
+    limits = (values[f"intensity.{name}"] for name in ("max_incidence", "max_range", "max_outside"))
+    return Radiometer(kind, load_poses(conn, survey), reference, *limits)
 
 
 def load_floor(conn: psycopg.Connection[Any], survey: Survey, km: int, halo: float) -> Floor:

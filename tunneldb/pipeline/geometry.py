@@ -13,6 +13,9 @@ from tunneldb.pipeline.stages import Counts, Progress
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
+MOST_NAMED = 5
+"""Rejected vertices that are named, at the most."""
+
 FEW_POINTS = 10_000
 """A kilometre with fewer points than this, at the end of a tunnel, may be without a section of its own."""
 
@@ -21,21 +24,24 @@ def axis(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping
     """Stage 1 of Gonçalves et al. (2012): the axis; vertices edited by hand (stage 2) stay."""
     _place_vertices(conn, survey)
     passes = conn.execute(
-        "SELECT moved, measured FROM tunnel_api.axis_refine(%s, %s, %s, %s, %s, %s)",
-        [
-            survey.id,
-            km,
-            values["axis.half_width"],
-            values["axis.angle_step"],
-            values["axis.tolerance"],
-            int(values["axis.max_iterations"]),
-        ],
+        """
+        SELECT moved, measured FROM tunnel_api.axis_refine(
+            %(survey)s, %(km)s, half_width => %(half_width)s, angle_step => %(angle_step)s, tolerance => %(tolerance)s,
+            max_iterations => %(max_iterations)s::int, max_deviation => %(max_deviation)s, max_rejected => %(max_rejected)s)
+        """,
+        {"survey": survey.id, "km": km, **{name.removeprefix("axis."): value for name, value in values.items()}},
     ).fetchall()
-    moved = float(passes[-1][0])
-    if moved >= values["axis.tolerance"]:
+    moved, measured = passes[-1]
+    rejected = conn.execute(
+        "SELECT label, remark FROM tunnel_api.axis_vertex WHERE survey_id = %s AND km = %s AND remark IS NOT NULL ORDER BY n",
+        [survey.id, km],
+    ).fetchall()
+    named = ", ".join(f"the vertex at {label} {remark}" for label, remark in rejected[:MOST_NAMED])
+    named += f" and {len(rejected) - MOST_NAMED} more" if len(rejected) > MOST_NAMED else ""
+    if moved >= values["axis.tolerance"] or len(rejected) > max(1, values["axis.max_rejected"] * measured):
         raise UserError(
-            f"the axis of kilometre {km} does not come to rest: it still moves by {moved:.3f} m after {len(passes)} passes;"
-            " look at the points and the given axis there, or set axis.tolerance or axis.max_iterations"
+            f"the axis of kilometre {km} was not found in {len(passes)} passes: {named or f'it still moves by {moved:.3f} m'};"
+            " look at the points and the given axis there, or let more be interpolated by axis.max_rejected"
         )
     vertices = dict(
         conn.execute(
@@ -43,9 +49,10 @@ def axis(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping
             [survey.id, km],
         ).fetchall()
     )
-    if not passes[-1][1] and not vertices.get("edited"):
+    if not measured and not vertices.get("edited"):
         raise UserError(f"kilometre {km} has too few points near the axis' vertices to find the tunnel's centre")
-    return {"iterations": len(passes), "moved": moved, **vertices}
+    note = {"rejected": len(rejected), "note": f"{named}: interpolated between its neighbours"} if rejected else {}
+    return {"iterations": len(passes), "moved": moved, **vertices, **note}
 
 
 def _place_vertices(conn: psycopg.Connection[Any], survey: Survey) -> None:

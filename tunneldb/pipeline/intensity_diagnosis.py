@@ -10,11 +10,12 @@ from typing import Any, cast
 import numpy as np
 import psycopg
 from numpy.typing import NDArray
+from shapely import Polygon
 
 from tunneldb.arrays import Float, Int32, Single
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.pipeline.calibration import UNKNOWN, find_range_curve, observe_sample, roughness_of
+from tunneldb.pipeline.calibration import UNKNOWN, Sample, find_range_curve, observe_sample, roughness_of
 from tunneldb.pipeline.detect import ASIDE, load_floor, load_radiometer
 from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_scans
 from tunneldb.pointcloud.reader import Points, read_chunks, read_header
@@ -67,45 +68,72 @@ def diagnose_survey(
     share = max(1, SAMPLE // len(kilometres))
     diagnoses = []
     for km in kilometres:
-        diagnoses.append(_diagnose_kilometre(conn, survey, km, values, share))
+        diagnoses.append(compute_diagnosis(load_inputs(conn, survey, km, values), share))
         progress(1)
     numbers = ", ".join(map(str, kilometres))
     return pool(f"{survey.name}, kilometre {numbers}: {survey.intensity_kind}", diagnoses)
 
 
-def _diagnose_kilometre(
-    conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], most: int
-) -> Diagnosis:
+@dataclass(frozen=True)
+class DiagnosisInputs:
+    """What the diagnosis of a kilometre rests on.
+
+    Attributes
+    ----------
+    title : str
+        What is looked at.
+    kind : {'amplitude', 'reflectance', 'linear'}
+        What the intensity is.
+    measured : ReferenceCurve or None
+        Curve measured on a target, where the kind needs one and it was given.
+    observer : Observer
+    view : Sample
+        Lining points of survey density.
+    regions : list of Polygon
+        Those drawn as homogeneous.
+    """
+
+    title: str
+    kind: Kind
+    measured: ReferenceCurve | None
+    observer: Observer
+    view: Sample
+    regions: list[Polygon]
+
+
+def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float]) -> DiagnosisInputs:
+    """Load what the diagnosis of a kilometre rests on."""
     kind = cast(Kind, survey.intensity_kind)
     measured = load_reference(conn, survey) if needs_reference(kind) else None
     surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
     # Without a curve the lining itself is asked, whether or not detection is to go by it.
-    radiometer = load_radiometer(
-        conn,
-        survey if measured else replace(survey, reference="auto"),
-        values["intensity.max_incidence"],
-        values["intensity.max_range"],
-    )
+    radiometer = load_radiometer(conn, survey if measured else replace(survey, reference="auto"), values)
     depth = values["lining.tolerance"], values["lining.recess"]
     observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, km, 0.0))
-    view = observe_sample(sample(conn, survey, km), observer, survey.name)
-    found, refused = _attempt(lambda: find_range_curve(view, observer), view.observations.raw_db[view.telling])
-    if needs_reference(kind) and measured is None:
+    view = observe_sample(sample(conn, survey, km), observer)
+    return DiagnosisInputs(f"kilometre {km}", kind, measured, observer, view, load_regions(conn, survey, km, "homogeneous"))
+
+
+def compute_diagnosis(inputs: DiagnosisInputs, most: int) -> Diagnosis:
+    """Look at a kilometre's sample; of its points near a scanner no more than ``most`` are kept to be shown."""
+    view = inputs.view
+    found, refused = _attempt(lambda: find_range_curve(view, inputs.observer), view.observations.raw_db[view.telling])
+    if needs_reference(inputs.kind) and inputs.measured is None:
         roughness, note = found.roughness if found else None, None
         view = view.along(found.curve if found else UNKNOWN)
     else:
-        known = roughness_of(view, load_regions(conn, survey, km, "homogeneous"))
+        known = roughness_of(view, inputs.regions)
         roughness, note = known.sigma, known.note
     near = np.flatnonzero(view.telling)
     near = near[:: max(1, len(near) // most)]
     seen = view.observations
     return _diagnosis(
-        f"kilometre {km}",
-        kind,
+        inputs.title,
+        inputs.kind,
         _Points(*(v[near].astype(np.float64) for v in (seen.range_m, seen.cosine, seen.raw_db, seen.distance_db))),
         roughness,
         found,
-        measured,
+        inputs.measured,
         [note, refused],
     )
 

@@ -21,6 +21,7 @@ def settings_of(parameters: Mapping[str, Any]) -> FilterSettings:
         int(value["load.noise_points"]),
         float(value["load.noise_diameter"]),
         float(value["load.max_distance"]),
+        float(value["load.max_left_out"]),
     )
 
 
@@ -31,6 +32,7 @@ def parameters_of(settings: FilterSettings) -> dict[str, Any]:
         "load.noise_points": settings.noise_points,
         "load.noise_diameter": settings.noise_diameter,
         "load.max_distance": settings.max_distance,
+        "load.max_left_out": settings.max_left_out,
     }
 
 

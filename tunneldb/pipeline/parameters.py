@@ -35,6 +35,12 @@ PARAMETERS: dict[str, Parameter] = {
     "axis.angle_step": Parameter(5.0, 1.0, 20.0, "°", "width of the angular classes that place a vertex"),
     "axis.tolerance": Parameter(0.002, 1e-5, 1.0, "m", "the axis rests when no vertex moves by as much in a pass"),
     "axis.max_iterations": Parameter(20, 1, 100, "", "passes at the most", whole=True),
+    "axis.max_deviation": Parameter(
+        0.5, 0.05, 10.0, "m", "a vertex that lies farther off where its neighbours lead is interpolated"
+    ),
+    "axis.max_rejected": Parameter(
+        0.3, 0.0, 1.0, "", "share of the vertices that may be interpolated for that or as they do not rest; one always may"
+    ),
     "section.angle_step": Parameter(5.0, 1.0, 20.0, "°", "width of an angular class; must divide 180"),
     "section.half_width": Parameter(0.15, 0.01, 2.5, "m", "half the thickness of a section's slab, to begin with"),
     "section.max_half_width": Parameter(2.5, 0.01, 2.5, "m", "widest half of a slab where the classes don't fill"),
@@ -53,6 +59,9 @@ PARAMETERS: dict[str, Parameter] = {
     "image.pixel": Parameter(0.02, 0.005, 0.5, "m", "edge of a pixel of the unrolled images"),
     "intensity.max_incidence": Parameter(75.0, 30.0, 89.0, "°", "points seen more slantingly are left out of the images"),
     "intensity.max_range": Parameter(40.0, 2.0, 1000.0, "m", "points seen from farther are left out of the images"),
+    "intensity.max_outside": Parameter(
+        0.05, 0.0, 1.0, "", "share of the lining's points that may lie outside the reference curve, and are left out"
+    ),
     "appendage.distance": Parameter(0.03, 0.005, 0.5, "m", "what stands off the local plane by more hangs on the lining"),
     "leak.min_area": Parameter(0.05, 0.0, 100.0, "m²", "smaller leaks are left out"),
 }

@@ -56,8 +56,8 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
     Returns
     -------
     dict
-        ``file``, ``state`` (see `tunneldb.store.scan_files.Loaded`), ``points``, ``noise``, ``outside``, and ``kilometres``,
-        those that wait to be loaded with it.
+        ``file``, ``state`` (see `tunneldb.store.scan_files.Loaded`), ``points``, ``noise``, ``outside``, ``invalid`` and
+        ``unposed`` if any, and ``kilometres``, those that wait to be loaded with it.
 
     Raises
     ------
@@ -77,12 +77,21 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
         read = reading.read([header], [])
         files, state = [file.id for file in read], read[0].state
     row = conn.execute(
-        "SELECT points, noise, outside, ARRAY(SELECT DISTINCT km FROM tunnel.file_km"
+        "SELECT points, noise, outside, invalid, unposed, ARRAY(SELECT DISTINCT km FROM tunnel.file_km"
         " WHERE file_id = ANY (%s) AND loaded_at IS NULL ORDER BY km) FROM tunnel.scan_file WHERE id = %s",
         [files, files[0]],
     ).fetchone()
     assert row is not None
-    return {"file": path.name, "state": state, "points": row[0], "noise": row[1], "outside": row[2], "kilometres": row[3]}
+    left_out = {name: count for name, count in (("invalid", row[3]), ("unposed", row[4])) if count}
+    return {
+        "file": path.name,
+        "state": state,
+        "points": row[0],
+        "noise": row[1],
+        "outside": row[2],
+        **left_out,
+        "kilometres": row[5],
+    }
 
 
 @dataclass(frozen=True)

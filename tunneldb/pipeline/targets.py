@@ -19,7 +19,7 @@ from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.run import loaded_kilometres
-from tunneldb.pointcloud.poses import TIME_TOLERANCE, PoseModel
+from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import CHUNK, Points, ScanSource, read_chunks
 from tunneldb.pointcloud.spool import BINS_PER_METRE, Spool, bin_of, windows
 from tunneldb.store.ledger import stage_run
@@ -161,16 +161,7 @@ class _Place:
 
     def observers(self, points: Points) -> Float:
         """Where the scanner was for each point (n, 3), m; NaN where it isn't known."""
-        observers = np.full((len(points), 3), np.nan)
-        if self.poses is None or len(points) == 0:
-            return observers
-        if self.poses.mobile:
-            first, last = self.poses.time[0] - TIME_TOLERANCE, self.poses.time[-1] + TIME_TOLERANCE
-            known = (points.time >= first) & (points.time <= last)
-        else:
-            known = np.isin(points.scan_id, self.poses.scan_id)
-        observers[known] = self.poses.positions(points.some(known))
-        return observers
+        return np.full((len(points), 3), np.nan) if self.poses is None else self.poses.positions(points)
 
 
 def _if_there(load: Callable[..., Any], conn: psycopg.Connection[Any], survey: Survey) -> Any:

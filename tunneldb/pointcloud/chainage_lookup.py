@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from tunneldb.arrays import Float, Int32, Int64, Intp
-from tunneldb.compiled import kernel
-from tunneldb.geometry.alignment import Alignment
-from tunneldb.geometry.frame import frame_of, locate, nearest_segment, segment_rows, tangents
+from tunneldb.geometry.alignment import Alignment, locate_points
+from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.spool import BINS_PER_METRE, ROW, Rows
@@ -107,37 +104,5 @@ class ChainageLookup:
         """Chainage, distance from the axis (if wanted) and segment of points (n, 3), looked for from segments (n,) on."""
         chainage, distance, segment = np.empty(len(xyz)), np.empty(len(xyz) if distances else 0), np.empty(len(xyz), np.int32)
         a = self.alignment
-        _locate(self.segments, a.number, float(a.spacing), xyz, start, chainage, distance, segment)
+        locate_points(self.segments, a.number, float(a.spacing), xyz, start, chainage, distance, segment)
         return chainage, distance, segment
-
-
-@kernel
-def _locate(
-    segments: Float, number: Int64, spacing: float, xyz: Float, start: Int32, chainage: Float, distance: Float, segment: Int32
-) -> None:  # pragma: no cover - compiled
-    """Write chainage, distance from the axis and segment of points; beyond the ends the nearest end, infinitely far.
-
-    The segment is looked for from the one that start says on; from the last point's where it says -1. No distances are
-    written, and computed, if there is no room for them.
-    """
-    k = -1
-    for i in range(xyz.shape[0]):
-        x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-        if start[i] >= 0:
-            k = start[i]
-        elif k < 0:
-            k = nearest_segment(segments, x, y, z)
-        k, f = locate(segments, number, k, x, y, z)
-        if k < 0:
-            nearest = nearest_segment(segments, x, y, z)
-            last = 2 * nearest >= segments.shape[0]
-            chainage[i] = (number[nearest] + (1 if last else 0)) * spacing
-            segment[i] = nearest
-            if distance.shape[0] > 0:
-                distance[i] = np.inf
-            continue
-        chainage[i] = (number[k] + f) * spacing
-        segment[i] = k
-        if distance.shape[0] > 0:
-            plane = frame_of(segments, k, f)
-            distance[i] = math.sqrt((x - plane[0]) ** 2 + (y - plane[1]) ** 2 + (z - plane[2]) ** 2)

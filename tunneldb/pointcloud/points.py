@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pyproj import CRS
 
-from tunneldb.arrays import Float, Int32, Single, UInt8
+from tunneldb.arrays import Bool, Float, Int32, Single, UInt8
 
 CHUNK = 1_000_000
 
@@ -101,6 +101,19 @@ class Points:
         return Points(
             self.xyz[chosen], self.time[chosen], self.scan_id[chosen], self.intensity[chosen], self.classification[chosen]
         )
+
+    def finite(self, *, time: bool, intensity: bool) -> Bool | None:
+        """Which points have finite coordinates, and a finite time and intensity where these are asked for; None if all have."""
+        wanted: list[Float | Single] = [self.xyz]
+        wanted += [self.time] if time else []
+        wanted += [self.intensity] if intensity else []
+        with np.errstate(over="ignore", invalid="ignore"):
+            if all(np.isfinite(values.sum()) for values in wanted):
+                return None
+        finite = np.ones(len(self), np.bool_)
+        for values in wanted:
+            finite &= np.isfinite(values).reshape(len(self), -1).all(axis=1)
+        return None if finite.all() else finite
 
     @classmethod
     def of(cls, raw: Raw) -> Points:

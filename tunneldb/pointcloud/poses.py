@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from tunneldb.arrays import Float, Int32, Int64
+from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.compiled import point_inner, point_kernel
-from tunneldb.errors import UserError
 from tunneldb.pointcloud.reader import Points
 from tunneldb.threads import in_blocks
 
 # Times in a CSV are rounded; beyond the ends of the trajectory they may be off by this much, s.
 TIME_TOLERANCE = 0.001
+
+# Over a longer interval than both the scanner's place is not interpolated: a trolley that speeds up by 1 m/s² is 0.1 m off
+# in the middle of a second.
+LONGEST_GAP = 1.0  # s
+GAP_INTERVALS = 10  # times the median interval of the trajectory
 
 _BLOCK = 1 << 18  # points at a time
 
@@ -26,6 +31,8 @@ class PoseFaults:
     ----------
     outside : int
         Number of points whose time lies outside the trajectory.
+    gap : int
+        Number of points in its gaps.
     before, after : float
         How far the worst of them lie before its start and after its end, s.
     unknown : dict of int to int
@@ -33,12 +40,18 @@ class PoseFaults:
     """
 
     outside: int = 0
+    gap: int = 0
     before: float = 0.0
     after: float = 0.0
     unknown: dict[int, int] = field(default_factory=dict)
 
+    @property
+    def points(self) -> int:
+        """All of them."""
+        return self.outside + self.gap + sum(self.unknown.values())
+
     def __bool__(self) -> bool:
-        return self.outside > 0 or bool(self.unknown)
+        return self.points > 0
 
     def __add__(self, other: PoseFaults) -> PoseFaults:
         unknown = dict(self.unknown)
@@ -46,18 +59,19 @@ class PoseFaults:
             unknown[scan_id] = unknown.get(scan_id, 0) + count
         return PoseFaults(
             self.outside + other.outside,
+            self.gap + other.gap,
             max(self.before, other.before),
             max(self.after, other.after),
             unknown,
         )
 
-    def error(self, name: str) -> UserError:
-        """One line for the user; `name` is the file."""
+    def text(self) -> str:
+        """What is wrong and what to do, for the user."""
         if self.unknown:
             scans = ", ".join(f"{scan} ({count} points)" for scan, count in sorted(self.unknown.items())[:10])
             more = f" and {len(self.unknown) - 10} more" if len(self.unknown) > 10 else ""
-            return UserError(
-                f"{name}: no station for scan_id {scans}{more}; add them to the stations of the survey "
+            return (
+                f"no station for scan_id {scans}{more}; add them to the stations of the survey "
                 "(scan_id is a LAS file's point_source_id; an E57 file brings its own: survey add … --stations FILE.e57)"
             )
         where = [
@@ -65,15 +79,16 @@ class PoseFaults:
             for seconds, side in ((self.before, "before its start"), (self.after, "after its end"))
             if seconds > 0
         ]
-        return UserError(
-            f"{name}: gps_time of {self.outside} points is outside the trajectory, {' and '.join(where)}; "
-            "give the whole trajectory, in the time that the file uses"
-        )
+        lost = [f"gps_time of {self.outside} points is outside the trajectory, {' and '.join(where)}"] if self.outside else []
+        lost += [f"{self.gap} points were measured in gaps of the trajectory"] if self.gap else []
+        return f"{' and '.join(lost)}; give the whole trajectory, in the time that the file uses"
 
 
 @dataclass(frozen=True)
 class PoseModel:
     """Scanner positions: one station a scan, or a trajectory interpolated linearly at ``gps_time``.
+
+    Nothing is interpolated over a gap: longer than LONGEST_GAP and than GAP_INTERVALS of the trajectory's own intervals.
 
     Attributes
     ----------
@@ -102,6 +117,19 @@ class PoseModel:
             np.empty(0, np.int64), np.empty((0, 3)), np.asarray(time, np.float64)[order], np.asarray(track, float)[order]
         )
 
+    @cached_property
+    def longest(self) -> float:
+        """Longest interval that is interpolated over, s."""
+        if len(self.time) < 2:
+            return LONGEST_GAP
+        return max(LONGEST_GAP, GAP_INTERVALS * float(np.median(np.diff(self.time))))
+
+    @cached_property
+    def gaps(self) -> Float:
+        """Gaps of the trajectory: times from and to, (g, 2), s."""
+        before = np.flatnonzero(np.diff(self.time) > self.longest)
+        return np.column_stack([self.time[before], self.time[before + 1]])
+
     @property
     def mobile(self) -> bool:
         """Whether positions come from a trajectory."""
@@ -112,45 +140,39 @@ class PoseModel:
         if len(points) == 0:
             return PoseFaults()
         if self.mobile:
-            before = float(self.time[0] - points.time.min())
-            after = float(points.time.max() - self.time[-1])
-            if before <= TIME_TOLERANCE and after <= TIME_TOLERANCE:
-                return PoseFaults()
-            early = points.time < self.time[0] - TIME_TOLERANCE
-            late = points.time > self.time[-1] + TIME_TOLERANCE
-            return PoseFaults(int(early.sum() + late.sum()), max(before, 0.0), max(after, 0.0))
+            outside = points.time[~self._covers(points.time)]
+            gap = int(np.count_nonzero(self._in_gap(points.time)))
+            before, after = (float(np.nanmax(off, initial=0.0)) for off in (self.time[0] - outside, outside - self.time[-1]))
+            return PoseFaults(len(outside), gap, before, after)
         scans, counts = _count_scans(points.scan_id)
         known = np.isin(scans, self.scan_id)
         return PoseFaults(unknown=dict(zip(scans[~known].tolist(), counts[~known].tolist(), strict=True)))
 
-    def positions(self, points: Points, name: str = "scan") -> Float:
-        """Scanner position of each point.
+    def known(self, points: Points) -> Bool:
+        """Which points' scanner position is known."""
+        if self.mobile:
+            return self._covers(points.time) & ~self._in_gap(points.time)
+        return np.isin(points.scan_id, self.scan_id)
 
-        Parameters
-        ----------
-        points : Points
-            A chunk of n points.
-        name : str
-            The file, for the error's message.
-
-        Returns
-        -------
-        (n, 3) float64 array
-            In the tunnel's SRID, m.
-
-        Raises
-        ------
-        UserError
-            If a time lies outside the trajectory (says by how much) or a scan_id has no station (says which).
-        """
-        faults = self.faults(points)
-        if faults:
-            raise faults.error(name)
+    def positions(self, points: Points) -> Float:
+        """Scanner position of each of n points, (n, 3), in the tunnel's SRID, m; NaN where it is not known."""
         if self.mobile:
             out = np.empty((len(points), 3))
             in_blocks(lambda begin, end: _interpolate(self.time, self.track, points.time, out, begin, end), len(points), _BLOCK)
-            return out
-        return self.station[np.searchsorted(self.scan_id, points.scan_id)]
+        else:
+            out = self.station[np.minimum(np.searchsorted(self.scan_id, points.scan_id), len(self.scan_id) - 1)]
+        if self.faults(points):
+            out[~self.known(points)] = np.nan
+        return out
+
+    def _covers(self, time: Float) -> Bool:
+        return (time >= self.time[0] - TIME_TOLERANCE) & (time <= self.time[-1] + TIME_TOLERANCE)
+
+    def _in_gap(self, time: Float) -> Bool:
+        inside = np.zeros(len(time), np.bool_)
+        for begin, end in self.gaps:
+            inside |= (time > begin + TIME_TOLERANCE) & (time < end - TIME_TOLERANCE)
+        return inside
 
 
 def _count_scans(scan_id: Int32) -> tuple[Int64, Int64]:

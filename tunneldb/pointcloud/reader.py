@@ -65,9 +65,11 @@ def read_chunks(path: Path, dimension: str | None, size: int = CHUNK, ranges: Ra
     Yields
     ------
     Points
-        In file order within a range.
+        In file order within a range; those without finite coordinates are left out.
     """
-    return map(Points.of, read_raw(path, dimension, size, ranges))
+    for points in map(Points.of, read_raw(path, dimension, size, ranges)):
+        finite = points.finite(time=False, intensity=False)
+        yield points if finite is None else points.some(finite)
 
 
 def same_horizontally(one: CRS, other: CRS) -> bool:

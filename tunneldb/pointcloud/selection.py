@@ -17,16 +17,16 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tunneldb.arrays import Bool, Float, Int32, Int64
+from tunneldb.arrays import Bool, Float, Int32, Int64, Intp
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pointcloud.chainage_lookup import STRETCHING, ChainageLookup
+from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.noise import DIAMETER, POINTS, is_noise, search_radii
 from tunneldb.pointcloud.points import CHUNK, Points
 from tunneldb.pointcloud.poses import PoseFaults, PoseModel
 from tunneldb.pointcloud.prefetch import in_order, prefetch
-from tunneldb.pointcloud.reader import read_chunks
 from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, PLACE, Rows, Spool, bin_of, rows_xyz, windows
 from tunneldb.pointcloud.thinning import first_of_voxels, pick, voxel_edge
 from tunneldb.pointcloud.voxels import CellCounts
@@ -58,12 +58,15 @@ class FilterSettings:
         Diameter of the neighbourhood at full density, m.
     max_distance : float
         Points farther than this from the given axis are outside, m.
+    max_left_out : float
+        Share of the points near the axis that may be invalid or without a scanner position.
     """
 
     density: float | None = 100.0
     noise_points: int = POINTS
     noise_diameter: float = DIAMETER
     max_distance: float = 25.0
+    max_left_out: float = 0.05
 
     @property
     def edge(self) -> float | None:
@@ -73,12 +76,13 @@ class FilterSettings:
 
 @dataclass
 class FilterCounts:
-    """What became of the points of a file: points = noise + outside + thinned + kept.
+    """What became of the points of a file: points = invalid + outside + unposed + noise + thinned + kept.
 
     Attributes
     ----------
-    points, outside, noise, kept : int
-        Points read; beyond the ends of the axis or too far from it; noise; kept after thinning.
+    points, invalid, outside, unposed, noise, kept : int
+        Points read; without a finite coordinate, or a finite time or intensity that is needed; beyond the ends of the axis or
+        too far from it; of unknown scanner position; noise; kept after thinning.
     chainage : (float, float)
         Least and greatest chainage of the points kept, m.
     extent : (6,) float64 array
@@ -88,7 +92,9 @@ class FilterCounts:
     """
 
     points: int = 0
+    invalid: int = 0
     outside: int = 0
+    unposed: int = 0
     noise: int = 0
     kept: int = 0
     chainage: tuple[float, float] = (math.inf, -math.inf)
@@ -98,7 +104,7 @@ class FilterCounts:
     @property
     def thinned(self) -> int:
         """Points that thinning left out."""
-        return self.points - self.outside - self.noise - self.kept
+        return self.points - self.invalid - self.outside - self.unposed - self.noise - self.kept
 
     def locate(self, blocks: Int64, low: Float, high: Float) -> None:
         """Note where in the file kilometres are: blocks of BLOCK points, with the chainage from and to of each, m."""
@@ -145,7 +151,7 @@ def filter_file(
     alignment : Alignment
         The given axis, which gives the chainage.
     poses : PoseModel
-        Scanner positions, which must cover every point near the axis.
+        Scanner positions.
     settings : FilterSettings
         Noise filter, thinning, and how far from the axis the tunnel reaches.
     survivors : Spool
@@ -161,8 +167,8 @@ def filter_file(
     Raises
     ------
     UserError
-        If the file cannot be read, no point lies near the axis (says how far they are), all near it are noise, or the
-        scanner position of any point near the axis is unknown.
+        If the file cannot be read, no point lies near the axis (says how far they are), all near it are noise, or of more
+        points near the axis than ``max_left_out`` allows a number is invalid or the scanner position unknown.
     """
     with _Filter(path, dimension, alignment, poses, settings, memory) as work:
         work.read(progress, chunk)
@@ -196,6 +202,7 @@ class _Filter:
         self.path, self.dimension = path, dimension
         self.poses, self.settings = poses, settings
         self.counts, self.cells = FilterCounts(), CellCounts()
+        self.faults, self.invalid = PoseFaults(), ""
         self.places = ChainageLookup(alignment, settings.max_distance, self.cells.edge)
         self.rows, self.cloud = Spool(memory // 2), Spool(memory // 2, PLACE)
 
@@ -208,43 +215,78 @@ class _Filter:
 
     def read(self, progress: Progress, chunk: int) -> None:
         """Read the file, and set aside what the noise filter has to look at."""
-        faults, nearest = PoseFaults(), math.inf
-        with closing(prefetch(read_chunks(self.path, self.dimension, chunk))) as chunks:
+        counts, nearest = self.counts, math.inf
+        with closing(prefetch(map(Points.of, read_raw(self.path, self.dimension, chunk)))) as chunks:
             for points in chunks:
-                faults += self.poses.faults(self._near(points))
-                if self.counts.outside == self.counts.points:
+                self._set_aside(points)
+                if counts.outside and counts.outside + counts.invalid == counts.points:
                     vertices = self.places.alignment.vertices
-                    nearest = min(nearest, float(cKDTree(vertices).query(points.xyz[::100])[0].min()))
+                    some = points.xyz[np.isfinite(points.xyz).all(axis=1)][::100]
+                    nearest = min(nearest, float(cKDTree(vertices).query(some)[0].min(initial=math.inf)))
                 progress(len(points))
-        for ranges in self.counts.ranges.values():
-            ranges[-1] = (ranges[-1][0], min(ranges[-1][1], self.counts.points))
-        if self.counts.outside == self.counts.points:
+        for ranges in counts.ranges.values():
+            ranges[-1] = (ranges[-1][0], min(ranges[-1][1], counts.points))
+        if counts.outside and counts.outside + counts.invalid == counts.points:
             raise UserError(
                 f"{self.path}: no points near the axis: the nearest is about {nearest:.0f} m from it and the limit is "
                 f"{self.settings.max_distance:g} m; check the axis, the file's coordinates and the tunnel's SRID"
             )
-        if faults:
-            raise faults.error(str(self.path))
+        self._require_most()
 
-    def _near(self, points: Points) -> Points:
-        """Set the points of a chunk aside; returns those near the axis."""
+    def _require_most(self) -> None:
+        """Refuse the file where too many of its points near the axis are left out."""
+        counts = self.counts
+        near = counts.points - counts.outside
+        for count, reason in ((counts.invalid, self.invalid), (counts.unposed, self.faults.text())):
+            if count > self.settings.max_left_out * near:
+                raise UserError(
+                    f"{self.path}: {reason} ({100.0 * count / near:.2g} % of the points near the axis; "
+                    f"--max-left-out {100.0 * self.settings.max_left_out:g} allows less)"
+                )
+
+    def _set_aside(self, points: Points) -> None:
+        """Set the points of a chunk aside that lie near the axis and whose scanner position is known."""
+        number = np.arange(self.counts.points, self.counts.points + len(points))
+        self.counts.points += len(points)
+        finite = points.finite(time=self.poses.mobile, intensity=self.dimension is not None)
+        if finite is not None:
+            self._note_invalid(points, number, finite)
+            number, points = number[finite], points.some(finite)
+            if not len(points):
+                return
         cell = self.cells.add(points.xyz)
         self.places.update(self.cells)
         outside = self.places.outside(points, cell)
-        number = np.arange(self.counts.points, self.counts.points + len(points))
-        self.counts.points += len(points)
         self.counts.outside += len(outside)
         if len(outside):
-            self.cells.remove(cell[outside])
-            kept = np.delete(np.arange(len(points)), outside)
-            number, cell, points = number[kept], cell[kept], points.some(kept)
+            number, cell, points = self._drop(number, cell, points, outside)
+        faults = self.poses.faults(points)
+        if faults:
+            self.faults += faults
+            self.counts.unposed += faults.points
+            number, cell, points = self._drop(number, cell, points, np.flatnonzero(~self.poses.known(points)))
         if len(points):
             self.counts.locate(*self.places.span(number, cell, BLOCK))
             picked, certain = self._pick(points, cell)
             tag = np.where(certain, np.int32(CERTAIN), cell[picked])
             self.rows.add(self.places.rows(points, cell, picked, tag))
             self.cloud.add(points.xyz.view(PLACE).ravel(), self.places.bin[cell])
-        return points
+
+    def _drop(self, number: Int64, cell: Int32, points: Points, dropped: Intp) -> tuple[Int64, Int32, Points]:
+        """Leave out some points of a chunk, as if they had never been in their cells."""
+        self.cells.remove(cell[dropped])
+        kept = np.delete(np.arange(len(points)), dropped)
+        return number[kept], cell[kept], points.some(kept)
+
+    def _note_invalid(self, points: Points, number: Int64, finite: Bool) -> None:
+        """Count the points of a chunk that are not finite, and keep which number of the first it is."""
+        self.counts.invalid += int(np.count_nonzero(~finite))
+        if not self.invalid:
+            first = int(np.argmin(finite))
+            which = ("a coordinate" if not np.isfinite(points.xyz[first]).all()
+                     else "gps_time" if not np.isfinite(points.time[first]) and self.poses.mobile
+                     else self.dimension)  # fmt: skip
+            self.invalid = f"{which} is NaN or infinite, first at point {number[first] + 1}; mend the file"
 
     def _pick(self, points: Points, cell: Int32) -> tuple[Int32, Bool]:
         if self.settings.edge is None or self.cells.counts[cell].mean() < FEW:
@@ -274,7 +316,7 @@ class _Filter:
             counts.keep(rows)
             progress(int(bins[low - first : high - first].sum()))
             yield rows
-        progress(counts.outside)
+        progress(counts.points - counts.noise - counts.kept - counts.thinned)
 
     def _judge(self, low: int, high: int, reach: int, radii: Float) -> tuple[int, Rows]:
         """Noise of a window, counted, and the rows that stay."""

@@ -63,8 +63,8 @@ class ReferenceCurve:
         low, high = self.range_m[0] - SPAN_TOLERANCE, self.range_m[-1] + SPAN_TOLERANCE
         return np.asarray((ranges < low) | (ranges > high), dtype=np.bool_)
 
-    def require_span(self, nearest: float, farthest: float, outside: int, count: int) -> None:
-        """Raise UserError when lining points lie outside the curve's span.
+    def outside_text(self, nearest: float, farthest: float, outside: int, count: int) -> str:
+        """Say that too much of the lining lies outside the curve's span, and what to do.
 
         Parameters
         ----------
@@ -73,13 +73,12 @@ class ReferenceCurve:
         outside, count : int
             How many lining points lie outside the curve's span, and how many there are.
         """
-        if outside:
-            raise UserError(
-                f"the reference curve spans {self.range_m[0]:g} to {self.range_m[-1]:g} m, the lining lies "
-                f"{nearest:.2f} to {farthest:.2f} m from the scanner: {_share(outside, count)} of its points "
-                f"are outside; give a curve that spans them, or leave out slanting views by a smaller "
-                f"intensity.max_incidence"
-            )
+        return (
+            f"the reference curve spans {self.range_m[0]:g} to {self.range_m[-1]:g} m, the lining lies "
+            f"{nearest:.2f} to {farthest:.2f} m from the scanner: {_share(outside, count)} of its points "
+            f"are outside; give a curve that spans them, leave out slanting views by a smaller "
+            f"intensity.max_incidence, or let more be left out by intensity.max_outside"
+        )
 
 
 def _share(part: int, whole: int) -> str:

@@ -33,6 +33,8 @@ class Radiometer:
         Effect of distance; None for reflectance.
     max_incidence, max_range : float
         Points seen more slantingly (degrees) or from farther (m) are left out.
+    max_outside : float
+        Share of the lining's points that may lie outside the reference curve; those that do are left out.
     """
 
     kind: Kind
@@ -40,6 +42,7 @@ class Radiometer:
     reference: ReferenceCurve | None
     max_incidence: float
     max_range: float
+    max_outside: float
 
 
 @dataclass(frozen=True)
@@ -143,21 +146,8 @@ class Observer:
             points.classification[inside],
         )
 
-    def observe(self, points: Points, name: str) -> ObservedPoints:
-        """Unroll points and look up their intensity.
-
-        Parameters
-        ----------
-        points : Points
-            A chunk.
-        name : str
-            The file, for messages.
-
-        Raises
-        ------
-        UserError
-            If a point's scanner position is unknown.
-        """
+    def observe(self, points: Points) -> ObservedPoints:
+        """Unroll a chunk of points and look up their intensity; those whose scanner position is unknown are not used."""
         unrolled = self.surface.unroll(points.xyz)
         start = self.km * KILOMETRE
         with np.errstate(invalid="ignore"):
@@ -166,7 +156,7 @@ class Observer:
         observations = None
         if self.radiometer:
             radiometer = self.radiometer
-            scanner = radiometer.poses.positions(points, name)
+            scanner = radiometer.poses.positions(points)
             normals = self.edges.normals_of(points.xyz, unrolled)
             observations = observe(points.xyz, scanner, normals, points.intensity, radiometer.kind, radiometer.reference)
             with np.errstate(invalid="ignore"):
@@ -200,6 +190,7 @@ class RangeSpan:
         self.outside += outside
         self.count += count
 
-    def require(self, reference: ReferenceCurve) -> None:
-        """Raise UserError if points lie outside the curve's span."""
-        reference.require_span(self.nearest, self.farthest, self.outside, self.count)
+    def require(self, radiometer: Radiometer) -> None:
+        """Raise UserError if too many points lie outside the curve's span."""
+        if radiometer.reference and self.outside > radiometer.max_outside * self.count:
+            raise UserError(radiometer.reference.outside_text(self.nearest, self.farthest, self.outside, self.count))

@@ -55,12 +55,13 @@ class EdgeArrays(NamedTuple):
 
 
 class PoseArrays(NamedTuple):
-    """Scanner positions, see `PoseModel`."""
+    """Scanner positions, see `PoseModel`; no longer interval of the trajectory than ``longest`` (s) is interpolated over."""
 
     scan_id: Int64
     station: Float
     time: Float
     track: Float
+    longest: float
 
 
 class CorrectionArrays(NamedTuple):
@@ -139,9 +140,9 @@ class Pixels(NamedTuple):
 class ProjectionCounts(NamedTuple):
     """What `project` counts.
 
-    Points used in the kilometre itself; those whose scanner position is unknown (they go nowhere); of those used, in the
-    halo too, that are not floor, how many there are, how many lie outside the reference curve's ranges, and the nearest and
-    farthest range, m.
+    Points used in the kilometre itself; those whose scanner position is unknown (they go nowhere); of the others, in the
+    halo too, that are not floor, how many there are, how many lie outside the reference curve's ranges (they go nowhere
+    either), and the nearest and farthest range, m.
     """
 
     used: int
@@ -230,6 +231,7 @@ def _project(
     stations: Float,
     trajectory: Float,
     track: Float,
+    longest: float,
     wanted: bool,
     linear: bool,
     knots: Float,
@@ -285,10 +287,15 @@ def _project(
             x, y, z = xyz[k, 0], xyz[k, 1], xyz[k, 2]
             if mobile:
                 t = time[k]
-                if t < trajectory[0] - TIME_TOLERANCE or t > trajectory[-1] + TIME_TOLERANCE:
+                if not (trajectory[0] - TIME_TOLERANCE <= t <= trajectory[-1] + TIME_TOLERANCE):
                     lost += 1
                     continue
                 moment = interval(trajectory, t, moment)
+                if moment + 1 < trajectory.shape[0]:
+                    since, until = t - trajectory[moment], trajectory[moment + 1] - t
+                    if since + until > longest and since > TIME_TOLERANCE and until > TIME_TOLERANCE:
+                        lost += 1
+                        continue
                 dx, dy, dz = position_at(trajectory, track, t, moment)
             else:
                 if station < 0 or scan_id[k] != scan:
@@ -342,6 +349,7 @@ def _project(
                         farthest = distance
                     if distance < low or distance > high:
                         outside += 1
+                        continue
         row[k] = int(r)
         column[k] = int(c)
         weights[k] = weight

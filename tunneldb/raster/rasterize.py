@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -56,37 +55,39 @@ def rasterize(
     Raises
     ------
     UserError
-        If a file can't be read, the scanner position of a point is unknown, lining points lie outside the reference curve
-        or no point lies on the lining.
+        If a file can't be read, too much of the lining lies outside the reference curve, or no point lies on the lining.
     """
-    total, read, used = sum(file.points for file in files), 0, 0
+    total, read, used, lost = sum(file.points for file in files), 0, 0, 0
     span = RangeSpan()
     projector = Projector.of(observer, image.grid, roughness)
-    reference = observer.radiometer.reference if observer.radiometer else None
-    for path, points in _chunks(files):
+    for points in _chunks(files):
         pixels, tally = projector.project(points)
-        if tally.lost:
-            assert observer.radiometer is not None
-            raise observer.radiometer.poses.faults(observer.near(points)).error(path.name)
         image.add(pixels, len(points))
         span.add(tally.nearest, tally.farthest, tally.outside, tally.lining)
         read += len(points)
         used += tally.used
+        lost += tally.lost
         progress(0.9 * read / max(total, 1))
-    if reference:
-        span.require(reference)
+    if observer.radiometer:
+        span.require(observer.radiometer)
     if not used:
+        unposed = f": the scanner position of {lost:,} of its points is not known" if lost else ""
         raise UserError(
-            f"no point of {', '.join(file.path.name for file in files)} lies on the lining of kilometre {observer.km}"
+            f"no point of {', '.join(file.path.name for file in files)} lies on the lining of kilometre {observer.km}{unposed}"
         )
-    return {"files": len(files), "points_read": read, "points_used": used}
+    return {
+        "files": len(files),
+        "points_read": read,
+        "points_used": used,
+        **({"points_unposed": lost} if lost else {}),
+        **({"points_outside_curve": span.outside} if span.outside else {}),
+    }
 
 
-def _chunks(files: list[ScanSource]) -> Iterator[tuple[Path, Points]]:
+def _chunks(files: list[ScanSource]) -> Iterator[Points]:
     size = CHUNK if threads() == 1 else 4 * CHUNK * threads()  # so that each thread has chunks to decode
     for file in files:
-        for points in read_chunks(file.path, file.dimension, size, file.ranges):
-            yield file.path, points
+        yield from read_chunks(file.path, file.dimension, size, file.ranges)
 
 
 @dataclass
@@ -150,9 +151,9 @@ class Projector:
 
 def _scanner(observer: Observer) -> PoseArrays:
     if observer.radiometer is None:
-        return PoseArrays(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
+        return PoseArrays(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.inf)
     poses = observer.radiometer.poses
-    return PoseArrays(poses.scan_id, poses.station, poses.time, poses.track)
+    return PoseArrays(poses.scan_id, poses.station, poses.time, poses.track, poses.longest)
 
 
 def _optics(observer: Observer, roughness: float) -> CorrectionArrays:

@@ -16,7 +16,7 @@ from tunneldb.errors import UserError
 from tunneldb.pointcloud.selection import FilterCounts
 from tunneldb.store.survey import Survey
 
-COUNTED = ("points", "noise", "outside", "thinned", "kept")
+COUNTED = ("points", "noise", "outside", "invalid", "unposed", "thinned", "kept")
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,9 @@ class Loaded:
     state : str
         ``loaded``, ``replaced`` (there was a file of this name with other content), ``reread`` (because of a file that
         was replaced), ``unchanged`` or ``moved`` (unchanged, but it lies elsewhere now, which was noted).
-    points, noise, outside, thinned, kept : int
-        Its points, and what they came to; points = noise + outside + thinned + kept once all its kilometres are loaded.
+    points, noise, outside, invalid, unposed, thinned, kept : int
+        Its points, and what they came to, see `tunneldb.pointcloud.selection.FilterCounts`; points is the sum of the others
+        once all its kilometres are loaded.
     seconds : float
         Time that it took, its share of what was done for several files at once included; 0 when unchanged.
     """
@@ -40,6 +41,8 @@ class Loaded:
     points: int
     noise: int
     outside: int
+    invalid: int
+    unposed: int
     thinned: int
     kept: int
     seconds: float = 0.0
@@ -101,11 +104,11 @@ def unchanged(conn: psycopg.Connection[Any], path: Path, recorded: Recorded | No
 def outcome(conn: psycopg.Connection[Any], file_id: int, state: str, seconds: float = 0.0) -> Loaded:
     """What a file's points have come to so far."""
     row = conn.execute(
-        "SELECT name, points, noise, outside, thinned, kept FROM tunnel.scan_file WHERE id = %s", [file_id]
+        "SELECT name, points, noise, outside, invalid, unposed, thinned, kept FROM tunnel.scan_file WHERE id = %s", [file_id]
     ).fetchone()
     assert row is not None
-    name, points, noise, outside, thinned, kept = row
-    return Loaded(name, state, points, noise, outside, thinned, kept, seconds)
+    name, points, noise, outside, invalid, unposed, thinned, kept = row
+    return Loaded(name, state, points, noise, outside, invalid, unposed, thinned, kept, seconds)
 
 
 def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content) -> int:
@@ -113,12 +116,13 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
     counts = content.counts
     row = conn.execute(
         """
-        INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, thinned, kept,
-                                      chainage_from, chainage_to, extent, srid)
-        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s)
+        INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, invalid, unposed,
+                                      thinned, kept, chainage_from, chainage_to, extent, srid)
+        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s)
         ON CONFLICT (survey_id, name) DO UPDATE
            SET path = excluded.path, checksum = excluded.checksum, bytes = excluded.bytes, points = excluded.points,
-               noise = excluded.noise, outside = excluded.outside, thinned = excluded.thinned, kept = 0,
+               noise = excluded.noise, outside = excluded.outside, invalid = excluded.invalid, unposed = excluded.unposed,
+               thinned = excluded.thinned, kept = 0,
                chainage_from = excluded.chainage_from, chainage_to = excluded.chainage_to, extent = excluded.extent,
                srid = excluded.srid
         RETURNING id
@@ -132,6 +136,8 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
             counts.points,
             counts.noise,
             counts.outside,
+            counts.invalid,
+            counts.unposed,
             counts.thinned,
             *counts.chainage,
             counts.extent.tolist(),

@@ -30,6 +30,12 @@ class ScanFile(Base):
     points: Mapped[int] = mapped_column(BigInteger, comment="Points in the file")
     noise: Mapped[int] = mapped_column(BigInteger, comment="Points dropped as noise")
     outside: Mapped[int] = mapped_column(BigInteger, comment="Points dropped as too far from the given axis")
+    invalid: Mapped[int] = mapped_column(
+        BigInteger, server_default="0", comment="Points dropped as their coordinates, time or intensity are no numbers"
+    )
+    unposed: Mapped[int] = mapped_column(
+        BigInteger, server_default="0", comment="Points dropped as the scanner's position is not known"
+    )
     thinned: Mapped[int] = mapped_column(BigInteger, comment="Points dropped by thinning to survey density")
     kept: Mapped[int] = mapped_column(BigInteger, comment="Points kept, the rows in point")
     chainage_from: Mapped[float | None] = mapped_column(comment="Least chainage of the kept points, m")

@@ -34,6 +34,7 @@ class AxisVertex(Base):
     source: Mapped[str] = mapped_column(
         comment="measured (averaged), interpolated (too few points) or edited (by hand, kept by a rerun)"
     )
+    remark: Mapped[str | None] = mapped_column(comment="Why the place that was measured is not taken, if it is not")
     edited_by: Mapped[str | None] = mapped_column(comment="Who moved it")
     edited_at: Mapped[dt.datetime | None] = mapped_column(comment="When it was moved")
 

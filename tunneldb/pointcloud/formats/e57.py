@@ -24,7 +24,7 @@ from pyproj.exceptions import CRSError
 
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.formats.faults import check_finite, check_ranges, decoding, require_dimension
+from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
 from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
 
 KIND = "an E57"
@@ -179,7 +179,6 @@ class _Cursor:
         """Whole file."""
         good = 0
         for raw in self._from(0):
-            check_finite(self.path, raw, self.dimension, good)
             good += len(raw)
             yield raw
         require_good(self.path, self.scans, good)
@@ -191,7 +190,6 @@ class _Cursor:
         while begin < end:
             if begin < self.stop and self.piece is not None:
                 raw = self.piece.part(begin - self.at, min(end, self.stop) - self.at)
-                check_finite(self.path, raw, self.dimension, begin)
                 begin += len(raw)
                 yield raw
                 continue

@@ -6,10 +6,8 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.points import Ranges, Raw
+from tunneldb.pointcloud.points import Ranges
 
 
 @contextmanager
@@ -62,27 +60,3 @@ def check_ranges(path: Path, ranges: Ranges | None, count: int) -> Ranges:
         if end > count:
             raise UserError(f"{path}: truncated or changed: it announces {count} points, points up to {end} are wanted")
     return ranges
-
-
-def check_finite(path: Path, raw: Raw, dimension: str | None, before: int) -> None:
-    """Check a chunk's numbers; `before` points of the file lie before it.
-
-    Raises
-    ------
-    UserError
-        If a time, an intensity or a coordinate is NaN or infinite.
-    """
-    arrays = [(name, values) for name, values in (("gps_time", raw.time), (dimension, raw.intensity)) if values is not None]
-    arrays += [("coordinates", values) for values in (raw.x, raw.y, raw.z)]
-    for name, values in arrays:
-        if not np.issubdtype(values.dtype, np.floating):
-            continue
-        with np.errstate(over="ignore", invalid="ignore"):
-            if np.isfinite(values.sum()):
-                continue
-        bad = ~np.isfinite(values)
-        if bad.any():
-            raise UserError(
-                f"{path}: {name} is NaN or infinite at point {before + int(np.argmax(bad)) + 1} "
-                f"and at {int(bad.sum()) - 1} more of the same chunk; mend the file"
-            )

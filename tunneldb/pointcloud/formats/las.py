@@ -15,7 +15,7 @@ from pyproj.exceptions import CRSError
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.formats.faults import check_finite, check_ranges, decoding, line_of, require_dimension
+from tunneldb.pointcloud.formats.faults import check_ranges, decoding, line_of, require_dimension
 from tunneldb.pointcloud.formats.las_bounds import check_envelope
 from tunneldb.pointcloud.formats.laz_chunks import VariedChunks
 from tunneldb.pointcloud.points import Ranges, Raw, ScanHeader
@@ -104,7 +104,6 @@ def read_las(path: Path, dimension: str | None, size: int, ranges: Ranges | None
                     raise UserError(
                         f"{path}: truncated: {done} points read of the {header.point_count} that its header announces"
                     )
-                check_finite(path, raw, dimension, done)
                 done += len(raw)
                 yield raw
 

@@ -35,8 +35,7 @@ def read_raw(path: Path, dimension: str | None, size: int = CHUNK, ranges: Range
     Raises
     ------
     UserError
-        If the file is missing, truncated or corrupt, has fewer points than the ranges say, lacks the dimension, or
-        holds NaN or infinite numbers.
+        If the file is missing, truncated or corrupt, has fewer points than the ranges say, or lacks the dimension.
     """
     read = read_e57 if is_e57(path) else read_las
     return read(path, dimension, size, ranges)
