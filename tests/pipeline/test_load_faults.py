@@ -48,11 +48,11 @@ class TestBadInput:
         xyz = tube(980, 1020, 100, seed=1)
         path = write(tmp_path / "a.laz", xyz)
         las = laspy.read(path)
-        las.gps_time[:700] += 100.0
-        las.gps_time[700:1000] = -12.5
+        las.gps_time[:7000] += 100.0
+        las.gps_time[7000:10_000] = -12.5
         las.write(path)
         self.refused(
-            conn, [path], r"gps_time of 1000 points .* 12\.500 s before its start and up to .* s after its end.*--max-left"
+            conn, [path], r"gps_time of 10000 points .* 12\.500 s before its start and up to .* s after its end.*--max-left"
         )
         load(conn, [write(path, xyz)])
 

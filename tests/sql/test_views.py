@@ -24,7 +24,6 @@ GEOMETRIES = {
     "ground": "LineStringZ",
     "target_sphere": "PointZ",
 }
-EDITED = dt.datetime(2024, 5, 6, tzinfo=dt.UTC)
 
 
 @pytest.fixture(scope="session")
@@ -98,6 +97,7 @@ def stationing(conn: psycopg.Connection, example: str) -> None:
 def test_every_view_begins_with_a_stable_integer_key(
     conn: psycopg.Connection, example: str, points: None, queue: None, stationing: None
 ) -> None:
+    conn.execute("UPDATE tunnel.scan_file SET unposed = 3")  # a remark
     for view in views(conn):
         with conn.cursor() as cursor:
             cursor.execute(sql.SQL("SELECT * FROM tunnel_api.{}").format(sql.Identifier(view)))
