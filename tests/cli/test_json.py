@@ -159,6 +159,12 @@ def test_a_worker_tells_when_it_leaves(dsn: str, conn: psycopg.Connection) -> No
     assert (json.loads(output)["jobs"], errors) == (0, "")
 
 
+def test_what_a_scan_holds_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("x,y,z,Amplitude\n" + "".join(f"{i % 9},{i % 7},{i % 5},{i}\n" for i in range(900)))
+    (look,) = told(0, "inspect", tmp_path / "a.csv")["files"]
+    assert (look["points"], look["high"], look["intensities"][0]["values"]["most"]) == (900, [8.0, 6.0, 4.0], 899.0)
+
+
 def test_a_program_reads_it_from_the_pipe(example: str) -> None:
     piped = (
         " ".join(f"'{word}'" for word in [*TUNNELDB, "leaks", example, "--json"])

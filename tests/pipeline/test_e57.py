@@ -1,4 +1,4 @@
-"""The same points from LAZ and from E57, with poses for stations, end in the same leaks."""
+"""The same points from LAZ, from E57 and from PTX, with poses for stations, end in the same leaks."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def command(*arguments: object, code: int = 0) -> Result:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A tunnel scanned from two stations: one LAZ file, and two E57 files of a scan each."""
+    """A tunnel scanned from two stations: one LAZ file, two E57 files of a scan each, and a PTX file of both scans."""
     path = tmp_path_factory.mktemp("e57")
     write(
         Simulation(
@@ -64,6 +64,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         fields["cartesianInvalidState"] = np.concatenate([np.zeros(len(xyz), int), empty.astype(int) + 2])[order]
         scan = e57.Scan(fields, place, turn.as_quat(scalar_first=True), f"{{{number}}}", start=0.0)
         e57.write(path / f"t-{number:.0f}.e57", [scan])
+        with (path / "t.ptx").open("a") as file:
+            matrix = np.vstack([turn.inv().as_matrix(), place])  # of points as rows
+            file.write(f"{len(xyz)}\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n")
+            np.savetxt(file, np.column_stack([matrix, [0, 0, 0, 1]]), "%.12f")
+            np.savetxt(file, np.column_stack([xyz, las.Amplitude[of_scan]]), "%.6f")
     return path
 
 
@@ -89,21 +94,23 @@ def leaks(conn: psycopg.Connection, survey: str) -> list[tuple[shapely.Geometry,
 def test_same_leaks_as_from_laz(folder: Path, conn: psycopg.Connection) -> None:
     command("tunnel", "add", "t", "--srid", 25830, "--axis", folder / "t.axis.csv", "--start-chainage", START)
     process(folder, "las", [folder / "t.stations.csv"], "Amplitude", sorted(folder.glob("*.laz")))
-    process(folder, "e57", [folder], "intensity", sorted(folder.glob("*.e57")))
+    scans = sorted(folder.glob("*.e57"))
+    process(folder, "e57", scans, "intensity", scans)
+    process(folder, "ptx", [folder / "t.ptx"], "intensity", [folder / "t.ptx"])
 
     counts = conn.execute(
         "SELECT s.name, sum(f.points), sum(f.outside) FROM tunnel.scan_file f JOIN tunnel.survey s ON s.id = f.survey_id "
         "GROUP BY 1"
     ).fetchall()
-    (one, *las), (other, *as_e57) = sorted(counts)
-    assert (one, other) == ("e57", "las")
-    assert as_e57 == las
+    assert dict.fromkeys(("e57", "las", "ptx"), counts[0][1:]) == {name: (*rest,) for name, *rest in counts}
 
-    expected, found = leaks(conn, "las"), leaks(conn, "e57")
-    assert len(found) == len(expected) >= 4
-    for (polygon, drop), (true, true_drop) in zip(found, expected, strict=True):
-        assert polygon.intersection(true).area / polygon.union(true).area > 0.99
-        assert drop == pytest.approx(true_drop, abs=0.02)
+    expected = leaks(conn, "las")
+    assert len(expected) >= 4
+    for found in (leaks(conn, "e57"), leaks(conn, "ptx")):
+        assert len(found) == len(expected)
+        for (polygon, drop), (true, true_drop) in zip(found, expected, strict=True):
+            assert polygon.intersection(true).area / polygon.union(true).area > 0.99
+            assert drop == pytest.approx(true_drop, abs=0.02)
 
 
 def test_scans_that_are_no_stations_are_told(folder: Path, conn: psycopg.Connection) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import laspy
 import numpy as np
 import psycopg
 import pytest
@@ -217,6 +218,25 @@ def test_without_intensity_it_is_nought(conn: psycopg.Connection, tmp_path: Path
     assert {row[-2] for row in rows(conn)} == {0.0}
 
 
+def test_a_table_of_points_is_the_same_survey(survey: psycopg.Connection, tmp_path: Path) -> None:
+    xyz = tube(975, 985, 100, seed=1)
+    load(survey, [write(tmp_path / "a.laz", xyz)])
+    as_laz = {row[:8] + row[9:] for row in rows(survey)}
+    las = laspy.read(tmp_path / "a.laz")
+    survey.execute("DELETE FROM tunnel.scan_file")
+    survey.commit()
+    columns = np.column_stack([las.xyz, las.gps_time, las.point_source_id, las.Amplitude, las.classification])
+    np.savetxt(tmp_path / "a.txt", columns, "%.17g", delimiter=",")
+    (tmp_path / "a.txt.columns").write_text("x,y,z,gps_time,scan_id,Amplitude,classification")
+    (loaded,) = load(survey, [tmp_path / "a.txt"])
+    assert loaded.state == "loaded"
+    assert {row[:8] + row[9:] for row in rows(survey)} == as_laz
+    assert load(survey, [tmp_path / "a.txt"])[0].state == "unchanged"
+    # other names make another file of it
+    (tmp_path / "a.txt.columns").write_text("x,y,z,gps_time,scan_id,-,Amplitude")
+    assert load(survey, [tmp_path / "a.txt"])[0].state == "replaced"
+
+
 @pytest.fixture
 def cli(survey: psycopg.Connection, dsn: str) -> Callable[..., tuple[int, str, str]]:
     def run(*arguments: object) -> tuple[int, str, str]:
@@ -229,7 +249,7 @@ def cli(survey: psycopg.Connection, dsn: str) -> Callable[..., tuple[int, str, s
 def test_command(cli: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
     path = write(tmp_path / "a.laz", tube(980, 1020, 100, seed=1))
     code, out, err = cli(SURVEY, path)
-    assert (code, err) == (0, "")
+    assert (code, err) == (0, "a.laz: states no coordinate system: taken to be in the tunnel's, EPSG:25830\n")
     assert "points/s" in out
     assert "a.laz  loaded" in out
     assert "a.laz  unchanged" in cli(SURVEY, path)[1]

@@ -12,7 +12,7 @@ from support.real_scans import real_scan
 
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.e57 import read_e57_scans, scan_number
-from tunneldb.pointcloud.reader import check_header, read_chunks, read_header
+from tunneldb.pointcloud.reader import check_header, crs_note, read_chunks, read_header
 from tunneldb.pointcloud.stations import read_stations
 
 pytest.importorskip("pye57")
@@ -166,7 +166,13 @@ def test_box_is_in_the_file_s_frame(tmp_path: Path, frame: str) -> None:
     [("", None), ("site grid, see plan", None), (CRS(25830).to_wkt(), CRS(25830)), ("EPSG:3794", CRS(3794))],
 )
 def test_coordinate_system_where_it_is_readable(tmp_path: Path, metadata: str, crs: CRS | None) -> None:
-    assert read_header(e57.write(tmp_path / "a.e57", [e57.Scan(cloud())], metadata)).crs == crs
+    header = read_header(e57.write(tmp_path / "a.e57", [e57.Scan(cloud())], metadata))
+    assert header.crs == crs
+    assert crs_note(header, 25830) == {
+        "": "states no coordinate system: taken to be in the tunnel's, EPSG:25830",
+        "site grid, see plan": "states a coordinate system that can't be read ('site grid, see plan'): "
+        "taken to be in the tunnel's, EPSG:25830",
+    }.get(metadata)
 
 
 def test_poses_are_stations(tmp_path: Path) -> None:
@@ -213,7 +219,7 @@ def test_two_positions_of_one_station(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"scan_id 1 has two positions: by .*a\.csv, line 2 and by .*b\.csv, line 2"):
         read_stations([tmp_path / "a.csv", tmp_path / "b.csv"])
     (tmp_path / "empty").mkdir()
-    with pytest.raises(UserError, match="no E57 file in this folder"):
+    with pytest.raises(UserError, match="no E57 or PTX file in this folder"):
         read_stations([tmp_path / "empty"])
 
 

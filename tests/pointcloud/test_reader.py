@@ -5,7 +5,7 @@ import laspy
 import lazrs
 import numpy as np
 import pytest
-from laspy.vlrs.known import LasZipVlr
+from laspy.vlrs.known import LasZipVlr, WktCoordinateSystemVlr
 from pyproj import CRS
 from pyproj.crs import CompoundCRS
 from support.real_scans import real_scan
@@ -13,7 +13,7 @@ from support.real_scans import real_scan
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.las_bounds import header_box
 from tunneldb.pointcloud.formats.raw import read_raw
-from tunneldb.pointcloud.reader import check_header, read_chunks, read_header
+from tunneldb.pointcloud.reader import check_header, crs_note, read_chunks, read_header
 
 
 def write(
@@ -221,6 +221,19 @@ def test_a_trajectory_needs_times(tmp_path: Path) -> None:
 def test_agreeing_coordinate_systems(tmp_path: Path, crs: CRS | None) -> None:
     write(tmp_path / "a.laz", 10, crs)
     check_header(read_header(tmp_path / "a.laz"), "Amplitude", 25830, needs_time=True)
+
+
+def test_a_coordinate_system_that_nobody_can_read_is_told(tmp_path: Path) -> None:
+    las = write(tmp_path / "a.laz", 10)
+    las.header.vlrs.append(WktCoordinateSystemVlr("SITE GRID"))
+    las.header.global_encoding.wkt = True
+    las.write(tmp_path / "b.laz")
+    plain, odd = (crs_note(read_header(tmp_path / name), 25830) for name in ("a.laz", "b.laz"))
+    assert plain == "states no coordinate system: taken to be in the tunnel's, EPSG:25830"
+    assert odd is not None
+    assert odd.startswith("states a coordinate system that can't be read (Invalid")
+    write(tmp_path / "c.laz", 10, CRS(25830))
+    assert crs_note(read_header(tmp_path / "c.laz"), 25830) is None
 
 
 @pytest.mark.parametrize("code", [25829, 32630, 4326, 3794])

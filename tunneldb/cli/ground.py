@@ -30,9 +30,9 @@ _NAMES = [name for name in PARAMETERS if name.startswith(_PREFIXES)]
 def ground(file: Path, output: Path, assignments: tuple[str, ...]) -> None:
     """Class the points of FILE by itself: ground, lining and what stands or hangs before it; needs no database.
 
-    FILE is LAS, LAZ or E57; what is written is LAZ 1.4 with the classes 2 ground, 64 lining, 65 niche, 66 appendage, 67
-    rail, 68 object, 70 noise. Of LAS and LAZ all else stays as it is. With a survey, tunneldb export --classified knows
-    the lining better.
+    FILE may be of any format that is read; what is written is LAZ 1.4 with the classes 2 ground, 64 lining, 65 niche, 66
+    appendage, 67 rail, 68 object, 70 noise. Of LAS and LAZ all else stays as it is. With a survey, tunneldb export
+    --classified knows the lining better.
     """
     for assignment in assignments:
         if not assignment.startswith(_PREFIXES):

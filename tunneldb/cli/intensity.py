@@ -36,7 +36,7 @@ _FILES = (".las", ".laz", ".e57")
     "--scanner",
     type=(float, float, float),
     metavar="X Y Z",
-    help="Of a file: where the scanner stood, in the file's coordinates; an E57 file says it by its poses.",
+    help="Of a file: where the scanner stood, in the file's coordinates; an E57 or PTX file says it by its poses.",
 )
 @click.pass_obj
 def intensity(
@@ -51,7 +51,7 @@ def intensity(
     """Show whether intensity depends on range or incidence, before and after correction.
 
     Of a SURVEY the points of survey density on the lining are looked at, after the stages sections and ground; nothing is
-    changed. Of a FILE (LAS, LAZ or E57) by itself all flat surfaces are, and no database is needed. The table gives the
+    changed. Of a scan FILE by itself all flat surfaces are, and no database is needed. The table gives the
     slope of intensity, and how much the medians of classes of range and incidence differ (standard deviation).
     """
     if output is not None:

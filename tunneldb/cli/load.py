@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from tunneldb.store.scan_files import Loaded
 
+MOST_NAMED = 5  # files of which the same is said
+
 
 @verb(
     examples=[
@@ -77,7 +79,7 @@ def load(
     max_distance: float,
     max_left_out: float,
 ) -> None:
-    """Load LAS, LAZ and E57 FILES into SURVEY.
+    """Load FILES (LAS, LAZ, E57, PTX, PTS, PLY, tables of points) into SURVEY.
 
     Noise is dropped, the rest thinned to the survey's density and stored in the order of chainage. A file that is
     loaded already is left alone; a file of the same name with other content takes its place.
@@ -130,6 +132,17 @@ def _summary(connection: psycopg.Connection[Any], survey: Survey, done: list[Loa
     ).fetchall():
         click.echo(f"{name}: {remark}", err=True)
     connection.rollback()
+    noted: dict[str, list[str]] = {}
+    for file in done:
+        if file.note:
+            noted.setdefault(file.note, []).append(file.name)
+    for note, names in noted.items():
+        click.echo(f"{_some(names)}: {note}", err=True)
+
+
+def _some(names: list[str]) -> str:
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more
 
 
 def _number(value: float | None) -> str:

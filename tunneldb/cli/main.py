@@ -28,9 +28,10 @@ class Settings:
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "init": ("tunneldb.cli.init:init", "Create or upgrade the schema, the functions and the roles."),
+    "inspect": ("tunneldb.cli.inspect:inspect", "Tell what scan files hold, what is missing, and what to type next."),
     "tunnel": ("tunneldb.cli.tunnel:tunnel", "Add, list or remove tunnels, and give them a stationing."),
     "survey": ("tunneldb.cli.survey:survey", "Add, list or remove the scanning campaigns of a tunnel."),
-    "load": ("tunneldb.cli.load:load", "Load LAS, LAZ and E57 files into a survey."),
+    "load": ("tunneldb.cli.load:load", "Load scan files into a survey."),
     "run": ("tunneldb.cli.run:run", "Run the stages: axis, segments, sections, ground, detect."),
     "batch": ("tunneldb.cli.batch:batch", "Bring files to leaks, kilometre by kilometre, on all cores; go on after a stop."),
     "worker": ("tunneldb.cli.worker:worker", "Do what batches ask for, also of other machines."),

@@ -37,8 +37,8 @@ def survey() -> None:
     "--stations",
     type=FILE,
     multiple=True,
-    help="CSV with scan_id,x,y,z of a static scanner, scan_id as point_source_id; or an E57 file, for the poses of its scans; "
-    "or a folder of E57 files. May be given several times.",
+    help="CSV with scan_id,x,y,z of a static scanner, scan_id as point_source_id; or an E57 or PTX file, for the poses of its "
+    "scans; or a folder of such files. May be given several times.",
 )
 @click.option("--backwards", is_flag=True, help="The trajectory was driven towards falling chainage.")
 @click.option(

@@ -17,7 +17,7 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.calibration import UNKNOWN, Sample, find_range_curve, observe_sample, roughness_of
 from tunneldb.pipeline.detect import ASIDE, load_floor, load_radiometer
-from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_scans
+from tunneldb.pointcloud.formats.table import has_scans, posed_scans
 from tunneldb.pointcloud.reader import Points, read_chunks, read_header
 from tunneldb.pointcloud.thinning import thin
 from tunneldb.radiometry.cells import IntensitySamples
@@ -150,13 +150,13 @@ def diagnose_file(
     Parameters
     ----------
     path : Path
-        LAS, LAZ or E57.
+        Scan file.
     dimension : str
         Dimension that holds the intensity.
     kind : {'amplitude', 'reflectance', 'linear'}
         What it is.
     scanner : three floats or None
-        Where the scanner stood, in the file's coordinates, m; None to take the poses of an E57 file.
+        Where the scanner stood, in the file's coordinates, m; None to take the poses of an E57 or PTX file.
     begin : callable
         Called with a text and a number of points, None if unknown, before each step; returns what takes the points done.
 
@@ -267,11 +267,11 @@ def _attempt(find: Callable[[], RangeCurve], raw: NDArray[np.floating]) -> tuple
 
 def _stations(path: Path, scanner: tuple[float, float, float] | None) -> dict[int, Float]:
     """Positions of a file's scans by their numbers; none where ``scanner`` says it."""
-    if not is_e57(path):
+    if not has_scans(path):
         if scanner is None:
-            raise UserError(f"{path}: where the scanner stood isn't in a LAS file: give --scanner X Y Z in its coordinates")
+            raise UserError(f"{path}: where the scanner stood isn't in the file: give --scanner X Y Z in its coordinates")
         return {}
-    scans = read_e57_scans(path)
+    scans = posed_scans(path)
     posed = {scan.number: scan.position for scan in scans if scan.position is not None}
     if scanner is not None:
         if posed:

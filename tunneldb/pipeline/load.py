@@ -18,7 +18,7 @@ from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import parameters_of, require_same_density, settings_of
 from tunneldb.pipeline.read import Begin, Counts, Reading, silent
-from tunneldb.pointcloud.reader import ScanHeader, read_header
+from tunneldb.pointcloud.reader import ScanHeader, crs_note, read_header
 from tunneldb.pointcloud.selection import MEMORY, FilterSettings
 from tunneldb.pointcloud.spool import Spool
 from tunneldb.store.ledger import Run, lock, stage_run
@@ -193,14 +193,16 @@ def load_files(
     reading = Reading.of(conn, survey, settings, memory)
     conn.rollback()
     headers = _headers(reading, paths)
+    notes = {header.path.name: crs_note(header, survey.srid) for header in headers}
     for batch in _batches(headers, reading.alignment, settings.max_distance):
         recorded = recorded_files(conn, survey)
         there = {header.path: unchanged(conn, header.path, recorded.get(header.path.name)) for header in batch}
         conn.commit()
-        yield from (loaded for loaded in there.values() if loaded is not None)
+        yield from (replace(loaded, note=notes[loaded.name]) for loaded in there.values() if loaded is not None)
         changed = [header for header in batch if there[header.path] is None]
         if changed:
-            yield from _load_batch(reading, changed, paths, begin)
+            for loaded in _load_batch(reading, changed, paths, begin):
+                yield replace(loaded, note=notes.get(loaded.name))
 
 
 def _headers(reading: Reading, paths: Sequence[Path]) -> list[ScanHeader]:

@@ -148,6 +148,8 @@ class ScanHeader:
         Coordinate reference system, None when the file states none.
     low, high : (3,) float64 array
         Box of the coordinates by the header, m; not checked.
+    unread_crs : str
+        What the file has for a coordinate system that nobody can read, and why; empty if there is nothing of the kind.
     """
 
     path: Path
@@ -156,3 +158,4 @@ class ScanHeader:
     crs: CRS | None
     low: Float
     high: Float
+    unread_crs: str = ""

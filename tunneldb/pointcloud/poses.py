@@ -72,7 +72,7 @@ class PoseFaults:
             more = f" and {len(self.unknown) - 10} more" if len(self.unknown) > 10 else ""
             return (
                 f"no station for scan_id {scans}{more}; add them to the stations of the survey "
-                "(scan_id is a LAS file's point_source_id; an E57 file brings its own: survey add … --stations FILE.e57)"
+                "(scan_id is a LAS file's point_source_id; an E57 or PTX file brings its own: survey add … --stations FILE.e57)"
             )
         where = [
             f"up to {seconds:.3f} s {side}"

@@ -9,24 +9,23 @@ from pathlib import Path
 from pyproj import CRS
 
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_header
 from tunneldb.pointcloud.formats.faults import require_dimension
-from tunneldb.pointcloud.formats.las import read_las_header
 from tunneldb.pointcloud.formats.raw import read_raw
+from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.points import CHUNK, Points, Ranges, ScanHeader
 
 __all__ = ["CHUNK", "Points", "ScanHeader", "check_header", "read_chunks", "read_header"]
 
 
 def read_header(path: Path) -> ScanHeader:
-    """Read the header of a LAS, LAZ or E57 file.
+    """Read the header of a scan file; of PLY, PTX and other text its points too, once for each version of the file.
 
     Raises
     ------
     UserError
-        If the file is missing, is none of its kind, holds no points, or (LAS) its coordinate system cannot be read.
+        If the file is missing, is none of its kind, or holds no points.
     """
-    return read_e57_header(path) if is_e57(path) else read_las_header(path)
+    return format_of(path).header(path)
 
 
 def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_time: bool) -> None:
@@ -55,6 +54,14 @@ def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_tim
             f"{header.path}: its coordinate system is {describe_crs(header.crs)}, the tunnel's is "
             f"{describe_crs(CRS.from_epsg(srid))}; transform the file or add the tunnel with the file's SRID"
         )
+
+
+def crs_note(header: ScanHeader, srid: int) -> str | None:
+    """Say that a file's coordinates are taken to be the tunnel's (EPSG code) without its saying so; None if it does."""
+    if header.crs is not None:
+        return None
+    said = f"a coordinate system that can't be read ({header.unread_crs})" if header.unread_crs else "no coordinate system"
+    return f"states {said}: taken to be in the tunnel's, EPSG:{srid}"
 
 
 def read_chunks(path: Path, dimension: str | None, size: int = CHUNK, ranges: Ranges | None = None) -> Iterator[Points]:

@@ -24,6 +24,8 @@ from tunneldb.pointcloud.formats.las import KIND, read_las_header
 from tunneldb.pointcloud.formats.las_header import Head, read_head
 from tunneldb.pointcloud.formats.las_records import FORMAT_OF, coordinates, fields, record_size, upgraded
 from tunneldb.pointcloud.formats.laz import writing
+from tunneldb.pointcloud.formats.raw_records import RawRecords
+from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.points import CHUNK
 from tunneldb.threads import threads
 
@@ -56,7 +58,8 @@ def rewrite(
     Parameters
     ----------
     source : Path
-        LAS, LAZ or E57 file. Of E57, what `tunneldb.pointcloud.formats.e57_records.E57Records` says.
+        Scan file. Of E57, what `tunneldb.pointcloud.formats.e57_records.E57Records` says, of PTX, PTS, PLY and other
+        tables `tunneldb.pointcloud.formats.raw_records.RawRecords`.
     target : Path
         LAZ file to write; it must not exist.
     classes : callable
@@ -80,7 +83,7 @@ def rewrite(
     OSError
         If the target cannot be written.
     """
-    what = _of_e57(source, size) if is_e57(source) else _of_las(source, size)
+    what = _of_las(source, size) if format_of(source).is_las else _of_others(source, size)
     head = what.head.with_classes(names)
     counts = np.zeros(256, np.int64)
     with writing(target, head) as writer:
@@ -102,8 +105,8 @@ def read_coordinates(path: Path, size: int = CHUNK) -> Iterator[Float]:
     UserError
         If the file cannot be read, or holds no points.
     """
-    if is_e57(path):
-        source = E57Records(path)
+    if not format_of(path).is_las:
+        source = _records(path)
         for records in source.read(size):
             yield coordinates(records, source.head.scales, source.head.offsets)
         return
@@ -143,6 +146,10 @@ def _read(path: Path, count: int, size: int, selection: DecompressionSelection =
             yield array.view(np.uint8).reshape(len(array), -1)
 
 
-def _of_e57(path: Path, size: int) -> _Source:
-    source = E57Records(path)
+def _records(path: Path) -> E57Records | RawRecords:
+    return E57Records(path) if is_e57(path) else RawRecords(path)
+
+
+def _of_others(path: Path, size: int) -> _Source:
+    source = _records(path)
     return _Source(source.head, source.read(size), source.patches)

@@ -1,4 +1,4 @@
-"""Stations of a static scanner, from CSV files and from the poses of E57 files."""
+"""Stations of a static scanner, from CSV files and from the poses of E57 and PTX files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from tunneldb.arrays import Float, Int32
 from tunneldb.csvfile import read_csv
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.formats.e57 import is_e57, read_e57_scans
+from tunneldb.pointcloud.formats.table import has_scans, posed_scans
 
 SCAN_ID_LIMIT = 1 << 31  # point_source_id of LAS has 16 bits, the numbers of E57 scans have 31
 SAME_PLACE = 0.001  # m; one station that comes from two files
@@ -46,8 +46,8 @@ def read_stations(paths: Sequence[Path]) -> Stations:
     Parameters
     ----------
     paths : sequence of Path
-        CSV files with scan_id,x,y,z; E57 files, whose scans are stations where their poses say; folders, for all E57
-        files in them. A scan of an E57 file that has no pose must be in a CSV file, by its number.
+        CSV files with scan_id,x,y,z; E57 and PTX files, whose scans are stations where their poses say; folders, for all
+        such files in them. A scan of an E57 file that has no pose must be in a CSV file, by its number.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def read_stations(paths: Sequence[Path]) -> Stations:
     known: dict[int, _Station] = {}
     placeless = []
     for path in _files(paths):
-        for station in _of_e57(path) if is_e57(path) else _of_csv(path):
+        for station in _of_scans(path) if has_scans(path) else _of_csv(path):
             if station.place is None:
                 placeless.append(station)
                 continue
@@ -78,14 +78,14 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
         if not path.is_dir():
             yield path
             continue
-        found = sorted(file for file in path.iterdir() if is_e57(file))
+        found = sorted(file for file in path.iterdir() if has_scans(file))
         if not found:
-            raise UserError(f"{path}: no E57 file in this folder")
+            raise UserError(f"{path}: no E57 or PTX file in this folder")
         yield from found
 
 
-def _of_e57(path: Path) -> Iterator[_Station]:
-    for scan in read_e57_scans(path):
+def _of_scans(path: Path) -> Iterator[_Station]:
+    for scan in posed_scans(path):
         yield _Station(scan.number, scan.position, f"{path}, scan {scan.index + 1} ({scan.name})")
 
 

@@ -19,8 +19,8 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load import chainages_near, header_kilometres, parameters_of, settings_of
 from tunneldb.pipeline.run import loaded_kilometres
 from tunneldb.pipeline.stages import STAGE_NAMES
-from tunneldb.pointcloud.formats.e57 import is_e57
 from tunneldb.pointcloud.formats.las_bounds import header_box
+from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
 from tunneldb.store.sources import load_poses
 from tunneldb.store.surface import load_alignment
@@ -210,7 +210,7 @@ def _near_damaged(conn: psycopg.Connection[Any], survey: Survey, files: Sequence
 
 def _damaged_header(path: Path) -> ScanHeader | None:
     """What is known of a file that can't be read: its box, if that is there."""
-    box = None if is_e57(path) else header_box(path)
+    box = header_box(path) if format_of(path).is_las else None
     return None if box is None else ScanHeader(path, 0, (), None, np.array(box[0]), np.array(box[1]))
 
 

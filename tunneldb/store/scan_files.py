@@ -13,6 +13,7 @@ from psycopg.types.multirange import Multirange
 from psycopg.types.range import Range
 
 from tunneldb.errors import UserError
+from tunneldb.pointcloud.formats.columns import names_file
 from tunneldb.pointcloud.selection import FilterCounts
 from tunneldb.store.survey import Survey
 
@@ -34,6 +35,8 @@ class Loaded:
         once all its kilometres are loaded.
     seconds : float
         Time that it took, its share of what was done for several files at once included; 0 when unchanged.
+    note : str or None
+        What was taken for granted of it.
     """
 
     name: str
@@ -46,6 +49,7 @@ class Loaded:
     thinned: int
     kept: int
     seconds: float = 0.0
+    note: str | None = None
 
 
 @dataclass(frozen=True)
@@ -73,10 +77,14 @@ class Content:
 
 
 def checksum(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal."""
+    """SHA-256 of a file, hexadecimal; with the names of its columns, where they stand in a file beside it."""
     try:
         with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+            digest = hashlib.file_digest(file, "sha256")
+        beside = names_file(path)
+        if beside is not None:
+            digest.update(beside.read_bytes())
+        return digest.hexdigest()
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from error
 

@@ -51,7 +51,7 @@ def classify_file(source: Path, target: Path, values: Mapping[str, float], begin
     Parameters
     ----------
     source : Path
-        LAS, LAZ or E57 file.
+        Scan file.
     target : Path
         ``.laz`` file to write; it appears when it is complete.
     values : mapping of str to float

@@ -7,8 +7,6 @@ Source: ASTM E2807-11, Standard Specification for 3D Imaging Data Exchange, Vers
 
 from __future__ import annotations
 
-import hashlib
-import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -25,12 +23,12 @@ from pyproj.exceptions import CRSError
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
+from tunneldb.pointcloud.formats.scans import scan_number
 from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
 
 KIND = "an E57"
 CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
-FIRST_NUMBER = 65536  # scan numbers of LAS lie below
 FARTHEST = 1e8  # m; bounds beyond are those of an exporter that had none
 
 
@@ -45,7 +43,7 @@ class Scan:
     name : str
         As the exporter called it.
     number : int
-        `scan_number`.
+        By `scan_number`.
     records : int
         Points, invalid ones included.
     fields : frozenset of str
@@ -94,16 +92,6 @@ def is_e57(path: Path) -> bool:
     return path.suffix.lower() == ".e57"
 
 
-def scan_number(guid: str, position: Float | None) -> int:
-    """Number of a scan, the same in whichever file and place among the scans: a hash of its GUID and position.
-
-    From 65536 to 2³¹ − 1, so never one of a LAS file. A scan that was registered anew has another number.
-    """
-    place = b"" if position is None else struct.pack("<3d", *(position + 0.0))
-    digest = hashlib.blake2b(guid.strip().lower().encode() + place, digest_size=8).digest()
-    return FIRST_NUMBER + int.from_bytes(digest, "big") % ((1 << 31) - FIRST_NUMBER)
-
-
 def read_e57_scans(path: Path) -> list[Scan]:
     """Scans of an E57 file that hold points.
 
@@ -125,7 +113,7 @@ def read_e57_header(path: Path) -> ScanHeader:
     with open_e57(path) as image, decoding(path, KIND):
         scans = scans_of(path, image)
         boxes = [_box(image, scan) for scan in scans]
-        crs = _crs(image)
+        crs, unread = _crs(image)
     dimensions = [name for name, has in _DIMENSIONS if all(map(has, scans))]
     return ScanHeader(
         path,
@@ -134,6 +122,7 @@ def read_e57_header(path: Path) -> ScanHeader:
         crs,
         np.min([low for low, _ in boxes], axis=0),
         np.max([high for _, high in boxes], axis=0),
+        unread,
     )
 
 
@@ -403,13 +392,13 @@ def _xyz(raw: Raw) -> Float:
     return np.column_stack([raw.x, raw.y, raw.z]) * raw.scales + raw.offsets
 
 
-def _crs(image: Any) -> CRS | None:
-    """Coordinate system that the file names, where that can be understood; exporters write all sorts of things there."""
+def _crs(image: Any) -> tuple[CRS | None, str]:
+    """Coordinate system that the file names, or what it has in its place; exporters write all sorts of things there."""
     root = image.root()
     text = root["coordinateMetadata"].value().strip() if root.isDefined("coordinateMetadata") else ""
     if not text:
-        return None
+        return None, ""
     try:
-        return CRS.from_user_input(text)
+        return CRS.from_user_input(text), ""
     except CRSError:
-        return None
+        return None, repr(text.split("\n", 1)[0][:60])

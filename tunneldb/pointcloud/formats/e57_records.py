@@ -37,7 +37,7 @@ FORMAT = 7
 
 _SCALE = 1e-4  # m; finer than any scanner measures, and an int32 of it reaches 214 km
 _EXTRAS = (("intensity", "e57_intensity", "f4"), ("rowIndex", "row_index", "i4"), ("columnIndex", "column_index", "i4"))
-_TYPE_NUMBER = {"f4": 9, "i4": 6}
+_TYPE_NUMBER = {"f4": 9, "i4": 6, "f8": 10}
 _COLOURS = (("colorRed", "red"), ("colorGreen", "green"), ("colorBlue", "blue"))
 _GPS_EPOCH = dt.datetime(1980, 1, 6)
 _ADJUSTED = 1e9  # s that LAS takes off a GPS time
@@ -76,8 +76,8 @@ class E57Records:
         size = record_size(FORMAT) + 4 * len(self.extras)
         date = _GPS_EPOCH + dt.timedelta(seconds=created) if created else None
         timed = any(scan.has_time for scan in scans)
-        records = (_extra_bytes(self.extras),) if self.extras else ()
-        self.head = Head(_header(self.scale, self.offsets, date, size, timed), records).with_crs(header.crs)
+        records = (extra_bytes(self.extras, "E57"),) if self.extras else ()
+        self.head = Head(new_header(self.scale, self.offsets, date, FORMAT, size, timed), records).with_crs(header.crs)
         self.count = 0
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.returns = np.zeros(15, np.uint64)
@@ -132,10 +132,10 @@ class E57Records:
         point["bit_fields"] = number | np.clip(values.get("returnCount", np.ones(1)), 1, 15).astype(np.uint8) << 4
         point["point_source_id"] = min(scan.index + 1, 2**16 - 1)
         if "intensity" in values:
-            point["intensity"] = _spread(values["intensity"], *_limits(node, "intensityLimits/intensity", values["intensity"]))
+            point["intensity"] = spread(values["intensity"], *_limits(node, "intensityLimits/intensity", values["intensity"]))
         for name, channel in _COLOURS:
             if name in values:
-                point[channel] = _spread(values[name], *_limits(node, f"colorLimits/{name}", values[name]))
+                point[channel] = spread(values[name], *_limits(node, f"colorLimits/{name}", values[name]))
         if scan.has_time:
             point["gps_time"] = values["timeStamp"] + scan.start - _ADJUSTED
         for place, (name, _, kind) in enumerate(self.extras):
@@ -164,27 +164,30 @@ def _limits(node: Any, name: str, values: Float) -> tuple[float, float]:
     return 0.0, next((float(end) for end in (1, 2**8 - 1, 2**16 - 1) if most <= end), most)
 
 
-def _spread(values: Float, low: float, high: float) -> UInt16:
+def spread(values: Float, low: float, high: float) -> UInt16:
     """Values from low to high over 16 bits; what is no number is 0."""
     share = np.nan_to_num((values - low) / (high - low), nan=0.0, posinf=1.0, neginf=0.0)
     return np.rint(np.clip(share, 0.0, 1.0) * (2**16 - 1)).astype(np.uint16)
 
 
-def _header(scale: float, offsets: Float, date: dt.datetime | None, size: int, timed: bool) -> bytes:
+def new_header(scale: float, offsets: Float, date: dt.datetime | None, point_format: int, size: int, timed: bool) -> bytes:
+    """Header of a LAS file of version 1.4, without box and counts; `timed`: times are adjusted standard GPS time."""
     header = bytearray(HEADER_SIZE)
     flags = _STANDARD_TIME_FLAG if timed else 0
     struct.pack_into("<4sHH16sBB32s32s", header, 0, b"LASF", 0, flags, bytes(16), 1, 4, b"OTHER", b"tunneldb")
     day, year = (0, 0) if date is None else (date.timetuple().tm_yday, date.year)
     struct.pack_into("<HHH", header, 90, day, year, HEADER_SIZE)
-    struct.pack_into("<BH", header, 104, FORMAT, size)
+    struct.pack_into("<BH", header, 104, point_format, size)
     struct.pack_into("<6d", header, 131, *[scale] * 3, *offsets)
     return bytes(header)
 
 
-def _extra_bytes(extras: Sequence[tuple[str, str, str]]) -> Record:
-    """What describes the extra bytes: table 26."""
+def extra_bytes(extras: Sequence[tuple[str, str, str]], source: str) -> Record:
+    """What describes extra bytes, each a name in the source, its own and its type: table 26."""
     data = b"".join(
-        struct.pack("<2sBB32s4s120s32s", b"", _TYPE_NUMBER[kind], 0, name.encode(), b"", b"", f"{field} of E57".encode())
+        struct.pack(
+            "<2sBB32s4s120s32s", b"", _TYPE_NUMBER[kind], 0, name.encode(), b"", b"", f"{field} of {source}".encode()[:32]
+        )
         for field, name, kind in extras
     )
     return Record(b"LASF_Spec", 4, b"Extra bytes", data)

@@ -65,16 +65,30 @@ def read_las_header(path: Path) -> ScanHeader:
         header = las.header
         dimensions = _dimensions(header)
         scales, offsets, count = header.scales, header.offsets, int(header.point_count)
+        crs, unread = None, ""
         try:
             crs = header.parse_crs()
         except CRSError as error:
-            raise UserError(
-                f"{path}: its coordinate system cannot be read ({line_of(error)}); mend the file's header"
-            ) from error
+            unread = line_of(error)
     if count == 0:
         raise UserError(f"{path}: the file holds no points")
     _check_scales(path, scales, offsets)
-    return ScanHeader(path, count, dimensions, crs, np.array(header.mins), np.array(header.maxs))
+    return ScanHeader(path, count, dimensions, crs, np.array(header.mins), np.array(header.maxs), unread)
+
+
+def read_las_facts(path: Path) -> tuple[str, str | None]:
+    """Version and point format of a LAS or LAZ file, and what its header says that times are; None where it has none."""
+    with decoding(path, KIND):
+        check_envelope(path)
+        las = laspy.open(path)
+    with decoding(path, KIND), las:
+        header = las.header
+        kind = "LAZ" if header.are_points_compressed else "LAS"
+        name = f"{kind} {header.version}, point format {header.point_format.id}"
+        if "gps_time" not in header.point_format.dimension_names:
+            return name, None
+        standard = header.global_encoding.gps_time_type == laspy.header.GpsTimeType.STANDARD
+        return name, "adjusted standard GPS time" if standard else "seconds of the GPS week, or no GPS time"
 
 
 def read_las(path: Path, dimension: str | None, size: int, ranges: Ranges | None = None) -> Iterator[Raw]:

@@ -1,0 +1,134 @@
+"""`tunneldb inspect`: what it says of simulated scans is what they were made as, and what it says to type works."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from pyproj import CRS
+
+from tunneldb.cli.main import main
+from tunneldb.simulate import Parameters, Simulation, write
+
+
+def inspected(*files: object, code: int = 0) -> dict[str, Any]:
+    result = CliRunner().invoke(main, ["inspect", *map(str, files), "--json"])
+    assert result.exit_code == code, result.output
+    return json.loads(result.stdout)
+
+
+@pytest.fixture(scope="module")
+def tls(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("inspect")
+    write(
+        Simulation(Parameters(name="bend", length=24.0, scanner="static", angular_step=0.6, srid=3794, leaks=1, seed=3)), folder
+    )
+    return folder / "bend.laz"
+
+
+def changed(source: Path, target: Path, scale: float = 1.0, crs: int | None = None, bare: bool = False) -> Path:
+    """The same scan in another unit, without its coordinate system or with another, perhaps with nothing but coordinates."""
+    las = laspy.read(source)
+    header = laspy.LasHeader(point_format=0 if bare else 6, version="1.4")
+    header.scales, header.offsets = [0.001] * 3, np.floor(las.xyz.min(axis=0) * scale)
+    if crs is not None:
+        header.add_crs(CRS(crs))
+    out = laspy.LasData(header)
+    out.x, out.y, out.z = (las.xyz * scale).T
+    out.intensity = las.intensity
+    if not bare:
+        out.point_source_id = las.point_source_id
+    out.write(target)
+    return target
+
+
+def test_what_a_scan_holds(tls: Path) -> None:
+    said = inspected(tls)
+    (look,) = said["files"]
+    las = laspy.read(tls)
+    assert (look["points"], look["srid"], look["unit"], look["profile_spacing"]) == (len(las), 3794, None, None)
+    np.testing.assert_allclose([look["low"], look["high"]], [las.xyz.min(axis=0), las.xyz.max(axis=0)], atol=1e-9)
+    numbers, counts = np.unique(las.point_source_id, return_counts=True)
+    assert look["scans"] == dict(zip(map(str, numbers.tolist()), counts.tolist(), strict=True))
+    assert look["times"] == [las.gps_time.min(), las.gps_time.max()]
+    assert look["length"] == pytest.approx(24.0, abs=0.5)
+    assert look["width"] == pytest.approx(8.0, abs=0.3)
+    kinds = {one["name"]: one["guesses"][0]["kind"] for one in look["intensities"]}
+    assert kinds == {"intensity": "linear", "Amplitude": "amplitude", "Reflectance": "reflectance"}
+    by_name = {one["name"]: one["values"] for one in look["intensities"]}
+    assert by_name["Amplitude"]["most"] == pytest.approx(las.Amplitude.max())
+    assert by_name["Amplitude"]["median"] == pytest.approx(np.median(las.Amplitude))
+    assert by_name["intensity"]["whole"]
+
+
+def test_what_is_to_be_typed_next_are_commands(tls: Path) -> None:
+    said = inspected(tls)
+    assert [line for line in said["missing"] if "day" not in line] == []
+    for line in said["commands"]:
+        words = shlex.split(line.replace("YYYY-MM-DD", "2024-05-04"))
+        assert words[0] == "tunneldb"
+        command: Any = main
+        context = None
+        while words[1:] and hasattr(command, "get_command"):
+            words = words[1:]
+            command = command.get_command(context, words[0])
+        command.make_context("x", words[1:])  # parses the options, and refuses those that are none
+    tunnel, survey = said["commands"][1:3]
+    assert f"--srid 3794 --axis {tls.parent}/bend.axis.csv" in tunnel
+    assert f"--stations {tls.parent}/bend.stations.csv --intensity Reflectance --intensity-kind reflectance" in survey
+
+
+def test_what_is_missing_is_said(tls: Path, tmp_path: Path) -> None:
+    bare = changed(tls, tmp_path / "cloud.las", bare=True)
+    said = inspected(bare)
+    text = "\n".join(said["missing"])
+    for word in ("axis", "EPSG code in place of SRID", "where the scanner stood", "scans were merged", "YYYY-MM-DD"):
+        assert word in text
+    assert f"--srid SRID --axis auto {bare}" in said["commands"][1]
+    assert "--stations STATIONS.csv --intensity intensity --intensity-kind linear --reference auto" in said["commands"][2]
+    assert any("intensity is taken for 16-bit counts" in doubt for doubt in said["doubts"])
+
+
+def test_feet_are_noticed(tls: Path, tmp_path: Path) -> None:
+    (look,) = inspected(changed(tls, tmp_path / "a.las", 1 / 0.3048))["files"]
+    assert "looks like feet" in look["unit"]
+    assert inspected(changed(tls, tmp_path / "b.las"))["files"][0]["unit"] is None
+    (named,) = inspected(changed(tls, tmp_path / "c.las", 1.0, crs=2263))["files"]
+    assert named["unit"] == "US survey foot, by its coordinate system: transform it to one in metres"
+
+
+def test_a_ptx_brings_its_stations(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    lines = []
+    for number in range(2):
+        angle, along = rng.uniform(-np.pi, np.pi, 4000), rng.uniform(-10.0, 10.0, 4000)
+        lines += ["40", "100", f"{10 * number} 0 0", "1 0 0", "0 1 0", "0 0 1"]
+        lines += ["1 0 0 0", "0 1 0 0", "0 0 1 0", f"{500_010 + 10 * number} 4000000 300 1"]
+        lines += [f"{x:.4f} {3 * np.sin(a):.4f} {3 * np.cos(a):.4f} {0.5:.3f}" for x, a in zip(along, angle, strict=True)]
+    path = tmp_path / "site.ptx"
+    path.write_text("\n".join(lines))
+    said = inspected(path)
+    assert [scan["position"] for scan in said["files"][0]["poses"]] == [[500_010.0, 4e6, 300.0], [500_020.0, 4e6, 300.0]]
+    assert f"--stations {path} --intensity-kind none" in said["commands"][2]  # an intensity that is the same everywhere is none
+
+
+def test_files_are_concluded_from_together(tls: Path, tmp_path: Path) -> None:
+    for name in ("km-1.laz", "km-2.laz"):
+        os.link(tls, tmp_path / name)
+    (tmp_path / "km-3.laz").write_bytes(b"LASF")
+    other = changed(tls, tmp_path / "other.las", crs=25830)
+    said = inspected(*tmp_path.glob("km-*.laz"), code=1)
+    assert len(said["files"]) == 2
+    assert "km-3.laz" in said["unreadable"][0]
+    assert "tunnel add km " in said["commands"][1]
+    both = inspected(tmp_path / "km-1.laz", other)
+    assert any("different coordinate systems" in doubt for doubt in both["doubts"])
+    assert "--intensity intensity " in both["commands"][2]  # which is what they have in common
+    assert inspected(tmp_path / "km-3.laz", code=2)["ok"] is False

@@ -1,0 +1,189 @@
+"""What is missing of a scan to be worked on, and what to type next, by what its files hold."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tunneldb.pipeline.inspection import FileLook, IntensityLook
+from tunneldb.radiometry.intensity_kind import KindGuess
+
+_MOST_FILES = 5  # named one by one
+_PREFERRED = ("reflectance", "amplitude", "linear")
+_INTENSITY = re.compile("intens|ampl|reflect|refl")
+_SAME_PLACE = 0.001  # m
+_PLAIN = re.compile(r"[^A-Za-z0-9_]+")
+
+
+@dataclass(frozen=True)
+class FirstSteps:
+    """What to do with scan files.
+
+    Attributes
+    ----------
+    missing : list of str
+        What the files do not say, and who has it.
+    doubts : list of str
+        What may be wrong with them.
+    commands : list of str
+        What to type; words in capitals stand for what is missing.
+    """
+
+    missing: list[str]
+    doubts: list[str]
+    commands: list[str]
+
+
+def first_steps(looks: Sequence[FileLook]) -> FirstSteps:
+    """Conclude what to do with the files of a survey."""
+    missing: list[str] = []
+    doubts = [f"{look.path.name}: {look.unit}" for look in looks if look.unit]
+    doubts += [
+        f"{look.path.name}: {look.misplaced} points have no coordinates, {look.untimed} no time"
+        for look in looks
+        if look.misplaced or look.untimed
+    ]
+    name, files = _name(looks), _files(looks)
+    srid = _srid(looks, missing, doubts)
+    axis = _beside(looks, "axis.csv")
+    if axis is None:
+        missing.append("the given axis, which no scan holds: give --axis your own, or have it found from the points (auto)")
+    survey, date = _survey(looks, name, missing)
+    poses = _poses(looks, missing, doubts)
+    intensity = _intensity(looks, missing, doubts)
+    tunnel = f"tunneldb tunnel add {name} --srid {srid} --axis {f'auto {files}' if axis is None else _quoted(axis)}"
+    return FirstSteps(
+        missing,
+        doubts,
+        [
+            "tunneldb init",
+            tunnel,
+            f"tunneldb survey add {survey} --tunnel {name} --date {date} {poses} {intensity}",
+            f"tunneldb load {survey} {files}",
+            f"tunneldb run {survey}",
+        ],
+    )
+
+
+def _quoted(path: Path) -> str:
+    return shlex.quote(str(path))
+
+
+def _files(looks: Sequence[FileLook]) -> str:
+    folders, suffixes = {look.path.parent for look in looks}, {look.path.suffix for look in looks}
+    if len(looks) > _MOST_FILES and len(folders) == 1 and len(suffixes) == 1:
+        there = {path.name for path in looks[0].path.parent.glob(f"*{looks[0].path.suffix}")}
+        if there == {look.path.name for look in looks}:
+            folder = looks[0].path.parent
+            return f"*{looks[0].path.suffix}" if folder == Path() else f"{_quoted(folder)}/*{looks[0].path.suffix}"
+    return " ".join(_quoted(look.path) for look in looks)
+
+
+def _name(looks: Sequence[FileLook]) -> str:
+    """What the names of the files begin with, without numbers that tell them apart."""
+    stems = [look.path.name.split(".", 1)[0] for look in looks]
+    same = [len(set(letters)) == 1 for letters in zip(*stems, strict=False)]
+    common = stems[0][: same.index(False) if False in same else len(same)]
+    return _PLAIN.sub("-", common).strip("-_0123456789" if len(stems) > 1 else "-_") or "tunnel"
+
+
+def _survey(looks: Sequence[FileLook], name: str, missing: list[str]) -> tuple[str, str]:
+    dates = [look.date for look in looks if look.date is not None]
+    if not dates:
+        missing.append("the day of the scan, in place of YYYY-MM-DD")
+        return f"{name}-scan", "YYYY-MM-DD"
+    return f"{name}-{min(dates).year}", min(dates).isoformat()
+
+
+def _srid(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> str:
+    named = {look.crs: look.srid for look in looks if look.crs is not None}
+    if len(set(named.values())) > 1:
+        doubts.append(f"the files are in different coordinate systems: {', '.join(map(str, named))}; transform them to one")
+    codes = [code for code in named.values() if code is not None]
+    doubts += [f"{look.path.name}: its coordinate system can't be read: {look.unread_crs}" for look in looks if look.unread_crs]
+    if codes:
+        return str(codes[0])
+    why = f"that of {next(iter(named))} has no EPSG code" if named else "no file states one"
+    missing.append(f"the coordinate system, as EPSG code in place of SRID: {why}; it must be projected and in metres")
+    return "SRID"
+
+
+def _beside(looks: Sequence[FileLook], ending: str) -> Path | None:
+    """File beside the scans that is called as one of them, but for its ending; None if there is none, or more than one."""
+    found = set()
+    for look in looks:
+        stem = look.path.name.split(".", 1)[0]
+        for path in look.path.parent.glob(f"*.{ending}"):
+            if stem == path.name[: -len(ending) - 1] or stem.startswith(f"{path.name[: -len(ending) - 1]}-"):
+                found.add(path)
+    return found.pop() if len(found) == 1 else None
+
+
+def _poses(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> str:
+    posed = [look for look in looks if look.poses]
+    if posed and all(scan.position is not None for look in posed for scan in look.poses):
+        _doubt_positions(posed, doubts)
+        return " ".join(f"--stations {_quoted(look.path)}" for look in posed)
+    trajectory, stations = _beside(looks, "trajectory.csv"), _beside(looks, "stations.csv")
+    if trajectory is not None:
+        return f"--trajectory {_quoted(trajectory)}"
+    if stations is not None:
+        return f"--stations {_quoted(stations)}"
+    scans = sorted({scan for look in looks for scan in look.scans})
+    times = [time for look in looks if look.times for time in look.times]
+    if times and len(scans) < 3:
+        missing.append(
+            "where the scanner was: its trajectory as TRAJECTORY.csv with time,x,y,z, time being the gps_time of the files, "
+            f"{min(times):.3f} to {max(times):.3f}; of a scanner that stood still its stations, see --stations"
+        )
+        return "--trajectory TRAJECTORY.csv"
+    listed = ", ".join(map(str, scans[:10])) + (f" and {len(scans) - 10} more" if len(scans) > 10 else "")
+    several = "" if len(scans) > 1 else "; if scans were merged into one, their positions are lost: export them one by one"
+    missing.append(f"where the scanner stood: STATIONS.csv with scan_id,x,y,z, of scan_id {listed}{several}")
+    return "--stations STATIONS.csv"
+
+
+def _doubt_positions(posed: Sequence[FileLook], doubts: list[str]) -> None:
+    places = np.array([scan.position for look in posed for scan in look.poses])
+    if np.any(np.abs(places).max(axis=1) < _SAME_PLACE):
+        doubts.append(
+            "the pose of a scan is 0, 0, 0: did the scanner stand there, or was the pose lost when the scan was exported?"
+        )
+    elif len(places) > 1 and float(np.ptp(places, axis=0).max()) < _SAME_PLACE:
+        doubts.append(f"all {len(places)} scans have the same position: export them with their own poses")
+
+
+def _intensity(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> str:
+    found = _common_intensity(looks)
+    if found is None:
+        missing.append("an intensity that leaks can be found in; without one the lining is shown, and no leaks are sought")
+        return "--intensity-kind none"
+    name, guess, sure = found
+    if not sure:
+        doubts.append(f"{name} is taken for {guess.what} by its values ({guess.reason}): ask who scanned it, and say so")
+    words = f"--intensity {shlex.quote(name)} --intensity-kind {guess.kind}"
+    if guess.kind == "reflectance":
+        return words
+    reference = _beside(looks, "reference.csv")
+    return f"{words} --reference {'auto' if reference is None else _quoted(reference)}"
+
+
+def _common_intensity(looks: Sequence[FileLook]) -> tuple[str, KindGuess, bool] | None:
+    """Dimension that all files have and whose values may be an intensity, what it may be, and whether its name says so too."""
+    found = []
+    for first in looks[0].intensities:
+        same = [_named(look, first.name) for look in looks]
+        kinds = [[guess.kind for guess in one.usable] if one is not None else [] for one in same]
+        guesses = [guess for guess in first.usable if all(guess.kind in kind for kind in kinds)]
+        if guesses and _INTENSITY.search(first.name.lower()):
+            found.append((first.name, guesses[0], guesses[0].kind in first.name.lower()))
+    return min(found, key=lambda one: _PREFERRED.index(one[1].kind), default=None)
+
+
+def _named(look: FileLook, name: str) -> IntensityLook | None:
+    return next((one for one in look.intensities if one.name == name), None)

@@ -1,0 +1,263 @@
+"""A look at a scan file by itself: what it holds, and what that may be."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pyproj import CRS
+
+from tunneldb.arrays import Bool, Float
+from tunneldb.errors import UserError
+from tunneldb.pointcloud.contents import Contents, read_contents, read_near, read_values
+from tunneldb.pointcloud.form import WINDOW, TunnelForm, profile_spacing, surface_density, tunnel_form
+from tunneldb.pointcloud.formats.las import read_las_facts
+from tunneldb.pointcloud.formats.scans import PosedScan
+from tunneldb.pointcloud.formats.table import format_of, posed_scans
+from tunneldb.pointcloud.reader import ScanHeader, describe_crs, horizontal, read_header
+from tunneldb.radiometry.intensity_kind import KindGuess, ValueRange, contradiction, guess_kind, value_range
+
+WIDEST = 20.0
+"""Width of a tunnel in metres above which it is rather one in feet: three lanes with their shoulders have 16 to 18 m."""
+
+NARROWEST = 1.5
+"""Width in metres below which nobody carries a scanner through it."""
+
+LOWEST = 0.3
+"""Height over width below which a cloud is a piece of open country and no tunnel."""
+
+_FOOT = 0.3048  # m
+_PARTS = (0.25, 0.5, 0.75)  # of the tunnel's length, where profiles are looked for
+_GPS_EPOCH = dt.datetime(1980, 1, 6)
+_WEEK = 604_800.0  # s
+_LATEST = 100 * 52 * _WEEK
+_ADJUSTED = 1e9  # s that LAS takes off a GPS time
+
+_NO_INTENSITY = {
+    "x", "y", "z", "bit_fields", "raw_classification_flags", "return_number", "number_of_returns", "synthetic",
+    "key_point", "withheld", "overlap", "scanner_channel", "scan_direction_flag", "edge_of_flight_line",
+    "classification", "user_data", "scan_angle", "scan_angle_rank", "point_source_id", "scan_id", "gps_time", "red",
+    "green", "blue", "nir", "alpha", "nx", "ny", "nz", "wavepacket_index", "wavepacket_offset", "wavepacket_size",
+    "return_point_wave_location", "x_t", "y_t", "z_t",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class IntensityLook:
+    """A dimension that may hold the intensity.
+
+    Attributes
+    ----------
+    name, type : str
+        As the file has it, and what its numbers are: ``uint16``, ``float32``, ….
+    values : ValueRange or None
+        Of a sample; None where it cannot be read.
+    guesses : list of KindGuess
+        What it may be, the likeliest first.
+    fault : str or None
+        Why it cannot be read.
+    """
+
+    name: str
+    type: str
+    values: ValueRange | None
+    guesses: list[KindGuess]
+    fault: str | None = None
+
+    @property
+    def usable(self) -> list[KindGuess]:
+        """Guesses of kinds that the values contradict in nothing."""
+        if self.values is None:
+            return []
+        return [guess for guess in self.guesses if guess.kind != "none" and contradiction(guess.kind, self.values) is None]
+
+
+@dataclass(frozen=True)
+class FileLook:
+    """What a scan file holds.
+
+    Attributes
+    ----------
+    path : Path
+    format : str
+    points, invalid : int
+        Points, and how many more the file marks as invalid.
+    misplaced : int
+        Points with a coordinate that is NaN or infinite.
+    crs, unread_crs : str or None
+        Name of its coordinate system; what it has in the place of one.
+    srid : int or None
+        EPSG code of the coordinate system in plan.
+    low, high : (3,) float64 array
+        Box, in the file's unit.
+    length, width, height : float or None
+        Of the tunnel, as `tunnel_form` finds it.
+    density : tuple of three floats
+        Points per square unit of surface: 10th percentile, median, 90th; see `surface_density`.
+    sampled : int
+        Points that these were found on.
+    profile_spacing : float or None
+        Distance of the profiles along the tunnel; None where it can't be told.
+    unit : str or None
+        What the unit of length seems to be, where it is not the metre, and why.
+    times : (float, float) or None
+        First and last time, s.
+    time_kind : str or None
+        What the file says they are.
+    untimed : int
+        Points whose time is NaN or infinite.
+    date : datetime.date or None
+        Day of the first time, where the file says which times they are.
+    scans : dict of int to int
+        Points of each scan number.
+    poses : list of PosedScan
+        Scans that the file knows, with the positions that it gives them.
+    intensities : list of IntensityLook
+    """
+
+    path: Path
+    format: str
+    points: int
+    invalid: int
+    misplaced: int
+    crs: str | None
+    unread_crs: str | None
+    srid: int | None
+    low: Float
+    high: Float
+    length: float | None
+    width: float | None
+    height: float | None
+    density: tuple[float, float, float]
+    sampled: int
+    profile_spacing: float | None
+    unit: str | None
+    times: tuple[float, float] | None
+    time_kind: str | None
+    untimed: int
+    date: dt.date | None
+    scans: dict[int, int]
+    poses: list[PosedScan]
+    intensities: list[IntensityLook]
+
+
+def inspect_file(path: Path, begin: Callable[[str, float | None], Callable[[float], None]]) -> FileLook:
+    """Look at a scan file, read in chunks of constant memory.
+
+    Parameters
+    ----------
+    path : Path
+    begin : callable
+        Called with a text and a number of points before each step; returns what takes the points done.
+
+    Raises
+    ------
+    UserError
+        If it cannot be read.
+    """
+    header = read_header(path)
+    contents = read_contents(path, begin(path.name, header.points))
+    form = tunnel_form(contents.xyz)
+    names = [name for name in header.dimensions if name.lower() not in _NO_INTENSITY]
+    kind, time_kind = _described(path, contents)
+    return FileLook(
+        path,
+        kind,
+        contents.points,
+        header.points - contents.points,
+        contents.misplaced,
+        None if header.crs is None else describe_crs(header.crs),
+        header.unread_crs or None,
+        None if header.crs is None else horizontal(header.crs).to_epsg(),
+        contents.low,
+        contents.high,
+        None if form is None else form.length,
+        None if form is None else form.width,
+        None if form is None else form.height,
+        surface_density(contents.xyz, contents.share),
+        len(contents.xyz),
+        None if form is None else _spacing(path, contents, form),
+        _unit(header, contents, form),
+        contents.times,
+        time_kind,
+        contents.untimed,
+        _date(contents.times, time_kind),
+        contents.scans,
+        posed_scans(path),
+        [_look_at(path, name, contents.points) for name in names],
+    )
+
+
+def _described(path: Path, contents: Contents) -> tuple[str, str | None]:
+    """Format, and what the times are."""
+    found = format_of(path)
+    if found.is_las:
+        name, kind = read_las_facts(path)
+        return name, kind if contents.times else None
+    return found.name, "GPS seconds since 1980" if found.name == "E57" and contents.times else None
+
+
+def _date(times: tuple[float, float] | None, kind: str | None) -> dt.date | None:
+    """Day of the first time; to a few seconds, as GPS time knows no leap seconds."""
+    if times is None or kind is None or kind.startswith("seconds of the GPS week"):
+        return None
+    seconds = times[0] + (_ADJUSTED if "adjusted" in kind else 0.0)
+    # What is less than a week after the epoch is no date, but time from a beginning of its own.
+    if times[0] < _WEEK or seconds > _LATEST:
+        return None
+    return (_GPS_EPOCH + dt.timedelta(seconds=seconds)).date()
+
+
+def _look_at(path: Path, name: str, points: int) -> IntensityLook:
+    try:
+        values = read_values(path, name, points)
+    except UserError as error:
+        return IntensityLook(name, "", None, [], str(error).removeprefix(f"{path}: "))
+    found = value_range(values)
+    return IntensityLook(name, str(values.dtype.newbyteorder("=")), found, guess_kind(found, name))
+
+
+def _spacing(path: Path, contents: Contents, form: TunnelForm) -> float | None:
+    """Median of what is found in three short windows of the tunnel."""
+    along, _ = form.line.place(contents.xyz)
+    first = float(np.percentile(along, 0.1))
+    found = []
+    for part in _PARTS:
+        middle = first + part * form.length
+        near: Bool = np.abs(along - middle) < WINDOW / 2.0
+        if not near.any():
+            continue
+        xyz = read_near(path, contents, near)
+        at, across = form.line.place(xyz)
+        inside = np.abs(at - middle) < WINDOW / 2.0
+        spacing = profile_spacing(at[inside], across[inside], xyz[inside, 2])
+        if spacing is not None:
+            found.append(spacing)
+    return float(np.median(found)) if 2 * len(found) > len(_PARTS) else None
+
+
+def _unit(header: ScanHeader, contents: Contents, form: TunnelForm | None) -> str | None:
+    if header.crs is not None:
+        named = _unit_of(header.crs)
+        return None if named is None else f"{named}, by its coordinate system: transform it to one in metres"
+    low, high = contents.low, contents.high
+    inside = bool(np.all(np.abs([low[0], high[0]]) <= 180.0) and np.all(np.abs([low[1], high[1]]) <= 90.0))
+    if inside and float(np.max(high[:2] - low[:2])) < 0.1 < float(high[2] - low[2]):
+        return "looks like degrees (longitude and latitude): transform it to a projected system in metres"
+    if form is None:
+        return None
+    size = f"the tunnel is {form.width:.4g} wide and {form.height:.4g} high"
+    if form.width > 1000.0 * NARROWEST:
+        return f"looks like millimetres: {size}"
+    if form.width > WIDEST and form.height > LOWEST * form.width:
+        return f"looks like feet: {size}, which in feet were {form.width * _FOOT:.1f} m and {form.height * _FOOT:.1f} m"
+    return None
+
+
+def _unit_of(crs: CRS) -> str | None:
+    """Unit of a coordinate system in plan; None if it is the metre."""
+    units = {axis.unit_name for axis in horizontal(crs).axis_info}
+    return None if units <= {"metre", "meter", "m"} else ", ".join(sorted(units))

@@ -1,0 +1,132 @@
+"""Points of files that are neither LAS nor E57 as records of LAS, for who writes them as LAZ.
+
+Source: ASPRS LAS 1.4 R15, tables 3, 15 and 16 (formats 6 and 7), 26 (extra bytes).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from tunneldb.arrays import Float, UInt8
+from tunneldb.errors import UserError
+from tunneldb.pointcloud.formats.e57_records import extra_bytes, new_header, spread
+from tunneldb.pointcloud.formats.las_header import Head
+from tunneldb.pointcloud.formats.las_records import fields, record_size
+from tunneldb.pointcloud.formats.raw import read_raw
+from tunneldb.pointcloud.formats.table import format_of
+
+_SCALE = 1e-4  # m; finer than any scanner measures, and an int32 of it reaches 214 km
+_COLOURS = ("red", "green", "blue")
+_STANDARD = ("gps_time", "scan_id", "classification")
+_SHORT = 2**16
+
+
+class RawRecords:
+    """The points of a PTX, PTS, PLY or other table of points as records of LAS format 6, or 7 where they have a colour.
+
+    `point_source_id` is the scan number, or where that has more than 16 bits the place of the scan in the file, from 1. All
+    other columns lie in extra bytes, as 64-bit floats by their own names, the intensity as `source_intensity`; colours are
+    spread over 16 bits.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        header = format_of(path).header(path)
+        self.columns = [name for name in header.dimensions if name not in _STANDARD]
+        coloured = set(_COLOURS) <= set(self.columns)
+        self.format = 7 if coloured else 6
+        self.extras = [name for name in self.columns if not (coloured and name in _COLOURS)]
+        self.scale = _SCALE
+        with np.errstate(invalid="ignore"):
+            while np.max(header.high - header.low) / self.scale > 2**30:
+                self.scale *= 10
+        self.offsets = np.floor(header.low)
+        described = [(name, _extra_name(name), "f8") for name in self.extras]
+        size = record_size(self.format) + 8 * len(self.extras)
+        records = (extra_bytes(described, format_of(path).name),) if described else ()
+        start = new_header(self.scale, self.offsets, None, self.format, size, timed=False)
+        self.head = Head(start, records).with_crs(header.crs)
+        self.scans: dict[int, int] = {}
+        self.count = 0
+        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
+
+    def read(self, size: int) -> Iterator[UInt8]:
+        """Read the points, no more than `size` at a time; once.
+
+        Raises
+        ------
+        UserError
+            If they cannot be read, or one has no place.
+        """
+        # A pass for each column: readers give one at a time, and tables have few.
+        passes = [read_raw(self.path, name, size) for name in self.columns] or [read_raw(self.path, None, size)]
+        before = record_size(self.format)
+        for parts in zip(*passes, strict=True):
+            raw = parts[0]
+            xyz = np.column_stack([raw.x, raw.y, raw.z]) * raw.scales + raw.offsets
+            if not np.isfinite(xyz).all():
+                raise UserError(f"{self.path}: a coordinate is NaN or infinite; mend the file")
+            stored = np.rint((xyz - self.offsets) / self.scale)
+            if np.abs(stored).max() >= 2**31:
+                raise UserError(f"{self.path}: it was changed while it was read")
+            out: UInt8 = np.zeros((len(raw), before + 8 * len(self.extras)), np.uint8)
+            point = fields(out, self.format)
+            for column, axis in enumerate("XYZ"):
+                point[axis] = stored[:, column]
+            point["bit_fields"] = 1 | 1 << 4  # the first of one return
+            point["point_source_id"] = self._numbers(raw.scan_id)
+            if raw.time is not None:
+                point["gps_time"] = raw.time
+            values = {name: np.asarray(part.intensity, np.float64) for name, part in zip(self.columns, parts, strict=False)}
+            if "intensity" in values:
+                point["intensity"] = spread(values["intensity"], *_limits(values["intensity"]))
+            for name in _COLOURS if self.format == 7 else ():
+                point[name] = spread(values[name], *_limits(values[name]))
+            for place, name in enumerate(self.extras):
+                extra: Float = np.ndarray((len(out),), "<f8", out.data, before + 8 * place, (out.shape[1],))
+                extra[:] = values[name]
+            self._count(stored)
+            yield out
+
+    def patches(self) -> tuple[int, bytes]:
+        """Where in the header, and what stands there, that is known once all points were read: box and counts."""
+        corners = np.column_stack([self.high, self.low]).ravel()
+        returns = [self.count, *[0] * 14]
+        return 179, struct.pack("<6d", *corners) + bytes(247 - 227) + struct.pack("<Q15Q", self.count, *returns)
+
+    def _numbers(self, scan_id: np.ndarray[tuple[int, ...], np.dtype[np.integer]]) -> Float:
+        scans, places = np.unique(scan_id, return_inverse=True)
+        for scan in scans.tolist():
+            self.scans.setdefault(scan, len(self.scans) + 1)
+        found = [scan if scan < _SHORT else min(self.scans[scan], _SHORT - 1) for scan in scans.tolist()]
+        return np.array(found, np.float64)[places]
+
+    def _count(self, stored: Float) -> None:
+        self.count += len(stored)
+        self.low = np.minimum(self.low, stored.min(axis=0) * self.scale + self.offsets)
+        self.high = np.maximum(self.high, stored.max(axis=0) * self.scale + self.offsets)
+
+
+def _extra_name(name: str) -> str:
+    return "source_intensity" if name == "intensity" else name.encode("ascii", "replace").decode()[:32]
+
+
+def _limits(values: Float) -> tuple[float, float]:
+    """Limits of 0–1, 8 bits or 16 bits, whichever holds values; 12 bits may be shifted below zero, as Leica's are."""
+    most = float(np.nanmax(values, initial=0.0))
+    if float(np.nanmin(values, initial=0.0)) < 0.0:
+        return -2048.0, 2047.0
+    return 0.0, next((float(end) for end in (1, 2**8 - 1, 2**16 - 1) if most <= end), most)

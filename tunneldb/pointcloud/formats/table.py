@@ -1,0 +1,89 @@
+"""The formats of scan files, by the suffix of their names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tunneldb.pointcloud.formats.e57 import read_e57, read_e57_header, read_e57_scans
+from tunneldb.pointcloud.formats.las import read_las, read_las_header
+from tunneldb.pointcloud.formats.ply import read_ply, read_ply_header
+from tunneldb.pointcloud.formats.ptx import read_ptx, read_ptx_scans
+from tunneldb.pointcloud.formats.scans import PosedScan
+from tunneldb.pointcloud.formats.text import TextCloud, read_cloud
+from tunneldb.pointcloud.formats.xyz import read_table
+from tunneldb.pointcloud.points import Ranges, Raw, ScanHeader
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of scan files.
+
+    Attributes
+    ----------
+    name : str
+        As users know it.
+    header : callable
+        See `tunneldb.pointcloud.reader.read_header`.
+    read : callable
+        See `tunneldb.pointcloud.formats.raw.read_raw`.
+    scans : callable or None
+        Gives the scans of a file with their positions; None where the format has none.
+    is_las : bool
+        Whether it is LAS or LAZ.
+    """
+
+    name: str
+    header: Callable[[Path], ScanHeader]
+    read: Callable[[Path, str | None, int, Ranges | None], Iterator[Raw]]
+    scans: Callable[[Path], Sequence[PosedScan]] | None = None
+    is_las: bool = False
+
+
+def format_of(path: Path) -> Format:
+    """Format of a file, by the suffix of its name; LAS or LAZ where that is no other's."""
+    return _FORMATS.get(path.suffix.lower(), _LAS)
+
+
+def has_scans(path: Path) -> bool:
+    """Whether a file is of a format whose scans bring their poses, by its name."""
+    return format_of(path).scans is not None
+
+
+def posed_scans(path: Path) -> list[PosedScan]:
+    """Scans of a file with the positions that it gives them; none of a format that has no scans.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read or holds no points.
+    """
+    scans = format_of(path).scans
+    return [] if scans is None else list(scans(path))
+
+
+def _scans_of_e57(path: Path) -> list[PosedScan]:
+    return [PosedScan(scan.index, scan.name, scan.number, scan.position) for scan in read_e57_scans(path)]
+
+
+def _of_text(
+    name: str, look: Callable[[Path], TextCloud], scans: Callable[[Path], Sequence[PosedScan]] | None = None
+) -> Format:
+    return Format(
+        name,
+        lambda path: look(path).header(),
+        lambda path, dimension, size, ranges: read_cloud(look(path), dimension, size, ranges),
+        scans,
+    )
+
+
+_LAS = Format("LAS or LAZ", read_las_header, read_las, is_las=True)
+_TABLE = _of_text("table of points", read_table)
+_FORMATS = {
+    ".e57": Format("E57", read_e57_header, read_e57, _scans_of_e57),
+    ".ptx": _of_text("PTX", read_ptx, read_ptx_scans),
+    ".pts": _of_text("PTS", read_table),
+    ".ply": Format("PLY", read_ply_header, read_ply),
+    **dict.fromkeys((".xyz", ".txt", ".asc", ".csv"), _TABLE),
+}

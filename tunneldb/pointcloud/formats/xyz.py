@@ -1,0 +1,128 @@
+"""Tables of points: PTS, and XYZ, TXT, ASC or CSV whose columns are named.
+
+Of PTS the columns are those of the format: coordinates, intensity, colour. Of all others they are named: in the first line,
+or in a file beside it; a file ``.xyz`` of just three columns holds what its suffix says. Nothing else is guessed.
+
+Source: Leica Geosystems, *Cyclone* (PTS: a line with the number of points, then x, y, z, intensity and red, green, blue).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from tunneldb.errors import UserError
+from tunneldb.pointcloud.formats.columns import COORDINATES, columns_of, given_names, names_file, own_names, split_names
+from tunneldb.pointcloud.formats.faults import decoding
+from tunneldb.pointcloud.formats.text import KIND, CloudBuilder, TextCloud, TextScan
+from tunneldb.pointcloud.formats.text_lines import TextLines, are_numbers, divider_of
+
+COLOURS = ("red", "green", "blue")
+LEICA = {
+    3: COORDINATES,
+    4: (*COORDINATES, "intensity"),
+    6: (*COORDINATES, *COLOURS),
+    7: (*COORDINATES, "intensity", *COLOURS),
+}
+"""Columns of PTS and PTX by how many there are."""
+
+_MOST_COMMENTS = 1000
+
+
+def read_table(path: Path) -> TextCloud:
+    """What a file of points in lines holds.
+
+    Raises
+    ------
+    UserError
+        If it is missing or damaged, holds no points, or its columns are not named; with file and line.
+    """
+    with decoding(path, KIND):
+        status = path.stat()
+        beside = names_file(path)
+        named = None if beside is None else (beside, beside.stat().st_mtime_ns)
+    return _read_table(path, (status.st_size, status.st_mtime_ns), named)
+
+
+@lru_cache(maxsize=64)
+def _read_table(path: Path, version: tuple[int, int], named: tuple[Path, int] | None) -> TextCloud:
+    """Read a file once for each version of it and of the names of its columns."""
+    with decoding(path, KIND), TextLines(path) as lines:
+        builder = CloudBuilder(path, lines)
+        if path.suffix.lower() == ".pts":
+            _read_pts(builder)
+        else:
+            builder.add(_layout(path, lines), None)
+        return builder.cloud()
+
+
+def _read_pts(builder: CloudBuilder) -> None:
+    """Pieces of a PTS file, each after a line with its number of points; without one the file is one piece."""
+    path, lines = builder.path, builder.lines
+    while (text := lines.text()) is not None:
+        if not text:
+            continue
+        at, count = lines.line - 1, None
+        if text.isdigit():
+            count = int(text)
+            text = lines.text() if count else ""
+            if not text:
+                continue
+        lines.back()
+        width = len(text.split())
+        if width not in LEICA:
+            raise UserError(f"{path}, line {lines.line}: {width} values; a line of PTS has {', '.join(map(str, LEICA))}")
+        found = builder.add(TextScan(LEICA[width], None), count)
+        if count is not None and found < count:
+            raise UserError(f"{path}: truncated: line {at} announces {count} points, {found} follow")
+
+
+def _layout(path: Path, lines: TextLines) -> TextScan:
+    """Columns of a table; the lines before its points are taken."""
+    given = given_names(path)
+    remarks: list[str] = []
+    header: str | None = None
+    while (text := lines.text()) is not None:
+        if not text:
+            continue
+        if text.startswith(("#", "//")) and len(remarks) < _MOST_COMMENTS:
+            remarks.append(text)
+        elif header is None and not are_numbers(text, () if given is None else given[0]):
+            header = text
+        else:
+            break
+    if text is None:
+        raise UserError(f"{path}: the file holds no points")
+    lines.back()
+    divider = divider_of(text)
+    width = len(text.split(divider))
+    return TextScan(_columns(path, lines.line, width, text, given, header, remarks), divider)
+
+
+def _columns(
+    path: Path,
+    line: int,
+    width: int,
+    first: str,
+    given: tuple[list[str], str] | None,
+    header: str | None,
+    remarks: list[str],
+) -> tuple[str, ...]:
+    if given is not None:
+        names, source = given
+    elif header is not None:
+        names, source = split_names(header), "its header"
+    else:
+        found = [split_names(remark) for remark in reversed(remarks)]
+        names = next((names for names in found if len(names) == width and set("xyz") <= {n.lower() for n in names}), [])
+        source = "its header"
+    if not names and path.suffix.lower() == ".xyz" and width == len(COORDINATES):
+        return COORDINATES
+    if not names:
+        raise UserError(
+            f"{path}: its {width} columns have no names (line {line}: {first[:60]}); say what they are: "
+            f"echo 'x y z …' > {own_names(path)}"
+        )
+    if len(names) != width:
+        raise UserError(f"{path}, line {line}: {width} values, but {source} names {len(names)} columns: {', '.join(names)}")
+    return columns_of(path, names, source)

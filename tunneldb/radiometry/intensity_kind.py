@@ -1,0 +1,196 @@
+"""What the values of an intensity can be: dB of one kind or the other, counts, or nothing; a guess, with its reasons.
+
+The values alone decide, so an answer is never more than a guess: who knows the scanner knows better. Limits come from what
+the kinds are, and from how much of it a tunnel can show:
+
+- dB are logarithms. Over a tunnel's ranges (1 to 50 m) the inverse square is 34 dB, reflectance of 2 to 90 % is 17 dB,
+  incidence up to 80° is 8 dB: about 60 dB from the faintest lining to the brightest, retroreflecting targets left out.
+  So what spreads over more is none.
+- No scan of a tunnel is even to 1 dB: incidence of 0 to 40° alone is that much, and so is the grain of concrete.
+- *Amplitude* is dB above the weakest echo that counts (RIEGL), so it is hardly ever negative. *Reflectance* is dB of a
+  white diffuse target at the same range, so lining (2 to 90 %) lies at −17 to −0.5 dB, and only retroreflectors above 0.
+- Counts are whole, mostly of 8, 11, 12 or 16 bits, or brought to 0 … 1; they are powers, so never negative. Leica's
+  exchange formats may shift 12 bits to −2048 … 2047.
+
+Source: RIEGL, *LAS extrabytes implementation*, 2017 (amplitude, reflectance); Höfle & Pfeifer, *ISPRS J. Photogramm.
+Remote Sens.* 62, 2007 (range, incidence and reflectance in the radar equation).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+WIDEST_DB = 60.0
+"""Most that lining spreads in a tunnel, dB, between its 1st and 99th percentile."""
+
+NARROWEST_DB = 1.0
+"""Least that it spreads, dB, between these."""
+
+FARTHEST_DB = 150.0
+"""Size of a level in dB that no scanner tells: 10¹⁵ times the reference."""
+
+_BITS = (8, 11, 12, 16)
+_SHIFTED = (-2048.0, 2047.0)  # 12 bits, as Leica's PTS has them
+
+
+@dataclass(frozen=True)
+class ValueRange:
+    """How the values of a dimension are spread.
+
+    Attributes
+    ----------
+    count, missing : int
+        Values looked at, and how many of them are NaN or infinite.
+    least, low, median, high, most : float
+        Minimum, 1st percentile, median, 99th percentile, maximum of those that are finite; NaN if none is.
+    whole : bool
+        Whether all finite ones are whole numbers.
+    """
+
+    count: int
+    missing: int
+    least: float
+    low: float
+    median: float
+    high: float
+    most: float
+    whole: bool
+
+    @property
+    def spread(self) -> float:
+        """From the 1st to the 99th percentile."""
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class KindGuess:
+    """What an intensity may be.
+
+    Attributes
+    ----------
+    kind : {'amplitude', 'reflectance', 'linear', 'none'}
+        As `tunneldb survey add --intensity-kind` takes it.
+    what : str
+        In words: ``16-bit counts: linear``.
+    reason : str
+        Why.
+    """
+
+    kind: str
+    what: str
+    reason: str
+
+
+def value_range(values: NDArray[Any]) -> ValueRange:
+    """Return how values, in the file's own unit, are spread."""
+    numbers = np.asarray(values, np.float64).ravel()
+    finite = numbers[np.isfinite(numbers)]
+    missing = len(numbers) - len(finite)
+    if not len(finite):
+        return ValueRange(len(numbers), missing, np.nan, np.nan, np.nan, np.nan, np.nan, whole=False)
+    least, low, median, high, most = (float(value) for value in np.percentile(finite, [0.0, 1.0, 50.0, 99.0, 100.0]))
+    return ValueRange(len(numbers), missing, least, low, median, high, most, bool(np.all(finite == np.rint(finite))))
+
+
+def guess_kind(values: NDArray[Any] | ValueRange, name: str = "") -> list[KindGuess]:
+    """Guess what an intensity is.
+
+    Parameters
+    ----------
+    values : (n,) array of any number type, or ValueRange
+        A sample of the dimension, in the file's own unit, with the scale and offset that the file gives it.
+    name : str
+        Name of the dimension; where the values leave both kinds of dB open, a name that says one of them comes first.
+
+    Returns
+    -------
+    list of KindGuess
+        What the values can be, the likeliest first; empty if they can be none of it (negative and far from any dB).
+    """
+    found = values if isinstance(values, ValueRange) else value_range(values)
+    if not np.isfinite(found.median):
+        return [KindGuess("none", "no intensity", "no value is a number")]
+    if found.least == found.most:
+        return [KindGuess("none", "no intensity", f"all values are {found.least:g}")]
+    guesses = [guess for guess in (_linear(found), *_decibels(found)) if guess is not None]
+    # Fractions of a dB are how dB come; whole numbers, and all that fits into 0 … 1, are how powers come.
+    if not found.whole and found.most > 1.0:
+        guesses.sort(key=lambda guess: guess.kind == "linear")
+    said = [guess for guess in guesses if guess.kind in name.lower()]
+    return [*said, *(guess for guess in guesses if guess not in said)]
+
+
+def contradiction(kind: str, values: NDArray[Any] | ValueRange) -> str | None:
+    """Tell why values cannot be an intensity of the kind that they were declared to be.
+
+    Parameters
+    ----------
+    kind : {'amplitude', 'reflectance', 'linear', 'none'}
+    values : (n,) array of any number type, or ValueRange
+
+    Returns
+    -------
+    str or None
+        A phrase for an error's line, without the name of file or dimension; None where they can be.
+    """
+    found = values if isinstance(values, ValueRange) else value_range(values)
+    if kind == "none":
+        return None
+    if not np.isfinite(found.median):
+        return "no value is a number"
+    if found.least == found.most:
+        return f"all values are {found.least:g}"
+    reason = _not_linear(found) if kind == "linear" else _not_decibels(found)
+    if reason is None:
+        return None
+    others = [guess for guess in guess_kind(found) if guess.kind != kind]
+    return f"{reason}; it looks like {others[0].what}" if others else reason
+
+
+def _not_linear(found: ValueRange) -> str | None:
+    if found.low < 0.0:
+        return f"values go below zero ({found.least:g}), and a power is never negative"
+    return None
+
+
+def _not_decibels(found: ValueRange) -> str | None:
+    if max(abs(found.low), abs(found.high)) > FARTHEST_DB:
+        return f"values from {found.low:g} to {found.high:g} (1 to 99 %) are too far from zero to be dB"
+    if found.spread > WIDEST_DB:
+        return f"values spread over {found.spread:g} (1 to 99 %), and lining in a tunnel over {WIDEST_DB:g} dB at most"
+    if found.spread < NARROWEST_DB:
+        return (
+            f"values spread over {found.spread:.2g} only (1 to 99 %), and lining in a tunnel over more than {NARROWEST_DB:g} dB"
+        )
+    return None
+
+
+def _linear(found: ValueRange) -> KindGuess | None:
+    limits = f"from {found.least:g} to {found.most:g}"
+    if _not_linear(found) is None:
+        if not found.whole:
+            what = "0–1 float: linear" if found.most <= 1.0 else "linear"
+            return KindGuess("linear", what, f"fractions {limits}")
+        bits = next((bits for bits in _BITS if found.most < 2**bits), None)
+        what = "counts: linear" if bits is None else f"{bits}-bit counts: linear"
+        return KindGuess("linear", what, f"whole numbers {limits}")
+    if found.whole and found.spread > WIDEST_DB and _SHIFTED[0] <= found.least and found.most <= _SHIFTED[1]:
+        what = "12-bit counts, shifted below zero: linear when 2048 was added to each"
+        return KindGuess("linear", what, f"whole numbers {limits}")
+    return None
+
+
+def _decibels(found: ValueRange) -> list[KindGuess]:
+    if _not_decibels(found) is not None:
+        return []
+    spread = f"{found.low:.4g} to {found.high:.4g} (1 to 99 %)"
+    guesses = []
+    if found.median >= 0.0:
+        guesses.append(KindGuess("amplitude", "dB amplitude", f"{spread}, mostly above zero, as above a detection limit"))
+    if found.low < 0.0:
+        guesses.append(KindGuess("reflectance", "dB reflectance", f"{spread}, below zero, as what is darker than white"))
+    return guesses if found.median >= 0.0 else guesses[::-1]
