@@ -1,4 +1,4 @@
-"""What was left out: points of a scan file that are no numbers or of unknown scanner position, places of axis vertices.
+"""What was left out: points of a scan file that are no numbers or of unknown scanner position, places of axis vertices; when a survey's settings changed.
 
 Revision: 0009, after 0008.
 """
@@ -20,6 +20,14 @@ def upgrade() -> None:
         op.add_column(
             "scan_file", sa.Column(name, sa.BigInteger(), server_default="0", nullable=False, comment=comment), schema="tunnel"
         )
+    op.add_column(
+        "survey",
+        sa.Column(
+            "settings_at", sa.DateTime(timezone=True), nullable=True,
+            comment="When scanner positions, reference or intensity were last set to others",
+        ),
+        schema="tunnel",
+    )  # fmt: skip
     op.add_column(
         "axis_vertex",
         sa.Column("remark", sa.Text(), nullable=True, comment="Why the place that was measured is not taken, if it is not"),

@@ -19,7 +19,7 @@ FILE = click.Path(path_type=Path)
 
 @click.group(cls=VerbGroup)
 def survey() -> None:
-    """Add, list or remove the scanning campaigns of a tunnel."""
+    """Add, list, set or remove the scanning campaigns of a tunnel."""
 
 
 @survey.command(
@@ -83,7 +83,7 @@ def add(
     elif intensity is None:
         raise UserError(f"--intensity must name the dimension that holds the {intensity_kind}")
     with connect(settings.dsn) as connection:
-        count = add_survey(
+        positions = add_survey(
             connection,
             name,
             tunnel,
@@ -94,8 +94,75 @@ def add(
             reference="auto" if reference == "auto" else None if reference is None else Path(reference),
             intensity=Intensity(intensity_kind, intensity),
         )
-    tell(survey=name, tunnel=tunnel, date=date.date(), poses=count)
-    click.echo(f"{name}: {count} {'poses' if trajectory else 'stations'} of {tunnel}, {date:%Y-%m-%d}", err=True)
+    tell(survey=name, tunnel=tunnel, date=date.date(), poses=len(positions), notes=positions.notes)
+    click.echo(f"{name}: {len(positions)} {'poses' if trajectory else 'stations'} of {tunnel}, {date:%Y-%m-%d}", err=True)
+    for note in positions.notes:
+        click.echo(f"{name}: {note}", err=True)
+
+
+@survey.command(
+    "set",
+    examples=[
+        "tunneldb survey set ringo-2024 --date 2024-05-05",
+        "tunneldb survey set ringo-2024 --trajectory trajectory-mended.csv",
+        "tunneldb survey set ringo-2024 --intensity-kind linear --reference auto",
+    ],
+)
+@click.argument("name")
+@click.option("--date", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD", help="Day of the scan.")
+@click.option("--trajectory", type=FILE, help="Takes the place of the scanner's positions; as for survey add.")
+@click.option("--stations", type=FILE, multiple=True, help="The same for a static scanner; may be given several times.")
+@click.option("--backwards", is_flag=True, help="The trajectory was driven towards falling chainage.")
+@click.option("--reference", metavar="FILE|auto", help="The scanner's intensity over range, as for survey add.")
+@click.option("--intensity", metavar="DIMENSION", help="Dimension that holds the intensity; the files must be loaded again.")
+@click.option("--intensity-kind", type=click.Choice(["amplitude", "reflectance", "linear", "none"]), help="What it is.")
+@click.pass_obj
+def set_(
+    settings: Settings,
+    name: str,
+    date: dt.datetime | None,
+    trajectory: Path | None,
+    stations: tuple[Path, ...],
+    backwards: bool,
+    reference: str | None,
+    intensity: str | None,
+    intensity_kind: str | None,
+) -> None:
+    """Set what was said of the survey NAME to something else; what rests on it is stale then.
+
+    Points, axis, sections and reviews stay.
+    """
+    from tunneldb.store.catalog import SurveyChange, set_survey
+
+    if trajectory is not None and stations:
+        raise UserError("say where the scanner was by one of --trajectory and --stations")
+    if backwards and trajectory is None:
+        raise UserError("--backwards is about a trajectory: give it with --trajectory")
+    change = SurveyChange(
+        None if date is None else date.date(),
+        (trajectory,) if trajectory is not None else stations,
+        trajectory is not None,
+        backwards,
+        "auto" if reference == "auto" else None if reference is None else Path(reference),
+        intensity_kind,
+        intensity,
+    )
+    if change == SurveyChange():
+        raise UserError("nothing to set: give --date, --trajectory, --stations, --reference, --intensity or --intensity-kind")
+    with connect(settings.dsn) as connection:
+        notes, reload = set_survey(connection, name, change)
+        stale = connection.execute(
+            "SELECT count(*) FROM tunnel_api.stage_status WHERE survey = %s AND stale", [name]
+        ).fetchone()
+    assert stale is not None
+    if reload:
+        notes.append(f"{reload} of its files have to be loaded again: tunneldb load {name} FILE...")
+    if stale[0]:
+        notes.append(f"{stale[0]} stages are stale: tunneldb run {name} --stale")
+    tell(survey=name, notes=notes, reload=reload, stale=stale[0])
+    click.echo(f"{name}: set", err=True)
+    for note in notes:
+        click.echo(f"{name}: {note}", err=True)
 
 
 @survey.command("list", examples=["tunneldb survey list"])

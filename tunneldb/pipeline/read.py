@@ -21,6 +21,7 @@ from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
 from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
 from tunneldb.pointcloud.spool import Spool
+from tunneldb.radiometry.intensity_kind import contradiction
 from tunneldb.store.partition import drop_fragments, write_fragments
 from tunneldb.store.scan_files import (
     Content,
@@ -35,6 +36,9 @@ from tunneldb.store.scan_files import (
 from tunneldb.store.sources import load_poses
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
+
+FEWEST_INTENSITIES = 20
+"""Of fewer values nothing is said of their kind."""
 
 Counts = dict[str, Any]
 Begin = Callable[[str, int], Callable[[int], None]]
@@ -214,7 +218,20 @@ class Reading:
             counts = filter_file(
                 header.path, dimension, self.alignment, self.poses, self.settings, survivors, 0, progress, self.memory
             )
+            self._require_kind(header.path, counts)
             return counts, digest.result()
+
+    def _require_kind(self, path: Path, counts: FilterCounts) -> None:
+        """Refuse a file whose intensity cannot be of the kind that the survey was declared to have."""
+        kind = self.survey.intensity_kind
+        if kind == "none" or len(counts.intensity_sample) < FEWEST_INTENSITIES:
+            return
+        reason = contradiction(kind, counts.intensity_sample)
+        if reason is not None:
+            raise UserError(
+                f"{path}: {self.survey.intensity_dimension} is no intensity of kind {kind}: {reason}"
+                f" (tunneldb inspect {path.name}; tunneldb survey set {self.survey.name} --intensity-kind KIND)"
+            )
 
     def _leave(self, former: Recorded) -> list[int]:
         """Drop what waits of a file's former content; returns the kilometres that may hold rows of it."""

@@ -32,7 +32,8 @@ class Stage:
         ``module:function`` that does one kilometre; connection, survey, km, values of the parameters and progress go in, counts
         come out. Empty for ``load``, which goes by the files (`tunneldb.pipeline.load`).
     reads : tuple of str
-        Stages whose results in the kilometre itself it rests on, directly or through another.
+        Stages whose results in the kilometre itself it rests on, directly or through another; ``survey`` where it rests on the
+        scanner's positions, the reference curve or the kind of intensity.
     reads_beside : tuple of str
         Stages whose results in the kilometres before and after it rests on.
     parameters : tuple of str
@@ -74,7 +75,7 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "detect",
         "tunneldb.pipeline.detect:detect",
-        ("load", "axis", "segments", "sections", "ground"),
+        ("load", "axis", "segments", "sections", "ground", "survey"),
         ("ground",),
         ("lining", "image", "intensity", "appendage", "leak"),
     ),

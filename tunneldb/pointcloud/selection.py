@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tunneldb.arrays import Bool, Float, Int32, Int64, Intp
+from tunneldb.arrays import Bool, Float, Int32, Int64, Intp, Single
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
@@ -40,6 +40,7 @@ CROWDED = 4_000_000  # from this many points in one window on, one thread, for t
 BLOCK = 50_000  # points of a LAZ file that can be decoded by themselves
 MARGIN = 10.0  # m beyond its ends that a kilometre is looked up in a file for what happens at its end
 FEW = 150  # points in a cell up to which hardly any has enough around it to be certain to be no noise
+SAMPLED = 1000  # one in so many intensities is kept, to be looked at
 STRETCH = 5.0  # m of tunnel for which the noise filter's widest radius is found
 CERTAIN = -1  # tag of a candidate that is certain to be no noise; the others have the number of their cell
 
@@ -87,6 +88,8 @@ class FilterCounts:
         Least and greatest chainage of the points kept, m.
     extent : (6,) float64 array
         Least and greatest x, y, z of the points kept: x0, y0, z0, x1, y1, z1, m.
+    intensities : list of float32 arrays
+        Raw intensities of some points near the axis.
     ranges : dict of int to list of (int, int)
         Where in the file the points of each kilometre and MARGIN beyond are: ranges of point numbers from 0.
     """
@@ -100,6 +103,12 @@ class FilterCounts:
     chainage: tuple[float, float] = (math.inf, -math.inf)
     extent: Float = field(default_factory=lambda: np.array([np.inf] * 3 + [-np.inf] * 3))
     ranges: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
+    intensities: list[Single] = field(default_factory=list)
+
+    @property
+    def intensity_sample(self) -> Single:
+        """About one in a thousand of the raw intensities near the axis."""
+        return np.concatenate(self.intensities) if self.intensities else np.empty(0, np.float32)
 
     @property
     def thinned(self) -> int:
@@ -266,6 +275,7 @@ class _Filter:
             self.counts.unposed += faults.points
             number, cell, points = self._drop(number, cell, points, np.flatnonzero(~self.poses.known(points)))
         if len(points):
+            self.counts.intensities.append(points.intensity[::SAMPLED].copy())
             self.counts.locate(*self.places.span(number, cell, BLOCK))
             picked, certain = self._pick(points, cell)
             tag = np.where(certain, np.int32(CERTAIN), cell[picked])

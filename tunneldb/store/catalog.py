@@ -10,23 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
 import psycopg
 import pyproj
 import shapely
-from numpy.typing import NDArray
-from psycopg import sql
 
-from tunneldb.alignment.given import XYZ, GivenAxis
-from tunneldb.arrays import Float
-from tunneldb.csvfile import CsvTable, read_csv
-from tunneldb.database.copy import PointZ, copy_binary, pack
+from tunneldb.alignment.given import GivenAxis
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
-from tunneldb.pointcloud.stations import read_stations
 from tunneldb.store.alignment import save_design
-
-FARTHEST_SCANNER = 50.0  # m from the axis; a scanner that was never nearer stood in another tunnel
+from tunneldb.store.scanner import Positions, read_positions, read_reference, require_range, save_positions, save_reference
 
 
 @dataclass(frozen=True)
@@ -107,8 +99,8 @@ def add_survey(
     backwards: bool,
     reference: Path | Literal["auto"] | None,
     intensity: Intensity,
-) -> int:
-    """Add a survey with its scanner positions and reference curve; return how many positions it has.
+) -> Positions:
+    """Add a survey with its scanner positions and reference curve; return the positions.
 
     Parameters
     ----------
@@ -127,19 +119,10 @@ def add_survey(
     """
     _require_name(name)
     tunnel_id, srid, alignment = _alignment(connection, tunnel)
-    keys: NDArray[Any]
-    if mobile:
-        table = _read_trajectory(poses[0])
-        kind, key, keys, xyz = "pose", "time", table["time"], table.columns(XYZ)
-    else:
-        stations = read_stations(poses)
-        kind, key, keys, xyz = "station", "scan_id", stations.scan_id, stations.xyz
-    _require_near(poses, xyz, alignment, tunnel)
-    if mobile:
-        _require_direction(table, alignment, backwards=backwards)
+    positions = read_positions(poses, alignment, tunnel, mobile=mobile, backwards=backwards)
     if reference == "auto":
-        _require_range(intensity.kind)
-    curve = _read_reference(reference) if isinstance(reference, Path) else None
+        require_range(intensity.kind)
+    curve = read_reference(reference) if isinstance(reference, Path) else None
     try:
         row = connection.execute(
             """
@@ -159,17 +142,102 @@ def add_survey(
     except psycopg.errors.UniqueViolation:
         raise UserError(f"there is a survey {name!r} already: tunneldb survey list") from None
     assert row is not None
-    survey = np.full(len(xyz), row[0], dtype=np.int32)
-    _insert(connection, kind, ["survey_id", key, "geom"], [survey, keys, PointZ(xyz, srid)])
+    save_positions(connection, row[0], positions, srid)
     if curve is not None:
-        survey = np.full(len(curve), row[0], dtype=np.int32)
-        columns = [survey, curve["range_m"], curve["intensity_db"]]
-        _insert(connection, "reference", ["survey_id", "range_m", "intensity_db"], columns)
-    return len(xyz)
+        save_reference(connection, row[0], curve)
+    return positions
 
 
-def _insert(connection: psycopg.Connection[Any], table: str, names: list[str], columns: list[Any]) -> None:
-    copy_binary(connection, sql.Identifier("tunnel", table), names, [pack(columns)])
+@dataclass(frozen=True)
+class SurveyChange:
+    """What a survey is to be set to; None leaves what it has.
+
+    Attributes
+    ----------
+    date : date or None
+    poses : sequence of Path
+        Files of the scanner's positions, see `add_survey`; empty leaves them.
+    mobile, backwards : bool
+        What they are.
+    reference : Path, 'auto' or None
+    kind, dimension : str or None
+        Of the intensity.
+    """
+
+    date: dt.date | None = None
+    poses: Sequence[Path] = ()
+    mobile: bool = False
+    backwards: bool = False
+    reference: Path | Literal["auto"] | None = None
+    kind: str | None = None
+    dimension: str | None = None
+
+
+def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyChange) -> tuple[list[str], int]:
+    """Set a survey's date, positions, reference or intensity; what rests on them is stale then.
+
+    Returns
+    -------
+    notes : list of str
+        What the user is to know of the positions.
+    reload : int
+        How many of its files have to be loaded again: those of which another dimension is read now, or of which points were
+        left out for want of a position.
+
+    Raises
+    ------
+    UserError
+        As `add_survey` does; nothing is changed then.
+    """
+    row = connection.execute(
+        "SELECT s.id, t.name, s.intensity_kind, s.intensity_dimension, s.reference FROM tunnel.survey s"
+        " JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.name = %s FOR UPDATE OF s",
+        [name],
+    ).fetchone()
+    if row is None:
+        raise UserError(f"there is no survey {name!r}: tunneldb survey list")
+    key, tunnel, old_kind, old_dimension, reference = row
+    kind = change.kind or old_kind
+    dimension = None if kind == "none" else change.dimension or old_dimension
+    if kind != "none" and dimension is None:
+        raise UserError(f"--intensity must name the dimension that holds the {kind}")
+    notes: list[str] = []
+    if change.poses:
+        _, srid, alignment = _alignment(connection, tunnel)
+        positions = read_positions(change.poses, alignment, tunnel, mobile=change.mobile, backwards=change.backwards)
+        notes += positions.notes
+        connection.execute("DELETE FROM tunnel.pose WHERE survey_id = %s", [key])
+        connection.execute("DELETE FROM tunnel.station WHERE survey_id = %s", [key])
+        save_positions(connection, key, positions, srid)
+        connection.execute(
+            "UPDATE tunnel.survey SET platform = %s WHERE id = %s", ["mobile" if change.mobile else "static", key]
+        )
+    if change.reference is not None:
+        curve = read_reference(change.reference) if isinstance(change.reference, Path) else None
+        connection.execute("DELETE FROM tunnel.reference WHERE survey_id = %s", [key])
+        if curve is not None:
+            save_reference(connection, key, curve)
+        reference = "auto" if curve is None else "measured"
+    if reference == "auto" and (change.reference is not None or change.kind is not None):
+        require_range(kind)
+    connection.execute(
+        "UPDATE tunnel.survey SET date = coalesce(%s, date), intensity_kind = %s, intensity_dimension = %s, reference = %s,"
+        " settings_at = CASE WHEN %s THEN clock_timestamp() ELSE settings_at END WHERE id = %s",
+        [
+            change.date,
+            kind,
+            dimension,
+            reference,
+            bool(change.poses) or change.reference is not None or (kind, dimension) != (old_kind, old_dimension),
+            key,
+        ],
+    )
+    # Known by no checksum, so that detection asks for them and loading does not take them for unchanged.
+    reload = connection.execute(
+        "UPDATE tunnel.scan_file SET checksum = '' WHERE survey_id = %s AND (%s OR %s AND unposed > 0)",
+        [key, dimension is not None and dimension != old_dimension, bool(change.poses)],
+    ).rowcount
+    return notes, reload
 
 
 def _alignment(connection: psycopg.Connection[Any], tunnel: str) -> tuple[int, int, Alignment]:
@@ -201,57 +269,6 @@ def get_tunnel(connection: psycopg.Connection[Any], name: str) -> int:
 def _unknown(connection: psycopg.Connection[Any], tunnel: str) -> UserError:
     known = ", ".join(row[0] for row in connection.execute("SELECT name FROM tunnel.tunnel ORDER BY name"))
     return UserError(f"there is no tunnel {tunnel!r}; the database has {known or 'none: tunneldb tunnel add'}")
-
-
-def _read_trajectory(path: Path) -> CsvTable:
-    table = read_csv(path, ("time", *XYZ))
-    if len(table) < 2:
-        raise UserError(f"{path}: a trajectory needs at least 2 rows, this one has {len(table)}")
-    table.require_growing("time")
-    return table
-
-
-def _read_reference(path: Path) -> CsvTable:
-    table = read_csv(path, ("range_m", "intensity_db"))
-    if len(table) < 2:
-        raise UserError(f"{path}: a reference curve needs at least 2 rows, this one has {len(table)}")
-    if table["range_m"][0] <= 0:
-        raise table.error(0, f"range_m {table['range_m'][0]:g} is not positive")
-    table.require_growing("range_m")
-    return table
-
-
-def _require_range(kind: str) -> None:
-    """A range curve can be found only in intensity that falls with range."""
-    if kind == "none":
-        raise UserError("--reference auto finds the range curve in the intensity, and intensity of kind none is not read")
-    if kind == "reflectance":
-        raise UserError("--reference auto has nothing to find: from intensity of kind reflectance the maker removed the range")
-
-
-def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunnel: str) -> None:
-    """The scanner must have been near the axis at least once."""
-    distance = alignment.distance(xyz)
-    if np.isnan(distance).all() or np.nanmin(distance) > FARTHEST_SCANNER:
-        nearest = "beyond its ends" if np.isnan(distance).all() else f"{np.nanmin(distance):.0f} m at the nearest"
-        raise UserError(
-            f"{', '.join(map(str, paths))}: the scanner was never within {FARTHEST_SCANNER:g} m of the axis of {tunnel!r} "
-            f"({nearest}); is it of another tunnel or in another SRID?"
-        )
-
-
-def _require_direction(table: CsvTable, alignment: Alignment, *, backwards: bool) -> None:
-    """The trajectory must run up the axis, or down it when that was said."""
-    chainage = alignment.chainage(table.columns(XYZ))
-    within = chainage[np.isfinite(chainage)]
-    run = within[-1] - within[0]
-    if run < 0 and not backwards:
-        raise UserError(
-            f"{table.path}: the trajectory runs {-run:.0f} m down the axis; reverse the axis's points, or say --backwards "
-            "if the scanner did go towards falling chainage"
-        )
-    if run > 0 and backwards:
-        raise UserError(f"{table.path}: the trajectory runs {run:.0f} m up the axis, so --backwards is wrong")
 
 
 def remove_survey(connection: psycopg.Connection[Any], name: str) -> None:

@@ -1,0 +1,136 @@
+"""`tunneldb survey set`, and what it makes stale; positions and intensities that cannot be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import laspy
+import numpy as np
+import psycopg
+import pytest
+from click.testing import CliRunner, Result
+
+from tunneldb.cli.main import main
+from tunneldb.simulate import Parameters, Simulation, write
+
+NAME = "short"
+START = 1200.0
+
+
+def command(*arguments: object, code: int = 0) -> Result:
+    result = CliRunner().invoke(main, [str(a) for a in arguments])
+    assert result.exit_code == code, result.output
+    return result
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp(NAME)
+    scene = Parameters(
+        name=NAME, section="circular", length=30.0, start_chainage=START, straight=0.0, scanner="profiler", density=100.0,
+        leaks=0, appendages=False, niches=False,
+    )  # fmt: skip
+    write(Simulation(scene), folder)
+    return folder
+
+
+def add(folder: Path, *more: object, trajectory: Path | None = None, code: int = 0) -> Result:
+    command("tunnel", "add", NAME, "--srid", 25830, "--axis", folder / f"{NAME}.axis.csv", "--start-chainage", START)
+    poses = trajectory or folder / f"{NAME}.trajectory.csv"
+    return command("survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04", "--trajectory", poses, *more, code=code)
+
+
+def stale(conn: psycopg.Connection) -> dict[str, str]:
+    rows = conn.execute("SELECT stage, reason FROM tunnel_api.stage_status WHERE stale").fetchall()
+    conn.rollback()
+    return dict(rows)
+
+
+def settings(conn: psycopg.Connection) -> tuple[object, ...]:
+    row = conn.execute(
+        "SELECT date::text, intensity_kind, intensity_dimension, reference, platform FROM tunnel.survey"
+    ).fetchone()
+    conn.rollback()
+    assert row is not None
+    return tuple(row)
+
+
+def test_what_is_set_makes_detection_stale_and_nothing_else(folder: Path, conn: psycopg.Connection, tmp_path: Path) -> None:
+    add(folder, "--intensity", "Amplitude", "--intensity-kind", "amplitude", "--reference", folder / f"{NAME}.reference.csv")
+    command("load", NAME, *folder.glob("*.laz"))
+    command("run", NAME)
+    assert stale(conn) == {}
+    command("survey", "set", NAME, "--date", "2024-05-05")
+    assert stale(conn) == {}
+    said = command("survey", "set", NAME, "--trajectory", folder / f"{NAME}.trajectory.csv").stderr
+    assert stale(conn) == {"detect": "positions, reference or intensity set since"}
+    assert f"1 stages are stale: tunneldb run {NAME} --stale" in said
+    command("run", NAME, "--stale")
+    assert stale(conn) == {}
+    command("survey", "set", NAME, "--reference", "auto")
+    assert settings(conn) == ("2024-05-05", "amplitude", "Amplitude", "auto", "mobile")
+    said = command("survey", "set", NAME, "--intensity", "intensity", "--intensity-kind", "linear").stderr
+    assert "1 of its files have to be loaded again" in said
+    assert "was changed since it was loaded; load it again" in command("run", NAME, "--stale", code=2).stderr
+    assert "replaced" in command("load", NAME, *folder.glob("*.laz")).output
+    assert settings(conn)[1:3] == ("linear", "intensity")
+    before = settings(conn)
+    bad = tmp_path / "bad.csv"
+    bad.write_text("range_m,intensity_db\n1,2\n1,3\n")
+    assert (
+        "line 3: range_m 1 repeats" in command("survey", "set", NAME, "--date", "2020-01-01", "--reference", bad, code=2).stderr
+    )
+    assert "nothing to set" in command("survey", "set", NAME, code=2).stderr
+    assert settings(conn) == before
+
+
+@pytest.mark.parametrize(
+    ("scale", "says"), [(500.0, "are too far from zero to be dB"), (1 / 50.0, "values spread over 0")], ids=["counts", "unit"]
+)
+def test_values_that_are_no_decibels_are_refused_as_such(
+    folder: Path, conn: psycopg.Connection, tmp_path: Path, scale: float, says: str
+) -> None:
+    (path,) = folder.glob("*.laz")
+    las = laspy.read(path)
+    las.Amplitude = las.Amplitude * scale
+    las.write(tmp_path / "a.laz")
+    add(folder, "--intensity", "Amplitude", "--intensity-kind", "amplitude", "--reference", "auto")
+    line = command("load", NAME, tmp_path / "a.laz", code=2).stderr.strip().splitlines()[-1]
+    assert "Amplitude is no intensity of kind amplitude" in line
+    assert says in line
+    assert conn.execute("SELECT count(*) FROM tunnel.scan_file").fetchone() == (0,)
+
+
+def test_poses_that_cannot_be_are_left_out_and_told(folder: Path, conn: psycopg.Connection, tmp_path: Path) -> None:
+    rows = np.genfromtxt(folder / f"{NAME}.trajectory.csv", delimiter=",", skip_header=1)
+    rows[len(rows) // 2, 1:] = 0.0
+    path = tmp_path / "poses.csv"
+    np.savetxt(path, rows, "%.4f", ",", header="time,x,y,z", comments="")
+    said = add(folder, "--intensity-kind", "none", trajectory=path).stderr
+    assert f"1 of {len(rows)} poses cannot be the scanner's, and are left out: the first in line {len(rows) // 2 + 2}" in said
+    assert conn.execute("SELECT count(*) FROM tunnel.pose").fetchone() == (len(rows) - 1,)
+
+
+def test_a_station_that_cannot_be_is_refused_by_its_number(folder: Path, conn: psycopg.Connection, tmp_path: Path) -> None:
+    rows = np.genfromtxt(folder / f"{NAME}.trajectory.csv", delimiter=",", skip_header=1)[::20]
+    rows[:, 0] = np.arange(len(rows))
+    rows[1, 1:3] += 30.0 / np.sqrt(2) * np.array([1.0, -1.0])
+    path = tmp_path / "stations.csv"
+    np.savetxt(path, rows, "%.4f", ",", header="scan_id,x,y,z", comments="")
+    command("tunnel", "add", NAME, "--srid", 25830, "--axis", folder / f"{NAME}.axis.csv", "--start-chainage", START)
+    arguments = (
+        "survey",
+        "add",
+        NAME,
+        "--tunnel",
+        NAME,
+        "--date",
+        "2024-05-04",
+        "--stations",
+        path,
+        "--intensity-kind",
+        "none",
+    )
+    line = command(*arguments, code=2).stderr.strip()
+    assert "the station of scan_id 1 lies" in line
+    assert conn.execute("SELECT count(*) FROM tunnel.survey").fetchone() == (0,)

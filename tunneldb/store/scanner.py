@@ -1,0 +1,181 @@
+"""What a survey knows of its scanner: where it stood, and its intensity over range."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+from numpy.typing import NDArray
+from psycopg import sql
+
+from tunneldb.alignment.given import XYZ
+from tunneldb.arrays import Float
+from tunneldb.csvfile import CsvTable, read_csv
+from tunneldb.database.copy import PointZ, copy_binary, pack
+from tunneldb.errors import UserError
+from tunneldb.geometry.alignment import Alignment
+from tunneldb.pointcloud.pose_checks import FARTHEST_ASIDE, FARTHEST_BEYOND, far_from_axis, jumps
+from tunneldb.pointcloud.poses import PoseModel
+from tunneldb.pointcloud.stations import read_stations
+
+FARTHEST_SCANNER = 50.0  # m from the axis; a scanner that was never nearer stood in another tunnel
+MOST_WILD = 0.05  # share of a trajectory's poses that may be left out as they cannot be
+
+
+@dataclass(frozen=True)
+class Positions:
+    """Scanner positions as they were read.
+
+    Attributes
+    ----------
+    mobile : bool
+        Whether they are poses of a trajectory; else stations.
+    keys : (n,) array
+        Times, s, or numbers of the scans.
+    xyz : (n, 3) float64 array
+        m, in the tunnel's SRID.
+    notes : tuple of str
+        What the user is to know: poses that were left out, gaps.
+    """
+
+    mobile: bool
+    keys: NDArray[Any]
+    xyz: Float
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.keys)
+
+
+def read_positions(paths: Sequence[Path], alignment: Alignment, tunnel: str, *, mobile: bool, backwards: bool) -> Positions:
+    """Read the scanner's positions, and leave out poses of a trajectory that cannot be.
+
+    Parameters
+    ----------
+    paths
+        The one CSV of the trajectory (time,x,y,z) when `mobile`, else the files of the stations, see
+        `tunneldb.pointcloud.stations.read_stations`.
+    alignment, tunnel
+        The given axis, and the tunnel's name, for errors.
+    backwards
+        Whether the trajectory was driven towards falling chainage.
+
+    Raises
+    ------
+    UserError
+        If a file cannot be read, the scanner was never near the axis, a station lies where none can be, or too many poses do.
+    """
+    if not mobile:
+        stations = read_stations(paths)
+        _require_near(paths, stations.xyz, alignment, tunnel)
+        far = far_from_axis(stations.xyz, alignment)
+        if far.any():
+            worst = int(np.argmax(far))
+            raise UserError(
+                f"{', '.join(map(str, paths))}: the station of scan_id {stations.scan_id[worst]} lies {far[worst]:.0f} m"
+                f" from the axis of {tunnel!r}, and {np.count_nonzero(far) - 1} others like it; no scanner stands more than"
+                f" {FARTHEST_ASIDE:g} m aside of it or {FARTHEST_BEYOND:g} m beyond its ends: mend the position, or take the"
+                " row out, and the points of that scan are left out"
+            )
+        return Positions(False, stations.scan_id, stations.xyz)
+    table = _read_trajectory(paths[0])
+    time, xyz = table["time"], table.columns(XYZ)
+    _require_near(paths, xyz, alignment, tunnel)
+    far = far_from_axis(xyz, alignment)
+    wild = (far > 0.0) | jumps(time, xyz)
+    if wild.mean() > MOST_WILD:
+        raise table.error(
+            int(np.argmax(wild)),
+            f"this pose and {np.count_nonzero(wild) - 1} others ({100 * wild.mean():.2g} %) lie more than {FARTHEST_ASIDE:g} m"
+            f" aside of the axis of {tunnel!r}, {FARTHEST_BEYOND:g} m beyond its ends, or jump; mend the trajectory",
+        )
+    notes = []
+    if wild.any():
+        first = int(np.argmax(wild))
+        notes.append(
+            f"{np.count_nonzero(wild)} of {len(time)} poses cannot be the scanner's, and are left out: the first in line"
+            f" {table.lines[first]}, {f'{far[first]:.0f} m from the axis' if far[first] else 'a jump there and back'}"
+        )
+    time, xyz = time[~wild], xyz[~wild]
+    _require_direction(table.path, xyz, alignment, backwards=backwards)
+    gaps = PoseModel.from_trajectory(time, xyz).gaps
+    if len(gaps):
+        longest = gaps[np.argmax(gaps[:, 1] - gaps[:, 0])]
+        notes.append(
+            f"the trajectory has {len(gaps)} gap{'s' if len(gaps) > 1 else ''}, the longest of {longest[1] - longest[0]:.1f} s"
+            f" from time {longest[0]:.3f}: points measured in {'them' if len(gaps) > 1 else 'it'} are left out"
+        )
+    return Positions(True, time, xyz, tuple(notes))
+
+
+def save_positions(connection: psycopg.Connection[Any], survey: int, positions: Positions, srid: int) -> None:
+    """Write the positions of a survey, by its key, that has none."""
+    table, key = ("pose", "time") if positions.mobile else ("station", "scan_id")
+    columns = [np.full(len(positions), survey, dtype=np.int32), positions.keys, PointZ(positions.xyz, srid)]
+    _insert(connection, table, ["survey_id", key, "geom"], columns)
+
+
+def read_reference(path: Path) -> CsvTable:
+    """Read a reference curve: range_m, growing, and intensity_db."""
+    table = read_csv(path, ("range_m", "intensity_db"))
+    if len(table) < 2:
+        raise UserError(f"{path}: a reference curve needs at least 2 rows, this one has {len(table)}")
+    if table["range_m"][0] <= 0:
+        raise table.error(0, f"range_m {table['range_m'][0]:g} is not positive")
+    table.require_growing("range_m")
+    return table
+
+
+def save_reference(connection: psycopg.Connection[Any], survey: int, curve: CsvTable) -> None:
+    """Write the reference curve of a survey, by its key, that has none."""
+    columns = [np.full(len(curve), survey, dtype=np.int32), curve["range_m"], curve["intensity_db"]]
+    _insert(connection, "reference", ["survey_id", "range_m", "intensity_db"], columns)
+
+
+def require_range(kind: str) -> None:
+    """A range curve can be found only in intensity that falls with range."""
+    if kind == "none":
+        raise UserError("--reference auto finds the range curve in the intensity, and intensity of kind none is not read")
+    if kind == "reflectance":
+        raise UserError("--reference auto has nothing to find: from intensity of kind reflectance the maker removed the range")
+
+
+def _insert(connection: psycopg.Connection[Any], table: str, names: list[str], columns: list[Any]) -> None:
+    copy_binary(connection, sql.Identifier("tunnel", table), names, [pack(columns)])
+
+
+def _read_trajectory(path: Path) -> CsvTable:
+    table = read_csv(path, ("time", *XYZ))
+    if len(table) < 2:
+        raise UserError(f"{path}: a trajectory needs at least 2 rows, this one has {len(table)}")
+    table.require_growing("time")
+    return table
+
+
+def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunnel: str) -> None:
+    """The scanner must have been near the axis at least once."""
+    distance = alignment.distance(xyz)
+    if np.isnan(distance).all() or np.nanmin(distance) > FARTHEST_SCANNER:
+        nearest = "beyond its ends" if np.isnan(distance).all() else f"{np.nanmin(distance):.0f} m at the nearest"
+        raise UserError(
+            f"{', '.join(map(str, paths))}: the scanner was never within {FARTHEST_SCANNER:g} m of the axis of {tunnel!r} "
+            f"({nearest}); is it of another tunnel or in another SRID?"
+        )
+
+
+def _require_direction(path: Path, xyz: Float, alignment: Alignment, *, backwards: bool) -> None:
+    """The trajectory must run up the axis, or down it when that was said."""
+    chainage = alignment.chainage(xyz)
+    within = chainage[np.isfinite(chainage)]
+    run = within[-1] - within[0]
+    if run < 0 and not backwards:
+        raise UserError(
+            f"{path}: the trajectory runs {-run:.0f} m down the axis; reverse the axis's points, or say --backwards "
+            "if the scanner did go towards falling chainage"
+        )
+    if run > 0 and backwards:
+        raise UserError(f"{path}: the trajectory runs {run:.0f} m up the axis, so --backwards is wrong")
