@@ -136,7 +136,7 @@ COMMENT ON FUNCTION tunnel_api.axis_shift(int, int[], float8[], float8[], float8
 -- first great, a curve of the tunnel that begins at once the second; a vertex that is out of place both. At an end the first
 -- compares with the one neighbour, the second continues the parabola through three.
 -- x, y, z: places; gx, gy, gz: where the given axis has them, m. Neighbours are the next in the arrays.
-CREATE OR REPLACE FUNCTION tunnel_api.axis_deviation(
+CREATE OR REPLACE FUNCTION tunnel_api.axis_residual(
     n int[], x float8[], y float8[], z float8[], gx float8[], gy float8[], gz float8[])
 RETURNS TABLE (n int, deviation float8)
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
@@ -159,7 +159,7 @@ AS $$
     )
     SELECT r.n, sqrt(least(sum(r.shift ^ 2), sum(r.place ^ 2))) FROM residual r GROUP BY r.n ORDER BY r.n
 $$;
-COMMENT ON FUNCTION tunnel_api.axis_deviation(int[], float8[], float8[], float8[], float8[], float8[], float8[]) IS
+COMMENT ON FUNCTION tunnel_api.axis_residual(int[], float8[], float8[], float8[], float8[], float8[], float8[]) IS
 'How far each vertex of an axis lies off where its neighbours lead, m: the lesser of what its shift from the given axis differs from theirs, and its distance from the curve through their places.';
 
 
@@ -168,7 +168,7 @@ COMMENT ON FUNCTION tunnel_api.axis_deviation(int[], float8[], float8[], float8[
 -- Every run starts from the given axis (or the vertex as edited by hand, which stays), and the vertices two spacings beyond
 -- the kilometre are found along with it, so the result doesn't depend on which neighbours were done before.
 -- A vertex without points takes the shift of its neighbours, and is marked interpolated. So is one that does not come to rest
--- in max_iterations passes, or lies farther than max_deviation off where its neighbours lead (axis_deviation); of several side
+-- in max_iterations passes, or lies farther than max_deviation off where its neighbours lead (axis_residual); of several side
 -- by side the worst first, then the others are asked again. axis_vertex.remark says why. It ends when all others rest, or when
 -- a greater share than max_rejected (and more than one) was taken out.
 CREATE OR REPLACE FUNCTION tunnel_api.axis_refine(
@@ -265,7 +265,7 @@ BEGIN
                       array_agg(v.z ORDER BY v.n) AS z, array_agg(v.gx ORDER BY v.n) AS gx,
                       array_agg(v.gy ORDER BY v.n) AS gy, array_agg(v.gz ORDER BY v.n) AS gz
                   FROM measured_vertex v) a
-            CROSS JOIN LATERAL tunnel_api.axis_deviation(a.n, a.x, a.y, a.z, a.gx, a.gy, a.gz) d
+            CROSS JOIN LATERAL tunnel_api.axis_residual(a.n, a.x, a.y, a.z, a.gx, a.gy, a.gz) d
         ), fault AS (  -- how many times the limit
             SELECT v.n, v.moved, d.deviation, d.deviation > axis_refine.max_deviation AS off,
                 greatest(v.moved / axis_refine.tolerance, d.deviation / axis_refine.max_deviation) AS times
