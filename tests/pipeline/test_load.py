@@ -275,6 +275,21 @@ def test_what_was_loaded_before_a_failure_is_told(cli: Callable[..., tuple[int, 
     assert "b.laz: no station for scan_id 9" in err
 
 
+def test_a_file_that_a_batch_could_not_read_is_off_its_list_once_it_is_loaded(
+    conn: psycopg.Connection, cli: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    path = write(tmp_path / "a.laz", tube(980, 1020, 100, seed=1))
+    failed = (
+        "INSERT INTO tunnel.incoming (survey_id, name, path, bytes, points, parameters, failed_at, message)"
+        " SELECT s.id, f.name, '/there/' || f.name, 1, 0, '{}', now(), 'truncated'"
+        " FROM tunnel.survey s, unnest(ARRAY['a.laz', 'b.laz']) AS f (name)"
+    )
+    conn.execute(failed)
+    conn.commit()
+    assert cli(SURVEY, path)[0] == 0
+    assert conn.execute("SELECT name FROM tunnel.incoming").fetchall() == [("b.laz",)]
+
+
 def test_a_real_tunnel(conn: psycopg.Connection, dsn: str) -> None:
     run = CliRunner().invoke
     axis, trajectory = str(real_scan("ringo.axis.csv")), str(real_scan("ringo.trajectory.csv"))

@@ -16,6 +16,12 @@ from tunneldb.store.survey import Survey
 MOST_NAMED = 5
 """Rejected vertices that are named, at the most."""
 
+WIDEST = 20.0
+"""Tunnels are narrower, m: four lanes or three tracks under one vault."""
+
+FOOT = 0.3048
+"""m."""
+
 FEW_POINTS = 10_000
 """A kilometre with fewer points than this, at the end of a tunnel, may be without a section of its own."""
 
@@ -115,7 +121,23 @@ def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Map
         " WHERE s.survey_id = %s AND s.km = %s GROUP BY c.state",
         [survey.id, km],
     ).fetchall()
-    return {"sections": built, **{f"classes_{state}": count for state, count in classes}}
+    width = conn.execute(
+        "SELECT percentile_cont(0.5) WITHIN GROUP (ORDER BY (SELECT max(c.radius * abs(sind(c.angle)))"
+        " FROM tunnel.section_class c WHERE c.section_id = s.id)) FROM tunnel.section s WHERE s.survey_id = %s AND s.km = %s",
+        [survey.id, km],
+    ).fetchone()
+    note = _too_wide(2.0 * width[0]) if width is not None and width[0] is not None else {}
+    return {"sections": built, **{f"classes_{state}": count for state, count in classes}, **note}
+
+
+def _too_wide(width: float) -> Counts:
+    """Question sections of a width (m) that no tunnel has, as where coordinates in feet are taken for metres."""
+    if width <= WIDEST:
+        return {}
+    return {
+        "note": f"the sections are {width:.1f} m wide: are the coordinates in feet ({width * FOOT:.1f} m then), is it a cavern,"
+        " or are there two tubes? Transform the scan to metres"
+    }
 
 
 def _one(conn: psycopg.Connection[Any], query: LiteralString, *arguments: Any) -> int:

@@ -197,6 +197,7 @@ def load_files(
     for batch in _batches(headers, reading.alignment, settings.max_distance):
         recorded = recorded_files(conn, survey)
         there = {header.path: unchanged(conn, header.path, recorded.get(header.path.name)) for header in batch}
+        _withdraw(conn, survey, [path.name for path, loaded in there.items() if loaded is not None])
         conn.commit()
         yield from (replace(loaded, note=notes[loaded.name]) for loaded in there.values() if loaded is not None)
         changed = [header for header in batch if there[header.path] is None]
@@ -270,11 +271,17 @@ def _load_batch(reading: Reading, headers: Sequence[ScanHeader], given: Sequence
         finish(conn, survey, merged)
         for one in merged:
             _enter(conn, run, one.km, one.kept)
+        _withdraw(conn, survey, [header.path.name for header in headers])
         share = (time.monotonic() - started) / len(read)
         loaded = [outcome(conn, file.id, file.state, file.seconds + share) for file in read]
         for name in COUNTED:
             run.counts[name] = sum(getattr(file, name) for file in loaded)
     return loaded
+
+
+def _withdraw(conn: psycopg.Connection[Any], survey: Survey, names: list[str]) -> None:
+    """Take files off the list of those that a batch is to read or could not read: they are loaded."""
+    conn.execute("DELETE FROM tunnel.incoming WHERE survey_id = %s AND name = ANY (%s)", [survey.id, names])
 
 
 def _close(held: Mapping[int, Spool]) -> None:
