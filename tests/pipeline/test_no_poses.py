@@ -77,3 +77,12 @@ def test_leaks_of_a_merged_cloud(cloud: Path, conn: psycopg.Connection) -> None:
     command("report", "s", "-o", cloud / "report.html")
     assert SAID[1:] in (cloud / "report.html").read_text("utf-8")
     assert "no scanner positions" in command("intensity", "s", code=2).stderr
+
+
+def test_what_falls_with_range_is_not_set_either(cloud: Path, conn: psycopg.Connection) -> None:
+    command("tunnel", "add", "t", "--srid", 25830, "--axis", cloud / "t.axis.csv")
+    command("survey", "add", "s", "--tunnel", "t", "--date", "2024-05-04", "--no-poses", "--intensity-kind", "none")
+    refused = command("survey", "set", "s", "--intensity-kind", "linear", "--intensity", "intensity", code=2)
+    assert "can't be corrected without scanner positions" in refused.stderr
+    command("survey", "set", "s", "--trajectory", cloud / "t.trajectory.csv")
+    assert conn.execute("SELECT platform FROM tunnel.survey").fetchone() == ("mobile",)

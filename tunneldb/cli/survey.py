@@ -12,7 +12,7 @@ from tunneldb.cli.output import VerbGroup, records, tell
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.store.survey import get_survey
+from tunneldb.store.survey import UNPOSED, get_survey
 
 FILE = click.Path(path_type=Path)
 
@@ -101,10 +101,11 @@ def add(
             reference="auto" if reference == "auto" else None if reference is None else Path(reference),
             intensity=Intensity(intensity_kind, intensity),
         )
-    tell(survey=name, tunnel=tunnel, date=date.date(), poses=len(positions), notes=positions.notes)
+    notes = [*positions.notes, *([UNPOSED] if no_poses and intensity is not None else [])]
+    tell(survey=name, tunnel=tunnel, date=date.date(), poses=len(positions), notes=notes)
     known = "no scanner positions" if no_poses else f"{len(positions)} {'poses' if trajectory else 'stations'}"
     click.echo(f"{name}: {known} of {tunnel}, {date:%Y-%m-%d}", err=True)
-    for note in positions.notes:
+    for note in notes:
         click.echo(f"{name}: {note}", err=True)
 
 
