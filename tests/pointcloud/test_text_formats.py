@@ -256,6 +256,12 @@ def test_a_point_that_is_none_is_left_out(tmp_path: Path) -> None:
     assert read_header(tmp_path / "a.csv").high[2] == 4.0
 
 
+def test_a_file_of_a_name_that_no_format_has_is_told_which_there_are(tmp_path: Path) -> None:
+    (tmp_path / "a.pcd").write_text("VERSION .7\n")
+    with pytest.raises(UserError, match=r"a\.pcd: a file of points is known by how its name ends: \.las, \.laz, .*\.ptx"):
+        read_header(tmp_path / "a.pcd")
+
+
 def test_what_is_no_text_is_refused(tmp_path: Path) -> None:
     for name in ("a.ptx", "a.pts", "a.xyz", "a.ply"):
         (tmp_path / name).write_bytes(bytes(range(256)) * 1000)

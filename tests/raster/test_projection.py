@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -243,6 +244,27 @@ def test_points_of_unknown_scanner_position_go_nowhere(mobile: bool) -> None:
     pixels, tally = Projector.of(observer("amplitude", mobile), grid(), ROUGHNESS).project(points)
     np.testing.assert_array_equal(pixels.column[: len(points)], expected)
     assert 0 < tally.lost <= 10
+
+
+def test_without_scanner_positions_intensity_is_taken_as_it_is() -> None:
+    points = cloud(20_000, 9)
+    points.intensity[::50] = np.nan
+    posed = observer("reflectance", True)
+    assert posed.radiometer is not None
+    look = replace(posed, radiometer=replace(posed.radiometer, poses=PoseModel.unknown()))
+    pixels, tally = Projector.of(look, grid(), 0.0).project(points)
+    bare, _ = Projector.of(observer("none", True), grid(), 0.0).project(points)
+    expected = np.where(np.isnan(points.intensity), -1, bare.column[: len(points)])
+    np.testing.assert_array_equal(pixels.column[: len(points)], expected)
+    use = expected >= 0
+    assert 1000 < tally.used <= use.sum()
+    assert tally.lost == 0
+    np.testing.assert_array_equal(pixels.corrected[: len(points)][use], points.intensity[use])
+    np.testing.assert_array_equal(pixels.weight[: len(points)][use], 1)
+    seen = look.observe(points)
+    assert seen.observations is not None
+    assert np.count_nonzero(seen.use) > 1000
+    np.testing.assert_allclose(seen.observations.corrected(0.0)[seen.use], points.intensity[seen.use], atol=1e-6)
 
 
 def test_a_time_just_beyond_the_trajectory_is_that_of_its_end(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -107,6 +107,9 @@ def leaks(
         found = get_survey(conn, survey)
         if found.intensity_kind == "none":
             click.echo(f"survey {survey} has no intensity: leaks were not sought", err=True)
+        if found.note:
+            tell(note=found.note)
+            click.echo(f"survey {survey}: {found.note}", err=True)
         kilometres = parse_km(km, loaded_kilometres(conn, found)) if km else None
         if by_km:
             _print_classes(conn, found, kilometres)

@@ -12,7 +12,7 @@ from tunneldb.cli.output import VerbGroup, records, tell
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.store.survey import get_survey
+from tunneldb.store.survey import UNPOSED, get_survey
 
 FILE = click.Path(path_type=Path)
 
@@ -40,6 +40,12 @@ def survey() -> None:
     help="CSV with scan_id,x,y,z of a static scanner, scan_id as point_source_id; or an E57 or PTX file, for the poses of its "
     "scans; or a folder of such files. May be given several times.",
 )
+@click.option(
+    "--no-poses",
+    is_flag=True,
+    help="Nobody knows where the scanner was, as of merged scans: intensity, of kind reflectance or none, is taken as it is, "
+    "and every result says so.",
+)
 @click.option("--backwards", is_flag=True, help="The trajectory was driven towards falling chainage.")
 @click.option(
     "--reference",
@@ -66,6 +72,7 @@ def add(
     date: dt.datetime,
     trajectory: Path | None,
     stations: tuple[Path, ...],
+    no_poses: bool,
     backwards: bool,
     reference: str | None,
     intensity: str | None,
@@ -74,8 +81,8 @@ def add(
     """Add the survey NAME."""
     from tunneldb.store.catalog import Intensity, add_survey
 
-    if (trajectory is None) == (not stations):
-        raise UserError("say where the scanner was: exactly one of --trajectory and --stations")
+    if [trajectory is not None, bool(stations), no_poses].count(True) != 1:
+        raise UserError("say where the scanner was: exactly one of --trajectory and --stations; or --no-poses, if nobody knows")
     if backwards and trajectory is None:
         raise UserError("--backwards is about a trajectory; stations have no direction")
     if intensity_kind == "none":
@@ -88,15 +95,17 @@ def add(
             name,
             tunnel,
             date.date(),
-            stations if trajectory is None else (trajectory,),
+            None if no_poses else stations if trajectory is None else (trajectory,),
             mobile=trajectory is not None,
             backwards=backwards,
             reference="auto" if reference == "auto" else None if reference is None else Path(reference),
             intensity=Intensity(intensity_kind, intensity),
         )
-    tell(survey=name, tunnel=tunnel, date=date.date(), poses=len(positions), notes=positions.notes)
-    click.echo(f"{name}: {len(positions)} {'poses' if trajectory else 'stations'} of {tunnel}, {date:%Y-%m-%d}", err=True)
-    for note in positions.notes:
+    notes = [*positions.notes, *([UNPOSED] if no_poses and intensity is not None else [])]
+    tell(survey=name, tunnel=tunnel, date=date.date(), poses=len(positions), notes=notes)
+    known = "no scanner positions" if no_poses else f"{len(positions)} {'poses' if trajectory else 'stations'}"
+    click.echo(f"{name}: {known} of {tunnel}, {date:%Y-%m-%d}", err=True)
+    for note in notes:
         click.echo(f"{name}: {note}", err=True)
 
 

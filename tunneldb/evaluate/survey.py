@@ -120,6 +120,8 @@ def scanner_distance(conn: psycopg.Connection[Any], survey: Survey, shapes: Sequ
 
 def distance_from_scanner(points: Float, poses: PoseModel) -> Float:
     """Distance of points (n, 3) from the nearest station, or from the trajectory between its rows, m; NaN where they are."""
+    if poses.empty:
+        return np.full(len(points), np.nan)
     track = poses.track if poses.mobile else poses.station
     known = np.isfinite(points).all(axis=1)
     distance = np.full(len(points), np.nan)

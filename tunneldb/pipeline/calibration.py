@@ -151,9 +151,11 @@ def calibrate(points: Points, observer: Observer, drawn: list[Polygon], survey: 
         If nothing is seen of the lining, it lies outside the reference curve, or its own curve can't be found on it.
     """
     view = observe_sample(points, observer)
+    assert observer.radiometer is not None
+    if observer.radiometer.poses.empty:
+        return Calibration(observer, view, Roughness.unsought(), None)
     if not own_curve:
         return Calibration(observer, view, roughness_of(view, drawn), None)
-    assert observer.radiometer is not None
     try:
         found = find_range_curve(view, observer)
         found.require()

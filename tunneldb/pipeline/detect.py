@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -256,7 +256,7 @@ def _save(
         "leaks_again": matched.again,
         "leaks_kept_for_review": matched.kept,
         "leaks_gone": matched.gone,
-        **_report(roughness, result.calibration.note, matched.other_pixels),
+        **_report(roughness, [survey.note, result.calibration.note], matched.other_pixels),
     }
 
 
@@ -317,7 +317,7 @@ def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
     return Grid.covering(km, pixel, float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max()), beyond)
 
 
-def _report(roughness: Roughness, note: str | None, other_pixels: list[int]) -> Counts:
+def _report(roughness: Roughness, said: Sequence[str | None], other_pixels: list[int]) -> Counts:
     """What the ledger says about the roughness, and what else there is to note."""
 
     def known(value: float, digits: int) -> float | None:
@@ -331,7 +331,7 @@ def _report(roughness: Roughness, note: str | None, other_pixels: list[int]) -> 
         "incidence_from": known(roughness.incidence_from, 1),
         "incidence_to": known(roughness.incidence_to, 1),
     }
-    notes = [note] if note else []
+    notes = [note for note in said if note]
     if text := roughness.note:
         notes.append(text)
     if other_pixels:

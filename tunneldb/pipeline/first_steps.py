@@ -13,6 +13,9 @@ import numpy as np
 from tunneldb.pipeline.inspection import FileLook, IntensityLook
 from tunneldb.radiometry.intensity_kind import KindGuess
 
+FAR_APART = 0.1
+"""Profiles farther apart than this leave room for leaks that are worth a report, m."""
+
 _MOST_FILES = 5  # named one by one
 _PREFERRED = ("reflectance", "amplitude", "linear")
 _INTENSITY = re.compile("intens|ampl|reflect|refl")
@@ -47,6 +50,11 @@ def first_steps(looks: Sequence[FileLook]) -> FirstSteps:
         f"{look.path.name}: {look.misplaced} points have no coordinates, {look.untimed} no time"
         for look in looks
         if look.misplaced or look.untimed
+    ]
+    doubts += [
+        f"{look.path.name}: its profiles lie {look.profile_spacing:.2f} m apart, and what is between them was not seen"
+        for look in looks
+        if look.profile_spacing is not None and look.profile_spacing > FAR_APART
     ]
     name, files = _name(looks), _files(looks)
     srid = _srid(looks, missing, doubts)
@@ -143,8 +151,12 @@ def _poses(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> 
         )
         return "--trajectory TRAJECTORY.csv"
     listed = ", ".join(map(str, scans[:10])) + (f" and {len(scans) - 10} more" if len(scans) > 10 else "")
-    several = "" if len(scans) > 1 else "; if scans were merged into one, their positions are lost: export them one by one"
-    missing.append(f"where the scanner stood: STATIONS.csv with scan_id,x,y,z, of scan_id {listed}{several}")
+    missing.append(f"where the scanner stood: STATIONS.csv with scan_id,x,y,z, of scan_id {listed}")
+    if len(scans) == 1:
+        doubts.append(
+            "if this is several scans, merged, their positions are lost: export them one by one; or say --no-poses in place of "
+            "--stations, with intensity of kind reflectance or none"
+        )
     return "--stations STATIONS.csv"
 
 

@@ -65,6 +65,8 @@ def diagnose_survey(
     """
     if survey.intensity_kind == "none":
         raise UserError(f"survey {survey.name} has no intensity: it was added with --intensity-kind none")
+    if survey.platform == "unknown":
+        raise UserError(f"survey {survey.name} has no scanner positions, so range and incidence are not known (--no-poses)")
     share = max(1, SAMPLE // len(kilometres))
     diagnoses = []
     for km in kilometres:

@@ -161,7 +161,7 @@ class _Place:
 
     def observers(self, points: Points) -> Float:
         """Where the scanner was for each point (n, 3), m; NaN where it isn't known."""
-        return np.full((len(points), 3), np.nan) if self.poses is None else self.poses.positions(points)
+        return np.full((len(points), 3), np.nan) if self.poses is None or self.poses.empty else self.poses.positions(points)
 
 
 def _if_there(load: Callable[..., Any], conn: psycopg.Connection[Any], survey: Survey) -> Any:

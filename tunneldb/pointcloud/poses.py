@@ -86,7 +86,7 @@ class PoseFaults:
 
 @dataclass(frozen=True)
 class PoseModel:
-    """Scanner positions: one station a scan, or a trajectory interpolated linearly at ``gps_time``.
+    """Scanner positions: one station a scan, or a trajectory interpolated linearly at ``gps_time``; or none at all.
 
     Nothing is interpolated over a gap: longer than LONGEST_GAP and than GAP_INTERVALS of the trajectory's own intervals.
 
@@ -117,6 +117,16 @@ class PoseModel:
             np.empty(0, np.int64), np.empty((0, 3)), np.asarray(time, np.float64)[order], np.asarray(track, float)[order]
         )
 
+    @classmethod
+    def unknown(cls) -> PoseModel:
+        """Scanner of which it is known of no point where it was."""
+        return cls(np.empty(0, np.int64), np.empty((0, 3)), np.empty(0), np.empty((0, 3)))
+
+    @property
+    def empty(self) -> bool:
+        """Whether it is known of no point where the scanner was, and so is nothing that any of them lacks."""
+        return not len(self.time) and not len(self.scan_id)
+
     @cached_property
     def longest(self) -> float:
         """Longest interval that is interpolated over, s."""
@@ -137,7 +147,7 @@ class PoseModel:
 
     def faults(self, points: Points) -> PoseFaults:
         """Count the points whose scanner position is unknown."""
-        if len(points) == 0:
+        if len(points) == 0 or self.empty:
             return PoseFaults()
         if self.mobile:
             outside = points.time[~self._covers(points.time)]
@@ -149,13 +159,17 @@ class PoseModel:
         return PoseFaults(unknown=dict(zip(scans[~known].tolist(), counts[~known].tolist(), strict=True)))
 
     def known(self, points: Points) -> Bool:
-        """Which points' scanner position is known."""
+        """Which points' scanner position is known; all, where none is asked for."""
+        if self.empty:
+            return np.ones(len(points), np.bool_)
         if self.mobile:
             return self._covers(points.time) & ~self._in_gap(points.time)
         return np.isin(points.scan_id, self.scan_id)
 
     def positions(self, points: Points) -> Float:
         """Scanner position of each of n points, (n, 3), in the tunnel's SRID, m; NaN where it is not known."""
+        if self.empty:
+            return np.full((len(points), 3), np.nan)
         if self.mobile:
             out = np.empty((len(points), 3))
             in_blocks(lambda begin, end: _interpolate(self.time, self.track, points.time, out, begin, end), len(points), _BLOCK)

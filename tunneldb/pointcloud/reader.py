@@ -11,7 +11,7 @@ from pyproj import CRS
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.formats.raw import read_raw
-from tunneldb.pointcloud.formats.table import format_of
+from tunneldb.pointcloud.formats.table import format_of, require_known
 from tunneldb.pointcloud.points import CHUNK, Points, Ranges, ScanHeader
 
 __all__ = ["CHUNK", "Points", "ScanHeader", "check_header", "read_chunks", "read_header"]
@@ -25,6 +25,7 @@ def read_header(path: Path) -> ScanHeader:
     UserError
         If the file is missing, is none of its kind, or holds no points.
     """
+    require_known(path)
     return format_of(path).header(path)
 
 

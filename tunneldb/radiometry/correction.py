@@ -116,6 +116,20 @@ def observe(
     return Observations(*(array.astype(np.float32) for array in (range_m, cosine, raw_db, distance_db)))
 
 
+def unposed(raw: Single, kind: Kind) -> Observations:
+    """Intensity taken as it is, since nobody knows where the scanner was: as if seen squarely, from no distance.
+
+    Parameters
+    ----------
+    raw : (n,) float array
+        Raw intensity.
+    kind : {'amplitude', 'reflectance', 'linear'}
+        What it is.
+    """
+    level = to_decibel(raw, kind).astype(np.float32)
+    return Observations(np.zeros(len(level), np.float32), np.ones(len(level), np.float32), level, level)
+
+
 def range_span(observations: Observations, use: Bool, reference: ReferenceCurve) -> tuple[float, float, int, int]:
     """Nearest and farthest range (m) of the points to use, how many are outside the curve's span, and all."""
     used = observations.range_m[use].astype(np.float64)

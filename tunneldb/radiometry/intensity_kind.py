@@ -6,7 +6,8 @@ the kinds are, and from how much of it a tunnel can show:
 - dB are logarithms. Over a tunnel's ranges (1 to 50 m) the inverse square is 34 dB, reflectance of 2 to 90 % is 17 dB,
   incidence up to 80° is 8 dB: about 60 dB from the faintest lining to the brightest, retroreflecting targets left out.
   So what spreads over more is none.
-- No scan of a tunnel is even to 1 dB: incidence of 0 to 40° alone is that much, and so is the grain of concrete.
+- Values that all lie in 0 … 1 are fractions of full scale: as dB they were a lining that is even to 1 dB and, as an amplitude,
+  all within 1 dB of the detection limit.
 - *Amplitude* is dB above the weakest echo that counts (RIEGL), so it is hardly ever negative. *Reflectance* is dB of a
   white diffuse target at the same range, so lining (2 to 90 %) lies at −17 to −0.5 dB, and only retroreflectors above 0.
 - Counts are whole, mostly of 8, 11, 12 or 16 bits, or brought to 0 … 1; they are powers, so never negative. Leica's
@@ -26,9 +27,6 @@ from numpy.typing import NDArray
 
 WIDEST_DB = 60.0
 """Most that lining spreads in a tunnel, dB, between its 1st and 99th percentile."""
-
-NARROWEST_DB = 1.0
-"""Least that it spreads, dB, between these."""
 
 FARTHEST_DB = 150.0
 """Size of a level in dB that no scanner tells: 10¹⁵ times the reference."""
@@ -118,7 +116,7 @@ def guess_kind(values: NDArray[Any] | ValueRange, name: str = "") -> list[KindGu
         return [KindGuess("none", "no intensity", f"all values are {found.least:g}")]
     guesses = [guess for guess in (_linear(found), *_decibels(found)) if guess is not None]
     # Fractions of a dB are how dB come; whole numbers, and all that fits into 0 … 1, are how powers come.
-    if not found.whole and found.most > 1.0:
+    if not found.whole and found.high > 1.0:
         guesses.sort(key=lambda guess: guess.kind == "linear")
     said = [guess for guess in guesses if guess.kind in name.lower()]
     return [*said, *(guess for guess in guesses if guess not in said)]
@@ -162,10 +160,8 @@ def _not_decibels(found: ValueRange) -> str | None:
         return f"values from {found.low:g} to {found.high:g} (1 to 99 %) are too far from zero to be dB"
     if found.spread > WIDEST_DB:
         return f"values spread over {found.spread:g} (1 to 99 %), and lining in a tunnel over {WIDEST_DB:g} dB at most"
-    if found.spread < NARROWEST_DB:
-        return (
-            f"values spread over {found.spread:.2g} only (1 to 99 %), and lining in a tunnel over more than {NARROWEST_DB:g} dB"
-        )
+    if found.low >= 0.0 and found.high <= 1.0:
+        return f"values from {found.low:.3g} to {found.high:.3g} (1 to 99 %) are fractions of 1, and no dB of a lining"
     return None
 
 
@@ -173,7 +169,7 @@ def _linear(found: ValueRange) -> KindGuess | None:
     limits = f"from {found.least:g} to {found.most:g}"
     if _not_linear(found) is None:
         if not found.whole:
-            what = "0–1 float: linear" if found.most <= 1.0 else "linear"
+            what = "0–1 float: linear" if found.high <= 1.0 else "linear"
             return KindGuess("linear", what, f"fractions {limits}")
         bits = next((bits for bits in _BITS if found.most < 2**bits), None)
         what = "counts: linear" if bits is None else f"{bits}-bit counts: linear"

@@ -94,9 +94,16 @@ class Roughness:
     incidence_from: float
     incidence_to: float
 
+    @classmethod
+    def unsought(cls) -> Roughness:
+        """Stand for none, where incidence is not known, and so not corrected."""
+        return cls(0.0, False, False, np.nan, np.nan, 0, np.nan, np.nan)
+
     @property
     def note(self) -> str | None:
         """What is to be said about it, if anything."""
+        if not self.regions and not self.assumed:
+            return None
         if self.assumed:
             return (
                 f"no roughness explains how intensity changes with incidence (something else changes along with it, soot"

@@ -13,7 +13,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import Points
-from tunneldb.radiometry.correction import Kind, Observations, observe
+from tunneldb.radiometry.correction import Kind, Observations, observe, unposed
 from tunneldb.radiometry.edge_normals import Edges
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.raster.floor import Floor
@@ -156,9 +156,12 @@ class Observer:
         observations = None
         if self.radiometer:
             radiometer = self.radiometer
-            scanner = radiometer.poses.positions(points)
-            normals = self.edges.normals_of(points.xyz, unrolled)
-            observations = observe(points.xyz, scanner, normals, points.intensity, radiometer.kind, radiometer.reference)
+            if radiometer.poses.empty:
+                observations = unposed(points.intensity, radiometer.kind)
+            else:
+                scanner = radiometer.poses.positions(points)
+                normals = self.edges.normals_of(points.xyz, unrolled)
+                observations = observe(points.xyz, scanner, normals, points.intensity, radiometer.kind, radiometer.reference)
             with np.errstate(invalid="ignore"):
                 use &= observations.cosine >= np.cos(np.radians(radiometer.max_incidence))
                 use &= observations.range_m <= radiometer.max_range

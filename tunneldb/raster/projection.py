@@ -55,7 +55,10 @@ class EdgeArrays(NamedTuple):
 
 
 class PoseArrays(NamedTuple):
-    """Scanner positions, see `PoseModel`; no longer interval of the trajectory than ``longest`` (s) is interpolated over."""
+    """Scanner positions, see `PoseModel`; no longer interval of the trajectory than ``longest`` (s) is interpolated over.
+
+    Where there are none at all, intensity is taken as it is.
+    """
 
     scan_id: Int64
     station: Float
@@ -269,6 +272,7 @@ def _project(
 ) -> tuple[int, int, int, int, float, float]:  # pragma: no cover - compiled
     """What `project` does with a block of unrolled points; of plain arrays, which compile faster than tuples of them."""
     mobile = trajectory.shape[0] > 0
+    posed = mobile or known_scans.shape[0] > 0
     curve = knots.shape[0] > 0
     moment, knot, station, scan = np.int64(0), np.int64(0), np.int64(-1), np.int64(-1)
     used, lost, lining, outside = 0, 0, 0, 0
@@ -283,7 +287,14 @@ def _project(
         if c < first or c >= stop or r < 0 or r >= rows:
             continue
         raw, corrected, weight = 0.0, 0.0, 1
-        if wanted:
+        if wanted and not posed:
+            raw = float(intensity[k])
+            if linear:
+                raw = 10.0 * np.log10(intensity[k]) if raw > 0.0 else np.nan
+            if not np.isfinite(raw):
+                continue
+            corrected = raw
+        elif wanted:
             x, y, z = xyz[k, 0], xyz[k, 1], xyz[k, 2]
             if mobile:
                 t = time[k]

@@ -143,6 +143,7 @@ class _Report:
             "edits_in_all": edits_in_all,
             "part": (low, high) != data.find_stretch(conn, survey, -np.inf, np.inf),
             "sought": survey.intensity_kind != "none",
+            "unposed": survey.note,
             "crs": text.crs(crs_text(conn, survey.srid)),
             "clock": text.by_clock(counted),
             "sizes": text.by_size(counted),

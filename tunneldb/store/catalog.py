@@ -18,7 +18,15 @@ from tunneldb.alignment.given import GivenAxis
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.store.alignment import save_design
-from tunneldb.store.scanner import Positions, read_positions, read_reference, require_range, save_positions, save_reference
+from tunneldb.store.scanner import (
+    Positions,
+    read_positions,
+    read_reference,
+    require_no_range,
+    require_range,
+    save_positions,
+    save_reference,
+)
 
 
 @dataclass(frozen=True)
@@ -93,7 +101,7 @@ def add_survey(
     name: str,
     tunnel: str,
     date: dt.date,
-    poses: Sequence[Path],
+    poses: Sequence[Path] | None,
     *,
     mobile: bool,
     backwards: bool,
@@ -106,7 +114,7 @@ def add_survey(
     ----------
     poses
         The one CSV of the trajectory (time,x,y,z) when `mobile`, else the files of the stations, see
-        `tunneldb.pointcloud.stations.read_stations`.
+        `tunneldb.pointcloud.stations.read_stations`; None where nobody knows where the scanner was.
     backwards
         Whether the trajectory was driven towards falling chainage.
     reference
@@ -120,6 +128,8 @@ def add_survey(
     _require_name(name)
     tunnel_id, srid, alignment = _alignment(connection, tunnel)
     positions = read_positions(poses, alignment, tunnel, mobile=mobile, backwards=backwards)
+    if poses is None:
+        require_no_range(intensity.kind)
     if reference == "auto":
         require_range(intensity.kind)
     curve = read_reference(reference) if isinstance(reference, Path) else None
@@ -135,7 +145,7 @@ def add_survey(
                 date,
                 intensity.dimension,
                 intensity.kind,
-                "mobile" if mobile else "static",
+                "unknown" if poses is None else "mobile" if mobile else "static",
                 "measured" if curve is not None else reference or "none",
             ],
         ).fetchone()
@@ -190,17 +200,19 @@ def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyCha
         As `add_survey` does; nothing is changed then.
     """
     row = connection.execute(
-        "SELECT s.id, t.name, s.intensity_kind, s.intensity_dimension, s.reference FROM tunnel.survey s"
+        "SELECT s.id, t.name, s.intensity_kind, s.intensity_dimension, s.reference, s.platform FROM tunnel.survey s"
         " JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.name = %s FOR UPDATE OF s",
         [name],
     ).fetchone()
     if row is None:
         raise UserError(f"there is no survey {name!r}: tunneldb survey list")
-    key, tunnel, old_kind, old_dimension, reference = row
+    key, tunnel, old_kind, old_dimension, reference, platform = row
     kind = change.kind or old_kind
     dimension = None if kind == "none" else change.dimension or old_dimension
     if kind != "none" and dimension is None:
         raise UserError(f"--intensity must name the dimension that holds the {kind}")
+    if platform == "unknown" and not change.poses:
+        require_no_range(kind)
     notes: list[str] = []
     if change.poses:
         _, srid, alignment = _alignment(connection, tunnel)

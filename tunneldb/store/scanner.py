@@ -51,14 +51,16 @@ class Positions:
         return len(self.keys)
 
 
-def read_positions(paths: Sequence[Path], alignment: Alignment, tunnel: str, *, mobile: bool, backwards: bool) -> Positions:
+def read_positions(
+    paths: Sequence[Path] | None, alignment: Alignment, tunnel: str, *, mobile: bool, backwards: bool
+) -> Positions:
     """Read the scanner's positions, and leave out poses of a trajectory that cannot be.
 
     Parameters
     ----------
     paths
         The one CSV of the trajectory (time,x,y,z) when `mobile`, else the files of the stations, see
-        `tunneldb.pointcloud.stations.read_stations`.
+        `tunneldb.pointcloud.stations.read_stations`; None where nobody knows where the scanner was: there are none then.
     alignment, tunnel
         The given axis, and the tunnel's name, for errors.
     backwards
@@ -69,6 +71,8 @@ def read_positions(paths: Sequence[Path], alignment: Alignment, tunnel: str, *, 
     UserError
         If a file cannot be read, the scanner was never near the axis, a station lies where none can be, or too many poses do.
     """
+    if paths is None:
+        return Positions(False, np.empty(0, np.int32), np.empty((0, 3)))
     if not mobile:
         stations = read_stations(paths)
         _require_near(paths, stations.xyz, alignment, tunnel)
@@ -114,6 +118,8 @@ def read_positions(paths: Sequence[Path], alignment: Alignment, tunnel: str, *, 
 
 def save_positions(connection: psycopg.Connection[Any], survey: int, positions: Positions, srid: int) -> None:
     """Write the positions of a survey, by its key, that has none."""
+    if not len(positions):
+        return
     table, key = ("pose", "time") if positions.mobile else ("station", "scan_id")
     columns = [np.full(len(positions), survey, dtype=np.int32), positions.keys, PointZ(positions.xyz, srid)]
     _insert(connection, table, ["survey_id", key, "geom"], columns)
@@ -142,6 +148,15 @@ def require_range(kind: str) -> None:
         raise UserError("--reference auto finds the range curve in the intensity, and intensity of kind none is not read")
     if kind == "reflectance":
         raise UserError("--reference auto has nothing to find: from intensity of kind reflectance the maker removed the range")
+
+
+def require_no_range(kind: str) -> None:
+    """Without scanner positions nothing can take the range out of the intensity."""
+    if kind not in ("reflectance", "none"):
+        raise UserError(
+            f"intensity of kind {kind} falls with range, which can't be corrected without scanner positions: --no-poses takes"
+            " --intensity-kind reflectance, from which the maker removed the range, or none"
+        )
 
 
 def _insert(connection: psycopg.Connection[Any], table: str, names: list[str], columns: list[Any]) -> None:

@@ -108,13 +108,15 @@ def sample(conn: psycopg.Connection[Any], survey: Survey, km: int, count: int = 
 
 
 def load_poses(conn: psycopg.Connection[Any], survey: Survey) -> PoseModel:
-    """Read the trajectory of a mobile survey, or the stations of a static one.
+    """Read the trajectory of a mobile survey, or the stations of a static one; nothing of one without.
 
     Raises
     ------
     UserError
         If the survey has none.
     """
+    if survey.platform == "unknown":
+        return PoseModel.unknown()
     table, key = ("pose", "time") if survey.platform == "mobile" else ("station", "scan_id")
     fields: list[tuple[str, str, sql.Composable]] = [(key, "f8", sql.SQL("{}::float8").format(sql.Identifier(key)))]
     fields += [("x", "f8", sql.SQL("ST_X(geom)")), ("y", "f8", sql.SQL("ST_Y(geom)")), ("z", "f8", sql.SQL("ST_Z(geom)"))]

@@ -11,6 +11,12 @@ from psycopg.rows import class_row
 
 from tunneldb.errors import UserError
 
+UNPOSED = (
+    "where the scanner was is not known: intensity is taken as the maker gives it, incidence is not corrected, and lining seen"
+    " too slantingly or from too far counts as seen; leaks may be missing, and false ones among them"
+)
+"""What is to be said of leaks that were sought without scanner positions."""
+
 
 @dataclass(frozen=True)
 class Survey:
@@ -35,7 +41,7 @@ class Survey:
     intensity_kind
         ``amplitude``, ``reflectance``, ``linear`` or ``none``.
     platform
-        ``static`` (stations) or ``mobile`` (trajectory).
+        ``static`` (stations), ``mobile`` (trajectory), or ``unknown``: range and incidence are not corrected.
     reference
         Range curve: ``none``, ``measured`` on a target, or ``auto``, found on the lining of each kilometre.
     """
@@ -52,6 +58,11 @@ class Survey:
     intensity_kind: str
     platform: str
     reference: str
+
+    @property
+    def note(self) -> str | None:
+        """What is to be said of all leaks of the survey, if anything."""
+        return UNPOSED if self.platform == "unknown" and self.intensity_kind != "none" else None
 
 
 def get_survey(conn: psycopg.Connection[Any], name: str) -> Survey:

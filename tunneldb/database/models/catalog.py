@@ -94,7 +94,7 @@ class Survey(Base):
     __tablename__ = "survey"
     __table_args__ = (
         one_of("intensity_kind", "amplitude", "reflectance", "linear", "none"),
-        one_of("platform", "static", "mobile"),
+        one_of("platform", "static", "mobile", "unknown"),
         one_of("reference", "none", "measured", "auto"),
         CheckConstraint("(intensity_dimension IS NULL) = (intensity_kind = 'none')", name="intensity_dimension"),
         Index(None, "tunnel_id"),
@@ -111,7 +111,9 @@ class Survey(Base):
     intensity_kind: Mapped[str] = mapped_column(
         comment="amplitude (dB, falls with range), reflectance (dB, range removed), linear (counts) or none"
     )
-    platform: Mapped[str] = mapped_column(comment="static (rows in station) or mobile (rows in pose)")
+    platform: Mapped[str] = mapped_column(
+        comment="static (rows in station), mobile (rows in pose), or unknown: range and incidence are not corrected"
+    )
     reference: Mapped[str] = mapped_column(
         server_default=text("'none'"),
         comment="Range curve: none, measured on a target (rows in reference) or auto, from the lining of each kilometre",

@@ -19,7 +19,7 @@ from pyproj.exceptions import CRSError
 
 HEADER_SIZE = 375
 _SIZES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375, 5: 393}
-_SIGNATURE = b"LASF"
+SIGNATURE = b"LASF"
 _WKT_FLAG = 1 << 4
 _INTERNAL_WAVEFORMS = 1 << 1
 _LASZIP = (b"laszip encoded", 22204)
@@ -149,7 +149,7 @@ def read_head(path: Path) -> Head:
     """
     with path.open("rb") as file:
         head = file.read(_SIZES[0])
-        if head[:4] != _SIGNATURE or head[25] not in _SIZES:
+        if head[:4] != SIGNATURE or head[25] not in _SIZES:
             raise ValueError(f"it is no LAS of a version from 1.0 to 1.5: {head[:4]!r}, 1.{head[25]}")
         size, points_at, count = struct.unpack_from("<HII", head, 94)
         file.seek(0)

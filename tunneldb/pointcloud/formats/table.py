@@ -6,8 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.e57 import read_e57, read_e57_header, read_e57_scans
 from tunneldb.pointcloud.formats.las import read_las, read_las_header
+from tunneldb.pointcloud.formats.las_header import SIGNATURE
 from tunneldb.pointcloud.formats.ply import read_ply, read_ply_header
 from tunneldb.pointcloud.formats.ptx import read_ptx, read_ptx_scans
 from tunneldb.pointcloud.formats.scans import PosedScan
@@ -46,6 +48,21 @@ def format_of(path: Path) -> Format:
     return _FORMATS.get(path.suffix.lower(), _LAS)
 
 
+def require_known(path: Path) -> None:
+    """Refuse a file whose suffix is that of no format, and that is no LAS either.
+
+    Raises
+    ------
+    UserError
+    """
+    if path.suffix.lower() in (*_FORMATS, *_SUFFIXES_OF_LAS) or not path.is_file():
+        return
+    with path.open("rb") as file:
+        if file.read(len(SIGNATURE)) != SIGNATURE:
+            known = ", ".join((*_SUFFIXES_OF_LAS, *_FORMATS))
+            raise UserError(f"{path}: a file of points is known by how its name ends: {known}")
+
+
 def has_scans(path: Path) -> bool:
     """Whether a file is of a format whose scans bring their poses, by its name."""
     return format_of(path).scans is not None
@@ -78,6 +95,7 @@ def _of_text(
     )
 
 
+_SUFFIXES_OF_LAS = (".las", ".laz")
 _LAS = Format("LAS or LAZ", read_las_header, read_las, is_las=True)
 _TABLE = _of_text("table of points", read_table)
 _FORMATS = {
