@@ -137,7 +137,7 @@ def _rows(file: Iterable[str], any_separator: bool) -> tuple[_csv.Reader, bool]:
     lines = iter(file)
     header = next(lines, "")
     separator = next((one for one in _SEPARATORS if one in header.strip()), ",")
-    whole = chain([header] if header else [], lines)
+    whole: Iterable[str] = chain([header] if header else [], lines)
     if separator == " ":  # columns may be lined up by several
         whole = (" ".join(line.split()) for line in whole)
     return csv.reader(whole, delimiter=separator), separator != ","
@@ -157,10 +157,8 @@ def _read_rows(
             continue
         if len(row) != len(header):
             raise UserError(f"{path}, line {reader.line_num}: {len(row)} values under a header of {len(header)} columns")
-        cells = {name: row[index] for name, index in indices.items()}
-        rows.append([
-            _number(path, reader.line_num, name, cells[name], decimal_comma) if name in cells else default[name] for name in names
-        ])  # fmt: skip
+        numbers = {name: _number(path, reader.line_num, name, row[index], decimal_comma) for name, index in indices.items()}
+        rows.append([numbers[name] if name in numbers else default[name] for name in names])
         lines.append(reader.line_num)
     return rows, lines
 

@@ -76,12 +76,13 @@ def read_dxf(path: Path, layer: str | None, unit: float | None) -> Drawn:
     UserError
         If it can't be read, holds no lines, several layers to choose from, or states a unit that isn't the metre.
     """
-    import ezdxf
+    from ezdxf import filemanagement
     from ezdxf import path as paths
+    from ezdxf.lldxf.const import DXFError
 
     try:
-        drawing = ezdxf.readfile(path)
-    except (OSError, ezdxf.DXFError, ValueError) as error:
+        drawing = filemanagement.readfile(str(path))
+    except (OSError, DXFError, ValueError) as error:
         raise UserError(f"{path} cannot be read as DXF: {str(error).strip().splitlines()[0]}") from None
     entities = [entity for entity in drawing.modelspace() if entity.dxftype() in _ENTITIES and not _is_mesh(entity)]
     names = sorted({entity.dxf.layer for entity in entities})
@@ -140,7 +141,9 @@ def choose_layer(path: Path, names: list[str], wanted: str | None, others: list[
     listed = ", ".join(repr(name) for name in names)
     if wanted is not None:
         if wanted not in names:
-            there = f"it has {listed}" if names else f"there are none; its layers: {', '.join(map(repr, others or [])) or 'none'}"
+            there = (
+                f"it has {listed}" if names else f"there are none; its layers: {', '.join(map(repr, others or [])) or 'none'}"
+            )
             raise UserError(f"{path} has no layer {wanted!r} of lines; {there}")
         return wanted
     if not names:
@@ -189,7 +192,7 @@ def _dxf_unit(path: Path, code: int, unit: float | None) -> tuple[float, str]:
     if code == 0:
         return 1.0, "states no unit; its lengths are taken to be metres, as the SRID's are"
     raise UserError(
-        f"{path}: its unit is {units.decode(code)} ($INSUNITS {code}); say what its coordinates are in truth by --axis-unit, such "
+        f"{path}: its unit is {units.decode(code)} ($INSUNITS {code}); what are its lengths? Say it by --axis-unit, such "
         "as --axis-unit meter"
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from tunneldb.alignment.design import Design
 from tunneldb.alignment.drawing import read_dxf, read_vector
-from tunneldb.alignment.landxml import UNITS
+from tunneldb.alignment.units import UNITS
 from tunneldb.arrays import Float
 from tunneldb.csvfile import read_csv, read_header
 from tunneldb.errors import UserError
@@ -94,7 +94,7 @@ def read_given(
     layer
         Which layer of a drawing or a map.
     unit
-        Unit of a LandXML's or a drawing's lengths, a name of `tunneldb.alignment.landxml.UNITS`; None: as the file says.
+        Unit of a LandXML's or a drawing's lengths, a name of `tunneldb.alignment.units.UNITS`; None: as the file says.
     srid
         EPSG code that the file's coordinate system is held against, where it names one; None: not checked.
     reverse

@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from tunneldb.arrays import Float, Int32
+from tunneldb.arrays import Float, Int32, Intp
 
 SNAP = 0.01
 """Ends of pieces that lie as near to each other as this are one place, m: files are rounded to millimetres."""
@@ -50,7 +50,13 @@ def join_pieces(pieces: Sequence[Float]) -> list[Float]:
 
 
 def _follow(
-    pieces: Sequence[Float], nodes: Int32, degree: np.ndarray, ends: dict[int, list[int]], left: set[int], first: int, start: int
+    pieces: Sequence[Float],
+    nodes: Int32,
+    degree: Intp,
+    ends: dict[int, list[int]],
+    left: set[int],
+    first: int,
+    start: int,
 ) -> Float:
     """Take pieces from those that are left, from a node on, as long as there is one way to go."""
     parts: list[Float] = []

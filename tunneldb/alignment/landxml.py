@@ -14,13 +14,8 @@ from xml.etree.ElementTree import Element, ParseError, iterparse
 from tunneldb.alignment.design import Design, StationPiece
 from tunneldb.alignment.elements import PlanElement, clothoid_from_chord
 from tunneldb.alignment.profile import Pvi, profile_elements
+from tunneldb.alignment.units import UNITS
 from tunneldb.errors import UserError
-
-UNITS = {
-    "millimeter": 0.001, "centimeter": 0.01, "meter": 1.0, "kilometer": 1000.0,
-    "inch": 0.0254, "foot": 0.3048, "USSurveyFoot": 1200.0 / 3937.0, "mile": 1609.344,
-}  # fmt: skip
-"""Metres in each linear unit of the schema."""
 
 MISMATCH = 0.02  # m between a length as stated and as the points have it; files are rounded to millimetres or centimetres
 _PVIS = ("PVI", "ParaCurve", "UnsymParaCurve", "CircCurve")

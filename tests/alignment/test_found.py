@@ -1,0 +1,134 @@
+"""The axis found from points: of boxes bent along circles of known radius and slope, with what stands in and about them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tunneldb.alignment.found import FoundAxis, find_axis, follow_line
+from tunneldb.arrays import Bool, Float
+from tunneldb.errors import UserError
+
+Rng = np.random.Generator
+WIDTH, HEIGHT, LENGTH = 8.0, 6.0, 120.0
+AT = np.array([512_345.0, 104_321.0, 414.0])
+
+
+def box(low: tuple[float, ...], high: tuple[float, ...], density: float, rng: Rng, faces: str = "NSTB") -> Float:
+    """Points on faces of a box in (along, right, up): walls N and S, top, bottom, and its ends E and W."""
+    a, b = np.array(low), np.array(high)
+    points = []
+    for face in faces:
+        axis, value = {"N": (1, b), "S": (1, a), "T": (2, b), "B": (2, a), "E": (0, b), "W": (0, a)}[face]
+        size = np.delete(b - a, axis).prod()
+        p = a + rng.random((int(size * density), 3)) * (b - a)
+        p[:, axis] = value[axis]
+        points.append(p)
+    return np.vstack(points)
+
+
+def inside(p: Float, low: tuple[float, ...], high: tuple[float, ...]) -> Bool:
+    return ((p > np.array(low)) & (p < np.array(high))).all(axis=1)
+
+
+def bent(p: Float, radius: float, slope: float) -> Float:
+    """From (along, right, up) to the map: along an arc that bends right (inf: straight), from north-east on, with a slope."""
+    s, u, w = p.T
+    turn = 0.9 + (s / radius)
+    centre = np.array([np.sin(0.9), -np.cos(0.9)])  # to the right
+    if np.isinf(radius):
+        plan = s[:, None] * [np.cos(0.9), np.sin(0.9)] + u[:, None] * centre
+    else:
+        heading = 0.9 - (turn - 0.9)
+        right = np.column_stack([np.sin(heading), -np.cos(heading)])
+        plan = radius * centre - (radius - u)[:, None] * right
+    return AT + np.column_stack([plan, w + slope * s])
+
+
+def axis(radius: float, slope: float, step: float = 0.05) -> Float:
+    along = np.arange(0.0, LENGTH + step / 2, step)
+    return bent(np.column_stack([along, 0 * along, 0 * along]), radius, slope)
+
+
+def away(found: FoundAxis, truth: Float) -> tuple[float, float]:
+    """Greatest distance in plan and in height of the found line from the true one, m."""
+    step = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(found.xyz, axis=0), axis=1))])
+    at = np.arange(0.0, step[-1], 0.5)
+    line = np.column_stack([np.interp(at, step, column) for column in found.xyz.T])
+    from scipy.spatial import cKDTree
+
+    distance, place = cKDTree(truth[:, :2]).query(line[:, :2])
+    return float(distance.max()), float(np.abs(line[:, 2] - truth[place, 2]).max())
+
+
+def tunnel(density: float, rng: Rng) -> Float:
+    half, up = WIDTH / 2, HEIGHT / 2
+    return box((0.0, -half, -up), (LENGTH, half, up), density, rng)
+
+
+def open_cut(density: float, rng: Rng) -> Float:
+    """30 m of track before and behind, with slopes of 45° up to the crown, the portal's face, and the hill above it."""
+    parts = []
+    for low, high, face in ((-30.0, 0.0, 0.0), (LENGTH, LENGTH + 30.0, LENGTH)):
+        n = int(30 * 30 * density)
+        p = np.column_stack([rng.uniform(low, high, n), rng.uniform(-15, 15, n), np.zeros(n)])
+        p[:, 2] = -3.0 + np.maximum(np.abs(p[:, 1]) - 5.0, 0.0)
+        n = int(30 * 12 * density)
+        wall = np.column_stack([np.full(n, face), rng.uniform(-15, 15, n), rng.uniform(-3, 9, n)])
+        parts += [p, wall[~((np.abs(wall[:, 1]) < 4) & (wall[:, 2] < 3))]]
+    return np.vstack(parts)
+
+
+def passage(density: float, rng: Rng) -> Float:
+    """A cross passage of 3.5 m by 3 m that leaves to the right for 18 m."""
+    return box((50.0, 4.0, -3.0), (53.5, 22.0, 0.0), density, rng, "TBEW")
+
+
+def with_passage(points: Float, density: float, rng: Rng) -> Float:
+    hole = inside(points, (50.0, 3.9, -3.0), (53.5, 4.1, 0.0))
+    return np.vstack([points[~hole], passage(density, rng)])
+
+
+def with_train(points: Float, density: float, rng: Rng) -> Float:
+    """A train 70 m long on the right track: what it hides of floor and wall isn't seen."""
+    hidden = inside(points, (30.0, -0.2, -3.1), (100.0, 4.1, 1.2)) & ((points[:, 1] > 0.0) | (points[:, 2] > -2.9))
+    return np.vstack([points[~hidden], box((30.0, 0.2, -2.5), (100.0, 3.2, 1.2), density, rng, "STEW")])
+
+
+def with_niches(points: Float, density: float, rng: Rng) -> Float:
+    for at in (20.0, 45.0, 70.0, 95.0):
+        points = points[~inside(points, (at, -4.1, -3.1), (at + 4.0, -3.9, -0.5))]
+        points = np.vstack([points, box((at, -6.5, -3.0), (at + 4.0, -4.0, -0.5), density, rng, "STBEW")])
+    return points
+
+
+@pytest.mark.parametrize("density", [3.0, 30.0])
+@pytest.mark.parametrize(("radius", "slope"), [(np.inf, 0.0), (300.0, 0.04), (-150.0, -0.02)])
+@pytest.mark.parametrize("what", ["bare", "niches", "passage", "train", "cut", "all"])
+def test_it_lies_in_the_middle(what: str, radius: float, slope: float, density: float) -> None:
+    rng = np.random.default_rng(5)
+    points = tunnel(density, rng)
+    if what in ("niches", "all"):
+        points = with_niches(points, density, rng)
+    if what in ("passage", "all"):
+        points = with_passage(points, density, rng)
+    if what in ("train", "all"):
+        points = with_train(points, density, rng)
+    if what in ("cut", "all"):
+        points = np.vstack([points, open_cut(density, rng)])
+    found = find_axis(bent(points + rng.normal(0, 0.005, points.shape), radius, slope))
+    truth = axis(radius, slope)
+    plan, height = away(found, truth)
+    print(
+        what,
+        radius,
+        density,
+        round(plan, 2),
+        round(height, 2),
+        found.whole.mean(),
+        np.nanquantile(found.away, 0.95),
+        found.doubtful,
+    )
+    assert plan < (1.0 if what in ("train", "all") else 0.25)
+    assert height < 0.5
+    assert found.length == pytest.approx(LENGTH, abs=1.5)
