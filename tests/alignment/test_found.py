@@ -102,10 +102,20 @@ def with_niches(points: Float, density: float, rng: Rng) -> Float:
     return points
 
 
-@pytest.mark.parametrize("density", [3.0, 30.0])
-@pytest.mark.parametrize(("radius", "slope"), [(np.inf, 0.0), (300.0, 0.04), (-150.0, -0.02)])
-@pytest.mark.parametrize("what", ["bare", "niches", "passage", "train", "cut", "all"])
-def test_it_lies_in_the_middle(what: str, radius: float, slope: float, density: float) -> None:
+CASES = [
+    ("bare", np.inf, 0.0, 3.0, 0.1),
+    ("bare", -150.0, -0.1, 8.0, 0.5),
+    ("niches", 300.0, 0.04, 5.0, 0.1),
+    ("passage", 300.0, 0.04, 5.0, 0.1),
+    ("train", 300.0, 0.04, 3.0, 0.2),
+    ("train", np.inf, 0.0, 25.0, 0.2),
+    ("cut", -150.0, -0.02, 8.0, 0.6),
+    ("all", 300.0, 0.04, 3.0, 0.3),
+]
+
+
+@pytest.mark.parametrize(("what", "radius", "slope", "density", "within"), CASES)
+def test_it_lies_in_the_middle(what: str, radius: float, slope: float, density: float, within: float) -> None:
     rng = np.random.default_rng(5)
     points = tunnel(density, rng)
     if what in ("niches", "all"):
@@ -116,19 +126,60 @@ def test_it_lies_in_the_middle(what: str, radius: float, slope: float, density: 
         points = with_train(points, density, rng)
     if what in ("cut", "all"):
         points = np.vstack([points, open_cut(density, rng)])
-    found = find_axis(bent(points + rng.normal(0, 0.005, points.shape), radius, slope))
-    truth = axis(radius, slope)
-    plan, height = away(found, truth)
-    print(
-        what,
-        radius,
-        density,
-        round(plan, 2),
-        round(height, 2),
-        found.whole.mean(),
-        np.nanquantile(found.away, 0.95),
-        found.doubtful,
-    )
-    assert plan < (1.0 if what in ("train", "all") else 0.25)
-    assert height < 0.5
-    assert found.length == pytest.approx(LENGTH, abs=1.5)
+    stray = rng.uniform((-20, -30, -20), (LENGTH + 20, 30, 20), (30, 3))
+    found = find_axis(bent(np.vstack([points + rng.normal(0, 0.005, points.shape), stray]), radius, slope))
+    plan, height = away(found, axis(radius, slope))
+    assert plan < within
+    assert height < 0.2
+    assert found.length == pytest.approx(LENGTH, abs=1.0)
+    assert found.width == pytest.approx(WIDTH, abs=0.3)
+    assert found.xyz[0, 0] < found.xyz[-1, 0]  # from the west
+    np.testing.assert_array_equal(found.reversed().xyz, found.xyz[::-1])
+
+
+def test_where_walls_are_missing_is_said() -> None:
+    rng = np.random.default_rng(5)
+    points = tunnel(5.0, rng)
+    points = points[~inside(points, (60.0, -5.0, -2.9), (80.0, -2.0, 4.0))]  # no left wall for 20 m
+    found = find_axis(bent(points, np.inf, 0.0))
+    assert away(found, axis(np.inf, 0.0))[0] < 0.3
+    ((low, high),) = found.doubtful if found.xyz[0, 0] < found.xyz[-1, 0] else found.reversed().doubtful
+    assert 58.0 < low < 66.0
+    assert 74.0 < high < 82.0
+    assert find_axis(bent(tunnel(5.0, rng), np.inf, 0.0)).doubtful == []
+
+
+def test_two_tubes_are_refused_and_a_drawn_line_chooses() -> None:
+    rng = np.random.default_rng(5)
+    second = tunnel(5.0, rng) + np.array([0.0, 20.0, 0.0])
+    both = bent(np.vstack([tunnel(5.0, rng), second]), 300.0, 0.04)
+    with pytest.raises(UserError, match=r"don't hang together, or there are several: .* m² about .*; .* m² about"):
+        find_axis(both)
+    drawn = np.column_stack([np.linspace(10.0, 100.0, 7), [1.0, -1.0, 1.5, 0.0, -1.5, 1.0, 0.5], np.zeros(7)])
+    plan = bent(drawn, 300.0, 0.0)[:, :2]
+    found = follow_line(both, plan[::-1])
+    assert max(away(found, axis(300.0, 0.04))) < 0.1
+    assert np.hypot(*(found.xyz[0, :2] - plan[-1])) < 1.5  # it begins where the line does
+    with pytest.raises(UserError, match="no points of a tunnel along the line"):
+        follow_line(both, plan + 500.0)
+
+
+def test_a_fork_of_the_same_width_is_refused() -> None:
+    rng = np.random.default_rng(5)
+    turned = tunnel(5.0, rng)[:, [1, 0, 2]] * (1.0, 0.6, 1.0) + (60.0, 4.0, 0.0)
+    with pytest.raises(UserError, match="the tunnel forks: what lies about"):
+        find_axis(bent(np.vstack([tunnel(5.0, rng), turned]), np.inf, 0.0))
+
+
+@pytest.mark.parametrize("what", ["field", "wall", "hangers", "nothing"])
+def test_what_is_no_tunnel_is_refused(what: str) -> None:
+    rng = np.random.default_rng(5)
+    points = {
+        "field": np.column_stack([rng.uniform(0, 100, (20_000, 2)), rng.normal(0, 0.2, 20_000)]),
+        "wall": np.column_stack([rng.uniform(0, 100, 20_000), rng.normal(0, 0.1, 20_000), rng.uniform(0, 8, 20_000)]),
+        # a roof on posts: no walls
+        "hangers": np.column_stack([rng.uniform(0, (100, 8), (20_000, 2)), rng.choice([0.0, 6.0], 20_000)]),
+        "nothing": np.full((3, 3), np.nan),
+    }[what]
+    with pytest.raises(UserError, match="no tunnel: "):
+        find_axis(points)

@@ -18,6 +18,7 @@ _OUTWARD = 0.9  # share of a class's points that lie nearer: what hangs before t
 _FREE = 0.8  # share of the sections in which walls are nearer to each other: a train may stand along most of a tunnel
 _BLOCKED = 0.1  # share by which the walls of a pair of classes may be nearer or farther than usual
 _FEWEST = 3  # classes, or pairs of them, whose median is a wall, a vault or a floor
+_WALL = 25.0  # ° above and below the horizontal, within which there is a wall
 _VAULT = 1.0 / 3.0  # share of the classes overhead that makes a roof
 _GAP = 1.5  # m without vault after which the lining has ended
 
@@ -105,12 +106,15 @@ def section_centres(placed: Placed, count: int, half_width: float) -> Centres:
     radius = _radii(placed.at((placed.station >= 0) & (np.abs(placed.along) <= half_width)), count)
     angle = (np.arange(_CLASSES) + 0.5) * _CLASS - 180.0
     cosine = np.cos(np.radians(angle))
-    a, b = radius[:, (angle > 45) & (angle < 135)], radius[:, (angle < -45) & (angle > -135)][:, ::-1]
-    apart = (a + b) * np.sin(np.radians(angle[(angle > 45) & (angle < 135)]))
-    shift = (a - b) / 2.0
+    side = (angle > 45) & (angle < 135)
+    a, b = radius[:, side], radius[:, ::-1][:, side]
+    shift, apart = (a - b) / 2.0, (a + b) * np.sin(np.radians(angle[side]))
     free = np.abs(apart / _usual(apart) - 1.0) <= _BLOCKED
     right, width = (_median(np.where(free, values, np.nan), fewest=1) for values in (shift, apart))
     right, width = np.where(np.isfinite(right), (right, width), (_median(shift), _median(apart)))
+    # a roof on posts has no walls at the height of its middle
+    walls = np.isfinite(apart[:, np.abs(angle[side] - 90.0) < _WALL]).sum(axis=1) >= _FEWEST
+    right, width = np.where(walls, (right, width), np.nan)
     floor, vault = np.abs(angle) > 135, np.abs(angle) < 45
     depth = _median(-radius[:, floor] * cosine[floor])
     roofed = np.isfinite(radius[:, vault]).mean(axis=1) >= _VAULT
