@@ -86,7 +86,7 @@ def read_header(path: Path) -> list[str]:
     with _opened(path) as file:
         header = next(_rows(file, True)[0], None)
     if header is None:
-        raise UserError(f"{path} is empty; it needs a header with the names of its columns")
+        raise UserError(f"{path} is empty; it needs a header that names its columns, such as x,y,z")
     return [cell.strip() for cell in header]
 
 

@@ -77,7 +77,6 @@ def read_dxf(path: Path, layer: str | None, unit: float | None) -> Drawn:
         If it can't be read, holds no lines, several layers to choose from, or states a unit that isn't the metre.
     """
     from ezdxf import filemanagement
-    from ezdxf import path as paths
     from ezdxf.lldxf.const import DXFError
 
     try:
@@ -88,9 +87,9 @@ def read_dxf(path: Path, layer: str | None, unit: float | None) -> Drawn:
     names = sorted({entity.dxf.layer for entity in entities})
     chosen = choose_layer(path, names, layer)
     scale, note = _dxf_unit(path, drawing.header.get("$INSUNITS", 0), unit)
-    drawn = [paths.make_path(entity) for entity in entities if entity.dxf.layer == chosen]
-    curved = any(one.has_curves for one in drawn)
-    pieces = [scale * np.array([tuple(v) for v in one.flattening(CHORD_ERROR / scale)]) for one in drawn if len(one)]
+    parts = [part for entity in entities if entity.dxf.layer == chosen for part in _simple(entity)]
+    curved = any(part.dxftype() != "LINE" for part in parts)
+    pieces = [scale * _vertices(part, CHORD_ERROR / scale) for part in parts]
     lines = [_densified(line) if curved else line for line in join_pieces(pieces)]
     return _drawn(path, lines, chosen, (note,) if note else ())
 
@@ -195,6 +194,18 @@ def _dxf_unit(path: Path, code: int, unit: float | None) -> tuple[float, str]:
         f"{path}: its unit is {units.decode(code)} ($INSUNITS {code}); what are its lengths? Say it by --axis-unit, such "
         "as --axis-unit meter"
     )
+
+
+def _simple(entity: Any) -> list[Any]:
+    """Return the lines and arcs of a polyline, else the entity itself."""
+    return list(entity.virtual_entities()) if entity.dxftype() in ("LWPOLYLINE", "POLYLINE") else [entity]
+
+
+def _vertices(entity: Any, chord_error: float) -> Float:
+    """Vertices (n, 3) along a LINE, an ARC or a SPLINE, in its drawing's unit."""
+    line = entity.dxftype() == "LINE"
+    vertices = (entity.dxf.start, entity.dxf.end) if line else entity.flattening(chord_error)
+    return np.array([tuple(vertex) for vertex in vertices], dtype=np.float64).reshape(-1, 3)
 
 
 def _is_mesh(entity: Any) -> bool:
