@@ -89,10 +89,10 @@ def with_passage(points: Float, density: float, rng: Rng) -> Float:
     return np.vstack([points[~hole], passage(density, rng)])
 
 
-def with_train(points: Float, density: float, rng: Rng) -> Float:
+def with_train(points: Float, density: float, rng: Rng, top: float = 1.2) -> Float:
     """A train 70 m long on the right track: what it hides of floor and wall isn't seen."""
-    hidden = inside(points, (30.0, -0.2, -3.1), (100.0, 4.1, 1.2)) & ((points[:, 1] > 0.0) | (points[:, 2] > -2.9))
-    return np.vstack([points[~hidden], box((30.0, 0.2, -2.5), (100.0, 3.2, 1.2), density, rng, "STEW")])
+    hidden = inside(points, (30.0, -0.2, -3.1), (100.0, 4.1, top)) & ((points[:, 1] > 0.0) | (points[:, 2] > -2.9))
+    return np.vstack([points[~hidden], box((30.0, 0.2, -2.5), (100.0, 3.2, top), density, rng, "STEW")])
 
 
 def with_niches(points: Float, density: float, rng: Rng) -> Float:
@@ -109,6 +109,7 @@ CASES = [
     ("passage", 300.0, 0.04, 5.0, 0.1),
     ("train", 300.0, 0.04, 3.0, 0.2),
     ("train", np.inf, 0.0, 25.0, 0.2),
+    ("tall train", 300.0, 0.04, 5.0, 0.3),
     ("cut", -150.0, -0.02, 8.0, 0.6),
     ("all", 300.0, 0.04, 3.0, 0.3),
 ]
@@ -122,8 +123,8 @@ def test_it_lies_in_the_middle(what: str, radius: float, slope: float, density: 
         points = with_niches(points, density, rng)
     if what in ("passage", "all"):
         points = with_passage(points, density, rng)
-    if what in ("train", "all"):
-        points = with_train(points, density, rng)
+    if what in ("train", "tall train", "all"):
+        points = with_train(points, density, rng, 2.0 if what == "tall train" else 1.2)
     if what in ("cut", "all"):
         points = np.vstack([points, open_cut(density, rng)])
     stray = rng.uniform((-20, -30, -20), (LENGTH + 20, 30, 20), (30, 3))
@@ -147,6 +148,31 @@ def test_where_walls_are_missing_is_said() -> None:
     assert 58.0 < low < 66.0
     assert 74.0 < high < 82.0
     assert find_axis(bent(tunnel(5.0, rng), np.inf, 0.0)).doubtful == []
+
+
+def test_what_is_not_along_the_line_is_said() -> None:
+    """A passage of 18 m by 3.5 m beside a tunnel of 120 m by 8 m, and a second piece of the tunnel beyond 40 m without points."""
+    rng = np.random.default_rng(5)
+    passed = find_axis(bent(with_passage(tunnel(5.0, rng), 5.0, rng), np.inf, 0.0))
+    assert 0.01 < passed.aside < 63.0 / (120.0 * 8.0)
+    assert passed.aside_at is not None
+    middle = bent(np.array([[51.75, 15.0, 0.0]]), np.inf, 0.0)[0, :2]
+    assert np.hypot(*(passed.aside_at - middle)) < 4.0
+    piece = box((160.0, -4.0, -3.0), (180.0, 4.0, 3.0), 5.0, rng)
+    parted = find_axis(bent(np.vstack([tunnel(5.0, rng), piece]), np.inf, 0.0))
+    assert parted.aside == pytest.approx(20.0 / 140.0, abs=0.03)
+    assert find_axis(bent(tunnel(5.0, rng), np.inf, 0.0)).aside == 0.0
+
+
+def test_a_drawn_line_keeps_its_course_beyond_the_tunnel() -> None:
+    rng = np.random.default_rng(5)
+    drawn = bent(np.column_stack([np.linspace(-60.0, 60.0, 5), np.full(5, 1.0), np.zeros(5)]), -150.0, 0.0)[:, :2]
+    found = follow_line(bent(tunnel(5.0, rng), -150.0, 0.0), drawn)
+    outside = bent(np.column_stack([np.arange(-60.0, 0.0), np.zeros(60), np.zeros(60)]), -150.0, 0.0)
+    assert max(np.hypot(*(found.xyz[:8, :2] - place).T).min() for place in outside[:30]) < 5.0
+    assert np.abs(found.xyz[:8, 2] - AT[2]).max() < 0.5
+    assert not found.whole[:8].any()
+    assert found.whole[-8:].all()
 
 
 def test_two_tubes_are_refused_and_a_drawn_line_chooses() -> None:

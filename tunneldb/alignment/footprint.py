@@ -106,11 +106,21 @@ def branches(part: Footprint, path: Int64) -> Float:
     half = half_width(part, path)
     away = cKDTree(part.cells[path]).query(part.cells)[0]
     rest = part.part((away > 2.0 * half + _REACH) & (part.depth >= 0.6 * half))
-    if not len(rest.cells):
-        return np.empty((0, 2))
-    label = connected_components(_graph(rest.cells), directed=False)[1]
-    groups = [rest.cells[label == number] for number in range(label.max() + 1)]
+    groups = _groups(rest.cells)
     return np.array([g.mean(axis=0) for g in groups if np.hypot(*np.ptp(g, axis=0)) > 2.0 * half]).reshape(-1, 2)
+
+
+def largest_group(cells: Float) -> Float:
+    """Those (k, 2) of the cells (n, 2) that hang together, where they are most, m."""
+    return _groups(cells)[0]
+
+
+def _groups(cells: Float) -> list[Float]:
+    """Cells that hang together, the most first."""
+    if not len(cells):
+        return []
+    label = connected_components(_graph(cells), directed=False)[1]
+    return [cells[label == number] for number in np.argsort(-np.bincount(label), kind="stable")]
 
 
 def _roofed(points: Float) -> Int64:

@@ -12,7 +12,17 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.spatial import cKDTree
 
-from tunneldb.alignment.footprint import CELL, Footprint, branches, half_width, longest_path, roofed_parts, without_side_rooms
+from tunneldb.alignment.footprint import (
+    CELL,
+    CLEARANCE,
+    Footprint,
+    branches,
+    half_width,
+    largest_group,
+    longest_path,
+    roofed_parts,
+    without_side_rooms,
+)  # fmt: skip
 from tunneldb.alignment.section_centres import Centres, Frames, place_points, roof_ends, section_centres
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.errors import UserError
@@ -24,6 +34,8 @@ STEP = 5.0
 
 _SECTIONS = 12  # of a short tunnel
 _PASSES = 6
+_FEWEST = 4  # whole sections in a row that make a tunnel
+_LEAST = 0.2  # share of the sections that must be whole at any time
 _LONE = 1.5  # m about a point within which others lie, or it is a stray one
 _COMPANY = 5  # others
 _OTHER_PART = 0.2  # share of the largest part from which another one may be meant
@@ -54,6 +66,10 @@ class FoundAxis:
         Of the tunnel, medians, m.
     points : (n, 3) float array
         The points it was found from, m.
+    aside : float
+        Share of what has a roof that lies beside the line or beyond its ends, farther than the tunnel's width.
+    aside_at : (2,) float array or None
+        Middle of the largest piece of that, m.
     """
 
     xyz: Float
@@ -63,6 +79,8 @@ class FoundAxis:
     width: float
     height: float
     points: Float
+    aside: float = 0.0
+    aside_at: Float | None = None
 
     @property
     def length(self) -> float:
@@ -100,7 +118,7 @@ def find_axis(points: Float) -> FoundAxis:
     local = points - origin
     parts = roofed_parts(local)
     if not parts:
-        raise UserError("no tunnel: nowhere do points lie one above the other by 2 m, as floor and vault do")
+        raise UserError(f"no tunnel: nowhere do points have others {CLEARANCE:g} m or more above them, as a floor has a vault")
     if len(parts) > 1 and parts[1].area > _OTHER_PART * parts[0].area:
         raise UserError(
             "the tunnel lies in parts that don't hang together, or there are several: "
@@ -122,7 +140,7 @@ def find_axis(points: Float) -> FoundAxis:
         way = ends_by_projection(near)
     found = _through_sections(local, way, half, extend=True)
     found = found if found.xyz[0, 0] <= found.xyz[-1, 0] else found.reversed()
-    return _moved(found, origin)
+    return _moved(_with_the_rest(found, np.vstack([part.cells for part in parts])), origin)
 
 
 def follow_line(points: Float, plan: Float) -> FoundAxis:
@@ -150,6 +168,13 @@ def follow_line(points: Float, plan: Float) -> FoundAxis:
         )
     half = max(float(part.depth[cKDTree(part.cells).query(way)[1]].mean()) for part in parts)
     return _moved(_through_sections(local, way, half, extend=False), origin)
+
+
+def _with_the_rest(found: FoundAxis, cells: Float) -> FoundAxis:
+    """Say how much of what has a roof, in cells (n, 2) of the plan, is not along the line."""
+    along = _at_even_distances(found.xyz[:, :2], CELL)
+    rest = cells[cKDTree(along).query(cells)[0] > max(found.width, STEP)]
+    return replace(found, aside=len(rest) / len(cells), aside_at=largest_group(rest).mean(axis=0) if len(rest) else None)
 
 
 def _crossed(parts: list[Footprint], way: Float) -> list[Footprint]:
@@ -187,17 +212,22 @@ def _centred(points: Float, line: Float, reach: float) -> tuple[Float, Centres, 
     spacing = float(np.median(np.diff(_distances(line))))
     placed = place_points(points, frames, reach)
     centres = section_centres(placed, len(line), 0.5 * spacing + 0.25)
-    raw = line + np.nan_to_num(centres.right)[:, None] * frames.right + np.nan_to_num(centres.up)[:, None] * frames.up
-    _require_tunnel(centres)
-    smooth = smooth_line(raw, centres.whole)
-    return smooth, centres, raw
+    _require_tunnel(centres.whole)
+    shift = np.nan_to_num(centres.right)[:, None] * frames.right + np.nan_to_num(centres.up)[:, None] * frames.up
+    first, *_, last = np.flatnonzero(centres.whole)
+    # beyond the tunnel the line keeps its course
+    shift[:first], shift[last + 1 :] = shift[first], shift[last]
+    seen = centres.whole.copy()
+    seen[:first] = seen[last + 1 :] = True
+    raw = line + shift
+    return smooth_line(raw, seen), centres, raw
 
 
-def _require_tunnel(centres: Centres) -> None:
-    whole = int(centres.whole.sum())
-    if whole < 4 or whole < 0.2 * len(centres.whole):
+def _require_tunnel(whole: Bool) -> None:
+    count = int(whole.sum())
+    if count < _FEWEST or count < _LEAST * len(whole):
         raise UserError(
-            f"no tunnel: of {len(centres.whole)} sections across what has a roof {whole} have two walls, a vault and a floor"
+            f"no tunnel: of {len(whole)} sections across what has a roof {count} have two walls, a vault and a floor"
         )
 
 
@@ -211,6 +241,8 @@ def _inside(centres: Centres, gap: int) -> slice:
     firsts, lasts = rows[np.append(0, cuts + 1)], rows[np.append(cuts, len(rows) - 1)]
     best = int(np.argmax(lasts - firsts))
     rows = rows[(rows >= firsts[best]) & (rows <= lasts[best])]
+    if len(rows) < _FEWEST:
+        raise UserError("no tunnel: sections with two walls, a vault and a floor lie too far apart")
     usual = np.ones(len(rows), dtype=bool)
     for size in (centres.width[rows], centres.height[rows]):
         usual &= np.abs(size / np.median(size) - 1.0) <= _OTHER_SIZE
@@ -277,7 +309,8 @@ def _without_stray(points: Float) -> Float:
 
 
 def _moved(found: FoundAxis, by: Float) -> FoundAxis:
-    return replace(found, xyz=found.xyz + by, points=found.points + by)
+    aside = None if found.aside_at is None else found.aside_at + by[:2]
+    return replace(found, xyz=found.xyz + by, points=found.points + by, aside_at=aside)
 
 
 def _place(plan: Float) -> str:
