@@ -184,16 +184,17 @@ def find_axis(scans: tuple[Path, ...], output: Path, picture: Path | None, rever
     with niches, cross passages, a train, open cuts before the portals. Chainage grows from the end farther west. The picture
     shows the line over the points in plan and profile: look at it, then tunneldb tunnel add --axis.
     """
+    from tunneldb.alignment.drawing import describe_line
     from tunneldb.pipeline.axis_search import found_given
 
     with told_to_end(), bar("points") as progress:
         _, found = found_given(scans, None, step(progress), None, reverse)
     _keep(found, output, picture, 0.0, scans[0].stem)
+    click.echo(f"chainage grows over {describe_line(found.xyz)}; --reverse turns it round", err=True)
 
 
 def _keep(found: FoundAxis, path: Path, picture: Path | None, start: float, title: str) -> None:
     """Write an axis that was found, with its picture, and say how far to trust it."""
-    from tunneldb.alignment.drawing import describe_line
     from tunneldb.export.figures.found_axis import write_found
     from tunneldb.files import replacing
     from tunneldb.pipeline.axis_search import describe_found, write_axis
@@ -209,7 +210,7 @@ def _keep(found: FoundAxis, path: Path, picture: Path | None, start: float, titl
         axis=path, picture=picture, length=found.length, width=found.width, height=found.height, sections=len(found.whole),
         whole_sections=int(found.whole.sum()), doubtful=found.doubtful, says=lines,
     )  # fmt: skip
-    for line in [*lines, f"chainage grows over {describe_line(found.xyz)}", f"axis: {path}, picture to check: {picture}"]:
+    for line in [*lines, f"axis: {path}, picture to check: {picture}"]:
         click.echo(line, err=True)
 
 
