@@ -37,7 +37,7 @@ def tunnel() -> None:
     ]
 )
 @click.argument("name")
-@click.argument("scans", metavar="[SCAN]...", nargs=-1, type=click.Path(path_type=Path))
+@click.argument("scans", metavar="[SCAN...]", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--srid", type=int, required=True, help="Spatial reference of all coordinates; projected, metres.")
 @click.option(
     "--axis",
