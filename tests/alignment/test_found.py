@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tunneldb.alignment.found import FoundAxis, find_axis, follow_line
+from tunneldb.alignment.found import FoundAxis, find_axis, follow_line, without_haze
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
 
@@ -136,6 +136,35 @@ def test_it_lies_in_the_middle(what: str, radius: float, slope: float, density: 
     assert found.width == pytest.approx(WIDTH, abs=0.3)
     assert found.xyz[0, 0] < found.xyz[-1, 0]  # from the west
     np.testing.assert_array_equal(found.reversed().xyz, found.xyz[::-1])
+
+
+@pytest.mark.parametrize("spacing", [1.0, 2.5, 5.0])
+def test_profiles_may_lie_apart(spacing: float) -> None:
+    rng = np.random.default_rng(5)
+    points = tunnel(20.0, rng)
+    points[:, 0] = np.round(points[:, 0] / spacing) * spacing
+    found = find_axis(bent(points, 300.0, 0.02))
+    assert max(away(found, axis(300.0, 0.02))) < 0.1
+    assert found.length == pytest.approx(LENGTH, abs=1.0)
+
+
+def test_haze_is_left_out_and_what_is_far_from_the_scanner_is_not() -> None:
+    """Voxels of a wall that a scanner sees with 20 000 points nearby and with 2 at 60 m, and single echoes in the air."""
+    rng = np.random.default_rng(5)
+    wall = np.column_stack([rng.uniform(0.0, 60.0, 4000), np.zeros(4000), rng.uniform(0.0, 6.0, 4000)])
+    counts = np.maximum(20_000.0 / (1.0 + wall[:, 0]) ** 2.2, 2.0).astype(np.int64)
+    air = np.column_stack([rng.uniform(0.0, 12.0, 500), rng.uniform(1.0, 4.0, 500), rng.uniform(0.0, 6.0, 500)])
+    kept = without_haze(np.vstack([wall, air]), np.append(counts, np.ones(500, np.int64)))
+    assert (kept[:, 1] == 0.0).sum() == len(wall)
+    assert (kept[:, 1] > 0.0).sum() < 100
+
+
+def test_a_wide_and_low_tunnel() -> None:
+    """Seen from its middle, vault and floor take more of the sides than the walls."""
+    rng = np.random.default_rng(5)
+    found = find_axis(bent(box((0.0, -8.0, -2.5), (LENGTH, 8.0, 2.5), 8.0, rng), 300.0, 0.0))
+    assert max(away(found, axis(300.0, 0.0))) < 0.15
+    assert found.width == pytest.approx(16.0, abs=0.3)
 
 
 def test_where_walls_are_missing_is_said() -> None:

@@ -15,13 +15,13 @@ from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float, Int64
 
-CELL = 1.0
-"""Edge of a cell of the plan, m."""
+CELLS = (1.0, 2.0, 4.0)
+"""Edges of a cell of the plan, m: the smallest in which most of the neighbours of a roofed cell are roofed, too."""
 
 CLEARANCE = 1.5
 """Empty height between points one above the other that makes the upper ones a roof, m. Slopes and walls have none."""
 
-_REACH = 3.0  # cells closer than this hang together, m: profiles may lie apart
+_REACH = 3.0  # edges: cells closer than this hang together, for profiles may lie apart
 _WINDOW = 2  # cells on each side, of the window that fills holes
 _FAR = 1 << 25  # cells; more than any tunnel is long
 
@@ -36,19 +36,22 @@ class Footprint:
         Their middles, m.
     depth : (n,) float array
         Distance of each from the edge of what is roofed over, m.
+    edge : float
+        Edge of a cell, m.
     """
 
     cells: Float
     depth: Float
+    edge: float
 
     def part(self, chosen: Bool) -> Footprint:
         """Footprint of some of the cells, with the same depths."""
-        return Footprint(self.cells[chosen], self.depth[chosen])
+        return Footprint(self.cells[chosen], self.depth[chosen], self.edge)
 
     @property
     def area(self) -> float:
         """Area, m²."""
-        return len(self.cells) * CELL**2
+        return len(self.cells) * self.edge**2
 
 
 def roofed_parts(points: Float) -> list[Footprint]:
@@ -59,11 +62,15 @@ def roofed_parts(points: Float) -> list[Footprint]:
     points : (n, 3) float array
         m, spread evenly.
     """
-    cells = _filled(_roofed(points))
+    for edge in CELLS:
+        roofed = _roofed(points, edge)
+        cells = _filled(roofed)
+        if 2 * len(cells) > len(roofed):
+            break
     if not len(cells):
         return []
-    footprint = Footprint(np.asarray((cells + 0.5) * CELL, dtype=np.float64), _depth(cells))
-    label = connected_components(_graph(footprint.cells), directed=False)[1]
+    footprint = Footprint(np.asarray((cells + 0.5) * edge, dtype=np.float64), edge * _depth(cells), edge)
+    label = connected_components(_graph(footprint.cells, edge), directed=False)[1]
     order = np.argsort(-np.bincount(label), kind="stable")
     return [footprint.part(label == number) for number in order]
 
@@ -76,7 +83,7 @@ def without_side_rooms(part: Footprint) -> Footprint:
     half = half_width(part, longest_path(part))
     core = part.cells[part.depth >= 0.6 * half]
     opened = part.part(cKDTree(core).query(part.cells)[0] <= half)
-    label = connected_components(_graph(opened.cells), directed=False)[1]
+    label = connected_components(_graph(opened.cells, part.edge), directed=False)[1]
     size = np.bincount(label)
     # where the tunnel itself is so narrow somewhere, it stays as it is
     return opened.part(label == np.argmax(size)) if size.max() > 0.8 * size.sum() else part
@@ -89,7 +96,7 @@ def half_width(part: Footprint, path: Int64) -> float:
 
 def longest_path(part: Footprint) -> Int64:
     """Numbers of the cells along the middle of a part, from one of its ends to the other."""
-    graph = _graph(part.cells).tocsr()
+    graph = _graph(part.cells, part.edge).tocsr()
     start = 0
     for _ in range(2):
         start = int(np.argmax(dijkstra(graph, directed=False, indices=start)))
@@ -105,27 +112,27 @@ def branches(part: Footprint, path: Int64) -> Float:
     """Middles (k, 2) of what leaves a path, is as wide as the tunnel and longer than wide, m."""
     half = half_width(part, path)
     away = cKDTree(part.cells[path]).query(part.cells)[0]
-    rest = part.part((away > 2.0 * half + _REACH) & (part.depth >= 0.6 * half))
-    groups = _groups(rest.cells)
+    rest = part.part((away > 2.0 * half + _REACH * part.edge) & (part.depth >= 0.6 * half))
+    groups = _groups(rest.cells, part.edge)
     return np.array([g.mean(axis=0) for g in groups if np.hypot(*np.ptp(g, axis=0)) > 2.0 * half]).reshape(-1, 2)
 
 
-def largest_group(cells: Float) -> Float:
+def largest_group(cells: Float, edge: float) -> Float:
     """Those (k, 2) of the cells (n, 2) that hang together, where they are most, m."""
-    return _groups(cells)[0]
+    return _groups(cells, edge)[0]
 
 
-def _groups(cells: Float) -> list[Float]:
+def _groups(cells: Float, edge: float) -> list[Float]:
     """Cells that hang together, the most first."""
     if not len(cells):
         return []
-    label = connected_components(_graph(cells), directed=False)[1]
+    label = connected_components(_graph(cells, edge), directed=False)[1]
     return [cells[label == number] for number in np.argsort(-np.bincount(label), kind="stable")]
 
 
-def _roofed(points: Float) -> Int64:
+def _roofed(points: Float, edge: float) -> Int64:
     """Cells (n, 2) of the plan with a roof, and the walls beside them."""
-    key = _key(np.floor(points[:, :2] / CELL).astype(np.int64))
+    key = _key(np.floor(points[:, :2] / edge).astype(np.int64))
     order = np.lexsort((points[:, 2], key))
     key, z = key[order], points[order, 2]
     held, first, count = np.unique(key, return_index=True, return_counts=True)
@@ -149,17 +156,17 @@ def _filled(cell: Int64) -> Int64:
 
 
 def _depth(cell: Int64) -> Float:
-    """Distance of cells from the edge, m."""
+    """Distance of cells from the edge of them all, in edges of a cell."""
     key = _key(cell)
     inside = np.ones(len(cell), dtype=bool)
     for step in _steps(1):
         inside &= np.isin(_key(cell + step), key, assume_unique=True)
-    return np.asarray(cKDTree(cell[~inside]).query(cell)[0] * CELL + 0.5 * CELL)
+    return np.asarray(cKDTree(cell[~inside]).query(cell)[0] + 0.5)
 
 
-def _graph(middle: Float) -> coo_array:
+def _graph(middle: Float, edge: float) -> coo_array:
     """Distances of cells from those near them."""
-    pairs = cKDTree(middle).query_pairs(_REACH, output_type="ndarray")
+    pairs = cKDTree(middle).query_pairs(_REACH * edge, output_type="ndarray")
     length = np.hypot(*(middle[pairs[:, 0]] - middle[pairs[:, 1]]).T) if len(pairs) else np.empty(0)
     return coo_array((length, (pairs[:, 0], pairs[:, 1])), shape=(len(middle), len(middle)))
 

@@ -13,7 +13,6 @@ from numpy.polynomial import Polynomial
 from scipy.spatial import cKDTree
 
 from tunneldb.alignment.footprint import (
-    CELL,
     CLEARANCE,
     Footprint,
     branches,
@@ -23,7 +22,7 @@ from tunneldb.alignment.footprint import (
     roofed_parts,
     without_side_rooms,
 )  # fmt: skip
-from tunneldb.alignment.section_centres import Centres, Frames, place_points, roof_ends, section_centres
+from tunneldb.alignment.section_centres import Centres, Frames, place_points, roof_ends, section_centres, vault_gap
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.errors import UserError
 from tunneldb.geometry.centreline import SHORT, ends_by_projection
@@ -36,6 +35,8 @@ _SECTIONS = 12  # of a short tunnel
 _PASSES = 6
 _FEWEST = 4  # whole sections in a row that make a tunnel
 _LEAST = 0.2  # share of the sections that must be whole at any time
+_BLOCK = 6.0  # m, in which a scan is about as dense
+_HAZE = 0.01  # share of the lining's points in a voxel, below which it is in the air
 _LONE = 1.5  # m about a point within which others lie, or it is a stray one
 _COMPANY = 5  # others
 _OTHER_PART = 0.2  # share of the largest part from which another one may be meant
@@ -100,6 +101,27 @@ class FoundAxis:
         return replace(self, xyz=self.xyz[::-1], whole=self.whole[::-1], away=self.away[::-1], distance=distance)
 
 
+def without_haze(points: Float, counts: Int64) -> Float:
+    """Leave out voxels in the air that hold but a few of a dense scan's points: stray echoes.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        Centroids of voxels, m.
+    counts : (n,) int array
+        Points in each.
+
+    Returns
+    -------
+    Those that hold 1 % or more of what nine in ten of the voxels within their cube of 6 m hold at most, m.
+    """
+    block = np.unique(np.floor(points / _BLOCK).astype(np.int64), axis=0, return_inverse=True)[1].ravel()
+    order = np.lexsort((counts, block))
+    first, held = np.unique(block[order], return_index=True, return_counts=True)[1:]
+    dense = counts[order][first + np.floor(0.9 * (held - 1)).astype(np.int64)]
+    return points[counts >= _HAZE * dense[block]]
+
+
 def find_axis(points: Float) -> FoundAxis:
     """Find the axis of the one tunnel in a cloud, from its end farther west.
 
@@ -134,13 +156,13 @@ def find_axis(points: Float) -> FoundAxis:
             f"the tunnel forks: what lies about {_place(forks[0] + origin[:2])} is as wide as the rest; give the files of one "
             "tube, or draw its line and give that with the files"
         )
-    near = local[cKDTree(part.cells).query(local[:, :2])[0] <= half + CELL]
+    near = local[cKDTree(part.cells).query(local[:, :2])[0] <= half + part.edge]
     way = part.cells[path]
     if _length(way) < SHORT:
         way = ends_by_projection(near)
     found = _through_sections(local, way, half, extend=True)
     found = found if found.xyz[0, 0] <= found.xyz[-1, 0] else found.reversed()
-    return _moved(_with_the_rest(found, np.vstack([part.cells for part in parts])), origin)
+    return _moved(_with_the_rest(found, np.vstack([part.cells for part in parts]), part.edge), origin)
 
 
 def follow_line(points: Float, plan: Float) -> FoundAxis:
@@ -170,21 +192,24 @@ def follow_line(points: Float, plan: Float) -> FoundAxis:
     return _moved(_through_sections(local, way, half, extend=False), origin)
 
 
-def _with_the_rest(found: FoundAxis, cells: Float) -> FoundAxis:
+def _with_the_rest(found: FoundAxis, cells: Float, edge: float) -> FoundAxis:
     """Say how much of what has a roof, in cells (n, 2) of the plan, is not along the line."""
-    along = _at_even_distances(found.xyz[:, :2], CELL)
+    along = _at_even_distances(found.xyz[:, :2], edge)
     rest = cells[cKDTree(along).query(cells)[0] > max(found.width, STEP)]
-    return replace(found, aside=len(rest) / len(cells), aside_at=largest_group(rest).mean(axis=0) if len(rest) else None)
+    return replace(found, aside=len(rest) / len(cells), aside_at=largest_group(rest, edge).mean(axis=0) if len(rest) else None)
 
 
 def _crossed(parts: list[Footprint], way: Float) -> list[Footprint]:
     """Parts of the footprint that a line runs through."""
-    even = _at_even_distances(way, CELL)
-    return [part for part in parts if (cKDTree(part.cells).query(even)[0] < CELL).mean() > _OTHER_PART]
+    even = _at_even_distances(way, 1.0)
+    return [part for part in parts if (cKDTree(part.cells).query(even)[0] < part.edge).mean() > _OTHER_PART]
 
 
 def _through_sections(points: Float, way: Float, half: float, extend: bool) -> FoundAxis:
-    """Line through the centres of sections across a way (k, 2) in plan, in a tunnel of a half-width (m)."""
+    """Line through the centres of sections across a way (k, 2) in plan, in a tunnel of a half-width (m).
+
+    It is extended to where the vault ends, or ends where the way does.
+    """
     step = min(STEP, _length(way) / _SECTIONS)
     even = _at_even_distances(way, step)
     line = np.column_stack([even, _mid_heights(points, even)])
@@ -256,7 +281,8 @@ def _to_the_ends(points: Float, line: Float, reach: float, height: float) -> Flo
     frames = Frames.along(inner)
     placed = place_points(points, frames, reach + _BEYOND)
     lining = placed.at(placed.up <= _HIGHEST * height)
-    first, last = (min(roof_ends(lining, station, way), _BEYOND) for station, way in ((0, -1.0), (len(inner) - 1, 1.0)))
+    gap = vault_gap(lining, _distances(inner))
+    first, last = (min(roof_ends(lining, station, way, gap), _BEYOND) for station, way in ((0, -1.0), (len(inner) - 1, 1.0)))
     half = 0.5 * float(np.hypot(*(line[1, :2] - line[0, :2])))
     begin, end = _drawn_on(inner[::-1], first)[::-1], _drawn_on(inner, last)
     return np.vstack([begin, inner[int(first < half) : len(inner) - int(last < half)], end])

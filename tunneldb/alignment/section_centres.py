@@ -16,11 +16,13 @@ _CLASS = 5  # ° of an angular class
 _CLASSES = 360 // _CLASS
 _OUTWARD = 0.9  # share of a class's points that lie nearer: what hangs before the lining and stands in the tunnel
 _FREE = 0.8  # share of the sections in which walls are nearer to each other: a train may stand along most of a tunnel
+_UPRIGHT = 0.8  # share of the greatest width that a pair of classes must have to be on the walls of a low, wide tunnel
 _BLOCKED = 0.1  # share by which the walls of a pair of classes may be nearer or farther than usual
+_PROFILES = 0.3  # m; less lies between points of one profile
+_LEAST_GAP = 1.0  # m
 _FEWEST = 3  # classes, or pairs of them, whose median is a wall, a vault or a floor
 _WALL = 25.0  # ° above and below the horizontal, within which there is a wall
 _VAULT = 1.0 / 3.0  # share of the classes overhead that makes a roof
-_GAP = 1.5  # m without vault after which the lining has ended
 
 
 @dataclass(frozen=True)
@@ -109,9 +111,11 @@ def section_centres(placed: Placed, count: int, half_width: float) -> Centres:
     side = (angle > 45) & (angle < 135)
     a, b = radius[:, side], radius[:, ::-1][:, side]
     shift, apart = (a - b) / 2.0, (a + b) * np.sin(np.radians(angle[side]))
-    free = np.abs(apart / _usual(apart) - 1.0) <= _BLOCKED
+    usual = _usual(apart)
+    upright = usual >= _UPRIGHT * np.nanmax(usual, initial=0.0)  # not vault and floor of a low, wide tunnel
+    free = (np.abs(apart / usual - 1.0) <= _BLOCKED) & upright
     right, width = (_median(np.where(free, values, np.nan), fewest=1) for values in (shift, apart))
-    right, width = np.where(np.isfinite(right), (right, width), (_median(shift), _median(apart)))
+    right, width = np.where(np.isfinite(right), (right, width), (_median(shift[:, upright]), _median(apart[:, upright])))
     # a roof on posts has no walls at the height of its middle
     walls = np.isfinite(apart[:, np.abs(angle[side] - 90.0) < _WALL]).sum(axis=1) >= _FEWEST
     right, width = np.where(walls, (right, width), np.nan)
@@ -123,14 +127,34 @@ def section_centres(placed: Placed, count: int, half_width: float) -> Centres:
     return Centres(right, up, width, height)
 
 
-def roof_ends(placed: Placed, station: int, way: float) -> float:
-    """How far ahead of a station (``way`` 1) or behind it (-1) the vault goes on, m."""
-    along = np.sort(way * placed.along[(placed.station == station) & (placed.up > np.abs(placed.right))])
+def vault_gap(placed: Placed, distance: Float) -> float:
+    """Gap along the line beyond which there is no vault, m: half as much again as between most profiles.
+
+    Parameters
+    ----------
+    placed : Placed
+        Points of the lining.
+    distance : (k,) float array
+        Distance of each station along the line, m.
+    """
+    overhead = placed.at((placed.station >= 0) & _overhead(placed))
+    gaps = np.diff(np.sort(distance[overhead.station] + overhead.along))
+    apart = gaps[gaps > _PROFILES]
+    return 1.5 * max(float(np.quantile(apart, 0.9)) if len(apart) else 0.0, _LEAST_GAP)
+
+
+def roof_ends(placed: Placed, station: int, way: float, gap: float) -> float:
+    """How far ahead of a station (``way`` 1) or behind it (-1) the vault goes on, with gaps at most so wide, m."""
+    along = np.sort(way * placed.along[(placed.station == station) & _overhead(placed)])
     along = along[along >= 0.0]
-    if not len(along) or along[0] > _GAP:
+    if not len(along) or along[0] > gap:
         return 0.0
-    gaps = np.flatnonzero(np.diff(along) > _GAP)
+    gaps = np.flatnonzero(np.diff(along) > gap)
     return float(along[gaps[0]] if len(gaps) else along[-1])
+
+
+def _overhead(placed: Placed) -> Bool:
+    return np.asarray(placed.up > np.abs(placed.right))
 
 
 def _radii(placed: Placed, count: int) -> Float:
@@ -148,10 +172,15 @@ def _radii(placed: Placed, count: int) -> Float:
 
 
 def _usual(apart: Float) -> Float:
-    """How far the walls are apart at each height, (classes,), m, where nothing stands before them."""
+    """How far the walls are apart at each height, (classes,), m, where nothing stands before them.
+
+    A train may stand along most of a tunnel, but hides no wall up to the vault; niches are more than a wall's width apart.
+    """
     known = np.isfinite(apart).any(axis=0)
     out = np.full(apart.shape[1], np.nan)
-    out[known] = np.nanquantile(apart[:, known], _FREE, axis=0)
+    if known.any():
+        half, most = np.nanquantile(apart[:, known], (0.5, _FREE), axis=0)
+        out[known] = np.minimum(most, (1.0 + _BLOCKED) * half.max())
     return out
 
 

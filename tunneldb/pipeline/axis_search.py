@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from pyproj import CRS
 
-from tunneldb.alignment.found import FoundAxis, find_axis, follow_line
+from tunneldb.alignment.found import FoundAxis, find_axis, follow_line, without_haze
 from tunneldb.alignment.given import GivenAxis
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
@@ -126,7 +126,7 @@ def write_axis(path: Path, xyz: Float) -> None:
 
 
 def _voxels(headers: Sequence[ScanHeader], begin: Begin) -> Float:
-    """Centroids of the voxels that hold points."""
+    """Centroids of the voxels on surfaces."""
     done = begin("reading", float(sum(header.points for header in headers)))
     voxels = Voxels(EDGE)
     middle: Float | None = None
@@ -137,7 +137,7 @@ def _voxels(headers: Sequence[ScanHeader], begin: Begin) -> Float:
             if middle is not None:
                 voxels.add(chunk.xyz[(np.abs(chunk.xyz - middle) < FARTHEST).all(axis=1)])
             done(len(chunk.xyz))
-    return voxels.centroids()
+    return without_haze(voxels.centroids(), voxels.counts())
 
 
 def _require_one_system(headers: Sequence[ScanHeader]) -> None:
