@@ -154,7 +154,8 @@ def roof_ends(placed: Placed, station: int, way: float, gap: float) -> float:
 
 
 def _overhead(placed: Placed) -> Bool:
-    return np.asarray(placed.up > np.abs(placed.right))
+    """Which points are of the vault's middle; a portal's wings stand beside it."""
+    return np.asarray(placed.up > 2.0 * np.abs(placed.right))
 
 
 def _radii(placed: Placed, count: int) -> Float:
