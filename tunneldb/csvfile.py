@@ -1,13 +1,20 @@
-"""Reading the small CSV files of the interface: axis, stations, trajectory, reference, points."""
+"""Reading the small CSV files of the interface: axis, stations, trajectory, reference, points.
+
+Columns are separated by commas; in what people bring from elsewhere perhaps by semicolons, tabs or spaces, as the header
+shows. Where commas do not separate, they may stand for the decimal point.
+"""
 
 from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
@@ -16,6 +23,9 @@ from tunneldb.errors import UserError
 
 if TYPE_CHECKING:
     import _csv
+
+_SEPARATORS = (";", "\t", ",", " ")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d*(?:[eE][+-]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -65,7 +75,24 @@ class CsvTable:
             raise self.error(row, f"{name} {column[row]:.15g} {how} that of the row before; sort by {name}, each once")
 
 
-def read_csv(path: Path, names: Sequence[str], default: Mapping[str, float] | None = None) -> CsvTable:
+def read_header(path: Path) -> list[str]:
+    """Names of the columns of a CSV file with any separator, as they stand in its first line.
+
+    Raises
+    ------
+    UserError
+        When the file cannot be read or is empty.
+    """
+    with _opened(path) as file:
+        header = next(_rows(file, True)[0], None)
+    if header is None:
+        raise UserError(f"{path} is empty; it needs a header that names its columns, such as x,y,z")
+    return [cell.strip() for cell in header]
+
+
+def read_csv(
+    path: Path, names: Sequence[str], default: Mapping[str, float] | None = None, *, any_separator: bool = False
+) -> CsvTable:
     """Read numeric columns of a CSV file with a header; other columns are left out.
 
     Parameters
@@ -74,6 +101,8 @@ def read_csv(path: Path, names: Sequence[str], default: Mapping[str, float] | No
         The file, and the columns.
     default
         Columns that may be missing, with the value that all rows have then.
+    any_separator
+        Whether columns may be separated by semicolons, tabs or spaces, too, and then commas stand for the decimal point.
 
     Raises
     ------
@@ -81,21 +110,41 @@ def read_csv(path: Path, names: Sequence[str], default: Mapping[str, float] | No
         When the file cannot be read, a column is missing, or a value is not a finite number; names file, line and
         value.
     """
+    with _opened(path) as file:
+        rows, lines = _read_rows(path, *_rows(file, any_separator), names, default or {})
+    values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
+    return CsvTable(path, tuple(names), values, np.array(lines, dtype=np.int64))
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[TextIO]:
+    """A text file, with one line for whatever is wrong with it as such."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows, lines = _read_rows(path, csv.reader(file), names, default or {})
+            yield file
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise UserError(f"{path} is not a text file in UTF-8 (byte {error.start}); save it as CSV") from None
     except csv.Error as error:
         raise UserError(f"{path} is not a CSV file: {error}") from None
-    values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
-    return CsvTable(path, tuple(names), values, np.array(lines, dtype=np.int64))
+
+
+def _rows(file: Iterable[str], any_separator: bool) -> tuple[_csv.Reader, bool]:
+    """Rows of a CSV file, and whether commas may stand for the decimal point in them."""
+    if not any_separator:
+        return csv.reader(file), False
+    lines = iter(file)
+    header = next(lines, "")
+    separator = next((one for one in _SEPARATORS if one in header.strip()), ",")
+    whole: Iterable[str] = chain([header] if header else [], lines)
+    if separator == " ":  # columns may be lined up by several
+        whole = (" ".join(line.split()) for line in whole)
+    return csv.reader(whole, delimiter=separator), separator != ","
 
 
 def _read_rows(
-    path: Path, reader: _csv.Reader, names: Sequence[str], default: Mapping[str, float]
+    path: Path, reader: _csv.Reader, decimal_comma: bool, names: Sequence[str], default: Mapping[str, float]
 ) -> tuple[list[list[float]], list[int]]:
     header = next(reader, None)
     if header is None:
@@ -108,8 +157,8 @@ def _read_rows(
             continue
         if len(row) != len(header):
             raise UserError(f"{path}, line {reader.line_num}: {len(row)} values under a header of {len(header)} columns")
-        cells = {name: row[index] for name, index in indices.items()}
-        rows.append([_number(path, reader.line_num, name, cells[name]) if name in cells else default[name] for name in names])
+        numbers = {name: _number(path, reader.line_num, name, row[index], decimal_comma) for name, index in indices.items()}
+        rows.append([numbers[name] if name in numbers else default[name] for name in names])
         lines.append(reader.line_num)
     return rows, lines
 
@@ -125,9 +174,10 @@ def _indices(path: Path, header: list[str], names: Sequence[str], default: Mappi
     return {name: header.index(name) for name in names if name in header}
 
 
-def _number(path: Path, line: int, name: str, text: str) -> float:
+def _number(path: Path, line: int, name: str, text: str, decimal_comma: bool) -> float:
+    comma = decimal_comma and _DECIMAL_COMMA.fullmatch(text.strip())
     try:
-        value = float(text)
+        value = float(text.replace(",", ".") if comma else text)
     except ValueError:
         raise UserError(f"{path}, line {line}: {name} is {text.strip()!r}, not a number") from None
     if not math.isfinite(value):

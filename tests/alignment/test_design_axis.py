@@ -272,6 +272,7 @@ def as_landxml(simulation: Simulation, shift: np.ndarray) -> str:
         f'<PVI>{line.start} {z[0]}</PVI><ParaCurve length="{length}">{middle} {height}</ParaCurve><PVI>{line.end} {z[1]}</PVI>'
     )
     return (
-        f'<LandXML version="1.2"><Alignments><Alignment name="curve" staStart="{line.start}"><CoordGeom>{elements}</CoordGeom>'
+        '<LandXML version="1.2"><Units><Metric linearUnit="meter"/></Units>'
+        f'<Alignments><Alignment name="curve" staStart="{line.start}"><CoordGeom>{elements}</CoordGeom>'
         f"<Profile><ProfAlign>{profile}</ProfAlign></Profile></Alignment></Alignments></LandXML>"
     )

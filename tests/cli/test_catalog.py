@@ -100,8 +100,10 @@ def test_a_survey_and_its_tunnel_are_removed_in_this_order(tunnel: Path, conn: p
     ("text", "parts"),
     [
         ("", ["axis.csv is empty", "x,y,z"]),
-        ("x;y;z\n1;2;3\n", ["no column x, y, z", "commas"]),
-        ("x,y\n1,2\n", ["no column z"]),
+        ("x|y|z\n1|2|3\n", ["no column x", "header is 'x|y|z'"]),
+        ("x;y;z\n1;2;3\n", ["at least 2 points"]),
+        ("x;y;z\n0,5;0,5;0\n1.000,5;2;3\n", ["line 3", "x is '1.000,5'"]),
+        ("x,y\n0,0\n10,0\n", ["no heights", "tunneldb tunnel add t --srid 25830 --axis axis.csv SCAN..."]),
         ("x,x,y,z\n1,1,2,3\n", ["column x twice"]),
         ("x,y,z\n0,0,0\n", ["at least 2 points", "has 1"]),
         ("x,y,z\n0,0,0\n10,abc,0\n", ["line 3", "y is 'abc'"]),

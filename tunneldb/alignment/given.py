@@ -1,20 +1,41 @@
-"""The axis that a tunnel is given: a table of points, or a design alignment in LandXML or IFC."""
+"""The axis that a tunnel is given: a table of points, lines of a drawing or a map, or a design alignment."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from tunneldb.alignment.design import Design
+from tunneldb.alignment.drawing import read_dxf, read_vector
+from tunneldb.alignment.units import UNITS
 from tunneldb.arrays import Float
-from tunneldb.csvfile import read_csv
+from tunneldb.csvfile import read_csv, read_header
 from tunneldb.errors import UserError
 
 XYZ = ("x", "y", "z")
+TRAJECTORY_STEP = 5.0
+"""Least way between two points of a trajectory that become vertices of the axis, m."""
+
 _SNIFFED = 1024  # bytes
+_HEADERS = {
+    "x": ("x", "e", "east", "easting"),
+    "y": ("y", "n", "north", "northing"),
+    "z": ("z", "h", "height", "elevation"),
+}
+_GIS = (b"SQLite format 3\0", b"\0\0\x27\x0a", b"fgb\x03fgb", b"{")  # GeoPackage, Shapefile, FlatGeobuf, GeoJSON
+_NOT_READ = {
+    b"LASF": "is a scan, not an axis; --axis auto FILE... finds the axis in scans",
+    b"ASTM-E57": "is a scan, not an axis; --axis auto FILE... finds the axis in scans",
+    b"AC10": "is a DWG drawing; save it as DXF",
+    b"PK\x03\x04": "is a ZIP archive or a spreadsheet; unpack it, or save the table as CSV",
+}
+
+Kind = Literal["landxml", "ifc", "dxf", "gis", "csv"]
 
 
 @dataclass(frozen=True)
@@ -24,32 +45,60 @@ class GivenAxis:
     Attributes
     ----------
     xyz : (n, 3) float array
-        Vertices in growing chainage, m.
+        Vertices in growing chainage, m; heights are NaN where it has none.
     start : float
         Chainage of the first one, m.
     design : Design or None
         The alignment that they lie on, where there is one.
     source : str or None
         File and alignment that it was read from.
+    notes : tuple of str
+        What the user should know about the reading.
     """
 
     xyz: Float
     start: float
     design: Design | None = None
     source: str | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def has_heights(self) -> bool:
+        """Whether it is a line in space, not only in plan."""
+        return bool(np.isfinite(self.xyz[:, 2]).all())
 
 
-def read_given(path: Path, start: float | None = None, alignment: str | None = None, profile: str | None = None) -> GivenAxis:
+def read_given(
+    path: Path,
+    start: float | None = None,
+    alignment: str | None = None,
+    profile: str | None = None,
+    *,
+    layer: str | None = None,
+    unit: str | None = None,
+    srid: int | None = None,
+    reverse: bool = False,
+) -> GivenAxis:
     """Read the axis of a tunnel.
 
     Parameters
     ----------
     path
-        CSV with x,y,z, LandXML or IFC; told apart by their content.
+        CSV with x,y,z; GeoPackage, Shapefile, GeoJSON, FlatGeobuf or DXF with lines; LandXML or IFC. Told apart by their
+        content.
     start
-        Chainage of its beginning, m; by default 0 of a CSV, the alignment's own of a design.
+        Chainage of its beginning, m; by default 0, of a design the alignment's own.
     alignment, profile
-        Which of a design's alignments and of its profiles, by name; needed where there are several.
+        Which of a design's alignments and of its profiles, by name; needed where there are several. Of lines that don't
+        meet end to end the number.
+    layer
+        Which layer of a drawing or a map.
+    unit
+        Unit of a LandXML's or a drawing's lengths, a name of `tunneldb.alignment.units.UNITS`; None: as the file says.
+    srid
+        EPSG code that the file's coordinate system is held against, where it names one; None: not checked.
+    reverse
+        Let chainage grow the other way.
 
     Raises
     ------
@@ -57,37 +106,76 @@ def read_given(path: Path, start: float | None = None, alignment: str | None = N
         When the file can't be read, holds no such alignment or several to choose from, or is no line.
     """
     kind = _kind(path)
+    _refuse_options(path, kind, {"--alignment": alignment, "--profile": profile, "--axis-layer": layer, "--axis-unit": unit})
+    if kind in ("landxml", "ifc"):
+        if reverse:
+            raise UserError(
+                f"{path} is a design alignment, whose chainage has its own direction; a stationing that runs backwards is "
+                "given by --stationing"
+            )
+        return _given_design(path, kind, start, alignment, profile, unit)
     if kind == "csv":
-        if alignment is not None or profile is not None:
-            raise UserError(f"{path} is a table of points; --alignment and --profile are for LandXML and IFC")
-        return GivenAxis(_read_points(path), start or 0.0)
-    design = _read_design(path, kind, alignment, profile).renumbered(start)
-    try:
-        design.check()
-    except UserError as error:
-        raise UserError(f"{path}: {error}") from None
-    return GivenAxis(
-        design.polyline(), design.chainages[0], design, f"{path.name}: {design.name}" if design.name else path.name
-    )
+        given = _read_points(path)
+    else:
+        drawn = read_dxf(path, layer, UNITS[unit] if unit else None) if kind == "dxf" else read_vector(path, layer, srid)
+        line = drawn.choose(path, alignment)
+        _require_forward(line, lambda row, text: UserError(f"{path}: at {line[row, 0]:.2f},{line[row, 1]:.2f} {text}"))
+        given = GivenAxis(line, 0.0, source=f"{path.name}: {drawn.layer}", notes=drawn.notes)
+    return replace(given, xyz=given.xyz[::-1] if reverse else given.xyz, start=start or 0.0)
 
 
-def _kind(path: Path) -> Literal["landxml", "ifc", "csv"]:
+def _kind(path: Path) -> Kind:
     try:
         with path.open("rb") as file:
-            # A null is every second byte of UTF-16.
-            head = file.read(_SNIFFED).replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
+            head = file.read(_SNIFFED)
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from None
+    for magic, why in _NOT_READ.items():
+        if head.startswith(magic):
+            raise UserError(f"{path} {why}")
+    if head.startswith(b"AutoCAD Binary DXF") or re.match(rb"\s*(999\s|0\s+SECTION\s)", head.removeprefix(b"\xef\xbb\xbf")):
+        return "dxf"
+    if head.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n").startswith(_GIS):
+        return "gis"
+    # A null is every second byte of UTF-16.
+    head = head.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
     if head.startswith(b"ISO-10303-21"):
         return "ifc"
     return "landxml" if head.startswith(b"<") else "csv"
 
 
-def _read_design(path: Path, kind: Literal["landxml", "ifc"], alignment: str | None, profile: str | None) -> Design:
+def _refuse_options(path: Path, kind: Kind, given: dict[str, str | None]) -> None:
+    """Refuse options that mean nothing for a kind of file."""
+    meant = {
+        "csv": ("a table of points", ()),
+        "gis": ("a map", ("--alignment", "--axis-layer")),
+        "dxf": ("a drawing", ("--alignment", "--axis-layer", "--axis-unit")),
+        "landxml": ("a LandXML", ("--alignment", "--profile", "--axis-unit")),
+        "ifc": ("an IFC", ("--alignment", "--profile")),
+    }
+    what, allowed = meant[kind]
+    wrong = [option for option, value in given.items() if value is not None and option not in allowed]
+    if wrong:
+        raise UserError(f"{path} is {what}, for which {wrong[0]} means nothing; leave it out")
+
+
+def _given_design(
+    path: Path, kind: Kind, start: float | None, alignment: str | None, profile: str | None, unit: str | None
+) -> GivenAxis:
+    design = _read_design(path, kind, alignment, profile, unit).renumbered(start)
+    try:
+        design.check()
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
+    source = f"{path.name}: {design.name}" if design.name else path.name
+    return GivenAxis(design.polyline(), design.chainages[0], design, source, design.notes)
+
+
+def _read_design(path: Path, kind: Kind, alignment: str | None, profile: str | None, unit: str | None) -> Design:
     from tunneldb.alignment.ifc import Ifc
     from tunneldb.alignment.landxml import LandXml
 
-    file = LandXml(path) if kind == "landxml" else Ifc(path)
+    file = LandXml(path, unit) if kind == "landxml" else Ifc(path)
     number = _choose(path, "alignment", file.names, alignment)
     if not file.profiles[number]:
         raise UserError(
@@ -111,17 +199,58 @@ def _choose(path: Path, what: str, names: list[str], wanted: str | None) -> int:
     return names.index(wanted)
 
 
-def _read_points(path: Path) -> Float:
-    """Return the vertices of an axis file; it must not turn back on itself."""
-    table = read_csv(path, XYZ)
+def _read_points(path: Path) -> GivenAxis:
+    """Read the vertices of an axis file, or a trajectory; it must not turn back on itself."""
+    header = read_header(path)
+    columns = [_column(path, header, name) for name in XYZ]
+    names = [column for column in columns if column is not None]
+    table = read_csv(path, names, any_separator=True)
     if len(table) < 2:
         raise UserError(f"{path}: an axis needs at least 2 points, this one has {len(table)}")
-    xyz = table.columns(XYZ)
+    xyz = np.full((len(table), 3), np.nan)
+    xyz[:, : len(names)] = table.columns(names)
+    if "time" in (name.lower() for name in header):
+        rows = _thinned(xyz)
+        _require_forward(xyz[rows], lambda row, text: table.error(int(rows[row]), text))
+        note = f"a trajectory: of {len(xyz)} points {len(rows)}, {TRAJECTORY_STEP:g} m apart or more, are the axis"
+        return GivenAxis(xyz[rows], 0.0, notes=(note,))
+    _require_forward(xyz, table.error)
+    return GivenAxis(xyz, 0.0)
+
+
+def _column(path: Path, header: list[str], name: str) -> str | None:
+    """Column that holds a coordinate, by its usual names; None where there is no height."""
+    found = [column for column in header if column.lower() in _HEADERS[name]]
+    exact = [column for column in found if column.lower() == name]
+    if len(found) > 1 and len(exact) != 1 and len(set(found)) > 1:
+        raise UserError(f"{path}: {' and '.join(found)} may both be {name}; name just one of them {name}")
+    if found:
+        return exact[0] if exact else found[0]
+    if name == "z" and len(header) > 1:
+        return None
+    numbers = sum(re.fullmatch(r"[+-]?[\d.,]+", column) is not None for column in header)
+    hint = "; the first line must name the columns, such as x,y,z" if numbers > 1 else ""
+    raise UserError(f"{path} has no column {name}: its header is {','.join(header)!r}{hint}")
+
+
+def _thinned(xyz: Float) -> np.ndarray:
+    """Rows of a trajectory at least a step apart in plan; the last of them is the last that moved on."""
+    rows = [0]
+    for row in range(1, len(xyz)):
+        if np.hypot(*(xyz[row, :2] - xyz[rows[-1], :2])) >= TRAJECTORY_STEP:
+            rows.append(row)
+    last = len(xyz) - 1
+    if len(rows) > 1 and rows[-1] != last and np.hypot(*(xyz[last, :2] - xyz[rows[-1], :2])) > 0.0:
+        rows[-1 if len(rows) > 2 else len(rows) :] = [last]
+    return np.array(rows)
+
+
+def _require_forward(xyz: Float, error: Callable[[int, str], UserError]) -> None:
+    """Raise the error of a row at which a line stands still or turns back in plan."""
     steps = np.diff(xyz[:, :2], axis=0)
     standing = np.flatnonzero(~steps.any(axis=1))
     if len(standing):
-        raise table.error(int(standing[0]) + 1, "the same x,y as the point before; remove one of them")
+        raise error(int(standing[0]) + 1, "the same x,y as the point before; remove one of them")
     turns = np.flatnonzero(np.einsum("ij,ij->i", steps[1:], steps[:-1]) <= 0)
     if len(turns):
-        raise table.error(int(turns[0]) + 2, "the axis turns back here; its points must be in growing chainage")
-    return xyz
+        raise error(int(turns[0]) + 2, "the axis turns back here; its points must be in growing chainage")

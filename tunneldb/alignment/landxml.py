@@ -14,13 +14,8 @@ from xml.etree.ElementTree import Element, ParseError, iterparse
 from tunneldb.alignment.design import Design, StationPiece
 from tunneldb.alignment.elements import PlanElement, clothoid_from_chord
 from tunneldb.alignment.profile import Pvi, profile_elements
+from tunneldb.alignment.units import UNITS
 from tunneldb.errors import UserError
-
-UNITS = {
-    "millimeter": 0.001, "centimeter": 0.01, "meter": 1.0, "kilometer": 1000.0,
-    "inch": 0.0254, "foot": 0.3048, "USSurveyFoot": 1200.0 / 3937.0, "mile": 1609.344,
-}  # fmt: skip
-"""Metres in each linear unit of the schema."""
 
 MISMATCH = 0.02  # m between a length as stated and as the points have it; files are rounded to millimetres or centimetres
 _PVIS = ("PVI", "ParaCurve", "UnsymParaCurve", "CircCurve")
@@ -33,6 +28,13 @@ Point = tuple[float, float]
 class LandXml:
     """The alignments of a LandXML file.
 
+    Parameters
+    ----------
+    path : Path
+        The file.
+    unit : str or None
+        Name of the unit of its lengths, one of `UNITS`; None: as the file says.
+
     Attributes
     ----------
     names : list of str
@@ -41,10 +43,15 @@ class LandXml:
         Names of the profiles (ProfAlign) of each.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, unit: str | None = None) -> None:
         self._path = path
         root = _read(path)
-        self._unit = self._linear_unit(root)
+        stated = self._linear_unit(root)
+        name = unit or stated
+        if name is None:
+            raise UserError(f"{path} states no unit of its lengths (linearUnit of Units); say it: --axis-unit meter, foot, ...")
+        self._unit = UNITS[name]
+        self._told = "" if unit is None or unit == stated else f", as told; the file says {stated or 'nothing'}"
         self._points = {
             point.get("name"): point.text for point in root.iter() if _tag(point) == "CgPoint" and point.get("name")
         }
@@ -66,8 +73,8 @@ class LandXml:
             raise UserError(f"{self._path}: the plan of alignment {self.names[number]!r} (CoordGeom) has no length")
         pvis = list(self._pvis(self._profiles(alignment)[profile], start))
         notes = []
-        if self._unit != 1.0:
-            notes.append(f"lengths are turned into metres: 1 unit is {self._unit:.9g} m")
+        if self._unit != 1.0 or self._told:
+            notes.append(f"lengths are turned into metres: 1 unit is {self._unit:.9g} m{self._told}")
         if self._epsg:
             notes.append(f"the file says its coordinates are EPSG:{self._epsg}")
         return Design(
@@ -79,14 +86,15 @@ class LandXml:
             tuple(notes),
         )
 
-    def _linear_unit(self, root: Element) -> float:
+    def _linear_unit(self, root: Element) -> str | None:
+        """Name of the unit that the file states; None where it states none."""
         for units in (element for element in root.iter() if _tag(element) == "Units"):
             for system in units:
-                unit = system.get("linearUnit", "meter" if _tag(system) == "Metric" else "foot")
-                if unit not in UNITS:
+                unit = system.get("linearUnit")
+                if unit is not None and unit not in UNITS:
                     raise UserError(f"{self._path}: its linearUnit {unit!r} is none of {', '.join(UNITS)}")
-                return UNITS[unit]
-        return 1.0
+                return unit
+        return None
 
     def _profiles(self, alignment: Element) -> list[Element]:
         return [

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from tunneldb.alignment.units import UNITS
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
+from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.files import told_to_end
+
+if TYPE_CHECKING:
+    from tunneldb.alignment.found import FoundAxis
+
+AUTO = "auto"
+"""Stands for a file of the axis that is to be found in the scan."""
 
 
 @click.group(cls=VerbGroup)
@@ -21,24 +31,40 @@ def tunnel() -> None:
 @tunnel.command(
     examples=[
         "tunneldb tunnel add ringo --srid 3794 --axis ringo.axis.csv --start-chainage 511746.75",
+        "tunneldb tunnel add ringo --srid 3794 --axis auto ringo.laz",
+        "tunneldb tunnel add ringo --srid 3794 --axis drawn.gpkg --axis-layer axis --reverse ringo.laz",
         "tunneldb tunnel add ringo --srid 3794 --axis ringo.xml --alignment Mainline",
     ]
 )
 @click.argument("name")
+@click.argument("scans", metavar="[SCAN...]", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--srid", type=int, required=True, help="Spatial reference of all coordinates; projected, metres.")
 @click.option(
     "--axis",
-    type=click.Path(path_type=Path),
+    metavar="FILE|auto",
     required=True,
-    help="Design alignment (LandXML, IFC 4.3), or CSV with the header x,y,z: points of the axis in growing chainage.",
+    help="Design alignment (LandXML, IFC 4.3); lines of a drawing or a map (DXF, GeoPackage, Shapefile, GeoJSON, FlatGeobuf); "
+    "CSV with a header x,y,z, or a trajectory: points of the axis in growing chainage; or auto: found in the SCAN files.",
 )
-@click.option("--alignment", metavar="NAME", help="Which alignment of a LandXML or IFC file, if it holds several.")
+@click.option("--axis-layer", metavar="NAME", help="Which layer of a drawing or a map, if several hold lines.")
+@click.option(
+    "--axis-unit",
+    type=click.Choice(UNITS),
+    metavar="UNIT",
+    help=f"Unit of a LandXML's or a DXF's lengths, where it states none or a wrong one: {', '.join(UNITS)}.",
+)
+@click.option(
+    "--alignment",
+    metavar="NAME",
+    help="Which alignment of a LandXML or IFC file, if it holds several; of lines that don't meet, the number.",
+)
 @click.option("--profile", metavar="NAME", help="Which profile of the alignment, if it has several.")
+@click.option("--reverse", is_flag=True, help="Let chainage grow the other way; not of a design alignment.")
 @click.option(
     "--start-chainage",
     type=float,
     metavar="M",
-    help="Chainage of the axis's beginning. [default: that of the alignment; 0 of a CSV]",
+    help="Chainage of the axis's beginning. [default: that of the alignment; else 0]",
 )
 @click.option(
     "--spacing", type=float, default=10.0, show_default=True, metavar="M", help="Distance between the axis's vertices."
@@ -50,41 +76,142 @@ def tunnel() -> None:
     metavar="FILE",
     help="The tunnel's own stationing, see tunneldb tunnel stationing. [default: that of the alignment]",
 )
+@click.option(
+    "--axis-out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Where an axis found in SCAN files is kept, .csv, with its picture, .png, beside it. [default: NAME.found-axis.csv]",
+)
 @click.pass_obj
 def add(
     settings: Settings,
     name: str,
+    scans: tuple[Path, ...],
     srid: int,
-    axis: Path,
+    axis: str,
+    axis_layer: str | None,
+    axis_unit: str | None,
     alignment: str | None,
     profile: str | None,
+    reverse: bool,
     start_chainage: float | None,
     spacing: float,
     equations: Path | None,
+    axis_out: Path | None,
 ) -> None:
     """Add the tunnel NAME with its given axis.
 
     Of a design alignment the elements (lines, arcs, clothoids; grades, parabolas, circles) and the stationing are kept, and
     the axis follows them to a millimetre. Lengths in feet are turned into metres when the file says that they are feet.
-    """
-    from tunneldb.alignment.given import read_given
-    from tunneldb.store.alignment import read_equations, save_equations
-    from tunneldb.store.catalog import add_tunnel, get_tunnel
 
-    given = read_given(axis, start_chainage, alignment, profile)
+    Lines that meet end to end are joined. A line without heights, as drawn in QGIS, takes its heights and the tunnel's middle
+    from SCAN files. With --axis auto these are all that is needed; look at the picture that is written.
+    """
+    from tunneldb.alignment.drawing import describe_line
+    from tunneldb.alignment.given import read_given
+    from tunneldb.pipeline.axis_search import complete, found_given
+    from tunneldb.store.alignment import read_equations, save_equations
+    from tunneldb.store.catalog import add_tunnel, get_tunnel, require_new_tunnel
+
     own = read_equations(equations) if equations else None
+    found = None
+    with connect(settings.dsn) as connection:
+        require_new_tunnel(connection, name, srid)
+    if axis == AUTO:
+        if {axis_layer, axis_unit, alignment, profile} != {None}:
+            raise UserError("--axis auto reads SCAN files; --axis-layer, --axis-unit, --alignment and --profile are for others")
+        with told_to_end(), bar("points") as progress:
+            given, found = found_given(scans, srid, step(progress), start_chainage, reverse)
+    else:
+        given = read_given(
+            Path(axis), start_chainage, alignment, profile, layer=axis_layer, unit=axis_unit, srid=srid, reverse=reverse
+        )
+        if given.has_heights and scans:
+            raise UserError(f"{axis} has heights; SCAN files go with --axis auto, or with a line that has none")
+        if not given.has_heights:
+            if not scans:
+                raise UserError(
+                    f"{axis}: its line has no heights; give the scan files too, which have them: "
+                    f"tunneldb tunnel add {name} --srid {srid} --axis {axis} SCAN..."
+                )
+            with told_to_end(), bar("points") as progress:
+                given, found = complete(given, scans, srid, step(progress))
+    if found is None and axis_out is not None:
+        raise UserError("--axis-out is for an axis that is found in SCAN files")
     with connect(settings.dsn) as connection:
         line = add_tunnel(connection, name, srid, given, spacing)
         if own is not None:
             save_equations(connection, get_tunnel(connection, name), own)
-    tell(tunnel=name, srid=srid, chainage_from=line.start, chainage_to=line.end, source=given.source)
+        if found is not None:
+            _keep(found, axis_out or Path(f"{name}.found-axis.csv"), None, line.start, name)
+    tell(
+        tunnel=name,
+        srid=srid,
+        chainage_from=line.start,
+        chainage_to=line.end,
+        source=given.source,
+        begins_at=given.xyz[0].tolist(),
+        ends_at=given.xyz[-1].tolist(),
+        notes=given.notes,
+    )
     click.echo(f"{name}: {line.end - line.start:.3f} m of axis, chainage {line.start:.3f} to {line.end:.3f} m", err=True)
+    turn = "" if given.design is not None else "; --reverse turns it round"
+    click.echo(f"chainage grows over {describe_line(given.xyz)}{turn}", err=True)
     if given.design is not None:
         plan, profiles = len(given.design.plan), len(given.design.profile)
-        tell(plan_elements=plan, profile_elements=profiles, notes=given.design.notes)
+        tell(plan_elements=plan, profile_elements=profiles)
         click.echo(f"{given.source}: {plan} elements in plan, {profiles} in profile", err=True)
-        for note in given.design.notes:
-            click.echo(f"{axis}: {note}", err=True)
+    for note in given.notes:
+        click.echo(f"{axis}: {note}", err=True)
+
+
+@tunnel.command("find-axis", examples=["tunneldb tunnel find-axis ringo.laz -o ringo.axis.csv"])
+@click.argument("scans", metavar="SCAN...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", required=True, type=click.Path(dir_okay=False, path_type=Path), help="Axis to write, .csv with x,y,z."
+)
+@click.option(
+    "--picture",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Picture to write, .png. [default: beside the axis, of its name]",
+)
+@click.option("--reverse", is_flag=True, help="Let chainage grow the other way.")
+def find_axis(scans: tuple[Path, ...], output: Path, picture: Path | None, reverse: bool) -> None:
+    """Find the axis of the tunnel in SCAN files; needs no database.
+
+    It needs a roof, two walls and a floor along most of one tunnel, and nothing else: straight or curved, rising or falling,
+    with niches, cross passages, a train, open cuts before the portals. Chainage grows from the end farther west. The picture
+    shows the line over the points in plan and profile: look at it, then tunneldb tunnel add --axis.
+    """
+    from tunneldb.alignment.drawing import describe_line
+    from tunneldb.pipeline.axis_search import found_given
+
+    with told_to_end(), bar("points") as progress:
+        _, found = found_given(scans, None, step(progress), None, reverse)
+    _keep(found, output, picture, 0.0, scans[0].stem)
+    click.echo(f"chainage grows over {describe_line(found.xyz)}; --reverse turns it round", err=True)
+
+
+def _keep(found: FoundAxis, path: Path, picture: Path | None, start: float, title: str) -> None:
+    """Write an axis that was found, with its picture, and say how far to trust it."""
+    from tunneldb.export.figures.found_axis import write_found
+    from tunneldb.files import replacing
+    from tunneldb.pipeline.axis_search import describe_found, write_axis
+
+    picture = picture or path.with_suffix(".png")
+    if path.suffix.lower() != ".csv" or picture.suffix.lower() != ".png":
+        raise UserError(f"{path}, {picture}: an axis is written as .csv, its picture as .png")
+    with replacing(picture) as drawn, replacing(path) as written:
+        write_axis(written, found.xyz)
+        write_found(found, drawn, start, title)
+    lines = describe_found(found, start)
+    tell(
+        axis=path, picture=picture, length=found.length, width=found.width, height=found.height, sections=len(found.whole),
+        whole_sections=int(found.whole.sum()), doubtful=found.doubtful, says=lines,
+    )  # fmt: skip
+    for line in [*lines, f"axis: {path}, picture to check: {picture}"]:
+        click.echo(line, err=True)
 
 
 @tunnel.command(examples=["tunneldb tunnel stationing ringo equations.csv", "tunneldb tunnel stationing ringo --show"])

@@ -6,18 +6,19 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import solve
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
-from tunneldb.arrays import Bool, Float
+from tunneldb.arrays import Float
 from tunneldb.geometry.plan_line import PlanLine
-from tunneldb.robust import MAD_TO_SIGMA
+from tunneldb.geometry.smoothing import smooth_line
 
 _CELL = 1.0  # m in plan
 _REACH = 3.0  # cells closer than this are neighbours, m: profiles may lie apart
-_SHORT = 40.0  # m; below, a tunnel may be wider than long, and its projection tells its direction
+SHORT = 40.0
+"""Length below which a tunnel may be wider than long, and its projection tells its direction, m."""
+
 _STEP = 5.0  # m between vertices
 _SAMPLE = 10_000  # points that are projected in all directions
 _PIXEL = 0.2  # edge of a cell of the projection, m
@@ -69,7 +70,7 @@ def centreline(points: Float) -> Float:
     local = points - origin
     cells = _connected_cells(local[:, :2])
     path = _path_lengths(cells)
-    vertices = _vertices_along_path(cells, path) if path.max() > _SHORT else _ends_by_projection(local)
+    vertices = _vertices_along_path(cells, path) if path.max() > SHORT else ends_by_projection(local)
     if vertices[-1, 0] < vertices[0, 0]:
         vertices = vertices[::-1]
     # Spread evenly: a scanner's own surroundings would outweigh the walls.
@@ -129,9 +130,9 @@ def _end_of_cells(cells: Float, at: Float, unit: Float) -> Float:
     return np.asarray(at + max(float((near @ unit).max()), 0.5) * unit)
 
 
-def _ends_by_projection(local: Float) -> Float:
+def ends_by_projection(local: Float) -> Float:
     """Both ends of a short piece: along the direction in which its points fill the fewest cells of the projection."""
-    local = local[np.abs(local - np.median(local, axis=0)).max(axis=1) < _SHORT]
+    local = local[np.abs(local - np.median(local, axis=0)).max(axis=1) < SHORT]
     sample = local[:: max(1, len(local) // _SAMPLE)]
     sample = sample - sample.mean(axis=0)
     best, step = 0.0, np.pi / 90
@@ -172,7 +173,7 @@ def _between_walls(vertices: Float, plan: Float) -> Float:
     near = [walls[np.abs(slices - place) <= _STEP] for place in at]
     middle = np.array([np.nanmedian(w, axis=0).mean() if np.isfinite(w).any() else np.nan for w in near])
     seen = np.isfinite(middle)
-    return _smooth(line.point(at, np.where(seen, middle, 0.0)), seen)
+    return smooth_line(line.point(at, np.where(seen, middle, 0.0)), seen)
 
 
 def _walls(along: Float, across: Float, count: int) -> Float:
@@ -187,23 +188,3 @@ def _walls(along: Float, across: Float, count: int) -> Float:
     walls[held, 0] = across[(first + spare)[held]]
     walls[held, 1] = across[(stop - 1 - spare)[held]]
     return walls
-
-
-def _smooth(places: Float, seen: Bool) -> Float:
-    """Smooth places (k, 2) at even distances, those of niches and gaps after their neighbours (Whittaker, 1923).
-
-    Third differences are kept small: neither a straight line nor a circle is bent.
-    """
-    count = len(places)
-    if count < 6 or np.count_nonzero(seen) < 4:
-        return places
-    third = np.diff(np.eye(count), n=3, axis=0)
-    bend = 10.0 * third.T @ third
-    weight = seen.astype(np.float64)
-    out = places
-    for _ in range(5):
-        out = solve(np.diag(weight) + bend + 1e-9 * np.eye(count), (weight + 1e-9)[:, None] * places, assume_a="pos")
-        away = np.hypot(*(places - out).T)
-        usual = max(3.0 * MAD_TO_SIGMA * float(np.median(away[seen])), 0.02)
-        weight = np.where(seen, 1.0 / (1.0 + (away / usual) ** 2), 0.0)
-    return np.asarray(out)

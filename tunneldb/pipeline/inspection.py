@@ -12,12 +12,13 @@ from pyproj import CRS
 
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
+from tunneldb.geometry.crs import describe_crs, horizontal
 from tunneldb.pointcloud.contents import Contents, read_contents, read_near, read_values
 from tunneldb.pointcloud.form import WINDOW, TunnelForm, profile_spacing, surface_density, tunnel_form
 from tunneldb.pointcloud.formats.las import read_las_facts
 from tunneldb.pointcloud.formats.scans import PosedScan
 from tunneldb.pointcloud.formats.table import format_of, posed_scans
-from tunneldb.pointcloud.reader import ScanHeader, describe_crs, horizontal, read_header
+from tunneldb.pointcloud.reader import ScanHeader, read_header
 from tunneldb.radiometry.intensity_kind import KindGuess, ValueRange, contradiction, guess_kind, value_range
 
 WIDEST = 20.0

@@ -58,10 +58,9 @@ def add_tunnel(
     UserError
         For a name that is taken, an SRID that is unknown or not in metres, or an axis that is none.
     """
-    _require_name(name)
+    require_new_tunnel(connection, name, srid)
     if not math.isfinite(axis.start) or not math.isfinite(spacing):
         raise UserError(f"start chainage {axis.start:g} m and spacing {spacing:g} m must be finite numbers")
-    _require_metres(connection, srid)
     alignment = Alignment.from_polyline(axis.xyz, axis.start, spacing)
     line = shapely.set_srid(shapely.LineString(axis.xyz), srid)
     try:
@@ -71,11 +70,23 @@ def add_tunnel(
             [name, srid, axis.start, spacing, shapely.to_wkb(line, hex=True, include_srid=True), axis.source],
         ).fetchone()
     except psycopg.errors.UniqueViolation:
-        raise UserError(f"there is a tunnel {name!r} already: tunneldb tunnel list") from None
+        raise _taken(name) from None
     assert row is not None
     if axis.design is not None:
         save_design(connection, row[0], axis.design)
     return alignment
+
+
+def require_new_tunnel(connection: psycopg.Connection[Any], name: str, srid: int) -> None:
+    """Raise UserError for a tunnel's name that is taken or won't do, or an SRID that is unknown or not in metres."""
+    _require_name(name)
+    _require_metres(connection, srid)
+    if connection.execute("SELECT FROM tunnel.tunnel WHERE name = %s", [name]).fetchone() is not None:
+        raise _taken(name)
+
+
+def _taken(name: str) -> UserError:
+    return UserError(f"there is a tunnel {name!r} already: tunneldb tunnel list")
 
 
 def _require_name(name: str) -> None:

@@ -1,0 +1,221 @@
+"""Lines of drawings and maps: DXF by ezdxf; GeoPackage, Shapefile, GeoJSON and FlatGeobuf by GDAL."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from tunneldb.alignment.joining import join_pieces
+from tunneldb.arrays import Float
+from tunneldb.errors import UserError
+from tunneldb.geometry.crs import describe_crs, same_horizontally
+
+CHORD_ERROR = 0.0005  # m, of arcs and splines
+LONGEST_STEP = 1.0  # m between vertices of a drawing with arcs: the spline through them shall keep straights straight
+_LISTED = 8
+_ENTITIES = {"LINE", "ARC", "LWPOLYLINE", "POLYLINE", "SPLINE"}
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Lines of a layer, joined end to end.
+
+    Attributes
+    ----------
+    lines : list of (n, 3) float arrays
+        The longest first, m; heights are NaN where the layer has none, or 0 throughout.
+    layer : str
+        Its name.
+    notes : tuple of str
+        What the user should know about the reading.
+    """
+
+    lines: list[Float]
+    layer: str
+    notes: tuple[str, ...] = ()
+
+    def choose(self, path: Path, number: str | None) -> Float:
+        """Return the only line, or that with a number of the list, counted from 1."""
+        if number is None and len(self.lines) == 1:
+            return self.lines[0]
+        listed = "; ".join(f"{n} ({describe_line(line)})" for n, line in enumerate(self.lines[:_LISTED], start=1))
+        more = len(self.lines) - _LISTED
+        listed += f"; and {more} shorter ones" if more > 0 else ""
+        count = "1 line" if len(self.lines) == 1 else f"{len(self.lines)} lines that don't meet end to end"
+        if number is None:
+            raise UserError(f"{path}: layer {self.layer!r} holds {count}: {listed}; choose one by --alignment NUMBER")
+        if not number.isdecimal() or not 1 <= int(number) <= len(self.lines):
+            raise UserError(f"{path}: layer {self.layer!r} has no line {number!r}; it holds {count}: {listed}")
+        return self.lines[int(number) - 1]
+
+
+def describe_line(line: Float) -> str:
+    """Length and ends of a line, for a message."""
+    length = float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
+    (x1, y1), (x2, y2) = line[0, :2], line[-1, :2]
+    return f"{length:.1f} m from {x1:.1f},{y1:.1f} to {x2:.1f},{y2:.1f}"
+
+
+def read_dxf(path: Path, layer: str | None, unit: float | None) -> Drawn:
+    """Read the lines of a DXF file's model space: LINE, ARC, LWPOLYLINE, POLYLINE and SPLINE.
+
+    Parameters
+    ----------
+    layer
+        Which layer; needed where several hold lines.
+    unit
+        Metres in a unit of the drawing; None: as the file says.
+
+    Raises
+    ------
+    UserError
+        If it can't be read, holds no lines, several layers to choose from, or states a unit that isn't the metre.
+    """
+    from ezdxf import filemanagement
+    from ezdxf.lldxf.const import DXFError
+
+    try:
+        drawing = filemanagement.readfile(str(path))
+    except (OSError, DXFError, ValueError) as error:
+        raise UserError(f"{path} cannot be read as DXF: {str(error).strip().splitlines()[0]}") from None
+    entities = [entity for entity in drawing.modelspace() if entity.dxftype() in _ENTITIES and not _is_mesh(entity)]
+    names = sorted({entity.dxf.layer for entity in entities})
+    chosen = choose_layer(path, names, layer)
+    scale, note = _dxf_unit(path, drawing.header.get("$INSUNITS", 0), unit)
+    parts = [part for entity in entities if entity.dxf.layer == chosen for part in _simple(entity)]
+    curved = any(part.dxftype() != "LINE" for part in parts)
+    pieces = [scale * _vertices(part, CHORD_ERROR / scale) for part in parts]
+    lines = [_densified(line) if curved else line for line in join_pieces(pieces)]
+    return _drawn(path, lines, chosen, (note,) if note else ())
+
+
+def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
+    """Read the lines of a GeoPackage, Shapefile, GeoJSON or FlatGeobuf.
+
+    Parameters
+    ----------
+    layer
+        Which layer; needed where several hold lines.
+    srid
+        EPSG code that its coordinates must be in; None: not checked.
+
+    Raises
+    ------
+    UserError
+        If it can't be read, holds no lines, several layers to choose from, or is in another coordinate system.
+    """
+    import pyogrio
+    import shapely
+
+    try:
+        layers = [(str(name), str(kind)) for name, kind in pyogrio.list_layers(path) if kind is not None]
+        linear = [name for name, kind in layers if not any(other in kind for other in ("Point", "Polygon", "Surface"))]
+        chosen = choose_layer(path, linear, layer, [name for name, _ in layers])
+        meta, _, wkb, _ = pyogrio.raw.read(path, layer=chosen, columns=[])
+    except pyogrio.errors.DataSourceError as error:
+        raise UserError(f"{path} cannot be read: {str(error).strip().splitlines()[0]}") from None
+    notes = _check_crs(path, meta["crs"], srid)
+    try:
+        geometries = shapely.get_parts(shapely.get_parts(shapely.from_wkb(wkb)))
+    except (shapely.errors.GEOSException, NotImplementedError) as error:
+        raise UserError(
+            f"{path}: a line of layer {chosen!r} cannot be read ({str(error).strip().splitlines()[0]}); if it has arcs, turn "
+            "them into vertices (in QGIS: Vector geometry, Segmentize)"
+        ) from None
+    geometries = geometries[np.isin(shapely.get_type_id(geometries), (1, 2))]  # lines and rings
+    pieces = [shapely.get_coordinates(line, include_z=True) for line in geometries]
+    broken = sum(not np.isfinite(piece[:, :2]).all() for piece in pieces)
+    if broken:
+        raise UserError(f"{path}: {broken} lines of layer {chosen!r} have coordinates that are no numbers")
+    return _drawn(path, join_pieces(pieces), chosen, notes)
+
+
+def choose_layer(path: Path, names: list[str], wanted: str | None, others: list[str] | None = None) -> str:
+    """Name of the layer that is wanted, or of the only one with lines."""
+    listed = ", ".join(repr(name) for name in names)
+    if wanted is not None:
+        if wanted not in names:
+            there = (
+                f"it has {listed}" if names else f"there are none; its layers: {', '.join(map(repr, others or [])) or 'none'}"
+            )
+            raise UserError(f"{path} has no layer {wanted!r} of lines; {there}")
+        return wanted
+    if not names:
+        held = f"; its layers: {', '.join(map(repr, others))}" if others else ""
+        raise UserError(f"{path} holds no lines{held}; an axis is drawn as a line")
+    if len(names) > 1:
+        raise UserError(f"{path} holds {len(names)} layers of lines: {listed}; choose one by --axis-layer NAME")
+    return names[0]
+
+
+def _drawn(path: Path, lines: list[Float], layer: str, notes: tuple[str, ...]) -> Drawn:
+    if not lines:
+        raise UserError(f"{path}: layer {layer!r} holds no line with a length")
+    for line in lines:
+        if not np.isfinite(line[:, 2]).all() or not line[:, 2].any():
+            line[:, 2] = np.nan
+    return Drawn(lines, layer, notes)
+
+
+def _check_crs(path: Path, stated: str | None, srid: int | None) -> tuple[str, ...]:
+    if srid is None:
+        return ()
+    if stated is None:
+        return (f"names no coordinate system; its coordinates are taken to be EPSG:{srid}",)
+    try:
+        own, wanted = CRS.from_user_input(stated), CRS.from_epsg(srid)
+    except CRSError as error:
+        raise UserError(f"{path}: SRID {srid} or the file's coordinate system is not known: {error}") from None
+    if not same_horizontally(own, wanted):
+        raise UserError(
+            f"{path}: its coordinate system is {describe_crs(own)}, the tunnel's is {describe_crs(wanted)}; save the line in "
+            f"EPSG:{srid} (in QGIS: Export, Save Features As), or add the tunnel with the line's SRID"
+        )
+    return ()
+
+
+def _dxf_unit(path: Path, code: int, unit: float | None) -> tuple[float, str]:
+    """Metres in a unit of the drawing, and what is to be said of it."""
+    from ezdxf import units
+
+    if unit is not None:
+        says = f"; the file itself says {units.decode(code)}" if code else ""
+        return unit, f"1 unit is taken to be {unit:.9g} m, as told{says}"
+    if code == units.M:
+        return 1.0, ""
+    if code == 0:
+        return 1.0, "states no unit; its lengths are taken to be metres, as the SRID's are"
+    raise UserError(
+        f"{path}: its unit is {units.decode(code)} ($INSUNITS {code}); what are its lengths? Say it by --axis-unit, such "
+        "as --axis-unit meter"
+    )
+
+
+def _simple(entity: Any) -> list[Any]:
+    """Return the lines and arcs of a polyline, else the entity itself."""
+    return list(entity.virtual_entities()) if entity.dxftype() in ("LWPOLYLINE", "POLYLINE") else [entity]
+
+
+def _vertices(entity: Any, chord_error: float) -> Float:
+    """Vertices (n, 3) along a LINE, an ARC or a SPLINE, in its drawing's unit."""
+    line = entity.dxftype() == "LINE"
+    vertices = (entity.dxf.start, entity.dxf.end) if line else entity.flattening(chord_error)
+    return np.array([tuple(vertex) for vertex in vertices], dtype=np.float64).reshape(-1, 3)
+
+
+def _is_mesh(entity: Any) -> bool:
+    return entity.dxftype() == "POLYLINE" and (entity.is_poly_face_mesh or entity.is_polygon_mesh)
+
+
+def _densified(line: Float) -> Float:
+    """The same line with vertices at most a metre apart."""
+    length = np.hypot(*np.diff(line[:, :2], axis=0).T)
+    parts = np.maximum(np.ceil(length / LONGEST_STEP), 1.0).astype(int)
+    within = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    at = np.append(np.repeat(np.arange(len(parts)), parts) + within / np.repeat(parts, parts), float(len(parts)))
+    return np.column_stack([np.interp(at, np.arange(len(line)), column) for column in line.T])

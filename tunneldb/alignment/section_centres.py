@@ -1,0 +1,194 @@
+"""Where a tunnel's centre lies in sections across a line: halfway between the walls, and between vault and floor.
+
+These are the terms by which stage ``axis`` places its vertices (``sql/geometry/axis.sql``), on a thinned cloud.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tunneldb.arrays import Bool, Float, Int64
+
+_CLASS = 5  # ° of an angular class
+_CLASSES = 360 // _CLASS
+_OUTWARD = 0.9  # share of a class's points that lie nearer: what hangs before the lining and stands in the tunnel
+_FREE = 0.8  # share of the sections in which walls are nearer to each other: a train may stand along most of a tunnel
+_UPRIGHT = 0.8  # share of the greatest width that a pair of classes must have to be on the walls of a low, wide tunnel
+_BLOCKED = 0.1  # share by which the walls of a pair of classes may be nearer or farther than usual
+_PROFILES = 0.3  # m; less lies between points of one profile
+_LEAST_GAP = 1.0  # m
+_FEWEST = 3  # classes, or pairs of them, whose median is a wall, a vault or a floor
+_WALL = 25.0  # ° above and below the horizontal, within which there is a wall
+_VAULT = 1.0 / 3.0  # share of the classes overhead that makes a roof
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Frames of stations along a line: position, ahead, right and up, each (k, 3)."""
+
+    position: Float
+    ahead: Float
+    right: Float
+    up: Float
+
+    @classmethod
+    def along(cls, line: Float) -> Frames:
+        """Frames at the vertices of a line (k, 3), k ≥ 2."""
+        ahead = np.gradient(line, axis=0)
+        ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+        right = np.column_stack([ahead[:, 1], -ahead[:, 0], np.zeros(len(ahead))])
+        right /= np.linalg.norm(right, axis=1, keepdims=True)
+        return cls(line, ahead, right, np.cross(right, ahead))
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Points by the station that is nearest to them.
+
+    Attributes
+    ----------
+    station : (n,) int array
+        Number of the station; -1 of points beyond the reach.
+    along, right, up : (n,) float arrays
+        In its frame, m.
+    """
+
+    station: Int64
+    along: Float
+    right: Float
+    up: Float
+
+    def at(self, chosen: Bool) -> Placed:
+        """Some of the points."""
+        return Placed(self.station[chosen], self.along[chosen], self.right[chosen], self.up[chosen])
+
+
+@dataclass(frozen=True)
+class Centres:
+    """Shift of each station to the tunnel's centre.
+
+    Attributes
+    ----------
+    right, up : (k,) float arrays
+        m; NaN where a wall, the vault or the floor is not seen.
+    width, height : (k,) float arrays
+        Between the walls and from floor to vault, m; NaN likewise.
+    """
+
+    right: Float
+    up: Float
+    width: Float
+    height: Float
+
+    @property
+    def whole(self) -> Bool:
+        """Which stations have both walls, vault and floor."""
+        return np.isfinite(self.right) & np.isfinite(self.up)
+
+
+def place_points(points: Float, frames: Frames, reach: float) -> Placed:
+    """Put points (n, 3) into the frames of the stations nearest to them, up to a distance from these (m)."""
+    distance, station = cKDTree(frames.position).query(points, distance_upper_bound=reach)
+    station = np.where(np.isfinite(distance), station, -1)
+    away = points - frames.position[station]
+    along, right, up = (np.einsum("ij,ij->i", away, axis[station]) for axis in (frames.ahead, frames.right, frames.up))
+    return Placed(station, along, right, up)
+
+
+def section_centres(placed: Placed, count: int, half_width: float) -> Centres:
+    """Shift of each of ``count`` stations to the centre, from the points within half a width (m) of its plane.
+
+    The lining is as far, in a class of 5° about the station, as nine in ten of its points. Where pairs of
+    opposite classes have walls that are as far apart as in the other stations, the others don't count: there a train stands
+    before a wall, or a passage begins.
+    """
+    radius = _radii(placed.at((placed.station >= 0) & (np.abs(placed.along) <= half_width)), count)
+    angle = (np.arange(_CLASSES) + 0.5) * _CLASS - 180.0
+    cosine = np.cos(np.radians(angle))
+    side = (angle > 45) & (angle < 135)
+    a, b = radius[:, side], radius[:, ::-1][:, side]
+    shift, apart = (a - b) / 2.0, (a + b) * np.sin(np.radians(angle[side]))
+    usual = _usual(apart)
+    upright = usual >= _UPRIGHT * np.nanmax(usual, initial=0.0)  # not vault and floor of a low, wide tunnel
+    free = (np.abs(apart / usual - 1.0) <= _BLOCKED) & upright
+    right, width = (_median(np.where(free, values, np.nan), fewest=1) for values in (shift, apart))
+    right, width = np.where(np.isfinite(right), (right, width), (_median(shift[:, upright]), _median(apart[:, upright])))
+    # a roof on posts has no walls at the height of its middle
+    walls = np.isfinite(apart[:, np.abs(angle[side] - 90.0) < _WALL]).sum(axis=1) >= _FEWEST
+    right, width = np.where(walls, (right, width), np.nan)
+    floor, vault = np.abs(angle) > 135, np.abs(angle) < 45
+    depth = _median(-radius[:, floor] * cosine[floor])
+    roofed = np.isfinite(radius[:, vault]).mean(axis=1) >= _VAULT
+    up = np.where(roofed, _median((radius[:, vault] - depth[:, None] / cosine[vault]) / 2.0), np.nan)
+    height = np.where(roofed, depth + _median(radius[:, vault] * cosine[vault]), np.nan)
+    return Centres(right, up, width, height)
+
+
+def vault_gap(placed: Placed, distance: Float) -> float:
+    """Gap along the line beyond which there is no vault, m: half as much again as between most profiles.
+
+    Parameters
+    ----------
+    placed : Placed
+        Points of the lining.
+    distance : (k,) float array
+        Distance of each station along the line, m.
+    """
+    overhead = placed.at((placed.station >= 0) & _overhead(placed))
+    gaps = np.diff(np.sort(distance[overhead.station] + overhead.along))
+    apart = gaps[gaps > _PROFILES]
+    return 1.5 * max(float(np.quantile(apart, 0.9)) if len(apart) else 0.0, _LEAST_GAP)
+
+
+def roof_ends(placed: Placed, station: int, way: float, gap: float) -> float:
+    """How far ahead of a station (``way`` 1) or behind it (-1) the vault goes on, with gaps at most so wide, m."""
+    along = np.sort(way * placed.along[(placed.station == station) & _overhead(placed)])
+    along = along[along >= 0.0]
+    if not len(along) or along[0] > gap:
+        return 0.0
+    gaps = np.flatnonzero(np.diff(along) > gap)
+    return float(along[gaps[0]] if len(gaps) else along[-1])
+
+
+def _overhead(placed: Placed) -> Bool:
+    """Which points are of the vault's middle; a portal's wings stand beside it."""
+    return np.asarray(placed.up > 2.0 * np.abs(placed.right))
+
+
+def _radii(placed: Placed, count: int) -> Float:
+    """Distance of the lining in each angular class of each station (count, classes), m; NaN where there is no point."""
+    angle = np.degrees(np.arctan2(placed.right, placed.up))
+    number = np.clip(np.floor((angle + 180.0) / _CLASS).astype(np.int64), 0, _CLASSES - 1)
+    key = placed.station * _CLASSES + number
+    away = np.hypot(placed.right, placed.up)
+    order = np.lexsort((away, key))
+    key, away = key[order], away[order]
+    held, first, points = np.unique(key, return_index=True, return_counts=True)
+    out = np.full(count * _CLASSES, np.nan)
+    out[held] = away[first + np.floor(_OUTWARD * (points - 1)).astype(np.int64)]
+    return out.reshape(count, _CLASSES)
+
+
+def _usual(apart: Float) -> Float:
+    """How far the walls are apart at each height, (classes,), m, where nothing stands before them.
+
+    A train may stand along most of a tunnel, but hides no wall up to the vault; niches are more than a wall's width apart.
+    """
+    known = np.isfinite(apart).any(axis=0)
+    out = np.full(apart.shape[1], np.nan)
+    if known.any():
+        half, most = np.nanquantile(apart[:, known], (0.5, _FREE), axis=0)
+        out[known] = np.minimum(most, (1.0 + _BLOCKED) * half.max())
+    return out
+
+
+def _median(values: Float, fewest: int = _FEWEST) -> Float:
+    """Median of each row; NaN where too few are known."""
+    known = np.isfinite(values).sum(axis=1) >= fewest
+    out = np.full(len(values), np.nan)
+    if known.any():
+        out[known] = np.nanmedian(values[known], axis=1)
+    return out

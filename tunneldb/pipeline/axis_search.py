@@ -1,0 +1,157 @@
+"""The axis of a tunnel from its scan files, without a database."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from pyproj import CRS
+
+from tunneldb.alignment.found import FoundAxis, find_axis, follow_line, without_haze
+from tunneldb.alignment.given import GivenAxis
+from tunneldb.arrays import Float
+from tunneldb.errors import UserError
+from tunneldb.geometry.crs import describe_crs, horizontal, same_horizontally
+from tunneldb.geometry.stationing import chainage_label
+from tunneldb.pointcloud.reader import ScanHeader, check_header, read_chunks, read_header
+from tunneldb.pointcloud.voxels import Voxels
+
+EDGE = 0.5
+"""Edge of the voxels whose centroids the axis is found from, m."""
+
+FARTHEST = 200_000.0
+"""Distance from most points beyond which a point is none of the scan, m."""
+
+TRUSTED_SHARE = 0.8
+"""Share of sections that must be whole for the axis not to be called doubtful."""
+
+TRUSTED_DISTANCE = 0.5
+"""Distance from the line (m) within which 95 % of the sections' centres must lie for the same."""
+
+TRUSTED_ASIDE = 0.03
+"""Share of what has a roof that may lie elsewhere before it is told."""
+
+Begin = Callable[[str, float | None], Callable[[float], None]]
+
+
+def search_axis(files: Sequence[Path], srid: int | None, begin: Begin, along: Float | None = None) -> FoundAxis:
+    """Find the axis of the tunnel in scan files.
+
+    Parameters
+    ----------
+    files
+        Scan files of one tunnel.
+    srid
+        EPSG code that their coordinate systems are held against; None: against each other.
+    begin
+        Called with a text and the number of points; returns what takes the points that are done.
+    along : (k, 2) float array or None
+        A line drawn in plan, which the axis follows, m.
+
+    Raises
+    ------
+    UserError
+        If a file can't be read or is in another coordinate system, or no tunnel is found.
+    """
+    headers = [read_header(path) for path in files]
+    for header in headers:
+        if srid is not None:
+            check_header(header, None, srid, needs_time=False)
+    _require_one_system(headers)
+    points = _voxels(headers, begin)
+    try:
+        return find_axis(points) if along is None else follow_line(points, along)
+    except UserError as error:
+        raise UserError(f"{_names(files)}: {error}") from None
+
+
+def found_given(
+    files: Sequence[Path], srid: int | None, begin: Begin, start: float | None, reverse: bool
+) -> tuple[GivenAxis, FoundAxis]:
+    """Return the axis found in scan files, as one that a tunnel can be given.
+
+    Parameters
+    ----------
+    files, srid, begin
+        As of `search_axis`.
+    start
+        Chainage of its beginning, m; None: 0.
+    reverse
+        Whether chainage grows from its end farther east.
+    """
+    if not files:
+        raise UserError("--axis auto finds the axis in scan files; name them behind the tunnel: --axis auto SCAN...")
+    found = search_axis(files, srid, begin)
+    found = found.reversed() if reverse else found
+    return GivenAxis(found.xyz, start or 0.0, source=f"found in {_names(files)}"), found
+
+
+def complete(given: GivenAxis, files: Sequence[Path], srid: int, begin: Begin) -> tuple[GivenAxis, FoundAxis]:
+    """Give a line that was drawn in plan the tunnel's middle and heights from scan files; ends and direction stay."""
+    found = search_axis(files, srid, begin, given.xyz[:, :2])
+    note = f"its middle and heights are from {_names(files)}"
+    return GivenAxis(found.xyz, given.start, None, given.source, (*given.notes, note)), found
+
+
+def describe_found(found: FoundAxis, start: float = 0.0) -> list[str]:
+    """Lines that say what was found and how far to trust it; chainages from ``start`` (m) on."""
+    whole, count = int(found.whole.sum()), len(found.whole)
+    middle, far = np.nanquantile(found.away, (0.5, 0.95))
+    lines = [
+        f"axis found: {found.length:.1f} m; the tunnel is {found.width:.1f} m wide and {found.height:.1f} m high",
+        f"{whole} of {count} sections have both walls, vault and floor; the middles of half of them lie within {middle:.2f} m "
+        f"of the line, of 95 % within {far:.2f} m",
+    ]
+    stretches = [f"{chainage_label(start + a, 0)} to {chainage_label(start + b, 0)}" for a, b in found.doubtful]
+    if stretches:
+        lines.append(f"look at {', '.join(stretches)}: walls, vault or floor are missing there, or lie elsewhere")
+    if found.aside > TRUSTED_ASIDE and found.aside_at is not None:
+        lines.append(
+            f"{100 * found.aside:.0f} % of what has a roof is not along the line, most of it about "
+            f"{found.aside_at[0]:.0f},{found.aside_at[1]:.0f}: a side room, or the tunnel beyond a gap"
+        )
+    if whole < TRUSTED_SHARE * count or far > TRUSTED_DISTANCE:
+        lines.append("doubtful as a whole: look at the picture before you go on, or draw the line")
+    return lines
+
+
+def write_axis(path: Path, xyz: Float) -> None:
+    """Write vertices as a CSV file that ``--axis`` takes."""
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        table = csv.writer(stream, lineterminator="\n")
+        table.writerow(("x", "y", "z"))
+        table.writerows([f"{value:.3f}" for value in vertex] for vertex in xyz.tolist())
+
+
+def _voxels(headers: Sequence[ScanHeader], begin: Begin) -> Float:
+    """Centroids of the voxels on surfaces."""
+    done = begin("reading", float(sum(header.points for header in headers)))
+    voxels = Voxels(EDGE)
+    middle: Float | None = None
+    for header in headers:
+        for chunk in read_chunks(header.path, None):
+            if middle is None and len(chunk.xyz):
+                middle = np.median(chunk.xyz, axis=0)
+            if middle is not None:
+                voxels.add(chunk.xyz[(np.abs(chunk.xyz - middle) < FARTHEST).all(axis=1)])
+            done(len(chunk.xyz))
+    return without_haze(voxels.centroids(), voxels.counts())
+
+
+def _require_one_system(headers: Sequence[ScanHeader]) -> None:
+    known = [(header, header.crs) for header in headers if header.crs is not None]
+    for header, crs in known:
+        units = {axis.unit_name for axis in horizontal(crs).axis_info}
+        if units != {"metre"}:
+            raise UserError(f"{header.path}: its coordinates are in {', '.join(sorted(units))}, not metres; transform it")
+        first: CRS = known[0][1]
+        if not same_horizontally(crs, first):
+            raise UserError(
+                f"{header.path} is in {describe_crs(crs)}, {known[0][0].path} in {describe_crs(first)}; give files of one"
+            )
+
+
+def _names(files: Sequence[Path]) -> str:
+    return files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
