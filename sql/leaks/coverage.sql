@@ -110,15 +110,31 @@ CREATE OR REPLACE FUNCTION tunnel_api.coverage(
     OUT lining_area float8, OUT seen_area float8, OUT seen_share float8, OUT wet_pixel_area float8, OUT wet_pixel_share float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 AS $$
-    SELECT d.lining, d.seen, d.seen / nullif(d.lining, 0), d.wet, d.wet / nullif(d.seen, 0)
+    SELECT d.lining, d.seen, d.seen / nullif(d.lining, 0) * least(d.length / (r.ends[2] - r.ends[1]), 1), d.wet,
+        d.wet / nullif(d.seen, 0)
     FROM (SELECT tunnel_api.survey_id($1) AS id) s
     CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
     CROSS JOIN LATERAL (SELECT ARRAY[greatest($2, e.chainage_from), least($3, e.chainage_to)] AS ends) r
     LEFT JOIN LATERAL (
-        SELECT max(c.lining) - min(c.lining) AS lining, max(c.seen) - min(c.seen) AS seen, max(c.wet) - min(c.wet) AS wet
+        SELECT max(c.lining) - min(c.lining) AS lining, max(c.seen) - min(c.seen) AS seen, max(c.wet) - min(c.wet) AS wet,
+            max(c.length) - min(c.length) AS length
         FROM tunnel_api.coverage_at(s.id, r.ends) c
         HAVING max(c.length) > min(c.length)) d ON true
     WHERE e.chainage_from IS NOT NULL AND r.ends[1] < r.ends[2]
 $$;
 COMMENT ON FUNCTION tunnel_api.coverage(text, float8, float8) IS
-'Lining of a survey between two chainages (m), what the last detection saw of it, and the pixels that it found wet, after the median filter (m²); seen_share of the lining, wet_pixel_share of what was seen, as Xu et al. (2018) state it. Steps of chainage that an end cuts count by their share; kilometres without detection are not counted.';
+'Lining of a survey between two chainages (m) where it was searched for leaks, what the last detection saw of it, and the pixels that it found wet, after the median filter (m²); seen_share of the lining of the whole stretch, in which kilometres without detection count as unseen, as in leak_statistics; wet_pixel_share of what was seen, as Xu et al. (2018) state it. Steps of chainage that an end cuts count by their share.';
+
+
+-- Of an area on the lining (m²) whose outline lies in the unrolled plane, the part between two chainages (m). The planner puts
+-- the body in the place of a call; one that is not cut is not clipped.
+CREATE OR REPLACE FUNCTION tunnel_api.area_between(outline geometry, area float8, chainage_from float8, chainage_to float8)
+RETURNS float8
+LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT
+AS $$
+    SELECT CASE WHEN public.ST_XMin($1) >= $3 AND public.ST_XMax($1) <= $4 THEN $2
+        ELSE $2 / nullif(public.ST_Area($1), 0) * public.ST_Area(public.ST_ClipByBox2D($1, public.ST_MakeBox2D(
+            public.ST_MakePoint(greatest($3, -1e9), -1e4), public.ST_MakePoint(least($4, 1e9), 1e4)))) END
+$$;
+COMMENT ON FUNCTION tunnel_api.area_between(geometry, float8, float8, float8) IS
+'Part of an area on the lining (m²), such as a leak''s, that lies between two chainages (m), by its outline in the unrolled plane. The area of a leak over the end of a stretch, wherever it is stated.';

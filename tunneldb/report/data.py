@@ -17,6 +17,7 @@ from shapely.geometry import Polygon
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.pipeline.stages import STAGE_NAMES
+from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
 Row = dict[str, Any]
@@ -127,13 +128,13 @@ def find_stretch(conn: psycopg.Connection[Any], survey: Survey, low: float, high
     UserError
         If the survey has no segments, or none of them lies in the stretch.
     """
-    row = conn.execute("SELECT * FROM tunnel_api.survey_ends(%s)", [survey.id]).fetchone()
-    if row is None or row[0] is None:
+    ends = survey_ends(conn, survey)
+    if ends is None:
         raise UserError(f"survey {survey.name} has nothing to report yet: tunneldb run {survey.name}")
-    start, end = max(row[0], low), min(row[1], high)
+    start, end = max(ends[0], low), min(ends[1], high)
     if start >= end:
         asked = f"from chainage {max(low, -1e9):.3f} to {min(high, 1e9):.3f} m"
-        raise UserError(f"survey {survey.name} reaches from chainage {row[0]:.3f} to {row[1]:.3f} m: nothing lies {asked}")
+        raise UserError(f"survey {survey.name} reaches from chainage {ends[0]:.3f} to {ends[1]:.3f} m: nothing lies {asked}")
     return start, end
 
 
