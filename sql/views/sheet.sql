@@ -55,8 +55,9 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
          CROSS JOIN LATERAL unnest(q.lining[p.first:p.last], q.seen[p.first:p.last]) AS v (lining, seen)
          WHERE q.survey_id = s.id AND q.km = b.km) c ON true
   LEFT JOIN LATERAL (
-        SELECT count(*) AS leaks,
-               coalesce(sum(tunnel_api.area_between(x.unrolled, x.area, r.chainage_from, r.chainage_to)), 0) AS wet_area
+        SELECT CASE WHEN c.lining IS NOT NULL OR count(*) > 0 THEN count(*) END AS leaks,
+               coalesce(sum(tunnel_api.area_between(x.unrolled, x.area, r.chainage_from, r.chainage_to)),
+                        CASE WHEN c.lining IS NOT NULL THEN 0 END) AS wet_area
           FROM tunnel.anomaly x
          WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND coalesce(x.judged, x.kind) = 'leak'
            AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(b.chainage_from, -1e4, b.chainage_to, 1e4)
@@ -70,6 +71,6 @@ COMMENT ON COLUMN tunnel_api.sheet.ticks IS 'Station at each 10 m from its begin
 COMMENT ON COLUMN tunnel_api.sheet.lining_area IS 'Lining, seen or not, m²; NULL before detection';
 COMMENT ON COLUMN tunnel_api.sheet.seen_share IS 'Share of it that was seen, as in leak_statistics; on what was not, no leak was searched for';
 COMMENT ON COLUMN tunnel_api.sheet.wet_area IS 'Area of the leaks within the sheet, m²; a leak over its edge by its part';
-COMMENT ON COLUMN tunnel_api.sheet.leaks IS 'Leaks on it or over its edges, found last and not rejected';
+COMMENT ON COLUMN tunnel_api.sheet.leaks IS 'Leaks on it or over its edges, found last and not rejected; NULL where they were not searched for';
 COMMENT ON COLUMN tunnel_api.sheet.gaps IS 'Where on it leaks were not searched for, or not as they should be (coverage_statement); NULL if nowhere';
 COMMENT ON COLUMN tunnel_api.sheet.geom IS 'From edge to edge, as high as the survey''s widest place';

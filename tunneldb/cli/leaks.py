@@ -11,6 +11,7 @@ import psycopg
 from psycopg import sql
 from rich.console import Console
 
+from tunneldb.cli.coverage import say_coverage
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import records, tell, verb
 from tunneldb.cli.stretch import parse_stretch, stretch_options
@@ -31,7 +32,7 @@ from tunneldb.export.tables.leaks import (
 from tunneldb.files import replacing
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
-from tunneldb.store.coverage import Coverage, read_coverage
+from tunneldb.store.coverage import read_coverage
 from tunneldb.store.survey import Survey, get_survey
 
 _BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
@@ -132,34 +133,19 @@ def leaks(
             raise UserError(f"--km {km} and the stretch asked for have nothing in common")
         if by_km:
             coverage = read_coverage(conn, found, low, high)
-            _say(coverage, found, beside=False)
+            say_coverage(coverage, found, on_stdout=True)
             _print_classes(conn, found, low, high)
         else:
             listed = read_leaks(conn, found, chosen, Selection(cast(Kind, kind), low, high, hours, min_area, min_confidence))
             coverage = listed.coverage
-            _say(coverage, found, beside=form != "table" or output is not None)
+            say_coverage(coverage, found, on_stdout=form == "table" and output is None)
             _write(listed, form, chosen, found, output)
     if not coverage.complete:
         context.exit(1)
 
 
-def _say(coverage: Coverage, survey: Survey, *, beside: bool) -> None:
-    """Say for what the leaks can't be vouched for: before them, or on stderr where something else is read on stdout."""
-    tell(
-        survey=survey.name, statement=coverage.statement, gaps=coverage.gaps, seen_area=coverage.seen_area,
-        seen_share=coverage.seen_share, searched_share=coverage.searched_share,
-    )  # fmt: skip
-    if survey.intensity_kind == "none":
-        click.echo(f"survey {survey.name} has no intensity: leaks were not sought", err=True)
-    elif coverage.statement is not None and beside:
-        click.echo(coverage.statement, err=True)
-    elif coverage.statement is not None:
-        console = Console()
-        Console(width=console.width if console.is_terminal else _WIDTH).print(coverage.statement, markup=False, highlight=False)
-
-
 def _write(listed: LeakList, form: str, geometry: Geometry, survey: Survey, output: Path | None) -> None:
-    tell(kind=listed.kind, count=listed.count, area=listed.area, listed=len(listed.rows))
+    tell(survey=survey.name, kind=listed.kind, count=listed.count, area=listed.area, listed=len(listed.rows))
     if output is None:
         tell(geometry=geometry, leaks=listed.rows)
         _print(listed, form, geometry, survey)
@@ -219,7 +205,7 @@ def _print_classes(conn: psycopg.Connection, survey: Survey, low: float, high: f
     total = conn.execute(whole, place).fetchall()
     names = ["km", *(name for name, _, _ in _BY_KM)]
     kilometres = [{**row, "km": int(row["km"])} for row in records(names, rows)]
-    tell(kilometres=kilometres, total=records(names, total)[0] if total else None)
+    tell(survey=survey.name, kilometres=kilometres, total=records(names, total)[0] if total else None)
     formats = [form for _, _, form in _BY_KM]
     lines = [
         [km, *("-" if v is None else format(v, form).removesuffix("%") for v, form in zip(values, formats, strict=True))]
@@ -247,6 +233,6 @@ def _text(listed: LeakList, form: str, geometry: Geometry, survey: Survey) -> st
         return as_geojson(listed, geometry, survey.srid)
     console = Console(width=_WIDTH, record=True, quiet=True)
     if listed.coverage.statement is not None:
-        console.print(listed.coverage.statement, markup=False, highlight=False)
+        console.print(listed.coverage.statement, markup=False, highlight=False, soft_wrap=True)
     console.print(as_table(listed, survey.name))
     return console.export_text()

@@ -22,9 +22,6 @@ from tunneldb.store.survey import Survey
 
 Row = dict[str, Any]
 
-HIDDEN_SHARE, HIDDEN_LENGTH = 0.5, 5.0
-"""Where less than this share of the lining was seen over at least so many metres, the report lists the stretch."""
-
 
 @dataclass(frozen=True)
 class Leak:
@@ -40,8 +37,8 @@ class Leak:
         Chainage of its middle, in the tunnel's stationing.
     clock : float
         Hours, 12 is the crown.
-    area : float
-        m².
+    area, inside : float
+        Its area, and that of its part in the stretch reported, m².
     drop_mean, drop_max : float
         dB below dry lining.
     contrast, confidence : float or None
@@ -66,6 +63,7 @@ class Leak:
     arc_to: float
     clock: float
     area: float
+    inside: float
     drop_mean: float
     drop_max: float
     contrast: float | None
@@ -90,7 +88,7 @@ class Leak:
 
 
 @dataclass(frozen=True)
-class Coverage:
+class CoverageBins:
     """Lining by bins along the tunnel.
 
     Attributes
@@ -110,10 +108,10 @@ class Coverage:
         """Share of the lining seen, 0 to 1; NaN where detection did not run."""
         return np.divide(self.seen, self.lining, out=np.full(len(self.seen), np.nan), where=self.lining > 1e-6)
 
-    def merged(self, count: int) -> Coverage:
+    def merged(self, count: int) -> CoverageBins:
         """Take so many bins together."""
         starts = np.arange(0, len(self.lining), count)
-        return Coverage(
+        return CoverageBins(
             np.append(self.edges[starts], self.edges[-1]),
             np.add.reduceat(self.lining, starts),
             np.add.reduceat(self.seen, starts),
@@ -139,19 +137,20 @@ def find_stretch(conn: psycopg.Connection[Any], survey: Survey, low: float, high
 
 
 _LEAK = sql.SQL(
-    "SELECT {columns}, public.ST_AsBinary(unrolled) AS outline FROM tunnel_api.leak"
-    " WHERE survey_id = %s AND (detected OR review = 'confirmed') AND chainage_to > %s AND chainage_from < %s"
-    " ORDER BY chainage_from, arc_from, id"
-).format(columns=sql.SQL(", ").join(sql.Identifier(f.name) for f in fields(Leak) if f.name != "outline"))
+    "SELECT {columns}, tunnel_api.area_between(unrolled, area, %(low)s, %(high)s) AS inside,"
+    " public.ST_AsBinary(unrolled) AS outline FROM tunnel_api.leak"
+    " WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed') AND chainage_to > %(low)s"
+    " AND chainage_from < %(high)s ORDER BY chainage_from, arc_from, id"
+).format(columns=sql.SQL(", ").join(sql.Identifier(f.name) for f in fields(Leak) if f.name not in ("inside", "outline")))
 
 
 def read_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Leak]:
     """Read the leaks of a stretch in order of chainage: found last, or confirmed although found no more; also the rejected."""
-    rows = _rows(conn, _LEAK, [survey.id, low, high])
+    rows = _rows(conn, _LEAK, {"survey": survey.id, "low": low, "high": high})
     return [Leak(**{**row, "outline": shapely.from_wkb(bytes(row["outline"]))}) for row in rows]
 
 
-def read_coverage(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> Coverage:
+def read_bins(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> CoverageBins:
     """Read lining and lining seen of a stretch by bins of 1 m."""
     edges = np.unique(np.concatenate([[low], np.arange(np.ceil(low), np.floor(high) + 1), [high]]))
     edges = edges[(edges >= low) & (edges <= high)]
@@ -159,20 +158,7 @@ def read_coverage(conn: psycopg.Connection[Any], survey: Survey, low: float, hig
         "SELECT c.lining, c.seen FROM tunnel_api.coverage_at(%s, %s) c ORDER BY c.n", (survey.id, edges.tolist())
     ).fetchall()
     lining, seen = np.diff(np.array(rows, float), axis=0).T
-    return Coverage(edges, lining, seen)
-
-
-def hidden_stretches(coverage: Coverage) -> list[tuple[float, float, float]]:
-    """Find where too little of the lining was seen: begin and end, m, and the share that was (0 without detection)."""
-    share = np.nan_to_num(coverage.share)
-    turns = np.flatnonzero(np.diff(np.concatenate([[False], share < HIDDEN_SHARE, [False]]).astype(np.int8)))
-    found = []
-    for first, last in turns.reshape(-1, 2).tolist():
-        low, high = float(coverage.edges[first]), float(coverage.edges[last])
-        if high - low >= HIDDEN_LENGTH:
-            lining = coverage.lining[first:last].sum()
-            found.append((low, high, float(coverage.seen[first:last].sum() / lining) if lining > 0 else 0.0))
-    return found
+    return CoverageBins(edges, lining, seen)
 
 
 def read_statistics(conn: psycopg.Connection[Any], survey: Survey, starts: Sequence[float], ends: Sequence[float]) -> list[Row]:
@@ -305,7 +291,7 @@ def place_name(conn: psycopg.Connection[Any], survey: Survey) -> str:
     return "Chainage" if own is None else "Station"
 
 
-def _rows(conn: psycopg.Connection[Any], query: sql.Composed | LiteralString, values: list[Any]) -> list[Row]:
+def _rows(conn: psycopg.Connection[Any], query: sql.Composed | LiteralString, values: list[Any] | dict[str, Any]) -> list[Row]:
     """Rows of a query as mappings."""
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(query, values).fetchall()
