@@ -30,10 +30,11 @@ BEGIN
         WHERE f.survey_id = survey_key
         GROUP BY k.km
     ), kilometre AS MATERIALIZED (
-        SELECT km, coalesce(e.chainage_from, q.low) AS low, coalesce(e.chainage_to, q.high) AS high, e.km IS NOT NULL AS placed,
-            EXISTS (SELECT FROM tunnel.coverage c WHERE c.survey_id = survey_key AND c.km = km) AND NOT blind AS searched
-        FROM scanned q
-        FULL JOIN (SELECT k.* FROM tunnel_api.km_ends k WHERE k.survey_id = survey_key) e USING (km)
+        SELECT p.km, p.low, p.high, c.km IS NOT NULL AND NOT blind AS searched
+        FROM (SELECT coalesce(q.km, e.km) AS km, coalesce(e.chainage_from, q.low) AS low, coalesce(e.chainage_to, q.high) AS high
+              FROM scanned q
+              FULL JOIN (SELECT k.* FROM tunnel_api.km_ends k WHERE k.survey_id = survey_key) e ON e.km = q.km) p
+        LEFT JOIN tunnel.coverage c ON c.survey_id = survey_key AND c.km = p.km
     ), stage AS MATERIALIZED (
         SELECT t.km, t.step, t.stage, t.outcome, t.reason, t.done_at, split_part(t.message, E'\n', 1) AS message
         -- staleness comes from as many kilometres away as there are stages
@@ -49,7 +50,7 @@ BEGIN
             CASE WHEN blind THEN 'no intensity'
                  WHEN b.outcome IN ('failed', 'interrupted') THEN b.outcome
                  WHEN k.searched THEN CASE WHEN d.reason IS NOT NULL THEN 'stale' END
-                 WHEN b.stage = 'load' AND NOT k.placed THEN 'not loaded'
+                 WHEN b.stage = 'load' THEN 'not loaded'
                  ELSE 'not searched' END AS state,
             CASE WHEN blind THEN 'by which wet lining is told from dry'
                  WHEN b.outcome = 'failed' THEN b.stage || ': ' || coalesce(b.message, 'no reason was noted')

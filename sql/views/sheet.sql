@@ -27,9 +27,12 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
  CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
  CROSS JOIN LATERAL (  -- a survey that ends some centimetres into the next sheet has none for them, unless it leaks there
         SELECT i AS number
-          FROM tunnel.segment g
+          FROM (SELECT q.chainage_from, q.chainage_to FROM tunnel.segment q WHERE q.survey_id = s.id
+                 UNION ALL  -- a kilometre without segments has empty ones, which say so
+                SELECT k.chainage_from, k.chainage_to FROM tunnel_api.km_ends k
+                 WHERE k.survey_id = s.id
+                   AND NOT EXISTS (SELECT FROM tunnel.segment q WHERE q.survey_id = k.survey_id AND q.km = k.km)) g
          CROSS JOIN generate_series(floor(g.chainage_from / 50)::integer, ceil(g.chainage_to / 50)::integer - 1) AS i
-         WHERE g.survey_id = s.id
          GROUP BY i
         HAVING sum(least(g.chainage_to, e.chainage_to, (i + 1) * 50) - greatest(g.chainage_from, e.chainage_from, i * 50)) >= 1
             OR EXISTS (SELECT FROM tunnel.anomaly x

@@ -233,7 +233,7 @@
     const order = largest.sort((a, b) => a.chainage - b.chainage || a.id - b.id);
     $("#sheets-note").textContent = order.length < leaks.length
       ? `The ${order.length} largest of ${leaks.length} leaks, in order of chainage; the HTML file of this report shows each.`
-      : `All ${order.length} leaks, in order of chainage.`;
+      : order.length ? `All ${order.length} leaks, in order of chainage.` : "";
     $("#sheets .cards").replaceChildren(...order.map(card));
   }
   function toScreen() {
