@@ -138,25 +138,25 @@ def leaks(
         else:
             listed = read_leaks(conn, found, chosen, Selection(cast(Kind, kind), low, high, hours, min_area, min_confidence))
             coverage = listed.coverage
-            say_coverage(coverage, found, on_stdout=form == "table" and output is None)
-            _write(listed, form, chosen, found, output)
+            if output is None:
+                say_coverage(coverage, found, on_stdout=form == "table")
+                _print(listed, form, chosen, found)
+            else:
+                _write_file(listed, form, chosen, found, output)
+                say_coverage(coverage, found)
+                click.echo(f"{listed.total} to {output}", err=True)
+            tell(survey=survey, kind=listed.kind, count=listed.count, area=listed.area, listed=len(listed.rows))
     if not coverage.complete:
         context.exit(1)
 
 
-def _write(listed: LeakList, form: str, geometry: Geometry, survey: Survey, output: Path | None) -> None:
-    tell(survey=survey.name, kind=listed.kind, count=listed.count, area=listed.area, listed=len(listed.rows))
-    if output is None:
-        tell(geometry=geometry, leaks=listed.rows)
-        _print(listed, form, geometry, survey)
-        return
+def _write_file(listed: LeakList, form: str, geometry: Geometry, survey: Survey, output: Path) -> None:
     with replacing(output) as temporary:
         if form == "gpkg":
             write_gpkg(temporary, listed, geometry, survey.srid)
         else:
             temporary.write_text(_text(listed, form, geometry, survey), encoding="utf-8")
     tell(file=output)
-    click.echo(f"{listed.total} to {output}", err=True)
 
 
 def parse_clock(text: str) -> tuple[float, float]:
@@ -216,6 +216,7 @@ def _print_classes(conn: psycopg.Connection, survey: Survey, low: float, high: f
 
 
 def _print(listed: LeakList, form: str, geometry: Geometry, survey: Survey) -> None:
+    tell(geometry=geometry, leaks=listed.rows)
     if form != "table":
         click.echo(_text(listed, form, geometry, survey), nl=False)
     elif listed.rows or listed.coverage.seen_area:
