@@ -359,7 +359,7 @@ def test_places_that_were_not_scanned_are_no_all_clear(documents: str, asked: tu
 
 def test_what_changed_since_the_search_is_said(conn: psycopg.Connection) -> None:
     make_survey(conn, WHOLE.scene)
-    conn.execute("UPDATE tunnel.axis_vertex SET source = 'edited', edited_at = now() WHERE n = 95")
+    conn.execute("UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0.1, 0, 0) WHERE n = 95")
     conn.execute(
         "INSERT INTO tunnel.run (survey_id, km, stage, started_at, finished_at, outcome, message)"
         " SELECT id, 1, 'ground', now(), now(), 'failed', E'out of memory\\nand more' FROM tunnel.survey"
@@ -374,7 +374,7 @@ def test_what_changed_since_the_search_is_said(conn: psycopg.Connection) -> None
     ).fetchall()
     assert rows == [
         (1000, 1060, "not loaded", "b.laz was not read: truncated", False),
-        (940, 1000, "stale", "axis edited since", True),
+        (940, 1000, "stale", "segments is stale", True),
         (1000, 1060, "failed", "ground: out of memory", True),
     ]
 
