@@ -79,21 +79,32 @@ COMMENT ON FUNCTION tunnel_api.coverage_at(int, float8[]) IS
 
 -- Where a survey begins and ends: at its first and last point, within its segments. Segments end at vertices, up to a spacing
 -- beyond the points, and lining out there is nothing that a survey should have seen. Files know where they reach along the
--- given axis, on which segment n goes from n to n + 1 times the spacing; that is carried over to the axis found.
+-- given axis, on which segment n goes from n to n + 1 times the spacing; that is carried over to the axis found. A kilometre
+-- without segments of a survey that has some, whose axis failed, say, goes as far as its points along the given axis: it is a
+-- part of what was scanned, and must not be missing where that is stated.
 CREATE OR REPLACE VIEW tunnel_api.km_ends AS
-SELECT g.survey_id::bigint * 1000000 + 500000 + g.km AS id, g.survey_id, g.km,
-       min(g.chainage_from + (g.chainage_to - g.chainage_from) * greatest(0, f.first - g.n)) AS chainage_from,
-       max(g.chainage_to - (g.chainage_to - g.chainage_from) * greatest(0, g.n + 1 - f.last)) AS chainage_to
-  FROM (SELECT s.id AS survey_id, coalesce(min(q.chainage_from) / t.spacing, '-Infinity') AS first,
-               coalesce(max(q.chainage_to) / t.spacing, 'Infinity') AS last
-          FROM tunnel.survey s
-          JOIN tunnel.tunnel t ON t.id = s.tunnel_id
-          LEFT JOIN tunnel.scan_file q ON q.survey_id = s.id
-         GROUP BY s.id, t.spacing) f
-  JOIN tunnel.segment g ON g.survey_id = f.survey_id AND g.n < f.last AND g.n + 1 > f.first
- GROUP BY g.survey_id, g.km;
+SELECT k.survey_id::bigint * 1000000 + 500000 + k.km AS id, k.survey_id, k.km, k.chainage_from, k.chainage_to
+  FROM (
+    SELECT g.survey_id, g.km,
+           min(g.chainage_from + (g.chainage_to - g.chainage_from) * greatest(0, f.first - g.n)) AS chainage_from,
+           max(g.chainage_to - (g.chainage_to - g.chainage_from) * greatest(0, g.n + 1 - f.last)) AS chainage_to
+      FROM (SELECT s.id AS survey_id, coalesce(min(q.chainage_from) / t.spacing, '-Infinity') AS first,
+                   coalesce(max(q.chainage_to) / t.spacing, 'Infinity') AS last
+              FROM tunnel.survey s
+              JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+              LEFT JOIN tunnel.scan_file q ON q.survey_id = s.id
+             GROUP BY s.id, t.spacing) f
+      JOIN tunnel.segment g ON g.survey_id = f.survey_id AND g.n < f.last AND g.n + 1 > f.first
+     GROUP BY g.survey_id, g.km
+     UNION ALL
+    SELECT q.survey_id, i.km, min(greatest(q.chainage_from, i.km * 1000)), max(least(q.chainage_to, (i.km + 1) * 1000))
+      FROM tunnel.scan_file q
+     CROSS JOIN LATERAL generate_series(floor(q.chainage_from / 1000)::integer, ceil(q.chainage_to / 1000)::integer - 1) AS i (km)
+     WHERE EXISTS (SELECT FROM tunnel.segment g WHERE g.survey_id = q.survey_id)
+       AND NOT EXISTS (SELECT FROM tunnel.segment g WHERE g.survey_id = q.survey_id AND g.km = i.km)
+     GROUP BY q.survey_id, i.km) k;
 COMMENT ON VIEW tunnel_api.km_ends IS
-    'Where each kilometre of a survey begins and ends: with its segments, as far as they were scanned';
+    'Where each kilometre of a survey begins and ends: with its segments, as far as they were scanned; without segments with its points';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.survey_ends(survey_id int, OUT chainage_from float8, OUT chainage_to float8)
@@ -102,7 +113,7 @@ COST 5000  -- once a survey, not once a kilometre
 SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
 AS $$ SELECT min(k.chainage_from), max(k.chainage_to) FROM tunnel_api.km_ends k WHERE k.survey_id = $1 $$;
 COMMENT ON FUNCTION tunnel_api.survey_ends(int) IS
-'Least and greatest chainage (m) of what a survey scanned: its first and last point, within its segments.';
+'Least and greatest chainage (m) of what a survey scanned: its first and last point, within its segments. NULL before it has any.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.coverage(
@@ -110,15 +121,31 @@ CREATE OR REPLACE FUNCTION tunnel_api.coverage(
     OUT lining_area float8, OUT seen_area float8, OUT seen_share float8, OUT wet_pixel_area float8, OUT wet_pixel_share float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 AS $$
-    SELECT d.lining, d.seen, d.seen / nullif(d.lining, 0), d.wet, d.wet / nullif(d.seen, 0)
+    SELECT d.lining, d.seen, d.seen / nullif(d.lining, 0) * least(d.length / (r.ends[2] - r.ends[1]), 1), d.wet,
+        d.wet / nullif(d.seen, 0)
     FROM (SELECT tunnel_api.survey_id($1) AS id) s
     CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
     CROSS JOIN LATERAL (SELECT ARRAY[greatest($2, e.chainage_from), least($3, e.chainage_to)] AS ends) r
     LEFT JOIN LATERAL (
-        SELECT max(c.lining) - min(c.lining) AS lining, max(c.seen) - min(c.seen) AS seen, max(c.wet) - min(c.wet) AS wet
+        SELECT max(c.lining) - min(c.lining) AS lining, max(c.seen) - min(c.seen) AS seen, max(c.wet) - min(c.wet) AS wet,
+            max(c.length) - min(c.length) AS length
         FROM tunnel_api.coverage_at(s.id, r.ends) c
         HAVING max(c.length) > min(c.length)) d ON true
     WHERE e.chainage_from IS NOT NULL AND r.ends[1] < r.ends[2]
 $$;
 COMMENT ON FUNCTION tunnel_api.coverage(text, float8, float8) IS
-'Lining of a survey between two chainages (m), what the last detection saw of it, and the pixels that it found wet, after the median filter (m²); seen_share of the lining, wet_pixel_share of what was seen, as Xu et al. (2018) state it. Steps of chainage that an end cuts count by their share; kilometres without detection are not counted.';
+'Lining of a survey between two chainages (m) where it was searched for leaks, what the last detection saw of it, and the pixels that it found wet, after the median filter (m²); seen_share of the lining of the whole stretch, in which kilometres without detection count as unseen, as in leak_statistics; wet_pixel_share of what was seen, as Xu et al. (2018) state it. Steps of chainage that an end cuts count by their share.';
+
+
+-- Of an area on the lining (m²) whose outline lies in the unrolled plane, the part between two chainages (m). The planner puts
+-- the body in the place of a call; one that is not cut is not clipped.
+CREATE OR REPLACE FUNCTION tunnel_api.area_between(outline geometry, area float8, chainage_from float8, chainage_to float8)
+RETURNS float8
+LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT
+AS $$
+    SELECT CASE WHEN public.ST_XMin($1) >= $3 AND public.ST_XMax($1) <= $4 THEN $2
+        ELSE $2 / nullif(public.ST_Area($1), 0) * public.ST_Area(public.ST_ClipByBox2D($1, public.ST_MakeBox2D(
+            public.ST_MakePoint(greatest($3, -1e9), -1e4), public.ST_MakePoint(least($4, 1e9), 1e4)))) END
+$$;
+COMMENT ON FUNCTION tunnel_api.area_between(geometry, float8, float8, float8) IS
+'Part of an area on the lining (m²), such as a leak''s, that lies between two chainages (m), by its outline in the unrolled plane. The area of a leak over the end of a stretch, wherever it is stated.';

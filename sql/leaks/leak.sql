@@ -25,26 +25,25 @@ COMMENT ON FUNCTION tunnel_api.nearest_leaks(int, geometry, int) IS
 
 
 -- Wet area of a stretch of a survey, m² on the lining: the leaks (of kind leak, after judging) that were found last and are
--- not rejected, cut at both ends. Runs with the owner's rights, for it reads the tables themselves. Those that are not cut come
--- from the index alone, of which no more is read than the longest leak can reach.
+-- not rejected, cut at both ends, those of the survey among them. Runs with the owner's rights, for it reads the tables
+-- themselves. Those that are not cut come from the index alone, of which no more is read than the longest leak can reach.
 CREATE OR REPLACE FUNCTION tunnel_api.wet_area(survey text, chainage_from float8, chainage_to float8)
 RETURNS float8
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER
 SET search_path = pg_catalog, public, pg_temp
 AS $$
     WITH given AS MATERIALIZED (
-        SELECT s.id, (SELECT max(l.chainage_to - l.chainage_from) FROM tunnel.anomaly l WHERE l.survey_id = s.id) AS longest
-        FROM tunnel.survey s WHERE s.name = $1
+        SELECT s.id, greatest($2, e.chainage_from) AS low, least($3, e.chainage_to) AS high,
+            (SELECT max(l.chainage_to - l.chainage_from) FROM tunnel.anomaly l WHERE l.survey_id = s.id) AS longest
+        FROM tunnel.survey s CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e WHERE s.name = $1
     )
-    SELECT coalesce(sum(CASE WHEN l.chainage_from >= $2 AND l.chainage_to <= $3 THEN l.area
-        ELSE l.area * (SELECT ST_Area(ST_ClipByBox2D(a.unrolled, ST_MakeBox2D(
-            ST_MakePoint($2, -1e4), ST_MakePoint($3, 1e4)))) / ST_Area(a.unrolled)
-            FROM tunnel.anomaly a WHERE a.id = l.id) END), 0)
-    FROM tunnel.anomaly l
-    WHERE l.survey_id = (SELECT g.id FROM given g) AND l.detected AND l.review <> 'rejected'
+    SELECT coalesce(sum(CASE WHEN l.chainage_from >= g.low AND l.chainage_to <= g.high THEN l.area
+        ELSE (SELECT tunnel_api.area_between(a.unrolled, a.area, g.low, g.high) FROM tunnel.anomaly a WHERE a.id = l.id) END), 0)
+    FROM given g
+    JOIN tunnel.anomaly l ON l.survey_id = g.id AND l.detected AND l.review <> 'rejected'
         AND coalesce(l.judged, l.kind) = 'leak'
-        AND l.chainage_from > $2 - 1e-6 - (SELECT g.longest FROM given g)
-        AND l.chainage_to > $2 AND l.chainage_from < $3 AND $2 < $3
+        AND l.chainage_from > g.low - 1e-6 - g.longest AND l.chainage_to > g.low AND l.chainage_from < g.high
+    WHERE g.low < g.high
 $$;
 COMMENT ON FUNCTION tunnel_api.wet_area(text, float8, float8) IS
 'Wet area (m² on the lining) of a survey between two chainages (m), of leaks found last and not rejected.';

@@ -111,7 +111,8 @@ CREATE OR REPLACE FUNCTION tunnel_api.stretch_statistics(survey_id int, starts f
 RETURNS TABLE (
     n int, chainage_from float8, chainage_to float8, lining_area float8, seen_area float8, seen_share float8,
     wet_area float8, wet_ratio float8, patches int, largest_area float8, largest_leak bigint,
-    window_patches int, window_from float8, window_to float8, window_leaks bigint[], window_wet_area float8, class int)
+    window_patches int, window_from float8, window_to float8, window_leaks bigint[], window_wet_area float8, class int,
+    searched_share float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 100
 SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
@@ -155,8 +156,7 @@ BEGIN
         SELECT l.n, l.id, greatest(l.low, g.low[l.n]) AS low, least(l.high, g.high[l.n]) AS high, l.area AS whole,
             CASE WHEN l.low >= g.low[l.n] AND l.high <= g.high[l.n] THEN l.area
                  -- few are cut: only they are looked up, the others come from the index alone
-                 ELSE l.area * (SELECT ST_Area(ST_ClipByBox2D(a.unrolled, ST_MakeBox2D(
-                     ST_MakePoint(g.low[l.n], -1e4), ST_MakePoint(g.high[l.n], 1e4)))) / ST_Area(a.unrolled)
+                 ELSE (SELECT tunnel_api.area_between(a.unrolled, a.area, g.low[l.n], g.high[l.n])
                      FROM tunnel.anomaly a WHERE a.id = l.id) END AS area
         FROM leak l CROSS JOIN given g
         WHERE l.high > g.low[l.n] AND l.low < g.high[l.n]
@@ -207,8 +207,11 @@ BEGIN
         SELECT s.n, s.low, s.high, nullif(s.b - s.a, 0) AS lining, s.seen,
             CASE WHEN coalesce(s.looked_at, 0) > 0 THEN s.seen / nullif(s.b - s.a, 0) * least(s.looked_at / (s.high - s.low), 1)
                  ELSE 0 END AS seen_share,
-            coalesce(t.area, 0) AS wet, coalesce(t.area, 0) / nullif(s.seen, 0) AS ratio,
-            coalesce(t.patches, 0) AS patches, t.largest, l.id,
+            least(coalesce(s.looked_at, 0) / nullif(s.high - s.low, 0), 1) AS searched_share,
+            -- that none was found is said only where they were searched for
+            CASE WHEN s.looked_at > 0 THEN coalesce(t.area, 0) ELSE t.area END AS wet,
+            coalesce(t.area, 0) / nullif(s.seen, 0) AS ratio,
+            CASE WHEN s.looked_at > 0 THEN coalesce(t.patches, 0) ELSE t.patches END AS patches, t.largest, l.id,
             -- where there are no more than 100 m², they are the window; where no lining is known, there is none
             CASE WHEN w.n IS NOT NULL THEN w.patches WHEN s.b > s.a THEN coalesce(t.patches, 0) END AS crowd,
             CASE WHEN p.n IS NOT NULL THEN greatest(p.low, s.low) WHEN w.n IS NULL AND s.b > s.a THEN s.low END AS crowd_low,
@@ -226,7 +229,8 @@ BEGIN
         r.crowd, r.crowd_low, r.crowd_high, r.leaks, r.window_wet,
         (SELECT min(c.id) FROM tunnel_api.waterproof_limit c
          WHERE r.seen > 0 AND (r.ratio > c.wet_ratio) IS NOT TRUE AND (r.largest > c.patch_area) IS NOT TRUE
-            AND (r.crowd > c.patches_per_100 OR (c.patches_per_100 = 0 AND r.patches > 0)) IS NOT TRUE)
+            AND (r.crowd > c.patches_per_100 OR (c.patches_per_100 = 0 AND r.patches > 0)) IS NOT TRUE),
+        r.searched_share
     FROM result r
     ORDER BY r.n;
 END
@@ -239,12 +243,14 @@ CREATE OR REPLACE FUNCTION tunnel_api.leak_statistics(survey text, chainage_from
 RETURNS TABLE (
     chainage_from float8, chainage_to float8, lining_area float8, seen_area float8, seen_share float8,
     wet_area float8, wet_ratio float8, patches int, largest_area float8, largest_leak bigint,
-    window_patches int, window_from float8, window_to float8, window_leaks bigint[], window_wet_area float8, class int)
+    window_patches int, window_from float8, window_to float8, window_leaks bigint[], window_wet_area float8, class int,
+    searched_share float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 ROWS 1
 AS $$
     SELECT t.chainage_from, t.chainage_to, t.lining_area, t.seen_area, t.seen_share, t.wet_area, t.wet_ratio, t.patches,
-        t.largest_area, t.largest_leak, t.window_patches, t.window_from, t.window_to, t.window_leaks, t.window_wet_area, t.class
+        t.largest_area, t.largest_leak, t.window_patches, t.window_from, t.window_to, t.window_leaks, t.window_wet_area, t.class,
+        t.searched_share
     FROM (SELECT tunnel_api.survey_id($1) AS id) s
     CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
     CROSS JOIN LATERAL (SELECT greatest($2, e.chainage_from) AS low, least($3, e.chainage_to) AS high) r
@@ -252,7 +258,7 @@ AS $$
     WHERE e.chainage_from IS NOT NULL AND r.low < r.high
 $$;
 COMMENT ON FUNCTION tunnel_api.leak_statistics(text, float8, float8) IS
-'Leaks of a survey between two chainages (m), as far as it reaches; of kind leak, found last and not rejected. wet_ratio is wet_area of the lining seen; seen_share that of the lining, in which kilometres without detection count as unseen. A leak that an end cuts counts by its part in wet_area and as one patch; largest_area and largest_leak take leaks whole. window_patches: most patches in any 100 m² of lining, here between window_from and window_to, and which; window_wet_area: greatest wet area in any 100 m² (m²). class: best class of GB 50108-2008 that the seen lining keeps, NULL if nothing was seen.';
+'Leaks of a survey between two chainages (m), as far as it reaches; of kind leak, found last and not rejected. wet_ratio is wet_area of the lining seen; lining_area and seen_area are those of the part that was searched for leaks, which makes up searched_share of the length; seen_share is that of the lining of the whole stretch, in which what was not searched counts as unseen. patches and wet_area are NULL where nothing was searched and nothing is known. A leak that an end cuts counts by its part in wet_area and as one patch; largest_area and largest_leak take leaks whole. window_patches: most patches in any 100 m² of lining, here between window_from and window_to, and which; window_wet_area: greatest wet area in any 100 m² (m²). class: best class of GB 50108-2008 that the seen lining keeps, NULL if nothing was seen.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.waterproof_class(survey text, chainage_from float8, chainage_to float8)

@@ -33,7 +33,7 @@ COMMENT ON COLUMN tunnel_api.km_waterproof.lining_area IS 'Lining, seen or not, 
 COMMENT ON COLUMN tunnel_api.km_waterproof.seen_share IS 'Share of it that was seen: the rest cannot be certified';
 COMMENT ON COLUMN tunnel_api.km_waterproof.wet_area IS 'Area of the leaks within the kilometre, m²; a leak over its end by its part';
 COMMENT ON COLUMN tunnel_api.km_waterproof.wet_ratio IS 'wet_area, of the lining seen';
-COMMENT ON COLUMN tunnel_api.km_waterproof.patches IS 'Leaks in the kilometre or over its ends';
+COMMENT ON COLUMN tunnel_api.km_waterproof.patches IS 'Leaks in the kilometre or over its ends; NULL where they were not searched for';
 COMMENT ON COLUMN tunnel_api.km_waterproof.largest_area IS 'Area of the largest of them, whole, m²';
 COMMENT ON COLUMN tunnel_api.km_waterproof.largest_leak IS 'Its id';
 COMMENT ON COLUMN tunnel_api.km_waterproof.window_patches IS 'Most leaks in any 100 m² of lining';

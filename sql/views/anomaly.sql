@@ -13,6 +13,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        coalesce(a.judged, a.kind) AS kind, a.kind AS found, a.reasons, a.confidence, a.contrast,
        a.area, a.drop_mean, a.drop_max, a.image_share,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.detected, a.created_at, a.detected_at,
+       a.detected AND a.review <> 'rejected' AS counted,
        a.unrolled::public.geometry(Polygon, 0) AS unrolled,
        a.map::public.geometry AS map,
        a.surface::public.geometry AS surface
@@ -74,7 +75,8 @@ BEGIN
         ('reviewed_by', 'Who reviewed or judged it last, set by the database'),
         ('reviewed_at', 'When it was reviewed or judged last, set by the database'),
         ('remark', 'The reviewer''s remark'),
-        ('detected', 'False when the last detection found it no more (kept for its review)')) AS t (name, text)
+        ('detected', 'False when the last detection found it no more (kept for its review)'),
+        ('counted', 'Whether sums count it: found last, and not rejected')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
       JOIN pg_class c ON c.oid = a.attrelid
      WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname ~ '^(anomaly|leak)(_|$)'

@@ -74,11 +74,13 @@ DECLARE
 BEGIN
     IF (NEW.id, NEW.survey_id, NEW.survey, NEW.km, NEW.segment, NEW.chainage_from, NEW.chainage_to, NEW.label,
         NEW.arc_from, NEW.arc_to, NEW.clock, NEW.found, NEW.reasons, NEW.confidence, NEW.contrast, NEW.area, NEW.drop_mean,
-        NEW.drop_max, NEW.image_share, NEW.reviewed_by, NEW.reviewed_at, NEW.detected, NEW.created_at, NEW.detected_at)
+        NEW.drop_max, NEW.image_share, NEW.reviewed_by, NEW.reviewed_at, NEW.detected, NEW.counted,
+        NEW.created_at, NEW.detected_at)
        IS DISTINCT FROM
        (OLD.id, OLD.survey_id, OLD.survey, OLD.km, OLD.segment, OLD.chainage_from, OLD.chainage_to, OLD.label,
         OLD.arc_from, OLD.arc_to, OLD.clock, OLD.found, OLD.reasons, OLD.confidence, OLD.contrast, OLD.area, OLD.drop_mean,
-        OLD.drop_max, OLD.image_share, OLD.reviewed_by, OLD.reviewed_at, OLD.detected, OLD.created_at, OLD.detected_at) THEN
+        OLD.drop_max, OLD.image_share, OLD.reviewed_by, OLD.reviewed_at, OLD.detected, OLD.counted,
+        OLD.created_at, OLD.detected_at) THEN
         RAISE EXCEPTION 'of a leak or another anomaly only the review, the remark and the kind can be edited'
             USING ERRCODE = 'feature_not_supported';
     END IF;

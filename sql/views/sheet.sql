@@ -8,6 +8,7 @@ CREATE OR REPLACE VIEW tunnel_api.sheet AS
 SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.name AS survey, n.number, b.km,
        b.chainage_from, b.chainage_to, k.labels[1] AS label_from, k.labels[6] AS label_to, k.labels AS ticks,
        c.lining AS lining_area, c.seen / nullif(c.lining, 0) AS seen_share, l.wet_area, l.leaks,
+       g.said AS gaps,
        public.st_makeenvelope(b.chainage_from, a.arc_from, b.chainage_to, a.arc_to, 0)::public.geometry(Polygon, 0) AS geom
   FROM tunnel.survey s
  CROSS JOIN LATERAL (
@@ -24,16 +25,26 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
                           FROM tunnel.section t WHERE t.survey_id = s.id) e
                 WINDOW w AS (ORDER BY e.chainage)) q) a
  CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
- CROSS JOIN LATERAL (  -- a survey that ends some centimetres into the next sheet has none for them
+ CROSS JOIN LATERAL (  -- a survey that ends some centimetres into the next sheet has none for them, unless it leaks there
         SELECT i AS number
-          FROM tunnel.segment g
+          FROM (SELECT q.chainage_from, q.chainage_to FROM tunnel.segment q WHERE q.survey_id = s.id
+                 UNION ALL  -- a kilometre without segments has empty ones, which say so
+                SELECT k.chainage_from, k.chainage_to FROM tunnel_api.km_ends k
+                 WHERE k.survey_id = s.id
+                   AND NOT EXISTS (SELECT FROM tunnel.segment q WHERE q.survey_id = k.survey_id AND q.km = k.km)) g
          CROSS JOIN generate_series(floor(g.chainage_from / 50)::integer, ceil(g.chainage_to / 50)::integer - 1) AS i
-         WHERE g.survey_id = s.id
          GROUP BY i
-        HAVING sum(least(g.chainage_to, e.chainage_to, (i + 1) * 50) - greatest(g.chainage_from, e.chainage_from, i * 50)) >= 1) n
+        HAVING sum(least(g.chainage_to, e.chainage_to, (i + 1) * 50) - greatest(g.chainage_from, e.chainage_from, i * 50)) >= 1
+            OR EXISTS (SELECT FROM tunnel.anomaly x
+                        WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND coalesce(x.judged, x.kind) = 'leak'
+                          AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(i * 50, -1e4, (i + 1) * 50, 1e4)
+                          AND x.chainage_to > greatest(e.chainage_from, i * 50)
+                          AND x.chainage_from < least(e.chainage_to, (i + 1) * 50))) n
  CROSS JOIN LATERAL (
         SELECT n.number * 50::float8 AS chainage_from, (n.number + 1) * 50::float8 AS chainage_to,
                floor(n.number / 20.0)::integer AS km) b
+ CROSS JOIN LATERAL (  -- as far as the survey reaches
+        SELECT greatest(b.chainage_from, e.chainage_from) AS chainage_from, least(b.chainage_to, e.chainage_to) AS chainage_to) r
   LEFT JOIN LATERAL (
         SELECT array_agg(regexp_replace(t.label, '\.0+$', '') ORDER BY i) AS labels
           FROM generate_series(0, 5) AS i
@@ -42,26 +53,27 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
         SELECT sum(v.lining::float8) AS lining, sum(v.seen::float8) AS seen
           FROM tunnel.coverage q
          CROSS JOIN LATERAL (
-                SELECT round((greatest(b.chainage_from, e.chainage_from) - b.km * 1000) / q.step)::integer + 1 AS first,
-                       round((least(b.chainage_to, e.chainage_to) - b.km * 1000) / q.step)::integer AS last) p
+                SELECT round((r.chainage_from - b.km * 1000) / q.step)::integer + 1 AS first,
+                       round((r.chainage_to - b.km * 1000) / q.step)::integer AS last) p
          CROSS JOIN LATERAL unnest(q.lining[p.first:p.last], q.seen[p.first:p.last]) AS v (lining, seen)
          WHERE q.survey_id = s.id AND q.km = b.km) c ON true
   LEFT JOIN LATERAL (
-        SELECT count(*) AS leaks,
-               coalesce(sum(CASE WHEN x.chainage_from >= b.chainage_from AND x.chainage_to <= b.chainage_to THEN x.area
-                   ELSE x.area / public.st_area(x.unrolled) * public.st_area(public.st_clipbybox2d(x.unrolled,
-                       public.st_makebox2d(public.st_makepoint(b.chainage_from, -1e4), public.st_makepoint(b.chainage_to, 1e4))))
-                   END), 0) AS wet_area
+        SELECT CASE WHEN c.lining IS NOT NULL OR count(*) > 0 THEN count(*) END AS leaks,
+               coalesce(sum(tunnel_api.area_between(x.unrolled, x.area, r.chainage_from, r.chainage_to)),
+                        CASE WHEN c.lining IS NOT NULL THEN 0 END) AS wet_area
           FROM tunnel.anomaly x
          WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND coalesce(x.judged, x.kind) = 'leak'
-           AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(b.chainage_from, -1e4, b.chainage_to, 1e4)) l ON true
+           AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(b.chainage_from, -1e4, b.chainage_to, 1e4)
+           AND x.chainage_to > r.chainage_from AND x.chainage_from < r.chainage_to) l ON true
+ CROSS JOIN LATERAL (SELECT tunnel_api.coverage_statement(s.id, r.chainage_from, r.chainage_to) AS said) g
  WHERE a.arc_from IS NOT NULL;
 COMMENT ON VIEW tunnel_api.sheet IS
     'Sheets of 50 m on which a survey is drawn and printed: rectangles of the unrolled plane (chainage, arc), SRID 0';
 COMMENT ON COLUMN tunnel_api.sheet.number IS 'floor(chainage / 50), as the blocks of the images';
 COMMENT ON COLUMN tunnel_api.sheet.ticks IS 'Station at each 10 m from its beginning to its end, as 12+350';
 COMMENT ON COLUMN tunnel_api.sheet.lining_area IS 'Lining, seen or not, m²; NULL before detection';
-COMMENT ON COLUMN tunnel_api.sheet.seen_share IS 'Share of it that was seen; on what was not, no leak was searched for';
+COMMENT ON COLUMN tunnel_api.sheet.seen_share IS 'Share of it that was seen, as in leak_statistics; on what was not, no leak was searched for';
 COMMENT ON COLUMN tunnel_api.sheet.wet_area IS 'Area of the leaks within the sheet, m²; a leak over its edge by its part';
-COMMENT ON COLUMN tunnel_api.sheet.leaks IS 'Leaks on it or over its edges, found last and not rejected';
+COMMENT ON COLUMN tunnel_api.sheet.leaks IS 'Leaks on it or over its edges, found last and not rejected; NULL where they were not searched for';
+COMMENT ON COLUMN tunnel_api.sheet.gaps IS 'Where on it leaks were not searched for, or not as they should be (coverage_statement); NULL if nowhere';
 COMMENT ON COLUMN tunnel_api.sheet.geom IS 'From edge to edge, as high as the survey''s widest place';

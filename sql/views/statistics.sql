@@ -33,46 +33,35 @@ COMMENT ON COLUMN tunnel_api.radiometry.sigma_raw IS 'Standard deviation of dry 
 COMMENT ON COLUMN tunnel_api.radiometry.sigma_lambert IS 'The same after correction by Lambert''s law, dB';
 COMMENT ON COLUMN tunnel_api.radiometry.sigma_oren_nayar IS 'The same after correction by Oren-Nayar, dB';
 
--- Of a kilometre that was detected before there was a coverage the lining seen is what that detection counted: pixels of
--- lining that hold measurements × the area of a pixel.
+-- Leaks, areas and shares are those of km_waterproof. Of a kilometre that was detected before there was a coverage the lining
+-- seen is what that detection counted: pixels of lining that hold measurements × the area of a pixel.
 CREATE OR REPLACE VIEW tunnel_api.km_statistics AS
-SELECT s.id::bigint * 1000000 + 500000 + g.km AS id, s.id AS survey_id, s.name AS survey, g.km, g.chainage_from,
-       g.chainage_to, c.lining AS lining_area, d.seen AS seen_area, d.seen / nullif(c.lining, 0) AS seen_share,
-       l.wet_area, l.wet_area / nullif(d.seen, 0) AS wet_share, c.wet / nullif(c.seen, 0) AS wet_pixel_share, l.leaks,
-       l.leaks_open, l.leaks_confirmed, l.leaks_rejected, l.largest_area, l.greatest_drop
-  FROM tunnel.survey s
-  JOIN (SELECT k.*, k.chainage_from < k.km * 1000 + 1e-6 AND k.chainage_to > (k.km + 1) * 1000 - 1e-6 AS whole
-          FROM tunnel_api.km_ends k) g ON g.survey_id = s.id
-  LEFT JOIN tunnel.coverage w ON w.survey_id = g.survey_id AND w.km = g.km
+SELECT g.id, g.survey_id, g.survey, g.km, g.chainage_from, g.chainage_to, g.lining_area, d.seen AS seen_area,
+       d.seen / nullif(g.lining_area, 0) AS seen_share, g.wet_area, g.wet_area / nullif(d.seen, 0) AS wet_share,
+       c.wet / nullif(c.seen, 0) AS wet_pixel_share, g.patches AS leaks, l.leaks_open, l.leaks_confirmed, l.leaks_rejected,
+       g.largest_area, l.greatest_drop
+  FROM tunnel_api.km_waterproof g
   LEFT JOIN LATERAL (
-        SELECT w.lining_total AS lining, w.seen_total AS seen, w.wet_total AS wet WHERE g.whole
-         UNION ALL
-        SELECT sum(v.lining * i.share), sum(v.seen * i.share), sum(v.wet * i.share)
-          FROM unnest(w.lining, w.seen, w.wet) WITH ORDINALITY AS v (lining, seen, wet, n)
-         -- the tunnel may end within the kilometre, even within a step of it
-         CROSS JOIN LATERAL (SELECT greatest(0, least(g.chainage_to - w.km * 1000 - v.n * w.step, 0)
-                                 - greatest(g.chainage_from - w.km * 1000 - v.n * w.step, -w.step)) / w.step AS share) i
-         WHERE NOT g.whole) c ON c.lining IS NOT NULL
+        SELECT max(q.seen) - min(q.seen) AS seen, max(q.wet) - min(q.wet) AS wet
+          FROM tunnel_api.coverage_at(g.survey_id, ARRAY[g.chainage_from, g.chainage_to]) q) c ON g.lining_area IS NOT NULL
  CROSS JOIN LATERAL (SELECT coalesce(c.seen, (
         SELECT (r.counts ->> 'lining_pixels')::float8 * (r.parameters ->> 'image.pixel')::float8 ^ 2
           FROM tunnel.run r
          WHERE r.survey_id = g.survey_id AND r.km = g.km AND r.stage = 'detect' AND r.outcome = 'done'
          ORDER BY r.finished_at DESC, r.id DESC LIMIT 1)) AS seen) d
  CROSS JOIN LATERAL (
-        SELECT count(*) FILTER (WHERE k.review <> 'rejected') AS leaks,
-               count(*) FILTER (WHERE k.review = 'open') AS leaks_open,
-               count(*) FILTER (WHERE k.review = 'confirmed') AS leaks_confirmed,
-               count(*) FILTER (WHERE k.review = 'rejected') AS leaks_rejected,
-               coalesce(sum(k.area) FILTER (WHERE k.review <> 'rejected'), 0) AS wet_area,
-               max(k.area) FILTER (WHERE k.review <> 'rejected') AS largest_area,
-               max(k.drop_max) FILTER (WHERE k.review <> 'rejected') AS greatest_drop
+        SELECT count(*) FILTER (WHERE k.detected AND k.review = 'open') AS leaks_open,
+               count(*) FILTER (WHERE k.detected AND k.review = 'confirmed') AS leaks_confirmed,
+               count(*) FILTER (WHERE k.detected AND k.review = 'rejected') AS leaks_rejected,
+               max(k.drop_max) FILTER (WHERE k.detected AND k.review <> 'rejected') AS greatest_drop
           FROM tunnel.anomaly k
-         WHERE k.survey_id = g.survey_id AND k.km = g.km AND k.detected AND coalesce(k.judged, k.kind) = 'leak') l;
-COMMENT ON VIEW tunnel_api.km_statistics IS 'Leaks of each kilometre, summed; without those rejected or no longer found';
+         WHERE k.survey_id = g.survey_id AND k.chainage_to > g.chainage_from AND k.chainage_from < g.chainage_to
+           AND coalesce(k.judged, k.kind) = 'leak') l;
+COMMENT ON VIEW tunnel_api.km_statistics IS 'Leaks of each kilometre, summed, as km_waterproof has them; without those rejected or no longer found';
 COMMENT ON COLUMN tunnel_api.km_statistics.lining_area IS 'Lining, seen or not, m²; NULL before detection, and after one by an earlier version';
 COMMENT ON COLUMN tunnel_api.km_statistics.seen_area IS 'Lining that the last detection saw, m²; NULL before it';
 COMMENT ON COLUMN tunnel_api.km_statistics.seen_share IS 'seen_area / lining_area';
-COMMENT ON COLUMN tunnel_api.km_statistics.wet_area IS 'Area of the leaks on the lining, m²';
+COMMENT ON COLUMN tunnel_api.km_statistics.wet_area IS 'Area of the leaks on the lining within the kilometre, m²; a leak over its end by its part';
 COMMENT ON COLUMN tunnel_api.km_statistics.wet_share IS 'wet_area / seen_area';
 COMMENT ON COLUMN tunnel_api.km_statistics.wet_pixel_share IS 'Share of wet pixels, after the median filter, in the lining seen (Xu et al., 2018)';
-COMMENT ON COLUMN tunnel_api.km_statistics.leaks IS 'Leaks open or confirmed';
+COMMENT ON COLUMN tunnel_api.km_statistics.leaks IS 'Leaks in the kilometre or over its ends, open or confirmed; NULL where they were not searched for';

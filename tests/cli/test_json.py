@@ -43,7 +43,9 @@ def test_what_is_listed_is_what_the_views_hold(example: str, conn: psycopg.Conne
     held = rows(
         conn, "SELECT id, area, chainage_from, review, ST_AsGeoJSON(unrolled, 15)::json FROM tunnel_api.leak WHERE detected"
     )
-    assert leaks["count"] == len(leaks["leaks"]) == len(held)
+    assert leaks["listed"] == len(leaks["leaks"]) == len(held)
+    counted = "SELECT count(*)::int, sum(area) FROM tunnel_api.leak WHERE counted"
+    assert [(leaks["count"], pytest.approx(leaks["area"]))] == rows(conn, counted)
     by_id = {leak["id"]: leak for leak in leaks["leaks"]}
     for key, area, chainage, review, outline in held:
         assert (by_id[key]["area"], by_id[key]["chainage_from"], by_id[key]["review"]) == (area, chainage, review)
@@ -69,7 +71,7 @@ def test_what_is_written_is_named(example: str, tmp_path: Path, conn: psycopg.Co
     assert {Path(path).suffix for path in images} == {".tif", ".png"}
     assert sorted(map(str, (tmp_path / "images").iterdir())) == sorted(images)
     leaks = told(0, "leaks", example, "-o", tmp_path / "leaks.csv")
-    assert len(Path(leaks["file"]).read_text("utf-8").splitlines()) == leaks["count"] + 1
+    assert len(Path(leaks["file"]).read_text("utf-8").splitlines()) == 1 + len(leaks["gaps"]) + leaks["listed"]
     assert "leaks" not in leaks
     project = told(0, "qgis", example, "-o", tmp_path / "demo.qgz")
     assert project["written"] == [str(tmp_path / "demo.qgz")]
@@ -79,7 +81,7 @@ def test_what_is_written_is_named(example: str, tmp_path: Path, conn: psycopg.Co
     assert plain["layers"]
     report = told(0, "report", example, "-o", tmp_path / "demo.html")
     assert report["bytes"] == (tmp_path / "demo.html").stat().st_size
-    assert report["leaks"] == rows(conn, "SELECT count(*)::int FROM tunnel_api.leak")[0][0]
+    assert report["leaks"] == rows(conn, "SELECT count(*)::int FROM tunnel_api.leak WHERE counted")[0][0]
 
 
 def test_what_is_compared_and_computed(example: str, tmp_path: Path, conn: psycopg.Connection) -> None:
@@ -87,7 +89,7 @@ def test_what_is_compared_and_computed(example: str, tmp_path: Path, conn: psyco
         "INSERT INTO tunnel.station (survey_id, scan_id, geom) SELECT survey_id, 1, geom FROM tunnel.axis_vertex WHERE n = 1240"
     )
     conn.commit()
-    assert told(0, "leaks", example, "-o", tmp_path / "truth.geojson")["count"] == 7
+    assert told(0, "leaks", example, "-o", tmp_path / "truth.geojson")["listed"] == 7
     figures = told(0, "evaluate", example, tmp_path / "truth.geojson")
     everything = next(group for group in figures["groups"] if group["group"] == "all")
     assert everything["area_recall"] < 1.0  # one leak was rejected, and counts as not found
@@ -171,7 +173,7 @@ def test_a_program_reads_it_from_the_pipe(example: str) -> None:
         + f" | {sys.executable} -m json.tool --compact"
     )
     done = subprocess.run(["bash", "-o", "pipefail", "-c", piped], capture_output=True, text=True, check=True)
-    assert json.loads(done.stdout)["count"] == 7
+    assert json.loads(done.stdout)["listed"] == 7
 
 
 def test_no_verb_was_left_out() -> None:

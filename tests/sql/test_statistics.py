@@ -162,6 +162,11 @@ def ask(conn: psycopg.Connection, query: str, *values: object) -> list[dict[str,
         return cursor.execute(query, values).fetchall()  # type: ignore[arg-type]
 
 
+def searched(low: float, high: float) -> float:
+    """Share of a stretch that was searched: nothing is known of kilometre 4, which counts as unseen."""
+    return (high - low - max(0, min(high, 5000) - max(low, 4000))) / (high - low)
+
+
 def windows(made: Made, low: float, high: float) -> tuple[int, float]:
     """Most leaks and greatest wet area in 100 m² of lining, by sliding a window in small steps."""
     a, b = made.upto(made.lining, [low, high])
@@ -185,7 +190,8 @@ def test_coverage_is_summed_with_shares_of_steps(rows: psycopg.Connection, made:
     (row,) = ask(rows, "SELECT * FROM tunnel_api.coverage('s', %s, %s)", low, high)
     lining, seen, wet = (made.between(what, low, high) for what in (made.lining, made.seen, made.wet))
     assert row == {
-        "lining_area": pytest.approx(lining), "seen_area": pytest.approx(seen), "seen_share": pytest.approx(seen / lining),
+        "lining_area": pytest.approx(lining), "seen_area": pytest.approx(seen),
+        "seen_share": pytest.approx(seen / lining * searched(low, high)),
         "wet_pixel_area": pytest.approx(wet), "wet_pixel_share": pytest.approx(wet / seen),
     }  # fmt: skip
 
@@ -199,10 +205,9 @@ def test_statistics_are_those_of_clipped_leaks_and_sliding_windows(
     wet = sum(area for area, _, _ in parts.values())
     seen = made.between(made.seen, low, high)
     lining = made.between(made.lining, low, high)
-    # nothing is known of kilometre 4, which counts as unseen
-    known = (high - low - max(0, min(high, 5000) - max(low, 4000))) / (high - low)
     assert (row["lining_area"], row["seen_area"]) == (pytest.approx(lining), pytest.approx(seen))
-    assert row["seen_share"] == pytest.approx(seen / lining * known)
+    assert row["seen_share"] == pytest.approx(seen / lining * searched(low, high))
+    assert row["searched_share"] == pytest.approx(searched(low, high))
     assert (row["wet_area"], row["wet_ratio"]) == (pytest.approx(wet), pytest.approx(wet / seen))
     whole = {key: made.leaks[key][1] for key in parts}
     assert (row["patches"], row["largest_area"]) == (len(parts), max(whole.values(), default=None))
@@ -227,7 +232,8 @@ def test_rings_are_stretches_of_their_own(rows: psycopg.Connection, made: Made, 
         low, high = row["chainage_from"], row["chainage_to"]
         parts = made.parts(low, high)
         wet, seen = sum(area for area, _, _ in parts.values()), made.between(made.seen, low, high)
-        assert (row["patches"], row["wet_area"]) == (len(parts), pytest.approx(wet, abs=1e-9))
+        none = not parts and not searched(low, high)  # that there are none is said only where they were searched for
+        assert (row["patches"], row["wet_area"]) == ((None, None) if none else (len(parts), pytest.approx(wet, abs=1e-9)))
         assert row["wet_ratio"] == (pytest.approx(wet / seen) if seen else None)
         largest = max((made.leaks[key][1] for key in parts), default=0)
         assert row["largest_area"] == (largest or None)

@@ -9,6 +9,7 @@ import click
 import numpy as np
 import psycopg
 
+from tunneldb.cli.coverage import say_coverage
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say, step
@@ -18,6 +19,7 @@ from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import make_folder, replacing, told_to_end
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
+from tunneldb.store.coverage import read_coverage
 from tunneldb.store.survey import Survey, get_survey
 
 _PLAIN = (".gpkg", ".dxf")
@@ -55,6 +57,9 @@ def export(
     the unrolled lining and, side by side, the profiles of the sections, with what leaks on them. What an inspector
     rejected isn't drawn.
 
+    In both the layer of coverage gaps tells where leaks could be missed: what was not searched for them, is out of date or was
+    hardly seen.
+
     With --classified the scan files are written again, as LAZ 1.4 with the class of each point. The classes are those of
     stage ground, which must have run and be up to date in every kilometre that a file touches: 2 ground, 64 lining, 65
     niche, 66 appendage, 67 rail, 68 object, 69 target sphere, 70 noise, 1 outside of the surveyed tunnel. All else stays as
@@ -78,9 +83,11 @@ def export(
 def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, stretch: Stretch) -> None:
     from tunneldb.export.exchange import write_survey
 
+    coverage = read_coverage(conn, survey, stretch.low, stretch.high)
     with told_to_end(), replacing(output) as temporary, bar("parts") as progress:
         counts = write_survey(conn, survey, stretch.low, stretch.high, temporary, step(progress))
     tell(survey=survey.name, file=output, layers=counts)
+    say_coverage(coverage, survey)
     click.echo(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count), err=True)
 
 

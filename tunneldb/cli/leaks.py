@@ -8,8 +8,10 @@ from typing import cast
 
 import click
 import psycopg
+from psycopg import sql
 from rich.console import Console
 
+from tunneldb.cli.coverage import say_coverage
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import records, tell, verb
 from tunneldb.cli.stretch import parse_stretch, stretch_options
@@ -17,18 +19,20 @@ from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.tables.leaks import (
-    Anomaly,
     Geometry,
     Kind,
+    LeakList,
+    Selection,
     as_csv,
     as_geojson,
     as_table,
     read_leaks,
-    total,
     write_gpkg,
 )
 from tunneldb.files import replacing
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
+from tunneldb.store.coverage import read_coverage
 from tunneldb.store.survey import Survey, get_survey
 
 _BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
@@ -41,9 +45,10 @@ _CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
     examples=[
         "tunneldb leaks ringo-2024",
         "tunneldb leaks ringo-2024 --from 511+700 --to 511+800 --clock 10-2 --min-area 0.1",
-        "tunneldb leaks ringo-2024 -o leaks.gpkg --geometry 3d",
+        "tunneldb leaks ringo-2024 --min-confidence 0.8 -o leaks.gpkg --geometry 3d",
         "tunneldb leaks ringo-2024 --by-km",
-    ]
+    ],
+    wrong="done, but not all that was asked for has been searched for leaks, or nothing of it was seen: what, is said first",
 )
 @click.argument("survey")
 @click.option(
@@ -71,10 +76,17 @@ _CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
 @stretch_options
 @click.option("--clock", metavar="A-B", help="Only those between these hours, clockwise; 12 is the crown: 10-2 or 10:30-1:30.")
 @click.option("--min-area", type=click.FloatRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
+@click.option(
+    "--min-confidence",
+    type=click.FloatRange(0, 1),
+    default=0.0,
+    metavar="SHARE",
+    help="Only those that detection is at least so sure of, 0 to 1; none without a confidence.",
+)
 @click.option("--by-km", is_flag=True, help="Leaks of each kilometre summed up instead, with its class of waterproofing.")
-@click.pass_obj
+@click.pass_context
 def leaks(
-    settings: Settings,
+    context: click.Context,
     survey: str,
     kind: str,
     geometry: str,
@@ -85,49 +97,69 @@ def leaks(
     end: str | None,
     clock: str | None,
     min_area: float,
+    min_confidence: float,
     by_km: bool,
 ) -> None:
     """List the leaks of SURVEY, or what else is dark on its lining, or export them.
 
-    Of a stretch those are listed that reach into it; of hours of the clock, looking up-chainage, those whose middle lies there.
+    Of a stretch or of kilometres those are listed that reach into it, and their area is summed as far as it lies there; of
+    hours of the clock, looking up-chainage, those whose middle lies there. Listed, but not counted, are those that an
+    inspector rejected, or confirmed and the last detection did not find again.
 
-    With --by-km a line for each kilometre: wet area and number of leaks, the most in any 100 m² of lining, and the best
-    class of GB 50108-2008 that the lining seen keeps, as far as a scan can tell. Any other stretch, and what breaks a
+    First it says where the list can't be vouched for: stretches that are not loaded, not searched for leaks, failed, out of
+    date, or of whose lining less than half was seen. The same is in every file; see tunnel_api.coverage_gap.
+
+    With --by-km a line for each kilometre, and one for all: wet area and number of leaks, the most in any 100 m² of lining, and
+    the best class of GB 50108-2008 that the lining seen keeps, as far as a scan can tell. Any other stretch, and what breaks a
     class: SELECT * FROM tunnel_api.waterproof_class(survey, from, to).
     """
-    chosen, what = cast(Geometry, geometry), cast(Kind, kind)
+    settings: Settings = context.obj
+    chosen = cast(Geometry, geometry)
     form = form or (_BY_SUFFIX.get(output.suffix.lower(), "table") if output else "table")
     if form == "gpkg" and output is None:
         raise UserError("a GeoPackage needs a file to be written to: add -o leaks.gpkg")
-    parted = start is not None or end is not None or clock is not None
-    if by_km and (output is not None or form != "table" or kind != "leak" or min_area > 0 or parted):
+    filtered = start is not None or end is not None or clock is not None or min_area > 0 or min_confidence > 0
+    if by_km and (output is not None or form != "table" or kind != "leak" or filtered):
         raise UserError("--by-km prints a table of all leaks; elsewhere read the view tunnel_api.km_waterproof")
     hours = parse_clock(clock) if clock else None
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
-        if found.intensity_kind == "none":
-            click.echo(f"survey {survey} has no intensity: leaks were not sought", err=True)
         if found.note:
             tell(note=found.note)
             click.echo(f"survey {survey}: {found.note}", err=True)
         kilometres = parse_km(km, loaded_kilometres(conn, found)) if km else None
-        if by_km:
-            _print_classes(conn, found, kilometres)
-            return
         stretch = parse_stretch(conn, found, start, end)
-        rows = read_leaks(conn, found, chosen, kilometres, min_area, what, stretch.low, stretch.high, hours)
-    tell(survey=survey, kind=kind, count=len(rows), area=sum(row.area for row in rows))
-    if output is None:
-        tell(geometry=geometry, leaks=rows)
-        _print(rows, form, chosen, what, found)
-        return
+        low, high = stretch.low, stretch.high
+        if kilometres:
+            low, high = max(low, kilometres[0] * KILOMETRE), min(high, (kilometres[-1] + 1) * KILOMETRE)
+        if low >= high:
+            raise UserError(f"--km {km} and the stretch asked for have nothing in common")
+        if by_km:
+            coverage = read_coverage(conn, found, low, high)
+            say_coverage(coverage, found, on_stdout=True)
+            _print_classes(conn, found, low, high)
+        else:
+            listed = read_leaks(conn, found, chosen, Selection(cast(Kind, kind), low, high, hours, min_area, min_confidence))
+            coverage = listed.coverage
+            if output is None:
+                say_coverage(coverage, found, on_stdout=form == "table")
+                _print(listed, form, chosen, found)
+            else:
+                _write_file(listed, form, chosen, found, output)
+                say_coverage(coverage, found)
+                click.echo(f"{listed.total} to {output}", err=True)
+            tell(survey=survey, kind=listed.kind, count=listed.count, area=listed.area, listed=len(listed.rows))
+    if not coverage.complete:
+        context.exit(1)
+
+
+def _write_file(listed: LeakList, form: str, geometry: Geometry, survey: Survey, output: Path) -> None:
     with replacing(output) as temporary:
         if form == "gpkg":
-            write_gpkg(temporary, rows, chosen, found.srid, what)
+            write_gpkg(temporary, listed, geometry, survey.srid)
         else:
-            temporary.write_text(_text(rows, form, chosen, what, found), encoding="utf-8")
+            temporary.write_text(_text(listed, form, geometry, survey), encoding="utf-8")
     tell(file=output)
-    click.echo(f"{total(rows, what)} to {output}", err=True)
 
 
 def parse_clock(text: str) -> tuple[float, float]:
@@ -147,42 +179,64 @@ def parse_clock(text: str) -> tuple[float, float]:
     return hours[0], hours[1]
 
 
-def _print_classes(conn: psycopg.Connection, survey: Survey, kilometres: list[int] | None) -> None:
+_BY_KM = (
+    ("lining_area", "lining m²", ".0f"),
+    ("seen_share", "seen %", ".1%"),
+    ("wet_area", "wet m²", ".2f"),
+    ("wet_per_mille", "wet ‰", ".2f"),
+    ("patches", "leaks", "d"),
+    ("largest_area", "largest m²", ".2f"),
+    ("window_patches", "in 100 m²", "d"),
+    ("class", "class", "d"),
+)
+"""Name in JSON, heading and format of what is stated of each kilometre."""
+
+
+def _print_classes(conn: psycopg.Connection, survey: Survey, low: float, high: float) -> None:
+    place = {"survey": survey.id, "name": survey.name, "low": low, "high": high}
+    stated = sql.SQL(", ").join(
+        sql.SQL("1000 * t.wet_ratio") if name == "wet_per_mille" else sql.Identifier("t", name) for name, _, _ in _BY_KM
+    )
     rows = conn.execute(
-        "SELECT km, lining_area, seen_share, wet_area, 1000 * wet_ratio, patches, largest_area, window_patches, class"
-        " FROM tunnel_api.km_waterproof WHERE survey_id = %(survey)s AND (%(km)s::int[] IS NULL OR km = ANY (%(km)s))"
-        " ORDER BY km",
-        {"survey": survey.id, "km": kilometres},
+        sql.SQL(
+            "SELECT t.km::text, {} FROM tunnel_api.km_waterproof t"
+            " WHERE t.survey_id = %(survey)s AND t.chainage_to > %(low)s AND t.chainage_from < %(high)s ORDER BY t.km"
+        ).format(stated),
+        place,
     ).fetchall()
-    names = (
-        "km", "lining_area", "seen_share", "wet_area", "wet_per_mille", "patches", "largest_area", "window_patches", "class",
-    )  # fmt: skip
-    tell(survey=survey.name, kilometres=records(names, rows))
-    header = ("km", "lining m²", "seen %", "wet m²", "wet ‰", "leaks", "largest m²", "in 100 m²", "class")
-    formats = ("d", ".0f", ".1%", ".2f", ".2f", "d", ".2f", "d", "d")
+    whole = sql.SQL("SELECT 'all', {} FROM tunnel_api.leak_statistics(%(name)s, %(low)s, %(high)s) t").format(stated)
+    total = conn.execute(whole, place).fetchall()
+    names = ["km", *(name for name, _, _ in _BY_KM)]
+    kilometres = [{**row, "km": int(row["km"])} for row in records(names, rows)]
+    tell(survey=survey.name, kilometres=kilometres, total=records(names, total)[0] if total else None)
+    formats = [form for _, _, form in _BY_KM]
     lines = [
-        ["-" if value is None else format(value, form).removesuffix("%") for value, form in zip(row, formats, strict=True)]
-        for row in rows
+        [km, *("-" if v is None else format(v, form).removesuffix("%") for v, form in zip(values, formats, strict=True))]
+        for km, *values in [*rows, *total]
     ]
+    header = ["km", *(heading for _, heading, _ in _BY_KM)]
     print_table(header, lines, right=range(len(header)))
 
 
-def _print(rows: list[Anomaly], form: str, geometry: Geometry, kind: Kind, survey: Survey) -> None:
-    if form == "table":
+def _print(listed: LeakList, form: str, geometry: Geometry, survey: Survey) -> None:
+    tell(geometry=geometry, leaks=listed.rows)
+    if form != "table":
+        click.echo(_text(listed, form, geometry, survey), nl=False)
+    elif listed.rows or listed.coverage.seen_area:
         console = Console()
         if console.is_terminal:
-            console.print(as_table(rows, survey.name, kind, console.width))
+            console.print(as_table(listed, survey.name, console.width))
         else:
-            Console(width=_WIDTH).print(as_table(rows, survey.name, kind))
-    else:
-        click.echo(_text(rows, form, geometry, kind, survey), nl=False)
+            Console(width=_WIDTH).print(as_table(listed, survey.name))
 
 
-def _text(rows: list[Anomaly], form: str, geometry: Geometry, kind: Kind, survey: Survey) -> str:
+def _text(listed: LeakList, form: str, geometry: Geometry, survey: Survey) -> str:
     if form == "csv":
-        return as_csv(rows)
+        return as_csv(listed)
     if form == "geojson":
-        return as_geojson(rows, geometry, survey.srid, kind)
+        return as_geojson(listed, geometry, survey.srid)
     console = Console(width=_WIDTH, record=True, quiet=True)
-    console.print(as_table(rows, survey.name, kind))
+    if listed.coverage.statement is not None:
+        console.print(listed.coverage.statement, markup=False, highlight=False, soft_wrap=True)
+    console.print(as_table(listed, survey.name))
     return console.export_text()

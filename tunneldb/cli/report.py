@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 import psycopg
 
+from tunneldb.cli.coverage import say_coverage
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar
@@ -18,6 +19,7 @@ from tunneldb.errors import UserError
 from tunneldb.files import replacing, told_to_end
 from tunneldb.report.page import CARDS, write_html
 from tunneldb.report.pdf import find_browser, print_pdf
+from tunneldb.store.coverage import read_coverage
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
@@ -43,7 +45,8 @@ _PRINTING = 1.2  # time in which it prints a page as a multiple of that in which
 def report(settings: Settings, survey: str, output: Path, start: str | None, end: str | None) -> None:
     """Write the inspection report of SURVEY, to be handed over and signed.
 
-    It states what was scanned and how much of the lining was seen, class of waterproofing, the unrolled lining with its
+    It says first where leaks could be missed: what was not searched for them, is out of date or was hardly seen. It states
+    what was scanned and how much of the lining was seen, class of waterproofing, the unrolled lining with its
     leaks, each leak with picture and cross-section, statistics, parameters and versions, and who reviewed what.
 
     The HTML file is whole in itself: it asks nothing of the network. Its table of leaks can be sorted and searched, and it
@@ -57,6 +60,7 @@ def report(settings: Settings, survey: str, output: Path, start: str | None, end
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
         stretch = parse_stretch(conn, found, start, end)
+        coverage = read_coverage(conn, found, stretch.low, stretch.high)
         conn.rollback()
         with told_to_end(), replacing(output) as temporary, bar("strips") as shown:
             if browser is None:
@@ -68,8 +72,9 @@ def report(settings: Settings, survey: str, output: Path, start: str | None, end
                     conn.close()  # a browser may take minutes
                     _print(browser, page, temporary, shown)
     tell(survey=survey, file=output, leaks=leaks, bytes=output.stat().st_size)
-    said = "no intensity, leaks were not sought" if found.intensity_kind == "none" else f"{leaks} leaks"
-    click.echo(f"{output}: {said}", err=True)
+    say_coverage(coverage, found)
+    sought = leaks or coverage.searched_share
+    click.echo(f"{output}: {leaks} leaks" if sought else f"{output}: leaks were not searched for", err=True)
 
 
 def _write(conn: psycopg.Connection, survey: Survey, stretch: Stretch, page: Path, shown: Progress, *, paper: bool) -> int:

@@ -87,7 +87,7 @@ def _layer(path: Path, wanted: str | None) -> str:
     if not path.is_file():
         raise UserError(f"{path}: there is no such file")
     try:
-        there = [str(name) for name in pyogrio.list_layers(str(path))[:, 0]]
+        there = [str(name) for name, kind in pyogrio.list_layers(str(path)) if kind is not None]  # a table is no layer
     except DataSourceError:
         raise UserError(f"{path} is neither GeoPackage nor GeoJSON: write the truth as one of these") from None
     listed = ", ".join(there) or "none"

@@ -33,6 +33,7 @@ from tunneldb.raster.image import halo, lining_image
 from tunneldb.raster.observation import Observer, Radiometer
 from tunneldb.raster.rasterize import Counts, rasterize
 from tunneldb.store.anomalies import save_anomalies
+from tunneldb.store.coverage import seen_share
 from tunneldb.store.images import (
     ImageStore,
     drop_coverage,
@@ -45,7 +46,7 @@ from tunneldb.store.images import (
 )
 from tunneldb.store.scene import load_arcs
 from tunneldb.store.sources import load_poses, sample, sources
-from tunneldb.store.surface import load_surface
+from tunneldb.store.surface import load_surface, survey_ends
 from tunneldb.store.survey import Survey
 
 ASIDE = 50.0
@@ -162,7 +163,8 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
     radiometer = load_radiometer(conn, survey, values)
     beyond = grid.halo * grid.pixel
     depth = values["lining.tolerance"], values["lining.recess"]
-    observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, km, beyond), beyond)
+    ends = survey_ends(conn, survey) or (-np.inf, np.inf)
+    observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, km, beyond), beyond, ends)
     return DetectionInputs(
         survey.name,
         observer,
@@ -201,7 +203,7 @@ def compute_detection(
     with Accumulator(inputs.grid) as image:
         counts = _gather(observer, inputs.files, image, roughness.sigma, progress)
         outliers = SectionOutliers.of(observer.surface, MOST)
-        lining = lining_image(image, observer.floor, outliers, values["appendage.distance"], save_block)
+        lining = lining_image(image, observer, outliers, values["appendage.distance"], save_block)
     background = map_background(lining, inputs.dry)
     contrast = contrast_image(lining, background)
     found = find_anomalies(contrast, background, values["leak.min_area"])
@@ -241,13 +243,12 @@ def _save(
     save_radiometry(conn, survey, km, roughness, result.background, found, result.dry_levels)
     save_coverage(conn, survey, km, result.coverage)
     matched = save_anomalies(conn, survey, km, surface, found.anomalies, found.cut, min_area)
-    coverage = result.coverage
     return {
         **result.counts,
         "pixels": images.pixels,
         "lining_pixels": found.pixels,
         "wet_pixels": found.wet_pixels,
-        "seen": round(float(coverage.seen.sum() / max(coverage.lining.sum(), 1e-9)), 4),
+        "seen": round(seen_share(conn, survey, km), 4),
         "leaks": matched.new + matched.again,
         "joints": matched.kinds["joint"],
         "dark": matched.kinds["dark"],

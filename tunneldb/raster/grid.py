@@ -86,6 +86,12 @@ class Grid:
         """Columns that take points: the kilometre's and those of the halo."""
         return slice(self.inner.start - self.halo, self.inner.stop + self.halo)
 
+    def columns_between(self, low: float, high: float) -> slice:
+        """Columns that lie wholly between two chainages, m, which may be infinite."""
+        ends = np.clip((np.array([low, high]) - self.west) / self.pixel, -1.0, self.columns + 1.0)
+        first, stop = int(np.ceil(ends[0] - 1e-6)), int(np.floor(ends[1] + 1e-6))
+        return slice(max(first, 0), max(min(stop, self.columns), max(first, 0)))
+
     @property
     def first_block(self) -> int:
         """Number of the first block, counted from chainage 0."""

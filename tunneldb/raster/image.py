@@ -11,9 +11,9 @@ from tunneldb.arrays import Int16, UInt8
 from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.geometry.surface import Surface
 from tunneldb.raster.accumulator import Accumulator, Window
-from tunneldb.raster.floor import Floor
 from tunneldb.raster.geotiff import NODATA, whole
 from tunneldb.raster.grid import BLOCK, Grid
+from tunneldb.raster.observation import Observer
 from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
 
 WET_EDGE = 3
@@ -50,7 +50,7 @@ def _judged() -> int:
 
 
 def lining_image(
-    image: Accumulator, floor: Floor, outliers: SectionOutliers, delta: float, keep: Callable[[Window], None]
+    image: Accumulator, observer: Observer, outliers: SectionOutliers, delta: float, keep: Callable[[Window], None]
 ) -> LiningImage:
     """Find the state of every pixel, block by block.
 
@@ -58,8 +58,8 @@ def lining_image(
     ----------
     image : Accumulator
         The sums of all points.
-    floor : Floor
-        Where the floor begins.
+    observer : Observer
+        Where the floor begins, and where the survey does and ends: beyond there is no lining.
     outliers : SectionOutliers
         Where the surface leaves the wall.
     delta : float
@@ -78,11 +78,13 @@ def lining_image(
         if columns.start >= columns.stop:
             continue
         window = image.window(columns.start - reach(grid.pixel), columns.stop + reach(grid.pixel))
-        state[:, columns] = pixel_states(window, columns, grid, floor, outliers, delta)
+        state[:, columns] = pixel_states(window, columns, grid, observer.floor, outliers, delta)
         here = window.cut(columns)
         level[:, columns] = whole(here.corrected, "corrected")
         if block in inner:
             keep(here)
+    scanned = grid.columns_between(*observer.ends)
+    state[:, : scanned.start] = state[:, scanned.stop :] = PixelState.OFF
     return LiningImage(grid, state, level)
 
 

@@ -89,6 +89,8 @@ class Observer:
         Where the surface bends sharply.
     box : (2, 3) float array
         Least and greatest coordinates of the kilometre's lining, m.
+    ends : (float, float)
+        Chainage at which the survey begins and ends, m: what lies beyond is none of its lining.
     """
 
     surface: Surface
@@ -99,6 +101,7 @@ class Observer:
     floor: Floor
     edges: Edges
     box: Float
+    ends: tuple[float, float]
 
     @classmethod
     def of(
@@ -109,10 +112,12 @@ class Observer:
         radiometer: Radiometer | None,
         floor: Floor,
         halo: float = 0.0,
+        ends: tuple[float, float] = (-math.inf, math.inf),
     ) -> Observer:
         """Make the eye for a kilometre that the surface covers at least in part, and so many metres beyond its ends.
 
-        ``depth`` is how far in front of the surface and behind it lining is looked for, m: tolerance and recess.
+        ``depth`` is how far in front of the surface and behind it lining is looked for, m: tolerance and recess; ``ends`` is
+        where the survey begins and ends.
         """
         start, stop = km * KILOMETRE, (km + 1) * KILOMETRE
         touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)
@@ -131,6 +136,7 @@ class Observer:
             floor,
             Edges.of(surface, start, stop),
             np.array([vertices.min(0) - margin, vertices.max(0) + margin]),
+            ends,
         )
 
     def near(self, points: Points) -> Points:

@@ -105,6 +105,7 @@ class Projector:
     def of(cls, observer: Observer, grid: Grid, roughness: float) -> Projector:
         """Prepare it for an image; ``roughness`` in degrees."""
         s, edges, floor = observer.surface, observer.edges, observer.floor
+        scanned = grid.columns_between(*observer.ends)
         return cls(
             SurfaceArrays(s.segments, s.number, s.ends, s.chainages, s.radius, s.arcs, s.reach),
             EdgeArrays(bool(edges.sharp.any()), edges.start, edges.first, edges.feet, edges.normals, edges.sharp),
@@ -119,8 +120,8 @@ class Projector:
                 1.0 / grid.pixel,
                 grid.bottom,
                 grid.rows,
-                grid.near.start,
-                grid.near.stop,
+                max(grid.near.start, scanned.start),
+                min(grid.near.stop, scanned.stop),
                 grid.inner.start,
                 grid.inner.stop,
                 float(floor.start),

@@ -17,12 +17,10 @@ from shapely.geometry import Polygon
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.pipeline.stages import STAGE_NAMES
+from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
 Row = dict[str, Any]
-
-HIDDEN_SHARE, HIDDEN_LENGTH = 0.5, 5.0
-"""Where less than this share of the lining was seen over at least so many metres, the report lists the stretch."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +37,8 @@ class Leak:
         Chainage of its middle, in the tunnel's stationing.
     clock : float
         Hours, 12 is the crown.
-    area : float
-        m².
+    area, inside : float
+        Its area, and that of its part in the stretch reported, m².
     drop_mean, drop_max : float
         dB below dry lining.
     contrast, confidence : float or None
@@ -65,6 +63,7 @@ class Leak:
     arc_to: float
     clock: float
     area: float
+    inside: float
     drop_mean: float
     drop_max: float
     contrast: float | None
@@ -89,7 +88,7 @@ class Leak:
 
 
 @dataclass(frozen=True)
-class Coverage:
+class CoverageBins:
     """Lining by bins along the tunnel.
 
     Attributes
@@ -109,10 +108,10 @@ class Coverage:
         """Share of the lining seen, 0 to 1; NaN where detection did not run."""
         return np.divide(self.seen, self.lining, out=np.full(len(self.seen), np.nan), where=self.lining > 1e-6)
 
-    def merged(self, count: int) -> Coverage:
+    def merged(self, count: int) -> CoverageBins:
         """Take so many bins together."""
         starts = np.arange(0, len(self.lining), count)
-        return Coverage(
+        return CoverageBins(
             np.append(self.edges[starts], self.edges[-1]),
             np.add.reduceat(self.lining, starts),
             np.add.reduceat(self.seen, starts),
@@ -127,30 +126,31 @@ def find_stretch(conn: psycopg.Connection[Any], survey: Survey, low: float, high
     UserError
         If the survey has no segments, or none of them lies in the stretch.
     """
-    row = conn.execute("SELECT * FROM tunnel_api.survey_ends(%s)", [survey.id]).fetchone()
-    if row is None or row[0] is None:
+    ends = survey_ends(conn, survey)
+    if ends is None:
         raise UserError(f"survey {survey.name} has nothing to report yet: tunneldb run {survey.name}")
-    start, end = max(row[0], low), min(row[1], high)
+    start, end = max(ends[0], low), min(ends[1], high)
     if start >= end:
         asked = f"from chainage {max(low, -1e9):.3f} to {min(high, 1e9):.3f} m"
-        raise UserError(f"survey {survey.name} reaches from chainage {row[0]:.3f} to {row[1]:.3f} m: nothing lies {asked}")
+        raise UserError(f"survey {survey.name} reaches from chainage {ends[0]:.3f} to {ends[1]:.3f} m: nothing lies {asked}")
     return start, end
 
 
 _LEAK = sql.SQL(
-    "SELECT {columns}, public.ST_AsBinary(unrolled) AS outline FROM tunnel_api.leak"
-    " WHERE survey_id = %s AND (detected OR review = 'confirmed') AND chainage_to > %s AND chainage_from < %s"
-    " ORDER BY chainage_from, arc_from, id"
-).format(columns=sql.SQL(", ").join(sql.Identifier(f.name) for f in fields(Leak) if f.name != "outline"))
+    "SELECT {columns}, tunnel_api.area_between(unrolled, area, %(low)s, %(high)s) AS inside,"
+    " public.ST_AsBinary(unrolled) AS outline FROM tunnel_api.leak"
+    " WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed') AND chainage_to > %(low)s"
+    " AND chainage_from < %(high)s ORDER BY chainage_from, arc_from, id"
+).format(columns=sql.SQL(", ").join(sql.Identifier(f.name) for f in fields(Leak) if f.name not in ("inside", "outline")))
 
 
 def read_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Leak]:
     """Read the leaks of a stretch in order of chainage: found last, or confirmed although found no more; also the rejected."""
-    rows = _rows(conn, _LEAK, [survey.id, low, high])
+    rows = _rows(conn, _LEAK, {"survey": survey.id, "low": low, "high": high})
     return [Leak(**{**row, "outline": shapely.from_wkb(bytes(row["outline"]))}) for row in rows]
 
 
-def read_coverage(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> Coverage:
+def read_bins(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> CoverageBins:
     """Read lining and lining seen of a stretch by bins of 1 m."""
     edges = np.unique(np.concatenate([[low], np.arange(np.ceil(low), np.floor(high) + 1), [high]]))
     edges = edges[(edges >= low) & (edges <= high)]
@@ -158,20 +158,7 @@ def read_coverage(conn: psycopg.Connection[Any], survey: Survey, low: float, hig
         "SELECT c.lining, c.seen FROM tunnel_api.coverage_at(%s, %s) c ORDER BY c.n", (survey.id, edges.tolist())
     ).fetchall()
     lining, seen = np.diff(np.array(rows, float), axis=0).T
-    return Coverage(edges, lining, seen)
-
-
-def hidden_stretches(coverage: Coverage) -> list[tuple[float, float, float]]:
-    """Find where too little of the lining was seen: begin and end, m, and the share that was (0 without detection)."""
-    share = np.nan_to_num(coverage.share)
-    turns = np.flatnonzero(np.diff(np.concatenate([[False], share < HIDDEN_SHARE, [False]]).astype(np.int8)))
-    found = []
-    for first, last in turns.reshape(-1, 2).tolist():
-        low, high = float(coverage.edges[first]), float(coverage.edges[last])
-        if high - low >= HIDDEN_LENGTH:
-            lining = coverage.lining[first:last].sum()
-            found.append((low, high, float(coverage.seen[first:last].sum() / lining) if lining > 0 else 0.0))
-    return found
+    return CoverageBins(edges, lining, seen)
 
 
 def read_statistics(conn: psycopg.Connection[Any], survey: Survey, starts: Sequence[float], ends: Sequence[float]) -> list[Row]:
@@ -304,7 +291,7 @@ def place_name(conn: psycopg.Connection[Any], survey: Survey) -> str:
     return "Chainage" if own is None else "Station"
 
 
-def _rows(conn: psycopg.Connection[Any], query: sql.Composed | LiteralString, values: list[Any]) -> list[Row]:
+def _rows(conn: psycopg.Connection[Any], query: sql.Composed | LiteralString, values: list[Any] | dict[str, Any]) -> list[Row]:
     """Rows of a query as mappings."""
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(query, values).fetchall()

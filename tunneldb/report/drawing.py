@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry import LineString, Polygon
 
 from tunneldb.arrays import Float
-from tunneldb.report.data import Coverage, Leak
+from tunneldb.report.data import CoverageBins, Leak
 
 STEPS = (1.0, 2.0, 5.0, 10.0, 20.0, 25.0, 50.0, 100.0, 200.0, 250.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0)
 """Distances between ticks, and lengths of bins, m."""
@@ -86,7 +86,7 @@ class Section:
         return f"{west:.2f} {-high:.2f} {east - west:.2f} {high - low:.2f}"
 
 
-def share_path(coverage: Coverage, low: float, high: float, base: float, height: float, scale: float = 1.0) -> str:
+def share_path(coverage: CoverageBins, low: float, high: float, base: float, height: float, scale: float = 1.0) -> str:
     """Path of the area under the share of lining seen, in steps; ``base`` is where 0 lies, ``height`` how far up 1 is.
 
     x is the chainage from ``low``, times ``scale``; only what lies between ``low`` and ``high``.
@@ -101,7 +101,7 @@ def share_path(coverage: Coverage, low: float, high: float, base: float, height:
     return "".join(parts)
 
 
-def without_detection(coverage: Coverage, low: float, high: float) -> list[tuple[float, float]]:
+def without_detection(coverage: CoverageBins, low: float, high: float) -> list[tuple[float, float]]:
     """Stretches between two chainages, m, in which detection did not run."""
     none = np.isnan(coverage.share)
     turns = np.flatnonzero(np.diff(np.concatenate([[False], none, [False]]).astype(np.int8))).reshape(-1, 2)
@@ -110,37 +110,60 @@ def without_detection(coverage: Coverage, low: float, high: float) -> list[tuple
 
 
 def wet_bins(leaks: Sequence[Leak], edges: Float) -> Float:
-    """Wet area in bins of chainage, m²: that of each leak spread evenly over its length."""
+    """Wet area in bins of chainage, m²: that of each leak in the stretch spread evenly over its length there."""
     total = np.zeros(len(edges) - 1)
     for leak in leaks:
         if not leak.counts:
             continue
         first = int(np.clip(np.searchsorted(edges, leak.chainage_from, side="right") - 1, 0, len(total) - 1))
         last = int(np.clip(np.searchsorted(edges, leak.chainage_to, side="left") - 1, first, len(total) - 1))
+        length = min(leak.chainage_to, edges[-1]) - max(leak.chainage_from, edges[0])
         for n in range(first, last + 1):
             inside = min(edges[n + 1], leak.chainage_to) - max(edges[n], leak.chainage_from)
-            total[n] += leak.area * max(inside, 0.0) / max(leak.chainage_to - leak.chainage_from, 1e-9)
+            total[n] += leak.inside * max(inside, 0.0) / max(length, 1e-9)
     return total
+
+
+ROWS = 12
+"""Rows of numbers beside a strip at most."""
 
 
 @dataclass(frozen=True)
 class Sign:
-    """A number beside a picture that points at a leak: its id, where it stands and where the leak's middle is, m."""
+    """A number beside a picture that points at a leak.
+
+    Attributes
+    ----------
+    id : int
+        The leak's.
+    x, at : float
+        Where it stands and where the leak's middle is, m.
+    row : int
+        Row in which it stands, from 0, the one next to the picture.
+    """
 
     id: int
     x: float
     at: float
+    row: int
 
 
 def place_signs(leaks: Sequence[Leak], low: float, high: float, width: float) -> list[Sign]:
-    """Place numbers of leaks along a strip, of the largest first, as many as fit; a digit is ``width`` m wide."""
-    placed: list[tuple[float, float, Sign]] = []
+    """Place numbers of leaks along a strip, those of the largest nearest to it; a digit is ``width`` m wide.
+
+    Where they don't fit beside one another they stand in rows, ROWS at most: only a leak that finds no room there has none.
+    """
+    placed: list[list[tuple[float, float]]] = [[] for _ in range(ROWS)]
+    signs = []
     for leak in sorted(leaks, key=lambda leak: -leak.area):
         half = width * (len(str(leak.id)) + 1) / 2
         x = float(np.clip(leak.middle, low + half, high - half))
-        if all(x + half <= left or x - half >= right for left, right, _ in placed):
-            placed.append((x - half, x + half, Sign(leak.id, x, leak.middle)))
-    return sorted((sign for _, _, sign in placed), key=lambda sign: sign.x)
+        free = (n for n, row in enumerate(placed) if all(x + half <= left or x - half >= right for left, right in row))
+        row = next(free, None)
+        if row is not None:
+            placed[row].append((x - half, x + half))
+            signs.append(Sign(leak.id, x, leak.middle, row))
+    return sorted(signs, key=lambda sign: sign.x)
 
 
 def near(leak: Leak, least: float, shape: float) -> tuple[float, float, float, float]:

@@ -19,6 +19,7 @@ from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, witho
 from tunneldb.report.lining import Form
 from tunneldb.report.strip import LETTERS, Progress, Strips
 from tunneldb.store.catalog import crs_text
+from tunneldb.store.coverage import Coverage, read_coverage
 from tunneldb.store.survey import Survey
 
 CARDS = 400
@@ -51,13 +52,14 @@ def write_html(
     Returns
     -------
     int
-        Number of leaks reported.
+        Number of leaks that it counts: found last, and not rejected.
     """
     with snapshot(conn):
-        report = _Report(conn, survey, *data.find_stretch(conn, survey, low, high), progress, pictures, form)
+        search = read_coverage(conn, survey, low, high)
+        report = _Report(conn, survey, *data.find_stretch(conn, survey, low, high), search, progress, pictures, form)
         with path.open("w", encoding="utf-8") as file:
             file.writelines(_template().generate(report.context()))
-        return len(report.leaks)
+        return sum(leak.counts for leak in report.leaks)
 
 
 def _template() -> jinja2.Template:
@@ -81,7 +83,9 @@ class _Report:
     Parameters
     ----------
     conn, survey, low, high, progress, pictures, form
-        As in :func:`write_html`.
+        As in :func:`write_html`; the stretch as far as the survey reaches.
+    search : Coverage
+        What can be said of the stretch asked for, also where the survey does not reach.
     """
 
     def __init__(
@@ -90,13 +94,14 @@ class _Report:
         survey: Survey,
         low: float,
         high: float,
+        search: Coverage,
         progress: Progress,
         pictures: int | None,
         form: Form,
     ) -> None:
-        self.conn, self.survey, self.low, self.high = conn, survey, low, high
+        self.conn, self.survey, self.low, self.high, self.search = conn, survey, low, high, search
         self.leaks = data.read_leaks(conn, survey, low, high)
-        self.coverage = data.read_coverage(conn, survey, low, high)
+        self.coverage = data.read_bins(conn, survey, low, high)
         by_size = sorted(self.leaks, key=lambda leak: (leak.review == "rejected", -leak.area))
         pictured = {leak.id for leak in by_size[:pictures]}
         self.strips = Strips(conn, survey, low, high, self.leaks, self.coverage, pictured, form, progress)
@@ -108,7 +113,6 @@ class _Report:
         conn, survey, low, high = self.conn, self.survey, self.low, self.high
         classes = data.read_classes(conn, survey, low, high)
         total = data.read_statistics(conn, survey, [low], [high])[0]
-        hidden = data.hidden_stretches(self.coverage)
         runs = data.read_runs(conn, survey, low, high)
         counted = [leak for leak in self.leaks if leak.counts]
         edits_in_all, edits = data.read_edits(conn, survey)
@@ -128,10 +132,9 @@ class _Report:
             "by_review": {name: sum(leak.review == name for leak in self.leaks) for name in ("open", "confirmed", "rejected")},
             "lost": [leak for leak in self.leaks if not leak.detected],
             "others": data.read_others(conn, survey, low, high),
-            "hidden": self._named(hidden),
-            "hidden_length": sum(b - a for a, b, _ in hidden),
-            "hidden_share": data.HIDDEN_SHARE,
-            "unlooked": sum(b - a for a, b in without_detection(self.coverage, low, high)),
+            "search": self.search,
+            "gaps": sorted(self.search.gaps, key=lambda gap: (gap.searched, gap.chainage_from - gap.chainage_to)),
+            "unlooked": (1 - total["searched_share"]) * (high - low),
             "kilometres": self._kilometres(),
             "files": data.read_files(conn, survey, low, high),
             "stale": text.stale(data.read_stale(conn, survey, low, high)),
@@ -160,15 +163,6 @@ class _Report:
 
     def _labels(self, chainages: list[float]) -> list[str]:
         return data.label_chainages(self.conn, self.survey, chainages)
-
-    def _named(self, stretches: list[tuple[float, float, float]]) -> list[dict[str, Any]]:
-        """Stretches with the labels of their ends, the longest first."""
-        labels = self._labels([end for low, high, _ in stretches for end in (low, high)])
-        named = [
-            {"from": labels[2 * n], "to": labels[2 * n + 1], "length": high - low, "share": share}
-            for n, (low, high, share) in enumerate(stretches)
-        ]
-        return sorted(named, key=lambda stretch: -stretch["length"])
 
     def _kilometres(self) -> list[dict[str, Any]]:
         """Statistics of each kilometre, as far as it lies in the stretch."""
@@ -221,7 +215,7 @@ class _Report:
             [
                 leak.id, round(leak.middle, 3), leak.label, round(leak.chainage_to - leak.chainage_from, 2),
                 round(leak.arc_from, 2), round(leak.arc_to, 2), round(leak.clock, 3), round(leak.area, 3),
-                round(leak.drop_mean, 1), round(leak.drop_max, 1), text.rounded(leak.contrast, 1),
+                round(leak.inside, 3), round(leak.drop_mean, 1), round(leak.drop_max, 1), text.rounded(leak.contrast, 1),
                 text.rounded(leak.confidence, 2), round(leak.image_share, 2), leak.review, leak.reviewed_by or "",
                 text.when(leak.reviewed_at) if leak.reviewed_at else "", leak.remark or "", int(leak.detected),
                 self.strips.of(leak),
@@ -229,12 +223,29 @@ class _Report:
             for leak in self.leaks
         ]  # fmt: skip
         return text.script_json(
-            {"columns": TABLE, "rows": rows, "cards": self.cards, "strip": self.strips.length, "place": self.place}
+            {
+                **{"columns": TABLE, "rows": rows, "cards": self.cards, "strip": self.strips.length, "place": self.place},
+                "searched": self.search.searched_share > 0,
+            }
         )
 
 
 TABLE = [
-    *("id", "chainage", "label", "length", "arcFrom", "arcTo", "clock", "area", "drop", "dropMax", "contrast", "confidence"),
+    *(
+        "id",
+        "chainage",
+        "label",
+        "length",
+        "arcFrom",
+        "arcTo",
+        "clock",
+        "area",
+        "inside",
+        "drop",
+        "dropMax",
+        "contrast",
+        "confidence",
+    ),
     *("imageShare", "review", "by", "at", "remark", "detected", "strip"),
 ]
 """Columns of the table, as the script of the page calls them."""

@@ -11,7 +11,7 @@ import psycopg
 from markupsafe import Markup
 
 from tunneldb.report import text
-from tunneldb.report.data import Coverage, Leak, label_chainages
+from tunneldb.report.data import CoverageBins, Leak, Row, label_chainages, read_statistics
 from tunneldb.report.drawing import Section, Sign, near, outline_path, place_signs, share_path, ticks, without_detection
 from tunneldb.report.lining import Form, Lining, Picture, Window
 from tunneldb.store.survey import Survey
@@ -29,7 +29,7 @@ LETTERS = 80
 """Height of letters beside a strip: so many make its length."""
 
 SLIVER = 0.1
-"""A last strip shorter than this is left out, m."""
+"""A last strip shorter than this is left out, m, unless it leaks there."""
 
 Progress = Callable[[int, int], None]
 """Takes how many strips are drawn, and of how many."""
@@ -55,6 +55,8 @@ class Strip:
         Leaks with the path of their outline, x from ``low``.
     signs : list of Sign
         Their numbers.
+    rows : int
+        Rows in which these stand, at least 1.
     ribbon : str
         Path of the share seen.
     blank : list of (float, float)
@@ -73,6 +75,7 @@ class Strip:
     ticks: list[tuple[float, str]]
     leaks: list[tuple[Leak, str]]
     signs: list[Sign]
+    rows: int
     ribbon: str
     blank: list[tuple[float, float]]
     summary: str
@@ -110,6 +113,8 @@ class Strips:
         Length of a strip, m.
     south, north : float
         Least and greatest arc, m.
+    starts : list of float
+        Where the strips would begin if the stretch did not begin later, m.
     """
 
     def __init__(
@@ -119,7 +124,7 @@ class Strips:
         low: float,
         high: float,
         leaks: Sequence[Leak],
-        coverage: Coverage,
+        coverage: CoverageBins,
         pictured: Collection[int],
         form: Form,
         progress: Progress,
@@ -136,33 +141,34 @@ class Strips:
             [survey.id, low - survey.spacing, high + survey.spacing],
         ).fetchone()
         assert row is not None
+        first, last = np.floor(low / self.length), np.ceil((high - SLIVER) / self.length)
+        if any(leak.chainage_to > last * self.length for leak in leaks):
+            last = np.ceil(high / self.length)
+        self.starts = (np.arange(first, max(last, first + 1)) * self.length).tolist()
         self.south, self.north = (-9.0, 9.0) if row[0] is None else (float(row[0]), float(row[1]))
 
     def of(self, leak: Leak) -> int:
         """Begin of the strip that shows a leak's middle, m."""
-        inside = min(max(leak.middle, self.low), self.high - SLIVER)
-        return int(np.floor(inside / self.length) * self.length)
+        inside = min(max(leak.middle, self.low), self.high - 1e-6)
+        return int(min(np.floor(inside / self.length) * self.length, self.starts[-1]))
 
     def __iter__(self) -> Iterator[Strip]:
         """Draw one strip after another."""
         lining = Lining(self.conn, self.survey, self._form)
-        starts = np.arange(np.floor(self.low / self.length), np.ceil((self.high - SLIVER) / self.length)) * self.length
-        for done, start in enumerate(starts.tolist(), start=1):
-            low, high = max(start, self.low), min(start + self.length, self.high)
-            yield self._strip(lining, start, low, high)
-            self.progress(done, len(starts))
+        ends = [(max(start, self.low), min(start + self.length, self.high)) for start in self.starts]
+        stated = read_statistics(self.conn, self.survey, *map(list, zip(*ends, strict=True)))
+        for done, (start, (low, high), row) in enumerate(zip(self.starts, ends, stated, strict=True), start=1):
+            yield self._strip(lining, start, low, high, row)
+            self.progress(done, len(self.starts))
 
-    def _strip(self, lining: Lining, start: float, low: float, high: float) -> Strip:
+    def _strip(self, lining: Lining, start: float, low: float, high: float, stated: Row) -> Strip:
         leaks = [leak for leak in self.leaks if leak.chainage_to > low and leak.chainage_from < high]
-        seen = self.coverage
-        inside = (seen.edges[:-1] < high) & (seen.edges[1:] > low)
-        total = seen.lining[inside].sum()
-        wet = [leak for leak in leaks if leak.counts]
         places = ticks(low, high, self.length / 10)
         names = label_chainages(self.conn, self.survey, [low, high, *places])
         picture = lining.picture(Window(low, high, self.south, self.north), self.length / STRIP_PIXELS)
-        share = text.percent(seen.seen[inside].sum() / total) if total > 0 else "nothing"
         sought = self.survey.intensity_kind != "none"
+        wet = [leak for leak in leaks if leak.counts]
+        signs = place_signs(wet, low, low + self.length, self.length / LETTERS * 0.6)
         return Strip(
             number=int(start),
             low=low,
@@ -171,10 +177,11 @@ class Strips:
             picture=picture,
             ticks=[(place, text.short(name)) for place, name in zip(places, names[2:], strict=True)],
             leaks=[(leak, outline_path(leak.outline, low, self.north, self.length / 2000)) for leak in leaks],
-            signs=place_signs(wet, low, low + self.length, self.length / LETTERS * 0.6),
-            ribbon=share_path(seen, low, high, 0.0, 0.8 * self.length / LETTERS),
-            blank=without_detection(seen, low, high) if sought else [],
-            summary=f"{len(wet)} leak{'s' * (len(wet) != 1)}, {share} of the lining seen" if sought else "",
+            signs=signs,
+            rows=1 + max((sign.row for sign in signs), default=0),
+            ribbon=share_path(self.coverage, low, high, 0.0, 0.8 * self.length / LETTERS),
+            blank=without_detection(self.coverage, low, high) if sought else [],
+            summary=_summary(stated, len(wet) - len(signs)) if sought else "",
             details=text.script_json(self._details(lining, [leak for leak in leaks if self.of(leak) == int(start)])),
         )
 
@@ -210,3 +217,12 @@ class Strips:
             [self.survey.id, low - self.survey.spacing, high + self.survey.spacing],
         ).fetchall()
         return [(chainage, Section.of(radius, arc)) for chainage, radius, arc in rows]
+
+
+def _summary(stated: Row, unnumbered: int) -> str:
+    """How many leaks there are on a strip and how much of the lining was seen; so many leaks have no number beside it."""
+    if stated["patches"] is None:
+        return "leaks were not searched for"
+    count = stated["patches"]
+    without = f", the {unnumbered} smallest without a number here" if unnumbered else ""
+    return f"{count} leak{'s' * (count != 1)}{without}, {text.percent(stated['seen_share'])} of the lining seen"

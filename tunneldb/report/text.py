@@ -128,13 +128,13 @@ def script_json(value: Any) -> Markup:
 
 
 def by_clock(leaks: Sequence[Leak]) -> list[dict[str, Any]]:
-    """Return number and area of leaks by hour: up the left wall, down the right one, and below."""
+    """Return number of leaks, and their area in the stretch, by hour: up the left wall, down the right one, and below."""
     hours = [7, 8, 9, 10, 11, 12, 1, 2, 3, 4, 5, 6]
     tally = {hour: {"name": str(hour), "count": 0, "area": 0.0} for hour in hours}
     for leak in leaks:
         bar = tally[round(leak.clock) % 12 or 12]
         bar["count"] += 1  # type: ignore[operator]
-        bar["area"] += leak.area  # type: ignore[operator]
+        bar["area"] += leak.inside  # type: ignore[operator]
     return _scaled([tally[hour] for hour in hours])
 
 
@@ -143,13 +143,13 @@ SIZES = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0)
 
 
 def by_size(leaks: Sequence[Leak]) -> list[dict[str, Any]]:
-    """Return number and area of leaks by their size."""
+    """Return number of leaks, and their area in the stretch, by their size."""
     names = [f"≤ {SIZES[0]:g}", *(f"{a:g}{DASH}{b:g}" for a, b in pairwise(SIZES)), f"> {SIZES[-1]:g}"]
     bars: list[dict[str, Any]] = [{"name": name, "count": 0, "area": 0.0} for name in names]
     for leak in leaks:
         bar = bars[sum(leak.area > limit for limit in SIZES)]
         bar["count"] += 1
-        bar["area"] += leak.area
+        bar["area"] += leak.inside
     return _scaled(bars)
 
 

@@ -53,3 +53,9 @@ def load_surface(conn: psycopg.Connection[Any], survey: Survey, first: float = -
         arcs=np.array([row[2] for row in sections]),
         reach=survey.spacing,
     )
+
+
+def survey_ends(conn: psycopg.Connection[Any], survey: Survey) -> tuple[float, float] | None:
+    """Chainage at which a survey begins and ends, m: its first and last point, within its segments; None without segments."""
+    row = conn.execute("SELECT chainage_from, chainage_to FROM tunnel_api.survey_ends(%s)", [survey.id]).fetchone()
+    return None if row is None or row[0] is None else (float(row[0]), float(row[1]))

@@ -9,7 +9,7 @@ from typing import Any
 import psycopg
 
 from tunneldb.errors import UserError
-from tunneldb.store.surface import load_surface
+from tunneldb.store.surface import load_surface, survey_ends
 from tunneldb.store.survey import Survey
 
 
@@ -39,9 +39,9 @@ def write_survey(
     UserError
         The survey has no sections yet, or no axis between the two chainages.
     """
-    row = conn.execute("SELECT chainage_from, chainage_to FROM tunnel_api.survey_ends(%s)", [survey.id]).fetchone()
-    if row is not None and row[0] is not None and (row[0] >= high or row[1] <= low):
-        raise UserError(f"survey {survey.name} has nothing there: it lies between chainages {row[0]:.3f} and {row[1]:.3f} m")
+    ends = survey_ends(conn, survey)
+    if ends is not None and (ends[0] >= high or ends[1] <= low):
+        raise UserError(f"survey {survey.name} has nothing there: it lies between chainages {ends[0]:.3f} and {ends[1]:.3f} m")
     held = conn.execute(
         "SELECT bool_or(chainage_to > %s AND chainage_from < %s) FROM tunnel.segment WHERE survey_id = %s",
         [low, high, survey.id],
@@ -57,6 +57,6 @@ def write_survey(
         return gpkg.write_survey_gpkg(conn, survey, surface, low, high, path, begin(survey.name, gpkg.parts()))
     from tunneldb.export.exchange import dxf
 
-    if row is not None and row[0] is not None:  # what is drawn ends with the scan, not at the next vertex of the axis
-        low, high = max(low, row[0]), min(high, row[1])
+    if ends is not None:  # what is drawn ends with the scan, not at the next vertex of the axis
+        low, high = max(low, ends[0]), min(high, ends[1])
     return dxf.write_survey_dxf(conn, survey, surface, low, high, path, begin(survey.name, dxf.PARTS))

@@ -32,6 +32,7 @@ from tunneldb.export.exchange.table import Table, read_table
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.alignment import labels
 from tunneldb.store.catalog import crs_text
+from tunneldb.store.coverage import Coverage, read_coverage
 from tunneldb.store.survey import Survey
 
 MARGIN = 50.0
@@ -65,6 +66,7 @@ LAYERS = {
     },
     "LEAK_TEXT": (_BLUE, "Number and area of leaks"),
     "LEAK_PROFILE": (_BLUE, "Leaks on the profiles"),
+    "COVERAGE_GAP": (_MAGENTA, "Unrolled lining: where leaks could be missed, and why"),
     "UNROLLED": (_GREY, "Unrolled lining: edges and crown"),
     "UNROLLED_CHAINAGE": (_GREY, "Unrolled lining: lines every 10 m, with stations"),
     "PROFILE": (_BLACK, "Profiles, looking up-chainage"),
@@ -87,7 +89,8 @@ def write_survey_dxf(
 
     The tunnel lies in its SRID, lines in space at their height, what is flat at height 0. Below the map lies the unrolled
     lining, arc upwards and chainage to the right, and below that the profiles side by side, as seen looking up-chainage.
-    What an inspector rejected isn't drawn.
+    What an inspector rejected isn't drawn. Where leaks could be missed is drawn on the unrolled lining, and said in the
+    drawing's property ``Coverage``.
 
     Parameters
     ----------
@@ -102,7 +105,8 @@ def write_survey_dxf(
     progress : callable
         Given 1 after each of the PARTS.
     """
-    document = _document(conn, survey)
+    coverage = read_coverage(conn, survey, low, high)
+    document = _document(conn, survey, coverage)
     space = document.modelspace()
     parts = stretches(surface, low, high)
     box = _draw_map(conn, survey, surface, parts, space)
@@ -115,7 +119,8 @@ def write_survey_dxf(
     sides = [side for side in (edges(surface, part) for part in parts) if len(side[0]) > 1]
     ticked = tick_chainages(surface, low, high)
     stations = list(zip(ticked.tolist(), labels(conn, survey, ticked), strict=True))
-    strip = draw_unrolled(space, (box[0], box[1] - MARGIN), sides, stations, unrolled)
+    gaps = [(gap.chainage_from, gap.chainage_to, f"{gap.state}: {gap.reason}") for gap in coverage.gaps]
+    strip = draw_unrolled(space, (box[0], box[1] - MARGIN), sides, stations, unrolled, gaps)
     progress(1)
     found = profiles(surface, low, high)
     named = list(zip(found, labels(conn, survey, np.array([profile.chainage for profile in found])), strict=True))
@@ -157,16 +162,18 @@ def _spot(row: dict[str, Any], shape: Polygon) -> Spot:
     facts = [
         f"id={row['id']}", f"kind={row['kind']}", f"station={row['label']}", f"chainage_from={row['chainage_from']:.3f}",
         f"chainage_to={row['chainage_to']:.3f}", f"area_m2={row['area']:.3f}", f"confidence={row['confidence']:.2f}",
-        f"review={row['review']}", f"reviewed_by={row['reviewed_by'] or ''}",
+        f"review={row['review']}", f"reviewed_by={row['reviewed_by'] or ''}", f"counted={'yes' if row['counted'] else 'no'}",
     ]  # fmt: skip
     return Spot(int(row["id"]), row["kind"], row["review"], f"{row['id']}: {row['area']:.2f} m²", facts, shape)
 
 
-def _document(conn: psycopg.Connection[Any], survey: Survey) -> Any:
+def _document(conn: psycopg.Connection[Any], survey: Survey, coverage: Coverage) -> Any:
     document = filemanagement.new("R2010", units=M)
     document.header["$MEASUREMENT"] = 1
     document.header["$LUNITS"], document.header["$LUPREC"] = 2, 3
     about = {"Survey": survey.name, "Tunnel": survey.tunnel, "Scanned": survey.date.isoformat(), "Unit": "metre"}
+    if coverage.statement is not None:
+        about["Coverage"] = coverage.statement
     for name, text in {**about, "CRS": crs_text(conn, survey.srid), "Writer": f"tunneldb {__version__}"}.items():
         document.header.custom_vars.append(name, " ".join(text.split()))  # a value is a line of the file; WKT may have many
     document.appids.new(APPLICATION)

@@ -22,6 +22,8 @@ from tunneldb.export.tables.leaks import UNDEFINED_CARTESIAN
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.alignment import labels
 from tunneldb.store.catalog import crs_text
+from tunneldb.store.coverage import read_coverage
+from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
 VERSION = {"VERSION": "1.2"}
@@ -75,7 +77,8 @@ def write_survey_gpkg(
     surface : Surface
         The survey's surface, which holds the stretch.
     low, high : float
-        Chainage, m. What reaches into the stretch is written whole, only the axis is cut.
+        Chainage, m. What reaches into the stretch is written whole, only the axis is cut; of leaks and other dark spots what
+        reaches into the survey's part of it.
     path : Path
         File that isn't there yet.
     progress : callable
@@ -87,10 +90,15 @@ def write_survey_gpkg(
         The tunnel's coordinate system isn't known.
     """
     crs = crs_text(conn, survey.srid)
+    ends = survey_ends(conn, survey) or (low, high)
+    inside = max(low, ends[0]), min(high, ends[1])
     counts: dict[str, int] = {}
     styled: list[tuple[str, str, str]] = []
     for layer in layers():
-        table = read_table(conn, survey, layer.view, low, high, layer.where)
+        spots = layer.view.startswith(("leak", "anomaly"))
+        table = read_table(conn, survey, layer.view, *(inside if spots else (low, high)), layer.where)
+        if layer.view == "coverage_gap":
+            table = replace(table, description=read_coverage(conn, survey, low, high).statement or table.description)
         if layer.view == "axis":
             table = _cut_axis(conn, survey, table, low, high)
         _write(path, layer.id, table, layer.wkb, crs if layer.on_map else None)

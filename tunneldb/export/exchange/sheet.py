@@ -33,6 +33,7 @@ def draw_unrolled(
     parts: Sequence[tuple[Float, Float]],
     named: Sequence[tuple[float, str]],
     spots: Sequence[Spot],
+    gaps: Sequence[tuple[float, float, str]] = (),
 ) -> Box:
     """Draw the unrolled lining: chainage to the right, arc upwards, the right wall above the crown; returns its box.
 
@@ -48,6 +49,8 @@ def draw_unrolled(
         Chainages to draw a line at, and what to write there.
     spots : sequence of Spot
         What lies on it.
+    gaps : sequence of (float, float, str)
+        Where leaks could be missed: chainages from and to, m, and why.
     """
     if not parts:
         return corner[0], corner[1], corner[0], corner[1]
@@ -63,6 +66,12 @@ def draw_unrolled(
                 space.add_line(bottom, top, dxfattribs={"layer": "UNROLLED_CHAINAGE"})
                 above = top + np.array([0.0, SMALL])
                 write(space, label.partition(".")[0], above, 2 * SMALL, "UNROLLED_CHAINAGE", Align.BOTTOM_CENTER)
+    for first, last, why in gaps:
+        west, east = max(first, low[0]), min(last, high[0])
+        if west < east:
+            corners = np.array([(west, low[1]), (east, low[1]), (east, high[1]), (west, high[1])]) + shift
+            space.add_lwpolyline(corners, format="xy", close=True, dxfattribs={"layer": "COVERAGE_GAP"})
+            write(space, why, corners[0] + SMALL, 2 * SMALL, "COVERAGE_GAP")
     for spot in spots:
         draw_spot(space, spot, "UNROLLED", shift)
         if spot.kind == "leak":

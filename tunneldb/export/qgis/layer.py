@@ -76,6 +76,9 @@ LAYERS = (
     VectorLayer("segment", "Segments", "segment", "LineStringZ", "segment", MAP, (MAP,)),
     VectorLayer("section", "Sections", "section", "LineStringZ", "section", MAP, (MAP, SPACE)),
     VectorLayer("cluster", "Objects, rails, appendages", "cluster", "Polygon", "cluster", MAP, (MAP,)),
+    VectorLayer(
+        "coverage_gap", "Where leaks could be missed", "coverage_gap", "Polygon", "coverage_gap", UNROLLED, (UNROLLED, SHEETS)
+    ),
     VectorLayer("leak_unrolled", "Leaks (review)", "leak_unrolled", "Polygon", "leak", UNROLLED, (UNROLLED,), True),
     VectorLayer(
         "anomaly_unrolled", "Dark but dry (review)", "anomaly_unrolled", "Polygon", "anomaly", UNROLLED, (), True,

@@ -57,6 +57,8 @@ _COLUMNS = (
     ("Review", '"review"', 15, 1),
     ("Remark", _REMARK, 23, 1),
 )
+# As the sheet's sums count them: one that only touches its edge is not on it.
+_ON_SHEET = f'"chainage_to" > {_SHEET.format("chainage_from")} and "chainage_from" < {_SHEET.format("chainage_to")}'
 _CELL_MARGIN = 0.7
 _ROW = 4.1  # height of a row of one line at the most, mm; with DejaVu it is 3.9
 _LINE_LEAST, _LINE = 10, 12  # letters that a line of a remark holds at the least, and of several, which break between words
@@ -174,10 +176,12 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
     number = "[% @atlas_featurenumber %] of [% @atlas_totalfeatures %]"
     left, right, wide = _MARGIN, PAGE[0] - _MARGIN, PAGE[0] - 2 * _MARGIN
     what = f"Tunnel {survey.tunnel}, survey {survey.name} of {survey.date:%Y-%m-%d}"
-    lining, seen, leaks, wet = (_SHEET.format(name) for name in ("lining_area", "seen_share", "leaks", "wet_area"))
+    lining, seen, leaks, wet, gaps = (
+        _SHEET.format(name) for name in ("lining_area", "seen_share", "leaks", "wet_area", "gaps")
+    )
     sums = (
         f"Lining [% coalesce(format_number({lining}, 0) || ' m², ' || format_number(100 * {seen}, 1) || ' % of it seen',"
-        f" 'not seen yet') %]; leaks [% {leaks} %], [% format_number({wet}, 2) %] m²"
+        f" 'not seen yet') %]; leaks [% coalesce({leaks} || ', ' || format_number({wet}, 2) || ' m²', 'not searched for') %]"
     )
     how = (
         f"Unrolled lining seen from inside the tunnel, 1:{scale} on A4: along it chainage, up it arc from the crown (0), m, "
@@ -203,6 +207,8 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
             align="right",
         ),
     ]  # fmt: skip
+    if survey.intensity_kind != "none":
+        texts.append(_label("gaps", f"[% coalesce({gaps}, '') %]", (left, 20, wide, 4), 7, bold=True))
     for page in range(1, pages):
         texts += [
             _label(f"stretch {page + 1}", f"{stretch}, leaks continued", (left, 7, 150, 8), 12, page=page, bold=True),
@@ -267,7 +273,7 @@ def _table(leaks: tuple[str, str], top: float) -> list[ET.Element]:
     table = ET.Element(
         "LayoutMultiFrame", type=str(_TABLE), uuid=key, templateUuid=key, source="0", vectorLayer=leaks[0],
         vectorLayerName="Leaks", vectorLayerSource=leaks[1], vectorLayerProvider="postgres", maxFeatures=str(rows),
-        filterToAtlasIntersection="1", filterFeatures="false", featureFilter="", resizeMode="0", headerMode="1",
+        filterToAtlasIntersection="1", filterFeatures="true", featureFilter=_ON_SHEET, resizeMode="0", headerMode="1",
         headerHAlignment="0", emptyTableMode="0", emptyTableMessage="", showEmptyRows="1", showUniqueRowsOnly="0",
         showOnlyVisibleFeatures="0", useConditionalStyling="0", wrapBehavior="1", wrapString="",
         cellMargin=str(_CELL_MARGIN), showGrid="1", horizontalGrid="1", verticalGrid="0", gridStrokeWidth="0.1",

@@ -47,8 +47,7 @@
   ];
 
   function wanted(leak, filters) {
-    const kept = leak.review !== "rejected";
-    if (filters.review === "counted" ? !kept : filters.review && leak.review !== filters.review) return false;
+    if (filters.review === "counted" ? leak.review === "rejected" : filters.review && leak.review !== filters.review) return false;
     if (filters.area && !(leak.area >= Number(filters.area))) return false;
     const hour = leak.clock % 12;
     if (filters.clock === "crown" && hour > 2 && hour < 10) return false;
@@ -90,10 +89,13 @@
       if (place >= 0) state.page = Math.floor(place / PAGE);
     }
     state.page = Math.min(state.page, pages - 1);
-    const area = listed.reduce((sum, leak) => sum + leak.area, 0);
-    $("#found").textContent = state.all
-      ? `${listed.length} leaks, with those rejected, in order of chainage`
-      : `${listed.length} of ${leaks.length} leaks, ${area.toFixed(2)} m²`;
+    // sums are those of the summary: of leaks found last and not rejected, the part that lies in the stretch reported
+    const area = listed.filter((leak) => leak.detected && leak.review !== "rejected").reduce((sum, leak) => sum + leak.inside, 0);
+    $("#found").textContent = !data.searched && !leaks.length
+      ? "Leaks were not searched for"
+      : state.all
+        ? `${listed.length} leaks, with those rejected, in order of chainage`
+        : `${listed.length} of ${leaks.length} leaks, ${area.toFixed(2)} m²`;
     $("#table thead").replaceChildren(
       make("tr", {}, ...columns.map(([heading, key, , kind]) => {
         const sorted = state.sort === key ? { "aria-sort": state.up ? "ascending" : "descending" } : {};
@@ -231,7 +233,7 @@
     const order = largest.sort((a, b) => a.chainage - b.chainage || a.id - b.id);
     $("#sheets-note").textContent = order.length < leaks.length
       ? `The ${order.length} largest of ${leaks.length} leaks, in order of chainage; the HTML file of this report shows each.`
-      : `All ${order.length} leaks, in order of chainage.`;
+      : order.length ? `All ${order.length} leaks, in order of chainage.` : "";
     $("#sheets .cards").replaceChildren(...order.map(card));
   }
   function toScreen() {

@@ -379,6 +379,13 @@
         </config>
       </editWidget>
     </field>
+    <field name="counted" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
   </fieldConfiguration>
   <aliases>
     <alias index="0" field="id" name="Leak"/>
@@ -408,6 +415,7 @@
     <alias index="24" field="detected" name="Found by the last detection"/>
     <alias index="25" field="created_at" name="First detected"/>
     <alias index="26" field="detected_at" name="Last detected"/>
+    <alias index="27" field="counted" name="Counted in sums"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -437,6 +445,7 @@
     <field name="detected" editable="0"/>
     <field name="created_at" editable="0"/>
     <field name="detected_at" editable="0"/>
+    <field name="counted" editable="0"/>
   </editable>
   <editorlayout>tablayout</editorlayout>
   <attributeEditorForm>
@@ -467,6 +476,7 @@
       <attributeEditorField name="detected" index="24" showLabel="1"/>
       <attributeEditorField name="created_at" index="25" showLabel="1"/>
       <attributeEditorField name="detected_at" index="26" showLabel="1"/>
+      <attributeEditorField name="counted" index="27" showLabel="1"/>
       <attributeEditorField name="survey" index="2" showLabel="1"/>
     </attributeEditorContainer>
   </attributeEditorForm>

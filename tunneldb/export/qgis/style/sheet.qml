@@ -115,6 +115,13 @@
         </config>
       </editWidget>
     </field>
+    <field name="gaps" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
   </fieldConfiguration>
   <aliases>
     <alias index="0" field="id" name="Sheet key"/>
@@ -131,6 +138,7 @@
     <alias index="11" field="seen_share" name="Share seen"/>
     <alias index="12" field="wet_area" name="Wet area (m²)"/>
     <alias index="13" field="leaks" name="Leaks"/>
+    <alias index="14" field="gaps" name="Where leaks could be missed"/>
   </aliases>
   <attributeactions>
     <defaultAction key="Canvas" value="{7d6c7d0e-6a4c-4f0e-9a51-6f0f3c1f8a11}"/>

@@ -1,0 +1,185 @@
+-- Where a survey cannot vouch for its list of leaks: what was not loaded, not searched, searched in vain or before something
+-- changed, and lining that was hardly seen. Every document that states leaks asks here. Needs stage_state (views/status.sql),
+-- coverage_at and km_ends (leaks/coverage.sql).
+
+-- A kilometre was searched when detection noted what it saw of the lining there (tunnel.coverage). That of a kilometre which was
+-- not, begins and ends with its segments, or else with the points of its files along the given axis: the two differ by
+-- centimetres, and what is shorter than a metre is left out for that. Lining is looked at by bins of a metre.
+CREATE OR REPLACE FUNCTION tunnel_api.coverage_gaps(
+    survey_id int, stretch_from float8 DEFAULT '-Infinity', stretch_to float8 DEFAULT 'Infinity')
+RETURNS TABLE (chainage_from float8, chainage_to float8, state text, reason text, searched boolean, seen_share float8)
+LANGUAGE plpgsql STABLE STRICT PARALLEL RESTRICTED
+ROWS 10
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SET jit = off
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    first_place constant float8 := stretch_from;
+    last_place constant float8 := stretch_to;
+    blind constant boolean := (SELECT s.intensity_kind = 'none' FROM tunnel.survey s WHERE s.id = survey_key);
+    least_share constant float8 := 0.5;  -- of the lining seen
+    least_length constant float8 := 5;  -- over which it was not, m
+BEGIN
+    RETURN QUERY
+    WITH scanned AS (  -- along the given axis
+        SELECT k.km, min(greatest(f.chainage_from, k.km * 1000)) AS low, max(least(f.chainage_to, (k.km + 1) * 1000)) AS high
+        FROM tunnel.scan_file f
+        CROSS JOIN LATERAL generate_series(floor(f.chainage_from / 1000)::int, ceil(f.chainage_to / 1000)::int - 1) AS k (km)
+        WHERE f.survey_id = survey_key
+        GROUP BY k.km
+    ), kilometre AS MATERIALIZED (
+        SELECT p.km, p.low, p.high, c.km IS NOT NULL AND NOT blind AS searched
+        FROM (SELECT coalesce(q.km, e.km) AS km, coalesce(e.chainage_from, q.low) AS low, coalesce(e.chainage_to, q.high) AS high
+              FROM scanned q
+              FULL JOIN (SELECT k.* FROM tunnel_api.km_ends k WHERE k.survey_id = survey_key) e ON e.km = q.km) p
+        LEFT JOIN tunnel.coverage c ON c.survey_id = survey_key AND c.km = p.km
+    ), stage AS MATERIALIZED (
+        SELECT t.km, t.step, t.stage, t.outcome, t.reason, t.done_at, split_part(t.message, E'\n', 1) AS message
+        -- staleness comes from as many kilometres away as there are stages
+        FROM tunnel_api.stage_state(survey_key, greatest(first_place / 1000 - 7, -1000000)::int,
+                                    least(last_place / 1000 + 6, 1000000)::int) t
+        WHERE t.step <= (SELECT d.step FROM tunnel.stage d WHERE d.name = 'detect')
+    ), first_bad AS (  -- of what a kilometre has not, or failed to renew, the first
+        SELECT DISTINCT ON (t.km) t.* FROM stage t
+        WHERE t.done_at IS NULL OR t.outcome IN ('failed', 'interrupted')
+        ORDER BY t.km, t.step
+    ), judged AS (
+        SELECT k.low, k.high, k.searched,
+            CASE WHEN blind THEN 'no intensity'
+                 WHEN b.outcome IN ('failed', 'interrupted') THEN b.outcome
+                 WHEN k.searched THEN CASE WHEN d.reason IS NOT NULL THEN 'stale' END
+                 WHEN b.stage = 'load' THEN 'not loaded'
+                 ELSE 'not searched' END AS state,
+            CASE WHEN blind THEN 'by which wet lining is told from dry'
+                 WHEN b.outcome = 'failed' THEN b.stage || ': ' || coalesce(b.message, 'no reason was noted')
+                 WHEN b.outcome = 'interrupted' THEN b.stage || ': the program that ran it is gone'
+                 WHEN k.searched THEN d.reason
+                 WHEN b.outcome = 'running' THEN b.stage || ' is running'
+                 WHEN b.stage IS NOT NULL THEN b.stage || ' has not run'
+                 WHEN d.done_at IS NOT NULL THEN 'detect of an earlier version did not note what it saw'
+                 ELSE 'detect has not run' END AS reason
+        FROM kilometre k
+        LEFT JOIN first_bad b ON b.km = k.km
+        LEFT JOIN stage d ON d.km = k.km AND d.stage = 'detect'
+    ), unread AS (  -- what a file that was not read would have filled, as far as its header tells
+        SELECT greatest(coalesce(i.km_from * 1000::float8, '-Infinity'), t.start_chainage) AS low,
+            least(coalesce((i.km_to + 1) * 1000::float8, 'Infinity'), t.start_chainage + ST_Length(t.alignment)) AS high,
+            CASE WHEN i.failed_at IS NULL THEN i.name || ' waits to be read'
+                 ELSE i.name || ' was not read: ' || split_part(i.message, E'\n', 1) END AS reason
+        FROM tunnel.incoming i
+        JOIN tunnel.survey s ON s.id = i.survey_id
+        JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+        WHERE i.survey_id = survey_key
+    ), beyond AS (  -- between kilometres, and where the stretch asked for reaches farther than the survey
+        SELECT lag(k.high, 1, first_place) OVER (ORDER BY k.km) AS low, k.low AS high FROM kilometre k
+        UNION ALL
+        SELECT max(k.high), last_place FROM kilometre k HAVING count(*) > 0
+        UNION ALL
+        SELECT greatest(first_place, t.start_chainage), least(last_place, t.start_chainage + ST_Length(t.alignment))
+        FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+        WHERE s.id = survey_key AND NOT EXISTS (SELECT FROM kilometre)
+    ), place AS (
+        SELECT array_agg(DISTINCT p.at) AS at
+        FROM kilometre k
+        CROSS JOIN LATERAL (SELECT greatest(k.low, first_place) AS low, least(k.high, last_place) AS high) c
+        CROSS JOIN LATERAL (
+            SELECT c.low AS at UNION ALL SELECT c.high UNION ALL SELECT generate_series(ceil(c.low)::int, floor(c.high)::int)) p
+        WHERE k.searched AND c.low < c.high
+    ), bin AS (
+        SELECT c.chainage AS low, lead(c.chainage) OVER along AS high, lead(c.lining) OVER along - c.lining AS lining,
+            lead(c.seen) OVER along - c.seen AS seen
+        FROM tunnel_api.coverage_at(survey_key, (SELECT p.at FROM place p)) c
+        WINDOW along AS (ORDER BY c.chainage)
+    ), dim AS (
+        SELECT b.low, b.high, b.lining, b.seen, b.state,
+            sum(CASE WHEN b.state = b.before AND b.low = b.behind THEN 0 ELSE 1 END) OVER (ORDER BY b.low) AS part
+        FROM (
+            SELECT q.*, lag(q.state) OVER (ORDER BY q.low) AS before, lag(q.high) OVER (ORDER BY q.low) AS behind
+            FROM (SELECT b.*, CASE WHEN b.lining < 1e-6 THEN 'not scanned'
+                                   WHEN b.seen < least_share * b.lining THEN 'unseen' END AS state
+                  FROM bin b WHERE b.high < b.low + 1 + 1e-6) q) b
+    ), gap AS (
+        SELECT j.low, j.high, j.state, j.reason, j.searched, NULL::float8 AS seen FROM judged j WHERE j.state IS NOT NULL
+        UNION ALL
+        SELECT u.low, u.high, 'not loaded', u.reason, false, NULL FROM unread u
+        UNION ALL
+        SELECT b.low, b.high, 'not scanned', 'the survey has no points there', false, NULL FROM beyond b
+        WHERE b.low > '-Infinity' AND b.high < 'Infinity' AND b.high - b.low >= 1
+        UNION ALL
+        SELECT min(d.low), max(d.high), d.state,
+            CASE d.state WHEN 'unseen' THEN 'less than half of the lining was seen' ELSE 'no lining is known there' END, true,
+            coalesce(sum(d.seen) / nullif(sum(d.lining), 0), 0)
+        FROM dim d WHERE d.state IS NOT NULL
+        GROUP BY d.part, d.state
+        HAVING max(d.high) - min(d.low) >= least_length
+    ), cut AS (
+        SELECT greatest(g.low, first_place) AS low, least(g.high, last_place) AS high, g.state, g.reason, g.searched, g.seen
+        FROM gap g
+        WHERE g.low < last_place AND g.high > first_place
+    ), joined AS (  -- of kilometres in a row of which the same is to be said
+        SELECT c.*, sum(CASE WHEN c.low <= c.before + CASE c.state WHEN 'unseen' THEN 0 ELSE 1 END THEN 0 ELSE 1 END) OVER (
+            PARTITION BY c.state, c.reason, c.searched ORDER BY c.low) AS part
+        FROM (SELECT c.*, lag(c.high) OVER (PARTITION BY c.state, c.reason, c.searched ORDER BY c.low) AS before FROM cut c) c
+    )
+    SELECT min(j.low) AS low, max(j.high), j.state, j.reason, j.searched, max(j.seen)
+    FROM joined j
+    GROUP BY j.state, j.reason, j.searched, j.part
+    ORDER BY 5, 1, 2 DESC, 3, 4;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.coverage_gaps(int, float8, float8) IS
+'Where a survey cannot vouch for its list of leaks between two chainages (m), or anywhere: one row a stretch, those that were not searched for leaks first, then from the least chainage on. state: not scanned (no points or no lining there), not loaded, not searched, failed, interrupted, stale (searched before something changed), unseen (5 m or more of which less than half of the lining was seen), no intensity. searched: whether the result of a search stands there. No rows: everything was searched, is up to date and was seen by more than half.';
+
+
+CREATE OR REPLACE FUNCTION tunnel_api.coverage_statement(
+    survey_id int, chainage_from float8 DEFAULT '-Infinity', chainage_to float8 DEFAULT 'Infinity')
+RETURNS text
+LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+    SELECT string_agg(k.said, '; ' ORDER BY k.searched, k.n)
+    FROM (
+        SELECT w.searched, min(w.n) AS n,
+            CASE WHEN w.searched THEN 'Searched, but ' ELSE 'Not searched for leaks: ' END
+            || string_agg(CASE WHEN w.n <= 6 THEN w.said END, ', ' ORDER BY w.n)
+            || CASE WHEN max(w.n) > 6 THEN format(', and %s more', max(w.n) - 6) ELSE '' END AS said
+        FROM (
+            SELECT g.searched, row_number() OVER (PARTITION BY g.searched ORDER BY g.chainage_from) AS n,
+                format(CASE WHEN g.searched THEN '%3$s %1$s–%2$s%4$s' ELSE '%1$s–%2$s %3$s%4$s' END,
+                    f.label, t.label, g.state, CASE g.state
+                        WHEN 'unseen' THEN format(' (%s %% of the lining seen)', round((100 * g.seen_share)::numeric))
+                        ELSE format(' (%s)', g.reason) END) AS said
+            FROM tunnel.survey s
+            CROSS JOIN LATERAL tunnel_api.coverage_gaps(s.id, $2, $3) g
+            CROSS JOIN LATERAL (SELECT regexp_replace(l.label, '\.0+$', '') AS label
+                                FROM tunnel_api.stationing(s.tunnel_id, g.chainage_from) l) f
+            CROSS JOIN LATERAL (SELECT regexp_replace(l.label, '\.0+$', '') AS label
+                                FROM tunnel_api.stationing(s.tunnel_id, g.chainage_to) l) t
+            WHERE s.id = $1) w
+        GROUP BY w.searched) k
+$$;
+COMMENT ON FUNCTION tunnel_api.coverage_statement(int, float8, float8) IS
+'What coverage_gaps has to say of a survey between two chainages (m), in words, six stretches of each kind at most; NULL if there is nothing. What every document says before it counts leaks.';
+
+
+CREATE OR REPLACE VIEW tunnel_api.coverage_gap AS
+SELECT s.id::bigint * 1000000 + row_number() OVER (PARTITION BY s.id) AS id, s.id AS survey_id, s.name AS survey,
+       g.chainage_from, g.chainage_to, tunnel_api.station_label(s.tunnel_id, g.chainage_from) AS label_from,
+       tunnel_api.station_label(s.tunnel_id, g.chainage_to) AS label_to, g.state, g.reason, g.searched, g.seen_share,
+       public.st_makeenvelope(g.chainage_from, a.arc_from, g.chainage_to, a.arc_to, 0)::public.geometry(Polygon, 0) AS geom
+  FROM tunnel.survey s
+ CROSS JOIN LATERAL tunnel_api.coverage_gaps(s.id) g
+ CROSS JOIN LATERAL (  -- not of the widest section: one that was measured astray would make all higher
+        SELECT percentile_cont(0.02) WITHIN GROUP (ORDER BY t.arc[1]) AS arc_from,
+               percentile_cont(0.98) WITHIN GROUP (ORDER BY t.arc[361]) AS arc_to
+          FROM tunnel.section t WHERE t.survey_id = s.id) a;
+COMMENT ON VIEW tunnel_api.coverage_gap IS
+    'Where surveys cannot vouch for their lists of leaks, and why: see coverage_gaps; rectangles of the unrolled plane (chainage, arc), SRID 0';
+COMMENT ON COLUMN tunnel_api.coverage_gap.id IS 'Key, valid until something is loaded, run or edited';
+COMMENT ON COLUMN tunnel_api.coverage_gap.state IS 'not scanned, not loaded, not searched, failed, interrupted, stale, unseen or no intensity';
+COMMENT ON COLUMN tunnel_api.coverage_gap.reason IS 'Why';
+COMMENT ON COLUMN tunnel_api.coverage_gap.searched IS 'Whether the result of a search for leaks stands there nevertheless';
+COMMENT ON COLUMN tunnel_api.coverage_gap.seen_share IS 'Share of the lining that was seen, where that is little; else NULL';
+COMMENT ON COLUMN tunnel_api.coverage_gap.geom IS 'As high as the survey''s sections; NULL before it has any';

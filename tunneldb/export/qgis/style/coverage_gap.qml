@@ -1,0 +1,130 @@
+<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
+<qgis version="3.22.0" styleCategories="AllStyleCategories" hasScaleBasedVisibilityFlag="0" minScale="0" maxScale="0" readOnly="0">
+  <renderer-v2 type="categorizedSymbol" attr="searched" forceraster="0" enableorderby="0" symbollevels="0">
+    <categories>
+      <category symbol="0" value="false" type="bool" label="Not searched for leaks" render="true"/>
+      <category symbol="1" value="true" type="bool" label="Out of date, or hardly seen" render="true"/>
+    </categories>
+    <symbols>
+      <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="152,60,160,255"/>
+            <Option type="QString" name="style" value="b_diag"/>
+            <Option type="QString" name="outline_color" value="152,60,160,255"/>
+            <Option type="QString" name="outline_style" value="dash"/>
+            <Option type="QString" name="outline_width" value="0.5"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+          </Option>
+        </layer>
+      </symbol>
+      <symbol name="1" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="152,60,160,0"/>
+            <Option type="QString" name="style" value="no"/>
+            <Option type="QString" name="outline_color" value="152,60,160,255"/>
+            <Option type="QString" name="outline_style" value="dash"/>
+            <Option type="QString" name="outline_width" value="0.35"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+          </Option>
+        </layer>
+      </symbol>
+    </symbols>
+  </renderer-v2>
+  <fieldConfiguration>
+    <field name="id" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="survey_id" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="survey" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="chainage_from" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="chainage_to" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="label_from" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="label_to" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="state" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="reason" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="searched" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="seen_share" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+  </fieldConfiguration>
+  <aliases>
+    <alias index="0" field="id" name="Gap key"/>
+    <alias index="1" field="survey_id" name="Survey key"/>
+    <alias index="2" field="survey" name="Survey"/>
+    <alias index="3" field="chainage_from" name="Chainage from (m)"/>
+    <alias index="4" field="chainage_to" name="Chainage to (m)"/>
+    <alias index="5" field="label_from" name="From"/>
+    <alias index="6" field="label_to" name="To"/>
+    <alias index="7" field="state" name="State"/>
+    <alias index="8" field="reason" name="Why"/>
+    <alias index="9" field="searched" name="Searched for leaks"/>
+    <alias index="10" field="seen_share" name="Share seen"/>
+  </aliases>
+  <previewExpression>"label_from"</previewExpression>
+  <mapTip>&lt;b&gt;[% "label_from" %] – [% "label_to" %]&lt;/b&gt;: [% "state" %]&lt;br&gt;[% "reason" %]</mapTip>
+  <layerGeometryType>2</layerGeometryType>
+</qgis>

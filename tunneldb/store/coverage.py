@@ -1,0 +1,106 @@
+"""Where a survey was searched for leaks and what was seen of it, as every document states it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+import psycopg
+from psycopg import sql
+from psycopg.rows import class_row
+
+from tunneldb.store.survey import Survey
+
+
+@dataclass(frozen=True)
+class CoverageGap:
+    """A stretch for which a list of leaks can't be vouched for.
+
+    Attributes
+    ----------
+    chainage_from, chainage_to : float
+        m.
+    label_from, label_to : str
+        The same in the tunnel's stationing.
+    state : str
+        not scanned, not loaded, not searched, failed, interrupted, stale, unseen or no intensity.
+    reason : str
+        Why.
+    searched : bool
+        Whether the result of a search for leaks stands there nevertheless.
+    seen_share : float or None
+        Share of the lining seen, 0 to 1, where that is little.
+    """
+
+    chainage_from: float
+    chainage_to: float
+    label_from: str
+    label_to: str
+    state: str
+    reason: str
+    searched: bool
+    seen_share: float | None
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """What a statement on the leaks of a stretch rests on.
+
+    Attributes
+    ----------
+    gaps : list of CoverageGap
+        Where they can't be vouched for, those not searched first.
+    statement : str or None
+        The same in words; None where there is nothing to say.
+    seen_area : float
+        Lining seen, m².
+    seen_share : float
+        Of the lining of the whole stretch, 0 to 1; what was not searched counts as unseen.
+    searched_share : float
+        Share of the length that was searched for leaks, 0 to 1.
+    """
+
+    gaps: list[CoverageGap]
+    statement: str | None
+    seen_area: float
+    seen_share: float
+    searched_share: float
+
+    @property
+    def complete(self) -> bool:
+        """Whether all of it was searched, and anything was seen."""
+        return self.seen_area > 0 and all(gap.searched for gap in self.gaps)
+
+
+_GAPS = sql.SQL(
+    "SELECT {} FROM (SELECT g.*, tunnel_api.station_label(%(tunnel)s, g.chainage_from) AS label_from,"
+    " tunnel_api.station_label(%(tunnel)s, g.chainage_to) AS label_to"
+    " FROM tunnel_api.coverage_gaps(%(survey)s, %(low)s, %(high)s) WITH ORDINALITY g"
+    "  (chainage_from, chainage_to, state, reason, searched, seen_share, n)) q ORDER BY n"
+).format(sql.SQL(", ").join(sql.Identifier(field.name) for field in fields(CoverageGap)))
+
+
+def read_coverage(conn: psycopg.Connection[Any], survey: Survey, low: float = -math.inf, high: float = math.inf) -> Coverage:
+    """Read what a statement on the leaks between two chainages, m, rests on."""
+    place = {"survey": survey.id, "tunnel": survey.tunnel_id, "name": survey.name, "low": low, "high": high}
+    with conn.cursor(row_factory=class_row(CoverageGap)) as cursor:
+        gaps = cursor.execute(_GAPS, place).fetchall()
+    row = conn.execute(
+        "SELECT tunnel_api.coverage_statement(%(survey)s, %(low)s, %(high)s), coalesce(t.seen_area, 0),"
+        " coalesce(t.seen_share, 0), coalesce(t.searched_share, 0)"
+        " FROM (SELECT) one LEFT JOIN tunnel_api.leak_statistics(%(name)s, %(low)s, %(high)s) t ON true",
+        place,
+    ).fetchone()
+    assert row is not None
+    return Coverage(gaps, *row)
+
+
+def seen_share(conn: psycopg.Connection[Any], survey: Survey, km: int) -> float:
+    """Share of the lining of a kilometre that the last detection saw, as far as the survey reaches, 0 to 1."""
+    row = conn.execute(
+        "SELECT c.seen_share FROM tunnel_api.km_ends k"
+        " CROSS JOIN LATERAL tunnel_api.coverage(%s, k.chainage_from, k.chainage_to) c WHERE k.survey_id = %s AND k.km = %s",
+        [survey.name, survey.id, km],
+    ).fetchone()
+    return 0.0 if row is None or row[0] is None else float(row[0])
