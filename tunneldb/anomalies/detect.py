@@ -67,7 +67,7 @@ class Anomaly:
                 return None
         elif region.area < min_area * (1 - 1e-12):
             return None
-        share = region.filled / np.count_nonzero(region.mask)
+        share = region.measured / np.count_nonzero(region.mask)
         return cls(region.outline, region.drop_mean, region.drop_max, region.contrast, float(share), verdict)
 
 
@@ -138,7 +138,7 @@ def find_anomalies(contrast: ContrastImage, background: BackgroundMap, min_area:
 def _regions(dark: Bool, contrast: ContrastImage, min_area: float) -> list[Region]:
     """Regions of the dark pixels, joints cut off from what they run through."""
     inner = contrast.grid.inner
-    joints = find_joints(dark, inner.start, inner.stop, contrast.grid.pixel)
+    joints = find_joints(dark, inner.start, inner.stop, contrast.grid.pixel, contrast.spacing)
     if not joints.any():
         return find_regions(dark, dark, contrast, min_area, _may_drip)
     parts = [find_regions(part, dark, contrast, min_area, _may_drip) for part in (dark & ~joints, joints)]

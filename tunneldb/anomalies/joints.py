@@ -22,8 +22,14 @@ RESOLVED = 0.75
 """The same in pixels, at least: a line cannot be told to be straighter."""
 
 
-def find_joints(dark: Bool, first: int, stop: int, pixel: float) -> Bool:
+PROFILES = 3.0
+"""Where profiles lie apart, joints along the tunnel are seen over so many spacings: a spot of a single one is straight, too."""
+
+
+def find_joints(dark: Bool, first: int, stop: int, pixel: float, spacing: float = 0.0) -> Bool:
     """Find the pixels of narrow straight lines around the tunnel or along it that are long enough.
+
+    Profiles that lie apart can't tell how narrow is what goes around the tunnel: then only lines along it are found.
 
     Parameters
     ----------
@@ -33,14 +39,18 @@ def find_joints(dark: Bool, first: int, stop: int, pixel: float) -> Bool:
         Columns that count.
     pixel : float
         Side of a pixel, m.
+    spacing : float
+        Distance of profiles along the tunnel, m; 0 where they lie as close as pixels.
     """
     found = np.zeros(dark.shape, np.bool_)
     if 2 * pixel > NARROW_AROUND:
         return found  # a line of two pixels may be anything
     for runs_of, image, width, length in (
         (row_runs, found, NARROW_AROUND, LONG_AROUND),
-        (column_runs, found.T, NARROW_ALONG, LONG_ALONG),
+        (column_runs, found.T, NARROW_ALONG, max(LONG_ALONG, PROFILES * spacing)),
     ):
+        if spacing and runs_of is row_runs:
+            continue
         runs = runs_of(dark, first, stop)
         runs = runs[runs[:, 2] - runs[:, 1] <= max(2, round(width / pixel))]
         lines = round(length / pixel)

@@ -29,8 +29,9 @@ from tunneldb.raster.accumulator import Accumulator, Window
 from tunneldb.raster.floor import HIDDEN, Floor
 from tunneldb.raster.geotiff import KINDS
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.image import halo, lining_image
+from tunneldb.raster.image import halo, halo_of_profiles, lining_image
 from tunneldb.raster.observation import Observer, Radiometer
+from tunneldb.raster.profiles import ProfileGaps, find_gaps
 from tunneldb.raster.rasterize import Counts, rasterize
 from tunneldb.store.anomalies import save_anomalies
 from tunneldb.store.images import (
@@ -132,7 +133,7 @@ def detect(
     inputs = load_inputs(conn, survey, km, values)
     if inputs.sample is None:
         images = ImageStore(conn, survey, inputs.grid, ["offset"])
-        counts = make_offset_images(inputs, images.save, progress)
+        counts = make_offset_images(inputs, values["image.spacing"], images.save, progress)
         drop_radiometry(conn, survey, km)
         drop_coverage(conn, survey, km)
         save_range_curve(conn, survey, km, None)
@@ -141,7 +142,7 @@ def detect(
             **counts,
             "pixels": images.pixels,
             "leaks": 0,
-            "note": "no intensity: offset image only, no leaks sought",
+            "note": "; ".join(["no intensity: offset image only, no leaks sought", *_of_profiles(counts)]),
         }
     images = ImageStore(conn, survey, inputs.grid, KINDS)
     result = compute_detection(inputs, inputs.sample, values, images.save, progress)
@@ -201,7 +202,9 @@ def compute_detection(
     with Accumulator(inputs.grid) as image:
         counts = _gather(observer, inputs.files, image, roughness.sigma, progress)
         outliers = SectionOutliers.of(observer.surface, MOST)
-        lining = lining_image(image, observer.floor, outliers, values["appendage.distance"], save_block)
+        gaps = find_gaps(image, values["image.spacing"])
+        lining = lining_image(image, gaps, observer.floor, outliers, values["appendage.distance"], save_block)
+    counts |= _spacing(gaps)
     background = map_background(lining, inputs.dry)
     contrast = contrast_image(lining, background)
     found = find_anomalies(contrast, background, values["leak.min_area"])
@@ -217,14 +220,25 @@ def compute_detection(
 
 
 def make_offset_images(
-    inputs: DetectionInputs, save_block: Callable[[Window], None], progress: Callable[[float], None]
+    inputs: DetectionInputs, spacing: float, save_block: Callable[[Window], None], progress: Callable[[float], None]
 ) -> Counts:
-    """Make the offset image of a survey without intensity."""
+    """Make the offset image of a survey without intensity; ``spacing`` is that of its profiles, m, 0 if it is to be found."""
+    width = inputs.grid.block_columns
     with Accumulator(inputs.grid) as image:
         counts = _gather(inputs.observer, inputs.files, image, 0.0, progress)
+        gaps = find_gaps(image, spacing)
+        beyond = 0 if gaps is None else gaps.longest
         for block in image.inner_blocks():
-            save_block(image.window(block * image.grid.block_columns, (block + 1) * image.grid.block_columns))
-    return counts
+            window = image.window(block * width - beyond, (block + 1) * width + beyond)
+            if gaps is not None:
+                window = gaps.close(window)
+            save_block(window.cut(slice(block * width, (block + 1) * width)))
+    return counts | _spacing(gaps)
+
+
+def _spacing(gaps: ProfileGaps | None) -> Counts:
+    """What the ledger says of the distance of profiles, m: nothing where they lie as close as pixels."""
+    return {} if gaps is None else {"profile_spacing": round(gaps.spacing, 3)}
 
 
 def _save(
@@ -256,7 +270,7 @@ def _save(
         "leaks_again": matched.again,
         "leaks_kept_for_review": matched.kept,
         "leaks_gone": matched.gone,
-        **_report(roughness, result.calibration.note, matched.other_pixels),
+        **_report(roughness, result, matched.other_pixels),
     }
 
 
@@ -311,12 +325,24 @@ def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
     first, last = km * KILOMETRE - surface.reach, (km + 1) * KILOMETRE + surface.reach
     if not ((surface.chainages >= first) & (surface.chainages <= last)).any():
         raise UserError(f"kilometre {km} has no sections yet: run its stages segments and sections first")
-    beyond = halo(pixel)
+    beyond = halo(pixel)  # what is farther away counts only where profiles lie apart, and adds no rows
     inside = (surface.chainages >= first - beyond * pixel) & (surface.chainages <= last + beyond * pixel)
-    return Grid.covering(km, pixel, float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max()), beyond)
+    return Grid.covering(
+        km, pixel, float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max()), halo_of_profiles(pixel)
+    )
 
 
-def _report(roughness: Roughness, note: str | None, other_pixels: list[int]) -> Counts:
+def _of_profiles(counts: Counts) -> list[str]:
+    """What there is to note where profiles lie apart."""
+    if (spacing := counts.get("profile_spacing")) is None:
+        return []
+    return [
+        f"profiles {spacing:g} m apart: between them the image shows the nearest one; where leaks begin and end along the"
+        f" tunnel is known to {0.5 * spacing:.2g} m, and those shorter than {spacing:g} m may be missed"
+    ]
+
+
+def _report(roughness: Roughness, result: DetectionResult, other_pixels: list[int]) -> Counts:
     """What the ledger says about the roughness, and what else there is to note."""
 
     def known(value: float, digits: int) -> float | None:
@@ -330,7 +356,7 @@ def _report(roughness: Roughness, note: str | None, other_pixels: list[int]) -> 
         "incidence_from": known(roughness.incidence_from, 1),
         "incidence_to": known(roughness.incidence_to, 1),
     }
-    notes = [note] if note else []
+    notes = [note] if (note := result.calibration.note) else []
     if text := roughness.note:
         notes.append(text)
     if other_pixels:
@@ -338,6 +364,7 @@ def _report(roughness: Roughness, note: str | None, other_pixels: list[int]) -> 
             f"leaks over the end towards kilometre {' and '.join(map(str, other_pixels))} are in two pieces: its pixels are of"
             " another size; detect both with the same image.pixel"
         )
+    notes += _of_profiles(result.counts)
     if notes:
         report["note"] = "; ".join(notes)
     return report

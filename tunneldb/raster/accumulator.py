@@ -168,6 +168,12 @@ class Accumulator:
                 means[:, :, first - start : last - start] = np.nan
         return Window(slice(start, stop), weight, *means)
 
+    def held(self, start: int, stop: int) -> Bool:
+        """Tell which pixels of the columns of one block, from ``start`` up to ``stop``, hold points: (rows, columns)."""
+        first = start // self.grid.block_columns * self.grid.block_columns
+        sums = self._fetch(first // self.grid.block_columns)
+        return np.asarray(sums[:, start - first : stop - first, 0] > 0, dtype=np.bool_)
+
     def _fetch(self, block: int) -> Whole:
         """Sums of a block, brought into memory, from the file or new."""
         if block in self._blocks:
