@@ -82,7 +82,7 @@ class Figures:
         common = sum(f.area_recall * f.true_area for f in single)
         true_area, found_area = sum(f.true_area for f in single), sum(f.found_area for f in single)
         long = once = hit = 0
-        for outcome, c in zip(outcomes, comparisons, strict=True):
+        for c in comparisons:
             for shape, covered in zip(c.true_shape, c.covered, strict=True):
                 if shape.bounds[2] - shape.bounds[0] > 2.0 * spacing:
                     long += 1

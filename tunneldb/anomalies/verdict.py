@@ -46,7 +46,8 @@ class Verdict:
     kind : {'leak', 'joint', 'dark'}
         A leak; a joint; or dark but dry.
     reasons : tuple of str
-        What speaks against a leak, the strongest first; of a leak what makes it doubtful.
+        What speaks against a leak, the strongest first; of a leak what makes it doubtful, at last that it is ``sparse``: on
+        fewer than FEW_PROFILES profiles that lie apart, so that its length and area may be wrong by as much as themselves.
     confidence : float
         That it is of its kind, 0 to 1.
     """
@@ -74,6 +75,8 @@ def classify(region: Region) -> Verdict:
     against = sorted((name for name in degrees if degrees[name] > 0.0), key=lambda name: -degrees[name])
     worst = max(degrees.values())
     if worst <= 0.5:
+        if region.spacing and shape.along < FEW_PROFILES * region.spacing:
+            against.append("sparse")
         return Verdict("leak", tuple(against), detectability(region) * (1.0 - worst))
     reasons = tuple(name for name in against if degrees[name] > 0.5)
     return Verdict("joint" if "thin" in reasons else "dark", reasons, worst)

@@ -24,14 +24,13 @@ from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.reader import ScanSource
 from tunneldb.radiometry.correction import Kind, needs_reference
 from tunneldb.radiometry.robust_statistics import DryLevel
-from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.accumulator import Accumulator, Window
 from tunneldb.raster.floor import HIDDEN, Floor
 from tunneldb.raster.geotiff import KINDS
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import halo, halo_of_profiles, lining_image
 from tunneldb.raster.observation import Observer, Radiometer
-from tunneldb.raster.profiles import ProfileGaps, find_gaps
+from tunneldb.raster.profiles import find_gaps
 from tunneldb.raster.rasterize import Counts, rasterize
 from tunneldb.store.anomalies import save_anomalies
 from tunneldb.store.images import (
@@ -133,7 +132,7 @@ def detect(
     inputs = load_inputs(conn, survey, km, values)
     if inputs.sample is None:
         images = ImageStore(conn, survey, inputs.grid, ["offset"])
-        counts = make_offset_images(inputs, values["image.spacing"], images.save, progress)
+        counts = make_offset_images(inputs, images.save, progress)
         drop_radiometry(conn, survey, km)
         drop_coverage(conn, survey, km)
         save_range_curve(conn, survey, km, None)
@@ -142,7 +141,7 @@ def detect(
             **counts,
             "pixels": images.pixels,
             "leaks": 0,
-            "note": "; ".join(["no intensity: offset image only, no leaks sought", *_of_profiles(counts)]),
+            "note": "no intensity: offset image only, no leaks sought",
         }
     images = ImageStore(conn, survey, inputs.grid, KINDS)
     result = compute_detection(inputs, inputs.sample, values, images.save, progress)
@@ -204,7 +203,8 @@ def compute_detection(
         outliers = SectionOutliers.of(observer.surface, MOST)
         gaps = find_gaps(image, values["image.spacing"])
         lining = lining_image(image, gaps, observer.floor, outliers, values["appendage.distance"], save_block)
-    counts |= _spacing(gaps)
+    if gaps is not None:
+        counts["profile_spacing"] = round(gaps.spacing, 3)
     background = map_background(lining, inputs.dry)
     contrast = contrast_image(lining, background)
     found = find_anomalies(contrast, background, values["leak.min_area"])
@@ -220,25 +220,14 @@ def compute_detection(
 
 
 def make_offset_images(
-    inputs: DetectionInputs, spacing: float, save_block: Callable[[Window], None], progress: Callable[[float], None]
+    inputs: DetectionInputs, save_block: Callable[[Window], None], progress: Callable[[float], None]
 ) -> Counts:
-    """Make the offset image of a survey without intensity; ``spacing`` is that of its profiles, m, 0 if it is to be found."""
-    width = inputs.grid.block_columns
+    """Make the offset image of a survey without intensity."""
     with Accumulator(inputs.grid) as image:
         counts = _gather(inputs.observer, inputs.files, image, 0.0, progress)
-        gaps = find_gaps(image, spacing)
-        beyond = 0 if gaps is None else gaps.longest
         for block in image.inner_blocks():
-            window = image.window(block * width - beyond, (block + 1) * width + beyond)
-            if gaps is not None:
-                window = gaps.close(window)
-            save_block(window.cut(slice(block * width, (block + 1) * width)))
-    return counts | _spacing(gaps)
-
-
-def _spacing(gaps: ProfileGaps | None) -> Counts:
-    """What the ledger says of the distance of profiles, m: nothing where they lie as close as pixels."""
-    return {} if gaps is None else {"profile_spacing": round(gaps.spacing, 3)}
+            save_block(image.window(block * image.grid.block_columns, (block + 1) * image.grid.block_columns))
+    return counts
 
 
 def _save(
@@ -270,7 +259,7 @@ def _save(
         "leaks_again": matched.again,
         "leaks_kept_for_review": matched.kept,
         "leaks_gone": matched.gone,
-        **_report(roughness, result, matched.other_pixels),
+        **_report(result, matched.other_pixels),
     }
 
 
@@ -332,18 +321,9 @@ def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
     )
 
 
-def _of_profiles(counts: Counts) -> list[str]:
-    """What there is to note where profiles lie apart."""
-    if (spacing := counts.get("profile_spacing")) is None:
-        return []
-    return [
-        f"profiles {spacing:g} m apart: between them the image shows the nearest one; where leaks begin and end along the"
-        f" tunnel is known to {0.5 * spacing:.2g} m, and those shorter than {spacing:g} m may be missed"
-    ]
-
-
-def _report(roughness: Roughness, result: DetectionResult, other_pixels: list[int]) -> Counts:
+def _report(result: DetectionResult, other_pixels: list[int]) -> Counts:
     """What the ledger says about the roughness, and what else there is to note."""
+    roughness = result.calibration.roughness
 
     def known(value: float, digits: int) -> float | None:
         return round(value, digits) if np.isfinite(value) else None
@@ -364,7 +344,11 @@ def _report(roughness: Roughness, result: DetectionResult, other_pixels: list[in
             f"leaks over the end towards kilometre {' and '.join(map(str, other_pixels))} are in two pieces: its pixels are of"
             " another size; detect both with the same image.pixel"
         )
-    notes += _of_profiles(result.counts)
+    if (spacing := result.counts.get("profile_spacing")) is not None:
+        notes.append(
+            f"profiles {spacing:g} m apart: between them the images show the nearest one; where leaks begin and end along the"
+            f" tunnel is known to {0.5 * spacing:.2g} m, and those shorter than {spacing:g} m may be missed"
+        )
     if notes:
         report["note"] = "; ".join(notes)
     return report

@@ -168,11 +168,9 @@ class Accumulator:
                 means[:, :, first - start : last - start] = np.nan
         return Window(slice(start, stop), weight, *means)
 
-    def held(self, start: int, stop: int) -> Bool:
-        """Tell which pixels of the columns of one block, from ``start`` up to ``stop``, hold points: (rows, columns)."""
-        first = start // self.grid.block_columns * self.grid.block_columns
-        sums = self._fetch(first // self.grid.block_columns)
-        return np.asarray(sums[:, start - first : stop - first, 0] > 0, dtype=np.bool_)
+    def held(self, block: int) -> Bool:
+        """Tell which pixels (rows, columns) of a block hold points."""
+        return np.asarray(self._fetch(block)[:, :, 0] > 0, dtype=np.bool_)
 
     def _fetch(self, block: int) -> Whole:
         """Sums of a block, brought into memory, from the file or new."""

@@ -15,7 +15,7 @@ from tunneldb.raster.floor import Floor
 from tunneldb.raster.geotiff import NODATA, whole
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
-from tunneldb.raster.profiles import GREATEST, ProfileGaps
+from tunneldb.raster.profiles import ProfileGaps, farthest
 
 WET_EDGE = 3
 """Pixels about a wet one that don't count as dry lining."""
@@ -57,7 +57,7 @@ def halo(pixel: float) -> int:
 
 def halo_of_profiles(pixel: float) -> int:
     """As many for profiles as far apart as they may be: what is taken from the nearest one reaches farther."""
-    return halo(pixel) + 2 * ProfileGaps(GREATEST, pixel).longest
+    return halo(pixel) + 2 * farthest(pixel)
 
 
 def _judged() -> int:
@@ -93,7 +93,7 @@ def lining_image(
     grid = image.grid
     state = np.full((grid.rows, grid.columns), PixelState.OFF, np.uint8)
     level = np.full((grid.rows, grid.columns), NODATA, np.int16)
-    beyond = 0 if gaps is None else gaps.longest
+    beyond = 0 if gaps is None else int(gaps.longest.max())
     judged, about = min(_judged() + beyond, grid.halo), reach(grid.pixel) + beyond
     inner = set(image.inner_blocks())
     for block in sorted({*image.blocks(), *_with_surface(grid, outliers.surface)}):

@@ -7,12 +7,11 @@ As every place along the tunnel is as likely to be hit as any other, areas that 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.arrays import Bool, Int16, Int64, Intp
+from tunneldb.arrays import Bool, Float, Int16, Int64, Intp
 from tunneldb.raster.accumulator import Accumulator, Window
 from tunneldb.raster.geotiff import NODATA
 
@@ -29,8 +28,8 @@ from a static scanner, they may be as far apart in both directions."""
 JOINED = 1.5
 """A gap is closed where it is no longer than so many spacings: one that lacks a profile is not."""
 
-BLOCKS = 4
-"""Blocks of the image that the spacing is told from."""
+EVERY = 8
+"""Of the rows and columns of an image one in so many is enough to tell the spacing from."""
 
 ROWS = 64
 """Rows that are worked on at a time."""
@@ -43,49 +42,50 @@ class ProfileGaps:
     Attributes
     ----------
     spacing : float
-        Distance of the profiles along the tunnel, m.
-    pixel : float
-        Side of a pixel, m.
+        Distance of the profiles along the tunnel, the median over the image, m.
+    longest : (columns,) int array
+        Columns from one profile to the next, at most, for what lies between them to be closed.
+    half : (columns,) int array
+        Columns that a profile stands for to either side of it where the next one is farther away than that.
     """
 
     spacing: float
-    pixel: float
+    longest: Int64
+    half: Int64
 
-    @property
-    def longest(self) -> int:
-        """Columns from one profile to the next at most for what lies between them to be closed."""
-        return max(1, round(JOINED * self.spacing / self.pixel))
+    @classmethod
+    def of(cls, spacing: Float, pixel: float) -> ProfileGaps:
+        """Make them of the distance of the profiles, m, at each column (columns,)."""
+        return cls(float(np.median(spacing)), _columns(JOINED * spacing, pixel), _columns(0.5 * spacing, pixel))
 
-    @property
-    def half(self) -> int:
-        """Columns that a profile stands for to either side of it, where the next one is farther away than that."""
-        return max(1, round(0.5 * self.spacing / self.pixel))
-
-    def nearest(self, held: Bool) -> Intp:
+    def nearest(self, held: Bool, first: int = 0) -> Intp:
         """Column that each pixel takes its value from.
 
         Parameters
         ----------
         held : (rows, columns) bool array
             Pixels that hold points.
+        first : int
+            Column of the image with which it begins.
 
         Returns
         -------
         (rows, columns) int array
             The pixel's own column where it holds points, that of the nearest in its row that does where it lies between
-            profiles, -1 elsewhere.
+            profiles, -1 elsewhere; counted from ``first``.
         """
         columns = held.shape[1]
-        place, far = np.arange(columns), 2 * (columns + self.longest)
+        longest, half = (limit[first : first + columns] for limit in (self.longest, self.half))
+        place, far = np.arange(columns), 2 * columns + 2 * int(self.longest.max())
         before = np.maximum.accumulate(np.where(held, place, -far), axis=1)
         after = np.minimum.accumulate(np.where(held, place, far)[:, ::-1], axis=1)[:, ::-1]
         nearest = np.where(place - before <= after - place, before, after)
-        closed = (after - before <= self.longest) | (np.abs(nearest - place) <= self.half)
+        closed = (after - before <= longest) | (np.abs(nearest - place) <= half)
         return np.where(closed, nearest, -1)
 
     def close(self, window: Window) -> Window:
         """Give the pixels between profiles offset and intensity; their weight stays 0, which says that no point lies there."""
-        column = self.nearest(window.weight > 0)
+        column = self.nearest(window.weight > 0, window.columns.start)
         empty, column = column < 0, np.maximum(column, 0)
         values = []
         for measured in (window.offset, window.raw, window.corrected):
@@ -95,15 +95,20 @@ class ProfileGaps:
         return Window(window.columns, window.weight, *values)
 
     def close_levels(self, level: Int16) -> None:
-        """Give the pixels (rows, columns) between profiles, which are NODATA, a value, in place."""
+        """Give the pixels (rows, columns) of the image between profiles, which are NODATA, a value, in place."""
         for top in range(0, len(level), ROWS):
             part = level[top : top + ROWS]
             column = self.nearest(part != NODATA)
             part[:] = np.where(column < 0, np.int16(NODATA), np.take_along_axis(part, np.maximum(column, 0), axis=1))
 
 
+def farthest(pixel: float) -> int:
+    """Columns that a gap is long, at most, which is closed."""
+    return int(_columns(np.array([JOINED * GREATEST]), pixel)[0])
+
+
 def find_gaps(image: Accumulator, wanted: float) -> ProfileGaps | None:
-    """Find the gaps between the profiles of a kilometre; None where points lie as close as pixels, or in no profiles.
+    """Find the gaps between the profiles of a kilometre, block by block: scanners go now faster, now more slowly.
 
     Parameters
     ----------
@@ -111,41 +116,50 @@ def find_gaps(image: Accumulator, wanted: float) -> ProfileGaps | None:
         The sums of all points.
     wanted : float
         Distance of the profiles, m, if it is given; 0 if it is to be found.
+
+    Returns
+    -------
+    ProfileGaps or None
+        None where most blocks show points as close as pixels, or in no profiles.
     """
-    pixel = image.grid.pixel
-    spacing = wanted or profile_spacing(_held(image), pixel)
-    return ProfileGaps(spacing, pixel) if spacing > pixel else None
+    grid, width = image.grid, image.grid.block_columns
+    if wanted:
+        return ProfileGaps.of(np.full(grid.columns, wanted), grid.pixel) if wanted > grid.pixel else None
+    blocks = np.array(image.inner_blocks())
+    spacing = np.array([profile_spacing(image.held(block), grid.pixel) for block in blocks.tolist()])
+    told = spacing > 0.0
+    if 2 * np.count_nonzero(told) <= len(blocks):
+        return None
+    # A block that tells nothing, and what lies beyond the ends, is taken for what the nearest one that does is.
+    nearest = np.abs(np.arange(grid.blocks)[:, None] - blocks[told]).argmin(axis=1)
+    return ProfileGaps.of(np.repeat(spacing[told][nearest], width), grid.pixel)
 
 
-def profile_spacing(masks: Iterable[Bool], pixel: float) -> float:
+def profile_spacing(held: Bool, pixel: float) -> float:
     """Distance of profiles along the tunnel, m, told from the pixels that hold points; 0 where they lie in no profiles.
 
     It is the median over the length of the tunnel of the distance between pixels with points that follow each other in a row.
 
     Parameters
     ----------
-    masks : iterable of (rows, columns) bool arrays
-        Parts of the image.
+    held : (rows, columns) bool array
+        Pixels that hold points.
     pixel : float
         Side of a pixel, m.
     """
-    along, across = np.zeros((2, round(GREATEST / pixel) + 2), np.int64)
-    for mask in masks:
-        along += _distances(mask, len(along))
-        across += _distances(mask.T, len(across))
+    count = round(GREATEST / pixel) + 2
+    columns = np.flatnonzero(held.any(axis=0))[::EVERY]
+    along, across = _distances(held[::EVERY], count), _distances(held[:, columns].T, count)
     if not along.any() or not across.any():
         return 0.0
-    spacing = _median(along * np.arange(len(along))) * pixel
+    spacing = _median(along * np.arange(count)) * pixel
     alike = ANISOTROPY * _median(across) * pixel
     return spacing if max(LEAST, alike) - 1e-9 <= spacing <= GREATEST + 1e-9 else 0.0
 
 
-def _held(image: Accumulator) -> Iterable[Bool]:
-    """Which pixels hold points, of some blocks of the kilometre, spread evenly."""
-    blocks, width = image.inner_blocks(), image.grid.block_columns
-    for number in np.unique(np.linspace(0, len(blocks) - 1, BLOCKS).round().astype(int)).tolist():
-        start = blocks[number] * width
-        yield image.held(start, start + width)
+def _columns(length: Float, pixel: float) -> Int64:
+    """Lengths, m, in whole columns, one at least."""
+    return np.maximum(1, np.rint(length / pixel)).astype(np.int64)
 
 
 def _distances(mask: Bool, count: int) -> Int64:
