@@ -21,9 +21,16 @@ LEAST = 0.08
 GREATEST = 1.25
 """What is farther apart than that are no profiles of one pass, but scans with gaps between them, m."""
 
-ANISOTROPY = 3.0
-"""In a profile points lie closer than profiles do, by so many times at least; where the beam meets the lining slantingly, far
-from a static scanner, they may be as far apart in both directions."""
+ANISOTROPY = 3
+"""In a profile points lie closer than profiles do, by so many times at least. Far from a static scanner, where the beam meets
+the lining slantingly, they may be apart in both directions."""
+
+CLOSE = 3
+"""In a profile half of the points have another one within so many rows of pixels."""
+
+ALONE = 0.15
+"""Of the pixels of profiles no larger share has another one two or three columns away; of points strewn at random as far apart
+as that, more have."""
 
 JOINED = 1.5
 """A gap is closed where it is no longer than so many spacings: one that lacks a profile is not."""
@@ -147,14 +154,41 @@ def profile_spacing(held: Bool, pixel: float) -> float:
     pixel : float
         Side of a pixel, m.
     """
-    count = round(GREATEST / pixel) + 2
-    columns = np.flatnonzero(held.any(axis=0))[::EVERY]
-    along, across = _distances(held[::EVERY], count), _distances(held[:, columns].T, count)
-    if not along.any() or not across.any():
+    across = _rows_between(held)
+    if not across:
         return 0.0
-    spacing = _median(along * np.arange(count)) * pixel
-    alike = ANISOTROPY * _median(across) * pixel
-    return spacing if max(LEAST, alike) - 1e-9 <= spacing <= GREATEST + 1e-9 else 0.0
+    # Of so many rows together each profile has a point.
+    here = np.arange(0, len(held) - CLOSE, EVERY)
+    some = np.logical_or.reduce([held[here + rows] for rows in range(across)])
+    apart = _distances(some, round(GREATEST / pixel) + 2)
+    if not apart.any():
+        return 0.0
+    spacing = _median(apart * np.arange(len(apart)))
+    profiles = spacing >= ANISOTROPY * across and _beside(some) <= ALONE
+    return spacing * pixel if profiles and LEAST - 1e-9 <= spacing * pixel <= GREATEST + 1e-9 else 0.0
+
+
+def _rows_between(held: Bool) -> int:
+    """Rows from half of the pixels with points, at most, to the next one in the same column or beside it; 0 if above CLOSE."""
+    near = held.copy()
+    near[:, 1:] |= held[:, :-1]
+    near[:, :-1] |= held[:, 1:]
+    here = np.arange(0, len(held) - CLOSE, EVERY)
+    followed = np.zeros((len(here), held.shape[1]), np.bool_)
+    for rows in range(1, CLOSE + 1):
+        followed |= near[here + rows]
+        if 2 * np.count_nonzero(held[here] & followed) >= np.count_nonzero(held[here]) > 0:
+            return rows
+    return 0
+
+
+def _beside(held: Bool) -> float:
+    """Share of the pixels with points that have another one in their row, two or three columns away."""
+    other = np.zeros_like(held)
+    for columns in (2, 3):
+        other[:, columns:] |= held[:, :-columns]
+        other[:, :-columns] |= held[:, columns:]
+    return float(np.count_nonzero(held & other) / np.count_nonzero(held))
 
 
 def _columns(length: Float, pixel: float) -> Int64:
