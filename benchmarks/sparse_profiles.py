@@ -23,7 +23,7 @@ import shapely
 
 from benchmarks.common import print_table, progress, save, scratch_database, tunneldb
 from benchmarks.leak_set import COMMON, KILOMETRE, MARKED
-from benchmarks.leaks import Outcome
+from benchmarks.leaks import LIST_HEADER, Outcome, lines
 from benchmarks.scene import Scene
 from tunneldb.database import connect
 from tunneldb.evaluate.measure import HALF, figures
@@ -34,6 +34,7 @@ TUNNELS: dict[str, dict[str, Any]] = {
     "horseshoe segments": {
         "section": "horseshoe",
         "lining": "segments",
+        "ring": 1.37,
         "ring_step": 0.003,
         "roughness": 16,
         **MARKED,
@@ -111,7 +112,7 @@ def main() -> None:
     arguments = parser.parse_args()
     names = [name for name in TUNNELS if arguments.tunnel is None or arguments.tunnel in name]
     table: dict[str, dict[str, Any]] = {}
-    rows = []
+    rows, listed = [], []
     with nullcontext(arguments.folder) if arguments.folder else tempfile.TemporaryDirectory() as folder:
         for spacing in SPACINGS if arguments.only is None else (arguments.only,):
             found: dict[str, tuple[list[Outcome], list[float]]] = {way: ([], []) for way in WAYS}
@@ -125,7 +126,10 @@ def main() -> None:
                 rows.append(made.row(spacing, way))
                 progress("  " + "  ".join(map(str, rows[-1])))
                 table[f"{spacing:g} {way}"] = vars(made)
+                if way == "closed":
+                    listed += [[f"{spacing:g} m {line[0]}", *line[1:]] for outcome in outcomes for line in lines(outcome)]
     print_table(f"Leaks by the distance of profiles, seed {arguments.seed}", HEADER, rows)
+    print_table("Missed leaks and wrong ones, gaps closed", LIST_HEADER, listed)
     print(f"\n{save('sparse_profiles', {'seed': arguments.seed, 'distances': table})}")
 
 
