@@ -43,7 +43,7 @@ def test_leaks_over_several_profiles_are_found_once_and_with_their_area(
     ledger = counts(conn)
     assert ledger["profile_spacing"] == pytest.approx(SPACING, abs=0.021)
     assert "0.5 m apart" in str(ledger["note"])
-    assert ledger["seen"] > 0.9
+    assert ledger["seen"] > 0.75  # what cables hide is not seen
     ((tiff,), *_) = conn.execute(
         "SELECT tiff FROM tunnel.image WHERE kind = 'corrected' ORDER BY block", binary=True
     ).fetchall()

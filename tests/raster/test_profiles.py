@@ -9,6 +9,7 @@ from tunneldb.anomalies.background.contrast import contrast_image
 from tunneldb.anomalies.background.level_map import map_background
 from tunneldb.anomalies.coverage import measure_coverage
 from tunneldb.anomalies.detect import find_anomalies
+from tunneldb.anomalies.joints import crossed_joints
 from tunneldb.raster.accumulator import Window
 from tunneldb.raster.appendages import distance_from_plane, off_plane, recessed
 from tunneldb.raster.geotiff import NODATA
@@ -116,3 +117,18 @@ def test_a_leak_over_several_profiles_is_one_leak_and_says_how_they_lie() -> Non
     coverage = measure_coverage(state, found.wet, grid, found.size)
     assert coverage.seen.sum() == pytest.approx(80.0 * 4.0, rel=0.01)
     assert coverage.lining.sum() == pytest.approx(1000.0 * 4.0)
+
+
+def test_spots_that_come_back_as_rings_do_are_joints_and_others_are_not() -> None:
+    """Joints every 1.4 m that profiles 0.5 m apart cross now and then, among leaks that lie anywhere."""
+    rng = np.random.default_rng(5)
+    joints = (np.arange(70) * 1.4 + rng.normal(0, 0.08, 70))[rng.random(70) < 0.6]
+    leaks = rng.uniform(0, 100, 12)
+    at_profiles = np.rint(np.concatenate([joints, leaks]) / 0.5) * 0.5 + 3000.0
+    found = crossed_joints(at_profiles, 0.5) > 0
+    assert found[: len(joints)].mean() > 0.8
+    assert found[len(joints) :].sum() <= 6  # a third of what lies anywhere lies near a joint
+    for seed in range(20):
+        anywhere = np.rint(np.random.default_rng(seed).uniform(0, 300, 40) / 0.5) * 0.5
+        assert not crossed_joints(anywhere, 0.5).any()
+    assert len(crossed_joints(np.empty(0), 0.5)) == 0
