@@ -1,5 +1,7 @@
 """Profiles far apart along the tunnel: their distance, and what lies between them."""
 
+import itertools
+
 import numpy as np
 import pytest
 import shapely
@@ -128,7 +130,7 @@ def test_spots_that_come_back_as_rings_do_are_joints_and_others_are_not() -> Non
     found = crossed_joints(at_profiles, 0.5) > 0
     assert found[: len(joints)].mean() > 0.8
     assert found[len(joints) :].sum() <= 6  # a third of what lies anywhere lies near a joint
-    for seed in range(20):
-        anywhere = np.rint(np.random.default_rng(seed).uniform(0, 300, 40) / 0.5) * 0.5
-        assert not crossed_joints(anywhere, 0.5).any()
+    for spacing, seed in itertools.product((0.25, 0.5, 1.0), range(20)):
+        anywhere = np.rint(np.random.default_rng(seed).uniform(0, 300, 90) / spacing) * spacing
+        assert not crossed_joints(anywhere, spacing).any()
     assert len(crossed_joints(np.empty(0), 0.5)) == 0

@@ -27,6 +27,9 @@ STRETCH = 100.0
 BY_CHANCE = 1e-3
 """Spots that lie anywhere repeat as evenly in so small a share of stretches (Rayleigh's test, over all lengths of rings)."""
 
+AS_PROFILES = 0.1
+"""Whatever profiles show repeats as they do: lengths that differ by less from their distance, or a part of it, don't count."""
+
 NEAR_RING = 1.0 / 6.0
 """A spot is of a ring's joint up to so much of the ring's length from it: profiles stand askew to rings."""
 
@@ -82,7 +85,7 @@ def crossed_joints(chainage: Float, spacing: float) -> Float:
     chainage : (n,) float array
         Of the spots, m.
     spacing : float
-        Distance of the profiles, m. Rings hardly longer than that can't be told.
+        Distance of the profiles, m. Rings as long as that, or as a part of it, can't be told.
 
     Returns
     -------
@@ -91,7 +94,9 @@ def crossed_joints(chainage: Float, spacing: float) -> Float:
         where spots lie anywhere (Rayleigh's test; Mardia and Jupp, 2000).
     """
     found = np.zeros(len(chainage))
-    lengths = 1.0 / np.arange(1.0 / RING_LONGEST, 1.0 / max(RING_SHORTEST, 1.5 * spacing), 0.25 / STRETCH)
+    per_metre = np.arange(1.0 / RING_LONGEST, 1.0 / RING_SHORTEST, 0.25 / STRETCH)
+    beats = np.rint(per_metre * spacing)
+    lengths = 1.0 / per_metre[(beats == 0.0) | (np.abs(per_metre * spacing - beats) > AS_PROFILES)]
     low = np.floor(chainage.min(initial=np.inf) / STRETCH) if len(chainage) else 0.0
     for number in range(2 * int(np.ceil((chainage.max(initial=0.0) / STRETCH) - low)) if len(chainage) else 0):
         start = (low + 0.5 * number) * STRETCH
