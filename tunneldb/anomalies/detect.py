@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from shapely.geometry import Polygon
@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.background.level_map import BackgroundMap
 from tunneldb.anomalies.boundary import refine_boundary
-from tunneldb.anomalies.joints import find_joints
+from tunneldb.anomalies.joints import crossed_joints, find_joints
 from tunneldb.anomalies.regions import Region, find_regions
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
 from tunneldb.anomalies.verdict import Verdict, classify
@@ -23,6 +23,9 @@ from tunneldb.raster.pixel_state import PixelState
 
 GAP = 5.0
 """Lining that is seen nowhere along more of the tunnel was not scanned there, m; profiles lie closer."""
+
+SINGLE = 1.6
+"""What a single profile shows is no longer than so many spacings: half a gap that is closed to either side of it."""
 
 MIN_JOINT = 0.5
 """Joints that are seen over less are left out, m."""
@@ -67,7 +70,7 @@ class Anomaly:
                 return None
         elif region.area < min_area * (1 - 1e-12):
             return None
-        share = region.filled / np.count_nonzero(region.mask)
+        share = region.measured / np.count_nonzero(region.mask)
         return cls(region.outline, region.drop_mean, region.drop_max, region.contrast, float(share), verdict)
 
 
@@ -122,8 +125,11 @@ def find_anomalies(contrast: ContrastImage, background: BackgroundMap, min_area:
     dark = refine_boundary(dark_pixels(contrast, size), contrast, size)
     anomalies, cut, leaks = [], [], []
     ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
-    for region in _regions(dark, contrast, min_area):
-        anomaly = Anomaly.of(region, min_area)
+    regions = _regions(dark, contrast, min_area)
+    judged = [Anomaly.of(region, min_area) for region in regions]
+    if contrast.spacing:
+        judged = _without_joints(regions, judged, contrast.spacing)
+    for region, anomaly in zip(regions, judged, strict=True):
         if region.column == ends[0] or region.stop == ends[1]:
             cut.append(region)
         elif anomaly is not None:
@@ -138,11 +144,27 @@ def find_anomalies(contrast: ContrastImage, background: BackgroundMap, min_area:
 def _regions(dark: Bool, contrast: ContrastImage, min_area: float) -> list[Region]:
     """Regions of the dark pixels, joints cut off from what they run through."""
     inner = contrast.grid.inner
-    joints = find_joints(dark, inner.start, inner.stop, contrast.grid.pixel)
+    joints = find_joints(dark, inner.start, inner.stop, contrast.grid.pixel, contrast.spacing)
     if not joints.any():
         return find_regions(dark, dark, contrast, min_area, _may_drip)
     parts = [find_regions(part, dark, contrast, min_area, _may_drip) for part in (dark & ~joints, joints)]
     return sorted([*parts[0], *parts[1]], key=lambda region: (region.column, region.row))
+
+
+def _without_joints(regions: Sequence[Region], judged: Sequence[Anomaly | None], spacing: float) -> list[Anomaly | None]:
+    """Take leaks that a single profile shows and that repeat as rings do for what they are, joints that profiles cross."""
+    found = list(judged)
+    single = [
+        k
+        for k, (region, anomaly) in enumerate(zip(regions, judged, strict=True))
+        if anomaly is not None and anomaly.verdict.kind == "leak" and region.mask.shape[1] * region.pixel < SINGLE * spacing
+    ]
+    middle = np.array([0.5 * (regions[k].column + regions[k].stop) * regions[k].pixel for k in single])
+    for k, even in zip(single, crossed_joints(middle, spacing).tolist(), strict=True):
+        anomaly = found[k]
+        if even and anomaly is not None:
+            found[k] = replace(anomaly, verdict=Verdict("joint", ("thin", "sparse"), even))
+    return found
 
 
 def _may_drip(region: Region) -> bool:

@@ -14,8 +14,11 @@ GAP = 0.12
 WIDE = 0.3
 """A drip is no wider, m."""
 
+PROFILES = 1.5
+"""Where profiles lie apart, a drip shows on a single one, which stands for no more than so many spacings."""
 
-def attach_drips(components: Components, wanted: Bool, cut: Bool, grid: Grid) -> tuple[Int64, Int64]:
+
+def attach_drips(components: Components, wanted: Bool, cut: Bool, grid: Grid, spacing: float = 0.0) -> tuple[Int64, Int64]:
     """Find what each component is a part of.
 
     A drip is narrower than WIDE, smaller than what lies above it, and begins within GAP of it, towards the crown, or of
@@ -32,6 +35,8 @@ def attach_drips(components: Components, wanted: Bool, cut: Bool, grid: Grid) ->
         others are taken for smaller.
     grid : Grid
         The pixels.
+    spacing : float
+        Distance of profiles along the tunnel, m; 0 where they lie as close as pixels.
 
     Returns
     -------
@@ -42,7 +47,8 @@ def attach_drips(components: Components, wanted: Bool, cut: Bool, grid: Grid) ->
     """
     crown = grid.bottom + grid.rows  # rows before this one lie at arcs above 0
     gap = max(1, round(GAP / grid.pixel))
-    above, row, column, distance = _above(components, (components.width <= WIDE / grid.pixel) & ~cut, grid.rows, crown, gap)
+    narrow = (components.width <= max(WIDE, PROFILES * spacing) / grid.pixel) & ~cut
+    above, row, column, distance = _above(components, narrow, grid.rows, crown, gap)
     whole = np.arange(len(components.pixels))
     for _ in range(8):  # a drip below a drip below a drip …
         drip = np.flatnonzero((above >= 0) & (whole == np.arange(len(whole))))

@@ -18,12 +18,33 @@ LONG_AROUND, LONG_ALONG = 1.0, 0.5
 STRAIGHT = 0.015
 """Standard deviation of the middle of a joint about a straight line, m: it is built to millimetres, pixels are larger."""
 
+RING_SHORTEST, RING_LONGEST = 0.6, 12.0
+"""Rings of a lining, from one joint around the tunnel to the next, are no shorter and no longer, m."""
+
+STRETCH = 100.0
+"""Length of tunnel over which rings repeat evenly, m; the next stretch begins half-way."""
+
+BY_CHANCE = 1e-3
+"""Spots that lie anywhere repeat as evenly in so small a share of stretches (Rayleigh's test, over all lengths of rings)."""
+
+AS_PROFILES = 0.1
+"""Whatever profiles show repeats as they do: lengths that differ by less from their distance, or a part of it, don't count."""
+
+NEAR_RING = 1.0 / 6.0
+"""A spot is of a ring's joint up to so much of the ring's length from it: profiles stand askew to rings."""
+
 RESOLVED = 0.75
 """The same in pixels, at least: a line cannot be told to be straighter."""
 
 
-def find_joints(dark: Bool, first: int, stop: int, pixel: float) -> Bool:
+PROFILES = 3.0
+"""Where profiles lie apart, joints along the tunnel are seen over so many spacings: a spot of a single one is straight, too."""
+
+
+def find_joints(dark: Bool, first: int, stop: int, pixel: float, spacing: float = 0.0) -> Bool:
     """Find the pixels of narrow straight lines around the tunnel or along it that are long enough.
+
+    Profiles that lie apart can't tell how narrow is what goes around the tunnel: then only lines along it are found.
 
     Parameters
     ----------
@@ -33,19 +54,64 @@ def find_joints(dark: Bool, first: int, stop: int, pixel: float) -> Bool:
         Columns that count.
     pixel : float
         Side of a pixel, m.
+    spacing : float
+        Distance of profiles along the tunnel, m; 0 where they lie as close as pixels.
     """
     found = np.zeros(dark.shape, np.bool_)
     if 2 * pixel > NARROW_AROUND:
         return found  # a line of two pixels may be anything
     for runs_of, image, width, length in (
         (row_runs, found, NARROW_AROUND, LONG_AROUND),
-        (column_runs, found.T, NARROW_ALONG, LONG_ALONG),
+        (column_runs, found.T, NARROW_ALONG, max(LONG_ALONG, PROFILES * spacing)),
     ):
+        if spacing and runs_of is row_runs:
+            continue
         runs = runs_of(dark, first, stop)
         runs = runs[runs[:, 2] - runs[:, 1] <= max(2, round(width / pixel))]
         lines = round(length / pixel)
         if len(runs) >= lines:
             image[pixels_of(runs[_straight(runs, lines, max(STRAIGHT / pixel, RESOLVED))])] = True
+    return found
+
+
+def crossed_joints(chainage: Float, spacing: float) -> Float:
+    """How evenly dark spots of single profiles repeat along the tunnel, as joints of rings do that profiles cross.
+
+    A profile never stands quite as the rings do, and crosses the joint between two of them in some place only. What it shows
+    there is like a leak that is narrower than profiles are apart, but it comes back with the length of the rings.
+
+    Parameters
+    ----------
+    chainage : (n,) float array
+        Of the spots, m.
+    spacing : float
+        Distance of the profiles, m. Rings as long as that, or as a part of it, can't be told.
+
+    Returns
+    -------
+    (n,) float array
+        Length of the mean of the spots' directions in the ring, 0 to 1, for those near the joint; 0 for the others, and
+        where spots lie anywhere (Rayleigh's test; Mardia and Jupp, 2000).
+    """
+    found = np.zeros(len(chainage))
+    per_metre = np.arange(1.0 / RING_LONGEST, 1.0 / RING_SHORTEST, 0.25 / STRETCH)
+    beats = np.rint(per_metre * spacing)
+    lengths = 1.0 / per_metre[(beats == 0.0) | (np.abs(per_metre * spacing - beats) > AS_PROFILES)]
+    low = np.floor(chainage.min(initial=np.inf) / STRETCH) if len(chainage) else 0.0
+    for number in range(2 * int(np.ceil((chainage.max(initial=0.0) / STRETCH) - low)) if len(chainage) else 0):
+        start = (low + 0.5 * number) * STRETCH
+        here = np.flatnonzero((chainage >= start) & (chainage < start + STRETCH))
+        if not len(here) or not len(lengths):
+            continue
+        turns = (chainage[here] - start) / lengths[:, None]
+        mean = np.exp(2j * np.pi * turns).mean(axis=1)
+        best = int(np.argmax(np.abs(mean)))
+        even = float(np.abs(mean[best]))
+        if len(here) * even**2 < np.log(len(lengths) / BY_CHANCE):
+            continue
+        off = turns[best] - np.angle(mean[best]) / (2.0 * np.pi)
+        near = here[np.abs(off - np.rint(off)) <= NEAR_RING]
+        found[near] = np.maximum(found[near], even)
     return found
 
 

@@ -65,6 +65,9 @@ class Sides(NamedTuple):
 class Edges:
     """What is dark in a kilometre, and how regions end on it.
 
+    Where profiles lie apart, a region ends along the tunnel between two of them, nobody knows where or how. Then the sides that
+    face up and down alone tell how sharp and how straight it is.
+
     Parameters
     ----------
     dark : (rows, columns) bool array
@@ -78,6 +81,7 @@ class Edges:
         self.across = max(1, round(ACROSS / contrast.grid.pixel))
         self.aside = max(1, round(ASIDE / contrast.grid.pixel))
         self.near = max(1, round(NEAR_LINE / contrast.grid.pixel))
+        self.facings = 2 if contrast.spacing else len(FACING)
 
     def sides(self, label: Intp, row: Int64, column: Int64) -> Sides:
         """Sides of dark pixels (n,), in order of direction and then of the pixels."""
@@ -103,6 +107,7 @@ class Edges:
 
         (regions, 3).
         """
+        sides = sides.where(sides.facing < self.facings)
         for along, usable in ((1 - self.across, self._interior), (self.across, self._background)):
             sides = sides.where(self._inside(*sides.beyond(along, 0)))
             sides = sides.where(usable(*sides.beyond(along, 0)))
@@ -128,6 +133,7 @@ class Edges:
         (regions, 2) int array
         """
         count = len(mean_drop)
+        sides = sides.where(sides.facing < self.facings)
         sides = sides.where(self.state[sides.beyond(1, 0)] <= PixelState.RECESS)
         sides = sides.where(self._lost(sides) >= SHARP * mean_drop[sides.label] / STEP["corrected"])
         upright = sides.facing >= 2  # faces along the tunnel, and lies on a line around it

@@ -43,6 +43,8 @@ class RegionProperties(NamedTuple):
     sharp, straight : float
         Sides over which half of the region's drop is lost, and those of them that lie on straight lines
         (:meth:`tunneldb.anomalies.region_edges.Edges.straight`).
+    between : float
+        Pixels between profiles, which show what the nearest profile does.
     """
 
     sigma: float = 0.0
@@ -55,6 +57,7 @@ class RegionProperties(NamedTuple):
     outside: float = 0.0
     sharp: float = 0.0
     straight: float = 0.0
+    between: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,7 @@ class Region:
     mask : (rows, columns) bool array
         Its pixels, the first row at the lowest arc.
     filled : int
-        How many of them hold points.
+        How many of them hold points, or show what the nearest profile does.
     drop_sum, drop_max : float
         Sum over those and greatest of the drop below the background, dB.
     properties : RegionProperties
@@ -95,6 +98,19 @@ class Region:
     def area(self) -> float:
         """m² in the unrolled plane."""
         return float(np.count_nonzero(self.mask)) * self.pixel**2
+
+    @property
+    def measured(self) -> float:
+        """How many of its pixels hold points."""
+        return self.filled - self.properties.between
+
+    @property
+    def spacing(self) -> float:
+        """Distance along the tunnel of the profiles that show it, m: up to half of that its ends are uncertain.
+
+        0 where profiles lie as close as pixels.
+        """
+        return self.pixel * self.filled / max(self.measured, 1.0) if self.properties.between else 0.0
 
     @property
     def drop_mean(self) -> float:
@@ -141,7 +157,7 @@ def find_regions(
     ends = components.touching(inner.start, inner.stop)
     large = components.pixels * grid.pixel**2 >= min_area * (1 - 1e-12)
     wanted = ends | large | (components.extent * grid.pixel >= LONG)
-    whole, bridges = attach_drips(components, wanted, ends, grid)
+    whole, bridges = attach_drips(components, wanted, ends, grid, contrast.spacing)
     roots = np.unique(whole[whole != np.arange(len(whole))])
     for root, region in zip(roots.tolist(), _regions(runs, components.label, roots, dark, contrast), strict=True):
         if not may_drip(region):
@@ -181,7 +197,7 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
     Of the runs (row, first column, column behind the last one) the numbers of the regions are in order.
     """
     edges, found = Edges(dark, contrast), []
-    pixels, recess, steps, sigma = (np.zeros(count) for _ in range(4))
+    pixels, recess, steps, sigma, between = (np.zeros(count) for _ in range(5))
     most = np.full(count, NODATA, np.int16)
     until = np.cumsum(runs[:, 2] - runs[:, 1])
     for part in np.split(np.arange(len(runs)), np.searchsorted(until, np.arange(PIXELS, until[-1], PIXELS))):
@@ -194,6 +210,8 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
         drop = contrast.drop[row, column]
         held = drop != NODATA
         row, column, label, drop = row[held], column[held], label[held], drop[held]
+        if contrast.between is not None:
+            between += np.bincount(label[contrast.between[row, column]], minlength=count)
         pixels += np.bincount(label, minlength=count)
         steps += np.bincount(label, drop, count)
         np.maximum.at(most, label, drop)
@@ -202,9 +220,8 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
     drop_sum = steps * STEP["corrected"]
     straight = edges.straight(sides, drop_sum / np.maximum(pixels, 1))
     drop_max = np.where(pixels > 0, most * STEP["corrected"], -np.inf)
-    return np.column_stack(
-        [pixels, drop_sum, drop_max, sigma, recess, edges.perimeter(sides, count), edges.steps(sides, count), straight]
-    )
+    about = edges.perimeter(sides, count), edges.steps(sides, count)
+    return np.column_stack([pixels, drop_sum, drop_max, sigma, recess, *about, straight, between])
 
 
 def merge_regions(parts: Sequence[Region]) -> Region:

@@ -25,6 +25,12 @@ pixels sides look straight by chance, and leaks would be taken for something bui
 STRAIGHT = 0.02
 """Standard deviation of the sides of what was built about straight lines, m, at most."""
 
+POCKET = 0.3
+"""Bolt pockets are no longer, m."""
+
+FEW_PROFILES, MANY_PROFILES = 3.0, 6.0
+"""On so few profiles that lie apart anything looks straight along the tunnel; so many tell whether it is."""
+
 LEAST_STEPS = 0.2
 """Length of the boundary of a region along which the step over it must be known to tell that it is soft, m."""
 
@@ -40,7 +46,8 @@ class Verdict:
     kind : {'leak', 'joint', 'dark'}
         A leak; a joint; or dark but dry.
     reasons : tuple of str
-        What speaks against a leak, the strongest first; of a leak what makes it doubtful.
+        What speaks against a leak, the strongest first; of a leak what makes it doubtful, at last that it is ``sparse``: on
+        fewer than FEW_PROFILES profiles that lie apart, so that its length and area may be wrong by as much as themselves.
     confidence : float
         That it is of its kind, 0 to 1.
     """
@@ -62,12 +69,14 @@ def classify(region: Region) -> Verdict:
         "recess": _recess(region),
         "gradual": _gradual(region, shape),
         "rectangular": _rectangular(region, shape),
-        "stripe": _stripe(shape, _straight(region)),
+        "stripe": min(_stripe(shape, _straight(region)), _told(region, shape)),
         "shadow": _shadow(region, shape),
     }
     against = sorted((name for name in degrees if degrees[name] > 0.0), key=lambda name: -degrees[name])
     worst = max(degrees.values())
     if worst <= 0.5:
+        if region.spacing and shape.along < FEW_PROFILES * region.spacing:
+            against.append("sparse")
         return Verdict("leak", tuple(against), detectability(region) * (1.0 - worst))
     reasons = tuple(name for name in against if degrees[name] > 0.5)
     return Verdict("joint" if "thin" in reasons else "dark", reasons, worst)
@@ -75,8 +84,9 @@ def classify(region: Region) -> Verdict:
 
 def detectability(region: Region) -> float:
     """How sure it is that a region is darker than dry lining, 0 to 1: by contrast, size and support."""
-    area = region.area
-    share = region.filled * region.pixel**2 / area
+    share = region.filled * region.pixel**2 / region.area
+    # Between profiles nothing was measured.
+    area = region.area * (1.0 - region.properties.between / region.filled) if region.filled else region.area
     contrast = 1.0 - np.exp(-((region.contrast / 4.0) ** 2))
     return float(contrast * area / (area + 0.02) * (1.0 - np.exp(-share / 0.15)))
 
@@ -86,6 +96,7 @@ def _thin(region: Region, shape: Shape) -> float:
     straight = _straight(region)
     deviation = shape.deviation_along if shape.along > shape.across else shape.deviation_across
     return min(
+        _told(region, shape),
         _ramp(shape.mean_width, 0.10, 0.07),
         _ramp(shape.length / max(shape.mean_width, region.pixel), 4.0, 8.0),
         _ramp(deviation, 2.0 * straight, straight),
@@ -97,7 +108,9 @@ def _recess(region: Region) -> float:
     """A bolt pocket is dark as a whole, and small: it is set back, and what is about it is not."""
     properties, pixels = region.properties, np.count_nonzero(region.mask)
     about = properties.perimeter_recess / properties.perimeter if properties.perimeter else 0.0
-    return min(_ramp(properties.recess / pixels, 0.3, 0.7), _ramp(about, 0.4, 0.2), _ramp(region.area, 0.12, 0.08))
+    # A profile that hits a pocket stands for more than the pocket is long.
+    area = region.area / max(1.0, region.spacing / POCKET)
+    return min(_ramp(properties.recess / pixels, 0.3, 0.7), _ramp(about, 0.4, 0.2), _ramp(area, 0.12, 0.08))
 
 
 def _gradual(region: Region, shape: Shape) -> float:
@@ -109,7 +122,7 @@ def _gradual(region: Region, shape: Shape) -> float:
     if properties.steps * region.pixel < LEAST_STEPS * _coarseness(region) * (1 - 1e-12) or region.drop_sum <= 0:
         return 0.0
     step = (properties.inside - properties.outside) / properties.steps / region.drop_mean
-    band = _ramp(shape.along / shape.across, 4.0, 8.0)
+    band = min(_ramp(shape.along / shape.across, 4.0, 8.0), _told(region, shape))
     return _ramp(step, 0.6 + 0.25 * band, 0.3 + 0.25 * band)
 
 
@@ -127,7 +140,8 @@ def _rectangular(region: Region, shape: Shape) -> float:
     lines = _ramp(properties.straight / properties.sharp, most, most + 0.08)
     # Water that fills a panel between joints is rectangular too, and darker than repairs are, and so are small blobs.
     panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), _ramp(width, 0.45, 0.3))
-    return min(lines, _ramp(properties.sharp / shown, 0.15, 0.25), _ramp(width, 0.16, 0.22), 1.0 - panel)
+    sharp = _ramp(properties.sharp / shown, 0.15, 0.25)
+    return min(lines, sharp, _ramp(width, 0.16, 0.22), 1.0 - panel, _told(region, shape))
 
 
 def _strong(region: Region) -> float:
@@ -152,6 +166,11 @@ def _shadow(region: Region, shape: Shape) -> float:
     properties = region.properties
     beside = properties.perimeter_off / properties.perimeter if properties.perimeter else 0.0
     return max(min(_ramp(beside, 0.25, 0.45), _ramp(shape.width, 0.14, 0.08)), _ramp(beside, 0.8, 0.9))
+
+
+def _told(region: Region, shape: Shape) -> float:
+    """Whether enough profiles show a region to tell how straight it is: 1 where they lie as close as pixels."""
+    return _ramp(shape.along / region.spacing, FEW_PROFILES, MANY_PROFILES) if region.spacing else 1.0
 
 
 def _straight(region: Region) -> float:

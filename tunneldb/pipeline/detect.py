@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -24,13 +24,13 @@ from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.reader import ScanSource
 from tunneldb.radiometry.correction import Kind, needs_reference
 from tunneldb.radiometry.robust_statistics import DryLevel
-from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.accumulator import Accumulator, Window
 from tunneldb.raster.floor import HIDDEN, Floor
 from tunneldb.raster.geotiff import KINDS
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.image import halo, lining_image
+from tunneldb.raster.image import halo, halo_of_profiles, lining_image
 from tunneldb.raster.observation import Observer, Radiometer
+from tunneldb.raster.profiles import find_gaps
 from tunneldb.raster.rasterize import Counts, rasterize
 from tunneldb.store.anomalies import save_anomalies
 from tunneldb.store.coverage import seen_share
@@ -203,7 +203,10 @@ def compute_detection(
     with Accumulator(inputs.grid) as image:
         counts = _gather(observer, inputs.files, image, roughness.sigma, progress)
         outliers = SectionOutliers.of(observer.surface, MOST)
-        lining = lining_image(image, observer, outliers, values["appendage.distance"], save_block)
+        gaps = find_gaps(image, values["image.spacing"])
+        lining = lining_image(image, gaps, observer, outliers, values["appendage.distance"], save_block)
+    if gaps is not None:
+        counts["profile_spacing"] = round(gaps.spacing, 3)
     background = map_background(lining, inputs.dry)
     contrast = contrast_image(lining, background)
     found = find_anomalies(contrast, background, values["leak.min_area"])
@@ -257,7 +260,7 @@ def _save(
         "leaks_again": matched.again,
         "leaks_kept_for_review": matched.kept,
         "leaks_gone": matched.gone,
-        **_report(roughness, [survey.note, result.calibration.note], matched.other_pixels),
+        **_report(result, survey.note, matched.other_pixels),
     }
 
 
@@ -313,13 +316,16 @@ def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
     first, last = km * KILOMETRE - surface.reach, (km + 1) * KILOMETRE + surface.reach
     if not ((surface.chainages >= first) & (surface.chainages <= last)).any():
         raise UserError(f"kilometre {km} has no sections yet: run its stages segments and sections first")
-    beyond = halo(pixel)
+    beyond = halo(pixel)  # what is farther away counts only where profiles lie apart, and adds no rows
     inside = (surface.chainages >= first - beyond * pixel) & (surface.chainages <= last + beyond * pixel)
-    return Grid.covering(km, pixel, float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max()), beyond)
+    return Grid.covering(
+        km, pixel, float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max()), halo_of_profiles(pixel)
+    )
 
 
-def _report(roughness: Roughness, said: Sequence[str | None], other_pixels: list[int]) -> Counts:
+def _report(result: DetectionResult, known_before: str | None, other_pixels: list[int]) -> Counts:
     """What the ledger says about the roughness, and what else there is to note."""
+    roughness = result.calibration.roughness
 
     def known(value: float, digits: int) -> float | None:
         return round(value, digits) if np.isfinite(value) else None
@@ -332,13 +338,18 @@ def _report(roughness: Roughness, said: Sequence[str | None], other_pixels: list
         "incidence_from": known(roughness.incidence_from, 1),
         "incidence_to": known(roughness.incidence_to, 1),
     }
-    notes = [note for note in said if note]
+    notes = [note for note in (known_before, result.calibration.note) if note]
     if text := roughness.note:
         notes.append(text)
     if other_pixels:
         notes.append(
             f"leaks over the end towards kilometre {' and '.join(map(str, other_pixels))} are in two pieces: its pixels are of"
             " another size; detect both with the same image.pixel"
+        )
+    if (spacing := result.counts.get("profile_spacing")) is not None:
+        notes.append(
+            f"profiles {spacing:g} m apart: between them the images show the nearest one; where leaks begin and end along the"
+            f" tunnel is known to {0.5 * spacing:.2g} m, and those shorter than {spacing:g} m may be missed"
         )
     if notes:
         report["note"] = "; ".join(notes)

@@ -57,6 +57,13 @@ PARAMETERS: dict[str, Parameter] = {
     "lining.tolerance": Parameter(0.5, 0.01, 5.0, "m", "points that stand in farther from the surface are not lining"),
     "lining.recess": Parameter(1.2, 0.01, 3.0, "m", "points farther behind the surface are not lining, not even of a niche"),
     "image.pixel": Parameter(0.02, 0.005, 0.5, "m", "edge of a pixel of the unrolled images"),
+    "image.spacing": Parameter(
+        0.0,
+        0.0,
+        1.25,
+        "m",
+        "distance of profiles along the tunnel, between which the nearest is shown; 0: told from the points",
+    ),
     "intensity.max_incidence": Parameter(75.0, 30.0, 89.0, "°", "points seen more slantingly are left out of the images"),
     "intensity.max_range": Parameter(40.0, 2.0, 1000.0, "m", "points seen from farther are left out of the images"),
     "intensity.max_outside": Parameter(

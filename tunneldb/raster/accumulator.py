@@ -168,6 +168,10 @@ class Accumulator:
                 means[:, :, first - start : last - start] = np.nan
         return Window(slice(start, stop), weight, *means)
 
+    def held(self, block: int) -> Bool:
+        """Tell which pixels (rows, columns) of a block hold points."""
+        return np.asarray(self._fetch(block)[:, :, 0] > 0, dtype=np.bool_)
+
     def _fetch(self, block: int) -> Whole:
         """Sums of a block, brought into memory, from the file or new."""
         if block in self._blocks:

@@ -15,6 +15,7 @@ from tunneldb.raster.geotiff import NODATA, whole
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.observation import Observer
 from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
+from tunneldb.raster.profiles import ProfileGaps, farthest
 
 WET_EDGE = 3
 """Pixels about a wet one that don't count as dry lining."""
@@ -32,16 +33,31 @@ class LiningImage:
         Values of :class:`tunneldb.raster.pixel_state.PixelState`.
     level : (rows, columns) int16 array
         Corrected intensity in steps of the stored image, NODATA where there is no point.
+    gaps : ProfileGaps or None
+        Gaps between profiles, in which ``state`` is that of the nearest profile; None where profiles lie as close as pixels.
     """
 
     grid: Grid
     state: UInt8
     level: Int16
+    gaps: ProfileGaps | None = None
+
+    def measured(self) -> LiningImage:
+        """The same without what is taken from a profile nearby."""
+        if self.gaps is None:
+            return self
+        between = (self.level == NODATA) & ((self.state == PixelState.LINING) | (self.state == PixelState.RECESS))
+        return LiningImage(self.grid, np.where(between, np.uint8(PixelState.EMPTY), self.state), self.level)
 
 
 def halo(pixel: float) -> int:
     """Columns beyond the ends of a kilometre without whose points its own pixels would be judged otherwise."""
     return _judged() + reach(pixel)
+
+
+def halo_of_profiles(pixel: float) -> int:
+    """As many for profiles as far apart as they may be: what is taken from the nearest one reaches farther."""
+    return halo(pixel) + 2 * farthest(pixel)
 
 
 def _judged() -> int:
@@ -50,7 +66,12 @@ def _judged() -> int:
 
 
 def lining_image(
-    image: Accumulator, observer: Observer, outliers: SectionOutliers, delta: float, keep: Callable[[Window], None]
+    image: Accumulator,
+    gaps: ProfileGaps | None,
+    observer: Observer,
+    outliers: SectionOutliers,
+    delta: float,
+    keep: Callable[[Window], None],
 ) -> LiningImage:
     """Find the state of every pixel, block by block.
 
@@ -58,6 +79,8 @@ def lining_image(
     ----------
     image : Accumulator
         The sums of all points.
+    gaps : ProfileGaps or None
+        Gaps between profiles that are to be closed.
     observer : Observer
         Where the floor begins, and where the survey does and ends: beyond there is no lining.
     outliers : SectionOutliers
@@ -70,22 +93,24 @@ def lining_image(
     grid = image.grid
     state = np.full((grid.rows, grid.columns), PixelState.OFF, np.uint8)
     level = np.full((grid.rows, grid.columns), NODATA, np.int16)
-    judged = min(_judged(), grid.halo)
+    beyond = 0 if gaps is None else int(gaps.longest.max())
+    judged, about = min(_judged() + beyond, grid.halo), reach(grid.pixel) + beyond
     inner = set(image.inner_blocks())
     for block in sorted({*image.blocks(), *_with_surface(grid, outliers.surface)}):
         first = max(block * grid.block_columns, grid.inner.start - judged)
         columns = slice(first, min((block + 1) * grid.block_columns, grid.inner.stop + judged))
         if columns.start >= columns.stop:
             continue
-        window = image.window(columns.start - reach(grid.pixel), columns.stop + reach(grid.pixel))
+        window = image.window(columns.start - about, columns.stop + about)
+        level[:, columns] = whole(window.cut(columns).corrected, "corrected")
+        if gaps is not None:
+            window = gaps.close(window)
         state[:, columns] = pixel_states(window, columns, grid, observer.floor, outliers, delta)
-        here = window.cut(columns)
-        level[:, columns] = whole(here.corrected, "corrected")
         if block in inner:
-            keep(here)
+            keep(window.cut(columns))
     scanned = grid.columns_between(*observer.ends)
     state[:, : scanned.start] = state[:, scanned.stop :] = PixelState.OFF
-    return LiningImage(grid, state, level)
+    return LiningImage(grid, state, level, gaps)
 
 
 def _with_surface(grid: Grid, surface: Surface) -> range:

@@ -74,7 +74,7 @@ def pixel_states(window: Window, columns: slice, grid: Grid, floor: Floor, outli
     off, recess = (mask[:, columns.start - first : columns.stop - first] for mask in (off, recess))
     if bent is not None:
         off, recess = off | bent[:, inner], recess & ~bent[:, inner]
-    held = window.weight[:, inner] > 0
+    held = ~np.isnan(window.offset[:, inner])
     rows, low, high = arc[:, None], *outliers.surface.arc_range(chainage[inner])
     with np.errstate(invalid="ignore"):
         # Beyond the ends of the section there is no lining to be seen.

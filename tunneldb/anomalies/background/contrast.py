@@ -8,7 +8,8 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.level_map import BackgroundMap
-from tunneldb.arrays import Int16, Single, UInt8
+from tunneldb.arrays import Bool, Int16, Single, UInt8
+from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import LiningImage
 from tunneldb.raster.polygons import mask_of_polygons
@@ -33,6 +34,11 @@ class ContrastImage:
         Standard deviation of the background, dB; of pixel (i, j) in tile (i // tile, j // tile).
     drawn : tuple of Polygon
         Dry regions that the user drew, in the unrolled plane, m.
+    spacing : float
+        Distance of profiles along the tunnel, m, where pixels between them show what the nearest one does; 0 where profiles lie
+        as close as pixels.
+    between : (rows, columns) bool array or None
+        Those pixels.
     """
 
     grid: Grid
@@ -41,13 +47,22 @@ class ContrastImage:
     tile: int
     sigma: Single
     drawn: tuple[Polygon, ...] = ()
+    spacing: float = 0.0
+    between: Bool | None = None
 
 
 def contrast_image(picture: LiningImage, background: BackgroundMap) -> ContrastImage:
     """Take the level of the background from that of all pixels, in the memory of ``picture.level``, which is lost."""
     drop = picture.level
     background.level.subtract(drop)
+    spacing, between = 0.0, None
+    if picture.gaps is not None:
+        spacing, between = picture.gaps.spacing, drop == NODATA
+        picture.gaps.close_levels(drop)
+        between &= drop != NODATA
     for block, mask in mask_of_polygons(picture.grid, background.drawn):
         here = drop[:, block]
         here[mask] = np.minimum(here[mask], 0)
-    return ContrastImage(picture.grid, picture.state, drop, background.level.tile, background.sigma, background.drawn)
+    return ContrastImage(
+        picture.grid, picture.state, drop, background.level.tile, background.sigma, background.drawn, spacing, between
+    )

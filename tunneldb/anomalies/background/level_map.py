@@ -60,7 +60,7 @@ def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) ->
 
     Level and standard deviation are those of the dry part of the lining (`radiometry.robust_statistics`):
     of a column, of a row along 150 m, of windows of tiles. As long as no more than half of each is wet, leaks don't count.
-    Lining set back behind the wall doesn't count either.
+    Lining set back behind the wall doesn't count either, nor what lies between profiles.
 
     Parameters
     ----------
@@ -70,11 +70,13 @@ def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) ->
         Dry lining that the user drew, in the unrolled plane, m. Tiles that lie in it for the larger part take plain mean
         and standard deviation (Xu et al., 2018, eq. 19) of the pixels in it, however dark these are; others are left alone.
     """
+    spacing = 0.0 if picture.gaps is None else picture.gaps.spacing
+    picture = picture.measured()
     grid, state = picture.grid, picture.state
     tile, count = _tile_side(grid), int(np.count_nonzero(state == PixelState.LINING))
     if count == 0:
         return _nothing(grid, tile, tuple(dry_regions))
-    fit = BackgroundFit(picture, tile, count, dry_regions)
+    fit = BackgroundFit(picture, tile, count, dry_regions, spacing)
     for _ in range(PASSES):
         fit.add_bands()
         fit.add_rings()

@@ -32,6 +32,9 @@ ROW = 0.1
 RING = 0.3
 """Length of the running median along rings, m: joints are narrower than half of it, steps stay sharp."""
 
+PROFILE = 0.5
+"""Columns up to so many spacings apart are of one profile, which need not stand upright on the axis."""
+
 NARROW = 0.6
 """Rings are longer, m: a darker one is a joint that leaks all round."""
 
@@ -70,11 +73,13 @@ class BackgroundFit:
         Its lining pixels.
     drawn : sequence of Polygon
         Drawn dry regions.
+    spacing : float
+        Distance of profiles along the tunnel, m; 0 where they lie as close as pixels.
     """
 
-    def __init__(self, picture: LiningImage, tile: int, count: int, drawn: Sequence[Polygon]) -> None:
+    def __init__(self, picture: LiningImage, tile: int, count: int, drawn: Sequence[Polygon], spacing: float = 0.0) -> None:
         grid = self.grid = picture.grid
-        self.picture, self.tile, self.drawn = picture, tile, drawn
+        self.picture, self.tile, self.drawn, self.spacing = picture, tile, drawn, spacing
         self.every, self.apart = max(1, count // SAMPLE), max(1, count // LINES)
         shape = -(-grid.rows // tile), grid.columns // tile
         total = robust_statistics(_sample(picture.state, picture.level, max(1, count // 500_000)) * STEP["corrected"])
@@ -112,18 +117,25 @@ class BackgroundFit:
         self.bands += ndimage.median_filter(found, (size, 1), mode="nearest")
 
     def add_rings(self) -> None:
-        """Add what each column shows, without joints."""
+        """Add what each column shows, without joints.
+
+        Profiles that lie apart can't tell a joint from a ring: each takes the level that it shows itself.
+        """
         pixel = self.grid.pixel
         per_column = self.per_tile * self.lining.shape[0] / self.tile
         enough = max(FEW, round(PART * per_column / self.apart))
         found = Residuals(self.picture, self.level, self._plain, self.apart).of_columns(enough)
         # Where columns hold little, more of them are taken together.
-        size = _odd(max(RING / pixel, 10.0 * ENOUGH / max(per_column, 1.0)))
+        least = 10.0 * ENOUGH / max(per_column, 1.0)
+        size = _odd(PROFILE * self.spacing / pixel if self.spacing else max(RING / pixel, least))
         found = _running_median(found, size // 2)
         columns = np.flatnonzero(np.isfinite(found))
         if not len(columns):
             return
         rings = self.rings + np.interp(np.arange(len(found)), columns, found[columns])
+        if self.spacing:
+            self.rings = rings.astype(np.float32)
+            return
         closed = ndimage.grey_closing(rings, _odd(NARROW / pixel), mode="nearest")
         self.rings = np.where(closed - rings > 0.5 * self.spread, closed, rings).astype(np.float32)
 
