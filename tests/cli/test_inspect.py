@@ -17,6 +17,8 @@ from pyproj import CRS
 from tunneldb.cli.main import main
 from tunneldb.simulate import Parameters, Simulation, write
 
+pytestmark = pytest.mark.slow
+
 
 def inspected(*files: object, code: int = 0) -> dict[str, Any]:
     result = CliRunner().invoke(main, ["inspect", *map(str, files), "--json"])
