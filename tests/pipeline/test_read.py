@@ -71,6 +71,7 @@ def test_what_was_read_waits_until_it_is_loaded(survey: psycopg.Connection, tmp_
     counts = read(survey, path)
     survey.commit()
     assert (counts["file"], counts["state"], counts["kilometres"]) == ("a.laz", "loaded", [0, 1])
+    assert counts["note"] == "states no coordinate system: taken to be in the tunnel's, EPSG:25830"
     assert waiting(survey) == [("a.laz", 0), ("a.laz", 1)]
     (number,) = survey.execute("SELECT id FROM tunnel.scan_file").fetchone()
     assert [name.split("_f")[1] for name in fragments(survey)] == [f"{number}_km0", f"{number}_km1"]

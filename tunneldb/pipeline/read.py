@@ -18,7 +18,7 @@ from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import require_same_density
 from tunneldb.pointcloud.poses import PoseModel
-from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
+from tunneldb.pointcloud.reader import ScanHeader, check_header, crs_note, read_header
 from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
 from tunneldb.pointcloud.spool import Spool
 from tunneldb.radiometry.intensity_kind import contradiction
@@ -61,7 +61,8 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
     -------
     dict
         ``file``, ``state`` (see `tunneldb.store.scan_files.Loaded`), ``points``, ``noise``, ``outside``, ``invalid`` and
-        ``unposed`` if any, and ``kilometres``, those that wait to be loaded with it.
+        ``unposed`` if any, ``kilometres``, those that wait to be loaded with it, and ``note``, if something was taken for
+        granted.
 
     Raises
     ------
@@ -86,6 +87,7 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
         [files, files[0]],
     ).fetchone()
     assert row is not None
+    note = crs_note(header, survey.srid)
     left_out = {name: count for name, count in (("invalid", row[3]), ("unposed", row[4])) if count}
     return {
         "file": path.name,
@@ -95,6 +97,7 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
         "outside": row[2],
         **left_out,
         "kilometres": row[5],
+        **({} if note is None else {"note": note}),
     }
 
 
