@@ -14,7 +14,7 @@ COMMENT ON VIEW tunnel_api.tunnel IS 'Tunnels, with the axis as it was given';
 COMMENT ON COLUMN tunnel_api.tunnel.srid IS 'Coordinate reference system of all the tunnel''s geometry on the map';
 COMMENT ON COLUMN tunnel_api.tunnel.start_chainage IS 'Chainage of the first vertex of the given axis, m';
 COMMENT ON COLUMN tunnel_api.tunnel.spacing IS 'Distance between the vertices of a survey''s axis, m';
-COMMENT ON COLUMN tunnel_api.tunnel.design IS 'File and alignment that the axis was read from, where it is a design alignment';
+COMMENT ON COLUMN tunnel_api.tunnel.design IS 'What the axis was read from or found in: file and alignment, file and layer, or scan; NULL of a table';
 COMMENT ON COLUMN tunnel_api.tunnel.geom IS 'Axis as given, in the tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.survey AS

@@ -97,7 +97,7 @@ def test_a_tunnel_is_added_by_its_scan_alone(
     assert "t.found-axis.csv, picture to check: t.found-axis.png" in result.stderr
     row = conn.execute("SELECT start_chainage, design, ST_AsText(ST_StartPoint(alignment)) FROM tunnel.tunnel").fetchone()
     assert row is not None
-    assert row[:2] == (500.0, "found in bend.laz")
+    assert row[:2] == (500.0, "the axis found in bend.laz")
     begin = np.loadtxt("t.found-axis.csv", delimiter=",", skiprows=1)[0]
     assert np.hypot(*(begin[:2] - true_axis(simulation)[-1, :2])) < 0.5  # the simulator's line runs east
     conn.rollback()

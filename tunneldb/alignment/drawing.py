@@ -122,10 +122,10 @@ def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
     notes = _check_crs(path, meta["crs"], srid)
     try:
         geometries = shapely.get_parts(shapely.get_parts(shapely.from_wkb(wkb)))
-    except (shapely.errors.GEOSException, NotImplementedError) as error:
+    except shapely.errors.GEOSException as error:
         raise UserError(
-            f"{path}: a line of layer {chosen!r} cannot be read ({str(error).strip().splitlines()[0]}); if it has arcs, turn "
-            "them into vertices (in QGIS: Vector geometry, Segmentize)"
+            f"{path}: a geometry of layer {chosen!r} is damaged ({str(error).strip().splitlines()[0]}); mend it (in QGIS: Fix "
+            "geometries)"
         ) from None
     geometries = geometries[np.isin(shapely.get_type_id(geometries), (1, 2))]  # lines and rings
     pieces = [shapely.get_coordinates(line, include_z=True) for line in geometries]

@@ -85,7 +85,7 @@ def found_given(
         raise UserError("--axis auto finds the axis in scan files; name them behind the tunnel: --axis auto SCAN...")
     found = search_axis(files, srid, begin)
     found = found.reversed() if reverse else found
-    return GivenAxis(found.xyz, start or 0.0, source=f"found in {_names(files)}"), found
+    return GivenAxis(found.xyz, start or 0.0, source=f"the axis found in {_names(files)}"), found
 
 
 def complete(given: GivenAxis, files: Sequence[Path], srid: int, begin: Begin) -> tuple[GivenAxis, FoundAxis]:

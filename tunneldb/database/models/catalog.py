@@ -33,7 +33,7 @@ class Tunnel(Base):
         geometry("LINESTRINGZ"), comment="Axis as given, in growing chainage, in the tunnel's SRID"
     )
     design: Mapped[str | None] = mapped_column(
-        comment="File and alignment that the given axis was read from, if it is a design alignment (LandXML, IFC)"
+        comment="What the given axis was read from or found in: file and alignment, file and layer, or scan; NULL of a table"
     )
     created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was added")
 
