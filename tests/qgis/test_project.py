@@ -50,7 +50,7 @@ ON_MAP = {
 IMAGES = ("raw", "corrected", "offset", "state", "class")
 UNROLLED = {
     "leak_unrolled": "Polygon", "anomaly_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon",
-    "sheet": "Polygon", "leak_sheet": "Polygon",
+    "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon",
 }  # fmt: skip
 NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet"}
 """Layers of the unrolled plane that its theme does not show."""
@@ -188,13 +188,14 @@ def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
             "ground",
             "sheet",
             "leak_sheet",
+            "coverage_gap",
         )
     )
 
 
 def test_themes_and_views(seen: dict[str, Any]) -> None:
     assert set(seen["themes"]) == {"Map", "Unrolled", "3D", "Inspection sheets"}
-    assert set(seen["themes"]["Inspection sheets"]) == {"leak_sheet", "demo-2024-km012-corrected"}
+    assert set(seen["themes"]["Inspection sheets"]) == {"coverage_gap", "leak_sheet", "demo-2024-km012-corrected"}
     assert set(seen["themes"]["Map"]) == {
         "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster",
     }  # fmt: skip
