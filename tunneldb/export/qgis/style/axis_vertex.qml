@@ -185,6 +185,7 @@
     <field name="source" editable="0"/>
     <field name="edited_by" editable="0"/>
     <field name="edited_at" editable="0"/>
+    <field name="remark" editable="0"/>
   </editable>
   <editorlayout>tablayout</editorlayout>
   <attributeEditorForm>
