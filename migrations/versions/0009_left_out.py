@@ -1,4 +1,4 @@
-"""What was left out: points of a scan file that are no numbers or of unknown scanner position, places of axis vertices; when a survey's settings changed.
+"""What was left out: points without numbers or scanner positions, places of axis vertices; when settings of a survey changed.
 
 Revision: 0009, after 0008.
 """
