@@ -88,9 +88,9 @@ class Grid:
 
     def columns_between(self, low: float, high: float) -> slice:
         """Columns that lie wholly between two chainages, m, which may be infinite."""
-        ends = np.clip((np.array([low, high]) - self.west) / self.pixel, -1.0, self.columns + 1.0)
-        first, stop = int(np.ceil(ends[0] - 1e-6)), int(np.floor(ends[1] + 1e-6))
-        return slice(max(first, 0), max(min(stop, self.columns), max(first, 0)))
+        first, stop = np.clip((np.array([low, high]) - self.west) / self.pixel, 0.0, self.columns)
+        begin = int(np.ceil(first - 1e-6))
+        return slice(begin, max(int(np.floor(stop + 1e-6)), begin))
 
     @property
     def first_block(self) -> int:
