@@ -219,9 +219,15 @@ def test_state_that_does_not_hold_is_warned_of(example: str, conn: psycopg.Conne
     conn.execute("UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0.03, 0.04, 0) WHERE n = 1240")
     conn.execute("UPDATE tunnel.anomaly SET detected = false WHERE id = 3")
     conn.execute("DELETE FROM tunnel.coverage")
+    conn.execute("UPDATE tunnel.scan_file SET unposed = 3, points = points + 3")
+    conn.execute("""UPDATE tunnel.run SET counts = counts || '{"note": "roughness 9° is taken"}' WHERE stage = 'detect'""")
     conn.commit()
     run("report", example, "-o", tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text("utf-8")
+    remarks = ["3 points", "left out: the scanner&#39;s position is not known", "Kilometre 12, detect: roughness 9° is taken"]
+    for remark in remarks:
+        assert remark in text
+    assert "km 12, detect: roughness 9° is taken" in run("status", example).output
     assert "<li>stage segments of kilometre 12</li>" in text
     assert "Why: axis edited since (12)." in text
     assert "moved by 0.050 m" in text

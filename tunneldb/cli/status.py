@@ -16,6 +16,7 @@ from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.pipeline.stages import STAGE_NAMES
+from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import get_survey
 
 
@@ -93,7 +94,7 @@ def _all(connection: psycopg.Connection[Any]) -> None:
 
 
 def _one(connection: psycopg.Connection[Any], survey: str) -> None:
-    from tunneldb.cli.overview import render
+    from tunneldb.cli.overview import render, spans
     from tunneldb.queue.progress import overview
 
     seen = overview(connection, survey)
@@ -113,3 +114,10 @@ def _one(connection: psycopg.Connection[Any], survey: str) -> None:
             console = Console(width=1000)  # a pipe has no width: let nothing be cut there
         click.echo()
         console.print(render(seen))
+    remarks = read_remarks(connection, get_survey(connection, survey))
+    tell(remarks=remarks)
+    if remarks:
+        click.echo()
+    for remark in remarks:
+        where = remark.file or f"km {spans(remark.kilometres)}, {remark.stage}"
+        click.echo(f"{where}: {remark.remark}")

@@ -136,7 +136,7 @@ def compute_diagnosis(inputs: DiagnosisInputs, most: int) -> Diagnosis:
         roughness,
         found,
         inputs.measured,
-        [note, refused],
+        [note, f"the measured curve can't be checked on this lining: {refused}" if refused and inputs.measured else refused],
     )
 
 

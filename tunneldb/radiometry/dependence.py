@@ -18,6 +18,9 @@ FEWEST = 30
 ENDS = (0.001, 0.999)
 """Shares of the points between whose values the classes lie."""
 
+SMALL = 1.0 / 3.0
+"""What is left of the dependence is small when it is less of the lining's scatter: it raises that by 5 % then."""
+
 STEEP = 10.0
 """Slopes over incidence are given for so many degrees."""
 
@@ -139,6 +142,11 @@ class Dependence:
             return "Intensity could not be corrected."
         parts = [("range", self.range.spread), ("incidence", self.incidence.spread)]
         left = [f"{name} (medians differ by {spread:.2f} dB)" for name, spread in parts if spread > NOTICEABLE]
+        if left and max(spread for _, spread in parts) < SMALL * self.scatter:
+            return (
+                f"Good enough for detection: corrected intensity still depends on {' and '.join(left)}, but that is less than a"
+                f" third of what lining scatters by anyway, {self.scatter:.2f} dB."
+            )
         if left:
             return f"Corrected intensity still depends on {' and '.join(left)}; lining scatters by {self.scatter:.2f} dB."
         return (

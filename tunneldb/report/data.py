@@ -185,7 +185,8 @@ def read_files(conn: psycopg.Connection[Any], survey: Survey, low: float, high: 
     """Read the scan files that reach into a stretch."""
     return _rows(
         conn,
-        "SELECT name, checksum, bytes, points, noise, outside, thinned, kept, chainage_from, chainage_to, loaded_at"
+        "SELECT name, checksum, bytes, points, noise, outside, invalid, unposed, thinned, kept, chainage_from, chainage_to,"
+        " loaded_at"
         " FROM tunnel_api.file WHERE survey_id = %s AND chainage_to >= %s AND chainage_from <= %s"
         " ORDER BY chainage_from, name",
         [survey.id, low, high],
@@ -206,7 +207,7 @@ def read_runs(conn: psycopg.Connection[Any], survey: Survey, low: float, high: f
          GROUP BY d.stage, d.parameters, d.versions
          ORDER BY array_position(%s, d.stage), min(d.km)
         """,
-        [survey.id, *_kilometres(low, high), list(STAGE_NAMES), list(STAGE_NAMES)],
+        [survey.id, *kilometres_between(low, high), list(STAGE_NAMES), list(STAGE_NAMES)],
     )
 
 
@@ -218,7 +219,7 @@ def read_stale(conn: psycopg.Connection[Any], survey: Survey, low: float, high: 
         " array_agg(km ORDER BY km) AS kilometres"
         " FROM tunnel_api.stage_status WHERE survey_id = %s AND km BETWEEN %s AND %s AND (stale OR done_at IS NULL)"
         " GROUP BY stage, step, 2 ORDER BY step, 2",
-        [survey.id, *_kilometres(low, high)],
+        [survey.id, *kilometres_between(low, high)],
     )
 
 
@@ -228,7 +229,7 @@ def read_radiometry(conn: psycopg.Connection[Any], survey: Survey, low: float, h
         conn,
         "SELECT km, roughness, dry_mean, dry_sigma, threshold, sigma_raw, sigma_lambert, sigma_oren_nayar"
         " FROM tunnel_api.radiometry WHERE survey_id = %s AND km BETWEEN %s AND %s ORDER BY km",
-        [survey.id, *_kilometres(low, high)],
+        [survey.id, *kilometres_between(low, high)],
     )
 
 
@@ -297,6 +298,6 @@ def _rows(conn: psycopg.Connection[Any], query: sql.Composed | LiteralString, va
         return cursor.execute(query, values).fetchall()
 
 
-def _kilometres(low: float, high: float) -> tuple[int, int]:
+def kilometres_between(low: float, high: float) -> tuple[int, int]:
     """First and last kilometre of a stretch."""
     return int(np.floor(low / 1000)), int(np.ceil(high / 1000)) - 1

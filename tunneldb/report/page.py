@@ -20,6 +20,7 @@ from tunneldb.report.lining import Form
 from tunneldb.report.strip import LETTERS, Progress, Strips
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.coverage import Coverage, read_coverage
+from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey
 
 CARDS = 400
@@ -137,6 +138,7 @@ class _Report:
             "unlooked": (1 - total["searched_share"]) * (high - low),
             "kilometres": self._kilometres(),
             "files": data.read_files(conn, survey, low, high),
+            "remarks": read_remarks(conn, survey, *data.kilometres_between(low, high)),
             "stale": text.stale(data.read_stale(conn, survey, low, high)),
             "runs": runs,
             "versions": text.versions(runs),
