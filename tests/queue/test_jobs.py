@@ -277,7 +277,14 @@ def test_a_vertex_moved_by_hand_has_segments_made_anew(ledger: Ledger) -> None:
     ledger.conn.execute(
         "INSERT INTO tunnel.axis_vertex (survey_id, n, km, geom, given, points, source, edited_by, edited_at)"
         " SELECT %s, 50, 0, g, g, 0, 'edited', 'me', clock_timestamp()"
-        "   FROM (SELECT ST_SetSRID(ST_MakePoint(500, 0, 0), 25830)) AS p (g)",
+        "   FROM (SELECT ST_SetSRID(ST_MakePoint(500, 1, 0), 25830)) AS p (g)",
+        [ledger.survey],
+    )
+    # a segment that was made while it stood a metre aside
+    ledger.conn.execute(
+        "INSERT INTO tunnel.segment (survey_id, n, km, chainage_from, chainage_to, vertex_from, vertex_to, tangent_from,"
+        " tangent_to, geom, points) SELECT %s, 50, 0, 500, 510, '{500,0,0}', '{510,0,0}', '{1,0,0}', '{1,0,0}',"
+        " ST_SetSRID(ST_GeomFromText('LINESTRING Z (500 0 0, 510 0 0)'), 25830), 0",
         [ledger.survey],
     )
     assert ledger.states() == {0: "ddRwww", 1: "dddwww"}

@@ -276,17 +276,17 @@ def test_the_commands_show_and_take_stations(conn: psycopg.Connection, example: 
     assert "0+500.000" in run("status", example).stdout
     assert "2+930.000" in run("survey", "list").stdout
 
-    def listed(*options: str) -> list[str]:
+    def listed(*options: str, code: int = 0) -> list[str]:
         result = run("leaks", example, "--format", "csv", *options)
-        assert result.exit_code == 0, result.stderr
-        return [row["label"][:5] for row in csv.DictReader(result.stdout.splitlines())]
+        assert result.exit_code == code, result.stderr
+        return [row["label"][:5] for row in csv.DictReader(result.stdout.splitlines()) if row["id"]]
 
     every = listed()
     assert len(every) == 7
     assert listed("--from", "0+530", "--to", "0+560") == every[1:2]
     assert listed("--from", "2+980", "--to", "2+940") == listed("--from", "2+940", "--to", "2+980") == every[-1:]
     assert listed("--to", "12350") == every[:2]
-    assert listed("--from", "12000", "--to", "13000") == every
+    assert listed("--from", "12000", "--to", "13000", code=1) == every  # nothing was scanned of its ends
     refused(run("leaks", example, "--from", "0+590"), "--from 0+590", "2 times", "12390.000 and 12410.000", "--from 12390.000")
     refused(run("leaks", example, "--to", "7+000"), "no such station", "tunneldb tunnel stationing demo --show")
     refused(run("leaks", example, "--to", "km 7"), "--to takes a station", "'km 7'")
@@ -305,7 +305,7 @@ def test_leaks_by_the_clock(conn: psycopg.Connection, example: str, clock: str, 
     expected = sorted(key for key, hour in hours.items() if wanted(hour))
     assert 0 < len(expected) < len(hours)
     result = run("leaks", example, "--format", "csv", "--clock", clock)
-    assert sorted(int(row["id"]) for row in csv.DictReader(result.stdout.splitlines())) == expected
+    assert sorted(int(row["id"]) for row in csv.DictReader(result.stdout.splitlines()) if row["id"]) == expected
 
 
 def test_what_is_no_part_of_the_clock_is_refused(example: str) -> None:
