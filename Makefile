@@ -49,9 +49,8 @@ lint: install
 	$(BIN)/lint-imports --no-logo
 
 # Not `python -m pytest`: that would put the source tree before the wheel. Linting takes a core for a minute, beside the tests.
-# Three workers on two cores: much of the time tests wait for processes and servers of their own.
 tests: $(VENV)/wheel $(VENV)/tests
-	$(BIN)/pytest -n 3 --dist loadgroup --no-loadscope-reorder -rs
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -rs
 
 quick: $(VENV)/wheel
 	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not server and not slow" -rs
