@@ -17,6 +17,7 @@ from support.loaded_survey import ORIGIN, SURVEY, add_survey, assert_nothing_loa
 
 from tunneldb.cli.main import main
 from tunneldb.errors import UserError
+from tunneldb.pointcloud.selection import FilterSettings
 
 
 @pytest.fixture
@@ -55,6 +56,13 @@ class TestBadInput:
             conn, [path], r"gps_time of 10000 points .* 12\.500 s before its start and up to .* s after its end.*--max-left"
         )
         load(conn, [write(path, xyz)])
+
+    def test_a_file_of_which_nothing_is_left_is_refused_whatever_may_be_left_out(
+        self, survey: psycopg.Connection, tmp_path: Path
+    ) -> None:
+        path = write(tmp_path / "a.laz", tube(980, 1020, 50, seed=1), scan_id=9)
+        with pytest.raises(UserError, match="no station for scan_id 9"):
+            load(survey, [path], FilterSettings(max_left_out=1.0))
 
     def test_a_few_points_of_unknown_scanner_or_without_a_number_are_left_out(
         self, conn: psycopg.Connection, tmp_path: Path

@@ -246,8 +246,9 @@ class _Filter:
         """Refuse the file where too many of its points near the axis are left out."""
         counts = self.counts
         near = counts.points - counts.outside
+        nothing = counts.invalid + counts.unposed == near
         for count, reason in ((counts.invalid, self.invalid), (counts.unposed, self.faults.text())):
-            if count > self.settings.max_left_out * near:
+            if count > self.settings.max_left_out * near or (nothing and count):
                 raise UserError(
                     f"{self.path}: {reason} ({100.0 * count / near:.2g} % of the points near the axis; "
                     f"--max-left-out {100.0 * self.settings.max_left_out:g} allows less)"
