@@ -53,7 +53,8 @@ AS $$
           FROM stage s CROSS JOIN (VALUES (-1), (0), (1)) AS w (way)
          CROSS JOIN LATERAL unnest(CASE w.way WHEN 0 THEN s.here ELSE s.beside END) AS n (source)
     ), attempt AS MATERIALIZED (
-        SELECT r.km, s.step, r.id, r.outcome, r.started_at, r.finished_at, r.message, r.parameters, r.backend_pid, r.backend_start
+        SELECT r.km, s.step, r.id, r.outcome, r.started_at, r.finished_at, r.message, r.parameters, r.backend_pid, r.backend_start,
+               r.counts ->> 'kept' = '0' AS void
           FROM tunnel.run r JOIN stage s ON s.name = r.stage
          WHERE r.survey_id = $1 AND r.km BETWEEN $2 AND $3
     ), last AS (
@@ -132,6 +133,12 @@ AS $$
           FROM ripple r
           JOIN need n ON n.source = r.step
           JOIN direct d ON d.km = r.km - n.way AND d.step = n.step AND d.done
+    ), void AS (  -- emptied, with nothing left of it and nothing wanted: only its neighbours are to know
+        SELECT d.km FROM success d
+         WHERE d.step = 1 AND d.void
+           AND NOT EXISTS (SELECT FROM attempt a WHERE a.km = d.km AND (a.step > 1 OR a.started_at > d.started_at))
+        EXCEPT SELECT p.km FROM pending p
+        EXCEPT SELECT g.km FROM tunnel.goal g WHERE g.survey_id = $1
     ), stale AS MATERIALIZED (
         SELECT r.km, array_agg(r.step ORDER BY r.step) AS steps FROM ripple r GROUP BY r.km
     )
@@ -159,6 +166,7 @@ AS $$
       LEFT JOIN stale here ON here.km = d.km
       LEFT JOIN stale before ON before.km = d.km - 1
       LEFT JOIN stale after ON after.km = d.km + 1
+     WHERE d.km NOT IN (SELECT v.km FROM void v)
 $$;
 COMMENT ON FUNCTION tunnel_api.stage_state(integer, integer, integer) IS
     'How far kilometres of a survey have come: for each stage the last run, the last success, and what has changed since. What lies beyond the range is not looked at';

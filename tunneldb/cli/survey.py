@@ -9,6 +9,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
+from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
@@ -19,7 +20,7 @@ FILE = click.Path(path_type=Path)
 
 @click.group(cls=VerbGroup)
 def survey() -> None:
-    """Add, list, set or remove the scanning campaigns of a tunnel."""
+    """Add, list, set or remove the scanning campaigns of a tunnel, and withdraw files."""
 
 
 @survey.command(
@@ -172,6 +173,68 @@ def set_(
     click.echo(f"{name}: set", err=True)
     for note in notes:
         click.echo(f"{name}: {note}", err=True)
+
+
+@survey.command(
+    "remove-file",
+    examples=["tunneldb survey remove-file ringo-2024 km-512.laz"],
+    wrong="nothing was removed: the answer was no",
+)
+@click.argument("name", metavar="SURVEY")
+@click.argument("files", nargs=-1, required=True, type=FILE, metavar="FILES...")
+@click.option("--yes", is_flag=True, help="Do not ask.")
+@click.pass_obj
+def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: bool) -> None:
+    """Withdraw FILES, by their names, from SURVEY, as if they had never been loaded.
+
+    Files that overlap them are read again, and their kilometres loaded without them. One that is left without points
+    loses all that was made of it: where somebody has reviewed leaks there, or moved vertices, it asks first. A file that
+    a batch could not read is taken off its list. If it is cut off, call it again.
+    """
+    from tunneldb.pipeline.remove import known_names, remove_files, work_at_stake
+
+    names = list(dict.fromkeys(path.name for path in files))
+    with connect(settings.dsn) as connection:
+        found = get_survey(connection, name)
+        known_names(connection, found, names)
+        emptied, work = work_at_stake(connection, found, names)
+        connection.rollback()
+        if (work.reviewed or work.edited) and not yes:
+            kms = ", ".join(map(str, emptied))
+            question = (
+                f"Kilometre {kms} is left without points: {work.anomalies} leaks and other dark spots go, {work.reviewed} of"
+                f" them reviewed, and {work.edited} axis vertices moved by hand. Remove {', '.join(names)}?"
+            )
+            if not click.confirm(question, err=True):
+                raise click.Abort
+        with bar("points") as progress:
+            removed = remove_files(connection, found, names, step(progress))
+        stale = connection.execute(
+            "SELECT count(*) FROM tunnel_api.stage_status WHERE survey_id = %s AND stale", [found.id]
+        ).fetchone()
+    assert stale is not None
+    tell(
+        survey=name,
+        files=names,
+        reread=removed.reread,
+        kilometres=removed.kilometres,
+        emptied=removed.emptied,
+        anomalies=removed.lost.anomalies,
+        reviewed=removed.lost.reviewed,
+        edited=removed.lost.edited,
+        stale=stale[0],
+    )
+    again = f"; read again: {', '.join(removed.reread)}" if removed.reread else ""
+    click.echo(f"{name}: removed {', '.join(names)}{again}", err=True)
+    if removed.emptied:
+        lost = removed.lost
+        click.echo(
+            f"{name}: no points are left in kilometre {', '.join(map(str, removed.emptied))}, and all that was made of them is"
+            f" gone: {lost.anomalies} leaks and other dark spots, {lost.reviewed} of them reviewed",
+            err=True,
+        )
+    if stale[0]:
+        click.echo(f"{name}: {stale[0]} stages are stale: tunneldb run {name} --stale", err=True)
 
 
 @survey.command("list", examples=["tunneldb survey list"])

@@ -210,7 +210,8 @@ def _queue(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
         "SELECT survey, name, path, message FROM tunnel_api.incoming WHERE state = 'failed' ORDER BY survey, name"
     ).fetchall():
         why = (message or "it could not be read").splitlines()[0]
-        yield Finding("note", "files", f"{survey}, {name}: {why}", f"tunneldb batch {survey} {path}   -- once it is mended")
+        mend = f"tunneldb batch {survey} {path}   -- once it is mended; or tunneldb survey remove-file {survey} {name}"
+        yield Finding("note", "files", f"{survey}, {name}: {why}", mend)
     row = connection.execute(
         """
         SELECT (SELECT count(*) FROM tunnel_api.job WHERE state = 'queued'), (SELECT count(*) FROM tunnel_api.worker)

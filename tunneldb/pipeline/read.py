@@ -153,12 +153,13 @@ class Reading:
             Told of each file that begins; returns what is told of its progress.
         """
         for header in headers:
-            self._claim(header.path.name)
+            self.claim(header.path.name)
         recorded = recorded_files(self.conn, self.survey)
         names = {header.path.name for header in headers}
         former = [recorded[name] for name in names if name in recorded]
-        again = self._overlapped(former, [file for file in recorded.values() if file.name not in names])
-        others = [self._find(former, file, given) for file in again]
+        again = self.overlapped(former, [file for file in recorded.values() if file.name not in names])
+        why = f"{', '.join(old.name for old in former)} replaces a file that overlaps"
+        others = [self.find(file, given, why, "give its place in the same command") for file in again]
         # Their kilometres change under nobody's hands; in this order, so that two never wait for each other.
         for km in kilometres_of(self.conn, [file.id for file in [*former, *again]]):
             self.conn.execute("SELECT pg_advisory_xact_lock(%s, %s)", [self.survey.id, km])
@@ -169,30 +170,38 @@ class Reading:
             found.append(self._one(header, old, state, begin))
         return found
 
-    def _claim(self, name: str) -> None:
+    def claim(self, name: str) -> None:
         """Keep others from reading a file of the same name; numbers far below those of kilometres stand for names."""
         key = -(1 << 30) - (zlib.crc32(name.encode()) >> 2)
         row = self.conn.execute("SELECT pg_try_advisory_xact_lock(%s, %s)", [self.survey.id, key]).fetchone()
         if row is None or not row[0]:
             raise UserError(f"another process is reading {name}: wait until it has finished (tunneldb status)")
 
-    def _overlapped(self, former: Sequence[Recorded], rest: Iterable[Recorded]) -> list[Recorded]:
+    def overlapped(self, former: Sequence[Recorded], rest: Iterable[Recorded]) -> list[Recorded]:
         """Files that overlap one that is replaced: points of theirs may come back where it was nearer to the centre."""
         if self.settings.edge is None:
             return []
         reach = voxel_reach(self.settings.edge)
         return [file for file in rest if any(file.low <= old.high + reach and file.high >= old.low - reach for old in former)]
 
-    def _find(self, former: Sequence[Recorded], file: Recorded, given: Sequence[Path]) -> ScanHeader:
+    def find(self, file: Recorded, given: Sequence[Path], why: str, mend: str) -> ScanHeader:
+        """Header of a file that has to be read again, from where it lies now if that is given.
+
+        Raises
+        ------
+        UserError
+            If it is not there as it was loaded; why it is wanted and what to do are told.
+        """
         path = next((path for path in given if path.name == file.name), Path(file.path))
         if not path.is_file() or checksum(path) != file.checksum:
-            raise UserError(
-                f"{', '.join(old.name for old in former)} replaces a file that overlaps {file.name}, which has to be read"
-                f" again and is not at {path} as it was loaded: give its place in the same command"
-            )
+            raise UserError(f"{why} {file.name}, which has to be read again and is not at {path} as it was loaded: {mend}")
         header = read_header(path)
         self.check(header)
         return header
+
+    def reread(self, header: ScanHeader, former: Recorded, begin: Begin = silent) -> Read:
+        """Read a file again that is there."""
+        return self._one(header, former, "reread", begin)
 
     def _one(self, header: ScanHeader, former: Recorded | None, state: str, begin: Begin) -> Read:
         path, started = header.path, time.monotonic()
@@ -200,7 +209,7 @@ class Reading:
         try:
             counts, digest = self._filter(header, survivors, begin(path.name, 2 * header.points))
             stated = None if header.crs is None else self.survey.srid
-            left = [] if former is None else self._leave(former)
+            left = [] if former is None else self.leave(former)
             content = Content(path, digest, path.stat().st_size, stated, counts)
             file_id = record_file(self.conn, self.survey, content)
             record_kilometres(self.conn, file_id, survivors.kilometres(), counts.ranges, left)
@@ -236,7 +245,7 @@ class Reading:
                 f" (tunneldb inspect {path.name}; tunneldb survey set {self.survey.name} --intensity-kind KIND)"
             )
 
-    def _leave(self, former: Recorded) -> list[int]:
+    def leave(self, former: Recorded) -> list[int]:
         """Drop what waits of a file's former content; returns the kilometres that may hold rows of it."""
         drop_fragments(self.conn, self.survey, [former.id], kilometres_of(self.conn, [former.id]))
         waiting = self.conn.execute("SELECT km FROM tunnel.file_km WHERE file_id = %s AND loaded_at IS NULL", [former.id])

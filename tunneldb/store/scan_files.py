@@ -199,6 +199,16 @@ def record_kilometres(
         )
 
 
+def withdraw_file(conn: psycopg.Connection[Any], file_id: int, left: Iterable[int]) -> None:
+    """Note that a file is to leave the kilometres that may hold rows of it; one of no bytes has been withdrawn."""
+    record_kilometres(conn, file_id, {}, {}, left)
+    conn.execute(
+        "UPDATE tunnel.scan_file SET checksum = '', bytes = 0, points = 0, noise = 0, outside = 0, invalid = 0, unposed = 0,"
+        " thinned = 0, kept = 0 WHERE id = %s",
+        [file_id],
+    )
+
+
 def record_loaded(conn: psycopg.Connection[Any], km: int, file_ids: list[int]) -> None:
     """Enter that files are loaded into a kilometre; those that have left it are forgotten there."""
     conn.execute(

@@ -1,0 +1,79 @@
+"""Taking away what was made of a kilometre that holds no points any more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import psycopg
+from psycopg import sql
+
+from tunneldb.store.survey import Survey
+
+_RESULTS = (
+    "anomaly_part", "anomaly", "coverage", "image", "radiometry", "range_curve", "target_sphere", "cluster", "lining", "ground",
+    "section", "segment", "axis_vertex",
+)  # fmt: skip
+"""Tables of schema tunnel whose rows are the results of stages in a kilometre."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """What people have done to the results of kilometres.
+
+    Attributes
+    ----------
+    anomalies : int
+        Leaks and other dark spots there.
+    reviewed : int
+        Of them, those that somebody has reviewed.
+    edited : int
+        Vertices of the axis that somebody has moved.
+    """
+
+    anomalies: int
+    reviewed: int
+    edited: int
+
+
+def work_in(conn: psycopg.Connection[Any], survey: Survey, kms: list[int]) -> Work:
+    """Count what would go with the results of kilometres."""
+    row = conn.execute(
+        """
+        SELECT (SELECT count(*) FROM tunnel.anomaly l WHERE l.survey_id = %(survey)s AND l.km = ANY (%(kms)s)),
+               (SELECT count(*) FROM tunnel.anomaly l WHERE l.survey_id = %(survey)s AND l.km = ANY (%(kms)s)
+                   AND (l.review <> 'open' OR l.judged IS NOT NULL)),
+               (SELECT count(*) FROM tunnel.axis_vertex v WHERE v.survey_id = %(survey)s AND v.km = ANY (%(kms)s)
+                   AND v.edited_at IS NOT NULL)
+        """,
+        {"survey": survey.id, "kms": kms},
+    ).fetchone()
+    assert row is not None
+    return Work(*row)
+
+
+def has_results(conn: psycopg.Connection[Any], survey: Survey, km: int) -> bool:
+    """Whether a stage after ``load`` was tried in a kilometre, so that there is something to be cleared."""
+    row = conn.execute(
+        "SELECT FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage <> 'load' LIMIT 1", [survey.id, km]
+    ).fetchone()
+    return row is not None
+
+
+def clear_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Work:
+    """Delete the results of all stages after ``load`` in a kilometre, and that they ran; what a batch wants of it, too.
+
+    That points were loaded, and are gone, stays in the ledger: what the neighbours have is stale by that. What people have
+    changed by hand stays in the audit.
+    """
+    lost = work_in(conn, survey, [km])
+    for table in _RESULTS:
+        query = sql.SQL("DELETE FROM {} WHERE survey_id = %s AND km = %s").format(sql.Identifier("tunnel", table))
+        conn.execute(query, [survey.id, km])
+    conn.execute("DELETE FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage <> 'load'", [survey.id, km])
+    conn.execute(
+        "DELETE FROM tunnel.goal g WHERE g.survey_id = %(survey)s AND g.km = %(km)s AND NOT EXISTS ("
+        "SELECT FROM tunnel.incoming i WHERE i.survey_id = g.survey_id AND g.km BETWEEN i.km_from AND i.km_to)",
+        {"survey": survey.id, "km": km},
+    )
+    return lost
