@@ -92,14 +92,29 @@ BEGIN
             lead(c.seen) OVER along - c.seen AS seen
         FROM tunnel_api.coverage_at(survey_key, (SELECT p.at FROM place p)) c
         WINDOW along AS (ORDER BY c.chainage)
-    ), dim AS (
+    ), dim AS (  -- in parts of one state, and in wholes that lack nothing or something all along
         SELECT b.low, b.high, b.lining, b.seen, b.state,
-            sum(CASE WHEN b.state = b.before AND b.low = b.behind THEN 0 ELSE 1 END) OVER (ORDER BY b.low) AS part
+            sum(CASE WHEN b.state IS NOT DISTINCT FROM b.before AND b.low = b.behind THEN 0 ELSE 1 END) OVER along AS part,
+            sum(CASE WHEN (b.state IS NULL) = (b.before IS NULL) AND b.low = b.behind THEN 0 ELSE 1 END) OVER along AS whole
         FROM (
             SELECT q.*, lag(q.state) OVER (ORDER BY q.low) AS before, lag(q.high) OVER (ORDER BY q.low) AS behind
             FROM (SELECT b.*, CASE WHEN b.lining < 1e-6 THEN 'not scanned'
                                    WHEN b.seen < least_share * b.lining THEN 'unseen' END AS state
                   FROM bin b WHERE b.high < b.low + 1 + 1e-6) q) b
+        WINDOW along AS (ORDER BY b.low)
+    ), dark AS (  -- of a whole that is long enough, what is too short to be told by itself is unseen
+        SELECT d.*, sum(CASE WHEN d.said = d.before AND d.whole = d.whole_before THEN 0 ELSE 1 END) OVER (ORDER BY d.low) AS piece
+        FROM (
+            SELECT l.*, lag(l.said) OVER (ORDER BY l.low) AS before, lag(l.whole) OVER (ORDER BY l.low) AS whole_before
+            FROM (
+                SELECT d.low, d.high, d.lining, d.seen, d.whole,
+                    CASE WHEN d.state = 'not scanned' AND max(d.high) OVER of_part - min(d.low) OVER of_part >= least_length
+                         THEN d.state ELSE 'unseen' END AS said,
+                    max(d.high) OVER of_whole - min(d.low) OVER of_whole AS length
+                FROM dim d
+                WHERE d.state IS NOT NULL
+                WINDOW of_part AS (PARTITION BY d.part), of_whole AS (PARTITION BY d.whole)) l
+            WHERE l.length >= least_length) d
     ), gap AS (
         SELECT j.low, j.high, j.state, j.reason, j.searched, NULL::float8 AS seen FROM judged j WHERE j.state IS NOT NULL
         UNION ALL
@@ -108,12 +123,11 @@ BEGIN
         SELECT b.low, b.high, 'not scanned', 'the survey has no points there', false, NULL FROM beyond b
         WHERE b.low > '-Infinity' AND b.high < 'Infinity' AND b.high - b.low >= 1
         UNION ALL
-        SELECT min(d.low), max(d.high), d.state,
-            CASE d.state WHEN 'unseen' THEN 'less than half of the lining was seen' ELSE 'no lining is known there' END, true,
+        SELECT min(d.low), max(d.high), d.said,
+            CASE d.said WHEN 'unseen' THEN 'less than half of the lining was seen' ELSE 'no lining is known there' END, true,
             coalesce(sum(d.seen) / nullif(sum(d.lining), 0), 0)
-        FROM dim d WHERE d.state IS NOT NULL
-        GROUP BY d.part, d.state
-        HAVING max(d.high) - min(d.low) >= least_length
+        FROM dark d
+        GROUP BY d.piece, d.said
     ), cut AS (
         SELECT greatest(g.low, first_place) AS low, least(g.high, last_place) AS high, g.state, g.reason, g.searched, g.seen
         FROM gap g

@@ -50,7 +50,7 @@ def parameters(scanner: str, seed: int, **others: object) -> Parameters:
     )
 
 
-def prepare(folder: Path, scanner: str, kind: str = "amplitude", start: float = START) -> None:
+def prepare(folder: Path, scanner: str, kind: str = "amplitude", start: float = START) -> str:
     dimension = {"amplitude": "Amplitude", "reflectance": "Reflectance", "linear": "intensity", "none": None}[kind]
     poses = ["--stations", folder / f"{NAME}.stations.csv"]
     if scanner == "profiler":
@@ -61,7 +61,7 @@ def prepare(folder: Path, scanner: str, kind: str = "amplitude", start: float = 
         *(["--intensity", dimension] if dimension else []),
         *(["--reference", folder / f"{NAME}.reference.csv"] if kind in ("amplitude", "linear") else []),
     )  # fmt: skip
-    command("load", NAME, *sorted(folder.glob("*.laz")))
+    return command("load", NAME, *sorted(folder.glob("*.laz"))).output
 
 
 def outlines(conn: psycopg.Connection) -> dict[int, shapely.Polygon]:

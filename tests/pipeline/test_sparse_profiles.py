@@ -50,3 +50,23 @@ def test_leaks_over_several_profiles_are_found_once_and_with_their_area(
     first, stop = (round((START % 50.0 + metres) / 0.02) for metres in (2.0, 20.0))
     shown = decode(tiff).values[:, first:stop]
     assert np.isfinite(shown).any(axis=0).all()
+
+
+def test_a_survey_too_thin_to_be_searched_is_unseen_and_not_clean(conn: psycopg.Connection, tmp_path: Path) -> None:
+    """At 5 points/m² nothing can be told: no leaks, none of the lining seen, and every document says so first."""
+    write(Simulation(parameters("profiler", 1, density=5.0)), tmp_path)
+    said = prepare(tmp_path, "profiler", "reflectance")
+    assert "lining with fewer than 12 is not searched for leaks, and counts as unseen" in said
+    assert "too few to tell wet from dry" in command("run", NAME).output
+    assert outlines(conn) == {}
+    assert counts(conn)["seen"] < 0.01
+    assert counts(conn)["sparse"] > 0.99
+    gaps = conn.execute("SELECT chainage_from, chainage_to FROM tunnel_api.coverage_gap ORDER BY 1").fetchall()
+    assert gaps[0][0] == pytest.approx(START, abs=1.0)
+    assert gaps[-1][1] == pytest.approx(START + 24.0, abs=1.0)
+    assert sum(high - low for low, high in gaps) == pytest.approx(24.0, abs=1.0)
+    shown = command("leaks", NAME, code=1).output
+    assert shown.startswith("Searched, but unseen")
+    assert "0 leaks" not in shown
+    remarks = [row[0] for row in conn.execute("SELECT remark FROM tunnel_api.remark WHERE stage = 'detect'").fetchall()]
+    assert any("counts as unseen" in remark for remark in remarks)

@@ -14,6 +14,7 @@ from tunneldb.anomalies.background.contrast import contrast_image
 from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
 from tunneldb.anomalies.coverage import Coverage, measure_coverage
 from tunneldb.anomalies.detect import Detection, find_anomalies
+from tunneldb.anomalies.sparse import least_density, leave_out_sparse
 from tunneldb.arrays import UInt8
 from tunneldb.errors import UserError
 from tunneldb.geometry.section_outliers import MOST, SectionOutliers
@@ -51,6 +52,9 @@ from tunneldb.store.survey import Survey
 
 ASIDE = 50.0
 """Length of the surface beyond the ends that is loaded too: sections are judged by the three before and after them, m."""
+
+TOLD = 0.01
+"""A smaller share of the lining that is too sparse to be searched is not worth a note: it is in what was not seen."""
 
 
 @dataclass(frozen=True)
@@ -207,6 +211,9 @@ def compute_detection(
         lining = lining_image(image, gaps, observer, outliers, values["appendage.distance"], save_block)
     if gaps is not None:
         counts["profile_spacing"] = round(gaps.spacing, 3)
+    density = least_density(values["image.min_density"], inputs.grid.pixel)
+    if (sparse := leave_out_sparse(lining, density)) >= TOLD:
+        counts |= {"sparse": round(sparse, 4), "least_density": round(density, 1)}
     background = map_background(lining, inputs.dry)
     contrast = contrast_image(lining, background)
     found = find_anomalies(contrast, background, values["leak.min_area"])
@@ -345,6 +352,11 @@ def _report(result: DetectionResult, known_before: str | None, other_pixels: lis
         notes.append(
             f"leaks over the end towards kilometre {' and '.join(map(str, other_pixels))} are in two pieces: its pixels are of"
             " another size; detect both with the same image.pixel"
+        )
+    if (sparse := result.counts.get("sparse")) is not None:
+        notes.append(
+            f"{100.0 * sparse:.3g} % of the lining has fewer than {result.counts['least_density']:g} points/m², too few to tell"
+            " wet from dry: it was not searched for leaks and counts as unseen (image.min_density)"
         )
     if (spacing := result.counts.get("profile_spacing")) is not None:
         notes.append(

@@ -203,7 +203,8 @@ def load_files(
         changed = [header for header in batch if there[header.path] is None]
         if changed:
             for loaded in _load_batch(reading, changed, paths, begin):
-                yield replace(loaded, note=notes.get(loaded.name))
+                said = "; ".join(filter(None, (notes.get(loaded.name), loaded.note)))
+                yield replace(loaded, note=said or None)
 
 
 def _headers(reading: Reading, paths: Sequence[Path]) -> list[ScanHeader]:
@@ -273,7 +274,7 @@ def _load_batch(reading: Reading, headers: Sequence[ScanHeader], given: Sequence
             _enter(conn, run, one.km, one.kept)
         _withdraw(conn, survey, [header.path.name for header in headers])
         share = (time.monotonic() - started) / len(read)
-        loaded = [outcome(conn, file.id, file.state, file.seconds + share) for file in read]
+        loaded = [replace(outcome(conn, file.id, file.state, file.seconds + share), note=file.note) for file in read]
         for name in COUNTED:
             run.counts[name] = sum(getattr(file, name) for file in loaded)
     return loaded

@@ -17,6 +17,7 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import require_same_density
+from tunneldb.pipeline.parameters import PARAMETERS
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import ScanHeader, check_header, crs_note, read_header
 from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
@@ -87,7 +88,8 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
         [files, files[0]],
     ).fetchone()
     assert row is not None
-    note = crs_note(header, survey.srid)
+    sparse = None if known is not None else read[0].note
+    note = "; ".join(filter(None, (crs_note(header, survey.srid), sparse)))
     left_out = {name: count for name, count in (("invalid", row[3]), ("unposed", row[4])) if count}
     return {
         "file": path.name,
@@ -97,17 +99,30 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
         "outside": row[2],
         **left_out,
         "kilometres": row[5],
-        **({} if note is None else {"note": note}),
+        **({"note": note} if note else {}),
     }
 
 
 @dataclass(frozen=True)
 class Read:
-    """A file that was read: its row, what became of it (see `tunneldb.store.scan_files.Loaded`), and seconds it took."""
+    """A file that was read.
+
+    Attributes
+    ----------
+    id : int
+        Its row.
+    state : str
+        What became of it, see `tunneldb.store.scan_files.Loaded`.
+    seconds : float
+        Time that it took.
+    note : str or None
+        What is to be known of its points.
+    """
 
     id: int
     state: str
     seconds: float
+    note: str | None = None
 
 
 @dataclass(frozen=True)
@@ -220,7 +235,17 @@ class Reading:
         finally:
             if self.held is None or survivors not in self.held.values():
                 survivors.close()
-        return Read(file_id, state, time.monotonic() - started)
+        return Read(file_id, state, time.monotonic() - started, self._density_note(counts))
+
+    def _density_note(self, counts: FilterCounts) -> str | None:
+        """Say that most of a file's points lie where there are too few for leaks to be sought."""
+        least = PARAMETERS["image.min_density"].default
+        if self.survey.intensity_kind == "none" or counts.density >= least:
+            return None
+        return (
+            f"half of its points lie where there are {counts.density:.0f} points/m² or fewer; lining with fewer than {least:g}"
+            " is not searched for leaks, and counts as unseen (image.min_density)"
+        )
 
     def _filter(self, header: ScanHeader, survivors: Spool, progress: Callable[[int], None]) -> tuple[FilterCounts, str]:
         """Filter a file; returns its counts and its checksum, which another thread makes meanwhile."""

@@ -74,6 +74,18 @@ def search_radii(
     return radii
 
 
+def typical_density(counts: Int64, edge: float) -> float:
+    """Points per m² of surface about half of the points or more, from the points in each cell (k,) of an edge, m; 0 of none.
+
+    A point's cell holds, beside itself, as many points on average as any place like it does.
+    """
+    ascending = np.sort(counts[counts > 0])
+    if not len(ascending):
+        return 0.0
+    until = np.cumsum(ascending)
+    return float(ascending[np.searchsorted(until, 0.5 * until[-1])] - 1) / edge**2
+
+
 def is_noise(cloud: Float, xyz: Float, radius: Float, points: int = POINTS) -> Bool:
     """Find points with fewer than `points` points of a cloud within their search radius.
 

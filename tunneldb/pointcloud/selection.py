@@ -23,7 +23,7 @@ from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pointcloud.chainage_lookup import STRETCHING, ChainageLookup
 from tunneldb.pointcloud.formats.raw import read_raw
-from tunneldb.pointcloud.noise import DIAMETER, POINTS, is_noise, search_radii
+from tunneldb.pointcloud.noise import DIAMETER, POINTS, is_noise, search_radii, typical_density
 from tunneldb.pointcloud.points import CHUNK, Points
 from tunneldb.pointcloud.poses import PoseFaults, PoseModel
 from tunneldb.pointcloud.prefetch import in_order, prefetch
@@ -92,6 +92,8 @@ class FilterCounts:
         Raw intensities of some points near the axis.
     ranges : dict of int to list of (int, int)
         Where in the file the points of each kilometre and MARGIN beyond are: ranges of point numbers from 0.
+    density : float
+        Points per m² of surface about half of the points near the axis or more, noise included.
     """
 
     points: int = 0
@@ -104,6 +106,7 @@ class FilterCounts:
     extent: Float = field(default_factory=lambda: np.array([np.inf] * 3 + [-np.inf] * 3))
     ranges: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
     intensities: list[Single] = field(default_factory=list)
+    density: float = 0.0
 
     @property
     def intensity_sample(self) -> Single:
@@ -311,6 +314,7 @@ class _Filter:
         """Rows that stay, thinned within the file, a window of chainage after the other."""
         counts, cells, settings = self.counts, self.cells, self.settings
         stretch = np.floor(self.places.chainage / STRETCH).astype(np.int64)
+        counts.density = typical_density(cells.counts, cells.edge)
         radii = search_radii(cells.counts, cells.edge, settings.noise_points, settings.noise_diameter, stretch)
         widest = _widest(stretch, radii)
         first, bins = self.cloud.counts()
