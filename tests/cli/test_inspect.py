@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from pyproj import CRS
 
 from tunneldb.cli.main import main
+from tunneldb.pointcloud.reader import check_header, crs_note, read_header
 from tunneldb.simulate import Parameters, Simulation, write
 
 pytestmark = pytest.mark.slow
@@ -120,6 +121,48 @@ def test_a_ptx_brings_its_stations(tmp_path: Path) -> None:
     said = inspected(path)
     assert [scan["position"] for scan in said["files"][0]["poses"]] == [[500_010.0, 4e6, 300.0], [500_020.0, 4e6, 300.0]]
     assert f"--stations {path} --intensity-kind none" in said["commands"][2]  # an intensity that is the same everywhere is none
+
+
+def test_lengths_that_are_said_to_be_degrees_are_not_believed(tls: Path, tmp_path: Path) -> None:
+    """A tunnel can't be added in degrees, nor a file loaded that says it is in them: that it says so counts for nothing."""
+    path = changed(tls, tmp_path / "a.las", crs=4326)
+    said = inspected(path)
+    assert said["files"][0]["srid"] is None
+    assert "--srid SRID" in said["commands"][1]
+    assert any("EPSG:4326 (WGS 84) is in degrees, which x = " in doubt for doubt in said["doubts"])
+    header = read_header(path)
+    check_header(header, None, 25830, needs_time=False)
+    assert "can't be read (EPSG:4326 (WGS 84) is in degrees" in str(crs_note(header, 25830))
+
+
+def test_what_is_not_in_metres_is_to_be_transformed_first(tls: Path, tmp_path: Path) -> None:
+    said = inspected(changed(tls, tmp_path / "a.las", crs=2263))
+    assert said["commands"] == [f"tunneldb inspect {tmp_path}/TRANSFORMED-a.las"]
+    assert any("projected coordinate system in metres" in line for line in said["missing"])
+
+
+@pytest.mark.parametrize(
+    ("size", "says"),
+    [((200.0, 60.0, 1.5), "open country or a street"), ((3.0, 4.0, 3.5), "a room or a single place")],
+)
+def test_what_is_no_tunnel_is_doubted_first(tmp_path: Path, size: tuple[float, float, float], says: str) -> None:
+    """And no axis is sought in it: that would be refused."""
+    rng = np.random.default_rng(2)
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = [0.001] * 3, [0, 0, 0]
+    las = laspy.LasData(header)
+    count = 40_000
+    xyz = rng.uniform([0, 0, 0], size, (count, 3))
+    if size[2] > 2.0:  # on the walls
+        side = rng.integers(0, 2, count)
+        xyz[np.arange(count), side] = rng.integers(0, 2, count) * np.array(size)[side]
+    las.x, las.y, las.z = xyz.T
+    las.write(tmp_path / "a.las")
+    said = inspected(tmp_path / "a.las")
+    assert says in said["doubts"][0]
+    assert "--axis AXIS.csv" in said["commands"][1]
+    text = CliRunner().invoke(main, ["inspect", str(tmp_path / "a.las")]).stdout
+    assert text.index("Doubtful:") < text.index("Missing:") < text.index("Next:")
 
 
 def test_files_are_concluded_from_together(tls: Path, tmp_path: Path) -> None:

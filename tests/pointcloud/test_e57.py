@@ -135,6 +135,19 @@ def test_times_count_from_the_scan_s_start(tmp_path: Path) -> None:
         check_header(read_header(path), "intensity", 25830, needs_time=True)
 
 
+def test_fields_of_extensions_are_dimensions(tmp_path: Path) -> None:
+    """As RIEGL writes reflectance, in dB, beside an intensity without a unit; where one scan lacks it, it is none."""
+    fields = cloud() | {"rlms:reflectance": np.random.default_rng(5).uniform(-25.0, 5.0, 1000)}
+    path = e57.write(tmp_path / "a.e57", [e57.Scan(fields, STATION)])
+    assert read_header(path).dimensions == ("intensity", "rlms:reflectance")
+    points = read(path, "rlms:reflectance", size=300)
+    np.testing.assert_array_equal(points["intensity"], fields["rlms:reflectance"].astype("f4"))
+    np.testing.assert_allclose(points["xyz"], own(fields) + STATION, atol=1e-8)
+    both = e57.write(tmp_path / "b.e57", [e57.Scan(fields), e57.Scan(cloud(seed=1), guid="{B}")])
+    with pytest.raises(UserError, match=r"rlms:reflectance.*intensity"):
+        read(both, "rlms:reflectance")
+
+
 def test_missing_dimension_lists_those_present(tmp_path: Path) -> None:
     path = e57.write(tmp_path / "a.e57", [e57.Scan(cloud())])
     with pytest.raises(UserError, match=r"no dimension 'Intensity' \(did you mean 'intensity'\?.*; the file has intensity$"):

@@ -26,6 +26,8 @@ class Scan:
 def write(path: Path, scans: Sequence[Scan], metadata: str = "") -> Path:
     image = libe57.ImageFile(str(path), "w")
     image.extensionsAdd("", libe57.E57_V1_0_URI)
+    for prefix in sorted({name.split(":")[0] for scan in scans for name in scan.fields if ":" in name}):
+        image.extensionsAdd(prefix, f"http://example.com/e57/{prefix}")
     for name, text in (("formatName", "ASTM E57 3D Imaging Data File"), ("guid", "{F}"), ("coordinateMetadata", metadata)):
         image.root().set(name, libe57.StringNode(image, text))
     for name, number in (("versionMajor", libe57.E57_FORMAT_MAJOR), ("versionMinor", libe57.E57_FORMAT_MINOR)):

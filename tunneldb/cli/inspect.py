@@ -28,11 +28,12 @@ _MOST_SCANS = 8
 def inspect(files: tuple[Path, ...]) -> None:
     """Tell what scan FILES hold, what is missing, and what to type next; needs no database.
 
-    Files are read once, in chunks. Density, size and values are found on a random share of the points, and said to be. What
-    an intensity is, and whether lengths are metres, is guessed from its values: ask who made the scan.
+    Files are read in chunks, once, and of up to 50 million points once more, to try whether their axis can be found. Density,
+    size and values are found on a random share of the points, and said to be. What an intensity is, and whether lengths are
+    metres, is guessed from its values: ask who made the scan.
     """
-    from tunneldb.pipeline.first_steps import first_steps
-    from tunneldb.pipeline.inspection import inspect_file
+    from tunneldb.pipeline.first_steps import first_steps, needs_axis
+    from tunneldb.pipeline.inspection import find_axis_fault, inspect_file
 
     looks: list[FileLook] = []
     faults: list[UserError] = []
@@ -42,11 +43,12 @@ def inspect(files: tuple[Path, ...]) -> None:
                 looks.append(inspect_file(path, step(progress)))
             except UserError as error:  # what is wrong with one file is no reason not to look at the others
                 faults.append(error)
+        axis_fault = find_axis_fault(looks, step(progress)) if looks and needs_axis(looks) else None
     if not looks:
         raise faults[0]
     for look in looks:
         _print_file(look)
-    found = first_steps(looks)
+    found = first_steps(looks, axis_fault)
     tell(files=looks, unreadable=list(map(str, faults)), **dataclasses.asdict(found))
     for fault in faults:
         click.echo(str(fault), err=True)
@@ -82,7 +84,7 @@ def _rows(look: FileLook) -> list[tuple[str, str]]:
     rows = [
         ("format", look.format),
         ("points", _number(look.points) + invalid),
-        ("coordinate system", look.crs or "not stated"),
+        ("coordinate system", look.crs or (f"can't be read: {look.unread_crs}" if look.unread_crs else "not stated")),
         ("x, y, z from", "  ".join(f"{value:.3f}" for value in low)),
         ("to", "  ".join(f"{value:.3f}" for value in high)),
     ]
@@ -122,7 +124,7 @@ def _scans(look: FileLook) -> str:
 
 
 def _print_steps(found: FirstSteps) -> None:
-    for title, lines in (("Missing", found.missing), ("Doubtful", found.doubts), ("Next", found.commands)):
+    for title, lines in (("Doubtful", found.doubts), ("Missing", found.missing), ("Next", found.commands)):
         if lines:
             click.echo(f"{title}:")
             for line in lines:

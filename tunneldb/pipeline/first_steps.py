@@ -42,10 +42,23 @@ class FirstSteps:
     commands: list[str]
 
 
-def first_steps(looks: Sequence[FileLook]) -> FirstSteps:
-    """Conclude what to do with the files of a survey."""
+def needs_axis(looks: Sequence[FileLook]) -> bool:
+    """Whether no axis lies beside the files, so that it has to be found in them."""
+    return _beside(looks, "axis.csv") is None and not any(look.foreign_unit for look in looks)
+
+
+def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> FirstSteps:
+    """Conclude what to do with the files of a survey.
+
+    Parameters
+    ----------
+    looks : sequence of FileLook
+    axis_fault : str or None
+        Why no axis can be found in them, where that was tried.
+    """
     missing: list[str] = []
-    doubts = [f"{look.path.name}: {look.unit}" for look in looks if look.unit]
+    doubts = [f"{look.path.name}: is it a tunnel? {said}" for look in looks if (said := look.other_than_a_tunnel)]
+    doubts += [f"{look.path.name}: {look.unit}" for look in looks if look.unit]
     doubts += [
         f"{look.path.name}: {look.misplaced} points have no coordinates, {look.untimed} no time"
         for look in looks
@@ -56,15 +69,29 @@ def first_steps(looks: Sequence[FileLook]) -> FirstSteps:
         for look in looks
         if look.profile_spacing is not None and look.profile_spacing > FAR_APART
     ]
+    if axis_fault is not None:
+        doubts.append(f"no axis can be found in the points (--axis auto is refused): {axis_fault}")
+    if foreign := [look.path for look in looks if look.foreign_unit]:
+        missing.append(
+            f"{', '.join(path.name for path in foreign)} in a projected coordinate system in metres: transform first"
+        )
+        metric = [_quoted(path.with_name(f"TRANSFORMED-{path.name}")) for path in foreign]
+        return FirstSteps(missing, doubts, [f"tunneldb inspect {' '.join(metric)}"])
     name, files = _name(looks), _files(looks)
     srid = _srid(looks, missing, doubts)
     axis = _beside(looks, "axis.csv")
-    if axis is None:
+    if axis is not None:
+        given = _quoted(axis)
+    elif axis_fault is None:
+        given = f"auto {files}"
         missing.append("the given axis, which no scan holds: give --axis your own, or have it found from the points (auto)")
+    else:
+        given = "AXIS.csv"
+        missing.append("the given axis, x,y,z in place of AXIS.csv: it can't be found from these points")
     survey, date = _survey(looks, name, missing)
     poses = _poses(looks, missing, doubts)
     intensity = _intensity(looks, missing, doubts)
-    tunnel = f"tunneldb tunnel add {name} --srid {srid} --axis {f'auto {files}' if axis is None else _quoted(axis)}"
+    tunnel = f"tunneldb tunnel add {name} --srid {srid} --axis {given}"
     return FirstSteps(
         missing,
         doubts,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +29,12 @@ NARROWEST = 1.5
 
 LOWEST = 0.3
 """Height over width below which a cloud is a piece of open country and no tunnel."""
+
+SHORTEST = 1.5
+"""Length over width below which a cloud is a room rather than a stretch of a tunnel."""
+
+SEARCHED = 50_000_000
+"""Files with more points are not read once more to try whether their axis can be found."""
 
 _FOOT = 0.3048  # m
 _PARTS = (0.25, 0.5, 0.75)  # of the tunnel's length, where profiles are looked for
@@ -100,6 +106,8 @@ class FileLook:
         Points per square unit of surface: 10th percentile, median, 90th; see `surface_density`.
     sampled : int
         Points that these were found on.
+    foreign_unit : bool
+        Whether its coordinate system is in another unit than metres, in which no tunnel can be.
     profile_spacing : float or None
         Distance of the profiles along the tunnel; None where it can't be told.
     unit : str or None
@@ -143,6 +151,19 @@ class FileLook:
     scans: dict[int, int]
     poses: list[PosedScan]
     intensities: list[IntensityLook]
+    foreign_unit: bool = False
+
+    @property
+    def other_than_a_tunnel(self) -> str | None:
+        """What it rather is by its size; None where nothing speaks against a tunnel."""
+        if self.length is None or self.width is None or self.height is None:
+            return "no line runs through it as through a tunnel"
+        size = f"{self.length:.1f} long, {self.width:.1f} wide and {self.height:.1f} high"
+        if self.height < LOWEST * self.width:
+            return f"{size}: open country or a street rather than a tunnel"
+        if self.length < SHORTEST * self.width:
+            return f"{size}: a room or a single place rather than a tunnel"
+        return None
 
 
 def inspect_file(path: Path, begin: Callable[[str, float | None], Callable[[float], None]]) -> FileLook:
@@ -189,7 +210,21 @@ def inspect_file(path: Path, begin: Callable[[str, float | None], Callable[[floa
         contents.scans,
         posed_scans(path),
         [_look_at(path, name, contents.points) for name in names],
+        header.crs is not None and _unit_of(header.crs) is not None,
     )
+
+
+def find_axis_fault(looks: Sequence[FileLook], begin: Callable[[str, float | None], Callable[[float], None]]) -> str | None:
+    """Why ``--axis auto`` would be refused for files; None if it would not, or they have more than SEARCHED points."""
+    from tunneldb.pipeline.axis_search import search_axis
+
+    if sum(look.points for look in looks) > SEARCHED:
+        return None
+    try:
+        search_axis([look.path for look in looks], None, begin)
+    except UserError as error:
+        return str(error)
+    return None
 
 
 def _described(path: Path, contents: Contents) -> tuple[str, str | None]:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 from pyproj import CRS
 
 from tunneldb.errors import UserError
-from tunneldb.geometry.crs import describe_crs, same_horizontally
+from tunneldb.geometry.crs import describe_crs, horizontal, same_horizontally
 from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.formats.table import format_of, require_known
 from tunneldb.pointcloud.points import CHUNK, Points, Ranges, ScanHeader
 
 __all__ = ["CHUNK", "Points", "ScanHeader", "check_header", "read_chunks", "read_header"]
+
+_DEGREES = 360.0  # of longitude; coordinates beyond are lengths
 
 
 def read_header(path: Path) -> ScanHeader:
@@ -27,7 +30,19 @@ def read_header(path: Path) -> ScanHeader:
         If the file is missing, is none of its kind, or holds no points.
     """
     require_known(path)
-    return format_of(path).header(path)
+    return _without_wrong_crs(format_of(path).header(path))
+
+
+def _without_wrong_crs(header: ScanHeader) -> ScanHeader:
+    """Take a coordinate system in degrees for none where the coordinates can't be: exporters write one that they don't know."""
+    if header.crs is None or not horizontal(header.crs).is_geographic:
+        return header
+    corners = np.array([header.low[:2], header.high[:2]])
+    if not np.isfinite(corners).all() or np.abs(corners).max() <= _DEGREES:
+        return header
+    x, y = header.low[:2]
+    said = f"{describe_crs(header.crs)} is in degrees, which x = {x:.0f}, y = {y:.0f} are not"
+    return replace(header, crs=None, unread_crs=said)
 
 
 def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_time: bool) -> None:

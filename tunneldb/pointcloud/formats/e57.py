@@ -70,10 +70,14 @@ class Scan:
         """Whether its points have a GPS time."""
         return "timeStamp" in self.fields and self.start is not None
 
+    def has(self, dimension: str) -> bool:
+        """Whether its points have a dimension, under the name that the file's header is given here."""
+        return self.has_time if dimension == "gps_time" else dimension in self.fields
+
     def flags(self, dimension: str | None) -> list[str]:
         """Fields that are 0 for the points that are good."""
         names = ["cartesianInvalidState" if self._cartesian else "sphericalInvalidState"]
-        if dimension is not None:
+        if dimension == "intensity":
             names.append("isIntensityInvalid")
         return [name for name in names if name in self.fields]
 
@@ -107,18 +111,17 @@ def read_e57_scans(path: Path) -> list[Scan]:
 def read_e57_header(path: Path) -> ScanHeader:
     """Read the header of an E57 file; see `tunneldb.pointcloud.reader.read_header`.
 
-    Its dimensions are ``intensity`` and ``gps_time``, where every scan has them. Where a scan's bounds are missing,
-    its points are read.
+    Its dimensions are ``intensity``, ``gps_time`` and the fields of extensions, as ``rlms:reflectance``, where every scan has
+    them. Where a scan's bounds are missing, its points are read.
     """
     with open_e57(path) as image, decoding(path, KIND):
         scans = scans_of(path, image)
         boxes = [_box(image, scan) for scan in scans]
         crs, unread = _crs(image)
-    dimensions = [name for name, has in _DIMENSIONS if all(map(has, scans))]
     return ScanHeader(
         path,
         sum(scan.records for scan in scans),
-        tuple(dimensions),
+        tuple(_dimensions(scans)),
         crs,
         np.min([low for low, _ in boxes], axis=0),
         np.max([high for _, high in boxes], axis=0),
@@ -126,10 +129,10 @@ def read_e57_header(path: Path) -> ScanHeader:
     )
 
 
-_DIMENSIONS = (
-    ("intensity", lambda scan: "intensity" in scan.fields),
-    ("gps_time", lambda scan: scan.has_time),
-)
+def _dimensions(scans: Sequence[Scan]) -> list[str]:
+    """Dimensions that every scan has beside coordinates: those of the standard, then those of extensions (PREFIX:NAME)."""
+    extensions = sorted(name for name in scans[0].fields if ":" in name)
+    return [name for name in ("intensity", "gps_time", *extensions) if all(scan.has(name) for scan in scans)]
 
 
 def read_e57(path: Path, dimension: str | None, size: int, ranges: Ranges | None = None) -> Iterator[Raw]:
@@ -141,7 +144,7 @@ def read_e57(path: Path, dimension: str | None, size: int, ranges: Ranges | None
     with open_e57(path) as image:
         with decoding(path, KIND):
             scans = scans_of(path, image)
-        names = [name for name, has in _DIMENSIONS if all(map(has, scans))]
+        names = _dimensions(scans)
         require_dimension(path, dimension, names)
         if dimension == "gps_time":
             raise UserError(f"{path}: gps_time is no intensity; the file has {', '.join(names)}")
@@ -231,7 +234,7 @@ def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int) -> Iter
     """Points of a scan, turned into the file's frame; their position is added by the offsets."""
     flags = scan.flags(dimension)
     names = [*scan.coordinates, *flags]
-    names += ["intensity"] if dimension is not None else []
+    names += [dimension] if dimension is not None else []
     names += ["timeStamp"] if scan.has_time else []
     offsets = np.zeros(3) if scan.position is None else scan.position
     for fields in read_fields(image, scan, names, size):
@@ -248,7 +251,7 @@ def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int) -> Iter
                 offsets,
                 fields["timeStamp"] + scan.start if scan.has_time else None,
                 np.full(len(turned), scan.number, np.int32),
-                None if dimension is None else fields["intensity"].copy(),
+                None if dimension is None else fields[dimension].copy(),
                 None,
             )
 
