@@ -1,6 +1,6 @@
-"""Reading the small CSV files of the interface: axis, stations, trajectory, reference, points.
+"""Reading the small CSV files of the interface: axis, stations, trajectory, reference, control points.
 
-Columns are separated by commas; in what people bring from elsewhere perhaps by semicolons, tabs or spaces, as the header
+Columns are separated by commas, or, as programs of the user write them, by semicolons, tabs or spaces: whichever the header
 shows. Where commas do not separate, they may stand for the decimal point.
 """
 
@@ -84,15 +84,28 @@ def read_header(path: Path) -> list[str]:
         When the file cannot be read or is empty.
     """
     with _opened(path) as file:
-        header = next(_rows(file, True)[0], None)
+        header = next(_rows(file)[0], None)
     if header is None:
         raise UserError(f"{path} is empty; it needs a header that names its columns, such as x,y,z")
     return [cell.strip() for cell in header]
 
 
-def read_csv(
-    path: Path, names: Sequence[str], default: Mapping[str, float] | None = None, *, any_separator: bool = False
-) -> CsvTable:
+def read_texts(path: Path, name: str) -> list[str]:
+    """Read a column of a CSV file as it stands, stripped; the rows are those of `read_csv`.
+
+    Raises
+    ------
+    UserError
+        When the file cannot be read or has no such column.
+    """
+    with _opened(path) as file:
+        rows, _ = _rows(file)
+        header = [cell.strip() for cell in next(rows, [])]
+        index = _indices(path, header, [name], {})[name]
+        return [row[index].strip() for row in rows if any(cell.strip() for cell in row)]
+
+
+def read_csv(path: Path, names: Sequence[str], default: Mapping[str, float] | None = None) -> CsvTable:
     """Read numeric columns of a CSV file with a header; other columns are left out.
 
     Parameters
@@ -101,8 +114,6 @@ def read_csv(
         The file, and the columns.
     default
         Columns that may be missing, with the value that all rows have then.
-    any_separator
-        Whether columns may be separated by semicolons, tabs or spaces, too, and then commas stand for the decimal point.
 
     Raises
     ------
@@ -111,7 +122,7 @@ def read_csv(
         value.
     """
     with _opened(path) as file:
-        rows, lines = _read_rows(path, *_rows(file, any_separator), names, default or {})
+        rows, lines = _read_rows(path, *_rows(file), names, default or {})
     values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
     return CsvTable(path, tuple(names), values, np.array(lines, dtype=np.int64))
 
@@ -130,10 +141,8 @@ def _opened(path: Path) -> Iterator[TextIO]:
         raise UserError(f"{path} is not a CSV file: {error}") from None
 
 
-def _rows(file: Iterable[str], any_separator: bool) -> tuple[_csv.Reader, bool]:
+def _rows(file: Iterable[str]) -> tuple[_csv.Reader, bool]:
     """Rows of a CSV file, and whether commas may stand for the decimal point in them."""
-    if not any_separator:
-        return csv.reader(file), False
     lines = iter(file)
     header = next(lines, "")
     separator = next((one for one in _SEPARATORS if one in header.strip()), ",")
@@ -166,7 +175,7 @@ def _read_rows(
 def _indices(path: Path, header: list[str], names: Sequence[str], default: Mapping[str, float]) -> dict[str, int]:
     missing = [name for name in names if name not in header and name not in default]
     if missing:
-        hint = "; separate columns by commas" if len(header) == 1 else ""
+        hint = "; separate columns by commas, semicolons, tabs or spaces" if len(header) == 1 else ""
         raise UserError(f"{path} has no column {', '.join(missing)}: its header is {','.join(header)!r}{hint}")
     repeated = [name for name in names if header.count(name) > 1]
     if repeated:

@@ -136,3 +136,30 @@ def test_a_station_that_cannot_be_is_refused_by_its_number(folder: Path, conn: p
     line = command(*arguments, code=2).stderr.strip()
     assert "the station of scan_id 1 lies" in line
     assert conn.execute("SELECT count(*) FROM tunnel.survey").fetchone() == (0,)
+
+
+@pytest.mark.parametrize(("separator", "point"), [(";", ","), ("\t", "."), (" ", ".")])
+def test_tables_may_have_other_separators(
+    folder: Path, conn: psycopg.Connection, tmp_path: Path, separator: str, point: str
+) -> None:
+    """What is stored is the same, whichever separates the columns of trajectory and reference."""
+
+    def stored() -> list[object]:
+        tables = ("SELECT time, ST_AsText(geom) FROM tunnel.pose ORDER BY 1", "SELECT * FROM tunnel.reference ORDER BY 2")
+        found: list[object] = [[row[-2:] for row in conn.execute(query).fetchall()] for query in tables]
+        conn.rollback()
+        return found
+
+    kind = ("--intensity", "Amplitude", "--intensity-kind", "amplitude")
+    add(folder, *kind, "--reference", folder / f"{NAME}.reference.csv")
+    expected = stored()
+    assert all(expected)
+    for name in ("trajectory", "reference"):
+        text = (folder / f"{NAME}.{name}.csv").read_text()
+        (tmp_path / f"{name}.csv").write_text(text.replace(",", separator).replace(".", point))
+    command("survey", "remove", NAME, "--yes")
+    command(
+        "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04", "--trajectory", tmp_path / "trajectory.csv", *kind,
+        "--reference", tmp_path / "reference.csv",
+    )  # fmt: skip
+    assert stored() == expected

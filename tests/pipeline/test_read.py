@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import psycopg
 import pytest
+from click.testing import CliRunner
 from support.loaded_survey import ORIGIN, START, SURVEY, add_survey, files, load, rows, tube, write
 
+from tunneldb.cli.main import main
 from tunneldb.database import open_connection
 from tunneldb.errors import UserError
 from tunneldb.pipeline.load import load_kilometre, parameters_of, settings_of
@@ -247,3 +249,16 @@ def test_settings_are_told_by_parameters() -> None:
         assert settings_of(parameters_of(settings)) == settings
     assert settings_of({"load.density": "all"}).density is None
     assert settings_of({"axis.half_width": 1.0}) == FilterSettings()
+
+
+def test_a_batch_says_what_it_took_for_granted_as_load_does(survey: psycopg.Connection, dsn: str, tmp_path: Path) -> None:
+    paths = [write(tmp_path / f"{n}.laz", tube(*span, 100, seed=n)) for n, span in enumerate(((975, 990), (992, 997)))]
+    told = "0.laz, 1.laz: states no coordinate system: taken to be in the tunnel's, EPSG:25830\n"
+    arguments = ["--dsn", dsn, "batch", SURVEY, *map(str, paths), "--to", "load", "--workers", "1"]
+    first = CliRunner().invoke(main, arguments)
+    assert first.exit_code == 0, first.output
+    assert told in first.stderr
+    assert "states no" not in CliRunner().invoke(main, arguments).stderr  # nothing was read
+    survey.execute("DELETE FROM tunnel.tunnel")
+    add_survey(survey)
+    assert told in CliRunner().invoke(main, ["--dsn", dsn, "load", SURVEY, *map(str, paths)]).stderr

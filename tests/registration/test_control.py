@@ -131,6 +131,13 @@ def test_control_files(tmp_path: Path) -> None:
     assert control.xyz.tolist() == [[1, 2, 3], [4, 5, 6]]
 
 
+@pytest.mark.parametrize("text", ["id;x;y;z\nA 1;1,5;2;3\nB;4;5;6\n", "id\tz\tx\ty\nA 1\t3\t1.5\t2\nB\t6\t4\t5\n"])
+def test_control_files_with_other_separators(tmp_path: Path, text: str) -> None:
+    (tmp_path / "control.csv").write_text(text, encoding="utf-8")
+    control = read_control(tmp_path / "control.csv")
+    assert (control.names, control.xyz.tolist()) == (["A 1", "B"], [[1.5, 2, 3], [4, 5, 6]])
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -143,7 +150,7 @@ def test_control_files(tmp_path: Path) -> None:
         ("id,x,y,z\nA,1,2,3\nB,1,2,3.0005\n", "line 3: point B is at the place of point A (line 2)"),
         ("x,y,z\n1,2,3\n", "no column id"),
         ("id,x,y\nA,1,2\n", "no column z"),
-        ("id;x;y;z\nA;1;2;3\n", "separate columns by commas"),
+        ("id|x|y|z\nA|1|2|3\n", "separate columns by commas, semicolons, tabs or spaces"),
         ("id,x,y,z\n", "holds no control point"),
         ("", "is empty"),
     ],

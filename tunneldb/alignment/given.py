@@ -204,7 +204,7 @@ def _read_points(path: Path) -> GivenAxis:
     header = read_header(path)
     columns = [_column(path, header, name) for name in XYZ]
     names = [column for column in columns if column is not None]
-    table = read_csv(path, names, any_separator=True)
+    table = read_csv(path, names)
     if len(table) < 2:
         raise UserError(f"{path}: an axis needs at least 2 points, this one has {len(table)}")
     xyz = np.full((len(table), 3), np.nan)

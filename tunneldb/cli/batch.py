@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import os
 import sys
 import time
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.console import Console
 
-from tunneldb.cli.load import density_of
+from tunneldb.cli.load import density_of, say_notes
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb, wants_json
 from tunneldb.database import connect
@@ -95,11 +96,11 @@ def batch(
             tell(survey=survey, preview=seen, fits=seen.fits)
             raise SystemExit(0 if seen.fits else 1)
         register(conn, found, asked, retry=retry_failed)
-        busy = _busy(conn, found)
+        busy, since = _busy(conn, found)
     began = time.monotonic()
     watch = _work(found, settings_.dsn, count if busy else 0)
     with connect(settings_.dsn) as conn:  # the server may have been restarted meanwhile
-        raise SystemExit(_summary(conn, found, watch, time.monotonic() - began))
+        raise SystemExit(_summary(conn, found, watch, time.monotonic() - began, since))
 
 
 def _work(survey: Survey, dsn: str | None, count: int) -> Watch:
@@ -121,18 +122,21 @@ def _work(survey: Survey, dsn: str | None, count: int) -> Watch:
     return watch
 
 
-def _busy(conn: psycopg.Connection[Any], survey: Survey) -> bool:
-    row = conn.execute("SELECT tunnel_api.queue_busy(%s)", [survey.id]).fetchone()
-    return row is not None and bool(row[0])
+def _busy(conn: psycopg.Connection[Any], survey: Survey) -> tuple[bool, dt.datetime]:
+    """Whether there is something to be done, and the server's time."""
+    row = conn.execute("SELECT tunnel_api.queue_busy(%s), clock_timestamp()", [survey.id]).fetchone()
+    assert row is not None
+    return bool(row[0]), row[1]
 
 
-def _summary(conn: psycopg.Connection[Any], survey: Survey, watch: Watch, seconds: float) -> int:
+def _summary(conn: psycopg.Connection[Any], survey: Survey, watch: Watch, seconds: float, since: dt.datetime) -> int:
     """Say what became of it; returns the exit code."""
     from tunneldb.cli.overview import advise, duration, number, spans
-    from tunneldb.queue.batch import failed_files, results
+    from tunneldb.queue.batch import failed_files, notes_of_files, results
 
     found = results(conn, survey)
     files = failed_files(conn, survey)
+    notes = notes_of_files(conn, survey, since)
     done = sum(result.state == "done" for result in found)
     points = watch.ledger.points if watch.ledger is not None else 0
     tell(
@@ -140,7 +144,9 @@ def _summary(conn: psycopg.Connection[Any], survey: Survey, watch: Watch, second
         kilometres=found,
         failed_files=[{"name": name, "message": why} for name, why in files],
         points=points,
+        notes=[{"name": name, "note": note} for name, note in notes],
     )
+    say_notes(notes)
     speed = f", {number(points / seconds)} points/s" if points else ""
     click.echo(f"{done} of {len(found)} kilometres done; {duration(seconds)}{speed}")
     if watch.live is None and watch.seen is not None:  # on a terminal it stands there already

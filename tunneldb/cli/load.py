@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -132,10 +133,14 @@ def _summary(connection: psycopg.Connection[Any], survey: Survey, done: list[Loa
     ).fetchall():
         click.echo(f"{name}: {remark}", err=True)
     connection.rollback()
+    say_notes((file.name, file.note) for file in done if file.note)
+
+
+def say_notes(notes: Iterable[tuple[str, str]]) -> None:
+    """Say what is to be known of files (name, note) on standard error, a line for all of which it is the same."""
     noted: dict[str, list[str]] = {}
-    for file in done:
-        if file.note:
-            noted.setdefault(file.note, []).append(file.name)
+    for name, note in notes:
+        noted.setdefault(note, []).append(name)
     for note, names in noted.items():
         click.echo(f"{_some(names)}: {note}", err=True)
 

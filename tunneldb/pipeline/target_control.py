@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from tunneldb.arrays import Float, Int64
-from tunneldb.csvfile import read_csv
+from tunneldb.csvfile import read_csv, read_texts
 from tunneldb.errors import UserError
 from tunneldb.pipeline.targets import TargetObservation
 from tunneldb.registration.control import Match, Motion, best_motion, match
@@ -72,13 +71,7 @@ def read_control(path: Path) -> Control:
     table = read_csv(path, ("x", "y", "z"))
     if len(table) == 0:
         raise UserError(f"{path} holds no control point; it needs rows id,x,y,z")
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        reader = csv.reader(file)
-        header = [cell.strip() for cell in next(reader)]
-        if "id" not in header:
-            raise UserError(f"{path} has no column id: its header is {','.join(header)!r}")
-        column = header.index("id")
-        names = [row[column].strip() for row in reader if any(cell.strip() for cell in row)]
+    names = read_texts(path, "id")
     for row, name in enumerate(names):
         if not name:
             raise table.error(row, "id is empty")

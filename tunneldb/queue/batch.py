@@ -399,3 +399,16 @@ def failed_files(conn: psycopg.Connection[Any], survey: Survey) -> list[tuple[st
         "SELECT name, message FROM tunnel.incoming WHERE survey_id = %s AND failed_at IS NOT NULL ORDER BY km_from, name",
         [survey.id],
     ).fetchall()
+
+
+def notes_of_files(conn: psycopg.Connection[Any], survey: Survey, since: dt.datetime) -> list[tuple[str, str]]:
+    """What was noted of files as they were read since a moment: name and note, as in what was taken for granted of them."""
+    return conn.execute(
+        """
+        SELECT DISTINCT ON (r.counts ->> 'file') r.counts ->> 'file', r.counts ->> 'note'
+          FROM tunnel.run r
+         WHERE r.survey_id = %s AND r.stage = 'read' AND r.outcome = 'done' AND r.started_at >= %s AND r.counts ? 'note'
+         ORDER BY r.counts ->> 'file', r.id DESC
+        """,
+        [survey.id, since],
+    ).fetchall()
