@@ -8,7 +8,7 @@ CREATE OR REPLACE VIEW tunnel_api.sheet AS
 SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.name AS survey, n.number, b.km,
        b.chainage_from, b.chainage_to, k.labels[1] AS label_from, k.labels[6] AS label_to, k.labels AS ticks,
        c.lining AS lining_area, c.seen / nullif(c.lining, 0) AS seen_share, l.wet_area, l.leaks,
-       g.said AS gaps,
+       g.said AS gaps, m.said AS remarks,
        public.st_makeenvelope(b.chainage_from, a.arc_from, b.chainage_to, a.arc_to, 0)::public.geometry(Polygon, 0) AS geom
   FROM tunnel.survey s
  CROSS JOIN LATERAL (
@@ -66,6 +66,7 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
            AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(b.chainage_from, -1e4, b.chainage_to, 1e4)
            AND x.chainage_to > r.chainage_from AND x.chainage_from < r.chainage_to) l ON true
  CROSS JOIN LATERAL (SELECT tunnel_api.coverage_statement(s.id, r.chainage_from, r.chainage_to) AS said) g
+ CROSS JOIN LATERAL (SELECT tunnel_api.remark_statement(s.id, r.chainage_from, r.chainage_to) AS said) m
  WHERE a.arc_from IS NOT NULL;
 COMMENT ON VIEW tunnel_api.sheet IS
     'Sheets of 50 m on which a survey is drawn and printed: rectangles of the unrolled plane (chainage, arc), SRID 0';
@@ -76,4 +77,5 @@ COMMENT ON COLUMN tunnel_api.sheet.seen_share IS 'Share of it that was seen, as 
 COMMENT ON COLUMN tunnel_api.sheet.wet_area IS 'Area of the leaks within the sheet, m²; a leak over its edge by its part';
 COMMENT ON COLUMN tunnel_api.sheet.leaks IS 'Leaks on it or over its edges, found last and not rejected; NULL where they were not searched for';
 COMMENT ON COLUMN tunnel_api.sheet.gaps IS 'Where on it leaks were not searched for, or not as they should be (coverage_statement); NULL if nowhere';
+COMMENT ON COLUMN tunnel_api.sheet.remarks IS 'What is to be known of the results there (remark_statement); NULL if nothing';
 COMMENT ON COLUMN tunnel_api.sheet.geom IS 'From edge to edge, as high as the survey''s widest place';

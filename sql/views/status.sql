@@ -185,31 +185,3 @@ COMMENT ON COLUMN tunnel_api.stage_status.done_at IS 'End of the last successful
 COMMENT ON COLUMN tunnel_api.stage_status.counts IS 'What the last run counted';
 COMMENT ON COLUMN tunnel_api.stage_status.stale IS 'True when what the result rests on has changed since it was made';
 COMMENT ON COLUMN tunnel_api.stage_status.reason IS 'Why it is stale';
-
--- What a reader of the results is to know: notes of the stages whose results are in the database, and points that were left out
--- of files. A fifth of a scan's points is noise only where the filter does not suit the scan: it is made for those that strike
--- nothing (dust, edges, people), which are a few percent.
-CREATE OR REPLACE VIEW tunnel_api.remark AS
-SELECT 4 * r.id AS id, r.survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file, r.counts ->> 'note' AS remark
-  FROM (SELECT DISTINCT ON (d.survey_id, d.km, d.stage) d.*
-          FROM tunnel.run d
-         WHERE d.outcome = 'done' AND d.km IS NOT NULL
-         ORDER BY d.survey_id, d.km, d.stage, d.started_at DESC, d.id DESC) r
-  JOIN tunnel.survey s ON s.id = r.survey_id
- WHERE r.counts ? 'note'
- UNION ALL
-SELECT 4 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, format('%s points (%s %%) left out: %s', w.points,
-       round(100 * w.points / greatest(f.points - f.outside, 1)::numeric, 2), w.why)
-  FROM tunnel.scan_file f
-  JOIN tunnel.survey s ON s.id = f.survey_id
- CROSS JOIN LATERAL (VALUES
-       (1, f.invalid, 0.0, 'a coordinate, their time or their intensity is no number'),
-       (2, f.unposed, 0.0, 'the scanner''s position is not known'),
-       (3, f.noise, 0.2, 'they count as noise; is the scan too sparse for load --noise-points?')) AS w (k, points, share, why)
- WHERE w.points > w.share * (f.points - f.outside);
-COMMENT ON VIEW tunnel_api.remark IS
-    'What a reader of the results is to know: notes of the stages by kilometre, and points that were left out by file';
-COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file';
-COMMENT ON COLUMN tunnel_api.remark.stage IS 'Stage that says so';
-COMMENT ON COLUMN tunnel_api.remark.file IS 'Name of the scan file; NULL for a kilometre';
-COMMENT ON COLUMN tunnel_api.remark.remark IS 'What is to be known';

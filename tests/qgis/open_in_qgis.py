@@ -75,7 +75,7 @@ def describe(project: QgsProject, canvas: QgsMapCanvas) -> dict[str, Any]:
                 "aliases": [f.name() for f in layer.fields() if layer.attributeAlias(layer.fields().indexOf(f.name()))],
                 "read_only": layer.readOnly(),
                 "editable": editable,
-                "renderer": layer.renderer().type(),
+                "renderer": layer.renderer().type() if layer.isSpatial() else None,
                 "labels": layer.labelsEnabled(),
                 "error": layer.error().summary() if not layer.error().isEmpty() else "",
                 "extent": layer.extent().toString(),

@@ -6,6 +6,7 @@ The truth is that of the rectangles which the surveys are made of, cut by hand.
 from __future__ import annotations
 
 import csv
+import html
 import json
 import re
 import zipfile
@@ -34,7 +35,11 @@ from tunneldb.database import connect
 
 @dataclass(frozen=True)
 class Case:
-    """A survey, and what is to be said of it: between which chainages, how much was searched, and of what is warned."""
+    """A survey, and what is to be said of it.
+
+    Between which chainages, how much was searched, where leaks could be missed, whether all was searched, what else is to be
+    known.
+    """
 
     scene: Scene
     low: float
@@ -42,6 +47,7 @@ class Case:
     searched: float
     said: tuple[str, ...]
     complete: bool
+    known: tuple[str, ...] = ()
 
     @property
     def counted(self) -> list[Wet]:
@@ -69,8 +75,9 @@ CROWD = [Wet(1010 + 0.04 * n, 1010.03 + 0.04 * n, -6 + n, -5.5 + n) for n in ran
 """Leaks so near one another that their numbers do not fit side by side."""
 
 WHOLE = Case(
-    Scene("whole", leaks=[*INSIDE, *CROWD], dark=(1030.0, 1040.0)), FIRST, LAST, 1.0,
-    ("Searched, but unseen 1+030–1+040 (0 % of the lining seen)",), True,
+    Scene("whole", leaks=[*INSIDE, *CROWD], dark=(1030.0, 1040.0), notes=dict.fromkeys((0, 1), "2 of 7 are bent"), unposed=7),
+    FIRST, LAST, 1.0, ("Searched, but unseen 1+030–1+040 (0 % of the lining seen)",), True,
+    ("a.laz: 7 points (0.70 %) left out: the scanner's position is not known", "km 0–1, axis: 2 of 7 are bent"),
 )  # fmt: skip
 BY_AXIS = Case(
     Scene(
@@ -79,11 +86,16 @@ BY_AXIS = Case(
             *INSIDE, Wet(944, 946, 0, 1), Wet(1054, 1057, 0, 1), Wet(941, 944, 2, 3), Wet(1056, 1058, 2, 3),
             Wet(1049, 1050, 0, 1),
         ],
-    ), 945.0, 1055.0, 1.0, (), True,
+        notes={0: "<wide> & \"long\", 9 %"},
+    ), 945.0, 1055.0, 1.0, (), True, ("km 0, axis: <wide> & \"long\", 9 %",),
 )  # fmt: skip
 FAILED = Case(
-    Scene("failed", leaks=INSIDE, done={0: "detect", 1: "load"}, failed={1: ("axis", "no points near vertex 101")}),
+    Scene(
+        "failed", leaks=INSIDE, done={0: "detect", 1: "load"}, failed={1: ("axis", "no points near vertex 101")},
+        notes={0: "one is bent"},
+    ),
     FIRST, LAST, 0.5, ("Not searched for leaks: 1+000–1+060 failed (axis: no points near vertex 101)",), False,
+    ("km 0, axis: one is bent",),
 )  # fmt: skip
 NEVER = Case(
     Scene("never", done={0: "ground", 1: "ground"}), FIRST, LAST, 0.0,
@@ -138,12 +150,18 @@ def bounds(shapes: Any) -> list[Any]:
 
 
 def test_table(documents: str, case: Case) -> None:
-    lines = leaks(documents, case).stdout.splitlines()
+    result = leaks(documents, case)
+    lines = result.stdout.splitlines()
     if case.said:
         assert lines[0] == case.said[0], "first of all"
+    assert said_on_stderr(result) >= set(case.known)
     text = "\n".join(lines)
     assert (total(case) in text) == bool(case.searched)
     assert "0 leaks" not in text
+
+
+def said_on_stderr(result: Result) -> set[str]:
+    return set(result.stderr.splitlines())
 
 
 def test_json(documents: str, case: Case) -> None:
@@ -154,6 +172,7 @@ def test_json(documents: str, case: Case) -> None:
     assert (told["seen_share"], told["searched_share"]) == (pytest.approx(case.seen), pytest.approx(case.searched))
     assert sum(leak["counted"] for leak in told["leaks"]) == told["count"]
     assert bool(told["gaps"]) == bool(case.said)
+    assert [remark["said"] for remark in told["remarks"]] == list(case.known)
 
 
 def test_csv_and_geojson(documents: str, case: Case) -> None:
@@ -161,11 +180,14 @@ def test_csv_and_geojson(documents: str, case: Case) -> None:
     rows = list(csv.DictReader(result.stdout.splitlines()))
     counted = [row for row in rows if row["counted"] == "True"]
     assert outlines(case) == bounds([shapely.from_wkt(row["geometry"]) for row in counted])
-    assert [row["reasons"] for row in rows if row["kind"] not in ("leak", "joint")] == [gap_reason(said) for said in case.said]
-    assert all(said in result.stderr for said in case.said)
+    besides = [row["reasons"] for row in rows if row["kind"] not in ("leak", "joint")]
+    assert besides == [*(gap_reason(said) for said in case.said), *case.known]
+    assert [row["reasons"] for row in rows if row["kind"] == "remark"] == list(case.known)
+    assert said_on_stderr(result) >= {*case.said, *case.known}
     found = json.loads(leaks(documents, case, "--format", "geojson").stdout)
     assert (found["count"], found["area"]) == (len(case.counted), pytest.approx(case.area, abs=1e-4))
     assert found["statement"] == ("; ".join(case.said) or None)
+    assert [remark["said"] for remark in found["remarks"]] == list(case.known)
     shapes = [shapely.geometry.shape(f["geometry"]) for f in found["features"] if f["properties"]["counted"]]
     assert outlines(case) == bounds(shapes)
 
@@ -188,20 +210,33 @@ def test_geopackages(documents: str, case: Case, tmp_path: Path, monkeypatch: py
             assert list(gaps) == [gap_reason(said) for said in case.said]
         else:
             assert "coverage_gap" not in layers
+        if case.known or path == "survey.gpkg":
+            remarks = pyogrio.raw.read(tmp_path / path, layer="remark", columns=["said"], read_geometry=False)[3][0]
+            assert list(remarks) == list(case.known)
+        else:
+            assert "remark" not in layers
     said = pyogrio.read_info(tmp_path / "leaks.gpkg", layer="leak_unrolled")["layer_metadata"]["DESCRIPTION"]
-    assert all(text in said for text in case.said)
+    assert all(text in said for text in (*case.said, *case.known))
     assert (total(case) in said) == bool(case.searched)
 
 
 def test_drawing(documents: str, case: Case, tmp_path: Path) -> None:
     result = run(documents, "export", case.scene.name, "-o", tmp_path / "survey.dxf")
-    assert all(said in result.stderr for said in case.said)
+    assert said_on_stderr(result) >= {*case.said, *case.known}
     drawing = ezdxf.readfile(tmp_path / "survey.dxf")
     facts = [
         [value for _, value in line.get_xdata("TUNNELDB")] for line in drawing.modelspace().query('*[layer=="LEAK_UNROLLED"]')
     ]
     assert sum("counted=yes" in fact for fact in facts) == len(case.counted)
-    assert dict(drawing.header.custom_vars.properties).get("Coverage", "") == "; ".join(case.said)
+    properties = dict(drawing.header.custom_vars.properties)
+    assert properties.get("Coverage", "") == "; ".join(case.said)
+    assert [properties[name] for name in sorted(properties) if name.startswith("Remark ")] == list(case.known)
+    written = drawing.modelspace().query('TEXT[layer=="REMARK"]')
+    lines = [text.dxf.text for text in sorted(written, key=lambda text: -text.dxf.insert.y)]
+    said = " ".join(line.strip() for line in lines[1:])
+    assert said == " ".join(f"– {text}" for text in (*case.said, *case.known))
+    north = max(vertex.dxf.location.y for vertex in drawing.modelspace().query('POINT[layer=="AXIS_VERTEX"]'))
+    assert all(text.dxf.insert.y > north for text in written), "above the map"
     inside = [said for said in case.said if "1+000–1+060" not in said]  # what lies beyond the drawing has no place in it
     assert len(drawing.modelspace().query('TEXT[layer=="COVERAGE_GAP"]')) == len(inside)
 
@@ -213,6 +248,9 @@ def test_report(documents: str, case: Case, tmp_path: Path) -> None:
     text = path.read_text("utf-8")
     for said in case.said:
         assert 0 < text.index(said) < text.index('class="verdict'), "before the verdict"
+    assert re.findall(r"<li>(.*)</li>", text.partition("To be known of these results")[2].partition("</ul>")[0]) == [
+        html.escape(said, quote=True).replace("&#x27;", "&#39;").replace("&quot;", "&#34;") for said in case.known
+    ]
     figures = dict(re.findall(r"<dt>([^<]+)</dt><dd>([^<]+?) ?<", text))
     assert figures["Leaks"] == (str(len(case.counted)) if case.searched else "–")
     assert figures["Wet area"] == (f"{case.area:.2f}" if case.searched else "–")
@@ -242,6 +280,8 @@ def test_words_of_the_pdf(documents: str, name: str, tmp_path: Path, chromium: P
     words = " ".join(" ".join(page.extract_text() for page in pypdf.PdfReader(tmp_path / "report.pdf").pages).split())
     for said in case.said:
         assert "".join(said.split()) in "".join(words.split())
+    for known in case.known:
+        assert "".join(known.split()) in "".join(words.split())
     if case.searched:
         assert f" {len(case.counted)} Leaks {case.area:.2f} m² Wet area" in words
     else:
@@ -253,11 +293,15 @@ def test_words_of_the_pdf(documents: str, name: str, tmp_path: Path, chromium: P
 def test_sheets(documents: str, case: Case) -> None:
     with connect(documents) as conn:
         rows = conn.execute(
-            "SELECT chainage_from, chainage_to, leaks, wet_area, seen_share, gaps FROM tunnel_api.sheet"
+            "SELECT chainage_from, chainage_to, leaks, wet_area, seen_share, gaps, remarks FROM tunnel_api.sheet"
             " WHERE survey = %s ORDER BY number", [case.scene.name],
         ).fetchall()  # fmt: skip
     seen = 0.0
-    for first, last, count, area, share, gaps in rows:
+    for first, last, count, area, share, gaps, remarks in rows:
+        here = [
+            known.replace("km 0–1", f"km {first // 1000:.0f}") for known in case.known if "km 0," not in known or first < 1000
+        ]
+        assert remarks == ("; ".join(here) or None)
         low, high = max(first, case.low), min(last, case.high)
         here = [leak for leak in case.counted if leak.east > low and leak.west < high]
         searched = case.searched_between(low, high)
@@ -272,15 +316,26 @@ def test_sheets(documents: str, case: Case) -> None:
 def test_layers_of_qgis(documents: str, case: Case, tmp_path: Path) -> None:
     """What the sources of the layers select."""
     result = run(documents, "qgis", case.scene.name, "-o", tmp_path / "p.qgz", "--images", tmp_path)
-    assert all(said in result.stderr for said in case.said)
+    assert said_on_stderr(result) >= {*case.said, *case.known}
     with zipfile.ZipFile(tmp_path / "p.qgz") as archive:
         project = ElementTree.fromstring(archive.read("p.qgs"))
+    abstract = project.findtext("projectMetadata/abstract") or ""
+    assert abstract.splitlines()[1:] == ["; ".join(case.said)] * bool(case.said) + list(case.known)
     sources = {layer.findtext("id"): layer.findtext("datasource") or "" for layer in project.iter("maplayer")}
     counted = {}
     with connect(documents) as conn:
         for name in ("leak_sheet", "coverage_gap"):
             table, where = re.findall(r'table="tunnel_api"\."(\w+)".* sql=(.*)$', sources[f"tunneldb_layer_{name}"])[0]
             counted[name] = conn.execute(f"SELECT count(*) FROM tunnel_api.{table} WHERE {where}").fetchone()[0]  # type: ignore
+        table, where = re.findall(r'table="tunnel_api"\."(\w+)" sql=(.*)$', sources["tunneldb_layer_remark"])[0]
+        rows = conn.execute(f"SELECT km, file, remark FROM tunnel_api.{table} WHERE {where}").fetchall()  # type: ignore
+    assert sorted(rows, key=str) == sorted(
+        [
+            *((km, None, note) for km, note in case.scene.notes.items()),
+            *((None, "a.laz", known[7:]) for known in case.known if "a.laz" in known),
+        ],
+        key=str,
+    )
     beyond = [leak for leak in case.scene.leaks if leak.counts and leak not in case.counted]
     assert counted == {"leak_sheet": len(case.counted) + len(beyond), "coverage_gap": len(case.said)}
 

@@ -224,7 +224,7 @@ def test_state_that_does_not_hold_is_warned_of(example: str, conn: psycopg.Conne
     conn.commit()
     run("report", example, "-o", tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text("utf-8")
-    remarks = ["3 points", "left out: the scanner&#39;s position is not known", "Kilometre 12, detect: roughness 9° is taken"]
+    remarks = ["3 points", "left out: the scanner&#39;s position is not known", "km 12, detect: roughness 9° is taken"]
     for remark in remarks:
         assert remark in text
     assert "km 12, detect: roughness 9° is taken" in run("status", example).output

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import psycopg
 import shapely
+from psycopg.types.json import Jsonb
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.geometries import anomaly_geometries
@@ -67,6 +68,10 @@ class Scene:
         Share of the lining seen where detection ran.
     dark : (float, float)
         Stretch of it of which nothing was seen, m.
+    notes : dict of int to str
+        What stage axis noted of each kilometre.
+    unposed : int
+        Points of its file, of 1000, left out for want of the scanner's position.
     """
 
     name: str
@@ -76,6 +81,8 @@ class Scene:
     failed: dict[int, tuple[str, str]] = field(default_factory=dict)
     seen: float = 0.9
     dark: tuple[float, float] = (0.0, 0.0)
+    notes: dict[int, str] = field(default_factory=dict)
+    unposed: int = 0
 
 
 def make_survey(conn: psycopg.Connection, scene: Scene) -> None:
@@ -92,14 +99,14 @@ def make_survey(conn: psycopg.Connection, scene: Scene) -> None:
         (tunnel, scene.name),
     ).fetchone()
     conn.execute(
-        "INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, thinned, kept, "
-        "chainage_from, chainage_to) VALUES (%s, 'a.laz', '/a.laz', repeat('0', 64), 1, 1, 0, 0, 0, 1, %s, %s)",
-        (survey, *scene.scanned),
+        "INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, thinned, kept, unposed, "
+        "chainage_from, chainage_to) VALUES (%s, 'a.laz', '/a.laz', repeat('0', 64), 1, 1000, 0, 0, 0, %s, %s, %s, %s)",
+        (survey, 1000 - scene.unposed, scene.unposed, *scene.scanned),
     )
     for km, last in scene.done.items():
         reached = STAGES[: STAGES.index(last) + 1]
         for hour, stage in enumerate(reached):
-            _run(conn, survey, km, stage, hour, None)
+            _run(conn, survey, km, stage, hour, None, scene.notes.get(km) if stage == "axis" else None)
         if km in scene.failed:
             stage, message = scene.failed[km]
             _run(conn, survey, km, stage, len(STAGES), message)
@@ -112,11 +119,14 @@ def make_survey(conn: psycopg.Connection, scene: Scene) -> None:
     conn.commit()
 
 
-def _run(conn: psycopg.Connection, survey: int, km: int, stage: str, hour: int, message: str | None) -> None:
+def _run(
+    conn: psycopg.Connection, survey: int, km: int, stage: str, hour: int, message: str | None, note: str | None = None
+) -> None:
     conn.execute(
-        "INSERT INTO tunnel.run (survey_id, km, stage, started_at, finished_at, outcome, message) VALUES (%s, %s, %s, "
-        "make_timestamptz(2024, 5, 5, %s, 0, 0, 'UTC'), make_timestamptz(2024, 5, 5, %s, 30, 0, 'UTC'), %s, %s)",
-        (survey, km, stage, hour, hour, "failed" if message else "done", message),
+        "INSERT INTO tunnel.run (survey_id, km, stage, started_at, finished_at, outcome, message, counts) VALUES "
+        "(%s, %s, %s, make_timestamptz(2024, 5, 5, %s, 0, 0, 'UTC'), make_timestamptz(2024, 5, 5, %s, 30, 0, 'UTC'), "
+        "%s, %s, %s)",
+        (survey, km, stage, hour, hour, "failed" if message else "done", message, Jsonb({"note": note} if note else {})),
     )
 
 

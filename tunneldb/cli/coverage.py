@@ -1,13 +1,28 @@
-"""What verbs that state leaks say before them: where these can't be vouched for."""
+"""What verbs that state leaks say of them: where these can't be vouched for, and what else is to be known."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import click
 from rich.console import Console
 
 from tunneldb.cli.output import tell
 from tunneldb.store.coverage import Coverage
+from tunneldb.store.remarks import Remark
 from tunneldb.store.survey import Survey
+
+MOST_REMARKS = 6
+"""Of those that are printed with what they are about; ``status`` has all."""
+
+
+def say_remarks(remarks: Sequence[Remark], survey: Survey) -> None:
+    """Say on stderr what is to be known of the results, and tell it to ``--json``."""
+    tell(remarks=remarks)
+    for remark in remarks[:MOST_REMARKS]:
+        click.echo(remark.said, err=True)
+    if len(remarks) > MOST_REMARKS:
+        click.echo(f"and {len(remarks) - MOST_REMARKS} remarks more: tunneldb status {survey.name}", err=True)
 
 
 def say_coverage(coverage: Coverage, survey: Survey, *, on_stdout: bool = False) -> None:

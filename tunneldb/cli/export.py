@@ -9,7 +9,7 @@ import click
 import numpy as np
 import psycopg
 
-from tunneldb.cli.coverage import say_coverage
+from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say, step
@@ -20,6 +20,7 @@ from tunneldb.errors import UserError
 from tunneldb.files import make_folder, replacing, told_to_end
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
+from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
 _PLAIN = (".gpkg", ".dxf")
@@ -58,7 +59,7 @@ def export(
     rejected isn't drawn.
 
     In both the layer of coverage gaps tells where leaks could be missed: what was not searched for them, is out of date or was
-    hardly seen.
+    hardly seen; and the table or layer of remarks what else is to be known of the results.
 
     With --classified the scan files are written again, as LAZ 1.4 with the class of each point. The classes are those of
     stage ground, which must have run and be up to date in every kilometre that a file touches: 2 ground, 64 lining, 65
@@ -88,6 +89,7 @@ def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, st
         counts = write_survey(conn, survey, stretch.low, stretch.high, temporary, step(progress))
     tell(survey=survey.name, file=output, layers=counts)
     say_coverage(coverage, survey)
+    say_remarks(read_remarks(conn, survey, stretch.low, stretch.high), survey)
     click.echo(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count), err=True)
 
 

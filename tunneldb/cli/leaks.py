@@ -11,28 +11,20 @@ import psycopg
 from psycopg import sql
 from rich.console import Console
 
-from tunneldb.cli.coverage import say_coverage
+from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import records, tell, verb
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.export.tables.leaks import (
-    Geometry,
-    Kind,
-    LeakList,
-    Selection,
-    as_csv,
-    as_geojson,
-    as_table,
-    read_leaks,
-    write_gpkg,
-)
+from tunneldb.export.tables.leak_files import as_csv, as_geojson, write_gpkg
+from tunneldb.export.tables.leaks import Geometry, Kind, LeakList, Selection, as_table, read_leaks
 from tunneldb.files import replacing
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
+from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
 _BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
@@ -107,7 +99,8 @@ def leaks(
     inspector rejected, or confirmed and the last detection did not find again.
 
     First it says where the list can't be vouched for: stretches that are not loaded, not searched for leaks, failed, out of
-    date, or of whose lining less than half was seen. The same is in every file; see tunnel_api.coverage_gap.
+    date, or of whose lining less than half was seen; then what else is to be known: left out,
+    interpolated, in doubt. The same is in every file; see tunnel_api.coverage_gap and tunnel_api.remark.
 
     With --by-km a line for each kilometre, and one for all: wet area and number of leaks, the most in any 100 m² of lining, and
     the best class of GB 50108-2008 that the lining seen keeps, as far as a scan can tell. Any other stretch, and what breaks a
@@ -126,7 +119,6 @@ def leaks(
         found = get_survey(conn, survey)
         if found.note:
             tell(note=found.note)
-            click.echo(f"survey {survey}: {found.note}", err=True)
         kilometres = parse_km(km, loaded_kilometres(conn, found)) if km else None
         stretch = parse_stretch(conn, found, start, end)
         low, high = stretch.low, stretch.high
@@ -137,10 +129,12 @@ def leaks(
         if by_km:
             coverage = read_coverage(conn, found, low, high)
             say_coverage(coverage, found, on_stdout=True)
+            say_remarks(read_remarks(conn, found, low, high), found)
             _print_classes(conn, found, low, high)
         else:
             listed = read_leaks(conn, found, chosen, Selection(cast(Kind, kind), low, high, hours, min_area, min_confidence))
             coverage = listed.coverage
+            say_remarks(listed.remarks, found)
             if output is None:
                 say_coverage(coverage, found, on_stdout=form == "table")
                 _print(listed, form, chosen, found)

@@ -14,6 +14,7 @@ from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
@@ -127,11 +128,10 @@ def _summary(connection: psycopg.Connection[Any], survey: Survey, done: list[Loa
         for file in done
     ]
     print_table(header, rows, right=range(2, 9))
-    for name, remark in connection.execute(
-        "SELECT file, remark FROM tunnel_api.remark WHERE survey_id = %s AND file = ANY (%s) ORDER BY file, remark",
-        [survey.id, [file.name for file in done]],
-    ).fetchall():
-        click.echo(f"{name}: {remark}", err=True)
+    loaded = {file.name for file in done}
+    for remark in read_remarks(connection, survey):
+        if remark.file in loaded:
+            click.echo(remark.said, err=True)
     connection.rollback()
     say_notes((file.name, file.note) for file in done if file.note)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 import psycopg
 
-from tunneldb.cli.coverage import say_coverage
+from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, step
@@ -17,6 +17,7 @@ from tunneldb.export.images.image import export_filled, export_kilometre, image_
 from tunneldb.export.qgis import store_project, store_styles, write_project
 from tunneldb.files import make_folder
 from tunneldb.store.coverage import read_coverage
+from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
 
@@ -59,7 +60,7 @@ def qgis(
         raise UserError(f"{output}: there is no folder {output.parent}")
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
-        coverage = read_coverage(conn, found)
+        coverage, remarks = read_coverage(conn, found), read_remarks(conn, found)
         beside = Path(f"{found.name}-images") if output is None else output.with_name(f"{output.stem}-images")
         images = _export_images(conn, found, folder or beside)
         written = []
@@ -73,6 +74,7 @@ def qgis(
         socket = conn.info.host.startswith("/")
     tell(survey=survey, written=written, images=images, styles=styles)
     say_coverage(coverage, found)
+    say_remarks(remarks, found)
     click.echo(f"{', '.join(written)}: {len(images)} images, {styles}", err=True)
     if settings.dsn is None and service is None:
         click.echo("QGIS reads your own server; should it be stopped: tunneldb server start", err=True)

@@ -94,7 +94,7 @@ def _all(connection: psycopg.Connection[Any]) -> None:
 
 
 def _one(connection: psycopg.Connection[Any], survey: str) -> None:
-    from tunneldb.cli.overview import render, spans
+    from tunneldb.cli.overview import render
     from tunneldb.queue.progress import overview
 
     seen = overview(connection, survey)
@@ -119,5 +119,4 @@ def _one(connection: psycopg.Connection[Any], survey: str) -> None:
     if remarks:
         click.echo()
     for remark in remarks:
-        where = remark.file or f"km {spans(remark.kilometres)}, {remark.stage}"
-        click.echo(f"{where}: {remark.remark}")
+        click.echo(remark.said)

@@ -225,11 +225,11 @@ def _queue(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
 
 def _remarks(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
     """What a reader of the results is to know."""
-    for survey, where, remark in connection.execute(
-        "SELECT survey, coalesce(file, format('km %s, %s', km, stage)), remark FROM tunnel_api.remark"
-        " ORDER BY survey, km, stage, file"
+    for survey, said in connection.execute(
+        "SELECT s.name, r.said FROM tunnel.survey s CROSS JOIN LATERAL tunnel_api.remarks(s.id) WITH ORDINALITY AS"
+        " r (file, stage, kilometres, remark, said, n) ORDER BY s.name, r.n"
     ).fetchall():
-        yield Finding("note", "results", f"{survey}, {where}: {remark}")
+        yield Finding("note", "results", f"{survey}, {said}")
 
 
 def _stale(connection: psycopg.Connection[Any]) -> Iterator[Finding]:

@@ -138,7 +138,7 @@ class _Report:
             "unlooked": (1 - total["searched_share"]) * (high - low),
             "kilometres": self._kilometres(),
             "files": data.read_files(conn, survey, low, high),
-            "remarks": read_remarks(conn, survey, *data.kilometres_between(low, high)),
+            "remarks": read_remarks(conn, survey, low, high),
             "stale": text.stale(data.read_stale(conn, survey, low, high)),
             "runs": runs,
             "versions": text.versions(runs),

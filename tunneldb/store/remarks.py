@@ -1,7 +1,8 @@
-"""What a reader of a survey's results is to know: view `tunnel_api.remark`."""
+"""What a reader of a survey's results is to know: function `tunnel_api.remarks`, which finds the words for every document."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,20 +25,21 @@ class Remark:
     kilometres : list of int
         Empty for a file.
     remark : str
+        What is to be known.
+    said : str
+        The same, after the file or the kilometres and stage that it is about.
     """
 
     file: str | None
     stage: str
     kilometres: list[int]
     remark: str
+    said: str
 
 
-def read_remarks(conn: psycopg.Connection[Any], survey: Survey, first: int = -1_000_000, last: int = 1_000_000) -> list[Remark]:
-    """Read what is to be known of all files of a survey and of the kilometres from first to last; files first."""
+def read_remarks(conn: psycopg.Connection[Any], survey: Survey, low: float = -math.inf, high: float = math.inf) -> list[Remark]:
+    """Read what is to be known of the results between two chainages, m: of files first, then of kilometres."""
     with conn.cursor(row_factory=class_row(Remark)) as cursor:
         return cursor.execute(
-            "SELECT file, stage, coalesce(array_agg(km ORDER BY km) FILTER (WHERE km IS NOT NULL), '{}') AS kilometres, remark"
-            " FROM tunnel_api.remark WHERE survey_id = %s AND (km IS NULL OR km BETWEEN %s AND %s)"
-            " GROUP BY file, stage, remark ORDER BY file NULLS LAST, min(km), stage, remark",
-            [survey.id, first, last],
+            "SELECT file, stage, kilometres, remark, said FROM tunnel_api.remarks(%s, %s, %s)", [survey.id, low, high]
         ).fetchall()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +28,13 @@ from tunneldb.export.exchange.lines import (
     tick_chainages,
     ticks,
 )  # fmt: skip
-from tunneldb.export.exchange.sheet import draw_profiles, draw_unrolled
+from tunneldb.export.exchange.sheet import Box, draw_profiles, draw_unrolled
 from tunneldb.export.exchange.table import Table, read_table
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.alignment import labels
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.coverage import Coverage, read_coverage
+from tunneldb.store.remarks import Remark, read_remarks
 from tunneldb.store.survey import Survey
 
 MARGIN = 50.0
@@ -40,6 +42,9 @@ MARGIN = 50.0
 
 TEXT = 1.0
 """Height of text on the map, m: 2 mm at 1:500."""
+
+LETTERS, LINE = 120, 1.6
+"""Most letters on a line of the text above the map; distance of lines there, of the height of text."""
 
 PARTS = 7
 """It is made in: map, leaks on it and in space, unrolled lining, profiles, sections in space, the file."""
@@ -67,6 +72,7 @@ LAYERS = {
     "LEAK_TEXT": (_BLUE, "Number and area of leaks"),
     "LEAK_PROFILE": (_BLUE, "Leaks on the profiles"),
     "COVERAGE_GAP": (_MAGENTA, "Unrolled lining: where leaks could be missed, and why"),
+    "REMARK": (_MAGENTA, "Above the map: what is to be known of the results"),
     "UNROLLED": (_GREY, "Unrolled lining: edges and crown"),
     "UNROLLED_CHAINAGE": (_GREY, "Unrolled lining: lines every 10 m, with stations"),
     "PROFILE": (_BLACK, "Profiles, looking up-chainage"),
@@ -89,8 +95,8 @@ def write_survey_dxf(
 
     The tunnel lies in its SRID, lines in space at their height, what is flat at height 0. Below the map lies the unrolled
     lining, arc upwards and chainage to the right, and below that the profiles side by side, as seen looking up-chainage.
-    What an inspector rejected isn't drawn. Where leaks could be missed is drawn on the unrolled lining, and said in the
-    drawing's property ``Coverage``.
+    What an inspector rejected isn't drawn. Where leaks could be missed is drawn on the unrolled lining; in words, and with what
+    else is to be known of the results, it stands above the map, and in the properties ``Coverage`` and ``Remark 1``, ….
 
     Parameters
     ----------
@@ -106,7 +112,8 @@ def write_survey_dxf(
         Given 1 after each of the PARTS.
     """
     coverage = read_coverage(conn, survey, low, high)
-    document = _document(conn, survey, coverage)
+    remarks = read_remarks(conn, survey, low, high)
+    document = _document(conn, survey, coverage, remarks)
     space = document.modelspace()
     parts = stretches(surface, low, high)
     box = _draw_map(conn, survey, surface, parts, space)
@@ -134,7 +141,9 @@ def write_survey_dxf(
             name,
             dxfattribs={"center": ((west + east) / 2, (south + north) / 2), "width": east - west, "height": north - south},
         )
-    whole = min(b[0] for b in (box, strip, sheet)), sheet[1], max(b[2] for b in (box, strip, sheet)), box[3]
+    head = _write_remarks(space, (box[0], box[3] + MARGIN / 2), [coverage.statement, *(remark.said for remark in remarks)])
+    boxes = (box, strip, sheet, head)
+    whole = min(b[0] for b in boxes), sheet[1], max(b[2] for b in boxes), head[3]
     document.set_modelspace_vport(whole[3] - whole[1], ((whole[0] + whole[2]) / 2, (whole[1] + whole[3]) / 2))
     document.header["$EXTMIN"], document.header["$EXTMAX"] = (*whole[:2], 0.0), (*whole[2:], 0.0)
     document.saveas(path)
@@ -143,6 +152,21 @@ def write_survey_dxf(
     for entity in space:
         counts[entity.dxf.layer] += 1
     return counts
+
+
+def _write_remarks(space: Any, corner: tuple[float, float], said: Sequence[str | None]) -> Box:
+    """Write what is to be known upwards from a corner, m, and return the box of it."""
+    lines = [
+        line
+        for text in filter(None, said)
+        for line in textwrap.wrap(text, LETTERS, initial_indent="– ", subsequent_indent="  ")
+    ]
+    if not lines:
+        return *corner, corner[0], corner[1] - MARGIN / 2
+    lines.insert(0, "To be known of these results:")
+    for n, line in enumerate(reversed(lines)):
+        write(space, line, (corner[0], corner[1] + n * LINE * TEXT), TEXT, "REMARK")
+    return *corner, corner[0] + TEXT * max(map(len, lines)), corner[1] + len(lines) * LINE * TEXT
 
 
 def read_spots(conn: psycopg.Connection[Any], survey: Survey, view: str, low: float, high: float) -> list[Spot]:
@@ -167,13 +191,14 @@ def _spot(row: dict[str, Any], shape: Polygon) -> Spot:
     return Spot(int(row["id"]), row["kind"], row["review"], f"{row['id']}: {row['area']:.2f} m²", facts, shape)
 
 
-def _document(conn: psycopg.Connection[Any], survey: Survey, coverage: Coverage) -> Any:
+def _document(conn: psycopg.Connection[Any], survey: Survey, coverage: Coverage, remarks: list[Remark]) -> Any:
     document = filemanagement.new("R2010", units=M)
     document.header["$MEASUREMENT"] = 1
     document.header["$LUNITS"], document.header["$LUPREC"] = 2, 3
     about = {"Survey": survey.name, "Tunnel": survey.tunnel, "Scanned": survey.date.isoformat(), "Unit": "metre"}
     if coverage.statement is not None:
         about["Coverage"] = coverage.statement
+    about |= {f"Remark {n}": remark.said for n, remark in enumerate(remarks, 1)}
     for name, text in {**about, "CRS": crs_text(conn, survey.srid), "Writer": f"tunneldb {__version__}"}.items():
         document.header.custom_vars.append(name, " ".join(text.split()))  # a value is a line of the file; WKT may have many
     document.appids.new(APPLICATION)

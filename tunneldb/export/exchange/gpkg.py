@@ -18,11 +18,12 @@ from tunneldb.export.exchange.lines import edges, is_hundred, on_map, outline, s
 from tunneldb.export.exchange.table import Column, Table, read_table
 from tunneldb.export.qgis.layer import LAYERS, VectorLayer
 from tunneldb.export.qgis.styles import STYLE_NAME, style_text
-from tunneldb.export.tables.leaks import UNDEFINED_CARTESIAN
+from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN, write_remarks
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.alignment import labels
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.coverage import read_coverage
+from tunneldb.store.remarks import read_remarks
 from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
@@ -68,7 +69,8 @@ def write_survey_gpkg(
     """Write a stretch of a survey as a GeoPackage, and return the number of rows of each layer.
 
     Layers on the map and in space are in the tunnel's SRID; those of the unrolled plane (chainage, arc; m) in an undefined
-    Cartesian system. QGIS finds the styles in the table ``layer_styles``.
+    Cartesian system. QGIS finds the styles in the table ``layer_styles``. What is to be known of the results is in the table
+    ``remark``.
 
     Parameters
     ----------
@@ -111,8 +113,10 @@ def write_survey_gpkg(
         counts[name] = len(table.geometry)
         styled.append((name, style, text))
         progress(1)
+    remarks = read_remarks(conn, survey, low, high)
+    write_remarks(path, remarks, **VERSION)
     _write_styles(path, styled)
-    return counts
+    return counts | {"remark": len(remarks)}
 
 
 def _write(path: Path, name: str, table: Table, wkb: str, crs: str | None) -> None:

@@ -24,6 +24,8 @@ from tunneldb.export.qgis.source import RECOMPUTED_FROM, Source, recompute
 from tunneldb.export.qgis.space import docks, filled_layers, scene, viewpoint
 from tunneldb.export.qgis.styles import require_table, style_elements
 from tunneldb.files import replacing
+from tunneldb.store.coverage import read_coverage
+from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey
 
 QGIS_VERSION = "3.22.0-Białowieża"
@@ -34,13 +36,14 @@ _DOCTYPE = "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
 
 @dataclass(frozen=True)
 class _Entry:
-    """A layer of the project: its element, its place in the tree and the themes that show it."""
+    """A layer of the project: its element, its place in the tree, the themes that show it, whether its rows are counted."""
 
     id: str
     title: str
     group: tuple[str, ...]
     themes: tuple[str, ...]
     element: ET.Element
+    counted: bool = False
 
 
 @dataclass
@@ -125,7 +128,8 @@ def _project(
     crs = crs_element(conn, survey.srid)
     source = Source.of_connection(conn) if service is None else Source.of_service(service)
     filled = filled_layers(conn, survey.name)
-    entries = [_vector(layer, source, survey, crs, in_space=layer.id in filled) for layer in LAYERS]
+    entries = [_remarks(source, survey)]
+    entries += [_vector(layer, source, survey, crs, in_space=layer.id in filled) for layer in LAYERS]
     entries += _rasters(images, folder)
     views = _views(conn, survey.name)
     root = ET.Element("qgis", version=QGIS_VERSION, projectname=survey.name, saveUser="", saveUserFull="")
@@ -155,7 +159,10 @@ def _project(
         _extent(view_settings, views[0].extent, tag).append(deepcopy(crs))
     metadata = ET.SubElement(root, "projectMetadata")
     ET.SubElement(metadata, "title").text = survey.name
-    ET.SubElement(metadata, "abstract").text = f"Tunnel {survey.tunnel}, written by tunneldb {__version__}"
+    said = [read_coverage(conn, survey).statement, *(remark.said for remark in read_remarks(conn, survey))]
+    ET.SubElement(metadata, "abstract").text = "\n".join(
+        [f"Tunnel {survey.tunnel}, written by tunneldb {__version__}", *filter(None, said)]
+    )
     return root
 
 
@@ -186,6 +193,22 @@ def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element,
             quoted = value.replace("'", "''")
             ET.SubElement(defaults, "default", field=column, expression=f"'{quoted}'", applyOnUpdate="0")
     return _Entry(layer_id(layer.id), layer.title, (layer.group,), layer.themes, element)
+
+
+def _remarks(source: Source, survey: Survey) -> _Entry:
+    """The table of what is to be known of the results; how many lines it has, stands beside its name."""
+    title = "What is to be known (table)"
+    element = ET.Element(
+        "maplayer", type="vector", geometry="No geometry", wkbType="NoGeometry", readOnly="1", autoRefreshEnabled="0",
+        refreshOnNotifyEnabled="0", hasScaleBasedVisibilityFlag="0", minScale="0", maxScale="0",
+        styleCategories="AllStyleCategories",
+    )  # fmt: skip
+    ET.SubElement(element, "id").text = layer_id("remark")
+    ET.SubElement(element, "datasource").text = source.table("remark", survey.name)
+    ET.SubElement(element, "layername").text = title
+    ET.SubElement(element, "srs").append(no_crs())
+    ET.SubElement(element, "provider", encoding="UTF-8").text = "postgres"
+    return _Entry(layer_id("remark"), title, (), (), element, counted=True)
 
 
 def _rasters(images: Sequence[Path], folder: Path | None) -> list[_Entry]:
@@ -237,10 +260,13 @@ def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
         checked="Qt::Checked" if checked else "Qt::Unchecked",
     )  # fmt: skip
     for entry in group.entries:
-        ET.SubElement(
+        leaf = ET.SubElement(
             element, "layer-tree-layer", id=entry.id, name=entry.title, expanded="0",
             checked="Qt::Checked" if MAP in entry.themes else "Qt::Unchecked",
         )  # fmt: skip
+        if entry.counted:
+            shown = ET.SubElement(ET.SubElement(leaf, "customproperties"), "Option", type="Map")
+            ET.SubElement(shown, "Option", type="int", name="showFeatureCount", value="1")
     for title, part in group.groups.items():
         element.append(_group_element(part, title, title == MAP))
     return element

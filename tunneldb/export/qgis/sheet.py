@@ -40,11 +40,15 @@ _CHAINAGE_LABEL = (
 )
 _ARC_LABEL = "if(@grid_axis = 'y', to_string(round(@grid_number)), '')"
 
-# On one line or several, and cut where there is no room for all of it, which says so.
-_REMARK = (
-    "with_variable('said', coalesce(regexp_replace(\"remark\", '\\\\s+', ' '), ''), "
-    "if(length(@said) > {0}, left(@said, {0} - 1) || '…', @said))"
-)
+
+def _cut(text: str, letters: int | str) -> str:
+    """Expression: a text on one line or several, cut where there is no room for all of it, which says so."""
+    return (
+        f"with_variable('said', coalesce(regexp_replace({text}, '\\\\s+', ' '), ''), "
+        f"if(length(@said) > {letters}, left(@said, {letters} - 1) || '…', @said))"
+    )
+
+
 # Heading, expression, width in mm, alignment (1 left, 2 right), what rows are sorted by.
 _COLUMNS = (
     ("Leak", 'to_string("id")', 11, 2),
@@ -55,7 +59,7 @@ _COLUMNS = (
     ("Drop, dB", 'format_number("drop_mean", 1)', 12.5, 2),
     ("Sure", "coalesce(round(100 * \"confidence\") || ' %', '')", 9, 2),
     ("Review", '"review"', 15, 1),
-    ("Remark", _REMARK, 23, 1),
+    ("Remark", _cut('"remark"', "{0}"), 23, 1),
 )
 # As the sheet's sums count them: one that only touches its edge is not on it.
 _ON_SHEET = f'"chainage_to" > {_SHEET.format("chainage_from")} and "chainage_from" < {_SHEET.format("chainage_to")}'
@@ -193,10 +197,10 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
     else:
         how += "Orange: open, blue: confirmed; a number is the leak's."
     texts = [
-        _label("stretch", stretch, (left, 7, 150, 8), 15, bold=True),
-        _label("number", f"Inspection sheet {number}", (right - 110, 7, 110, 8), 10, align="right"),
-        _label("what", what, (left, 15.5, 140, 5), 8),
-        _label("sums", sums, (right - 140, 15.5, 140, 5), 8, align="right"),
+        _label("stretch", stretch, (left, 5, 150, 8), 15, bold=True),
+        _label("number", f"Inspection sheet {number}", (right - 110, 5, 110, 8), 10, align="right"),
+        _label("what", what, (left, 12.5, 140, 5), 8),
+        _label("sums", sums, (right - 140, 12.5, 140, 5), 8, align="right"),
         _label("how", how, (left + 55, _FOOT + 1, wide - 55, 4), 6.5, align="right"),
         _label(
             "signature", "Inspected by ______________________________   on ____________________",
@@ -208,7 +212,8 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
         ),
     ]  # fmt: skip
     if survey.intensity_kind != "none":
-        texts.append(_label("gaps", f"[% coalesce({gaps}, '') %]", (left, 20, wide, 4), 7, bold=True))
+        texts.append(_label("gaps", f"[% {_cut(gaps, 170)} %]", (left, 17, wide, 3.5), 7, bold=True))
+    texts.append(_label("remarks", f"[% {_cut(_SHEET.format('remarks'), 200)} %]", (left, 20.5, wide, 3.5), 6.5))
     for page in range(1, pages):
         texts += [
             _label(f"stretch {page + 1}", f"{stretch}, leaks continued", (left, 7, 150, 8), 12, page=page, bold=True),

@@ -73,6 +73,14 @@ class Source:
             f'sql="survey" = {name}{" AND " + layer.where if layer.where else ""}'
         )
 
+    def table(self, view: str, survey: str) -> str:
+        """Return the data source of a view without geometry, restricted to a survey."""
+        name = "'" + survey.replace("'", "''") + "'"
+        return (
+            f"{self.connection} key='id' estimatedmetadata=true checkPrimaryKeyUnicity='0' "
+            f'table="tunnel_api"."{view}" sql="survey" = {name}'
+        )
+
 
 RECOMPUTED_FROM = ("axis_vertex", "segment")
 """Layers that offer it."""

@@ -1,29 +1,22 @@
-"""Leaks, joints and other dark spots as a table, CSV, GeoJSON or GeoPackage."""
+"""Leaks, joints and other dark spots of a survey, read and laid out as a table; as files: leak_files."""
 
 from __future__ import annotations
 
-import csv
 import datetime as dt
-import io
-import json
 import math
-import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields
-from pathlib import Path
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from typing import Any, Literal
 
-import numpy as np
 import psycopg
-import pyogrio.raw
 import shapely
-from numpy.typing import NDArray
 from psycopg import sql
 from rich.cells import cell_len
 from rich.table import Table
-from shapely.geometry import Polygon, mapping
+from shapely.geometry import Polygon
 
-from tunneldb.store.coverage import Coverage, CoverageGap, read_coverage
+from tunneldb.store.coverage import Coverage, read_coverage
+from tunneldb.store.remarks import Remark, read_remarks
 from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
@@ -32,12 +25,6 @@ Geometry = Literal["unrolled", "map", "3d"]
 
 Kind = Literal["leak", "joint", "dark", "all"]
 """What is listed: leaks, joints, what else is dark but dry, or all of it."""
-
-UNDEFINED_CARTESIAN = {"SRID": "-1"}
-"""Coordinate system of the unrolled plane in a GeoPackage, by its standard."""
-
-DECIMALS = 4
-"""Decimals of coordinates in text, m."""
 
 _PLURAL = {"leak": "leaks", "joint": "joints", "dark": "dark spots", "all": "anomalies"}
 _COLUMN = {"unrolled": "unrolled", "map": "map", "3d": "surface"}
@@ -154,6 +141,8 @@ class LeakList:
         Area of these within the stretch, m².
     coverage : Coverage
         What can be said of the stretch.
+    remarks : list of Remark
+        What else is to be known of the results there.
     """
 
     kind: Kind
@@ -161,6 +150,7 @@ class LeakList:
     count: int
     area: float
     coverage: Coverage
+    remarks: list[Remark]
 
     @property
     def total(self) -> str:
@@ -223,6 +213,7 @@ def read_leaks(
         count=summed[0],
         area=summed[1],
         coverage=read_coverage(conn, survey, chosen.low, chosen.high),
+        remarks=read_remarks(conn, survey, chosen.low, chosen.high),
     )
 
 
@@ -280,143 +271,3 @@ def clock_label(hours: float) -> str:
     """Clock position as hours and minutes: 12 is the crown, 0.5 is 12:30."""
     minutes = round(hours * 60) % 720
     return f"{minutes // 60 or 12}:{minutes % 60:02d}"
-
-
-def as_csv(leaks: LeakList) -> str:
-    """Write leaks as CSV with a header; the last column, ``geometry``, is WKT.
-
-    First come the stretches for which they can't be vouched for: their ``kind`` is the state of the stretch, ``reasons`` says
-    why, and ``counted`` is False.
-    """
-    out = io.StringIO()
-    writer = csv.DictWriter(out, [*COLUMNS, "geometry"], lineterminator="\n")
-    writer.writeheader()
-    for gap in leaks.coverage.gaps:
-        place = {"chainage_from": _plain(gap.chainage_from), "chainage_to": _plain(gap.chainage_to), "label": gap.label_from}
-        writer.writerow({**place, "kind": gap.state, "reasons": gap.reason, "counted": False})
-    for leak in leaks.rows:
-        wkt = shapely.to_wkt(leak.geometry, rounding_precision=DECIMALS)
-        writer.writerow({**{name: _plain(getattr(leak, name)) for name in COLUMNS}, "geometry": wkt})
-    return out.getvalue()
-
-
-def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:
-    """Write leaks as a GeoJSON FeatureCollection in the coordinates of the chosen geometry.
-
-    Map and space carry the tunnel's coordinate system in a ``crs`` member, as GDAL and QGIS read it; the
-    unrolled plane has none. Further members are what ``--json`` tells, too: ``statement`` and ``gaps`` say for which
-    stretches the list can't be vouched for, ``count`` and ``area`` sum up.
-    """
-    collection: dict[str, Any] = {"type": "FeatureCollection", "name": layer_name(geometry, leaks.kind)}
-    if geometry != "unrolled":
-        collection["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{srid}"}}
-    collection["statement"] = leaks.coverage.statement
-    collection["gaps"] = [asdict(gap) for gap in leaks.coverage.gaps]
-    collection |= {"count": leaks.count, "area": round(leaks.area, DECIMALS)}
-    collection["features"] = [
-        {
-            "type": "Feature",
-            "id": leak.id,
-            "geometry": _rounded(mapping(leak.geometry)),
-            "properties": {name: _plain(getattr(leak, name)) for name in COLUMNS},
-        }
-        for leak in leaks.rows
-    ]
-    return json.dumps(collection, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def write_gpkg(path: Path, leaks: LeakList, geometry: Geometry, srid: int) -> None:
-    """Write leaks as a GeoPackage with one layer; the unrolled plane is an undefined Cartesian system there.
-
-    Where the list can't be vouched for, is in a table ``coverage_gap`` beside it, if there is such a stretch, and in the
-    description of the layer.
-    """
-    rows = leaks.rows
-    data = [np.array([getattr(leak, name) for leak in rows], dtype=_GPKG_TYPE.get(name, object)) for name in COLUMNS]
-    data[COLUMNS.index("reasons")] = np.array([_plain(leak.reasons) for leak in rows], dtype=object)
-    moments = [leak.reviewed_at for leak in rows]
-    data[COLUMNS.index("reviewed_at")] = np.array(
-        [np.datetime64("NaT") if m is None else _utc(m) for m in moments], dtype="datetime64[ms]"
-    )
-    said = f"{leaks.coverage.statement}. {leaks.total}" if leaks.coverage.statement else leaks.total
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "'crs' was not provided")  # the unrolled plane has none
-        _write_layer(path, rows, data, geometry, srid, layer_name(geometry, leaks.kind), said)
-    if leaks.coverage.gaps:
-        _write_gaps(path, leaks.coverage)
-
-
-def _write_gaps(path: Path, coverage: Coverage) -> None:
-    names = [field.name for field in fields(CoverageGap)]
-    columns = [[getattr(gap, name) for gap in coverage.gaps] for name in names]
-    kinds = [bool if name == "searched" else object if isinstance(values[0], str) else float
-             for name, values in zip(names, columns, strict=True)]  # fmt: skip
-    data = [np.array(values, dtype=kind) for values, kind in zip(columns, kinds, strict=True)]
-    pyogrio.raw.write(
-        str(path), None, data, np.array(names), geometry_type=None, driver="GPKG", layer="coverage_gap",
-        DESCRIPTION=coverage.statement,
-    )  # fmt: skip
-
-
-def _write_layer(
-    path: Path, leaks: Sequence[Anomaly], data: list[NDArray[Any]], geometry: Geometry, srid: int, layer: str, said: str
-) -> None:
-    pyogrio.raw.write(
-        str(path),
-        shapely.to_wkb(np.array([leak.geometry for leak in leaks], dtype=object)),
-        data,
-        np.array(COLUMNS),
-        geometry_type="Polygon Z" if geometry == "3d" else "Polygon",
-        crs=None if geometry == "unrolled" else f"EPSG:{srid}",
-        driver="GPKG",
-        layer=layer,
-        DESCRIPTION=said,
-        **(UNDEFINED_CARTESIAN if geometry == "unrolled" else {}),
-    )
-
-
-_GPKG_TYPE: dict[str, Any] = {
-    "id": np.int64,
-    "km": np.int32,
-    "detected": np.bool_,
-    "counted": np.bool_,
-    **dict.fromkeys(
-        (
-            "chainage_from",
-            "chainage_to",
-            "arc_from",
-            "arc_to",
-            "clock",
-            "confidence",
-            "contrast",
-            "area",
-            "drop_mean",
-            "drop_max",
-            "image_share",
-        ),
-        np.float64,
-    ),
-}
-
-
-def layer_name(geometry: Geometry, kind: Kind) -> str:
-    """Name of the layer in files."""
-    return f"{'anomaly' if kind == 'all' else kind}_{geometry}"
-
-
-def _utc(moment: dt.datetime) -> dt.datetime:
-    """Drop the zone, which NumPy doesn't know, after turning to UTC."""
-    return moment.astimezone(dt.UTC).replace(tzinfo=None)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return round(value, DECIMALS)
-    if isinstance(value, list):
-        return ", ".join(value)
-    return value.isoformat() if isinstance(value, dt.datetime) else value
-
-
-def _rounded(shape: dict[str, Any]) -> dict[str, Any]:
-    rings = [[[round(number, DECIMALS) for number in vertex] for vertex in ring] for ring in shape["coordinates"]]
-    return {"type": shape["type"], "coordinates": rings}

@@ -1,0 +1,79 @@
+-- What a reader of a survey's results is to know, as every document says it.
+
+-- Notes of the stages whose results are in the database, and points that were left out
+-- of files. A fifth of a scan's points is noise only where the filter does not suit the scan: it is made for those that strike
+-- nothing (dust, edges, people), which are a few percent.
+CREATE OR REPLACE VIEW tunnel_api.remark AS
+SELECT 4 * r.id AS id, r.survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file, r.counts ->> 'note' AS remark
+  FROM (SELECT DISTINCT ON (d.survey_id, d.km, d.stage) d.*
+          FROM tunnel.run d
+         WHERE d.outcome = 'done' AND d.km IS NOT NULL
+         ORDER BY d.survey_id, d.km, d.stage, d.started_at DESC, d.id DESC) r
+  JOIN tunnel.survey s ON s.id = r.survey_id
+ WHERE r.counts ? 'note'
+ UNION ALL
+SELECT 4 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, format('%s points (%s %%) left out: %s', w.points,
+       round(100 * w.points / greatest(f.points - f.outside, 1)::numeric, 2), w.why)
+  FROM tunnel.scan_file f
+  JOIN tunnel.survey s ON s.id = f.survey_id
+ CROSS JOIN LATERAL (VALUES
+       (1, f.invalid, 0.0, 'a coordinate, their time or their intensity is no number'),
+       (2, f.unposed, 0.0, 'the scanner''s position is not known'),
+       (3, f.noise, 0.2, 'they count as noise; is the scan too sparse for load --noise-points?')) AS w (k, points, share, why)
+ WHERE w.points > w.share * (f.points - f.outside);
+COMMENT ON VIEW tunnel_api.remark IS
+    'What a reader of the results is to know: notes of the stages by kilometre, and points that were left out by file';
+COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file';
+COMMENT ON COLUMN tunnel_api.remark.stage IS 'Stage that says so';
+COMMENT ON COLUMN tunnel_api.remark.file IS 'Name of the scan file; NULL for a kilometre';
+COMMENT ON COLUMN tunnel_api.remark.remark IS 'What is to be known';
+
+
+-- Files first, then by kilometre; what is the same in several kilometres is said once.
+CREATE OR REPLACE FUNCTION tunnel_api.remarks(
+    survey_id int, stretch_from float8 DEFAULT '-Infinity', stretch_to float8 DEFAULT 'Infinity')
+RETURNS TABLE (file text, stage text, kilometres int[], remark text, said text)
+LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
+ROWS 5
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+    WITH here AS (
+        SELECT r.file, r.stage, r.km, r.remark
+          FROM tunnel_api.remark r
+          LEFT JOIN tunnel.scan_file f ON f.survey_id = r.survey_id AND f.name = r.file
+         WHERE r.survey_id = $1
+           AND coalesce(r.km * 1000, f.chainage_from, '-Infinity') < $3
+           AND coalesce((r.km + 1) * 1000, f.chainage_to, 'Infinity') > $2
+    ), part AS (  -- kilometres in a row
+        SELECT h.*, h.km - row_number() OVER (PARTITION BY h.file, h.stage, h.remark ORDER BY h.km) AS part FROM here h
+    ), span AS (
+        SELECT p.file, p.stage, p.remark, min(p.km) AS first,
+               concat_ws('–', min(p.km), nullif(max(p.km), min(p.km))) AS span
+          FROM part p
+         GROUP BY p.file, p.stage, p.remark, p.part
+    ), whole AS (
+        SELECT s.file, s.stage, s.remark, min(s.first) AS first, string_agg(s.span, ', ' ORDER BY s.first) AS spans
+          FROM span s
+         GROUP BY s.file, s.stage, s.remark
+    )
+    SELECT w.file, w.stage,
+           ARRAY(SELECT h.km FROM here h
+                  WHERE h.km IS NOT NULL AND (h.stage, h.remark) = (w.stage, w.remark) AND w.file IS NULL ORDER BY h.km),
+           w.remark, coalesce(w.file, format('km %s, %s', w.spans, w.stage)) || ': ' || w.remark
+      FROM whole w
+     ORDER BY w.file NULLS LAST, w.first, w.stage, w.remark
+$$;
+COMMENT ON FUNCTION tunnel_api.remarks(int, float8, float8) IS
+'What is to be known of a survey''s results between two chainages (m), or anywhere, by the view remark: of its files there, then of its kilometres, the same in several of them once. said: the whole in words, as every document has it.';
+
+
+CREATE OR REPLACE FUNCTION tunnel_api.remark_statement(
+    survey_id int, stretch_from float8 DEFAULT '-Infinity', stretch_to float8 DEFAULT 'Infinity')
+RETURNS text
+LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
+AS $$
+    SELECT string_agg(r.said, '; ' ORDER BY r.n)
+      FROM tunnel_api.remarks($1, $2, $3) WITH ORDINALITY AS r (file, stage, kilometres, remark, said, n)
+$$;
+COMMENT ON FUNCTION tunnel_api.remark_statement(int, float8, float8) IS
+'What remarks has to say of a survey between two chainages (m), on one line; NULL if there is nothing.';

@@ -1,0 +1,158 @@
+"""Leaks, joints and other dark spots as CSV, GeoJSON or GeoPackage."""
+
+from __future__ import annotations
+
+import csv
+import datetime as dt
+import io
+import json
+import warnings
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyogrio.raw
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import mapping
+
+from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN, write_gaps, write_remarks
+from tunneldb.export.tables.leaks import COLUMNS, Anomaly, Geometry, Kind, LeakList
+
+DECIMALS = 4
+"""Decimals of coordinates in text, m."""
+
+
+def as_csv(leaks: LeakList) -> str:
+    """Write leaks as CSV with a header; the last column, ``geometry``, is WKT.
+
+    First come the stretches for which they can't be vouched for: their ``kind`` is the state of the stretch, ``reasons`` says
+    why, and ``counted`` is False. Then what else is to be known, of the kind ``remark``, in ``reasons``.
+    """
+    out = io.StringIO()
+    writer = csv.DictWriter(out, [*COLUMNS, "geometry"], lineterminator="\n")
+    writer.writeheader()
+    for gap in leaks.coverage.gaps:
+        place = {"chainage_from": _plain(gap.chainage_from), "chainage_to": _plain(gap.chainage_to), "label": gap.label_from}
+        writer.writerow({**place, "kind": gap.state, "reasons": gap.reason, "counted": False})
+    for remark in leaks.remarks:
+        writer.writerow({"kind": "remark", "reasons": remark.said, "counted": False})
+    for leak in leaks.rows:
+        wkt = shapely.to_wkt(leak.geometry, rounding_precision=DECIMALS)
+        writer.writerow({**{name: _plain(getattr(leak, name)) for name in COLUMNS}, "geometry": wkt})
+    return out.getvalue()
+
+
+def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:
+    """Write leaks as a GeoJSON FeatureCollection in the coordinates of the chosen geometry.
+
+    Map and space carry the tunnel's coordinate system in a ``crs`` member, as GDAL and QGIS read it; the
+    unrolled plane has none. Further members are what ``--json`` tells, too: ``statement`` and ``gaps`` say for which
+    stretches the list can't be vouched for, ``remarks`` what else is to be known, ``count`` and ``area`` sum up.
+    """
+    collection: dict[str, Any] = {"type": "FeatureCollection", "name": layer_name(geometry, leaks.kind)}
+    if geometry != "unrolled":
+        collection["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{srid}"}}
+    collection["statement"] = leaks.coverage.statement
+    collection["gaps"] = [asdict(gap) for gap in leaks.coverage.gaps]
+    collection["remarks"] = [asdict(remark) for remark in leaks.remarks]
+    collection |= {"count": leaks.count, "area": round(leaks.area, DECIMALS)}
+    collection["features"] = [
+        {
+            "type": "Feature",
+            "id": leak.id,
+            "geometry": _rounded(mapping(leak.geometry)),
+            "properties": {name: _plain(getattr(leak, name)) for name in COLUMNS},
+        }
+        for leak in leaks.rows
+    ]
+    return json.dumps(collection, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_gpkg(path: Path, leaks: LeakList, geometry: Geometry, srid: int) -> None:
+    """Write leaks as a GeoPackage with one layer; the unrolled plane is an undefined Cartesian system there.
+
+    Where the list can't be vouched for, is in a table ``coverage_gap`` beside it, if there is such a stretch, and what else is
+    to be known in a table ``remark``, if there is anything; both are in the description of the layer, too.
+    """
+    rows = leaks.rows
+    data = [np.array([getattr(leak, name) for leak in rows], dtype=_GPKG_TYPE.get(name, object)) for name in COLUMNS]
+    data[COLUMNS.index("reasons")] = np.array([_plain(leak.reasons) for leak in rows], dtype=object)
+    moments = [leak.reviewed_at for leak in rows]
+    data[COLUMNS.index("reviewed_at")] = np.array(
+        [np.datetime64("NaT") if m is None else _utc(m) for m in moments], dtype="datetime64[ms]"
+    )
+    said = ". ".join(filter(None, (leaks.coverage.statement, leaks.total, *(remark.said for remark in leaks.remarks))))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "'crs' was not provided")  # the unrolled plane has none
+        _write_layer(path, rows, data, geometry, srid, layer_name(geometry, leaks.kind), said)
+    if leaks.coverage.gaps:
+        write_gaps(path, leaks.coverage)
+    if leaks.remarks:
+        write_remarks(path, leaks.remarks)
+
+
+def _write_layer(
+    path: Path, leaks: Sequence[Anomaly], data: list[NDArray[Any]], geometry: Geometry, srid: int, layer: str, said: str
+) -> None:
+    pyogrio.raw.write(
+        str(path),
+        shapely.to_wkb(np.array([leak.geometry for leak in leaks], dtype=object)),
+        data,
+        np.array(COLUMNS),
+        geometry_type="Polygon Z" if geometry == "3d" else "Polygon",
+        crs=None if geometry == "unrolled" else f"EPSG:{srid}",
+        driver="GPKG",
+        layer=layer,
+        DESCRIPTION=said,
+        **(UNDEFINED_CARTESIAN if geometry == "unrolled" else {}),
+    )
+
+
+_GPKG_TYPE: dict[str, Any] = {
+    "id": np.int64,
+    "km": np.int32,
+    "detected": np.bool_,
+    "counted": np.bool_,
+    **dict.fromkeys(
+        (
+            "chainage_from",
+            "chainage_to",
+            "arc_from",
+            "arc_to",
+            "clock",
+            "confidence",
+            "contrast",
+            "area",
+            "drop_mean",
+            "drop_max",
+            "image_share",
+        ),
+        np.float64,
+    ),
+}
+
+
+def layer_name(geometry: Geometry, kind: Kind) -> str:
+    """Name of the layer in files."""
+    return f"{'anomaly' if kind == 'all' else kind}_{geometry}"
+
+
+def _utc(moment: dt.datetime) -> dt.datetime:
+    """Drop the zone, which NumPy doesn't know, after turning to UTC."""
+    return moment.astimezone(dt.UTC).replace(tzinfo=None)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return round(value, DECIMALS)
+    if isinstance(value, list):
+        return ", ".join(value)
+    return value.isoformat() if isinstance(value, dt.datetime) else value
+
+
+def _rounded(shape: dict[str, Any]) -> dict[str, Any]:
+    rings = [[[round(number, DECIMALS) for number in vertex] for vertex in ring] for ring in shape["coordinates"]]
+    return {"type": shape["type"], "coordinates": rings}
