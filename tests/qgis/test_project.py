@@ -142,7 +142,7 @@ def qgs(path: Path) -> str:
 def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str, Any]) -> None:
     layers = seen["layers"]
     assert {name for name, layer in layers.items() if not layer["valid"]} == set()
-    assert set(layers) == {*ON_MAP, *UNROLLED, *(f"demo-2024-km012-{kind}" for kind in IMAGES)}
+    assert set(layers) == {*ON_MAP, *UNROLLED, "remark", *(f"demo-2024-km012-{kind}" for kind in IMAGES)}
     assert seen["crs"] == "EPSG:25830"
     for name, kind in (ON_MAP | UNROLLED).items():
         layer = layers[name]
@@ -555,7 +555,7 @@ def test_project_holds_relative_paths_and_spares_qgis_the_search(shared: Path) -
     assert str(shared.parent) not in text
     assert "<datasource>./demo-images/demo-2024-km012-corrected.tif</datasource>" in text
     sources = re.findall(r"<datasource>([^<]*tunnel_api[^<]*)</datasource>", text)
-    assert len(sources) == len(ON_MAP | UNROLLED)
+    assert len(sources) == len(ON_MAP | UNROLLED) + 1, "and the table of remarks"
     assert all("estimatedmetadata=true" in source and "checkPrimaryKeyUnicity='0'" in source for source in sources)
 
 

@@ -41,11 +41,11 @@ _CHAINAGE_LABEL = (
 _ARC_LABEL = "if(@grid_axis = 'y', to_string(round(@grid_number)), '')"
 
 
-def _cut(text: str, letters: int | str) -> str:
-    """Expression: a text on one line or several, cut where there is no room for all of it, which says so."""
+def _cut(text: str, letters: int | str, more: str = "") -> str:
+    """Expression: a text on one line or several, cut where there is no room for all of it, which says so, and where more is."""
     return (
         f"with_variable('said', coalesce(regexp_replace({text}, '\\\\s+', ' '), ''), "
-        f"if(length(@said) > {letters}, left(@said, {letters} - 1) || '…', @said))"
+        f"if(length(@said) > {letters}, left(@said, {letters} - 1) || '…{more}', @said))"
     )
 
 
@@ -187,21 +187,18 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
         f"Lining [% coalesce(format_number({lining}, 0) || ' m², ' || format_number(100 * {seen}, 1) || ' % of it seen',"
         f" 'not seen yet') %]; leaks [% coalesce({leaks} || ', ' || format_number({wet}, 2) || ' m²', 'not searched for') %]"
     )
-    how = (
-        f"Unrolled lining seen from inside the tunnel, 1:{scale} on A4: along it chainage, up it arc from the crown (0), m, "
-        "the right wall above. "
-    )
+    how = f"Unrolled lining seen from inside, 1:{scale} on A4; up it arc from the crown, m, the right wall above. "
     if survey.intensity_kind == "none":
         sums = "No intensity: leaks were not sought"
         how += f"Red: inwards, blue: outwards; {TOLD}."
     else:
-        how += "Orange: open, blue: confirmed; a number is the leak's."
+        how += "Orange: open, blue: confirmed, with the leak's number; purple: leaks could be missed."
     texts = [
         _label("stretch", stretch, (left, 5, 150, 8), 15, bold=True),
         _label("number", f"Inspection sheet {number}", (right - 110, 5, 110, 8), 10, align="right"),
         _label("what", what, (left, 12.5, 140, 5), 8),
         _label("sums", sums, (right - 140, 12.5, 140, 5), 8, align="right"),
-        _label("how", how, (left + 55, _FOOT + 1, wide - 55, 4), 6.5, align="right"),
+        _label("how", how, (left + 60, _FOOT + 1, wide - 60, 4), 6.5, align="right"),
         _label(
             "signature", "Inspected by ______________________________   on ____________________",
             (left + 55, _FOOT + 6, wide - 55 - 60, 5), 8,
@@ -212,8 +209,10 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
         ),
     ]  # fmt: skip
     if survey.intensity_kind != "none":
-        texts.append(_label("gaps", f"[% {_cut(gaps, 170)} %]", (left, 17, wide, 3.5), 7, bold=True))
-    texts.append(_label("remarks", f"[% {_cut(_SHEET.format('remarks'), 200)} %]", (left, 20.5, wide, 3.5), 6.5))
+        texts.append(_label("gaps", f"[% {_cut(gaps, 170, ' (all: report)')} %]", (left, 17, wide, 3.5), 7, bold=True))
+    texts.append(
+        _label("remarks", f"[% {_cut(_SHEET.format('remarks'), 205, ' (all: report)')} %]", (left, 20.5, wide, 3.5), 6.5)
+    )
     for page in range(1, pages):
         texts += [
             _label(f"stretch {page + 1}", f"{stretch}, leaks continued", (left, 7, 150, 8), 12, page=page, bold=True),
