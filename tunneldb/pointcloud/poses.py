@@ -20,6 +20,9 @@ TIME_TOLERANCE = 0.001
 LONGEST_GAP = 1.0  # s
 GAP_INTERVALS = 10  # times the median interval of the trajectory
 
+_WEEK = 604_800.0  # s
+_UNIX_TO_GPS = 315_964_800.0  # s from 1970 to the beginning of GPS time, without leap seconds
+
 _BLOCK = 1 << 18  # points at a time
 
 
@@ -37,6 +40,8 @@ class PoseFaults:
         How far the worst of them lie before its start and after its end, s.
     unknown : dict of int to int
         Number of points of each scan_id that has no station.
+    guess : str
+        Why the times may differ.
     """
 
     outside: int = 0
@@ -44,6 +49,7 @@ class PoseFaults:
     before: float = 0.0
     after: float = 0.0
     unknown: dict[int, int] = field(default_factory=dict)
+    guess: str = ""
 
     @property
     def points(self) -> int:
@@ -63,6 +69,7 @@ class PoseFaults:
             max(self.before, other.before),
             max(self.after, other.after),
             unknown,
+            self.guess or other.guess,
         )
 
     def text(self) -> str:
@@ -81,7 +88,7 @@ class PoseFaults:
         ]
         lost = [f"gps_time of {self.outside} points is outside the trajectory, {' and '.join(where)}"] if self.outside else []
         lost += [f"{self.gap} points were measured in gaps of the trajectory"] if self.gap else []
-        return f"{' and '.join(lost)}; give the whole trajectory, in the time that the file uses"
+        return f"{' and '.join(lost)}; {self.guess or 'give the whole trajectory, in the time that the file uses'}"
 
 
 @dataclass(frozen=True)
@@ -153,7 +160,8 @@ class PoseModel:
             outside = points.time[~self._covers(points.time)]
             gap = int(np.count_nonzero(self._in_gap(points.time)))
             before, after = (float(np.nanmax(off, initial=0.0)) for off in (self.time[0] - outside, outside - self.time[-1]))
-            return PoseFaults(len(outside), gap, before, after)
+            guess = _clocks(self.time, outside) if len(outside) else ""
+            return PoseFaults(len(outside), gap, before, after, guess=guess)
         scans, counts = _count_scans(points.scan_id)
         known = np.isin(scans, self.scan_id)
         return PoseFaults(unknown=dict(zip(scans[~known].tolist(), counts[~known].tolist(), strict=True)))
@@ -187,6 +195,19 @@ class PoseModel:
         for begin, end in self.gaps:
             inside |= (time > begin + TIME_TOLERANCE) & (time < end - TIME_TOLERANCE)
         return inside
+
+
+def _clocks(track: Float, points: Float) -> str:
+    """Which clocks a trajectory and points outside of it seem to have, where these are others; said as a guess."""
+    one, other = float(np.median(track)), float(np.median(points))
+    in_week = [0.0 <= time <= _WEEK for time in (one, other)]
+    if in_week[0] != in_week[1]:
+        names = ("seconds of the GPS week", "time since an epoch")
+        return f"the trajectory seems to be in {names[in_week[1]]}, the file in {names[in_week[0]]}: bring them to one"
+    for seconds, names in ((1e9, ("adjusted GPS time", "GPS time")), (_UNIX_TO_GPS, ("GPS time", "Unix time"))):
+        if abs(abs(other - one) - seconds) < _WEEK:
+            return f"the trajectory seems to be in {names[one > other]}, the file in {names[other > one]}: bring them to one"
+    return ""
 
 
 def _count_scans(scan_id: Int32) -> tuple[Int64, Int64]:

@@ -20,6 +20,7 @@ from scipy.spatial import cKDTree
 from tunneldb.arrays import Bool, Float, Int32, Int64, Intp, Single
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.misplacement import explain_misplacement
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pointcloud.chainage_lookup import STRETCHING, ChainageLookup
 from tunneldb.pointcloud.formats.raw import read_raw
@@ -227,7 +228,7 @@ class _Filter:
 
     def read(self, progress: Progress, chunk: int) -> None:
         """Read the file, and set aside what the noise filter has to look at."""
-        counts, nearest = self.counts, math.inf
+        counts, nearest, guess = self.counts, math.inf, None
         with closing(prefetch(map(Points.of, read_raw(self.path, self.dimension, chunk)))) as chunks:
             for points in chunks:
                 self._set_aside(points)
@@ -235,13 +236,16 @@ class _Filter:
                     vertices = self.places.alignment.vertices
                     some = points.xyz[np.isfinite(points.xyz).all(axis=1)][::100]
                     nearest = min(nearest, float(cKDTree(vertices).query(some)[0].min(initial=math.inf)))
+                    if guess is None and len(some):
+                        guess = explain_misplacement(some, vertices, self.settings.max_distance)
                 progress(len(points))
         for ranges in counts.ranges.values():
             ranges[-1] = (ranges[-1][0], min(ranges[-1][1], counts.points))
         if counts.outside and counts.outside + counts.invalid == counts.points:
+            check = "check the axis, the file's coordinates and the tunnel's SRID"
             raise UserError(
                 f"{self.path}: no points near the axis: the nearest is about {nearest:.0f} m from it and the limit is "
-                f"{self.settings.max_distance:g} m; check the axis, the file's coordinates and the tunnel's SRID"
+                f"{self.settings.max_distance:g} m; {guess or check}"
             )
         self._require_most()
 

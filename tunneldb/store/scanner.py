@@ -18,6 +18,7 @@ from tunneldb.csvfile import CsvTable, read_csv
 from tunneldb.database.copy import PointZ, copy_binary, pack
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.misplacement import explain_misplacement
 from tunneldb.pointcloud.pose_checks import FARTHEST_ASIDE, FARTHEST_BEYOND, far_from_axis, jumps
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.stations import read_stations
@@ -176,9 +177,10 @@ def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunne
     distance = alignment.distance(xyz)
     if np.isnan(distance).all() or np.nanmin(distance) > FARTHEST_SCANNER:
         nearest = "beyond its ends" if np.isnan(distance).all() else f"{np.nanmin(distance):.0f} m at the nearest"
+        guess = explain_misplacement(xyz, alignment.vertices, FARTHEST_SCANNER)
         raise UserError(
             f"{', '.join(map(str, paths))}: the scanner was never within {FARTHEST_SCANNER:g} m of the axis of {tunnel!r} "
-            f"({nearest}); is it of another tunnel or in another SRID?"
+            f"({nearest}); {guess or 'is it of another tunnel or in another SRID?'}"
         )
 
 
