@@ -69,6 +69,12 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         for look in looks
         if look.profile_spacing is not None and look.profile_spacing > FAR_APART
     ]
+    if all(look.only_noise for look in looks):
+        doubts.append(
+            "nothing to load: all points would be left out as noise, for none has others near enough to be of one surface with"
+            " it; single points that were measured in profiles are no scan"
+        )
+        return FirstSteps(missing, doubts, [])
     if axis_fault is not None:
         doubts.append(f"no axis can be found in the points (--axis auto is refused): {axis_fault}")
     if foreign := [look.path for look in looks if look.foreign_unit]:

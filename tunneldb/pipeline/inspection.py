@@ -18,6 +18,7 @@ from tunneldb.pointcloud.form import WINDOW, TunnelForm, profile_spacing, surfac
 from tunneldb.pointcloud.formats.las import read_las_facts
 from tunneldb.pointcloud.formats.scans import PosedScan
 from tunneldb.pointcloud.formats.table import format_of, posed_scans
+from tunneldb.pointcloud.noise import noise_filter
 from tunneldb.pointcloud.reader import ScanHeader, read_header
 from tunneldb.radiometry.intensity_kind import KindGuess, ValueRange, contradiction, guess_kind, value_range
 
@@ -125,6 +126,8 @@ class FileLook:
     poses : list of PosedScan
         Scans that the file knows, with the positions that it gives them.
     intensities : list of IntensityLook
+    only_noise : bool
+        Whether all points would be left out as noise, each too far from others; False where not all were looked at.
     """
 
     path: Path
@@ -152,6 +155,7 @@ class FileLook:
     poses: list[PosedScan]
     intensities: list[IntensityLook]
     foreign_unit: bool = False
+    only_noise: bool = False
 
     @property
     def other_than_a_tunnel(self) -> str | None:
@@ -211,6 +215,7 @@ def inspect_file(path: Path, begin: Callable[[str, float | None], Callable[[floa
         posed_scans(path),
         [_look_at(path, name, contents.points) for name in names],
         header.crs is not None and _unit_of(header.crs) is not None,
+        contents.share == 1.0 and bool(noise_filter(contents.xyz).all()),
     )
 
 

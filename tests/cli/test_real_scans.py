@@ -1,0 +1,56 @@
+"""Scans of real places from `inspect` to the report, by no other commands and options than it names; skipped without them."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from support.real_scans import real_scan
+
+from tunneldb.cli.main import main
+
+UNPOSED = "--no-poses in place of --stations, with intensity of kind reflectance or none"
+"""What `inspect` says of scans of which nobody knows where the scanner stood."""
+
+
+def run(*arguments: str) -> str:
+    result = CliRunner().invoke(main, arguments, catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def inspect(path: Path) -> dict[str, Any]:
+    found = json.loads(CliRunner().invoke(main, ["inspect", str(path), "--json"]).stdout)
+    assert found["ok"]
+    return found
+
+
+def test_a_room_with_a_pump_is_doubted_and_surveyed(dsn: str, tmp_path: Path) -> None:
+    """A room of 3.8 m by 4.3 m, whose axis is drawn by hand through its middle."""
+    found = inspect(real_scan("pump.e57"))
+    assert any("is it a tunnel?" in doubt for doubt in found["doubts"])
+    assert any(UNPOSED in doubt for doubt in found["doubts"])
+    axis = tmp_path / "axis.csv"
+    axis.write_text("x,y,z\n-0.6,-5.2,-0.5\n-0.6,-0.9,-0.5\n")
+    for command in found["commands"]:
+        words = command.replace("SRID", "25832", 1).replace("AXIS.csv", str(axis)).replace("YYYY-MM-DD", "2017-09-25")
+        before, stations, _ = words.partition("--stations")
+        run(*shlex.split(f"{before} --no-poses --intensity-kind none" if stations else words)[1:])
+    run("report", "pump-scan", "-o", str(tmp_path / "report.html"))
+    text = (tmp_path / "report.html").read_text("utf-8")
+    assert "Leaks were not sought: the survey has no intensity" in text
+
+
+@pytest.mark.parametrize("separator", [",", "\t"])
+def test_rings_of_single_points_are_refused_at_once(separator: str, tmp_path: Path) -> None:
+    """Eight points a ring, measured by total station, are no scan: none has others near it."""
+    path = tmp_path / "points.csv"
+    path.write_text(real_scan("wriggle/points.csv").read_text().replace(",", separator))
+    found = inspect(path)
+    assert found["commands"] == []
+    assert found["files"][0]["only_noise"] is True
+    assert any("all points would be left out as noise" in doubt for doubt in found["doubts"])
