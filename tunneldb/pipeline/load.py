@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import psycopg
+from psycopg.types.json import Jsonb
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
@@ -19,12 +20,14 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import parameters_of, require_same_density, settings_of
 from tunneldb.pipeline.read import Begin, Counts, Reading, silent
 from tunneldb.pointcloud.reader import ScanHeader, crs_note, read_header
+from tunneldb.pointcloud.second_tube import find_second_tubes
 from tunneldb.pointcloud.selection import MEMORY, FilterSettings
 from tunneldb.pointcloud.spool import Spool
 from tunneldb.store.ledger import Run, lock, stage_run
 from tunneldb.store.partition import (
     drop_fragments,
     partition_exists,
+    parts_by_window,
     read_fragment,
     read_partition,
     rows_in,
@@ -50,7 +53,8 @@ def load_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, setti
     Returns
     -------
     dict
-        ``files``, those that waited, and ``kept``, the rows that the kilometre has now.
+        ``files``, those that waited, ``kept``, the rows that the kilometre has now, and ``second_tube`` and ``note``, if
+        rows of a tube beside it were left out.
 
     Raises
     ------
@@ -60,7 +64,7 @@ def load_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, setti
     require_same_density(conn, survey, settings)
     merged = merge(conn, survey, km, settings)
     finish(conn, survey, [merged])
-    return {"files": merged.files, "kept": merged.kept}
+    return {"files": merged.files, "kept": merged.kept, **merged.note}
 
 
 @dataclass(frozen=True)
@@ -71,14 +75,17 @@ class Merged:
     ----------
     km, files, kept : int
         Number of the kilometre; files that waited for it; rows that it has now.
-    changes : dict of int to (int, int)
-        By how much the rows kept and thinned of files (by id) change.
+    changes : dict of int to (int, int, int)
+        By how much the rows kept, thinned and outside of files (by id) change.
+    note : dict
+        What is to be known of it, for the ledger: ``second_tube``, the rows left out, and ``note``; empty if nothing is.
     """
 
     km: int
     files: int
     kept: int
-    changes: dict[int, tuple[int, int]]
+    changes: dict[int, tuple[int, int, int]]
+    note: Counts
 
 
 def merge(
@@ -119,7 +126,7 @@ def merge(
         advance = begin(f"kilometre {km}", max(total, 1))
         if not waiting:
             advance(1)
-            return Merged(km, 0, rows_in(conn, survey, km), {})
+            return Merged(km, 0, rows_in(conn, survey, km), {}, _told(conn, survey, km))
         stored = [file_id for file_id, count in waiting.items() if count and file_id not in held]
         for file_id in stored:
             for rows in read_fragment(conn, survey, file_id, km, tags[file_id]):
@@ -128,26 +135,44 @@ def merge(
         parts += [(held[file_id], tags[file_id]) for file_id in waiting if file_id in held]
         # A file by itself is thinned already.
         edge = None if len(waiting) == 1 and not before.any() else settings.edge
-        written = write_partition(conn, survey, km, parts, edge, file_ids, advance)
+        alignment = load_alignment(conn, survey)
+        tubes = find_second_tubes(parts_by_window(parts, km), alignment, km)
+        own = (lambda rows: tubes.own(rows, alignment)) if tubes.any else None
+        written, beside = write_partition(conn, survey, km, parts, edge, file_ids, advance, own)
     drop_fragments(conn, survey, stored, [km])
     record_loaded(conn, km, list(waiting))
     changes = {}
     for file_id, tag in tags.items():
-        change = int(written[tag] - before[tag])
+        change, other = int(written[tag] - before[tag]), int(beside[tag])
         # of a file that waited all points were counted as neither kept nor thinned there
-        changes[file_id] = (change, waiting.get(file_id, 0) - change)
-    return Merged(km, len(waiting), int(written.sum()), changes)
+        changes[file_id] = (change, waiting.get(file_id, 0) - change - other, other)
+    # what was left out before is not in the rows that were there
+    note = _told(conn, survey, km) if before.any() else {}
+    if tubes.any:
+        points = int(beside.sum()) + int(note.get("second_tube", 0))
+        note = {"second_tube": points, "note": tubes.note(points)}
+    return Merged(km, len(waiting), int(written.sum()), changes, note)
+
+
+def _told(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Counts:
+    """What the ledger has of a second tube that was left out of a kilometre when it was loaded last."""
+    row = conn.execute(
+        "SELECT counts FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage = 'load' AND outcome = 'done'"
+        " ORDER BY started_at DESC, id DESC LIMIT 1",
+        [survey.id, km],
+    ).fetchone()
+    return {} if row is None else {name: row[0][name] for name in ("second_tube", "note") if name in row[0]}
 
 
 def finish(conn: psycopg.Connection[Any], survey: Survey, merged: Sequence[Merged]) -> None:
     """Put kilometres in place, and enter what their files have come to: last in a transaction, for others wait then."""
-    changes: dict[int, tuple[int, int]] = {}
+    changes: dict[int, tuple[int, int, int]] = {}
     for one in merged:
         if one.files:
             swap_partition(conn, survey, one.km, one.kept)
         for file_id, change in one.changes.items():
-            kept, thinned = changes.get(file_id, (0, 0))
-            changes[file_id] = (kept + change[0], thinned + change[1])
+            kept, thinned, outside = changes.get(file_id, (0, 0, 0))
+            changes[file_id] = (kept + change[0], thinned + change[1], outside + change[2])
     change_counts(conn, changes)
 
 
@@ -271,7 +296,7 @@ def _load_batch(reading: Reading, headers: Sequence[ScanHeader], given: Sequence
         merged = [merge(conn, survey, km, settings, begin, reading.memory, held) for km in waiting]
         finish(conn, survey, merged)
         for one in merged:
-            _enter(conn, run, one.km, one.kept)
+            _enter(conn, run, one)
         _withdraw(conn, survey, [header.path.name for header in headers])
         share = (time.monotonic() - started) / len(read)
         loaded = [replace(outcome(conn, file.id, file.state, file.seconds + share), note=file.note) for file in read]
@@ -297,15 +322,15 @@ def _waiting(conn: psycopg.Connection[Any], file_ids: list[int]) -> list[int]:
     return [row[0] for row in rows.fetchall()]
 
 
-def _enter(conn: psycopg.Connection[Any], run: Run, km: int, kept: int) -> None:
+def _enter(conn: psycopg.Connection[Any], run: Run, one: Merged) -> None:
     """Enter the kilometre into the ledger, for what rests on its points."""
     conn.execute(
         """
         INSERT INTO tunnel.run (survey_id, km, stage, parameters, versions, counts, backend_pid, backend_start,
                                 started_at, finished_at, outcome)
-        SELECT survey_id, %s, stage, parameters, versions, jsonb_build_object('kept', %s::int8), backend_pid,
+        SELECT survey_id, %s, stage, parameters, versions, %s, backend_pid,
                backend_start, started_at, clock_timestamp(), 'done'
           FROM tunnel.run WHERE id = %s
         """,
-        [km, kept, run.id],
+        [one.km, Jsonb({"kept": one.kept, **one.note}), run.id],
     )

@@ -16,7 +16,7 @@ import numpy as np
 import psycopg
 from psycopg import sql
 
-from tunneldb.arrays import Int32, Int64
+from tunneldb.arrays import Bool, Int32, Int64
 from tunneldb.database.copy import copy_binary
 from tunneldb.database.fetch import fetch_array
 from tunneldb.geometry.alignment import Alignment
@@ -99,7 +99,8 @@ def write_partition(
     edge: float | None,
     file_ids: Int32,
     progress: Callable[[int], None],
-) -> Int64:
+    own: Callable[[Rows], Bool] | None = None,
+) -> tuple[Int64, Int64]:
     """Build a kilometre's partition aside from all its rows, thinned as a whole; `swap_partition` puts it in place.
 
     The table is made and filled in the caller's transaction: the embedded server writes no WAL for its rows.
@@ -115,20 +116,27 @@ def write_partition(
         equal in all else.
     progress : callable
         Called with the number of rows looked at.
+    own : callable or None
+        Tells which rows are of the tunnel; others are left out. None: all are.
 
     Returns
     -------
-    (k,) int64 array
-        Rows written of each tag.
+    two (k,) int64 arrays
+        Rows written of each tag, and those left out.
     """
     begin, end = km * BINS_PER_KM, (km + 1) * BINS_PER_KM
     counts = sum((spool.counts_of(begin, end) for spool, _ in parts), np.zeros(BINS_PER_KM, np.int64))
-    written = np.zeros(len(file_ids), np.int64)
+    written, left_out = np.zeros(len(file_ids), np.int64), np.zeros(len(file_ids), np.int64)
     reach = 0 if edge is None else math.ceil(voxel_reach(edge) * BINS_PER_METRE)
 
     def chunks() -> Iterator[memoryview]:
         for low, high in windows(begin, counts, WINDOW):
             rows = _read(parts, max(low - reach, begin), min(high + reach, end))
+            if own is not None:
+                mine, bins = own(rows), bin_of(rows["chainage"])
+                other = rows["tag"][~mine & (bins >= low) & (bins < high)]
+                np.add(left_out, np.bincount(other, minlength=len(left_out)), out=left_out)
+                rows = rows[mine]
             if edge is not None:
                 stays, _ = first_of_voxels(rows, edge, np.ones(len(rows), np.bool_))
                 bins = bin_of(rows["chainage"])
@@ -146,7 +154,15 @@ def write_partition(
     )
     with closing(prefetch(chunks())) as packed:
         copy_binary(conn, new, COLUMNS, packed, fresh=True)
-    return written
+    return written, left_out
+
+
+def parts_by_window(parts: Sequence[tuple[Spool, int | None]], km: int) -> Iterator[Rows]:
+    """Rows of several spools in a kilometre, a window of chainage after the other."""
+    begin, end = km * BINS_PER_KM, (km + 1) * BINS_PER_KM
+    counts = sum((spool.counts_of(begin, end) for spool, _ in parts), np.zeros(BINS_PER_KM, np.int64))
+    for low, high in windows(begin, counts, WINDOW):
+        yield _read(parts, low, high)
 
 
 def _read(parts: Sequence[tuple[Spool, int | None]], low: int, high: int) -> Rows:

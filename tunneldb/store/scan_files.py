@@ -217,17 +217,17 @@ def record_loaded(conn: psycopg.Connection[Any], km: int, file_ids: list[int]) -
     conn.execute("UPDATE tunnel.file_km SET loaded_at = clock_timestamp() WHERE file_id = ANY (%s) AND km = %s", [file_ids, km])
 
 
-def change_counts(conn: psycopg.Connection[Any], changes: Mapping[int, tuple[int, int]]) -> None:
-    """Add to the rows that files have (by id) and to those thinned.
+def change_counts(conn: psycopg.Connection[Any], changes: Mapping[int, tuple[int, int, int]]) -> None:
+    """Add to the rows that files have (by id), to those thinned and to those outside, as of a second tube.
 
     To be called last in a transaction: rows are locked in the order of their ids, so that two that load kilometres
     with the same files wait for each other's end and never for each other.
     """
     for file_id in sorted(changes):
-        kept, thinned = changes[file_id]
-        if kept or thinned:
+        kept, thinned, outside = changes[file_id]
+        if kept or thinned or outside:
             conn.execute(
-                "UPDATE tunnel.scan_file SET kept = kept + %s, thinned = thinned + %s, loaded_at = clock_timestamp()"
-                " WHERE id = %s",
-                [kept, thinned, file_id],
+                "UPDATE tunnel.scan_file SET kept = kept + %s, thinned = thinned + %s, outside = outside + %s,"
+                " loaded_at = clock_timestamp() WHERE id = %s",
+                [kept, thinned, outside, file_id],
             )
