@@ -55,8 +55,10 @@ COMMENT ON FUNCTION tunnel_api.axis_frame(int[], float8[], float8[], float8[]) I
 -- floor weighs no more than a thin crown. The centre is where opposite classes are equally far: to the side the median over
 -- pairs of classes mirrored in the upward direction, 45° to 135° from it; upwards the median over the classes of the
 -- vault (45° about the upward direction) against the level of the floor. Medians leave niches, cables and
--- equipment without weight. Where fewer than three pairs of classes are filled it is the plain mean of the points,
--- as the paper has it. A vertex whose slab holds fewer than min_points points is left out.
+-- equipment without weight. In a tunnel more than twice as wide as high most of those pairs lie on vault and floor: there only
+-- those count that are 0.8 of its width apart or more, and within 10 % as far as they are in the other slabs, where no train
+-- stands before a wall; a vertex without any is left out. Where fewer than three pairs of classes are filled it is the plain
+-- mean of the points, as the paper has it. A vertex whose slab holds fewer than min_points points is left out.
 CREATE OR REPLACE FUNCTION tunnel_api.axis_shift(
     survey_id int, n int[], x float8[], y float8[], z float8[],
     half_width float8 DEFAULT 1.0, angle_step float8 DEFAULT 5.0, min_points int DEFAULT 100)
@@ -103,11 +105,28 @@ BEGIN
             WHERE abs(c.angle) < 45
             GROUP BY c.n
             HAVING count(*) >= 3 AND min(f.classes) >= 3
-        ), sideward AS (
-            SELECT a.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY (a.radius - b.radius) / 2) AS shift
+        ), pair AS (
+            SELECT a.n, a.angle, (a.radius - b.radius) / 2 AS shift, (a.radius + b.radius) * sind(a.angle) AS apart
             FROM class a JOIN class b ON b.n = a.n AND b.angle = -a.angle
             WHERE a.angle BETWEEN 45 AND 135
-            GROUP BY a.n
+        ), usual AS (  -- how far apart the pairs are where nothing stands before the walls
+            SELECT q.angle, least(q.apart[2], 1.1 * max(q.apart[1]) OVER ()) AS apart
+            FROM (SELECT p.angle, percentile_cont(ARRAY[0.5, 0.8]) WITHIN GROUP (ORDER BY p.apart) AS apart
+                  FROM pair p GROUP BY p.angle) q
+        ), low AS (  -- whether the tunnel is low and wide
+            SELECT max(u.apart) AS width, max(u.apart) > 2 * (
+                SELECT percentile_cont(0.5) WITHIN GROUP (ORDER BY f.depth + v.height)
+                FROM floor_level f
+                JOIN (SELECT c.n, percentile_cont(0.5) WITHIN GROUP (ORDER BY c.radius * cosd(c.angle)) AS height
+                      FROM class c WHERE abs(c.angle) < 45 GROUP BY c.n) v ON v.n = f.n) AS is_low
+            FROM usual u
+        ), sideward AS (
+            SELECT p.n, coalesce(l.is_low, false) AS is_low,
+                percentile_cont(0.5) WITHIN GROUP (ORDER BY p.shift)
+                    FILTER (WHERE l.is_low IS NOT TRUE
+                              OR u.apart >= 0.8 * l.width AND abs(p.apart / u.apart - 1) <= 0.1) AS shift
+            FROM pair p JOIN usual u ON u.angle = p.angle CROSS JOIN low l
+            GROUP BY p.n, l.is_low
             HAVING count(*) >= 3
         ), total AS (
             SELECT c.n, sum(c.points)::bigint AS points, sum(c.u) / sum(c.points) AS u, sum(c.w) / sum(c.points) AS w
@@ -118,7 +137,7 @@ BEGIN
         FROM total t
         LEFT JOIN sideward s ON s.n = t.n
         LEFT JOIN upward u ON u.n = t.n
-        WHERE t.points >= $6
+        WHERE t.points >= $6 AND (s.shift IS NOT NULL OR s.is_low IS NOT TRUE)
         ORDER BY t.n
     $query$, tunnel_api.partition_source(axis_shift.survey_id, floor(low / 1000)::int, floor(high / 1000)::int))
     USING low, high, spacing, axis_shift.half_width, axis_shift.angle_step, axis_shift.min_points,
