@@ -52,8 +52,57 @@ COMMENT ON FUNCTION tunnel_api.section_gather(int, int, float8, float8, float8, 
 'Angular classes of each section of one kilometre as arrays; the slab (width: half of it, m) is widened until nine classes of ten hold min_points points.';
 
 
+-- Whether a section has a roof: at least a third of the classes within 45° of the upward direction are filled (radius: over the
+-- classes, NULL for an empty one). A portal or an open cut has none, and no lining.
+CREATE OR REPLACE FUNCTION tunnel_api.section_roofed(angle_step float8, radius float8[])
+RETURNS boolean
+LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
+AS $$
+    SELECT count(k.radius) * 3 >= count(*)
+    FROM unnest($2) WITH ORDINALITY AS k (radius, class)
+    WHERE abs((k.class - 0.5) * $1 - 180) < 45
+$$;
+COMMENT ON FUNCTION tunnel_api.section_roofed(float8, float8[]) IS
+'Whether at least a third of the angular classes within 45° of the upward direction are filled: without a roof there is no lining. radius: over the classes, counted from -180°, NULL for an empty one.';
+
+
+-- Where a kilometre has a floor and no roof, so no section: the chainage that each such plane stands for, m.
+CREATE OR REPLACE FUNCTION tunnel_api.section_open(
+    survey_id int, km int, angle_step float8, max_half_width float8, min_points int)
+RETURNS TABLE (chainage_from float8, chainage_to float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+ROWS 10
+AS $$
+    WITH class AS MATERIALIZED (
+        SELECT c.segment, c.half, c.class, c.radius
+        FROM (SELECT coalesce(array_agg(p.segment * 100 + p.half), '{}') AS missing
+              FROM tunnel_api.section_plane($1, $2) p
+              WHERE NOT EXISTS (SELECT FROM tunnel.section s
+                                WHERE s.survey_id = $1 AND s.km = $2 AND s.segment = p.segment AND s.half = p.half)) m
+        CROSS JOIN LATERAL tunnel_api.section_classes($1, $2, $4, $3, m.missing) c
+        WHERE c.points >= $5
+    ), seen AS (
+        SELECT d.segment, d.half, array_agg(c.radius ORDER BY i) AS radius,
+            count(c.radius) FILTER (WHERE abs((i + 0.5) * $3 - 180) > 135) * 3
+                >= count(*) FILTER (WHERE abs((i + 0.5) * $3 - 180) > 135) AS floored
+        FROM (SELECT DISTINCT c.segment, c.half FROM class c) d
+        CROSS JOIN generate_series(0, round(360 / $3)::int - 1) AS i
+        LEFT JOIN class c ON c.segment = d.segment AND c.half = d.half AND c.class = i
+        GROUP BY d.segment, d.half
+    )
+    SELECT s.chainage_from + (q.half - 25) / 100.0 * (s.chainage_to - s.chainage_from),
+        s.chainage_from + (q.half + 25) / 100.0 * (s.chainage_to - s.chainage_from)
+    FROM seen q JOIN tunnel.segment s ON s.survey_id = $1 AND s.km = $2 AND s.n = q.segment
+    WHERE q.floored AND NOT tunnel_api.section_roofed($3, q.radius)
+    ORDER BY 1
+$$;
+COMMENT ON FUNCTION tunnel_api.section_open(int, int, float8, float8, int) IS
+'Where a kilometre has a floor and no roof, as at portals and in open cuts, and therefore no section: chainage from and to of each plane, m.';
+
+
 -- The curves of the sections of a kilometre.
 --
+-- A section without a roof is left out: there is no lining.
 -- Each section is compared with the two before and the two after it (at the ends of the kilometre, with the nearest four),
 -- class by class. A class that stands in from their median
 -- by more than protrusion, and by more than the lining differs there from section to section, holds something hung on the
@@ -72,6 +121,7 @@ AS $$
         SELECT row_number() OVER (ORDER BY g.segment, g.half) AS i, g.*
         FROM tunnel_api.section_gather(section_curves.survey_id, section_curves.km, section_curves.angle_step,
             section_curves.half_width, section_curves.max_half_width, section_curves.min_points) g
+        WHERE tunnel_api.section_roofed(section_curves.angle_step, g.radius)
     ), alone AS MATERIALIZED (
         SELECT g.i, q.*
         FROM gathered g

@@ -19,6 +19,9 @@ MOST_NAMED = 5
 WIDEST = 20.0
 """Tunnels are narrower, m: four lanes or three tracks under one vault."""
 
+TOUCHING = 0.1
+"""Stretches with less between them are one, m."""
+
 FOOT = 0.3048
 """m."""
 
@@ -126,18 +129,49 @@ def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Map
         " FROM tunnel.section_class c WHERE c.section_id = s.id)) FROM tunnel.section s WHERE s.survey_id = %s AND s.km = %s",
         [survey.id, km],
     ).fetchone()
-    note = _too_wide(2.0 * width[0]) if width is not None and width[0] is not None else {}
-    return {"sections": built, **{f"classes_{state}": count for state, count in classes}, **note}
+    open_length, unroofed = _without_roof(conn, survey, km, values)
+    notes = [unroofed, _too_wide(2.0 * width[0]) if width is not None and width[0] is not None else ""]
+    return {
+        "sections": built,
+        **{f"classes_{state}": count for state, count in classes},
+        **({"open": round(open_length, 1)} if open_length else {}),
+        **({"note": "; ".join(filter(None, notes))} if any(notes) else {}),
+    }
 
 
-def _too_wide(width: float) -> Counts:
+def _without_roof(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float]) -> tuple[float, str]:
+    """Length (m) of what has a floor and no roof, as portals and open cuts, and what is to be known of it."""
+    planes = conn.execute(
+        "SELECT chainage_from, chainage_to FROM tunnel_api.section_open(%s, %s, %s, %s, %s)",
+        [survey.id, km, values["section.angle_step"], values["section.max_half_width"], int(values["section.min_points"])],
+    ).fetchall()
+    stretches: list[list[float]] = []
+    for low, high in planes:
+        if stretches and low - stretches[-1][1] < TOUCHING:
+            stretches[-1][1] = high
+        else:
+            stretches.append([low, high])
+    named = []
+    for stretch in stretches[:MOST_NAMED]:
+        labels = conn.execute(
+            "SELECT label FROM unnest(%s::float8[]) WITH ORDINALITY AS c (chainage, i),"
+            " tunnel_api.stationing((SELECT tunnel_id FROM tunnel.survey WHERE id = %s), c.chainage) ORDER BY i",
+            [[round(end, 1) for end in stretch], survey.id],
+        ).fetchall()
+        named.append(" and ".join(label for (label,) in labels))
+    more = f" and {len(stretches) - MOST_NAMED} stretches more" if len(stretches) > MOST_NAMED else ""
+    note = f"no roof between {', between '.join(named)}{more}: an open cut or a portal, without sections and lining"
+    return sum(high - low for low, high in stretches), note if stretches else ""
+
+
+def _too_wide(width: float) -> str:
     """Question sections of a width (m) that no tunnel has, as where coordinates in feet are taken for metres."""
     if width <= WIDEST:
-        return {}
-    return {
-        "note": f"the sections are {width:.1f} m wide: are the coordinates in feet ({width * FOOT:.1f} m then), is it a cavern,"
+        return ""
+    return (
+        f"the sections are {width:.1f} m wide: are the coordinates in feet ({width * FOOT:.1f} m then), is it a cavern,"
         " or are there two tubes? Transform the scan to metres"
-    }
+    )
 
 
 def _one(conn: psycopg.Connection[Any], query: LiteralString, *arguments: Any) -> int:
