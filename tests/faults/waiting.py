@@ -11,6 +11,9 @@ from faults.project import Project
 PATIENCE = 180.0
 """Seconds, far more than anything takes."""
 
+INTERVAL = 0.1
+"""Seconds between two looks: each is a session of the server's, which takes from what is waited for."""
+
 
 def wait_for(project: Project, what: Callable[[], object], process: subprocess.Popen[bytes] | None = None) -> None:
     """Wait until something is true, while a process goes on."""
@@ -18,7 +21,7 @@ def wait_for(project: Project, what: Callable[[], object], process: subprocess.P
     while not what():
         assert time.monotonic() < end, project.said("worker.log")[-3000:]
         assert process is None or process.poll() is None, project.said("worker.log")[-3000:]
-        time.sleep(0.02)
+        time.sleep(INTERVAL)
 
 
 def done(project: Project) -> bool:
