@@ -38,8 +38,8 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 LONG = ("faults", "report", "qgis", "pipeline", "queue", "simulate", "classification")
 """Folders whose tests take longest, in the order in which they begin: the last tests of a run are short ones."""
 
-SHARED = ("long", "short")
-"""Fixtures of the session that take minutes to make: what asks for them runs on one worker, whatever its module."""
+SHARED = "survey"
+"""Fixture of the fault tests that takes a minute to make: what asks for it runs on one worker, whatever its module."""
 
 
 @pytest.hookimpl(wrapper=True)  # before pytest-xdist reads the groups
@@ -49,7 +49,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> Iterator[None]:
         fixtures = getattr(item, "fixturenames", ())
         if "server_dsn" in fixtures or item.path.parent.name == "faults" or item.path.name == "test_server.py":
             item.add_marker("server")
-        group = next((name for name in SHARED if name in fixtures and "faults" in item.path.parts), item.path.name)
+        group = SHARED if SHARED in fixtures and "faults" in item.path.parts else item.path.name
         item.add_marker(pytest.mark.xdist_group(f"{item.path.parent.name}/{group}"))
     place = {name: n for n, name in enumerate(LONG)}
     items.sort(key=lambda item: place.get(item.path.parent.name, len(LONG)))

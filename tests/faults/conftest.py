@@ -1,4 +1,4 @@
-"""Simulated tunnels, and what an undisturbed batch makes of them."""
+"""A simulated tunnel, and what an undisturbed batch makes of them."""
 
 from __future__ import annotations
 
@@ -34,9 +34,12 @@ class Survey:
         return sorted(self.points())
 
 
-def _survey(folder: Path, last: int) -> Iterator[Survey]:
+@pytest.fixture(scope="session")
+def survey(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Survey]:
+    """Five kilometres: each way in which a file lies over their borders is there once."""
+    last = 4
     scene = make(1, last)
-    files = split(scene.scan, folder, anyhow)
+    files = split(scene.scan, tmp_path_factory.mktemp("survey"), anyhow)
     project = Project(scene)
     try:
         with reading(project, range(last + 1)) as seen:
@@ -50,15 +53,3 @@ def _survey(folder: Path, last: int) -> Iterator[Survey]:
         yield survey
     finally:
         project.close()
-
-
-@pytest.fixture(scope="session")
-def long(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Survey]:
-    """Ten kilometres."""
-    yield from _survey(tmp_path_factory.mktemp("long"), 9)
-
-
-@pytest.fixture(scope="session")
-def short(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Survey]:
-    """Five kilometres."""
-    yield from _survey(tmp_path_factory.mktemp("short"), 4)

@@ -25,7 +25,7 @@ NAME = "long"
 REACH = 25.0  # m
 DENSITY = 100.0  # points per m²
 # Stage parameters that suit a thin scan.
-THIN = ("image.pixel=0.2", "axis.tolerance=0.005")
+THIN = ("image.pixel=0.25", "axis.tolerance=0.005")
 
 
 @dataclass(frozen=True)

@@ -70,9 +70,9 @@ def _remove_network() -> None:
 
 
 @pytest.fixture
-def listening(short: Survey, network: None) -> Iterator[Project]:
+def listening(survey: Survey, network: None) -> Iterator[Project]:
     """The server, listening to the network for as long as the test lasts, for an operator with a password."""
-    project = short.project
+    project = survey.project
     cluster = project.home / "cluster"
     before = {name: (cluster / name).read_text() for name in ("postgresql.conf", "pg_hba.conf")}
     password = project.home / "pgpass"
@@ -138,9 +138,9 @@ def cut_at_work(project: Project, machine: str) -> tuple[int, int, str]:
             mend(machine)
 
 
-def test_cut_off_machine_is_replaced_and_its_work_thrown_away(short: Survey, listening: Project) -> None:
+def test_cut_off_machine_is_replaced_and_its_work_thrown_away(survey: Survey, listening: Project) -> None:
     first, second = MACHINES
-    register(listening, short.files)
+    register(listening, survey.files)
     workers = {first: worker(listening, first)}
     try:
         job, km, stage = cut_at_work(listening, first)
@@ -165,7 +165,7 @@ def test_cut_off_machine_is_replaced_and_its_work_thrown_away(short: Survey, lis
             if process.poll() is None:
                 process.send_signal(signal.SIGKILL)
                 process.wait()
-    assert differences(short.undisturbed, state(listening)) == []
+    assert differences(survey.undisturbed, state(listening)) == []
     assert [row for row in runs(listening) if row[3] != 1] == []
 
 
