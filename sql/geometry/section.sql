@@ -1,6 +1,7 @@
 -- Stage 4 of Gonçalves et al. (2012): two cross-sections a segment, from angular classes, as smooth curves.
 
--- The planes of the sections of a kilometre, at 25 % and 75 % of each segment.
+-- The planes of the sections of a kilometre, at 25 % and 75 % of each segment, within what was scanned: beyond its end a slab
+-- would show the portal's face and what stands before it. Needs km_ends (geometry/survey_ends.sql).
 CREATE OR REPLACE FUNCTION tunnel_api.section_plane(survey_id int, km int)
 RETURNS TABLE (segment int, half int2, chainage float8, frame float8[])
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
@@ -9,11 +10,13 @@ AS $$
     SELECT s.n, h.half::int2, s.chainage_from + h.half / 100.0 * (s.chainage_to - s.chainage_from),
         tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to, h.half / 100.0)
     FROM tunnel.segment s CROSS JOIN (VALUES (25), (75)) AS h (half)
+    JOIN tunnel_api.km_ends e ON e.survey_id = s.survey_id AND e.km = s.km
     WHERE s.survey_id = section_plane.survey_id AND s.km = section_plane.km
+        AND s.chainage_from + h.half / 100.0 * (s.chainage_to - s.chainage_from) BETWEEN e.chainage_from AND e.chainage_to
     ORDER BY 3
 $$;
 COMMENT ON FUNCTION tunnel_api.section_plane(int, int) IS
-'Planes of the cross-sections of one kilometre, at 25 % and 75 % of each segment: chainage (m) and frame (origin, tangent, right, up; 12 numbers). Source: Gonçalves et al. (2012), stage 4.';
+'Planes of the cross-sections of one kilometre, at 25 % and 75 % of each segment, within what was scanned: chainage (m) and frame (origin, tangent, right, up; 12 numbers). Source: Gonçalves et al. (2012), stage 4.';
 
 
 -- The points of a slab: those at most half_width (in chainage, m) from a plane, in the plane's own frame, right and up, m.

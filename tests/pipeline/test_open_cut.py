@@ -1,4 +1,4 @@
-"""A tunnel that ends in an open cut: no sections there, and it is said where."""
+"""Portals and open cuts: no sections there, and it is said where."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import psycopg
 from click.testing import CliRunner
 from support.loaded_survey import LENGTH, ORIGIN, START, SURVEY, add_survey, load, write
+from support.real_scans import real_scan
 
 from tunneldb.cli.main import main
 from tunneldb.pointcloud.selection import FilterSettings
@@ -48,3 +49,19 @@ def test_an_open_cut_has_no_sections_and_is_told(conn: psycopg.Connection, tmp_p
     assert " and 1+030.000: " in note
     assert "no roof between" in out.output
     assert abs(length - (LENGTH - PORTAL)) < 5.0
+
+
+def test_a_real_portal_has_no_section_beyond_the_scan(conn: psycopg.Connection, tmp_path: Path) -> None:
+    """The last plane of a segment may lie beyond the last point: what its slab would show is the portal's face."""
+    scan = str(real_scan("ringo.laz"))
+    axis = ["--axis", "auto", "--axis-out", str(tmp_path / "axis.csv"), scan]
+    for words in (
+        ["tunnel", "add", "ringo", "--srid", "3794", *axis],
+        ["survey", "add", "r", "--tunnel", "ringo", "--date", "2024-05-04", "--no-poses", "--intensity-kind", "none"],
+        ["load", "r", scan],
+        ["run", "r", "--to", "sections"],
+    ):
+        assert CliRunner().invoke(main, words, catch_exceptions=False).exit_code == 0
+    widest = np.array([max(radius) for (radius,) in conn.execute("SELECT radius FROM tunnel.section").fetchall()])
+    assert len(widest) == 24
+    assert widest.max() < 1.1 * np.median(widest)
