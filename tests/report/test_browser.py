@@ -40,7 +40,7 @@ def test_a_snap_is_taken_by_no_name(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert find_browser() == str(chrome)
 
 
-SLOW = "#!/bin/sh\nsleep 60 & echo $! > {pids}.new; mv {pids}.new {pids}; wait\n"
+SLOW = "#!/bin/sh\nsleep 600 & echo $! > {pids}.new; mv {pids}.new {pids}; wait\n"
 PRINT = """
 import sys
 from collections.abc import Callable

@@ -9,7 +9,9 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from tunneldb.errors import UserError
@@ -106,23 +108,31 @@ def _run(command: Sequence[str], folder: str, waiting: Callable[[float], None]) 
     Whatever breaks off the wait ends the browser, with all that it has started.
     """
     temporary = {"TMPDIR": folder} if len(os.fsencode(folder)) <= LONGEST else {}
-    with subprocess.Popen(
-        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
+    start = partial(
+        subprocess.Popen, command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
         env=os.environ | temporary, start_new_session=True,
-    ) as process:  # fmt: skip
-        began = time.monotonic()
+    )  # fmt: skip
+    # Started by a thread, which no signal interrupts: else Ctrl-C just then would leave a browser that nobody knows of.
+    with ThreadPoolExecutor(1, "browser") as pool:
+        started = pool.submit(start)
         try:
-            while True:
-                try:
-                    _, output = process.communicate(timeout=min(_TICK, PATIENCE))
-                    break
-                except subprocess.TimeoutExpired:
-                    seconds = time.monotonic() - began
-                    if seconds >= PATIENCE:
-                        raise
-                    waiting(seconds)
+            process = started.result()
+            output = _wait(process, waiting)
         except BaseException:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+            with started.result() as lost, suppress(ProcessLookupError):
+                os.killpg(lost.pid, signal.SIGKILL)
             raise
     return process.returncode, output
+
+
+def _wait(process: subprocess.Popen[str], waiting: Callable[[float], None]) -> str:
+    """Wait for a browser's end; returns its standard error."""
+    began = time.monotonic()
+    while True:
+        try:
+            return process.communicate(timeout=min(_TICK, PATIENCE))[1]
+        except subprocess.TimeoutExpired:
+            seconds = time.monotonic() - began
+            if seconds >= PATIENCE:
+                raise
+            waiting(seconds)
