@@ -1,0 +1,233 @@
+"""Faces that are one: pieces that touch, and what several scans see of one surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunneldb.arrays import Float, Int32, Int64
+from tunneldb.compiled import kernel
+from tunneldb.structures.growing import Grown
+from tunneldb.structures.models import AXIS, POINT, RADIUS, SIDE, distance, fit_cylinder, fit_plane
+from tunneldb.structures.voxel_grid import AXIS_BITS, VoxelGrid
+
+ANGLE = 10.0
+"""Two faces are no farther turned against each other, degrees (Ono et al., Table 1)."""
+
+APART = 0.005
+"""Nor does one lie farther off the other, m, on average (Table 1): registered scans fit so well."""
+
+STEP = 0.002
+"""Within one scan, which is no farther off than noise, m: plates lie on each other."""
+
+ROUNDS = 6
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Faces, the largest first.
+
+    Attributes
+    ----------
+    owner : (n,) int32 array
+        Face of each voxel, -1 for none.
+    models : (k, WIDTH) float array
+    points : (k,) float array
+        Points of its voxels.
+    rms : (k,) float array
+        Distance of these from the model, m.
+    """
+
+    owner: Int32
+    models: Float
+    points: Float
+    rms: Float
+
+
+def merge(
+    grid: VoxelGrid, starts: Int64, neighbours: Int32, towards: Float, grown: Grown, noise: float
+) -> Faces:
+    """Merge faces that touch and fit one model, within a scan and across scans.
+
+    Parameters
+    ----------
+    grid, starts, neighbours
+        Voxels, and which touch.
+    towards : (n, 3) float array
+        Unit vectors to the scanner.
+    grown : Grown
+    noise : float
+        Of ranges, m.
+    """
+    owner, models = grown.owner.copy(), grown.models.copy()
+    count = len(models)
+    centroid = grid.centroids
+    within = _touching(owner, starts, neighbours)
+    across = _at_one_place(grid.keys, owner)
+    tolerance = np.concatenate(
+        [np.full(len(within), max(STEP, 3.0 * noise)), np.full(len(across), max(APART, 3.0 * noise))]
+    )
+    pairs = np.concatenate([within, across])
+    merged_into = np.arange(count)
+    for _ in range(ROUNDS):
+        sums, held = _sums(grid, owner, count), _members(owner, count)
+        ends = merged_into[pairs]
+        differ = ends[:, 0] != ends[:, 1]
+        ends, limit = ends[differ], tolerance[differ]
+        big = np.where(sums[ends[:, 0], 0] >= sums[ends[:, 1], 0], ends[:, 0], ends[:, 1])
+        small = ends.sum(axis=1) - big
+        order = np.lexsort([small, big, -sums[big, 0]])
+        into = np.arange(count)
+        changed = np.zeros(count, np.bool_)
+        for k in order.tolist():
+            a, b = int(big[k]), int(small[k])
+            if changed[a] or changed[b] and into[b] != b or into[a] != a:
+                continue
+            if _fits(models[a], models[b], grid, centroid, sums[b], held(b), limit[k]):
+                into[b] = a
+                changed[b] = True
+        if not changed.any():
+            break
+        merged_into = into[merged_into]
+        owner = np.where(owner >= 0, into[np.maximum(owner, 0)], -1).astype(np.int32)
+        held = _members(owner, count)
+        sums = _sums(grid, owner, count)
+        for a in np.unique(into[changed]).tolist():
+            refit(grid, centroid, sums[a], held(a), noise, models[a])
+    return _ordered(grid, centroid, towards, owner, models, noise)
+
+
+def _ordered(grid: VoxelGrid, centroid: Float, towards: Float, owner: Int32, models: Float, noise: float) -> Faces:
+    """Faces in order of size, seen from the right side; what scatters as no face does is left out."""
+    count = len(models)
+    sums, held = _sums(grid, owner, count), _members(owner, count)
+    rms, good = np.zeros(count), np.zeros(count, np.bool_)
+    for k in range(count):
+        voxels = held(k)
+        if not len(voxels):
+            continue
+        if models[k, RADIUS] == 0.0:
+            side = float(np.sum((towards[voxels] @ models[k, AXIS]) * grid.moments[voxels, 0]))
+            if side < 0.0:
+                models[k, AXIS] *= -1.0
+            row = models[k].copy()
+            rms[k] = _plane_rms(np.ascontiguousarray(sums[k]), row)
+            cosine = np.abs(towards[voxels] @ models[k, AXIS]).mean()
+        else:
+            rms[k] = float(np.sqrt(np.mean(distances(models[k], centroid[voxels]) ** 2)))
+            cosine = 1.0
+        good[k] = rms[k] < 3.0 * max(noise * cosine, 0.0005)
+    order = np.lexsort([models[:, 0], -sums[:, 0]])
+    order = order[good[order]]
+    number = np.full(count + 1, -1, np.int32)
+    number[order] = np.arange(len(order))
+    return Faces(number[owner], models[order], sums[order, 0], rms[order])
+
+
+def distances(model: Float, xyz: Float) -> Float:
+    """Distance of places (n, 3) from a surface, towards the scanner's side, m."""
+    out = np.empty(len(xyz))
+    _distances(model, np.ascontiguousarray(xyz), out)
+    return out
+
+
+def refit(grid: VoxelGrid, centroid: Float, sums: Float, voxels: Int64, noise: float, model: Float) -> None:
+    """Fit a model again to voxels, in place."""
+    if model[RADIUS] == 0.0:
+        _plane_rms(np.ascontiguousarray(sums), model)
+    else:
+        _refit_cylinder(grid.moments, centroid, voxels.astype(np.int32), noise, model)
+
+
+def _fits(one: Float, other: Float, grid: VoxelGrid, centroid: Float, sums: Float, voxels: Int64, limit: float) -> bool:
+    """Whether the smaller face is of the larger one's surface."""
+    if (one[RADIUS] == 0.0) != (other[RADIUS] == 0.0):
+        # A strip of a cylinder that was taken for flat.
+        if one[RADIUS] == 0.0 or len(voxels) > 200:
+            return False
+        return bool(np.sqrt(np.mean(distances(one, centroid[voxels]) ** 2)) < 0.5 * limit)
+    cosine = float(one[AXIS] @ other[AXIS])
+    least = math.cos(math.radians(ANGLE))
+    if one[RADIUS] == 0.0:
+        small = len(voxels) < 60  # their own normals say little
+        if cosine < (0.5 if small else least):
+            return False
+        n = sums[0]
+        mean = sums[1:4] / n
+        xx, yy, zz, xy, xz, yz = sums[4:] / n
+        square = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        normal, at = one[AXIS], float(one[AXIS] @ one[POINT])
+        off = normal @ square @ normal - 2.0 * at * float(normal @ mean) + at * at
+        return math.sqrt(max(off, 0.0)) < limit
+    if abs(cosine) < least or one[SIDE] != other[SIDE]:
+        return False
+    if abs(one[RADIUS] - other[RADIUS]) > max(0.1 * one[RADIUS], limit):
+        return False
+    return bool(np.sqrt(np.mean(distances(one, centroid[voxels]) ** 2)) < limit)
+
+
+def _touching(owner: Int32, starts: Int64, neighbours: Int32) -> Int64:
+    """Pairs of faces (m, 2) whose voxels touch, or touch one voxel between them."""
+    at = np.repeat(np.arange(len(owner)), np.diff(starts))
+    mine, other = owner[at], owner[neighbours]
+    direct = (mine >= 0) & (other > mine)
+    pairs = [np.column_stack([mine[direct], other[direct]])]
+    free = (mine < 0) & (other >= 0)
+    beside = np.unique(np.column_stack([at[free], other[free]]), axis=0)
+    same = beside[1:, 0] == beside[:-1, 0]
+    pairs.append(np.column_stack([beside[:-1, 1][same], beside[1:, 1][same]]))
+    return np.unique(np.concatenate(pairs).astype(np.int64), axis=0)
+
+
+def _at_one_place(keys: Int64, owner: Int32) -> Int64:
+    """Pairs of faces (m, 2) of different scans with voxels at one place."""
+    held = owner >= 0
+    place = keys[held] & ((1 << (3 * AXIS_BITS)) - 1)
+    mine = owner[held].astype(np.int64)
+    order = np.argsort(place, kind="stable")
+    place, mine = place[order], mine[order]
+    found = [np.empty((0, 2), np.int64)]
+    for step in (1, 2, 3):
+        same = (place[step:] == place[:-step]) & (mine[step:] != mine[:-step])
+        pair = np.column_stack([mine[:-step][same], mine[step:][same]])
+        found.append(np.unique(np.sort(pair, axis=1), axis=0))
+    return np.unique(np.concatenate(found), axis=0)
+
+
+def _sums(grid: VoxelGrid, owner: Int32, count: int) -> Float:
+    """Moments (count, 10) of faces."""
+    held = owner >= 0
+    return np.column_stack([np.bincount(owner[held], grid.moments[held, k], count) for k in range(10)])
+
+
+class _members:  # noqa: N801 - called like a function
+    """Voxels of each face, looked up by its number."""
+
+    def __init__(self, owner: Int32, count: int) -> None:
+        self.order = np.argsort(owner, kind="stable")
+        self.starts = np.searchsorted(owner[self.order], np.arange(count + 1))
+
+    def __call__(self, face: int) -> Int64:
+        return self.order[self.starts[face] : self.starts[face + 1]]
+
+
+
+
+@kernel
+def _plane_rms(sums: Float, model: Float) -> float:  # pragma: no cover - compiled
+    return fit_plane(sums, model)
+
+
+@kernel
+def _refit_cylinder(
+    moments: Float, centroid: Float, voxels: Int32, noise: float, model: Float
+) -> float:  # pragma: no cover - compiled
+    return fit_cylinder(moments, centroid, voxels, voxels.shape[0], noise, model, 12)
+
+
+@kernel
+def _distances(model: Float, xyz: Float, out: Float) -> None:  # pragma: no cover - compiled
+    for i in range(xyz.shape[0]):
+        out[i] = distance(model, xyz[i, 0], xyz[i, 1], xyz[i, 2])

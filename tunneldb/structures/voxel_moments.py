@@ -1,0 +1,260 @@
+"""Moments of the points in each voxel of each scan, gathered in one pass whose order does not show.
+
+A voxel keeps the number of its points, their sum and the sum of their products (planes and their
+residuals follow from these alone, and those of a neighbourhood are sums). All are whole numbers of `QUANTUM`, so neither the
+order of the points nor that of the threads shows. Voxels of several scans are kept apart: one scan sees one side of a plate,
+and scans that do not fit together to the millimetre are fitted each by itself.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tunneldb.arrays import Bool, Float, Int32, Int64
+from tunneldb.compiled import inner, kernel
+from tunneldb.errors import UserError
+from tunneldb.structures.voxel_grid import AXIS_BITS, VoxelGrid
+
+QUANTUM = 2.0**-14
+"""Step in which coordinates are counted, m: 0.06 mm."""
+
+FINEST = 7
+"""Edge of the finest voxels is 2^-FINEST m, 7.8 mm: two to three points of a dense scan."""
+
+COARSEST = 2
+"""Edge of the coarsest is 2^-COARSEST m."""
+
+MOST = 4_000_000
+"""Voxels that are kept at most; beyond that the next coarser ones take their place."""
+
+SCANS = 1 << 10
+"""Scans that can be told apart."""
+
+_HALF = 1 << (AXIS_BITS - 1)
+_MASK = (1 << AXIS_BITS) - 1
+REACH = _HALF * 2.0**-FINEST
+"""Points farther than this from the middle of the scanner's positions along an axis are left out, m."""
+
+_ROOM = 1 << 16
+
+
+class VoxelMoments:
+    """Moments of the points in each voxel, scan by scan.
+
+    Parameters
+    ----------
+    middle : (3,) float array
+        About where voxels are numbered, m: the middle of the scanner's positions.
+
+    Attributes
+    ----------
+    level : int
+        The edge of a voxel is 2^-level m.
+    points, far : int
+        Points added, and those left out for lying farther than `REACH` from the middle.
+    """
+
+    def __init__(self, middle: Float) -> None:
+        self.origin = np.round(np.asarray(middle, np.float64))
+        self.level = FINEST
+        self.points = 0
+        self.far = 0
+        self._size = 0
+        self._keys = np.empty(_ROOM, np.int64)
+        self._sums = np.zeros((_ROOM, 10), np.int64)
+        self._table = np.full(4 * _ROOM, -1, np.int32)
+
+    def __len__(self) -> int:
+        return self._size
+
+    def add(self, xyz: Float, scan: Int32) -> None:
+        """Add points (n, 3), m, of scans (n,) from 0 to `SCANS` - 1."""
+        xyz = np.ascontiguousarray(xyz, np.float64)
+        scan = np.ascontiguousarray(scan, np.int32)
+        self.points += len(xyz)
+        done = 0
+        while True:
+            done, self._size, far = _add(
+                xyz, scan, self.origin, self.level, done, self._size, self._keys, self._sums, self._table
+            )
+            self.far += far
+            if done == len(xyz):
+                return
+            self._make_room()
+
+    def grid(self, level: int, wanted: Bool | None = None) -> VoxelGrid:
+        """Voxels with an edge of 2^-level m, no finer than those kept, in the order of scans and places."""
+        keys, sums = self._keys[: self._size], self._sums[: self._size]
+        order = np.argsort(keys)
+        keys, sums = keys[order], sums[order]
+        for finer in range(self.level, level, -1):
+            keys, sums = _coarser(keys, sums, finer)
+        if wanted is not None:
+            keys, sums = keys[wanted], sums[wanted]
+        return VoxelGrid(2.0**-level, self.origin, keys, _metres(keys, sums, level))
+
+    def counts(self, level: int) -> Int64:
+        """Points in each voxel with an edge of 2^-level m."""
+        keys, count = self._keys[: self._size], self._sums[: self._size, 0]
+        for _ in range(level, self.level):
+            keys, place = np.unique(parents(keys), return_inverse=True)
+            count = np.bincount(place, count, len(keys)).astype(np.int64)
+        return count
+
+    def _make_room(self) -> None:
+        if self._size < MOST:
+            room = min(len(self._keys) + len(self._keys) // 2, MOST)
+            for name in ("_keys", "_sums"):
+                old = getattr(self, name)
+                new = np.zeros((room, *old.shape[1:]), old.dtype)
+                new[: self._size] = old[: self._size]
+                setattr(self, name, new)
+                del old
+        elif self.level > COARSEST:
+            keys = self._keys[: self._size]
+            order = np.argsort(keys)
+            keys, sums = _coarser(keys[order], self._sums[: self._size][order], self.level)
+            self.level -= 1
+            self._size = len(keys)
+            self._keys[: len(keys)], self._sums[: len(keys)] = keys, sums
+            self._sums[len(keys) :] = 0
+        else:
+            raise UserError(
+                f"more than {MOST:,} voxels of {2.0**-COARSEST:g} m hold points: this is no structure; cut the file"
+            )
+        size = len(self._table)
+        while size < 2 * len(self._keys):
+            size *= 2
+        self._table = np.full(size, -1, np.int32)
+        _enter(self._keys, self._size, self._table)
+
+
+def parents(keys: Int64) -> Int64:
+    """Keys of the voxels twice as large in which voxels lie."""
+    scan, axes = keys >> (3 * AXIS_BITS), [(keys >> (AXIS_BITS * k)) & _MASK for k in (2, 1, 0)]
+    x, y, z = (((axis - _HALF) >> 1) + _HALF for axis in axes)
+    return np.asarray((((scan << AXIS_BITS | x) << AXIS_BITS | y) << AXIS_BITS) | z)
+
+
+def split_keys(keys: Int64) -> tuple[Int64, Int64]:
+    """Scan (n,) and place (n, 3), in edges from the origin, of voxels."""
+    places = [((keys >> (AXIS_BITS * k)) & _MASK) - _HALF for k in (2, 1, 0)]
+    return keys >> (3 * AXIS_BITS), np.column_stack(places)
+
+
+def _coarser(keys: Int64, sums: Int64, level: int) -> tuple[Int64, Int64]:
+    """Moments of voxels twice as large, in the order of their keys, of those with an edge of 2^-level m."""
+    step = round(2.0**-level / QUANTUM)
+    above = parents(keys)
+    shift = (split_keys(keys)[1] & 1) * step
+    n, s = sums[:, 0], sums[:, 1:4]
+    moved = np.empty_like(sums)
+    moved[:, 0] = n
+    moved[:, 1:4] = s + n[:, None] * shift
+    for k, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
+        moved[:, 4 + k] = sums[:, 4 + k] + shift[:, a] * s[:, b] + shift[:, b] * s[:, a] + n * shift[:, a] * shift[:, b]
+    order = np.argsort(above, kind="stable")
+    above = above[order]
+    first = np.flatnonzero(np.diff(above, prepend=above[0] - 1)) if len(above) else np.empty(0, np.int64)
+    return above[first], np.add.reduceat(moved[order], first) if len(above) else moved
+
+
+def _metres(keys: Int64, sums: Int64, level: int) -> Float:
+    """Moments (n, 10) about the origin, m and m²: number, x, y, z, xx, yy, zz, xy, xz, yz."""
+    corner = split_keys(keys)[1] * 2.0**-level + 0.5 * QUANTUM
+    out = sums.astype(np.float64)
+    n, s = out[:, 0], out[:, 1:4] * QUANTUM
+    out[:, 1:4] = s + n[:, None] * corner
+    for k, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
+        out[:, 4 + k] = (
+            out[:, 4 + k] * QUANTUM**2 + corner[:, a] * s[:, b] + corner[:, b] * s[:, a] + n * corner[:, a] * corner[:, b]
+        )
+    return out
+
+
+@inner
+def voxel_key(x: float, y: float, z: float, scan: int, per_metre: float) -> int:  # pragma: no cover - compiled
+    """Key of the voxel of a place relative to the origin; -1 beyond what can be numbered."""
+    half = 1 << 16
+    if not (abs(x) < 1e6 and abs(y) < 1e6 and abs(z) < 1e6):
+        return -1
+    i, j, k = math.floor(x * per_metre) + half, math.floor(y * per_metre) + half, math.floor(z * per_metre) + half
+    if min(i, j, k) < 1 or max(i, j, k) >= 2 * half - 1:
+        return -1
+    return ((((scan << 17) | i) << 17 | j) << 17) | k
+
+
+@inner
+def _slot(key: int, keys: Int64, table: Int32) -> int:  # pragma: no cover - compiled
+    mask = np.uint64(table.shape[0] - 1)
+    h = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
+    at = (h ^ (h >> np.uint64(32))) & mask
+    while table[at] >= 0 and keys[table[at]] != key:
+        at = (at + np.uint64(1)) & mask
+    return np.int64(at)  # type: ignore[return-value]  # to Numba it is an int
+
+
+@kernel
+def _enter(keys: Int64, size: int, table: Int32) -> None:  # pragma: no cover - compiled
+    for i in range(size):
+        table[_slot(keys[i], keys, table)] = i
+
+
+@kernel
+def _add(
+    xyz: Float, scan: Int32, origin: Float, level: int, done: int, size: int, keys: Int64, sums: Int64, table: Int32
+) -> tuple[int, int, int]:  # pragma: no cover - compiled
+    """Add points from ``done`` on until there is no room for another voxel: how far it came, voxels, points left out."""
+    per_metre, far = 2.0**level, 0
+    edge = 16384 >> level
+    for i in range(done, xyz.shape[0]):
+        x, y, z = xyz[i, 0] - origin[0], xyz[i, 1] - origin[1], xyz[i, 2] - origin[2]
+        # Numbered in the finest voxels, whatever their size now, so that what is left out does not depend on it.
+        if voxel_key(x, y, z, scan[i], 128.0) < 0:
+            far += 1
+            continue
+        key = voxel_key(x, y, z, scan[i], per_metre)
+        slot = _slot(key, keys, table)
+        if table[slot] < 0:
+            if size == keys.shape[0]:
+                return i, size, far
+            table[slot] = size
+            keys[size] = key
+            size += 1
+        k = table[slot]
+        a = np.int64(math.floor(x * 16384.0)) - np.int64(math.floor(x * per_metre)) * edge
+        b = np.int64(math.floor(y * 16384.0)) - np.int64(math.floor(y * per_metre)) * edge
+        c = np.int64(math.floor(z * 16384.0)) - np.int64(math.floor(z * per_metre)) * edge
+        row = sums[k]
+        row[0] += 1
+        row[1] += a
+        row[2] += b
+        row[3] += c
+        row[4] += a * a
+        row[5] += b * b
+        row[6] += c * c
+        row[7] += a * b
+        row[8] += a * c
+        row[9] += b * c
+    return xyz.shape[0], size, far
+
+
+@kernel
+def find_voxels(
+    xyz: Float, scan: Int32, origin: Float, per_metre: float, keys: Int64, table: Int32, out: Int64, begin: int, end: int
+) -> None:  # pragma: no cover - compiled
+    """Number of the voxel of each point from begin to end; -1 where there is none."""
+    for i in range(begin, end):
+        key = voxel_key(xyz[i, 0] - origin[0], xyz[i, 1] - origin[1], xyz[i, 2] - origin[2], scan[i], per_metre)
+        out[i] = -1
+        if key >= 0:
+            out[i] = table[_slot(key, keys, table)]
+
+
+def key_table(keys: Int64) -> Int32:
+    """Table in which `find_voxels` finds keys."""
+    table = np.full(1 << max(10, (2 * len(keys)).bit_length()), -1, np.int32)
+    _enter(keys, len(keys), table)
+    return table
