@@ -17,7 +17,7 @@ from tunneldb.anomalies.threshold import dark_pixels, filter_size
 from tunneldb.anomalies.verdict import Verdict, classify
 from tunneldb.anomalies.windows import count_about, count_in_columns, on_lining, row_blocks
 from tunneldb.arrays import Bool, Float, Int64, UInt8
-from tunneldb.raster.grid import Grid
+from tunneldb.raster.grid import PixelGrid
 from tunneldb.raster.image import WET_EDGE
 from tunneldb.raster.pixel_state import PixelState
 
@@ -181,7 +181,7 @@ def background_places(contrast: ContrastImage, detection: Detection, chainage: F
     return contrast.grid.pick(clear, chainage, arc)
 
 
-def _draw(image: Bool, drawn: Iterable[Region], grid: Grid) -> None:
+def _draw(image: Bool, drawn: Iterable[Region], grid: PixelGrid) -> None:
     """Draw the masks of regions."""
     for region in drawn:
         rows, columns = region.mask.shape

@@ -6,7 +6,7 @@ import numpy as np
 
 from tunneldb.anomalies.runs import Components, pixels_of
 from tunneldb.arrays import Bool, Int64
-from tunneldb.raster.grid import Grid
+from tunneldb.raster.grid import PixelGrid
 
 GAP = 0.12
 """Water that runs down a wall leaves dry places no longer than this, m."""
@@ -18,7 +18,7 @@ PROFILES = 1.5
 """Where profiles lie apart, a drip shows on a single one, which stands for no more than so many spacings."""
 
 
-def attach_drips(components: Components, wanted: Bool, cut: Bool, grid: Grid, spacing: float = 0.0) -> tuple[Int64, Int64]:
+def attach_drips(components: Components, wanted: Bool, cut: Bool, grid: PixelGrid, spacing: float = 0.0) -> tuple[Int64, Int64]:
     """Find what each component is a part of.
 
     A drip is narrower than WIDE, smaller than what lies above it, and begins within GAP of it, towards the crown, or of
@@ -33,7 +33,7 @@ def attach_drips(components: Components, wanted: Bool, cut: Bool, grid: Grid, sp
     cut : (k,) bool array
         Those that an end of the kilometre cuts: how large they are is not known, so that they are no drips, and that all
         others are taken for smaller.
-    grid : Grid
+    grid : PixelGrid
         The pixels.
     spacing : float
         Distance of profiles along the tunnel, m; 0 where they lie as close as pixels.

@@ -129,7 +129,7 @@ class Region:
 
 
 def find_regions(
-    part: Bool, dark: Bool, contrast: ContrastImage, min_area: float, may_drip: Callable[[Region], bool]
+    part: Bool, dark: Bool, contrast: ContrastImage, min_area: float, may_drip: Callable[[Region], bool] | None
 ) -> list[Region]:
     """Connected dark regions of a kilometre that are large or long enough, or are cut by its ends and may be a part of one.
 
@@ -145,8 +145,8 @@ def find_regions(
         Their drop.
     min_area : float
         Smaller regions within the kilometre are left out, m².
-    may_drip : callable
-        Tells whether a region may have drips.
+    may_drip : callable or None
+        Tells whether a region may have drips; None where nothing drips.
     """
     grid = contrast.grid
     inner = grid.inner
@@ -157,6 +157,9 @@ def find_regions(
     ends = components.touching(inner.start, inner.stop)
     large = components.pixels * grid.pixel**2 >= min_area * (1 - 1e-12)
     wanted = ends | large | (components.extent * grid.pixel >= LONG)
+    if may_drip is None:
+        found = _regions(runs, components.label, np.flatnonzero(wanted), dark, contrast)
+        return sorted(found, key=lambda region: (region.column, region.row))
     whole, bridges = attach_drips(components, wanted, ends, grid, contrast.spacing)
     roots = np.unique(whole[whole != np.arange(len(whole))])
     for root, region in zip(roots.tolist(), _regions(runs, components.label, roots, dark, contrast), strict=True):

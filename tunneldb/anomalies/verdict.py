@@ -63,15 +63,7 @@ def classify(region: Region) -> Verdict:
     Each reason why it may be dry gets a degree between 0 and 1; the region is a leak unless one is above 1/2.
     """
     shape = measure_shape(region.mask, region.pixel)
-    degrees = {
-        "faint": _ramp(region.contrast, 3.4, 3.0),
-        "thin": _thin(region, shape),
-        "recess": _recess(region),
-        "gradual": _gradual(region, shape),
-        "rectangular": _rectangular(region, shape),
-        "stripe": min(_stripe(shape, _straight(region)), _told(region, shape)),
-        "shadow": _shadow(region, shape),
-    }
+    degrees = degrees_of(region, shape)
     against = sorted((name for name in degrees if degrees[name] > 0.0), key=lambda name: -degrees[name])
     worst = max(degrees.values())
     if worst <= 0.5:
@@ -80,6 +72,19 @@ def classify(region: Region) -> Verdict:
         return Verdict("leak", tuple(against), detectability(region) * (1.0 - worst))
     reasons = tuple(name for name in against if degrees[name] > 0.5)
     return Verdict("joint" if "thin" in reasons else "dark", reasons, worst)
+
+
+def degrees_of(region: Region, shape: Shape) -> dict[str, float]:
+    """How much speaks for each of what a region may be instead of water, 0 to 1."""
+    return {
+        "faint": _ramp(region.contrast, 3.4, 3.0),
+        "thin": _thin(region, shape),
+        "recess": _recess(region),
+        "gradual": _gradual(region, shape),
+        "rectangular": _rectangular(region, shape),
+        "stripe": min(_stripe(shape, _straight(region)), _told(region, shape)),
+        "shadow": _shadow(region, shape),
+    }
 
 
 def detectability(region: Region) -> float:

@@ -42,7 +42,9 @@ def plain_statistics(values: NDArray[np.floating]) -> DryLevel:
     return DryLevel(float(values.mean()), float(values.std()), len(values))
 
 
-def robust_statistics(values: NDArray[np.floating]) -> DryLevel:
+def robust_statistics(
+    values: NDArray[np.floating], shorth: float = SHORTH, *, two_sided: bool = False
+) -> DryLevel:
     """Mean and standard deviation of the dry part of values of which up to about 30 % are wet.
 
     Wet lining is darker, so that it pulls mean, median and standard deviation. The shortest interval that
@@ -54,17 +56,24 @@ def robust_statistics(values: NDArray[np.floating]) -> DryLevel:
     ----------
     values : float array
         Corrected intensity, dB; NaNs are left out.
+    shorth : float
+        Share of all values in the shortest interval: less where more of them may be something else.
+    two_sided : bool
+        Whether what is something else may be brighter, too: the first σ is then that of the narrower side.
     """
     ordered = np.asarray(values, dtype=np.float64).ravel()
     ordered = np.sort(ordered[np.isfinite(ordered)])
     count = len(ordered)
     if count < 3:
         return plain_statistics(ordered)
-    width = max(2, int(np.ceil(SHORTH * count)))
+    width = max(2, int(np.ceil(shorth * count)))
     start = int(np.argmin(ordered[width - 1 :] - ordered[: count - width + 1]))
     mean = float(np.median(ordered[start : start + width]))
     above = ordered[np.searchsorted(ordered, mean, side="right") :]
     sigma = MAD_TO_SIGMA * float(np.median(above - mean)) if len(above) else 0.0
+    if two_sided:
+        below = ordered[: np.searchsorted(ordered, mean, side="left")]
+        sigma = min(sigma, MAD_TO_SIGMA * float(np.median(mean - below))) if len(below) else sigma
     total = np.concatenate([[0.0], np.cumsum(ordered)])
     squares = np.concatenate([[0.0], np.cumsum(ordered**2)])
     first, last = 0, count

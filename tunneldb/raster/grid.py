@@ -15,8 +15,99 @@ BLOCK = 50.0
 """Length of a block of the image along the tunnel, m."""
 
 
+class PixelGrid:
+    """Pixels of an unrolled surface: columns along its first coordinate, rows from the greatest of its second.
+
+    Attributes
+    ----------
+    pixel : float
+        Side of a pixel, m.
+    bottom : int
+        Second coordinate of the lower edge of the last row, in pixels.
+    rows : int
+        Number of rows.
+    """
+
+    pixel: float
+    bottom: int
+    rows: int
+
+    @property
+    def columns(self) -> int:
+        """Number of columns."""
+        raise NotImplementedError
+
+    @property
+    def first_column(self) -> int:
+        """Number of the first column, counted from where the first coordinate is 0."""
+        raise NotImplementedError
+
+    @property
+    def block_columns(self) -> int:
+        """Number of columns in a block."""
+        return self.columns
+
+    @property
+    def inner(self) -> slice:
+        """Columns that are judged; the others are those by which they are."""
+        return slice(0, self.columns)
+
+    @property
+    def west(self) -> float:
+        """First coordinate at which the first column begins, m."""
+        return self.first_column * self.pixel
+
+    def transform(self, column: int = 0) -> Affine:
+        """Transform from pixels, counted from a column, to unrolled coordinates."""
+        return Affine(
+            self.pixel, 0.0, self.west + column * self.pixel, 0.0, -self.pixel, (self.bottom + self.rows) * self.pixel
+        )
+
+    def place(self, chainage: Float, arc: Float) -> tuple[Int32, Int32]:
+        """Row and column of places (n,) in the unrolled plane, m; column -1 outside the grid."""
+        with np.errstate(invalid="ignore"):
+            column = np.floor((chainage - self.west) / self.pixel)
+            row = self.rows - 1 - (np.floor(arc / self.pixel) - self.bottom)
+            held = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
+        return np.where(held, row, 0).astype(np.int32), np.where(held, column, -1).astype(np.int32)
+
+    def pick(self, mask: Bool, chainage: Float, arc: Float) -> Bool:
+        """Value of a mask (rows, columns) at places (n,) in the unrolled plane; False outside the grid."""
+        row, column = self.place(chainage, arc)
+        return np.asarray((column >= 0) & mask[row, column], dtype=np.bool_)
+
+
 @dataclass(frozen=True)
-class Grid:
+class FaceGrid(PixelGrid):
+    """Pixels of one face, all of which are judged.
+
+    Attributes
+    ----------
+    pixel, bottom, rows
+        As of any grid.
+    left, width : int
+        Number of the first column, counted from where the first coordinate is 0, and how many there are.
+    """
+
+    pixel: float
+    bottom: int
+    rows: int
+    left: int
+    width: int
+
+    @property
+    def columns(self) -> int:
+        """Number of columns."""
+        return self.width
+
+    @property
+    def first_column(self) -> int:
+        """Number of the first column."""
+        return self.left
+
+
+@dataclass(frozen=True)
+class Grid(PixelGrid):
     """Pixels of one kilometre in the unrolled plane: columns along the chainage, rows from the greatest arc.
 
     With a halo the grid has a block more before the kilometre and one after it, so that pixels at its ends can be judged by
@@ -106,25 +197,6 @@ class Grid:
     def west(self) -> float:
         """Chainage at which the first column begins, m."""
         return self.first_block * BLOCK
-
-    def transform(self, column: int = 0) -> Affine:
-        """Transform from pixels, counted from a column, to (chainage, arc)."""
-        return Affine(
-            self.pixel, 0.0, self.west + column * self.pixel, 0.0, -self.pixel, (self.bottom + self.rows) * self.pixel
-        )
-
-    def place(self, chainage: Float, arc: Float) -> tuple[Int32, Int32]:
-        """Row and column of places (n,) in the unrolled plane, m; column -1 outside the grid."""
-        with np.errstate(invalid="ignore"):
-            column = np.floor((chainage - self.west) / self.pixel)
-            row = self.rows - 1 - (np.floor(arc / self.pixel) - self.bottom)
-            held = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
-        return np.where(held, row, 0).astype(np.int32), np.where(held, column, -1).astype(np.int32)
-
-    def pick(self, mask: Bool, chainage: Float, arc: Float) -> Bool:
-        """Value of a mask (rows, columns) at places (n,) in the unrolled plane; False outside the grid."""
-        row, column = self.place(chainage, arc)
-        return np.asarray((column >= 0) & mask[row, column], dtype=np.bool_)
 
     def chainages(self, columns: slice) -> Float:
         """Chainage of the centres of columns, m."""

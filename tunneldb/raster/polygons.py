@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from tunneldb.arrays import Bool
-from tunneldb.raster.grid import Grid
+from tunneldb.raster.grid import PixelGrid
 
 SIMPLIFY = 0.75
 """Tolerance of the simplification, pixels: enough to straighten the stairs of a slanting edge."""
@@ -55,7 +55,7 @@ def _straighten(stairs: Polygon) -> Polygon:
     return simple if isinstance(simple, Polygon) and not simple.is_empty and simple.is_valid else stairs
 
 
-def mask_of_polygons(grid: Grid, polygons: Sequence[Polygon]) -> Iterator[tuple[slice, Bool]]:
+def mask_of_polygons(grid: PixelGrid, polygons: Sequence[Polygon]) -> Iterator[tuple[slice, Bool]]:
     """Columns of each block that a polygon reaches, with a mask (rows, columns) of the pixels whose centres lie in one."""
     for start in range(0, grid.columns, grid.block_columns):
         columns = slice(start, start + grid.block_columns)

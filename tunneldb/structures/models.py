@@ -24,23 +24,26 @@ ANGLES = 36
 """Classes of the angle about an axis in which it is counted over how much of a turn a cylinder is seen."""
 
 
-def with_directions(models: Float) -> Float:
-    """Give each model the direction from which its unrolled coordinates count: as level as can be.
+def with_directions(models: Float, middles: Float) -> Float:
+    """Give each model (k, WIDTH) the direction from which its unrolled coordinates count.
 
-    u runs along the axis of a cylinder, level along a plane that is not level itself; v upwards there, to the right of u seen
-    from the scanner's side.
+    Of a plane u runs as level as can be and v upwards, to the left of u seen from the scanner's side. Of a cylinder u runs along
+    its axis and v = r·φ around it, 0 in the direction of the middle (k, 3) of what is seen, so that the cut lies behind.
     """
     out = models.copy()
     axis = out[:, AXIS]
     up = np.zeros_like(axis)
     up[:, 2] = 1.0
-    # Of what stands or lies straight, north takes the place of up.
+    # Of what lies level, north takes the place of up.
     up[np.abs(axis[:, 2]) > 0.999] = (0.0, 1.0, 0.0)
-    flat = out[:, RADIUS] == 0.0
     level = np.cross(up, axis)
-    level /= np.linalg.norm(level, axis=1, keepdims=True)
-    above = np.cross(axis, level)
-    out[:, ACROSS] = np.where(flat[:, None], level, above)
+    flat = out[:, RADIUS] == 0.0
+    towards = middles - out[:, POINT]
+    towards -= np.einsum("ni,ni->n", towards, axis)[:, None] * axis
+    length = np.linalg.norm(towards, axis=1)
+    around = (~flat) & (length > 1e-6)
+    level[around] = towards[around]
+    out[:, ACROSS] = level / np.linalg.norm(level, axis=1, keepdims=True)
     return out
 
 

@@ -187,7 +187,7 @@ def voxel_key(x: float, y: float, z: float, scan: int, per_metre: float) -> int:
 
 
 @inner
-def _slot(key: int, keys: Int64, table: Int32) -> int:  # pragma: no cover - compiled
+def find_slot(key: int, keys: Int64, table: Int32) -> int:  # pragma: no cover - compiled
     mask = np.uint64(table.shape[0] - 1)
     h = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     at = (h ^ (h >> np.uint64(32))) & mask
@@ -199,7 +199,7 @@ def _slot(key: int, keys: Int64, table: Int32) -> int:  # pragma: no cover - com
 @kernel
 def _enter(keys: Int64, size: int, table: Int32) -> None:  # pragma: no cover - compiled
     for i in range(size):
-        table[_slot(keys[i], keys, table)] = i
+        table[find_slot(keys[i], keys, table)] = i
 
 
 @kernel
@@ -216,7 +216,7 @@ def _add(
             far += 1
             continue
         key = voxel_key(x, y, z, scan[i], per_metre)
-        slot = _slot(key, keys, table)
+        slot = find_slot(key, keys, table)
         if table[slot] < 0:
             if size == keys.shape[0]:
                 return i, size, far
@@ -250,7 +250,7 @@ def find_voxels(
         key = voxel_key(xyz[i, 0] - origin[0], xyz[i, 1] - origin[1], xyz[i, 2] - origin[2], scan[i], per_metre)
         out[i] = -1
         if key >= 0:
-            out[i] = table[_slot(key, keys, table)]
+            out[i] = table[find_slot(key, keys, table)]
 
 
 def key_table(keys: Int64) -> Int32:

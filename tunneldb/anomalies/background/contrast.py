@@ -10,7 +10,7 @@ from shapely.geometry import Polygon
 from tunneldb.anomalies.background.level_map import BackgroundMap
 from tunneldb.arrays import Bool, Int16, Single, UInt8
 from tunneldb.raster.geotiff import NODATA
-from tunneldb.raster.grid import Grid
+from tunneldb.raster.grid import PixelGrid
 from tunneldb.raster.image import LiningImage
 from tunneldb.raster.polygons import mask_of_polygons
 
@@ -21,7 +21,7 @@ class ContrastImage:
 
     Attributes
     ----------
-    grid : Grid
+    grid : PixelGrid
         The pixels.
     state : (rows, columns) uint8 array
         Values of :class:`tunneldb.raster.pixel_state.PixelState`.
@@ -41,7 +41,7 @@ class ContrastImage:
         Those pixels.
     """
 
-    grid: Grid
+    grid: PixelGrid
     state: UInt8
     drop: Int16
     tile: int

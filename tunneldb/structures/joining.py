@@ -1,0 +1,283 @@
+"""Members: faces of one surface that something before it parts (Ono et al., 3.2.1 to 3.2.4).
+
+Two faces are joined if they lie on one plane or cylinder (3.2.1), have two rims in common, or one and a short gap along it
+(3.2.2 and 3.2.3), and if what was sent through the gap between them came back from nearer (3.2.4).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from tunneldb.arrays import Bool, Float, Int32, Int64, Single
+from tunneldb.compiled import kernel
+from tunneldb.structures.merging import ANGLE, APART
+from tunneldb.structures.models import AXIS, POINT, RADIUS, SIDE, to_space, unroll
+
+COMMON_ANGLE = 5.0
+"""Rims that are one line are turned against each other by no more, degrees."""
+
+COMMON_APART = 2.5
+"""And lie no farther apart, in pixels."""
+
+LEAST_RIM = 6
+"""A rim is at least so many pixels long."""
+
+GAP = 0.05
+"""Where one rim is common, the gap along it is no longer than this many metres (Table 1, whose unit is missing) …"""
+
+GAP_SPACINGS = 10.0
+"""… or this many pixels, or twice what the smaller face is long."""
+
+OCCLUDED = 0.8
+"""Share of the rays through the gap that must end before it."""
+
+CLEARANCE = 0.02
+"""What ends nearer than this before the surface is before it, m."""
+
+CELL = 0.1
+"""Angle of a cell of the range image, degrees."""
+
+
+class RangeImages:
+    """How far each scan sees in each direction: the nearest point of each cell.
+
+    Parameters
+    ----------
+    stations : (k, 3) float array
+        m from the origin.
+    """
+
+    def __init__(self, stations: Float) -> None:
+        self.stations = stations
+        # Of many scans the images are coarser, so that they take no more memory.
+        self.cell = math.radians(CELL * max(1.0, math.sqrt(len(stations) / 8.0)))
+        self.rows, self.columns = round(math.pi / self.cell), round(2.0 * math.pi / self.cell)
+        self.nearest: Single = np.full((len(stations), self.rows, self.columns), np.inf, np.float32)
+
+    def add(self, xyz: Float, scan: Int32) -> None:
+        """Add points (n, 3), m from the origin, of scans (n,)."""
+        _add_ranges(np.ascontiguousarray(xyz), np.ascontiguousarray(scan, np.int32), self.stations, self.cell, self.nearest)
+
+    def hidden(self, places: Float, scan: int) -> Bool:
+        """Which places (n, 3) something stands before, seen from a scan's position."""
+        towards = places - self.stations[scan]
+        far = np.linalg.norm(towards, axis=1)
+        row = np.clip(((np.arcsin(towards[:, 2] / far) + math.pi / 2) / self.cell).astype(np.int64), 0, self.rows - 1)
+        column = ((np.arctan2(towards[:, 1], towards[:, 0]) + math.pi) / self.cell).astype(np.int64) % self.columns
+        nearest = self.nearest[scan]
+        seen = nearest[row, column]
+        # An empty cell takes the nearest of those about it: rays may lie farther apart than cells.
+        empty = np.flatnonzero(np.isinf(seen))
+        for i in (-1, 0, 1):
+            for j in (-1, 0, 1):
+                about = nearest[np.clip(row[empty] + i, 0, self.rows - 1), (column[empty] + j) % self.columns]
+                seen[empty] = np.minimum(seen[empty], about)
+        return np.asarray(seen < far - CLEARANCE)
+
+
+@dataclass(frozen=True)
+class Extent:
+    """A face, as joining looks at it.
+
+    Attributes
+    ----------
+    model : (WIDTH,) float array
+    outline : MultiPolygon
+        Unrolled, m.
+    pixel : float
+        m.
+    scans : tuple of int
+        Scans that saw it.
+    points : float
+    """
+
+    model: Float
+    outline: shapely.MultiPolygon
+    pixel: float
+    scans: tuple[int, ...]
+    points: float
+
+
+def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
+    """Member of each face (n,), numbered from 0 in the order of their first faces.
+
+    Parameters
+    ----------
+    faces : list of Extent
+        The largest first.
+    images : RangeImages
+    noise : float
+        Of ranges, m.
+    """
+    pairs = [
+        (a, b) for a, b in _coplanar(faces, max(APART, 3.0 * noise)) if _joined(faces[a], faces[b], images)
+    ]
+    first, second = np.array(pairs, np.int64).reshape(-1, 2).T
+    graph = sparse.coo_array((np.ones(len(first), np.int8), (first, second)), shape=(len(faces), len(faces)))
+    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    _, place, member = np.unique(label, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(place))[member].astype(np.int64)
+
+
+def _coplanar(faces: list[Extent], apart: float) -> list[tuple[int, int]]:
+    """Pairs of faces on one plane or cylinder (3.2.1): the smaller lies on the surface of the larger."""
+    if not faces:
+        return []
+    models = np.array([face.model for face in faces])
+    places = [_corners(face) for face in faces]
+    middles = np.array([at.mean(axis=0) for at in places])
+    least, found = math.cos(math.radians(ANGLE)), []
+    for a in range(len(faces)):
+        one = models[a]
+        alike = (models[:, RADIUS] > 0.0) == (one[RADIUS] > 0.0)
+        alike[: a + 1] = False
+        turn = models[:, AXIS] @ one[AXIS]
+        if one[RADIUS] == 0.0:
+            alike &= (turn > least) & (np.abs((middles - one[POINT]) @ one[AXIS]) < apart)
+        else:
+            alike &= (np.abs(turn) > least) & (models[:, SIDE] == one[SIDE])
+            alike &= np.abs(models[:, RADIUS] - one[RADIUS]) < np.maximum(0.05 * one[RADIUS], apart)
+        for b in np.flatnonzero(alike).tolist():
+            off = np.abs(unroll(one, places[b])[2]).mean()
+            back = np.abs(unroll(models[b], places[a])[2]).mean()
+            if one[RADIUS] > 0.0:
+                back = off  # a short piece knows its axis less well than a long one
+            if off < apart and (back < 4.0 * apart):
+                found.append((a, b))
+    return found
+
+
+def _corners(face: Extent) -> Float:
+    """Places about a face's outline (n, 3)."""
+    at = shapely.get_coordinates(face.outline)
+    return to_space(face.model, at[:, 0], at[:, 1])
+
+
+def _joined(one: Extent, other: Extent, images: RangeImages) -> bool:
+    """Whether two faces of one surface are parted by what stands before it alone."""
+    moved = _unrolled_on(one, other)
+    if one.model[RADIUS] == 0.0:
+        pixel = max(one.pixel, other.pixel)
+        common = _common_rims(one.outline, moved, pixel)
+        if not common:
+            return False
+        if len(common) == 1 and _gap_along(common[0], one.outline, moved) > _longest_gap(one, other, pixel):
+            return False
+    return _occluded(one, moved, set(one.scans) | set(other.scans), images)
+
+
+def _longest_gap(one: Extent, other: Extent, pixel: float) -> float:
+    smaller = min(math.sqrt(one.outline.area), math.sqrt(other.outline.area))
+    return max(GAP, GAP_SPACINGS * pixel, 2.0 * smaller)
+
+
+def _unrolled_on(one: Extent, other: Extent) -> shapely.MultiPolygon:
+    """Outline of a face in the unrolled coordinates of another."""
+
+    def move(at: Float) -> Float:
+        u, v, _ = unroll(one.model, to_space(other.model, at[:, 0], at[:, 1]))
+        return np.column_stack([u, v])
+
+    return shapely.make_valid(shapely.transform(other.outline, move))
+
+
+def _common_rims(one: shapely.Geometry, other: shapely.Geometry, pixel: float) -> list[Float]:
+    """Lines (point, direction) that are rims of both (3.2.2), each once."""
+    mine, yours = _rims(one, pixel), _rims(other, pixel)
+    found: list[Float] = []
+    least = math.cos(math.radians(COMMON_ANGLE))
+    for a in mine:
+        for b in yours:
+            if abs(a[2:4] @ b[2:4]) < least:
+                continue
+            longer, shorter = (a, b) if a[4] >= b[4] else (b, a)
+            across = np.array([-longer[3], longer[2]])
+            ends = np.array([shorter[:2] - 0.5 * shorter[4] * shorter[2:4], shorter[:2] + 0.5 * shorter[4] * shorter[2:4]])
+            if np.abs((ends - longer[:2]) @ across).mean() > COMMON_APART * pixel:
+                continue
+            if all(abs(line[2:4] @ longer[2:4]) < least or _apart(line, longer) > COMMON_APART * pixel for line in found):
+                found.append(longer)
+    return found
+
+
+def _apart(one: Float, other: Float) -> float:
+    return float(abs((other[:2] - one[:2]) @ np.array([-one[3], one[2]])))
+
+
+def _rims(shape: shapely.Geometry, pixel: float) -> list[Float]:
+    """Straight pieces of an outline: middle (2), direction (2), length; pieces of one line put together."""
+    rims: list[Float] = []
+    for part in shapely.get_parts(shape):
+        if not isinstance(part, shapely.Polygon):
+            continue
+        ring = shapely.get_coordinates(shapely.simplify(part.exterior, 2.0 * pixel))
+        step = np.diff(ring, axis=0)
+        length = np.linalg.norm(step, axis=1)
+        for k in np.flatnonzero(length >= LEAST_RIM * pixel).tolist():
+            middle, along = 0.5 * (ring[k] + ring[k + 1]), step[k] / length[k]
+            rims.append(np.array([*middle, *along, length[k]]))
+    return sorted(rims, key=lambda rim: -rim[4])
+
+
+def _gap_along(line: Float, one: shapely.Geometry, other: shapely.Geometry) -> float:
+    """Gap between two faces along a line (3.2.3)."""
+    spans = []
+    for shape in (one, other):
+        at = (shapely.get_coordinates(shape) - line[:2]) @ line[2:4]
+        spans.append((at.min(), at.max()))
+    return max(spans[0][0] - spans[1][1], spans[1][0] - spans[0][1], 0.0)
+
+
+def _occluded(one: Extent, moved: shapely.Geometry, scans: set[int], images: RangeImages) -> bool:
+    """Whether something stands before the gap between two faces (3.2.4), for each scan that saw one of them."""
+    places = _gap_places(one.outline, moved, one.pixel)
+    if not len(places):
+        return True  # they touch
+    space = to_space(one.model, places[:, 0], places[:, 1])
+    hidden = np.ones(len(space), np.bool_)
+    for scan in sorted(scans):
+        hidden &= images.hidden(space, scan)
+    return bool(hidden.mean() >= OCCLUDED)
+
+
+def _gap_places(one: shapely.Geometry, other: shapely.Geometry, pixel: float) -> Float:
+    """Places (n, 2) between the facing rims of two faces: on the shortest ways from one to the other."""
+    ends = []
+    for shape in (one, other):
+        dense = shapely.get_coordinates(shapely.segmentize(shape.boundary, 2.0 * pixel))
+        ends.append(dense[:: max(1, len(dense) // 2000)])
+    found = []
+    for here, there in (ends, ends[::-1]):
+        far, which = cKDTree(there).query(here)
+        # Rims that turn away from the other face have their shortest way along it; the facing ones are the nearer half.
+        facing = far <= np.quantile(far, 0.25) * 1.5 + 2.0 * pixel
+        chosen = np.flatnonzero(facing)[:: max(1, int(facing.sum()) // 60)]
+        for share in (0.2, 0.35, 0.5, 0.65, 0.8):
+            found.append(here[chosen] + share * (there[which[chosen]] - here[chosen]))
+    places = np.concatenate(found)
+    free = ~shapely.contains_xy(shapely.buffer(one, pixel), places[:, 0], places[:, 1])
+    free &= ~shapely.contains_xy(shapely.buffer(other, pixel), places[:, 0], places[:, 1])
+    return places[free]
+
+
+@kernel
+def _add_ranges(
+    xyz: Float, scan: Int32, stations: Float, cell: float, nearest: Single
+) -> None:  # pragma: no cover - compiled
+    rows, columns = nearest.shape[1], nearest.shape[2]
+    for i in range(xyz.shape[0]):
+        s = scan[i]
+        x, y, z = xyz[i, 0] - stations[s, 0], xyz[i, 1] - stations[s, 1], xyz[i, 2] - stations[s, 2]
+        far = math.sqrt(x * x + y * y + z * z)
+        if not far > 0.0:
+            continue
+        row = min(max(int((math.asin(z / far) + math.pi / 2) / cell), 0), rows - 1)
+        column = int((math.atan2(y, x) + math.pi) / cell) % columns
+        if far < nearest[s, row, column]:
+            nearest[s, row, column] = far

@@ -1,0 +1,185 @@
+"""What is found of a structure: members, their faces, and the spots on these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import rasterio.features
+import shapely
+from affine import Affine
+from shapely.geometry import MultiPolygon, Polygon
+
+from tunneldb.arrays import Bool, Float
+from tunneldb.structures.models import RADIUS, to_space
+
+SIMPLIFY = 0.75
+"""Tolerance by which outlines of faces are simplified, pixels."""
+
+_CHORD = 0.005  # m by which an edge of a polygon may cut the corner of a curved face
+
+Kind = Literal["flat", "pipe"]
+
+
+@dataclass(frozen=True)
+class Member:
+    """Faces of one surface, joined over what stands before it.
+
+    Attributes
+    ----------
+    number : int
+        From 1, the largest first.
+    kind : {'flat', 'pipe'}
+    faces : tuple of int
+        Numbers of its faces.
+    area : float
+        m², of its faces.
+    length : float
+        Along its longest direction, gaps counted, m.
+    line : (2, 3) float array
+        The ends of that, m.
+    bimodal : bool
+        Whether so much of it differs from the rest that neither is known to be its own surface.
+    """
+
+    number: int
+    kind: Kind
+    faces: tuple[int, ...]
+    area: float
+    length: float
+    line: Float
+    bimodal: bool
+
+
+@dataclass(frozen=True)
+class Face:
+    """A plane or a part of a cylinder.
+
+    Attributes
+    ----------
+    number, member : int
+        From 1, and that of its member.
+    kind : {'flat', 'pipe'}
+    model : (11,) float array
+        See `models`; lengths are m from ``origin``.
+    origin : (3,) float array
+        m.
+    points : int
+        Points on it.
+    area : float
+        m².
+    radius : float
+        m; 0 of a plane.
+    rms : float
+        Of the voxels' centroids about a cylinder, of the points about a plane, m: its roughness and the noise.
+    seen_share : float
+        Share of its area that was judged, 0 to 1; of the rest too little is known for an all-clear.
+    incidence : (float, float)
+        Least and greatest at which it was judged, degrees; NaN where none of it was.
+    level, sigma : float
+        Median of its own level where it was judged, and of the standard deviation about it, dB; NaN where none of it was.
+    bimodal : bool
+        Whether more than half of what was judged differs from the level.
+    outline : MultiPolygon
+        Of unrolled (u, v), m.
+    """
+
+    number: int
+    member: int
+    kind: Kind
+    model: Float
+    origin: Float
+    points: int
+    area: float
+    radius: float
+    rms: float
+    seen_share: float
+    incidence: tuple[float, float]
+    level: float
+    sigma: float
+    bimodal: bool
+    outline: MultiPolygon
+
+    def in_space(self, shape: shapely.Geometry) -> shapely.Geometry:
+        """A geometry of unrolled coordinates on the face, with Z, in the coordinates of the points."""
+        if self.radius > 0.0:
+            shape = shapely.segmentize(shape, 2.0 * float(np.sqrt(2.0 * self.radius * _CHORD)))
+
+        def place(at: Float) -> Float:
+            return to_space(self.model, at[:, 0], at[:, 1])[:, :3] + self.origin
+
+        flat = shapely.get_coordinates(shape)
+        raised = place(flat)
+        lifted = shapely.force_3d(shape)
+        return shapely.set_coordinates(lifted, raised)
+
+    def on_map(self, shape: shapely.Geometry) -> shapely.Geometry:
+        """Where a geometry of unrolled coordinates lies in plan; what stands upright is a line there."""
+        placed = shapely.force_2d(self.in_space(shape))
+        return placed if placed.is_valid and placed.area > 0.05 * shape.area else placed.convex_hull
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A region that differs from its own surface.
+
+    Attributes
+    ----------
+    number, face, member : int
+        From 1; where it is.
+    kind : {'dark', 'bright'}
+        Against its own surface.
+    reasons : tuple of str
+        What is to be known of its shape, the strongest first: ``thin``, ``gradual``, ``rectangular``.
+    confidence : float
+        That there is a difference, 0 to 1.
+    contrast : float
+        Mean difference in standard deviations of the surface.
+    difference : float
+        The same in dB, positive.
+    area : float
+        m².
+    points : int
+    scans : int
+        Scans that saw it.
+    outline : Polygon
+        Of unrolled (u, v), m.
+    """
+
+    number: int
+    face: int
+    member: int
+    kind: Literal["dark", "bright"]
+    reasons: tuple[str, ...]
+    confidence: float
+    contrast: float
+    difference: float
+    area: float
+    points: int
+    scans: int
+    outline: Polygon
+
+
+@dataclass(frozen=True)
+class Structures:
+    """All that is found."""
+
+    members: list[Member]
+    faces: list[Face]
+    spots: list[Spot]
+
+
+def outline_of(mask: Bool, left: int, bottom: int, pixel: float) -> MultiPolygon:
+    """Outline of pixels (rows upwards, columns), in unrolled coordinates, m."""
+    image = mask.astype(np.uint8)
+    moved = Affine(pixel, 0.0, left * pixel, 0.0, pixel, bottom * pixel)
+    found = [shapely.geometry.shape(shape) for shape, _ in rasterio.features.shapes(image, mask=mask, transform=moved)]
+    simple = [shapely.make_valid(shapely.simplify(shape, SIMPLIFY * pixel)) for shape in found]
+    parts = [part for shape in simple for part in shapely.get_parts(shape) if isinstance(part, Polygon)]
+    return MultiPolygon(parts)
+
+
+def kind_of(model: Float) -> Kind:
+    """Kind of a face, by its model."""
+    return "pipe" if model[RADIUS] > 0.0 else "flat"

@@ -1,0 +1,91 @@
+"""Faces of a structure from the moments of its voxels, and where their points belong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tunneldb.arrays import Float
+from tunneldb.structures.face_raster import Layout, PointFinder, candidates_of, lay_out
+from tunneldb.structures.growing import UNKNOWN_NOISE, grow, noise_of
+from tunneldb.structures.merging import Faces, merge
+from tunneldb.structures.models import with_directions
+from tunneldb.structures.voxel_grid import VoxelGrid, voxel_planes
+from tunneldb.structures.voxel_moments import COARSEST, VoxelMoments
+
+POINTS_A_VOXEL = 3
+"""The edge of the voxels is the smallest of which half of the points share theirs with so many."""
+
+
+@dataclass(frozen=True)
+class Segmentation:
+    """Faces, and how to find a point's.
+
+    Attributes
+    ----------
+    edge : float
+        Edge of the voxels, m.
+    voxels : int
+    noise : float
+        Standard deviation of ranges, m.
+    origin : (3,) float array
+        Where the models' lengths count from, m.
+    stations : (k, 3) float array
+        m from there.
+    faces : Faces
+    layout : Layout
+    finder : PointFinder
+    """
+
+    edge: float
+    voxels: int
+    noise: float
+    origin: Float
+    stations: Float
+    faces: Faces
+    layout: Layout
+    finder: PointFinder
+
+
+def find_faces(moments: VoxelMoments, stations: Float) -> Segmentation:
+    """Find the faces of a structure.
+
+    Parameters
+    ----------
+    moments : VoxelMoments
+        Of all points.
+    stations : (k, 3) float array
+        Where the scanner stood, by the numbers of the scans, m.
+    """
+    grid = moments.grid(level_of(moments))
+    at = np.ascontiguousarray(stations - grid.origin)
+    starts, neighbours = grid.neighbours()
+    towards = at[grid.scan] - grid.centroids
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    noise = noise_of(voxel_planes(grid, starts, neighbours, at, UNKNOWN_NOISE), towards)
+    planes = voxel_planes(grid, starts, neighbours, at, noise)
+    grown = grow(grid, starts, neighbours, planes, towards, noise, np.full(len(grid), -1, np.int32))
+    faces = merge(grid, starts, neighbours, towards, grown, noise)
+    faces = replace(faces, models=with_directions(faces.models, _middles(grid, faces)))
+    layout = lay_out(grid, faces, len(stations))
+    candidates = candidates_of(faces.owner, starts, neighbours)
+    finder = PointFinder(grid, candidates, faces, layout, at, noise)
+    return Segmentation(grid.edge, len(grid), noise, grid.origin, at, faces, layout, finder)
+
+
+def level_of(moments: VoxelMoments) -> int:
+    """Level of the voxels in which faces are grown."""
+    for level in range(moments.level, COARSEST, -1):
+        counts = np.sort(moments.counts(level))
+        until = np.cumsum(counts)
+        if len(counts) and counts[np.searchsorted(until, 0.5 * until[-1])] >= POINTS_A_VOXEL:
+            return level
+    return COARSEST
+
+
+def _middles(grid: VoxelGrid, faces: Faces) -> Float:
+    held = faces.owner >= 0
+    owner, count = faces.owner[held], len(faces.models)
+    sums = np.column_stack([np.bincount(owner, grid.moments[held, k], count) for k in range(4)])
+    return np.asarray(sums[:, 1:] / sums[:, :1])

@@ -1,0 +1,139 @@
+"""From the contrast of a face to its spots: both tails, median filter, boundary, regions, verdict (Ono et al., 3.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy import ndimage
+from shapely.geometry import Polygon
+
+from tunneldb.anomalies.boundary import refine_boundary
+from tunneldb.anomalies.region_shape import measure_shape
+from tunneldb.anomalies.regions import Region, find_regions
+from tunneldb.anomalies.threshold import dark_pixels, filter_size
+from tunneldb.anomalies.verdict import degrees_of, detectability
+from tunneldb.arrays import Bool, Int32
+from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.pixel_state import PixelState
+from tunneldb.structures.contrast import FaceContrast
+
+LEAST_AREA = 0.0016
+"""Smaller spots are left out, m²: 4 cm × 4 cm."""
+
+LEAST_POINTS = 30
+"""Spots of fewer points are left out."""
+
+FAINT = 0.5
+"""Degree from which a region is too faint to be told from noise."""
+
+RIM = 0.75
+"""A region of which more lies along the face's own edge is what the beam loses there."""
+
+BIMODAL = 0.5
+"""Share of what was judged that differs, from which it is not known which of both is the surface itself."""
+
+_TOLD = ("thin", "gradual", "rectangular")
+
+
+@dataclass(frozen=True)
+class FoundSpot:
+    """A region of a face that differs from it; see `results.Spot`."""
+
+    kind: Literal["dark", "bright"]
+    reasons: tuple[str, ...]
+    confidence: float
+    contrast: float
+    difference: float
+    area: float
+    points: int
+    scans: int
+    outline: Polygon
+    mask: Bool
+    corner: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class FaceSpots:
+    """Spots of a face, and the number of the spot in each pixel (rows upwards), from 1; 0 is none."""
+
+    spots: list[FoundSpot]
+    numbers: Int32
+    share: float
+
+
+def find_spots(face: FaceContrast) -> FaceSpots:
+    """Find what differs from a face's own level, darker or brighter."""
+    numbers = np.zeros(face.face.shape, np.int32)
+    judged = int(face.judged.sum())
+    if not judged:
+        return FaceSpots([], numbers, 0.0)
+    empty = int((face.image.state == PixelState.EMPTY).sum())
+    size = filter_size(judged / (judged + empty))
+    rim = face.face & ~ndimage.binary_erosion(face.face, np.ones((3, 3), np.bool_), iterations=2)
+    found: list[FoundSpot] = []
+    kinds: tuple[tuple[Literal["dark", "bright"], int], ...] = (("dark", 1), ("bright", -1))
+    for kind, sign in kinds:
+        image = face.image
+        if sign < 0:
+            image = replace(image, drop=np.where(image.drop == NODATA, np.int16(NODATA), -image.drop).astype(np.int16))
+        marked = refine_boundary(dark_pixels(image, size), image, size)
+        for region in find_regions(marked, marked, image, LEAST_AREA, None):
+            spot = _judge(region, kind, face, rim)
+            if spot is None:
+                continue
+            found.append(spot)
+            part = numbers[_box(spot)]
+            part[spot.mask & (part == 0)] = len(found)
+    _over_rim(face, numbers, found)
+    share = float((numbers[face.judged] > 0).sum()) / judged
+    return FaceSpots(found, numbers, share)
+
+
+def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, rim: Bool) -> FoundSpot | None:
+    """What a region is; None if it is nothing."""
+    if not region.filled:
+        return None
+    grid = face.image.grid
+    corner = (region.row - grid.bottom, region.column - grid.first_column)
+    box = tuple(slice(at, at + size) for at, size in zip(corner, region.mask.shape, strict=True))
+    points = int(face.points[box][region.mask].sum())
+    if points < LEAST_POINTS:
+        return None
+    shape = measure_shape(region.mask, region.pixel)
+    degrees = degrees_of(region, shape)
+    if degrees["faint"] > FAINT:
+        return None
+    along = float(rim[box][region.mask].mean())
+    if along > RIM and not rim[face.judged].mean() > 0.5:
+        return None
+    told = sorted((name for name in _TOLD if degrees[name] > 0.5), key=lambda name: -degrees[name])
+    seen = int(np.bitwise_or.reduce(face.scans[box][region.mask]))
+    return FoundSpot(
+        kind,
+        tuple(told),
+        detectability(region) * (1.0 - degrees["faint"]),
+        region.contrast,
+        region.drop_mean,
+        region.area,
+        points,
+        seen.bit_count(),
+        region.outline,
+        region.mask,
+        corner,
+    )
+
+
+def _box(spot: FoundSpot) -> tuple[slice, slice]:
+    (row, column), (rows, columns) = spot.corner, spot.mask.shape
+    return slice(row, row + rows), slice(column, column + columns)
+
+
+def _over_rim(face: FaceContrast, numbers: Int32, found: list[FoundSpot]) -> None:
+    """Let spots reach over the face's rim, which was not judged, as far as they lie beside it."""
+    if not found:
+        return
+    left = face.face & (numbers == 0) & (face.image.state[::-1] == PixelState.OFF) & (face.points > 0)
+    grown = ndimage.grey_dilation(numbers, size=(3, 3))
+    numbers[left] = grown[left]
