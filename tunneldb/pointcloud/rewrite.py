@@ -1,13 +1,13 @@
-"""Scan files written again with other classes, as LAZ 1.4, in chunks of constant memory.
+"""Scan files written again with other classes or further dimensions, as LAZ 1.4, in chunks of constant memory.
 
-Nothing but the class of a point changes: coordinates, scales and offsets, all other dimensions, extra bytes, coordinate
+Nothing else of a point changes: coordinates, scales and offsets, all other dimensions, extra bytes, coordinate
 system, records and dates are the input's. Where its point format has no room for classes over 31, the next one that holds
 the same takes its place.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +15,7 @@ import laspy
 import numpy as np
 from laspy import DecompressionSelection, LazBackend
 
-from tunneldb.arrays import Float, Int64, UInt8
+from tunneldb.arrays import Float, Int32, Int64, UInt8, UInt32
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.e57 import is_e57
 from tunneldb.pointcloud.formats.e57_records import E57Records
@@ -95,6 +95,63 @@ def rewrite(
             progress(len(records))
         writer.close(what.patches())
     return counts
+
+
+def rewrite_with_numbers(
+    source: Path,
+    target: Path,
+    numbers: Iterable[Sequence[UInt32 | Int32]],
+    names: Mapping[str, str],
+    progress: Callable[[int], None] = lambda count: None,
+    size: int = CHUNK,
+) -> None:
+    """Write a scan file again, each point with further whole numbers.
+
+    Parameters
+    ----------
+    source, target, progress, size
+        As of `rewrite`.
+    numbers : iterable of sequences of (n,) arrays
+        The numbers of the points in the order of the file, an array for each name; in pieces of any length.
+    names : mapping of str to str
+        Names of the dimensions, and what they are.
+
+    Raises
+    ------
+    UserError
+        As of `rewrite`, and if the file has a dimension of that name.
+    OSError
+        If the target cannot be written.
+    """
+    what = _of_las(source, size) if format_of(source).is_las else _of_others(source, size)
+    try:
+        head = what.head.with_numbers(names, record_size(what.head.point_format))
+    except ValueError as error:
+        raise UserError(f"{source}: it has a dimension {str(error)!r} already; write it without") from None
+    values = _Pieces(numbers)
+    with writing(target, head) as writer:
+        for records in what.chunks:
+            added = np.column_stack(values.take(len(records))).astype("<u4").view(np.uint8).reshape(len(records), -1)
+            writer.write(np.concatenate([records, added], axis=1))
+            progress(len(records))
+        writer.close(what.patches())
+
+
+class _Pieces:
+    """Arrays that come in pieces, taken by so many elements."""
+
+    def __init__(self, pieces: Iterable[Sequence[UInt32 | Int32]]) -> None:
+        self.pieces = iter(pieces)
+        self.rest: list[UInt32 | Int32] = []
+
+    def take(self, count: int) -> list[UInt32 | Int32]:
+        """So many elements of each."""
+        while not self.rest or len(self.rest[0]) < count:
+            piece = next(self.pieces)
+            self.rest = [np.concatenate(pair) for pair in zip(self.rest, piece, strict=True)] if self.rest else list(piece)
+        taken = [array[:count] for array in self.rest]
+        self.rest = [array[count:] for array in self.rest]
+        return taken
 
 
 def read_coordinates(path: Path, size: int = CHUNK) -> Iterator[Float]:

@@ -25,6 +25,10 @@ _INTERNAL_WAVEFORMS = 1 << 1
 _LASZIP = (b"laszip encoded", 22204)
 _LOOKUP = (b"LASF_Spec", 0)
 _WKT = (b"LASF_Projection", 2112)
+_EXTRA_BYTES = (b"LASF_Spec", 4)
+_EXTRA = struct.Struct("<2sBB32s4s24s24s24s24s24s32s")  # table 26: 192 bytes
+_UINT32 = 5
+_SIZE_OF = (0, 1, 1, 2, 2, 4, 4, 8, 8, 4, 8)  # bytes of the data types of extra bytes
 _COPC = b"copc"
 
 
@@ -122,6 +126,44 @@ class Head:
         table = b"".join(struct.pack("<B15s", code, names.get(code, "").encode("ascii", "replace")) for code in range(256))
         kept = tuple(record for record in self.records if record.key != _LOOKUP)
         return replace(self, records=(*kept, Record(_LOOKUP[0], _LOOKUP[1], b"Classes", table)))
+
+    def with_numbers(self, names: Mapping[str, str], before: int) -> Head:
+        """With further dimensions behind all others, whole numbers of 32 bits.
+
+        Parameters
+        ----------
+        names : mapping of str to str
+            Their names, and what they are, up to 32 ASCII characters each.
+        before : int
+            Bytes of a point's standard fields.
+
+        Raises
+        ------
+        ValueError
+            If a dimension is of one of these names already; it is what the error says.
+        """
+        described = b"".join(record.data for record in self.records if record.key == _EXTRA_BYTES)
+        entries = [_EXTRA.unpack_from(described, at) for at in range(0, len(described) - _EXTRA.size + 1, _EXTRA.size)]
+        for entry in entries:
+            if (name := entry[3].rstrip(b"\0").decode("latin-1")) in names:
+                raise ValueError(name)
+        # Those of 11 to 30 are two or three values of 1 to 10.
+        told = sum(
+            entry[2] if kind == 0 else _SIZE_OF[(kind - 1) % 10 + 1] * ((kind - 1) // 10 + 1)
+            for entry in entries
+            for kind in (entry[1],)
+        )
+        blank = [b""] * 5
+        extra = self.record_size - before
+        unsaid = b"".join(
+            _EXTRA.pack(b"", 0, min(extra - at, 255), f"unsaid{at}".encode(), b"", *blank, b"") for at in range(told, extra, 255)
+        )
+        added = b"".join(
+            _EXTRA.pack(b"", _UINT32, 0, name.encode(), b"", *blank, text.encode()) for name, text in names.items()
+        )
+        kept = tuple(record for record in self.records if record.key != _EXTRA_BYTES)
+        record = Record(_EXTRA_BYTES[0], _EXTRA_BYTES[1], b"Extra bytes", described + unsaid + added)
+        return replace(self, records=(*kept, record)).with_points(self.point_format, self.record_size + 4 * len(names))
 
     def before_points(self, laszip: bytes) -> bytes:
         """All that comes before the compressed points; `laszip` says how they are compressed."""

@@ -1,0 +1,145 @@
+"""The verb ``members``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, cast, get_args
+
+import click
+
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.progress import bar, step
+from tunneldb.cli.tables import print_table
+from tunneldb.errors import UserError
+from tunneldb.files import told_to_end
+from tunneldb.radiometry.correction import Kind
+
+if TYPE_CHECKING:
+    from tunneldb.pipeline.members import FileMembers
+    from tunneldb.radiometry.reference_curve import ReferenceCurve
+
+_MOST = 20  # rows of a table that are printed
+
+
+@verb(
+    examples=[
+        "tunneldb members plant.laz --stations stations.csv --intensity Amplitude --intensity-kind amplitude -o out.laz",
+        "tunneldb members plant.laz --stations stations.csv --intensity Reflectance --intensity-kind reflectance -o out.gpkg",
+    ]
+)
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--stations",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Where the scanner stood: CSV with scan_id,x,y,z. An E57 or PTX file says it by its poses. May be repeated.",
+)
+@click.option("--intensity", metavar="DIMENSION", help="Dimension that holds the intensity.")
+@click.option("--intensity-kind", type=click.Choice(get_args(Kind)), help="What it is; as for tunneldb survey add.")
+@click.option(
+    "--reference",
+    metavar="CSV|auto",
+    help="Curve of a reference target by which range is corrected; auto finds one from the faces.",
+)
+@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write: .laz or .gpkg; not FILE.")
+def members(
+    file: Path,
+    stations: tuple[Path, ...],
+    intensity: str | None,
+    intensity_kind: str | None,
+    reference: str | None,
+    output: Path | None,
+) -> None:
+    """Find the members of a structure in the scan FILE, and what on them differs from its own surface.
+
+    Planes and cylinders are found as faces, faces that something before them parts are joined into members, and what is dark
+    or bright against its own surface is a spot: rust, stains, cracks, flakes; the name is the inspector's to give. A .laz has
+    the input's points with the dimensions face, member and anomaly (0: none), a .gpkg polygons in the layers member, face and
+    spot. Needs no database.
+    """
+    from tunneldb.export.pointcloud.members import check_target, export_members
+    from tunneldb.pipeline.members import Inputs, stations_for
+
+    if intensity is None:
+        raise UserError(f"{file}: say which dimension holds the intensity: --intensity DIMENSION")
+    if intensity_kind is None:
+        raise UserError(f"{file}: say what {intensity} is: --intensity-kind {'|'.join(get_args(Kind))}")
+    if output is not None:
+        check_target(file, output)
+    inputs = Inputs(file, intensity, cast(Kind, intensity_kind), stations_for(file, list(stations)), _reference(reference))
+    with told_to_end(), bar("points") as progress:
+        found = export_members(inputs, output, step(progress))
+    _tell(found, output)
+    _print(found)
+    if output is not None:
+        click.echo(f"written to {output}", err=True)
+
+
+def _reference(given: str | None) -> ReferenceCurve | str | None:
+    from tunneldb.csvfile import read_csv
+    from tunneldb.pipeline.members import AUTO
+    from tunneldb.radiometry.reference_curve import ReferenceCurve
+
+    if given is None or given == AUTO:
+        return given
+    table = read_csv(Path(given), ("range_m", "intensity_db"))
+    try:
+        return ReferenceCurve.from_rows(table["range_m"], table["intensity_db"])
+    except UserError as error:
+        raise UserError(f"{given}: {error}") from None
+
+
+def _tell(found: FileMembers, output: Path | None) -> None:
+    from tunneldb.export.exchange.members import face_row, member_row, spot_row
+
+    structures = found.found.structures
+    tell(
+        points=found.points,
+        points_far=found.far,
+        points_without_position=found.unknown,
+        points_without_intensity=found.untold,
+        saturated_share=found.saturated,
+        voxel=found.segmentation.edge,
+        voxels=found.segmentation.voxels,
+        noise=found.segmentation.noise,
+        members=[member_row(member) for member in structures.members],
+        faces=[face_row(face) for face in structures.faces],
+        spots=[spot_row(spot) for spot in structures.spots],
+        notes=found.notes,
+        file=output,
+    )
+
+
+def _print(found: FileMembers) -> None:
+    structures = found.found.structures
+    area = sum(face.area for face in structures.faces)
+    seen = sum(face.area * face.seen_share for face in structures.faces)
+    click.echo(
+        f"{len(structures.members)} members of {len(structures.faces)} faces, {area:.1f} m², of which {seen:.1f} m² was judged;"
+        f" {len(structures.spots)} spots"
+    )
+    rows = [
+        [
+            str(spot.number), str(spot.member), str(spot.face), spot.kind, f"{1e4 * spot.area:.0f}", f"{spot.difference:.1f}",
+            f"{spot.contrast:.1f}", f"{spot.confidence:.2f}", ", ".join(spot.reasons),
+        ]
+        for spot in sorted(structures.spots, key=lambda spot: -spot.area)[:_MOST]
+    ]  # fmt: skip
+    if rows:
+        header = ["spot", "member", "face", "kind", "cm²", "dB", "σ", "confidence", "shape"]
+        print_table(header, rows, right=(0, 1, 2, 4, 5, 6, 7))
+    if len(structures.spots) > _MOST:
+        click.echo(f"and {len(structures.spots) - _MOST} smaller ones; --json has all")
+    left = [
+        (found.far, "lie too far from the scanner positions"),
+        (found.unknown, "have no scanner position"),
+        (found.untold, "have no intensity"),
+    ]
+    for count, why in left:
+        if count:
+            click.echo(f"{count} of {found.points} points {why} and were left out")
+    if bimodal := [str(member.number) for member in structures.members if member.bimodal]:
+        click.echo(f"more than half differs of member {', '.join(bimodal)} (bimodal): which half is its own surface is open")
+    for note in found.notes:
+        click.echo(note)

@@ -1,0 +1,62 @@
+"""Scan files written again with the face, the member and the spot that each point is on; or what is on them as polygons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from tunneldb.errors import UserError
+from tunneldb.export.exchange.members import write_members
+from tunneldb.export.pointcloud.survey import same_file
+from tunneldb.files import replacing
+from tunneldb.pipeline.members import FileMembers, Inputs, find_members, numbers_of_points
+from tunneldb.pointcloud.reader import read_header
+from tunneldb.pointcloud.rewrite import rewrite_with_numbers
+
+Begin = Callable[[str, float | None], Callable[[float], None]]
+
+DIMENSIONS = {
+    "face": "face, 0: none",
+    "member": "member, 0: none",
+    "anomaly": "spot, 0: none",
+}
+"""What is added to each point."""
+
+
+def check_target(source: Path, target: Path) -> None:
+    """Refuse a target that cannot be written.
+
+    Raises
+    ------
+    UserError
+    """
+    if target.suffix.lower() not in (".laz", ".gpkg"):
+        raise UserError(f"{target}: points are written as .laz, polygons as .gpkg: let its name end so")
+    if same_file(source, target):
+        raise UserError(f"{target} is the file that is read, never to be written over: choose another name with -o")
+    if not target.parent.is_dir():
+        raise UserError(f"{target.parent}: no such folder")
+
+
+def export_members(inputs: Inputs, target: Path | None, begin: Begin) -> FileMembers:
+    """Find the members of a scan file, and write its points or polygons, if a target is given.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be used, see `find_members`; if the target cannot be written.
+    """
+    if target is not None:
+        check_target(inputs.path, target)
+    members = find_members(inputs, begin)
+    if target is None:
+        return members
+    header = read_header(inputs.path)
+    with replacing(target) as temporary:
+        if target.suffix.lower() == ".gpkg":
+            write_members(temporary, members.found.structures, header.crs)
+        else:
+            rewrite_with_numbers(
+                inputs.path, temporary, numbers_of_points(inputs, members), DIMENSIONS, begin("writing", header.points)
+            )
+    return members

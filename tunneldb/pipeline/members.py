@@ -1,0 +1,294 @@
+"""Members, faces and spots of a scan file by itself, in three passes over its points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tunneldb.arrays import Float, Int32, Int64, Single
+from tunneldb.errors import UserError
+from tunneldb.geometry.crs import describe_crs
+from tunneldb.pointcloud.formats.faults import require_dimension
+from tunneldb.pointcloud.formats.table import has_scans
+from tunneldb.pointcloud.points import Points
+from tunneldb.pointcloud.poses import PoseModel
+from tunneldb.pointcloud.prefetch import prefetch
+from tunneldb.pointcloud.reader import read_chunks, read_header
+from tunneldb.pointcloud.stations import read_stations
+from tunneldb.radiometry.cells import IntensitySamples
+from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
+from tunneldb.radiometry.intensity_kind import contradiction
+from tunneldb.radiometry.range_curve import estimate_range_curve
+from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.structures.contrast import observe_face
+from tunneldb.structures.face_raster import Sums
+from tunneldb.structures.find import Found, find_structures
+from tunneldb.structures.joining import RangeImages
+from tunneldb.structures.models import to_space
+from tunneldb.structures.segmentation import Segmentation, find_faces
+from tunneldb.structures.voxel_moments import REACH, SCANS, VoxelMoments
+
+Begin = Callable[[str, float | None], Callable[[float], None]]
+
+AUTO = "auto"
+
+SATURATED = 0.5
+"""Share of the points that have the greatest value of all from which there is nothing to be told by it."""
+
+NOTED_SATURATED = 0.01
+"""Share from which it is said."""
+
+UNKNOWN = 0.01
+"""Share of points without a scanner position that may be left out."""
+
+_SAMPLES = 400_000
+_SAMPLE_OF_VALUES = 100_000
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What is to be looked at.
+
+    Attributes
+    ----------
+    path : Path
+    dimension : str
+        That holds the intensity.
+    kind : {'amplitude', 'reflectance', 'linear'}
+    poses : PoseModel
+        Stations.
+    reference : ReferenceCurve or 'auto' or None
+        By what levels are corrected for range.
+    """
+
+    path: Path
+    dimension: str
+    kind: Kind
+    poses: PoseModel
+    reference: ReferenceCurve | str | None
+
+
+@dataclass(frozen=True)
+class FileMembers:
+    """What is found in a file.
+
+    Attributes
+    ----------
+    found : Found
+    segmentation : Segmentation
+    points, far, unknown, untold : int
+        Points; those left out for lying too far away, for want of a scanner position, and those whose intensity is no number.
+    saturated : float
+        Share of the points with the greatest intensity of all.
+    notes : tuple of str
+    """
+
+    found: Found
+    segmentation: Segmentation
+    points: int
+    far: int
+    unknown: int
+    untold: int
+    saturated: float
+    notes: tuple[str, ...]
+
+
+def find_members(inputs: Inputs, begin: Begin) -> FileMembers:
+    """Find the members of a scan file, their faces and spots.
+
+    Memory grows with the surface that was scanned, not with the points.
+
+    Parameters
+    ----------
+    inputs : Inputs
+    begin : callable
+        Called with a text and the number of points before each pass; returns what takes the points that are done.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, is in degrees, has no usable intensity, or scans without a position.
+    """
+    path = inputs.path
+    header = read_header(path)
+    if header.crs is not None and header.crs.is_geographic:
+        raise UserError(
+            f"{path}: its coordinates are degrees, {describe_crs(header.crs)}, and a structure is measured in metres;"
+            " transform the file into a projected system"
+        )
+    require_dimension(path, inputs.dimension, header.dimensions, "--intensity")
+    values = _Values(inputs)
+    moments = VoxelMoments(inputs.poses.station.mean(axis=0))
+    for points, scan in _read(inputs, values, begin("points", header.points)):
+        moments.add(points.xyz, scan)
+    values.require()
+    if not len(moments):
+        raise UserError(
+            f"{path}: all points lie more than {REACH:g} m from the middle of the scanner positions, which is"
+            f" {_place(moments.origin)}: are they in the file's coordinates?"
+        )
+    begin("faces", None)
+    far = moments.far
+    segmentation = find_faces(moments, inputs.poses.station)
+    del moments
+    sums, images = Sums.empty(segmentation.layout.size), RangeImages(segmentation.stations)
+    progress = begin("intensity", header.points)
+    for points, scan in _read(inputs, None, progress):
+        level = to_decibel(points.intensity, inputs.kind).astype(np.float32)
+        segmentation.finder.add(points.xyz, scan, level, sums)
+        images.add(points.xyz - segmentation.origin, scan)
+    begin("spots", None)
+    reference, note = _reference(inputs, segmentation, sums)
+    by_range = needs_reference(inputs.kind) and reference is None
+    found = find_structures(segmentation, sums, images, reference, by_range=by_range)
+    return FileMembers(
+        found, segmentation, values.count, far, values.unknown, values.untold, values.saturated, tuple(filter(None, [note]))
+    )
+
+
+def numbers_of_points(inputs: Inputs, members: FileMembers) -> Iterator[tuple[Int32, Int32, Int32]]:
+    """Face, member and spot of all points, in the order of the file, chunk by chunk; 0 is none."""
+    finder, found = members.segmentation.finder, members.found
+    for points, scan, use in _read_all(inputs, lambda count: None):
+        out = np.zeros((3, len(use)), np.int32)
+        face, pixel = finder.find(points.xyz[use], scan[use])
+        out[:, use] = found.of_points(face, pixel)
+        yield out[0], out[1], out[2]
+
+
+def stations_for(path: Path, stations: list[Path]) -> PoseModel:
+    """Scanner positions, by the files given, and by an E57 or PTX file's own poses where none is.
+
+    Raises
+    ------
+    UserError
+        If there is none.
+    """
+    if not stations and not has_scans(path):
+        raise UserError(
+            f"{path}: where the scanner stood isn't in the file, and incidence cannot be known without:"
+            " give --stations FILE with scan_id,x,y,z"
+        )
+    read = read_stations(stations or [path])
+    if len(read.scan_id) > SCANS:
+        raise UserError(f"{path}: {len(read.scan_id)} stations, and {SCANS} are looked at together at most; part the file")
+    return PoseModel.from_stations(read.scan_id.astype(np.int64), read.xyz)
+
+
+class _Values:
+    """What the values of an intensity are, gathered chunk by chunk."""
+
+    def __init__(self, inputs: Inputs) -> None:
+        self.inputs = inputs
+        self.count = self.untold = self.unknown = self.at_most = 0
+        self.least, self.most = np.inf, -np.inf
+        self.sample: list[Single] = []
+
+    def add(self, points: Points, known: int) -> None:
+        value = points.intensity
+        self.count += len(value)
+        self.unknown += len(value) - known
+        finite = value[np.isfinite(value)]
+        self.untold += len(value) - len(finite)
+        if not len(finite):
+            return
+        most = float(finite.max())
+        if most > self.most:
+            self.most, self.at_most = most, 0
+        if most == self.most:
+            self.at_most += int(np.count_nonzero(finite == most))
+        self.least = min(self.least, float(finite.min()))
+        if len(self.sample) < 20:
+            self.sample.append(finite[:: max(1, len(finite) * 20 // _SAMPLE_OF_VALUES)].copy())
+
+    @property
+    def saturated(self) -> float:
+        return self.at_most / max(self.count, 1)
+
+    def require(self) -> None:
+        """Raise a UserError where there is nothing to be told by the values."""
+        what = f"{self.inputs.path}: {self.inputs.dimension}"
+        if not np.isfinite(self.most):
+            raise UserError(f"{what}: no value is a number, so nothing can be told by it; choose another --intensity")
+        if self.least == self.most:
+            raise UserError(f"{what}: all values are {self.most:g}, so nothing can be told by it; choose another --intensity")
+        if self.saturated > SATURATED:
+            raise UserError(
+                f"{what} is saturated: {100 * self.saturated:.0f} % of the points have its greatest value, {self.most:g};"
+                " choose another --intensity, or scan with less gain"
+            )
+        wrong = contradiction(self.inputs.kind, np.concatenate(self.sample)) if self.sample else None
+        if wrong:
+            raise UserError(f"{what} is no {self.inputs.kind}: {wrong}")
+
+
+def _read(
+    inputs: Inputs, values: _Values | None, progress: Callable[[float], None]
+) -> Iterator[tuple[Points, Int32]]:
+    """Points whose scanner position is known, with the place of their scan among the stations."""
+    for points, scan, use in _read_all(inputs, progress):
+        if values is not None:
+            values.add(points, int(use.size))
+            _refuse_unknown(inputs, points, values)
+        yield (points, scan) if len(use) == len(points) else (points.some(use), scan[use])
+
+
+def _refuse_unknown(inputs: Inputs, points: Points, values: _Values) -> None:
+    if values.unknown > max(UNKNOWN * values.count, 1000):
+        raise UserError(f"{inputs.path}: {inputs.poses.faults(points).text() or 'points without a scanner position'}")
+
+
+def _read_all(inputs: Inputs, progress: Callable[[float], None]) -> Iterator[tuple[Points, Int32, Int64]]:
+    """All points, the place of their scan among the stations, and which of them have one."""
+    ids = inputs.poses.scan_id
+    with closing(prefetch(read_chunks(inputs.path, inputs.dimension))) as chunks:
+        for points in chunks:
+            scan = np.minimum(np.searchsorted(ids, points.scan_id), len(ids) - 1).astype(np.int32)
+            yield points, scan, np.flatnonzero(ids[scan] == points.scan_id)
+            progress(len(points))
+
+
+def _reference(
+    inputs: Inputs, segmentation: Segmentation, sums: Sums
+) -> tuple[ReferenceCurve | None, str | None]:
+    """The curve by which levels are corrected, and a note."""
+    if not needs_reference(inputs.kind):
+        return None, None
+    if isinstance(inputs.reference, ReferenceCurve):
+        return inputs.reference, None
+    if inputs.reference is None:
+        return None, (
+            "no reference curve: on each flat face the level goes by incidence, which tells the range there, on each pipe by"
+            " both; --reference auto has it found from the faces"
+        )
+    found = estimate_range_curve(_samples(segmentation, sums), unrolled=False)
+    found.require()
+    return found.curve, f"reference curve found from the faces, {found.nearest:.1f} to {found.farthest:.1f} m"
+
+
+def _samples(segmentation: Segmentation, sums: Sums) -> IntensitySamples:
+    """Pixels of all faces as samples of intensity over range and incidence."""
+    layout = segmentation.layout
+    step = max(1, int(np.count_nonzero(sums.count)) // _SAMPLES)
+    place: list[Float] = []
+    scans, ranges, cosines, levels = [], [], [], []
+    for face in range(len(layout.models)):
+        u, v = layout.centres(face)
+        for seen in observe_face(layout, sums, face, segmentation.stations, None):
+            row, column = np.divmod(seen.pixel[::step], len(u))
+            place.append(to_space(layout.models[face], u[column], v[row]))
+            scans.append(np.full(len(row), seen.scan, np.int32))
+            ranges.append(seen.range_m[::step])
+            cosines.append(seen.cosine[::step])
+            levels.append(seen.value[::step])
+    return IntensitySamples(
+        np.concatenate(place), np.concatenate(scans), np.concatenate(ranges), np.concatenate(cosines), np.concatenate(levels)
+    )
+
+
+def _place(xyz: Float) -> str:
+    return ", ".join(f"{value:.1f}" for value in xyz)
