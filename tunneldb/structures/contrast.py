@@ -132,6 +132,8 @@ def contrast_of(
         free = np.ones(len(one.pixel), np.bool_)
         for curve in known_by:
             use = np.flatnonzero(free & curve.known(one.cosine))
+            if not len(use):
+                continue
             free[use] = False
             at, n = one.pixel[use], one.points[use]
             level = curve(one.cosine[use], one.range_m[use])

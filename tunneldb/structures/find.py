@@ -185,7 +185,7 @@ def _face(
         float(extent.outline.area),
         float(model[RADIUS]),
         float(found.faces.rms[face]),
-        float(contrast.judged.sum() / whole) if whole else 0.0,
+        spots.seen / whole if whole else 0.0,
         contrast.incidence,
         contrast.level,
         contrast.sigma,

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from tunneldb.arrays import Bool, Float, Int32, Int64, Single
 from tunneldb.compiled import kernel
 from tunneldb.structures.merging import ANGLE, APART
-from tunneldb.structures.models import AXIS, POINT, RADIUS, SIDE, to_space, unroll
+from tunneldb.structures.models import AXIS, POINT, RADIUS, SIDE, normals_at, to_space, unroll
 
 COMMON_ANGLE = 5.0
 """Rims that are one line are turned against each other by no more, degrees."""
@@ -35,10 +35,13 @@ GAP_SPACINGS = 10.0
 """… or this many pixels, or twice what the smaller face is long."""
 
 OCCLUDED = 0.8
-"""Share of the rays through the gap that must end before it."""
+"""Share of the places of the gap that nothing was seen through."""
 
 CLEARANCE = 0.02
-"""What ends nearer than this before the surface is before it, m."""
+"""What ends farther than this behind the surface went through, m."""
+
+LEAST_FACING = 0.1
+"""Cosine of the incidence up to which a scan tells whether it sees through."""
 
 CELL = 0.1
 """Angle of a cell of the range image, degrees."""
@@ -64,8 +67,8 @@ class RangeImages:
         """Add points (n, 3), m from the origin, of scans (n,)."""
         _add_ranges(np.ascontiguousarray(xyz), np.ascontiguousarray(scan, np.int32), self.stations, self.cell, self.nearest)
 
-    def hidden(self, places: Float, scan: int) -> Bool:
-        """Which places (n, 3) something stands before, seen from a scan's position."""
+    def closed(self, places: Float, scan: int) -> Bool:
+        """To which places (n, 3), or not even so far, a scan sees: what is behind them it does not."""
         towards = places - self.stations[scan]
         far = np.linalg.norm(towards, axis=1)
         row = np.clip(((np.arcsin(towards[:, 2] / far) + math.pi / 2) / self.cell).astype(np.int64), 0, self.rows - 1)
@@ -78,7 +81,7 @@ class RangeImages:
             for j in (-1, 0, 1):
                 about = nearest[np.clip(row[empty] + i, 0, self.rows - 1), (column[empty] + j) % self.columns]
                 seen[empty] = np.minimum(seen[empty], about)
-        return np.asarray(seen < far - CLEARANCE)
+        return np.asarray(seen < far + CLEARANCE)
 
 
 @dataclass(frozen=True)
@@ -235,15 +238,22 @@ def _gap_along(line: Float, one: shapely.Geometry, other: shapely.Geometry) -> f
 
 
 def _occluded(one: Extent, moved: shapely.Geometry, scans: set[int], images: RangeImages) -> bool:
-    """Whether something stands before the gap between two faces (3.2.4), for each scan that saw one of them."""
+    """Whether no scan that saw one of two faces looks through between them (3.2.4).
+
+    What was sent there came back from nearer, or from the surface itself, which then goes on where too few points are for a face.
+    """
     places = _gap_places(one.outline, moved, one.pixel)
     if not len(places):
         return True  # they touch
     space = to_space(one.model, places[:, 0], places[:, 1])
-    hidden = np.ones(len(space), np.bool_)
+    normal = normals_at(one.model, places[:, 0], places[:, 1])
+    closed, faced = np.ones(len(space), np.bool_), np.zeros(len(space), np.bool_)
     for scan in sorted(scans):
-        hidden &= images.hidden(space, scan)
-    return bool(hidden.mean() >= OCCLUDED)
+        towards = images.stations[scan] - space
+        faces = np.einsum("ni,ni->n", towards, normal) > LEAST_FACING * np.linalg.norm(towards, axis=1)
+        closed &= ~faces | images.closed(space, scan)
+        faced |= faces
+    return bool(faced.any() and closed[faced].mean() >= OCCLUDED)
 
 
 def _gap_places(one: shapely.Geometry, other: shapely.Geometry, pixel: float) -> Float:

@@ -26,13 +26,13 @@ STEEPEST = 80.0
 SHORTH = 0.25
 """Share of the values in the shortest interval that marks the level: up to half of a surface may be something else."""
 
-RANGE_CLASS = 0.02
-"""Width of a class of lg R: 5 % of the range."""
+LEAST_SPAN = 0.01
+"""Span of lg R below which range makes no difference on a surface."""
 
-TURNS = 3
+TURNS = 6
 """Times that level and residuals are found in turns."""
 
-LEAST_SIGMA = 0.05
+LEAST_SIGMA = 0.01
 """The level scatters by no less, dB: rounding."""
 
 
@@ -44,15 +44,15 @@ class LevelCurve:
     ----------
     cosine, level, sigma : (n,) float arrays
         Middles of the classes, in growing order, level and standard deviation there, dB.
-    log_range, range_level : (m,) float arrays
-        Middles of classes of lg R and what is to be added there, dB; empty where range has no part in it.
+    middle, slope : float
+        lg R of the middle of the surface, and what the level changes by over lg R, dB; 0 where range has no part in it.
     """
 
     cosine: Float
     level: Float
     sigma: Float
-    log_range: Float
-    range_level: Float
+    middle: float
+    slope: float
 
     def known(self, cosine: Float) -> Bool:
         """Where the level is known (n,): within half a class of a middle or between two that follow each other."""
@@ -65,10 +65,7 @@ class LevelCurve:
 
     def __call__(self, cosine: Float, range_m: Float) -> Float:
         """Level at incidences and ranges (n,), dB."""
-        level = np.interp(cosine, self.cosine, self.level)
-        if len(self.log_range):
-            level = level + np.interp(np.log10(range_m), self.log_range, self.range_level)
-        return np.asarray(level)
+        return np.asarray(np.interp(cosine, self.cosine, self.level) + self.slope * (np.log10(range_m) - self.middle))
 
     def sigmas(self, cosine: Float) -> Float:
         """Standard deviation there, dB."""
@@ -91,31 +88,24 @@ def level_curve(cosine: Float, range_m: Float, value: Float, points: Float, *, b
     middles, order, starts = _classes(number, cosine, points)
     empty = np.empty(0)
     if not len(middles):
-        return LevelCurve(empty, empty, empty, empty, empty)
+        return LevelCurve(empty, empty, empty, 0.0, 0.0)
     level, sigma = np.zeros(len(middles)), np.full(len(middles), LEAST_SIGMA)
-    log_range, ranges = np.log10(range_m), empty
-    range_level = empty
-    if by_range:
-        ranges, range_order, range_starts = _classes(np.floor(log_range / RANGE_CLASS).astype(np.int64), log_range, points)
-        range_level = np.zeros(len(ranges))
-        by_range = len(ranges) > 1
+    log_range = np.log10(range_m)
+    slope, middle = 0.0, float(np.median(log_range))
+    by_range = by_range and float(np.ptp(log_range)) > LEAST_SPAN
     for _ in range(TURNS):
-        rest = value - np.interp(cosine, middles, level)
-        if by_range:
-            rest = rest - np.interp(log_range, ranges, range_level)
+        rest = value - np.interp(cosine, middles, level) - slope * (log_range - middle)
         for k in range(len(middles)):
             found = robust_statistics(rest[order[starts[k] : starts[k + 1]]], SHORTH, two_sided=True)
             level[k] += found.mean
             sigma[k] = max(found.sigma, LEAST_SIGMA)
         if by_range:
-            rest = value - np.interp(cosine, middles, level) - np.interp(log_range, ranges, range_level)
-            for k in range(len(ranges)):
-                of = range_order[range_starts[k] : range_starts[k + 1]]
-                range_level[k] += robust_statistics(rest[of], SHORTH, two_sided=True).mean
-            middle = float(np.mean(range_level))
-            range_level -= middle
-            level += middle
-    return LevelCurve(middles, level, sigma, ranges if by_range else empty, range_level if by_range else empty)
+            rest = value - np.interp(cosine, middles, level) - slope * (log_range - middle)
+            near = np.abs(rest) < 2.0 * np.interp(cosine, middles, sigma)
+            x = log_range[near] - middle
+            square = float(x @ x)
+            slope += float(x @ rest[near]) / square if square > 0.0 else 0.0
+    return LevelCurve(middles, level, sigma, middle, slope)
 
 
 def _classes(number: np.ndarray, value: Float, points: Float) -> tuple[Float, np.ndarray, np.ndarray]:  # type: ignore[type-arg]

@@ -12,7 +12,7 @@ from shapely.geometry import Polygon
 from tunneldb.anomalies.boundary import refine_boundary
 from tunneldb.anomalies.region_shape import measure_shape
 from tunneldb.anomalies.regions import Region, find_regions
-from tunneldb.anomalies.threshold import dark_pixels, filter_size
+from tunneldb.anomalies.threshold import dark_pixels, filter_size, seen_lining
 from tunneldb.anomalies.verdict import degrees_of, detectability
 from tunneldb.arrays import Bool, Int32
 from tunneldb.raster.geotiff import NODATA
@@ -56,11 +56,23 @@ class FoundSpot:
 
 @dataclass(frozen=True)
 class FaceSpots:
-    """Spots of a face, and the number of the spot in each pixel (rows upwards), from 1; 0 is none."""
+    """Spots of a face.
+
+    Attributes
+    ----------
+    spots : list of FoundSpot
+    numbers : (rows, columns) int32 array
+        Number of the spot in each pixel, rows upwards, from 1; 0 is none.
+    share : float
+        Share of the pixels judged that are in spots.
+    seen : int
+        Pixels of which it is known whether they differ: they were judged, or enough about them was.
+    """
 
     spots: list[FoundSpot]
     numbers: Int32
     share: float
+    seen: int
 
 
 def find_spots(face: FaceContrast) -> FaceSpots:
@@ -68,7 +80,7 @@ def find_spots(face: FaceContrast) -> FaceSpots:
     numbers = np.zeros(face.face.shape, np.int32)
     judged = int(face.judged.sum())
     if not judged:
-        return FaceSpots([], numbers, 0.0)
+        return FaceSpots([], numbers, 0.0, 0)
     empty = int((face.image.state == PixelState.EMPTY).sum())
     size = filter_size(judged / (judged + empty))
     rim = face.face & ~ndimage.binary_erosion(face.face, np.ones((3, 3), np.bool_), iterations=2)
@@ -88,7 +100,8 @@ def find_spots(face: FaceContrast) -> FaceSpots:
             part[spot.mask & (part == 0)] = len(found)
     _over_rim(face, numbers, found)
     share = float((numbers[face.judged] > 0).sum()) / judged
-    return FaceSpots(found, numbers, share)
+    seen = sum(int(np.count_nonzero(part)) for _, part in seen_lining(face.image.state, size))
+    return FaceSpots(found, numbers, share, seen)
 
 
 def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, rim: Bool) -> FoundSpot | None:
