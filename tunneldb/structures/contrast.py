@@ -14,7 +14,7 @@ from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import FaceGrid
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.structures.face_raster import BEAM, DIVERGENCE, STEP, Layout, Sums
-from tunneldb.structures.level import LevelCurve, level_curve
+from tunneldb.structures.level import CLASS, FEWEST, LevelCurve, level_curve
 from tunneldb.structures.models import RADIUS, normals_at, to_space
 
 CLOSING = 2
@@ -104,6 +104,29 @@ def curve_of(observed: list[Observed], model: Float, *, by_range: bool) -> Level
     names = ("cosine", "range_m", "value", "points")
     arrays = [np.concatenate([getattr(one, name) for one in observed]) for name in names]
     return level_curve(*arrays, by_range=by_range and model[RADIUS] > 0.0)
+
+
+def some_pixels(observed: list[Observed], inside: Bool) -> list[Observed]:
+    """Those of the pixels that lie in a part of the face (rows, columns), for each scan that saw any."""
+    found = []
+    for one in observed:
+        use = inside.ravel()[one.pixel]
+        if use.any():
+            arrays = (one.pixel, one.cosine, one.range_m, one.value, one.points)
+            found.append(Observed(one.scan, *(array[use] for array in arrays)))
+    return found
+
+
+def class_levels(observed: list[Observed]) -> dict[tuple[int, int], float]:
+    """Median level of each class of cos θ of each scan that holds enough points, dB."""
+    found = {}
+    for one in observed:
+        number = np.floor(one.cosine / CLASS).astype(np.int64)
+        for klass in np.unique(number).tolist():
+            use = number == klass
+            if one.points[use].sum() >= FEWEST:
+                found[one.scan, klass] = float(np.median(one.value[use]))
+    return found
 
 
 def contrast_of(

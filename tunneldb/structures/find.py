@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 
-from tunneldb.arrays import Float, Int32, Int64
+from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.radiometry.reference_curve import ReferenceCurve
-from tunneldb.structures.contrast import FaceContrast, Observed, contrast_of, curve_of, observe_face
+from tunneldb.structures.contrast import FaceContrast, Observed, class_levels, contrast_of, curve_of, observe_face, some_pixels
 from tunneldb.structures.face_raster import Layout, Sums
 from tunneldb.structures.joining import Extent, RangeImages, join
+from tunneldb.structures.materials import LEAST_WIDTH as LEAST_PART
+from tunneldb.structures.materials import part_by_material
 from tunneldb.structures.models import AXIS, RADIUS, to_space, unroll
 from tunneldb.structures.results import Face, Member, Spot, Structures, kind_of, outline_of
 from tunneldb.structures.segmentation import Segmentation
@@ -36,6 +38,8 @@ class Found:
     structures : Structures
     face_number, member_number : (k + 1,) int arrays
         Number of each face of the segmentation, 0 where it is none; the last is 0, for no face.
+    places : list of (2, rows, columns) int arrays or None
+        Numbers of face and member in each pixel of a face that is of several materials, rows upwards; None elsewhere.
     anomaly : list of int arrays or None
         Number of the spot in each pixel of a face, rows upwards; None where it has none.
     """
@@ -43,6 +47,7 @@ class Found:
     structures: Structures
     face_number: Int32
     member_number: Int32
+    places: list[Int32 | None]
     anomaly: list[Int32 | None]
 
     def of_points(self, face: Int32, pixel: Int32) -> tuple[Int32, Int32, Int32]:
@@ -55,10 +60,11 @@ class Found:
         which = face[held]
         bounds = np.flatnonzero(np.diff(which, prepend=-1, append=-1))
         for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
-            numbers = self.anomaly[int(which[begin])]
-            if numbers is not None:
-                of = held[begin:end]
-                spot[of] = numbers.ravel()[at[of]]
+            of, here = held[begin:end], int(which[begin])
+            if (parts := self.places[here]) is not None:
+                number[of], member[of] = parts.reshape(2, -1)[:, at[of]]
+            if (spots := self.anomaly[here]) is not None:
+                spot[of] = spots.ravel()[at[of]]
         return number, member, spot
 
 
@@ -80,52 +86,117 @@ def find_structures(
         Whether levels go by range otherwise.
     """
     layout = found.layout
-    kept, extents = _faces_that_are(found, sums)
-    member_of = join(extents, images, found.noise)
+    parts = _parts(found, sums, reference)
+    member_of = join([part.extent for part in parts], images, found.noise)
     count = len(layout.models)
+    places: list[Int32 | None] = [None] * count
     anomaly: list[Int32 | None] = [None] * count
     faces: list[Face] = []
     spots: list[Spot] = []
     members: list[Member] = []
     face_number, member_number = np.zeros(count + 1, np.int32), np.zeros(count + 1, np.int32)
-    sizes = np.bincount(member_of, [extent.outline.area for extent in extents], minlength=0)
+    sizes = np.bincount(member_of, [part.extent.outline.area for part in parts])
     for number, member in enumerate(np.argsort(-sizes, kind="stable").tolist(), start=1):
-        of = np.flatnonzero(member_of == member).tolist()
-        judged = _judge(layout, sums, [kept[k] for k in of], found.stations, reference, by_range=by_range)
+        of = [parts[k] for k in np.flatnonzero(member_of == member).tolist()]
         first = len(faces)
-        for k, (contrast, found_spots) in zip(of, judged, strict=True):
-            face = kept[k]
-            faces.append(_face(found, face, len(faces) + 1, number, extents[k], contrast, found_spots))
-            face_number[face], member_number[face] = len(faces), number
-            anomaly[face] = np.where(found_spots.numbers > 0, found_spots.numbers + len(spots), 0) if found_spots.spots else None
+        for part, (contrast, here) in zip(of, _judge(found, sums, of, reference, by_range=by_range), strict=True):
+            faces.append(_face(found, part, len(faces) + 1, number, contrast, here))
+            face_number[part.face], member_number[part.face] = len(faces), number
+            if part.inside is not None:
+                rows_columns = part.inside.shape
+                if places[part.face] is None:
+                    places[part.face] = np.zeros((2, *rows_columns), np.int32)
+                places[part.face][:, part.inside] = [[len(faces)], [number]]  # type: ignore[index]
+            if here.spots:
+                if anomaly[part.face] is None:
+                    anomaly[part.face] = np.zeros(here.numbers.shape, np.int32)
+                marked = here.numbers > 0
+                anomaly[part.face][marked] = here.numbers[marked] + len(spots)  # type: ignore[index]
             spots += [
                 Spot(
                     len(spots) + place, len(faces), number, spot.kind, spot.reasons, spot.confidence, spot.contrast,
                     spot.difference, spot.area, spot.points, spot.scans, spot.outline,
                 )
-                for place, spot in enumerate(found_spots.spots, start=1)
+                for place, spot in enumerate(here.spots, start=1)
             ]  # fmt: skip
-        members.append(_member(number, faces[first:], [extents[k] for k in of], found.origin))
-    return Found(Structures(members, faces, spots), face_number, member_number, anomaly)
+        members.append(_member(number, faces[first:], [part.extent for part in of], found.origin))
+    return Found(Structures(members, faces, spots), face_number, member_number, places, anomaly)
 
 
-def _faces_that_are(found: Segmentation, sums: Sums) -> tuple[list[int], list[Extent]]:
-    """Faces that are large and filled enough to be some."""
-    layout, kept, extents = found.layout, [], []
+@dataclass(frozen=True)
+class _Part:
+    """A face of the segmentation, or the part of it that is of one material.
+
+    Attributes
+    ----------
+    face : int
+    inside : (rows, columns) bool array or None
+        Its pixels; None for all.
+    extent : Extent
+    """
+
+    face: int
+    inside: Bool | None
+    extent: Extent
+
+
+def _parts(found: Segmentation, sums: Sums, reference: ReferenceCurve | None) -> list[_Part]:
+    """Faces that are large and filled enough to be some, parted by material."""
+    layout, parts = found.layout, []
     for face in range(len(layout.models)):
         held, scans = _points(layout, sums, face)
         columns, rows = layout.shape[face, 2:]
-        occupied = held.reshape(rows, columns) > 0
-        side = float(layout.pixel[face])
-        outline = outline_of(_closed(occupied), int(layout.shape[face, 0]), int(layout.shape[face, 1]), side)
-        area = outline.area
-        if area < LEAST_AREA or occupied.sum() * side**2 < LEAST_FILLED * area:
+        held = held.reshape(rows, columns)
+        extent = _extent(layout, face, held, scans)
+        if extent is None:
             continue
-        if 2.0 * area / max(outline.length, 1e-9) < LEAST_WIDTH * side:
+        observed, material = [], None
+        if extent.model[RADIUS] == 0.0 and max(rows, columns) * extent.pixel > 2.0 * LEAST_PART:
+            observed = observe_face(layout, sums, face, found.stations, reference)
+            material = _materials(layout, face, observed)
+        if material is None:
+            parts.append(_Part(face, None, extent))
             continue
-        kept.append(face)
-        extents.append(Extent(layout.models[face], outline, side, scans, float(held.sum())))
-    return kept, extents
+        for number in range(int(material.max()) + 1):
+            inside = material == number
+            part = _extent(layout, face, np.where(inside, held, 0), scans)
+            if part is not None:
+                levels = class_levels(some_pixels(observed, inside))
+                parts.append(_Part(face, inside, replace(part, levels=levels)))
+    # Others are compared with these.
+    if any(part.extent.levels is not None for part in parts):
+        for k, part in enumerate(parts):
+            if part.extent.levels is None and part.extent.model[RADIUS] == 0.0:
+                levels = class_levels(observe_face(layout, sums, part.face, found.stations, reference))
+                parts[k] = replace(part, extent=replace(part.extent, others=levels))
+    return sorted(parts, key=lambda part: -part.extent.points)
+
+
+def _extent(layout: Layout, face: int, held: Int64, scans: tuple[int, ...]) -> Extent | None:
+    """Extent of a face by the points in its pixels; None where these make none."""
+    occupied = held > 0
+    if not occupied.any():
+        return None
+    side = float(layout.pixel[face])
+    outline = outline_of(_closed(occupied), int(layout.shape[face, 0]), int(layout.shape[face, 1]), side)
+    area = outline.area
+    if area < LEAST_AREA or occupied.sum() * side**2 < LEAST_FILLED * area:
+        return None
+    if 2.0 * area / max(outline.length, 1e-9) < LEAST_WIDTH * side:
+        return None
+    return Extent(layout.models[face], outline, side, scans, float(held.sum()))
+
+
+def _materials(layout: Layout, face: int, observed: list[Observed]) -> Int32 | None:
+    """Part of each pixel of a face; None where it is of one material."""
+    if not observed:
+        return None
+    most = max(observed, key=lambda one: len(one.pixel))
+    columns, rows = layout.shape[face, 2:]
+    value, held = np.zeros(rows * columns), np.zeros(rows * columns, np.bool_)
+    value[most.pixel], held[most.pixel] = most.value, True
+    parts = part_by_material(value.reshape(rows, columns), held.reshape(rows, columns), float(layout.pixel[face]))
+    return parts if parts.any() else None
 
 
 def _closed(occupied: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
@@ -148,32 +219,36 @@ def _points(layout: Layout, sums: Sums, face: int) -> tuple[Int64, tuple[int, ..
 
 
 def _judge(
-    layout: Layout, sums: Sums, faces: list[int], stations: Float, reference: ReferenceCurve | None, *, by_range: bool
+    found: Segmentation, sums: Sums, parts: list[_Part], reference: ReferenceCurve | None, *, by_range: bool
 ) -> list[tuple[FaceContrast, FaceSpots]]:
     """Contrast and spots of the faces of a member; where a face has too few points it borrows the member's level."""
-    observed = [observe_face(layout, sums, face, stations, reference) for face in faces]
+    layout = found.layout
+    observed = []
+    for part in parts:
+        seen_by = observe_face(layout, sums, part.face, found.stations, reference)
+        observed.append(seen_by if part.inside is None else some_pixels(seen_by, part.inside))
     by_scan: dict[int, list[Observed]] = {}
     for one in observed:
         for seen in one:
             by_scan.setdefault(seen.scan, []).append(seen)
-    model = layout.models[faces[0]]
+    model = layout.models[parts[0].face]
     common = {
-        scan: curve_of(seen, model, by_range=by_range) for scan, seen in by_scan.items() if len(faces) > 1
+        scan: curve_of(seen, model, by_range=by_range) for scan, seen in by_scan.items() if len(parts) > 1
     }
     out = []
-    for face, one in zip(faces, observed, strict=True):
+    for part, one in zip(parts, observed, strict=True):
         curves = [
             [curve_of([seen], model, by_range=by_range), *([common[seen.scan]] if seen.scan in common else [])] for seen in one
         ]
-        contrast = contrast_of(layout, face, one, curves)
+        contrast = contrast_of(layout, part.face, one, curves)
         out.append((contrast, find_spots(contrast)))
     return out
 
 
 def _face(
-    found: Segmentation, face: int, number: int, member: int, extent: Extent, contrast: FaceContrast, spots: FaceSpots
+    found: Segmentation, part: _Part, number: int, member: int, contrast: FaceContrast, spots: FaceSpots
 ) -> Face:
-    model = found.layout.models[face]
+    model, extent = found.layout.models[part.face], part.extent
     whole = int(contrast.face.sum())
     return Face(
         number,
@@ -184,7 +259,7 @@ def _face(
         int(contrast.points.sum()),
         float(extent.outline.area),
         float(model[RADIUS]),
-        float(found.faces.rms[face]),
+        float(found.faces.rms[part.face]),
         spots.seen / whole if whole else 0.0,
         contrast.incidence,
         contrast.level,

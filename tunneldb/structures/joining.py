@@ -7,6 +7,7 @@ Two faces are joined if they lie on one plane or cylinder (3.2.1), have two rims
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,11 +41,15 @@ OCCLUDED = 0.8
 CLEARANCE = 0.02
 """What ends farther than this behind the surface went through, m."""
 
-LEAST_FACING = 0.1
-"""Cosine of the incidence up to which a scan tells whether it sees through."""
+LEAST_FACING, LEAST_FACING_PIPE = 0.1, 0.5
+"""Cosine of the incidence from which a scan tells whether it sees through: beside a thin pipe it does so anyway."""
 
 CELL = 0.1
 """Angle of a cell of the range image, degrees."""
+
+
+SAME_LEVEL = 0.75
+"""Parts of faces of several materials are joined with what differs by less, dB."""
 
 
 class RangeImages:
@@ -98,6 +103,10 @@ class Extent:
     scans : tuple of int
         Scans that saw it.
     points : float
+    levels : mapping or None
+        Of a part of a face of several materials, its level by scan and class of cos θ, dB.
+    others : mapping or None
+        The same of another face, to be held against such parts.
     """
 
     model: Float
@@ -105,6 +114,8 @@ class Extent:
     pixel: float
     scans: tuple[int, ...]
     points: float
+    levels: Mapping[tuple[int, int], float] | None = None
+    others: Mapping[tuple[int, int], float] | None = None
 
 
 def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
@@ -164,6 +175,8 @@ def _corners(face: Extent) -> Float:
 
 def _joined(one: Extent, other: Extent, images: RangeImages) -> bool:
     """Whether two faces of one surface are parted by what stands before it alone."""
+    if not _of_one_material(one, other):
+        return False
     moved = _unrolled_on(one, other)
     if one.model[RADIUS] == 0.0:
         pixel = max(one.pixel, other.pixel)
@@ -173,6 +186,15 @@ def _joined(one: Extent, other: Extent, images: RangeImages) -> bool:
         if len(common) == 1 and _gap_along(common[0], one.outline, moved) > _longest_gap(one, other, pixel):
             return False
     return _occluded(one, moved, set(one.scans) | set(other.scans), images)
+
+
+def _of_one_material(one: Extent, other: Extent) -> bool:
+    """Whether the levels of two faces agree, where one is a part of a face of several materials."""
+    if one.levels is None and other.levels is None:
+        return True
+    mine, yours = one.levels or one.others or {}, other.levels or other.others or {}
+    steps = [mine[key] - yours[key] for key in mine.keys() & yours.keys()]
+    return bool(steps) and abs(float(np.median(steps))) < SAME_LEVEL
 
 
 def _longest_gap(one: Extent, other: Extent, pixel: float) -> float:
@@ -247,10 +269,11 @@ def _occluded(one: Extent, moved: shapely.Geometry, scans: set[int], images: Ran
         return True  # they touch
     space = to_space(one.model, places[:, 0], places[:, 1])
     normal = normals_at(one.model, places[:, 0], places[:, 1])
+    least = LEAST_FACING_PIPE if one.model[RADIUS] > 0.0 else LEAST_FACING
     closed, faced = np.ones(len(space), np.bool_), np.zeros(len(space), np.bool_)
     for scan in sorted(scans):
         towards = images.stations[scan] - space
-        faces = np.einsum("ni,ni->n", towards, normal) > LEAST_FACING * np.linalg.norm(towards, axis=1)
+        faces = np.einsum("ni,ni->n", towards, normal) > least * np.linalg.norm(towards, axis=1)
         closed &= ~faces | images.closed(space, scan)
         faced |= faces
     return bool(faced.any() and closed[faced].mean() >= OCCLUDED)

@@ -1,0 +1,132 @@
+"""Faces of two materials that lie in one plane: parted where the level steps along a straight line from rim to rim.
+
+Geometry alone cannot tell a brick wall from the concrete beside it, and the paper's histogram of both has two heads. A stain or
+rust does not end on a straight line over the whole of a wide face; a wall of another material does. The step is looked for in
+what one scan saw, between places that lie close to each other, so that neither incidence nor range has a part in it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tunneldb.arrays import Bool, Float, Int32
+
+LEAST_WIDTH = 0.4
+"""Both sides of the line are at least so wide, and the line as long, m: on a beam rust may well go from rim to rim."""
+
+LEAST_STEP = 1.0
+"""The level steps by so many standard deviations of a pixel at least."""
+
+EVEN = 0.85
+"""Share of the blocks along the line where it steps so, by half of the whole step and more."""
+
+ALONG, ACROSS = 8, 3
+"""Pixels of a block along the line and across it."""
+
+BLOCKS = 4
+"""Blocks to either side whose median counts: near enough for incidence to be the same."""
+
+FEWEST = 6
+"""Blocks along the line that tell anything."""
+
+DEPTH = 3
+"""How many times a face is parted, at most."""
+
+
+def part_by_material(value: Float, held: Bool, pixel: float) -> Int32:
+    """Part a face.
+
+    Parameters
+    ----------
+    value : (rows, columns) float array
+        Level as one scan saw it, dB.
+    held : (rows, columns) bool array
+        Where it did.
+    pixel : float
+        Side of a pixel, m.
+
+    Returns
+    -------
+    (rows, columns) int32 array
+        Number of the part of each pixel, 0 being the first; all 0 where there is but one.
+    """
+    parts = np.zeros(held.shape, np.int32)
+    waiting, count = [(0, 0)], 1
+    while waiting:
+        number, depth = waiting.pop()
+        inside = parts == number
+        found = _best_line(value, held & inside, pixel) if depth < DEPTH else None
+        if found is None:
+            continue
+        axis, at = found
+        beyond = np.zeros(held.shape, np.bool_)
+        np.moveaxis(beyond, axis, 0)[at:] = True
+        parts[inside & beyond] = count
+        waiting += [(number, depth + 1), (count, depth + 1)]
+        count += 1
+    return parts
+
+
+def _best_line(value: Float, held: Bool, pixel: float) -> tuple[int, int] | None:
+    """Axis and place of the line over which the level steps most; None where it steps over none."""
+    best: tuple[float, int, int] | None = None
+    for axis in (0, 1):
+        lines, there = np.moveaxis(np.where(held, value, np.nan), axis, 0), np.moveaxis(held, axis, 0)
+        place = np.flatnonzero(there.any(axis=1))
+        if len(place) * pixel < 2.0 * LEAST_WIDTH:
+            continue
+        first = int(place[0])
+        blocks, sigma = _blocks(lines[first : place[-1] + 1])
+        edge = max(BLOCKS, int(np.ceil(LEAST_WIDTH / (ACROSS * pixel))))
+        for k in range(edge, len(blocks) - edge):
+            before, after = _medians(blocks[k - BLOCKS : k]), _medians(blocks[k : k + BLOCKS])
+            steps = (after - before)[np.isfinite(after - before)]
+            if len(steps) < FEWEST or len(steps) * ALONG * pixel < LEAST_WIDTH:
+                continue
+            step = float(np.median(steps))
+            size = abs(step) / sigma
+            if size < LEAST_STEP or (best is not None and size <= best[0]):
+                continue
+            if (steps * np.sign(step) > 0.5 * abs(step)).mean() >= EVEN:
+                best = (size, axis, first + ACROSS * k)
+    if best is None:
+        return None
+    _, axis, about = best
+    return axis, _sharpest(np.moveaxis(np.where(held, value, np.nan), axis, 0), about)
+
+
+def _blocks(lines: Float) -> tuple[Float, float]:
+    """Medians of blocks (across, along) and the standard deviation of a pixel about them, dB."""
+    rows, columns = -(-lines.shape[0] // ACROSS), -(-lines.shape[1] // ALONG)
+    padded = np.full((rows * ACROSS, columns * ALONG), np.nan)
+    padded[: lines.shape[0], : lines.shape[1]] = lines
+    cells = padded.reshape(rows, ACROSS, columns, ALONG).transpose(0, 2, 1, 3).reshape(rows, columns, -1)
+    known = np.isfinite(cells).sum(axis=2)
+    medians = np.full((rows, columns), np.nan)
+    full = known >= ACROSS * ALONG // 3
+    if not full.any():
+        return medians, np.inf
+    medians[full] = np.nanmedian(cells[full], axis=1)
+    sigma = 1.4826 * float(np.nanmedian(np.abs(cells[full] - medians[full][:, None])))
+    return medians, max(sigma, 0.05)
+
+
+def _medians(blocks: Float) -> Float:
+    """Median of each column of blocks; NaN where less than half of them are known."""
+    out = np.full(blocks.shape[1], np.nan)
+    use = np.isfinite(blocks).sum(axis=0) * 2 >= len(blocks)
+    out[use] = np.nanmedian(blocks[:, use], axis=0)
+    return out
+
+
+def _sharpest(lines: Float, about: int) -> int:
+    """Line near by before which and from which on two levels explain the lines best."""
+    reach = 2 * ACROSS
+    begin, end = max(about - 3 * reach, 0), min(about + 3 * reach, len(lines))
+    use = np.flatnonzero(np.isfinite(lines[begin:end]).any(axis=1)) + begin
+    medians = np.nanmedian(lines[use], axis=1)
+    places = [k for k in range(max(about - reach, 1), about + reach + 1) if (use < k).any() and (use >= k).any()]
+    costs = [
+        sum(float(np.abs(part - np.median(part)).sum()) for part in (medians[use < k], medians[use >= k])) for k in places
+    ]
+    return places[int(np.argmin(costs))] if places else about
