@@ -12,6 +12,7 @@ from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.structures.contrast import FaceContrast, Observed, class_levels, contrast_of, curve_of, observe_face, some_pixels
 from tunneldb.structures.face_raster import Layout, Sums
 from tunneldb.structures.joining import Extent, RangeImages, join
+from tunneldb.structures.level import FEWEST
 from tunneldb.structures.materials import LEAST_WIDTH as LEAST_PART
 from tunneldb.structures.materials import part_by_material
 from tunneldb.structures.models import AXIS, RADIUS, to_space, unroll
@@ -195,6 +196,13 @@ def _materials(layout: Layout, face: int, observed: list[Observed]) -> Int32 | N
     columns, rows = layout.shape[face, 2:]
     value, held = np.zeros(rows * columns), np.zeros(rows * columns, np.bool_)
     value[most.pixel], held[most.pixel] = most.value, True
+    for one in observed:  # where the others saw what this one did not, by what they have in common
+        shared = held[one.pixel]
+        if one is most or shared.sum() < FEWEST:
+            continue
+        offset = float(np.median(one.value[shared] - value[one.pixel[shared]]))
+        value[one.pixel[~shared]] = one.value[~shared] - offset
+        held[one.pixel] = True
     parts = part_by_material(value.reshape(rows, columns), held.reshape(rows, columns), float(layout.pixel[face]))
     return parts if parts.any() else None
 

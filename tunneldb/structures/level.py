@@ -29,7 +29,29 @@ SHORTH = 0.25
 LEAST_SPAN = 0.01
 """Span of lg R below which range makes no difference on a surface."""
 
-TURNS = 6
+INCIDENCE_SLOPES = (0.0, 5.0, 10.0, 15.0, 20.0, 30.0)
+"""Losses over lg cos θ that are tried first, dB: none, Lambert's 10, gloss more."""
+
+RANGE_SLOPES = (-20.0, -40.0, 20.0)
+"""The same over lg R: the inverse square, and what scanners make of it near by."""
+
+SHORTH_OF_ALL = 0.4
+"""Share of all pixels of a surface that lie nearest together about the right curve."""
+
+CLIP = 2.5
+"""Pixels within so many standard deviations of the curve refine it."""
+
+MOST_OFF, MOST_WIDE = 2.0, 1.5
+"""A class lies no farther off the curve in standard deviations, and scatters no more than so many times as much, or it is covered
+by something else."""
+
+GLOSS = 0.95
+"""Cosine from which a class may be as bright as it likes."""
+
+MOST_PIXELS = 60_000
+"""Pixels by which the curve is found."""
+
+TURNS = 4
 """Times that level and residuals are found in turns."""
 
 LEAST_SIGMA = 0.01
@@ -75,6 +97,9 @@ class LevelCurve:
 def level_curve(cosine: Float, range_m: Float, value: Float, points: Float, *, by_range: bool) -> LevelCurve:
     """Find the level of a surface from its pixels.
 
+    A smooth curve is found first, a + b lg cos θ + c (lg cos θ)², for which most pixels lie nearest together; then the robust
+    mode of each class is its level, unless it lies off the curve: a class may be covered by a spot altogether.
+
     Parameters
     ----------
     cosine, range_m, value, points : (n,) float arrays
@@ -84,28 +109,65 @@ def level_curve(cosine: Float, range_m: Float, value: Float, points: Float, *, b
     """
     usable = cosine >= np.cos(np.radians(STEEPEST))
     cosine, range_m, value, points = cosine[usable], range_m[usable], value[usable], points[usable]
-    number = np.floor(cosine / CLASS).astype(np.int64)
-    middles, order, starts = _classes(number, cosine, points)
+    middles, order, starts = _classes(np.floor(cosine / CLASS).astype(np.int64), cosine, points)
     empty = np.empty(0)
     if not len(middles):
         return LevelCurve(empty, empty, empty, 0.0, 0.0)
-    level, sigma = np.zeros(len(middles)), np.full(len(middles), LEAST_SIGMA)
     log_range = np.log10(range_m)
-    slope, middle = 0.0, float(np.median(log_range))
+    middle = float(np.median(log_range))
     by_range = by_range and float(np.ptp(log_range)) > LEAST_SPAN
+    smooth, slope, spread = _smooth(np.log10(cosine), log_range - middle, value, by_range=by_range)
+    curve = np.polyval(smooth, np.log10(middles))
+    level, sigma = curve.copy(), np.full(len(middles), max(spread, LEAST_SIGMA))
     for _ in range(TURNS):
         rest = value - np.interp(cosine, middles, level) - slope * (log_range - middle)
         for k in range(len(middles)):
             found = robust_statistics(rest[order[starts[k] : starts[k + 1]]], SHORTH, two_sided=True)
-            level[k] += found.mean
-            sigma[k] = max(found.sigma, LEAST_SIGMA)
-        if by_range:
-            rest = value - np.interp(cosine, middles, level) - slope * (log_range - middle)
-            near = np.abs(rest) < 2.0 * np.interp(cosine, middles, sigma)
-            x = log_range[near] - middle
-            square = float(x @ x)
-            slope += float(x @ rest[near]) / square if square > 0.0 else 0.0
+            at, wide = level[k] + found.mean, max(found.sigma, LEAST_SIGMA)
+            # Gloss makes what is seen squarely brighter than any smooth curve.
+            if abs(at - curve[k]) <= MOST_OFF * spread or (at > curve[k] and middles[k] > GLOSS):
+                level[k], sigma[k] = at, min(wide, MOST_WIDE * max(spread, LEAST_SIGMA))
+            else:
+                level[k] = curve[k]
     return LevelCurve(middles, level, sigma, middle, slope)
+
+
+def _smooth(x: Float, along: Float, value: Float, *, by_range: bool) -> tuple[Float, float, float]:
+    """Polynomial of lg cos θ, slope over lg R and standard deviation of a surface's level."""
+    if len(x) > MOST_PIXELS:
+        step = -(-len(x) // MOST_PIXELS)
+        x, along, value = x[::step], along[::step], value[::step]
+    degree = 0 if np.ptp(x) < 0.01 else 1 if np.ptp(x) < 0.08 else 2
+    best: tuple[float, Float] = (np.inf, np.zeros(degree + 1))
+    slopes = (0.0, *RANGE_SLOPES) if by_range else (0.0,)
+    slope = 0.0
+    for loss in INCIDENCE_SLOPES if degree else (0.0,):
+        for fall in slopes:
+            rest = np.sort(value - loss * x - fall * along)
+            width = max(2, int(np.ceil(SHORTH_OF_ALL * len(rest))))
+            if len(rest) < width + 1:
+                continue
+            lengths = rest[width - 1 :] - rest[: len(rest) - width + 1]
+            at = int(np.argmin(lengths))
+            if lengths[at] < best[0]:
+                start = np.zeros(degree + 1)
+                start[-1] = np.median(rest[at : at + width])
+                if degree:
+                    start[-2] = loss
+                best, slope = (float(lengths[at]), start), fall
+    smooth, spread = best[1], 0.0
+    for _ in range(TURNS):
+        rest = value - np.polyval(smooth, x) - slope * along
+        found = robust_statistics(rest, SHORTH_OF_ALL, two_sided=True)
+        smooth[-1] += found.mean
+        spread = max(found.sigma, LEAST_SIGMA)
+        near = np.abs(rest - found.mean) < CLIP * spread
+        if near.sum() < 10 * (degree + 2):
+            break
+        columns = [x[near] ** k for k in range(degree, -1, -1)] + ([along[near]] if by_range else [])
+        solution = np.linalg.lstsq(np.column_stack(columns), value[near], rcond=None)[0]
+        smooth, slope = solution[: degree + 1], float(solution[-1]) if by_range else 0.0
+    return smooth, slope, spread
 
 
 def _classes(number: np.ndarray, value: Float, points: Float) -> tuple[Float, np.ndarray, np.ndarray]:  # type: ignore[type-arg]

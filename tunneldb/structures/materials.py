@@ -1,8 +1,8 @@
 """Faces of two materials that lie in one plane: parted where the level steps along a straight line from rim to rim.
 
 Geometry alone cannot tell a brick wall from the concrete beside it, and the paper's histogram of both has two heads. A stain or
-rust does not end on a straight line over the whole of a wide face; a wall of another material does. The step is looked for in
-what one scan saw, between places that lie close to each other, so that neither incidence nor range has a part in it.
+rust does not end on a straight line over the whole of a wide face; a wall of another material does. The step is looked for
+between places that lie close to each other, so that neither incidence nor range has a part in it.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ def part_by_material(value: Float, held: Bool, pixel: float) -> Int32:
     Parameters
     ----------
     value : (rows, columns) float array
-        Level as one scan saw it, dB.
+        Level, dB.
     held : (rows, columns) bool array
-        Where it did.
+        Where it is known.
     pixel : float
         Side of a pixel, m.
 
@@ -120,13 +120,17 @@ def _medians(blocks: Float) -> Float:
 
 
 def _sharpest(lines: Float, about: int) -> int:
-    """Line near by before which and from which on two levels explain the lines best."""
-    reach = 2 * ACROSS
-    begin, end = max(about - 3 * reach, 0), min(about + 3 * reach, len(lines))
-    use = np.flatnonzero(np.isfinite(lines[begin:end]).any(axis=1)) + begin
-    medians = np.nanmedian(lines[use], axis=1)
-    places = [k for k in range(max(about - reach, 1), about + reach + 1) if (use < k).any() and (use >= k).any()]
-    costs = [
-        sum(float(np.abs(part - np.median(part)).sum()) for part in (medians[use < k], medians[use >= k])) for k in places
-    ]
-    return places[int(np.argmin(costs))] if places else about
+    """First line behind the sharpest step near a place: between the medians of the few lines before and behind it."""
+    reach = (BLOCKS + 1) * ACROSS
+    best, at = -1.0, about
+    medians = np.full(len(lines), np.nan)
+    near = slice(max(about - 2 * reach, 0), about + 2 * reach)
+    known = np.isfinite(lines[near]).any(axis=1)
+    medians[near][known] = np.nanmedian(lines[near][known], axis=1)
+    for k in range(max(about - reach, 1), min(about + reach, len(lines) - 1) + 1):
+        sides = medians[max(k - ACROSS, 0) : k], medians[k : k + ACROSS]
+        if all(np.isfinite(side).any() for side in sides):
+            step = abs(float(np.nanmedian(sides[1]) - np.nanmedian(sides[0])))
+            if step > best:
+                best, at = step, k
+    return at
