@@ -72,7 +72,7 @@ def merge(
     pairs = np.concatenate([within, across])
     merged_into = np.arange(count)
     for _ in range(ROUNDS):
-        sums, held = _sums(grid, owner, count), _members(owner, count)
+        sums, held = _sums(grid, owner, count), _Members(owner, count)
         ends = merged_into[pairs]
         differ = ends[:, 0] != ends[:, 1]
         ends, limit = ends[differ], tolerance[differ]
@@ -92,7 +92,7 @@ def merge(
             break
         merged_into = into[merged_into]
         owner = np.where(owner >= 0, into[np.maximum(owner, 0)], -1).astype(np.int32)
-        held = _members(owner, count)
+        held = _Members(owner, count)
         sums = _sums(grid, owner, count)
         for a in np.unique(into[changed]).tolist():
             refit(grid, centroid, sums[a], held(a), noise, models[a])
@@ -102,7 +102,7 @@ def merge(
 def _ordered(grid: VoxelGrid, centroid: Float, towards: Float, owner: Int32, models: Float, noise: float) -> Faces:
     """Faces in order of size, seen from the right side; what scatters as no face does is left out."""
     count = len(models)
-    sums, held = _sums(grid, owner, count), _members(owner, count)
+    sums, held = _sums(grid, owner, count), _Members(owner, count)
     rms, good = np.zeros(count), np.zeros(count, np.bool_)
     for k in range(count):
         voxels = held(k)
@@ -139,6 +139,29 @@ def refit(grid: VoxelGrid, centroid: Float, sums: Float, voxels: Int64, noise: f
         _plane_rms(np.ascontiguousarray(sums), model)
     else:
         _refit_cylinder(grid.moments, centroid, voxels.astype(np.int32), noise, model)
+
+
+def refine(fine: VoxelGrid, face: Int32, faces: Faces, noise: float) -> None:
+    """Fit cylinders again to finer voxels, in place: those in which they were grown may be as wide as they are.
+
+    Parameters
+    ----------
+    fine : VoxelGrid
+    face : (n,) int32 array
+        Face of each of its voxels.
+    faces : Faces
+    noise : float
+        Of ranges, m.
+    """
+    centroid = fine.centroids
+    held = _Members(face, len(faces.models))
+    for k in np.flatnonzero(faces.models[:, RADIUS] > 0.0).tolist():
+        voxels = held(k)
+        if len(voxels):
+            model = faces.models[k].copy()
+            _refit_cylinder(fine.moments, centroid, voxels.astype(np.int32), noise, model)
+            if abs(model[RADIUS] - faces.models[k, RADIUS]) < 0.2 * faces.models[k, RADIUS] + noise:
+                faces.models[k] = model
 
 
 def _fits(one: Float, other: Float, grid: VoxelGrid, centroid: Float, sums: Float, voxels: Int64, limit: float) -> bool:
@@ -202,7 +225,7 @@ def _sums(grid: VoxelGrid, owner: Int32, count: int) -> Float:
     return np.column_stack([np.bincount(owner[held], grid.moments[held, k], count) for k in range(10)])
 
 
-class _members:  # noqa: N801 - called like a function
+class _Members:
     """Voxels of each face, looked up by its number."""
 
     def __init__(self, owner: Int32, count: int) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 from tunneldb.arrays import Float
 from tunneldb.structures.face_raster import Layout, PointFinder, candidates_of, lay_out
 from tunneldb.structures.growing import UNKNOWN_NOISE, grow, noise_of
-from tunneldb.structures.merging import Faces, merge
-from tunneldb.structures.models import with_directions
+from tunneldb.structures.merging import Faces, merge, refine
+from tunneldb.structures.models import RADIUS, with_directions
 from tunneldb.structures.voxel_grid import VoxelGrid, voxel_planes
 from tunneldb.structures.voxel_moments import COARSEST, VoxelMoments
 
@@ -58,7 +58,8 @@ def find_faces(moments: VoxelMoments, stations: Float) -> Segmentation:
     stations : (k, 3) float array
         Where the scanner stood, by the numbers of the scans, m.
     """
-    grid = moments.grid(level_of(moments))
+    level = level_of(moments)
+    grid = moments.grid(level)
     at = np.ascontiguousarray(stations - grid.origin)
     starts, neighbours = grid.neighbours()
     towards = at[grid.scan] - grid.centroids
@@ -67,6 +68,10 @@ def find_faces(moments: VoxelMoments, stations: Float) -> Segmentation:
     planes = voxel_planes(grid, starts, neighbours, at, noise)
     grown = grow(grid, starts, neighbours, planes, towards, noise, np.full(len(grid), -1, np.int32))
     faces = merge(grid, starts, neighbours, towards, grown, noise)
+    round_ = np.append(faces.models[:, RADIUS] > 0.0, False)[faces.owner]
+    if round_.any():
+        fine, place = moments.finest(grid, level, round_)
+        refine(fine, faces.owner[place], faces, noise)
     faces = replace(faces, models=with_directions(faces.models, _middles(grid, faces)))
     layout = lay_out(grid, faces, len(stations))
     candidates = candidates_of(faces.owner, starts, neighbours)

@@ -84,16 +84,34 @@ class VoxelMoments:
                 return
             self._make_room()
 
-    def grid(self, level: int, wanted: Bool | None = None) -> VoxelGrid:
+    def grid(self, level: int) -> VoxelGrid:
         """Voxels with an edge of 2^-level m, no finer than those kept, in the order of scans and places."""
         keys, sums = self._keys[: self._size], self._sums[: self._size]
         order = np.argsort(keys)
         keys, sums = keys[order], sums[order]
         for finer in range(self.level, level, -1):
             keys, sums = _coarser(keys, sums, finer)
-        if wanted is not None:
-            keys, sums = keys[wanted], sums[wanted]
         return VoxelGrid(2.0**-level, self.origin, keys, _metres(keys, sums, level))
+
+    def finest(self, grid: VoxelGrid, level: int, wanted: Bool) -> tuple[VoxelGrid, Int64]:
+        """The finest voxels that lie in some of the voxels of a grid, and in which of these.
+
+        Parameters
+        ----------
+        grid : VoxelGrid
+        level : int
+            Its voxels have an edge of 2^-level m.
+        wanted : (n,) bool array
+            Which of them.
+        """
+        above = self._keys[: self._size]
+        for _ in range(level, self.level):
+            above = parents(above)
+        place = np.searchsorted(grid.keys, above)
+        chosen = np.flatnonzero(wanted[place])
+        chosen = chosen[np.argsort(self._keys[chosen])]
+        keys = self._keys[chosen]
+        return VoxelGrid(2.0**-self.level, self.origin, keys, _metres(keys, self._sums[chosen], self.level)), place[chosen]
 
     def counts(self, level: int) -> Int64:
         """Points in each voxel with an edge of 2^-level m."""
