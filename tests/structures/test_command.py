@@ -64,7 +64,7 @@ def test_points_get_their_numbers_and_keep_the_rest(plant: Path, tmp_path: Path)
 
 
 def test_polygons_lie_where_the_points_do(plant: Path, tmp_path: Path) -> None:
-    code, told = _run(plant, "-o", str(tmp_path / "out.gpkg"))
+    code, _ = _run(plant, "-o", str(tmp_path / "out.gpkg"))
     assert code == 0
     layers = dict(pyogrio.list_layers(tmp_path / "out.gpkg"))
     assert set(layers) == {"member", "face", "spot"}

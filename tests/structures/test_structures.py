@@ -31,7 +31,12 @@ SCENE = [
 ]
 WINDOW = (-0.7, 0.7, -0.6, 0.5)
 BASE = np.array([30.0, 25.0, 35.0, 28.0, 33.0, 31.0, 31.0])
-SPOTS = [(0, (1.6, 6, 1.5), 0.15, -3.0), (0, (0.6, 6, 0.5), 0.12, 3.0), (2, (0.5, 4.9, 1.0), 0.10, -3.0), (4, (-1.5, 5.3, 1.8), 0.12, -2.5)]
+SPOTS = [
+    (0, (1.6, 6, 1.5), 0.15, -3.0),
+    (0, (0.6, 6, 0.5), 0.12, 3.0),
+    (2, (0.5, 4.9, 1.0), 0.10, -3.0),
+    (4, (-1.5, 5.3, 1.8), 0.12, -2.5),
+]
 
 
 @dataclass(frozen=True)
@@ -118,7 +123,10 @@ def test_unrolling_and_its_inverse() -> None:
 def test_each_point_is_on_its_own_face(result: Result) -> None:
     held = result.face > 0
     assert held.mean() > 0.95
-    pure = sum(np.unique(result.seen.surface[result.face == face], return_counts=True)[1].max() for face in np.unique(result.face[held]))
+    pure = sum(
+        np.unique(result.seen.surface[result.face == face], return_counts=True)[1].max()
+        for face in np.unique(result.face[held])
+    )
     assert pure / held.sum() > 0.99
 
 
@@ -202,7 +210,9 @@ def test_a_plate_seen_from_both_sides_has_two_faces() -> None:
     stations = np.array([[0.0, 0.0, 1.5], [0.0, 6.0, 1.5]])
     front = scan(sides, stations[:1], step=0.003, window=(-0.3, 0.3, -0.3, 0.3))
     back = scan(sides, stations[1:], step=0.003, window=(np.pi - 0.3, np.pi + 0.3, -0.3, 0.3))
-    both = Seen(*(np.concatenate([getattr(s, n) for s in (front, back)]) for n in ("xyz", "surface", "scan", "range_m", "cosine")))
+    both = Seen(
+        *(np.concatenate([getattr(s, n) for s in (front, back)]) for n in ("xyz", "surface", "scan", "range_m", "cosine"))
+    )
     both.scan[len(front.xyz) :] = 1
     found = find(both, *levels(both, [], np.array([30.0, 30.0])), stations=stations)
     assert len(found.found.structures.faces) == 2

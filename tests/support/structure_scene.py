@@ -73,9 +73,7 @@ def scan(surfaces, stations, step=0.0012, noise=0.0015, seed=1, window=None) -> 
         azimuth, elevation = np.meshgrid(np.arange(low, high, step), np.arange(down, up, step))
         azimuth, elevation = azimuth.ravel(), elevation.ravel()
         azimuth = azimuth + rng.uniform(-0.1, 0.1, len(azimuth)) * step
-        rays = np.column_stack(
-            [np.cos(elevation) * np.sin(azimuth), np.cos(elevation) * np.cos(azimuth), np.sin(elevation)]
-        )
+        rays = np.column_stack([np.cos(elevation) * np.sin(azimuth), np.cos(elevation) * np.cos(azimuth), np.sin(elevation)])
         t = np.full(len(rays), np.inf)
         on, cosine = np.full(len(rays), -1), np.zeros(len(rays))
         for k, surface in enumerate(surfaces):

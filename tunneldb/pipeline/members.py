@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from tunneldb.arrays import Float, Int32, Int64, Single
+from tunneldb.arrays import Float, Int32, Int64, Single, UInt32
 from tunneldb.errors import UserError
 from tunneldb.geometry.crs import describe_crs
 from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.formats.table import has_scans
-from tunneldb.pointcloud.points import Points
+from tunneldb.pointcloud.points import Points, ScanHeader
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.prefetch import prefetch
 from tunneldb.pointcloud.reader import read_chunks, read_header
@@ -122,7 +122,7 @@ def find_members(inputs: Inputs, begin: Begin) -> FileMembers:
         )
     require_dimension(path, inputs.dimension, header.dimensions, "--intensity")
     values = _Values(inputs)
-    moments = VoxelMoments(inputs.poses.station.mean(axis=0))
+    moments = VoxelMoments(_middle(inputs.poses.station, header))
     for points, scan in _read(inputs, values, begin("points", header.points)):
         moments.add(points.xyz, scan)
     values.require()
@@ -150,11 +150,11 @@ def find_members(inputs: Inputs, begin: Begin) -> FileMembers:
     )
 
 
-def numbers_of_points(inputs: Inputs, members: FileMembers) -> Iterator[tuple[Int32, Int32, Int32]]:
+def numbers_of_points(inputs: Inputs, members: FileMembers) -> Iterator[tuple[UInt32, UInt32, UInt32]]:
     """Face, member and spot of all points, in the order of the file, chunk by chunk; 0 is none."""
     finder, found = members.segmentation.finder, members.found
     for points, scan, use in _read_all(inputs, lambda count: None):
-        out = np.zeros((3, len(use)), np.int32)
+        out = np.zeros((3, len(points)), np.uint32)
         face, pixel = finder.find(points.xyz[use], scan[use])
         out[:, use] = found.of_points(face, pixel)
         yield out[0], out[1], out[2]
@@ -226,9 +226,7 @@ class _Values:
             raise UserError(f"{what} is no {self.inputs.kind}: {wrong}")
 
 
-def _read(
-    inputs: Inputs, values: _Values | None, progress: Callable[[float], None]
-) -> Iterator[tuple[Points, Int32]]:
+def _read(inputs: Inputs, values: _Values | None, progress: Callable[[float], None]) -> Iterator[tuple[Points, Int32]]:
     """Points whose scanner position is known, with the place of their scan among the stations."""
     for points, scan, use in _read_all(inputs, progress):
         if values is not None:
@@ -252,9 +250,7 @@ def _read_all(inputs: Inputs, progress: Callable[[float], None]) -> Iterator[tup
             progress(len(points))
 
 
-def _reference(
-    inputs: Inputs, segmentation: Segmentation, sums: Sums
-) -> tuple[ReferenceCurve | None, str | None]:
+def _reference(inputs: Inputs, segmentation: Segmentation, sums: Sums) -> tuple[ReferenceCurve | None, str | None]:
     """The curve by which levels are corrected, and a note."""
     if not needs_reference(inputs.kind):
         return None, None
@@ -288,6 +284,13 @@ def _samples(segmentation: Segmentation, sums: Sums) -> IntensitySamples:
     return IntensitySamples(
         np.concatenate(place), np.concatenate(scans), np.concatenate(ranges), np.concatenate(cosines), np.concatenate(levels)
     )
+
+
+def _middle(stations: Float, header: ScanHeader) -> Float:
+    """Middle of the scanner positions near the box of the points: a list may hold those of other files, too."""
+    aside = np.maximum(header.low - stations, stations - header.high).max(axis=1)
+    near = stations[aside < REACH]
+    return np.asarray((near if len(near) else stations).mean(axis=0))
 
 
 def _place(xyz: Float) -> str:

@@ -15,7 +15,7 @@ import laspy
 import numpy as np
 from laspy import DecompressionSelection, LazBackend
 
-from tunneldb.arrays import Float, Int32, Int64, UInt8, UInt32
+from tunneldb.arrays import Float, Int64, UInt8, UInt32
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.e57 import is_e57
 from tunneldb.pointcloud.formats.e57_records import E57Records
@@ -100,7 +100,7 @@ def rewrite(
 def rewrite_with_numbers(
     source: Path,
     target: Path,
-    numbers: Iterable[Sequence[UInt32 | Int32]],
+    numbers: Iterable[Sequence[UInt32]],
     names: Mapping[str, str],
     progress: Callable[[int], None] = lambda count: None,
     size: int = CHUNK,
@@ -140,11 +140,11 @@ def rewrite_with_numbers(
 class _Pieces:
     """Arrays that come in pieces, taken by so many elements."""
 
-    def __init__(self, pieces: Iterable[Sequence[UInt32 | Int32]]) -> None:
+    def __init__(self, pieces: Iterable[Sequence[UInt32]]) -> None:
         self.pieces = iter(pieces)
-        self.rest: list[UInt32 | Int32] = []
+        self.rest: list[UInt32] = []
 
-    def take(self, count: int) -> list[UInt32 | Int32]:
+    def take(self, count: int) -> list[UInt32]:
         """So many elements of each."""
         while not self.rest or len(self.rest[0]) < count:
             piece = next(self.pieces)

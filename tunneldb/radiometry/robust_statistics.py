@@ -42,9 +42,7 @@ def plain_statistics(values: NDArray[np.floating]) -> DryLevel:
     return DryLevel(float(values.mean()), float(values.std()), len(values))
 
 
-def robust_statistics(
-    values: NDArray[np.floating], shorth: float = SHORTH, *, two_sided: bool = False
-) -> DryLevel:
+def robust_statistics(values: NDArray[np.floating], shorth: float = SHORTH, *, two_sided: bool = False) -> DryLevel:
     """Mean and standard deviation of the dry part of values of which up to about 30 % are wet.
 
     Wet lining is darker, so that it pulls mean, median and standard deviation. The shortest interval that

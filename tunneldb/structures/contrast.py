@@ -73,9 +73,7 @@ class FaceContrast:
     sigma: float
 
 
-def observe_face(
-    layout: Layout, sums: Sums, face: int, stations: Float, reference: ReferenceCurve | None
-) -> list[Observed]:
+def observe_face(layout: Layout, sums: Sums, face: int, stations: Float, reference: ReferenceCurve | None) -> list[Observed]:
     """Pixels of a face as each scan saw them, with the incidence and range of their centres."""
     u, v = layout.centres(face)
     model, columns = layout.models[face], len(u)
@@ -112,8 +110,8 @@ def some_pixels(observed: list[Observed], inside: Bool) -> list[Observed]:
     for one in observed:
         use = inside.ravel()[one.pixel]
         if use.any():
-            arrays = (one.pixel, one.cosine, one.range_m, one.value, one.points)
-            found.append(Observed(one.scan, *(array[use] for array in arrays)))
+            rest = (array[use] for array in (one.cosine, one.range_m, one.value, one.points))
+            found.append(Observed(one.scan, one.pixel[use], *rest))
     return found
 
 
@@ -129,9 +127,7 @@ def class_levels(observed: list[Observed]) -> dict[tuple[int, int], float]:
     return found
 
 
-def contrast_of(
-    layout: Layout, face: int, observed: list[Observed], curves: list[list[LevelCurve]]
-) -> FaceContrast:
+def contrast_of(layout: Layout, face: int, observed: list[Observed], curves: list[list[LevelCurve]]) -> FaceContrast:
     """Hold the pixels of a face against its level.
 
     Parameters

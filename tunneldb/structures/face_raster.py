@@ -100,9 +100,7 @@ class PointFinder:
         Of ranges, m.
     """
 
-    def __init__(
-        self, grid: VoxelGrid, candidates: Int32, faces: Faces, layout: Layout, stations: Float, noise: float
-    ) -> None:
+    def __init__(self, grid: VoxelGrid, candidates: Int32, faces: Faces, layout: Layout, stations: Float, noise: float) -> None:
         self.origin, self.edge = grid.origin, grid.edge
         self.keys, self.table = grid.keys, key_table(grid.keys)
         self.candidates, self.layout, self.stations, self.noise = candidates, layout, stations, noise
@@ -126,7 +124,9 @@ class PointFinder:
         face, pixel = self.find(xyz, scan)
         with np.errstate(invalid="ignore"):
             steps = np.where(np.isfinite(level), np.clip(np.rint(level / STEP), -32767, 32767), float(NONE))
-        _sum(face, pixel, np.ascontiguousarray(scan, np.int32), steps.astype(np.int32), self.layout.start, sums.count, sums.level)
+        _sum(
+            face, pixel, np.ascontiguousarray(scan, np.int32), steps.astype(np.int32), self.layout.start, sums.count, sums.level
+        )
 
 
 def lay_out(grid: VoxelGrid, faces: Faces, scans: int) -> Layout:
@@ -191,7 +191,7 @@ def _candidates(owner: Int32, starts: Int64, neighbours: Int32, out: Int32) -> N
         for place in range(min(many, out.shape[1])):
             best = place
             for k in range(place + 1, many):
-                if number[k] > number[best] or number[k] == number[best] and found[k] < found[best]:
+                if number[k] > number[best] or (number[k] == number[best] and found[k] < found[best]):
                     best = k
             found[place], found[best] = found[best], found[place]
             number[place], number[best] = number[best], number[place]
@@ -199,9 +199,7 @@ def _candidates(owner: Int32, starts: Int64, neighbours: Int32, out: Int32) -> N
 
 
 @inner
-def pixel_of(
-    model: Float, side: float, shape: Int64, x: float, y: float, z: float
-) -> int:  # pragma: no cover - compiled
+def pixel_of(model: Float, side: float, shape: Int64, x: float, y: float, z: float) -> int:  # pragma: no cover - compiled
     """Pixel of a place, row × columns + column; -1 beyond the face's box."""
     qx, qy, qz = x - model[0], y - model[1], z - model[2]
     ax, ay, az = model[3], model[4], model[5]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
+from scipy import ndimage
 
 from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.radiometry.reference_curve import ReferenceCurve
@@ -60,7 +62,7 @@ class Found:
         held = held[np.argsort(face[held], kind="stable")]
         which = face[held]
         bounds = np.flatnonzero(np.diff(which, prepend=-1, append=-1))
-        for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+        for begin, end in pairwise(bounds.tolist()):
             of, here = held[begin:end], int(which[begin])
             if (parts := self.places[here]) is not None:
                 number[of], member[of] = parts.reshape(2, -1)[:, at[of]]
@@ -160,10 +162,10 @@ def _parts(found: Segmentation, sums: Sums, reference: ReferenceCurve | None) ->
             continue
         for number in range(int(material.max()) + 1):
             inside = material == number
-            part = _extent(layout, face, np.where(inside, held, 0), scans)
-            if part is not None:
+            own = _extent(layout, face, np.where(inside, held, 0), scans)
+            if own is not None:
                 levels = class_levels(some_pixels(observed, inside))
-                parts.append(_Part(face, inside, replace(part, levels=levels)))
+                parts.append(_Part(face, inside, replace(own, levels=levels)))
     # Others are compared with these.
     if any(part.extent.levels is not None for part in parts):
         for k, part in enumerate(parts):
@@ -207,9 +209,7 @@ def _materials(layout: Layout, face: int, observed: list[Observed]) -> Int32 | N
     return parts if parts.any() else None
 
 
-def _closed(occupied: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
-    from scipy import ndimage
-
+def _closed(occupied: Bool) -> Bool:
     padded = np.pad(occupied, 2)
     return np.asarray(ndimage.binary_closing(padded, iterations=2)[2:-2, 2:-2])
 
@@ -240,9 +240,7 @@ def _judge(
         for seen in one:
             by_scan.setdefault(seen.scan, []).append(seen)
     model = layout.models[parts[0].face]
-    common = {
-        scan: curve_of(seen, model, by_range=by_range) for scan, seen in by_scan.items() if len(parts) > 1
-    }
+    common = {scan: curve_of(seen, model, by_range=by_range) for scan, seen in by_scan.items() if len(parts) > 1}
     out = []
     for part, one in zip(parts, observed, strict=True):
         curves = [
@@ -253,9 +251,7 @@ def _judge(
     return out
 
 
-def _face(
-    found: Segmentation, part: _Part, number: int, member: int, contrast: FaceContrast, spots: FaceSpots
-) -> Face:
+def _face(found: Segmentation, part: _Part, number: int, member: int, contrast: FaceContrast, spots: FaceSpots) -> Face:
     model, extent = found.layout.models[part.face], part.extent
     whole = int(contrast.face.sum())
     return Face(

@@ -1,8 +1,8 @@
 """Faces grown over voxels: planes and cylinders (Ono et al., 3.1, with models in the place of normals alone).
 
-From the flattest voxel on, a plane is grown over its neighbours, and where normals turn about an axis a cylinder, too; the one
-that explains more points stays. Each voxel is held against the face's own model: the distance of its centroid, the spread of its
-points and its normal.
+From the flattest voxel on, a plane is grown over its neighbours, and where normals turn about an axis a cylinder, too; the
+one that explains more points stays. Each voxel is held against the face's own model: the distance of its centroid, the spread
+of its points and its normal.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ WIDEST = 2.5
 LEAST_TOLERANCE = 0.001
 """Nor is it asked to lie nearer than this, m: coordinates are rounded, sheets are not that flat."""
 
-LEAST_NOISE, UNKNOWN_NOISE = 0.0003, 0.002
-"""Noise is not taken for less, nor known where nothing is flat, m."""
+LEAST_NOISE, MOST_NOISE, UNKNOWN_NOISE = 0.0003, 0.006, 0.002
+"""Noise is not taken for less or more, m: what is rougher is rock or soil; nor is it known where nothing is flat."""
 
 TURN = 18.0
 """Normals of a face's voxels differ from its own by no more, degrees: of few points they scatter by some."""
@@ -84,7 +84,7 @@ def noise_of(planes: VoxelPlanes, towards: Float) -> float:
     flat = (planes.variation < 0.01) & (cosine > 0.5)
     if not flat.any():
         return UNKNOWN_NOISE
-    return float(max(np.median(planes.rms[flat] / cosine[flat]), LEAST_NOISE))
+    return float(np.clip(np.median(planes.rms[flat] / cosine[flat]), LEAST_NOISE, MOST_NOISE))
 
 
 def grow(
@@ -314,7 +314,7 @@ def _grow_all(
                 and seen_angle(round_, centroid, other, held) >= math.radians(LEAST_ANGLE)
             ):
                 kind, count, points, deviation = 1, held, sums[0], rest
-        if kind == 0 and (count < LEAST_VOXELS or points < LEAST_POINTS) or points < LEAST_POINTS:
+        if (kind == 0 and (count < LEAST_VOXELS or points < LEAST_POINTS)) or points < LEAST_POINTS:
             tried[seed] = True
             continue
         for m in range(count):

@@ -129,9 +129,7 @@ def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
     noise : float
         Of ranges, m.
     """
-    pairs = [
-        (a, b) for a, b in _coplanar(faces, max(APART, 3.0 * noise)) if _joined(faces[a], faces[b], images)
-    ]
+    pairs = [(a, b) for a, b in _coplanar(faces, max(APART, 3.0 * noise)) if _joined(faces[a], faces[b], images)]
     first, second = np.array(pairs, np.int64).reshape(-1, 2).T
     graph = sparse.coo_array((np.ones(len(first), np.int8), (first, second)), shape=(len(faces), len(faces)))
     label = sparse.csgraph.connected_components(graph, directed=False)[1]
@@ -262,7 +260,7 @@ def _gap_along(line: Float, one: shapely.Geometry, other: shapely.Geometry) -> f
 def _occluded(one: Extent, moved: shapely.Geometry, scans: set[int], images: RangeImages) -> bool:
     """Whether no scan that saw one of two faces looks through between them (3.2.4).
 
-    What was sent there came back from nearer, or from the surface itself, which then goes on where too few points are for a face.
+    What was sent there came back from nearer, or from the surface itself, which goes on where points are too few for a face.
     """
     places = _gap_places(one.outline, moved, one.pixel)
     if not len(places):
@@ -291,8 +289,8 @@ def _gap_places(one: shapely.Geometry, other: shapely.Geometry, pixel: float) ->
         # Rims that turn away from the other face have their shortest way along it; the facing ones are the nearer half.
         facing = far <= np.quantile(far, 0.25) * 1.5 + 2.0 * pixel
         chosen = np.flatnonzero(facing)[:: max(1, int(facing.sum()) // 60)]
-        for share in (0.2, 0.35, 0.5, 0.65, 0.8):
-            found.append(here[chosen] + share * (there[which[chosen]] - here[chosen]))
+        way = there[which[chosen]] - here[chosen]
+        found += [here[chosen] + share * way for share in (0.2, 0.35, 0.5, 0.65, 0.8)]
     places = np.concatenate(found)
     free = ~shapely.contains_xy(shapely.buffer(one, pixel), places[:, 0], places[:, 1])
     free &= ~shapely.contains_xy(shapely.buffer(other, pixel), places[:, 0], places[:, 1])
@@ -300,9 +298,7 @@ def _gap_places(one: shapely.Geometry, other: shapely.Geometry, pixel: float) ->
 
 
 @kernel
-def _add_ranges(
-    xyz: Float, scan: Int32, stations: Float, cell: float, nearest: Single
-) -> None:  # pragma: no cover - compiled
+def _add_ranges(xyz: Float, scan: Int32, stations: Float, cell: float, nearest: Single) -> None:  # pragma: no cover - compiled
     rows, columns = nearest.shape[1], nearest.shape[2]
     for i in range(xyz.shape[0]):
         s = scan[i]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.arrays import Bool, Float
+from tunneldb.arrays import Bool, Float, Int64, Intp
 from tunneldb.radiometry.robust_statistics import robust_statistics
 
 CLASS = 0.05
@@ -42,8 +42,8 @@ CLIP = 2.5
 """Pixels within so many standard deviations of the curve refine it."""
 
 MOST_OFF, MOST_WIDE = 2.0, 1.5
-"""A class lies no farther off the curve in standard deviations, and scatters no more than so many times as much, or it is covered
-by something else."""
+"""A class lies no farther off the curve in standard deviations, and scatters no more than so many times as much, or it is
+covered by something else."""
 
 GLOSS = 0.95
 """Cosine from which a class may be as bright as it likes."""
@@ -117,7 +117,7 @@ def level_curve(cosine: Float, range_m: Float, value: Float, points: Float, *, b
     middle = float(np.median(log_range))
     by_range = by_range and float(np.ptp(log_range)) > LEAST_SPAN
     smooth, slope, spread = _smooth(np.log10(cosine), log_range - middle, value, by_range=by_range)
-    curve = np.polyval(smooth, np.log10(middles))
+    curve: Float = np.asarray(np.polyval(smooth, np.log10(middles)), np.float64)
     level, sigma = curve.copy(), np.full(len(middles), max(spread, LEAST_SIGMA))
     for _ in range(TURNS):
         rest = value - np.interp(cosine, middles, level) - slope * (log_range - middle)
@@ -138,7 +138,7 @@ def _smooth(x: Float, along: Float, value: Float, *, by_range: bool) -> tuple[Fl
         step = -(-len(x) // MOST_PIXELS)
         x, along, value = x[::step], along[::step], value[::step]
     degree = 0 if np.ptp(x) < 0.01 else 1 if np.ptp(x) < 0.08 else 2
-    best: tuple[float, Float] = (np.inf, np.zeros(degree + 1))
+    best = (np.inf, np.zeros(degree + 1))
     slopes = (0.0, *RANGE_SLOPES) if by_range else (0.0,)
     slope = 0.0
     for loss in INCIDENCE_SLOPES if degree else (0.0,):
@@ -166,11 +166,12 @@ def _smooth(x: Float, along: Float, value: Float, *, by_range: bool) -> tuple[Fl
             break
         columns = [x[near] ** k for k in range(degree, -1, -1)] + ([along[near]] if by_range else [])
         solution = np.linalg.lstsq(np.column_stack(columns), value[near], rcond=None)[0]
-        smooth, slope = solution[: degree + 1], float(solution[-1]) if by_range else 0.0
+        smooth = np.asarray(solution[: degree + 1], np.float64)
+        slope = float(solution[-1]) if by_range else 0.0
     return smooth, slope, spread
 
 
-def _classes(number: np.ndarray, value: Float, points: Float) -> tuple[Float, np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+def _classes(number: Int64, value: Float, points: Float) -> tuple[Float, Intp, Intp]:
     """Mean value of the classes that hold enough points; the values in order of these, and where each begins."""
     held, place = np.unique(number, return_inverse=True)
     enough = np.bincount(place, points, len(held)) >= FEWEST
@@ -180,5 +181,5 @@ def _classes(number: np.ndarray, value: Float, points: Float) -> tuple[Float, np
     starts = np.searchsorted(place[order], np.arange(count + 1))
     order = order[: starts[-1]]
     number_of = np.diff(starts)
-    middles = np.add.reduceat(value[order], starts[:-1]) / number_of if count else np.empty(0)
+    middles: Float = np.asarray(np.add.reduceat(value[order], starts[:-1]) / number_of if count else [], np.float64)
     return middles, order, starts

@@ -9,9 +9,9 @@ import numpy as np
 
 from tunneldb.arrays import Float, Int32, Int64
 from tunneldb.compiled import kernel
-from tunneldb.structures.growing import Grown
+from tunneldb.structures.growing import LEAST_TOLERANCE, TOLERANCE, Grown
 from tunneldb.structures.models import AXIS, POINT, RADIUS, SIDE, distance, fit_cylinder, fit_plane
-from tunneldb.structures.voxel_grid import AXIS_BITS, VoxelGrid
+from tunneldb.structures.voxel_grid import AXIS_BITS, VoxelGrid, VoxelPlanes
 
 ANGLE = 10.0
 """Two faces are no farther turned against each other, degrees (Ono et al., Table 1)."""
@@ -23,6 +23,18 @@ STEP = 0.002
 """Within one scan, which is no farther off than noise, m: plates lie on each other."""
 
 ROUNDS = 6
+
+WITHIN = 7
+"""A voxel within a face touches at least so many others of it."""
+
+LARGE = 250
+"""Nothing that is rock or foliage is as flat as noise over so many voxels."""
+
+SMOOTH_TURN = 25.0
+"""Where a face ends and what touches it there is turned against it by less, the surface goes on, degrees."""
+
+GOES_ON = 0.5
+"""Share of a face's rim over which the surface may go on so: rock, soil, bends and foliage have no rims of their own."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +59,7 @@ class Faces:
 
 
 def merge(
-    grid: VoxelGrid, starts: Int64, neighbours: Int32, towards: Float, grown: Grown, noise: float
+    grid: VoxelGrid, starts: Int64, neighbours: Int32, planes: VoxelPlanes, towards: Float, grown: Grown, noise: float
 ) -> Faces:
     """Merge faces that touch and fit one model, within a scan and across scans.
 
@@ -55,6 +67,8 @@ def merge(
     ----------
     grid, starts, neighbours
         Voxels, and which touch.
+    planes : VoxelPlanes
+        The plane of each.
     towards : (n, 3) float array
         Unit vectors to the scanner.
     grown : Grown
@@ -66,9 +80,7 @@ def merge(
     centroid = grid.centroids
     within = _touching(owner, starts, neighbours)
     across = _at_one_place(grid.keys, owner)
-    tolerance = np.concatenate(
-        [np.full(len(within), max(STEP, 3.0 * noise)), np.full(len(across), max(APART, 3.0 * noise))]
-    )
+    tolerance = np.concatenate([np.full(len(within), max(STEP, 3.0 * noise)), np.full(len(across), max(APART, 3.0 * noise))])
     pairs = np.concatenate([within, across])
     merged_into = np.arange(count)
     for _ in range(ROUNDS):
@@ -83,7 +95,7 @@ def merge(
         changed = np.zeros(count, np.bool_)
         for k in order.tolist():
             a, b = int(big[k]), int(small[k])
-            if changed[a] or changed[b] and into[b] != b or into[a] != a:
+            if changed[a] or (changed[b] and into[b] != b) or into[a] != a:
                 continue
             if _fits(models[a], models[b], grid, centroid, sums[b], held(b), limit[k]):
                 into[b] = a
@@ -96,10 +108,45 @@ def merge(
         sums = _sums(grid, owner, count)
         for a in np.unique(into[changed]).tolist():
             refit(grid, centroid, sums[a], held(a), noise, models[a])
-    return _ordered(grid, centroid, towards, owner, models, noise)
+    goes_on = _goes_on(owner, starts, neighbours, planes, centroid, towards, models, noise)
+    return _ordered(grid, centroid, towards, owner, models, noise, goes_on)
 
 
-def _ordered(grid: VoxelGrid, centroid: Float, towards: Float, owner: Int32, models: Float, noise: float) -> Faces:
+def _goes_on(
+    owner: Int32,
+    starts: Int64,
+    neighbours: Int32,
+    planes: VoxelPlanes,
+    centroid: Float,
+    towards: Float,
+    models: Float,
+    noise: float,
+) -> Float:
+    """Share of the rim of each face over which the surface goes on beyond it, bent, about."""
+    at = np.repeat(np.arange(len(owner)), np.diff(starts))
+    rim = (owner[at] >= 0) & (owner[neighbours] != owner[at])
+    mine, other = at[rim], neighbours[rim]
+    # What is beyond has a normal of its own, is smooth, and lies off the face.
+    turn = np.einsum("ni,ni->n", planes.normal[mine], planes.normal[other])
+    smooth = (turn > math.cos(math.radians(SMOOTH_TURN))) & (planes.rms[other] < 3.0 * noise)
+    mine, other = mine[smooth], other[smooth]
+    off = np.empty(len(mine))
+    for face in np.unique(owner[mine]).tolist():
+        of = owner[mine] == face
+        off[of] = np.abs(distances(models[face], centroid[other[of]]))
+    sigma = noise * np.abs(np.einsum("ni,ni->n", planes.normal[mine], towards[mine]))
+    touching = np.unique(mine[off > np.maximum(TOLERANCE * sigma, LEAST_TOLERANCE)])
+    own = np.bincount(at, owner[neighbours] == owner[at], len(owner))
+    edge = np.flatnonzero((owner >= 0) & (own < WITHIN))
+    around = np.bincount(owner[np.union1d(edge, touching)], minlength=len(models))
+    share = np.bincount(owner[touching], minlength=len(models)) / np.maximum(around, 1)
+    size = np.bincount(owner[owner >= 0], minlength=len(models))
+    return np.where(size < LARGE, share, 0.0)
+
+
+def _ordered(
+    grid: VoxelGrid, centroid: Float, towards: Float, owner: Int32, models: Float, noise: float, goes_on: Float
+) -> Faces:
     """Faces in order of size, seen from the right side; what scatters as no face does is left out."""
     count = len(models)
     sums, held = _sums(grid, owner, count), _Members(owner, count)
@@ -118,7 +165,7 @@ def _ordered(grid: VoxelGrid, centroid: Float, towards: Float, owner: Int32, mod
         else:
             rms[k] = float(np.sqrt(np.mean(distances(models[k], centroid[voxels]) ** 2)))
             cosine = 1.0
-        good[k] = rms[k] < 3.0 * max(noise * cosine, 0.0005)
+        good[k] = rms[k] < 3.0 * max(noise * cosine, 0.0005) and goes_on[k] < GOES_ON
     order = np.lexsort([models[:, 0], -sums[:, 0]])
     order = order[good[order]]
     number = np.full(count + 1, -1, np.int32)
@@ -234,8 +281,6 @@ class _Members:
 
     def __call__(self, face: int) -> Int64:
         return self.order[self.starts[face] : self.starts[face + 1]]
-
-
 
 
 @kernel

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from tunneldb.arrays import Float
+from tunneldb.arrays import Float, Int32
 from tunneldb.compiled import inner, point_inner
 from tunneldb.geometry.normals import eigenvalues, normal
 
@@ -27,8 +27,8 @@ ANGLES = 36
 def with_directions(models: Float, middles: Float) -> Float:
     """Give each model (k, WIDTH) the direction from which its unrolled coordinates count.
 
-    Of a plane u runs as level as can be and v upwards, to the left of u seen from the scanner's side. Of a cylinder u runs along
-    its axis and v = r·φ around it, 0 in the direction of the middle (k, 3) of what is seen, so that the cut lies behind.
+    Of a plane u runs as level as can be and v upwards, to the left of u seen from the scanner's side. Of a cylinder u runs
+    along its axis and v = r·φ around it, 0 in the direction of the middle (k, 3) of what is seen, so that the cut lies behind.
     """
     out = models.copy()
     axis = out[:, AXIS]
@@ -81,9 +81,7 @@ def normals_at(model: Float, u: Float, v: Float) -> Float:
         return np.broadcast_to(axis, (len(u), 3))
     angle = v / model[RADIUS]
     other = np.cross(axis, across)
-    return np.asarray(
-        model[SIDE] * (np.multiply.outer(np.cos(angle), across) + np.multiply.outer(np.sin(angle), other))
-    )
+    return np.asarray(model[SIDE] * (np.multiply.outer(np.cos(angle), across) + np.multiply.outer(np.sin(angle), other)))
 
 
 @point_inner
@@ -132,7 +130,7 @@ def fit_plane(total: Float, model: Float) -> float:  # pragma: no cover - compil
 
 @inner
 def fit_cylinder(
-    moments: Float, centroid: Float, held: object, count: int, noise: float, model: Float, turns: int
+    moments: Float, centroid: Float, held: Int32, count: int, noise: float, model: Float, turns: int
 ) -> float:  # pragma: no cover - compiled
     """Least-squares cylinder of voxels ``held`` (count,), Gauss-Newton with Tukey's weights; the rms distance, m.
 
@@ -229,7 +227,7 @@ def fit_cylinder(
 
 
 @inner
-def seen_angle(model: Float, centroid: Float, held: object, count: int) -> float:  # pragma: no cover - compiled
+def seen_angle(model: Float, centroid: Float, held: Int32, count: int) -> float:  # pragma: no cover - compiled
     """Angle about its axis over which voxels show a cylinder, radians."""
     ax, ay, az = model[3], model[4], model[5]
     if abs(ax) < 0.7:

@@ -112,9 +112,7 @@ def voxel_planes(grid: VoxelGrid, starts: Int64, neighbours: Int32, stations: Fl
         _BLOCK,
     )
     best = np.empty(n, np.int64)
-    in_blocks(
-        lambda begin, end: _choose(centroid, starts, neighbours, fitted, rms, 2.0 * noise, best, begin, end), n, _BLOCK
-    )
+    in_blocks(lambda begin, end: _choose(centroid, starts, neighbours, fitted, rms, 2.0 * noise, best, begin, end), n, _BLOCK)
     chosen = fitted[best]
     towards = stations[scan] - centroid
     chosen[np.einsum("ni,ni->n", chosen, towards) < 0.0] *= -1.0

@@ -57,7 +57,7 @@ class VoxelMoments:
     """
 
     def __init__(self, middle: Float) -> None:
-        self.origin = np.round(np.asarray(middle, np.float64))
+        self.origin: Float = np.round(np.asarray(middle, np.float64)).astype(np.float64)
         self.level = FINEST
         self.points = 0
         self.far = 0
@@ -206,6 +206,7 @@ def voxel_key(x: float, y: float, z: float, scan: int, per_metre: float) -> int:
 
 @inner
 def find_slot(key: int, keys: Int64, table: Int32) -> int:  # pragma: no cover - compiled
+    """Slot of a table that holds the place of a key among keys, or the empty one (-1) where it belongs."""
     mask = np.uint64(table.shape[0] - 1)
     h = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     at = (h ^ (h >> np.uint64(32))) & mask

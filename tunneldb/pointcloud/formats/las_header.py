@@ -156,7 +156,8 @@ class Head:
         blank = [b""] * 5
         extra = self.record_size - before
         unsaid = b"".join(
-            _EXTRA.pack(b"", 0, min(extra - at, 255), f"unsaid{at}".encode(), b"", *blank, b"") for at in range(told, extra, 255)
+            _EXTRA.pack(b"", 0, min(extra - at, 255), f"unsaid{at}".encode(), b"", *blank, b"")
+            for at in range(told, extra, 255)
         )
         added = b"".join(
             _EXTRA.pack(b"", _UINT32, 0, name.encode(), b"", *blank, text.encode()) for name, text in names.items()
