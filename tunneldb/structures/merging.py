@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,9 @@ STEP = 0.002
 """Within one scan, which is no farther off than noise, m: plates lie on each other."""
 
 ROUNDS = 6
+
+BLOCK = 100_000
+"""Voxels whose neighbours are looked at together."""
 
 WITHIN = 7
 """A voxel within a face touches at least so many others of it."""
@@ -123,9 +127,9 @@ def _goes_on(
     noise: float,
 ) -> Float:
     """Share of the rim of each face over which the surface goes on beyond it, bent, about."""
-    at = np.repeat(np.arange(len(owner)), np.diff(starts))
-    rim = (owner[at] >= 0) & (owner[neighbours] != owner[at])
-    mine, other = at[rim], neighbours[rim]
+    contacts = [(mine[owner[mine] >= 0], other[owner[mine] >= 0]) for mine, other in _contacts(owner, starts, neighbours)]
+    mine, other = (np.concatenate(part) for part in zip(*contacts, strict=True))
+    own = np.diff(starts) - np.bincount(mine, minlength=len(owner))
     # What is beyond has a normal of its own, is smooth, and lies off the face.
     turn = np.einsum("ni,ni->n", planes.normal[mine], planes.normal[other])
     smooth = (turn > math.cos(math.radians(SMOOTH_TURN))) & (planes.rms[other] < 3.0 * noise)
@@ -136,7 +140,6 @@ def _goes_on(
         off[of] = np.abs(distances(models[face], centroid[other[of]]))
     sigma = noise * np.abs(np.einsum("ni,ni->n", planes.normal[mine], towards[mine]))
     touching = np.unique(mine[off > np.maximum(TOLERANCE * sigma, LEAST_TOLERANCE)])
-    own = np.bincount(at, owner[neighbours] == owner[at], len(owner))
     edge = np.flatnonzero((owner >= 0) & (own < WITHIN))
     around = np.bincount(owner[np.union1d(edge, touching)], minlength=len(models))
     share = np.bincount(owner[touching], minlength=len(models)) / np.maximum(around, 1)
@@ -240,15 +243,26 @@ def _fits(one: Float, other: Float, grid: VoxelGrid, centroid: Float, sums: Floa
 
 def _touching(owner: Int32, starts: Int64, neighbours: Int32) -> Int64:
     """Pairs of faces (m, 2) whose voxels touch, or touch one voxel between them."""
-    at = np.repeat(np.arange(len(owner)), np.diff(starts))
-    mine, other = owner[at], owner[neighbours]
-    direct = (mine >= 0) & (other > mine)
-    pairs = [np.column_stack([mine[direct], other[direct]])]
-    free = (mine < 0) & (other >= 0)
-    beside = np.unique(np.column_stack([at[free], other[free]]), axis=0)
-    same = beside[1:, 0] == beside[:-1, 0]
-    pairs.append(np.column_stack([beside[:-1, 1][same], beside[1:, 1][same]]))
+    pairs = []
+    for at, there in _contacts(owner, starts, neighbours):
+        mine, other = owner[at], owner[there]
+        direct = (mine >= 0) & (other > mine)
+        pairs.append(np.unique(np.column_stack([mine[direct], other[direct]]), axis=0))
+        free = (mine < 0) & (other >= 0)
+        beside = np.unique(np.column_stack([at[free], other[free]]), axis=0)
+        same = beside[1:, 0] == beside[:-1, 0]
+        pairs.append(np.column_stack([beside[:-1, 1][same], beside[1:, 1][same]]))
     return np.unique(np.concatenate(pairs).astype(np.int64), axis=0)
+
+
+def _contacts(owner: Int32, starts: Int64, neighbours: Int32) -> Iterator[tuple[Int64, Int32]]:
+    """Voxels and what touches them that is not of the same face, for some voxels at a time."""
+    for begin in range(0, max(len(owner), 1), BLOCK):
+        end = min(begin + BLOCK, len(owner))
+        at = np.repeat(np.arange(begin, end), np.diff(starts[begin : end + 1]))
+        other = neighbours[starts[begin] : starts[end]]
+        differ = owner[at] != owner[other]
+        yield at[differ], other[differ]
 
 
 def _at_one_place(keys: Int64, owner: Int32) -> Int64:

@@ -26,7 +26,7 @@ FINEST = 7
 COARSEST = 2
 """Edge of the coarsest is 2^-COARSEST m."""
 
-MOST = 4_000_000
+MOST = 3_000_000
 """Voxels that are kept at most; beyond that the next coarser ones take their place."""
 
 SCANS = 1 << 10
