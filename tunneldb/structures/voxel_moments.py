@@ -87,8 +87,9 @@ class VoxelMoments:
     def grid(self, level: int) -> VoxelGrid:
         """Voxels with an edge of 2^-level m, no finer than those kept, in the order of scans and places."""
         keys, sums = self._keys[: self._size], self._sums[: self._size]
-        order = np.argsort(keys)
-        keys, sums = keys[order], sums[order]
+        if level == self.level:
+            order = np.argsort(keys)
+            keys, sums = keys[order], sums[order]
         for finer in range(self.level, level, -1):
             keys, sums = _coarser(keys, sums, finer)
         return VoxelGrid(2.0**-level, self.origin, keys, _metres(keys, sums, level))
@@ -131,9 +132,7 @@ class VoxelMoments:
                 setattr(self, name, new)
                 del old
         elif self.level > COARSEST:
-            keys = self._keys[: self._size]
-            order = np.argsort(keys)
-            keys, sums = _coarser(keys[order], self._sums[: self._size][order], self.level)
+            keys, sums = _coarser(self._keys[: self._size], self._sums[: self._size], self.level)
             self.level -= 1
             self._size = len(keys)
             self._keys[: len(keys)], self._sums[: len(keys)] = keys, sums
@@ -163,20 +162,13 @@ def split_keys(keys: Int64) -> tuple[Int64, Int64]:
 
 
 def _coarser(keys: Int64, sums: Int64, level: int) -> tuple[Int64, Int64]:
-    """Moments of voxels twice as large, in the order of their keys, of those with an edge of 2^-level m."""
-    step = round(2.0**-level / QUANTUM)
+    """Moments of voxels twice as large, in the order of their keys, of those with an edge of 2^-level m in any order."""
     above = parents(keys)
-    shift = (split_keys(keys)[1] & 1) * step
-    n, s = sums[:, 0], sums[:, 1:4]
-    moved = np.empty_like(sums)
-    moved[:, 0] = n
-    moved[:, 1:4] = s + n[:, None] * shift
-    for k, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
-        moved[:, 4 + k] = sums[:, 4 + k] + shift[:, a] * s[:, b] + shift[:, b] * s[:, a] + n * shift[:, a] * shift[:, b]
     order = np.argsort(above, kind="stable")
-    above = above[order]
-    first = np.flatnonzero(np.diff(above, prepend=above[0] - 1)) if len(above) else np.empty(0, np.int64)
-    return above[first], np.add.reduceat(moved[order], first) if len(above) else moved
+    count = int(np.count_nonzero(np.diff(above[order]))) + 1 if len(above) else 0
+    coarse, total = np.empty(count, np.int64), np.zeros((count, 10), np.int64)
+    _put_together(keys, sums, above, order, round(2.0**-level / QUANTUM), coarse, total)
+    return coarse, total
 
 
 def _metres(keys: Int64, sums: Int64, level: int) -> Float:
@@ -213,6 +205,31 @@ def find_slot(key: int, keys: Int64, table: Int32) -> int:  # pragma: no cover -
     while table[at] >= 0 and keys[table[at]] != key:
         at = (at + np.uint64(1)) & mask
     return np.int64(at)  # type: ignore[return-value]  # to Numba it is an int
+
+
+@kernel
+def _put_together(
+    keys: Int64, sums: Int64, above: Int64, order: Int64, step: int, coarse: Int64, total: Int64
+) -> None:  # pragma: no cover - compiled
+    """Add the moments of voxels, in the order of those twice as large, up about the corners of these."""
+    at = -1
+    for m in range(order.shape[0]):
+        i = order[m]
+        if at < 0 or coarse[at] != above[i]:
+            at += 1
+            coarse[at] = above[i]
+        n, row, out = sums[i, 0], sums[i], total[at]
+        x, y, z = ((keys[i] >> 34) & 1) * step, ((keys[i] >> 17) & 1) * step, (keys[i] & 1) * step
+        out[0] += n
+        out[1] += row[1] + n * x
+        out[2] += row[2] + n * y
+        out[3] += row[3] + n * z
+        out[4] += row[4] + 2 * x * row[1] + n * x * x
+        out[5] += row[5] + 2 * y * row[2] + n * y * y
+        out[6] += row[6] + 2 * z * row[3] + n * z * z
+        out[7] += row[7] + x * row[2] + y * row[1] + n * x * y
+        out[8] += row[8] + x * row[3] + z * row[1] + n * x * z
+        out[9] += row[9] + y * row[3] + z * row[2] + n * y * z
 
 
 @kernel
