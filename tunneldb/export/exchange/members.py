@@ -13,7 +13,7 @@ import shapely
 from pyproj import CRS
 
 from tunneldb.export.exchange.gpkg import VERSION
-from tunneldb.export.tables.leaks import UNDEFINED_CARTESIAN
+from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
 from tunneldb.structures.results import Face, Member, Spot, Structures
 
 MEMBER = "Faces of one surface, joined over what stands before it; in space"
