@@ -1,6 +1,6 @@
 -- Who may do what. Three group roles without login, to be granted to people:
 --   tunnel_viewer     reads the views of tunnel_api and calls its read-only functions
---   tunnel_inspector  and reviews leaks, moves axis vertices and draws regions, through the views
+--   tunnel_inspector  and reviews leaks and spots, moves axis vertices and draws regions, through the views
 --   tunnel_operator   and loads and processes: owns schema tunnel and what lies in it
 -- Runs last, after every function and view, as the database's owner. Where that may not create roles, it says what a
 -- superuser has to run, and goes on: the owner can do everything without them.
@@ -82,6 +82,8 @@ BEGIN
     GRANT UPDATE (review, remark, kind) ON
         tunnel_api.anomaly, tunnel_api.anomaly_unrolled, tunnel_api.anomaly_map, tunnel_api.anomaly_3d,
         tunnel_api.leak, tunnel_api.leak_unrolled, tunnel_api.leak_map, tunnel_api.leak_3d
+        TO tunnel_inspector;
+    GRANT UPDATE (review, remark) ON tunnel_api.spot, tunnel_api.spot_face, tunnel_api.spot_map, tunnel_api.spot_3d
         TO tunnel_inspector;
     GRANT INSERT, DELETE, UPDATE (kind, geom) ON tunnel_api.region TO tunnel_inspector;
 END

@@ -1,5 +1,5 @@
 -- What may be written through the views, by INSTEAD OF triggers: the position of axis vertices, review, remark and kind of
--- leaks and other anomalies (views/anomaly.sql), and regions drawn by hand. The functions run with the owner's rights, so that who edits
+-- leaks, other anomalies (views/anomaly.sql) and spots of structures (views/structures.sql), and regions drawn by hand. The functions run with the owner's rights, so that who edits
 -- needs no right on schema tunnel, and stamp each row with session_user, which stays the person's own name in them. Each locks
 -- its row and takes only what the person changed: what somebody else did meanwhile stays, and the audit says what truly was.
 -- What both changed, each to something else, is refused to the later one, as a failure of serialization.
@@ -64,24 +64,22 @@ COMMENT ON FUNCTION tunnel_api.edit_axis_vertex() IS 'Trigger of view axis_verte
 CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.axis_vertex
     FOR EACH ROW EXECUTE FUNCTION tunnel_api.edit_axis_vertex();
 
--- Sets the review, the remark and the kind of an anomaly; for the views anomaly, leak and those of one geometry alike.
--- A kind other than the one that was found is noted as judged; the one that was found takes that back.
--- Geometries, whose columns differ between the views, are never written back.
-CREATE OR REPLACE FUNCTION tunnel_api.review_anomaly() RETURNS trigger
+-- Sets the review, the remark and, where there are kinds to choose from, the kind of a finding: TG_ARGV is its table in schema
+-- tunnel, what it is called, and its kinds. For the views of anomalies, leaks and spots alike. A kind other than the one that
+-- was found is noted as judged; the one that was found takes that back. Geometries, whose columns differ between the views, are
+-- never written back.
+CREATE OR REPLACE FUNCTION tunnel_api.review_finding() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
 DECLARE
+    kinds CONSTANT text[] := TG_ARGV[2:];
+    judging CONSTANT boolean := cardinality(kinds) > 0;
+    editable CONSTANT text[] := CASE WHEN judging THEN ARRAY['review', 'remark', 'kind'] ELSE ARRAY['review', 'remark'] END;
+    geometries CONSTANT text[] := ARRAY['unrolled', 'map', 'surface', 'outline', 'geom'];
     was record;
 BEGIN
-    IF (NEW.id, NEW.survey_id, NEW.survey, NEW.km, NEW.segment, NEW.chainage_from, NEW.chainage_to, NEW.label,
-        NEW.arc_from, NEW.arc_to, NEW.clock, NEW.found, NEW.reasons, NEW.confidence, NEW.contrast, NEW.area, NEW.drop_mean,
-        NEW.drop_max, NEW.image_share, NEW.reviewed_by, NEW.reviewed_at, NEW.detected, NEW.counted,
-        NEW.created_at, NEW.detected_at)
-       IS DISTINCT FROM
-       (OLD.id, OLD.survey_id, OLD.survey, OLD.km, OLD.segment, OLD.chainage_from, OLD.chainage_to, OLD.label,
-        OLD.arc_from, OLD.arc_to, OLD.clock, OLD.found, OLD.reasons, OLD.confidence, OLD.contrast, OLD.area, OLD.drop_mean,
-        OLD.drop_max, OLD.image_share, OLD.reviewed_by, OLD.reviewed_at, OLD.detected, OLD.counted,
-        OLD.created_at, OLD.detected_at) THEN
-        RAISE EXCEPTION 'of a leak or another anomaly only the review, the remark and the kind can be edited'
+    IF to_jsonb(NEW) - editable - geometries IS DISTINCT FROM to_jsonb(OLD) - editable - geometries THEN
+        RAISE EXCEPTION 'of % only % can be edited', TG_ARGV[1],
+            CASE WHEN judging THEN 'the review, the remark and the kind' ELSE 'the review and the remark' END
             USING ERRCODE = 'feature_not_supported';
     END IF;
     IF NEW.review IS NULL OR NEW.review NOT IN ('open', 'confirmed', 'rejected') THEN
@@ -89,15 +87,21 @@ BEGIN
             OLD.kind, OLD.id, coalesce(NEW.review, 'empty')
             USING ERRCODE = 'check_violation';
     END IF;
-    IF NEW.kind IS NULL OR NEW.kind NOT IN ('leak', 'joint', 'dark') THEN
-        RAISE EXCEPTION 'the kind of % % can be leak, joint or dark, not %', OLD.kind, OLD.id, coalesce(NEW.kind, 'empty')
+    IF judging AND (NEW.kind IS NULL OR NEW.kind <> ALL (kinds)) THEN
+        RAISE EXCEPTION 'the kind of % % can be %, not %', OLD.kind, OLD.id,
+            array_to_string(kinds[:cardinality(kinds) - 1], ', ') || ' or ' || kinds[cardinality(kinds)],
+            coalesce(NEW.kind, 'empty')
             USING ERRCODE = 'check_violation';
     END IF;
     IF (NEW.review, NEW.remark, NEW.kind) IS NOT DISTINCT FROM (OLD.review, OLD.remark, OLD.kind) THEN
         RETURN NEW;
     END IF;
-    SELECT a.review, a.remark, coalesce(a.judged, a.kind) AS kind INTO was
-      FROM tunnel.anomaly a WHERE a.id = OLD.id FOR UPDATE;
+    IF TG_ARGV[0] = 'spot' THEN
+        SELECT p.review, p.remark, p.kind INTO was FROM tunnel.spot p WHERE p.id = OLD.id FOR UPDATE;
+    ELSE
+        SELECT a.review, a.remark, coalesce(a.judged, a.kind) AS kind INTO was
+          FROM tunnel.anomaly a WHERE a.id = OLD.id FOR UPDATE;
+    END IF;
     IF NOT FOUND THEN
         RETURN NULL;  -- gone meanwhile
     END IF;
@@ -109,23 +113,30 @@ BEGIN
     END IF;
     IF was.review NOT IN (OLD.review, NEW.review) OR was.kind NOT IN (OLD.kind, NEW.kind)
        OR (was.remark IS DISTINCT FROM OLD.remark AND was.remark IS DISTINCT FROM NEW.remark) THEN
-        RAISE EXCEPTION '% % at % was changed meanwhile: it is %, with the kind % and %', OLD.kind, OLD.id, OLD.label,
-            was.review, was.kind, coalesce('the remark ' || quote_literal(was.remark), 'no remark')
+        RAISE EXCEPTION '% % % was changed meanwhile: it is %, with the kind % and %', OLD.kind, OLD.id,
+            coalesce('at ' || OLD.label, 'of a site'), was.review, was.kind,
+            coalesce('the remark ' || quote_literal(was.remark), 'no remark')
             USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
     END IF;
     NEW.reviewed_by := session_user;
     NEW.reviewed_at := clock_timestamp();
-    UPDATE tunnel.anomaly a
-       SET review = NEW.review, remark = NEW.remark, reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at,
-           judged = CASE WHEN NEW.kind = was.kind THEN a.judged ELSE nullif(NEW.kind, a.kind) END
-     WHERE a.id = OLD.id;
-    PERFORM tunnel_api.note_edit(OLD.survey, 'anomaly', OLD.id, to_jsonb(was),
+    IF TG_ARGV[0] = 'spot' THEN
+        UPDATE tunnel.spot p
+           SET review = NEW.review, remark = NEW.remark, reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at
+         WHERE p.id = OLD.id;
+    ELSE
+        UPDATE tunnel.anomaly a
+           SET review = NEW.review, remark = NEW.remark, reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at,
+               judged = CASE WHEN NEW.kind = was.kind THEN a.judged ELSE nullif(NEW.kind, a.kind) END
+         WHERE a.id = OLD.id;
+    END IF;
+    PERFORM tunnel_api.note_edit(OLD.survey, TG_ARGV[0], OLD.id, to_jsonb(was),
                                  jsonb_build_object('review', NEW.review, 'remark', NEW.remark, 'kind', NEW.kind));
     RETURN NEW;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.review_anomaly() IS
-    'Trigger of the views of anomalies and leaks: sets review, remark and kind and notes who and when';
+COMMENT ON FUNCTION tunnel_api.review_finding() IS
+    'Trigger of the views of anomalies, leaks and spots: sets review, remark and kind and notes who and when';
 
 DO $$
 DECLARE
@@ -133,8 +144,12 @@ DECLARE
 BEGIN
     FOREACH name IN ARRAY ARRAY['anomaly', 'anomaly_unrolled', 'anomaly_map', 'anomaly_3d',
                                 'leak', 'leak_unrolled', 'leak_map', 'leak_3d'] LOOP
-        EXECUTE format('CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.%I
-                            FOR EACH ROW EXECUTE FUNCTION tunnel_api.review_anomaly()', name);
+        EXECUTE format('CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.%I FOR EACH ROW EXECUTE FUNCTION'
+                       ' tunnel_api.review_finding(''anomaly'', ''a leak or another anomaly'', ''leak'', ''joint'', ''dark'')', name);
+    END LOOP;
+    FOREACH name IN ARRAY ARRAY['spot', 'spot_face', 'spot_map', 'spot_3d'] LOOP
+        EXECUTE format('CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.%I FOR EACH ROW EXECUTE FUNCTION'
+                       ' tunnel_api.review_finding(''spot'', ''a spot'')', name);
     END LOOP;
 END
 $$;

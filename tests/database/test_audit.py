@@ -243,7 +243,7 @@ def test_no_role_touches_the_audit(person: psycopg.Connection) -> None:
         "ALTER TABLE tunnel_audit.entry OWNER TO tunnel_operator",
         "DROP TRIGGER edit ON tunnel_api.leak",
         "CREATE OR REPLACE VIEW tunnel_api.audit AS SELECT 1 AS id",
-        "ALTER FUNCTION tunnel_api.review_anomaly() RENAME TO unwatched",
+        "ALTER FUNCTION tunnel_api.review_finding() RENAME TO unwatched",
         "SET SESSION AUTHORIZATION postgres",
     ):
         with pytest.raises(psycopg.errors.InsufficientPrivilege):

@@ -231,7 +231,7 @@ def test_operator_forges_no_entry_of_the_audit(person: psycopg.Connection, conn:
     install(conn, STAGES)  # once more, over what was granted before
     conn.commit()
     person.execute("CREATE TEMP VIEW mine AS SELECT * FROM tunnel_api.leak")
-    for function in ("review_anomaly", "edit_axis_vertex", "edit_region"):
+    for function in ("review_finding", "edit_axis_vertex", "edit_region"):
         refused(person, f"CREATE TRIGGER edit INSTEAD OF UPDATE ON mine FOR EACH ROW EXECUTE FUNCTION tunnel_api.{function}()")
     with pytest.raises(psycopg.errors.InsufficientPrivilege, match="permission denied for function note_edit"):
         person.execute("SELECT tunnel_api.note_edit('demo-2024', 'anomaly', 1, '{}', '{\"review\": \"confirmed\"}')")

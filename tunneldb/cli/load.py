@@ -85,18 +85,26 @@ def load(
 
     Noise is dropped, the rest thinned to the survey's density and stored in the order of chainage. A file that is
     loaded already is left alone; a file of the same name with other content takes its place.
+
+    Files of a site are looked through and recorded; their points stay where they are.
     """
     from tunneldb.pipeline.load import load_files
+    from tunneldb.pipeline.site_files import register_files
     from tunneldb.pointcloud.selection import FilterSettings
 
     chosen = FilterSettings(density_of(density), noise_points, noise_diameter, max_distance, max_left_out / 100.0)
     done: list[Loaded] = []
     tell(survey=survey, files=done)
     with connect(settings.dsn) as connection:
-        found = get_survey(connection, survey)
+        found = get_survey(connection, survey, site=True)
         try:
             with bar("points") as progress:
-                for file in load_files(connection, found, files, chosen, step(progress)):
+                loaded = (
+                    register_files(connection, found, files, chosen.max_left_out, step(progress))
+                    if found.site
+                    else load_files(connection, found, files, chosen, step(progress))
+                )
+                for file in loaded:
                     done.append(file)  # noqa: PERF402 - those before a failure are in the summary too
         finally:
             if done:

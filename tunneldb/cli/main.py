@@ -38,10 +38,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "stop": ("tunneldb.cli.worker:stop", "Ask all workers to end what they are at and leave."),
     "leaks": ("tunneldb.cli.leaks:leaks", "List or export the leaks that were found."),
     "evaluate": ("tunneldb.cli.evaluate:evaluate", "Hold the leaks that were found against true ones."),
-    "members": (
-        "tunneldb.cli.members:members",
-        "Find the members of a structure in a scan file, and what differs from its own surface.",
-    ),
+    "members": ("tunneldb.cli.members:members", "Find the members of structures, and what differs from its own surface."),
+    "spots": ("tunneldb.cli.spots:spots", "List or export what on members differs from their own surface."),
     "spheres": ("tunneldb.cli.spheres:spheres", "Find target spheres, and compare them with control points."),
     "axis": ("tunneldb.cli.axis:axis", "Show how far the measured axis lies from the one given, by element of its design."),
     "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, cast, get_args
 
 import click
 
+from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
+from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import told_to_end
 from tunneldb.radiometry.correction import Kind
+from tunneldb.store.survey import get_survey
 
 if TYPE_CHECKING:
     from tunneldb.pipeline.members import FileMembers
@@ -25,9 +28,10 @@ _MOST = 20  # rows of a table that are printed
     examples=[
         "tunneldb members plant.laz --stations stations.csv --intensity Amplitude --intensity-kind amplitude -o out.laz",
         "tunneldb members plant.laz --stations stations.csv --intensity Reflectance --intensity-kind reflectance -o out.gpkg",
+        "tunneldb members hall-2024",
     ]
 )
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("survey", metavar="SURVEY|FILE")
 @click.option(
     "--stations",
     multiple=True,
@@ -43,7 +47,54 @@ _MOST = 20  # rows of a table that are printed
     help="Curve of a reference target by which range is corrected; auto finds one from the faces.",
 )
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write: .laz or .gpkg; not FILE.")
+@click.pass_obj
 def members(
+    settings: Settings,
+    survey: str,
+    stations: tuple[Path, ...],
+    intensity: str | None,
+    intensity_kind: str | None,
+    reference: str | None,
+    output: Path | None,
+) -> None:
+    """Find the members of a structure in the files of SURVEY or in a scan FILE, and what differs from its own surface there.
+
+    Planes and cylinders are found as faces, faces that something before them parts are joined into members, and what is dark
+    or bright against its own surface is a spot: rust, stains, cracks, flakes; the name is the inspector's to give. A .laz has
+    the input's points with the dimensions face, member and anomaly (0: none), a .gpkg polygons in the layers member, face and
+    spot; a FILE by itself needs no database. Of a SURVEY, of a site or of a tunnel, all are kept in the database in place of
+    what was found before: tunneldb spots lists them, views tunnel_api.member, face and spot have them. A spot that is found
+    again keeps its number and its review.
+    """
+    from tunneldb.pointcloud.formats.table import scan_suffixes
+
+    if survey.lower().endswith(scan_suffixes()):
+        _of_file(Path(survey), stations, intensity, intensity_kind, reference, output)
+        return
+    if stations or output is not None or {intensity, intensity_kind, reference} != {None}:
+        raise UserError(f"these options are for a scan file by itself; the survey {survey} has its own: tunneldb survey set")
+    _of_survey(settings, survey)
+
+
+def _of_survey(settings: Settings, name: str) -> None:
+    from tunneldb.pipeline.survey_members import find_survey_members
+
+    with connect(settings.dsn) as conn:
+        survey = get_survey(conn, name, site=True)
+        conn.rollback()
+        with bar("points") as progress:
+            done = find_survey_members(conn, survey, step(progress))
+    _tell(done.members, None)
+    tell(survey=name, new=done.spots.new, again=done.spots.again, kept=done.spots.kept, gone=done.spots.gone)
+    _print(done.members)
+    if done.spots.again or done.spots.kept or done.spots.gone:
+        click.echo(
+            f"{done.spots.again} of the spots were known, {done.spots.new} are new; of earlier ones {done.spots.gone} are gone,"
+            f" and {done.spots.kept} not found again are kept for their review"
+        )
+
+
+def _of_file(
     file: Path,
     stations: tuple[Path, ...],
     intensity: str | None,
@@ -51,13 +102,6 @@ def members(
     reference: str | None,
     output: Path | None,
 ) -> None:
-    """Find the members of a structure in the scan FILE, and what on them differs from its own surface.
-
-    Planes and cylinders are found as faces, faces that something before them parts are joined into members, and what is dark
-    or bright against its own surface is a spot: rust, stains, cracks, flakes; the name is the inspector's to give. A .laz has
-    the input's points with the dimensions face, member and anomaly (0: none), a .gpkg polygons in the layers member, face and
-    spot. Needs no database.
-    """
     from tunneldb.export.pointcloud.members import check_target, export_members
     from tunneldb.pipeline.members import Inputs, stations_for
 
@@ -67,7 +111,7 @@ def members(
         raise UserError(f"{file}: say what {intensity} is: --intensity-kind {'|'.join(get_args(Kind))}")
     if output is not None:
         check_target(file, output)
-    inputs = Inputs(file, intensity, cast(Kind, intensity_kind), stations_for(file, list(stations)), _reference(reference))
+    inputs = Inputs((file,), intensity, cast(Kind, intensity_kind), stations_for(file, list(stations)), _reference(reference))
     with told_to_end(), bar("points") as progress:
         found = export_members(inputs, output, step(progress))
     _tell(found, output)

@@ -54,7 +54,7 @@ def status(settings: Settings, survey: str | None, watch: bool, interval: float)
         if survey is None:
             _all(connection)
             return
-        get_survey(connection, survey)
+        get_survey(connection, survey, site=True)
         if not watch:
             _one(connection, survey)
             return
@@ -114,7 +114,7 @@ def _one(connection: psycopg.Connection[Any], survey: str) -> None:
             console = Console(width=1000)  # a pipe has no width: let nothing be cut there
         click.echo()
         console.print(render(seen))
-    remarks = read_remarks(connection, get_survey(connection, survey))
+    remarks = read_remarks(connection, get_survey(connection, survey, site=True))
     tell(remarks=remarks)
     if remarks:
         click.echo()

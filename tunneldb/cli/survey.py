@@ -192,11 +192,18 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
     a batch could not read is taken off its list. If it is cut off, call it again.
     """
     from tunneldb.pipeline.remove import known_names, remove_files, work_at_stake
+    from tunneldb.pipeline.site_files import remove_site_files
 
     names = list(dict.fromkeys(path.name for path in files))
     with connect(settings.dsn) as connection:
-        found = get_survey(connection, name)
+        found = get_survey(connection, name, site=True)
         known_names(connection, found, names)
+        if found.site:
+            connection.rollback()
+            remove_site_files(connection, found, names)
+            tell(survey=name, files=names)
+            click.echo(f"{name}: removed {', '.join(names)}; find its members anew: tunneldb members {name}", err=True)
+            return
         emptied, work = work_at_stake(connection, found, names)
         connection.rollback()
         if (work.reviewed or work.edited) and not yes:
@@ -266,7 +273,7 @@ def remove(settings: Settings, name: str, yes: bool) -> None:
     from tunneldb.store.catalog import remove_survey
 
     with connect(settings.dsn) as connection:
-        found = get_survey(connection, name)
+        found = get_survey(connection, name, site=True)
         row = connection.execute(
             """
             SELECT (SELECT coalesce(sum(kept), 0) FROM tunnel.scan_file WHERE survey_id = %(id)s),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -34,6 +34,7 @@ def tunnel() -> None:
         "tunneldb tunnel add ringo --srid 3794 --axis auto ringo.laz",
         "tunneldb tunnel add ringo --srid 3794 --axis drawn.gpkg --axis-layer axis --reverse ringo.laz",
         "tunneldb tunnel add ringo --srid 3794 --axis ringo.xml --alignment Mainline",
+        "tunneldb tunnel add hall --srid 25829 --site",
     ]
 )
 @click.argument("name")
@@ -42,10 +43,10 @@ def tunnel() -> None:
 @click.option(
     "--axis",
     metavar="FILE|auto",
-    required=True,
     help="Design alignment (LandXML, IFC 4.3); lines of a drawing or a map (DXF, GeoPackage, Shapefile, GeoJSON, FlatGeobuf); "
     "CSV with a header x,y,z, or a trajectory: points of the axis in growing chainage; or auto: found in the SCAN files.",
 )
+@click.option("--site", is_flag=True, help="It has no axis: a bridge, a hall, a plant, of which structures are to be found.")
 @click.option("--axis-layer", metavar="NAME", help="Which layer of a drawing or a map, if several hold lines.")
 @click.option(
     "--axis-unit",
@@ -88,7 +89,8 @@ def add(
     name: str,
     scans: tuple[Path, ...],
     srid: int,
-    axis: str,
+    axis: str | None,
+    site: bool,
     axis_layer: str | None,
     axis_unit: str | None,
     alignment: str | None,
@@ -99,7 +101,7 @@ def add(
     equations: Path | None,
     axis_out: Path | None,
 ) -> None:
-    """Add the tunnel NAME with its given axis.
+    """Add the tunnel NAME with its given axis, or with --site a structure that has none.
 
     Of a design alignment the elements (lines, arcs, clothoids; grades, parabolas, circles) and the stationing are kept, and
     the axis follows them to a millimetre. Lengths in feet are turned into metres when the file says that they are feet.
@@ -113,6 +115,12 @@ def add(
     from tunneldb.store.alignment import read_equations, save_equations
     from tunneldb.store.catalog import add_tunnel, get_tunnel, require_new_tunnel
 
+    if (axis is None) != site:
+        raise UserError("give a tunnel its --axis; or say --site, if it has none")
+    if axis is None:
+        about_axis = {axis_layer, axis_unit, alignment, profile, start_chainage, equations, axis_out, *scans}
+        _add_site(settings, name, srid, about_axis)
+        return
     own = read_equations(equations) if equations else None
     found = None
     with connect(settings.dsn) as connection:
@@ -163,6 +171,18 @@ def add(
         click.echo(f"{given.source}: {plan} elements in plan, {profiles} in profile", err=True)
     for note in given.notes:
         click.echo(f"{axis}: {note}", err=True)
+
+
+def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None:
+    """Add a site; nothing that is about an axis may be given."""
+    from tunneldb.store.catalog import add_site
+
+    if given - {None}:
+        raise UserError("a --site has no axis: what is about one can't be given with it")
+    with connect(settings.dsn) as connection:
+        add_site(connection, name, srid)
+    tell(tunnel=name, srid=srid, site=True)
+    click.echo(f"{name}: a site, without an axis", err=True)
 
 
 @tunnel.command("find-axis", examples=["tunneldb tunnel find-axis ringo.laz -o ringo.axis.csv"])

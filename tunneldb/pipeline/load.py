@@ -14,12 +14,11 @@ import psycopg
 from psycopg.types.json import Jsonb
 
 from tunneldb.arrays import Float
-from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import parameters_of, require_same_density, settings_of
-from tunneldb.pipeline.read import Begin, Counts, Reading, silent
-from tunneldb.pointcloud.reader import ScanHeader, crs_note, read_header
+from tunneldb.pipeline.read import Begin, Counts, Reading, read_headers, silent
+from tunneldb.pointcloud.reader import ScanHeader, crs_note
 from tunneldb.pointcloud.second_tube import find_second_tubes
 from tunneldb.pointcloud.selection import MEMORY, FilterSettings
 from tunneldb.pointcloud.spool import Spool
@@ -217,7 +216,9 @@ def load_files(
     require_same_density(conn, survey, settings)
     reading = Reading.of(conn, survey, settings, memory)
     conn.rollback()
-    headers = _headers(reading, paths)
+    headers = read_headers(paths)
+    for header in headers:
+        reading.check(header)
     notes = {header.path.name: crs_note(header, survey.srid) for header in headers}
     for batch in _batches(headers, reading.alignment, settings.max_distance):
         recorded = recorded_files(conn, survey)
@@ -230,18 +231,6 @@ def load_files(
             for loaded in _load_batch(reading, changed, paths, begin):
                 said = "; ".join(filter(None, (notes.get(loaded.name), loaded.note)))
                 yield replace(loaded, note=said or None)
-
-
-def _headers(reading: Reading, paths: Sequence[Path]) -> list[ScanHeader]:
-    names: dict[str, Path] = {}
-    for path in paths:
-        if path.name in names:
-            raise UserError(f"{path} and {names[path.name]} have the same name: a survey's files are known by their names")
-        names[path.name] = path
-    headers = [read_header(path) for path in paths]
-    for header in headers:
-        reading.check(header)
-    return headers
 
 
 def _batches(headers: Sequence[ScanHeader], alignment: Alignment, reach: float) -> Iterator[list[ScanHeader]]:

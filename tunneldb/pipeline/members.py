@@ -1,10 +1,11 @@
-"""Members, faces and spots of a scan file by itself, in three passes over its points."""
+"""Members, faces and spots of scan files, in three passes over their points."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +56,8 @@ class Inputs:
 
     Attributes
     ----------
-    path : Path
+    paths : tuple of Path
+        Scan files, of one coordinate system and one numbering of scans.
     dimension : str
         That holds the intensity.
     kind : {'amplitude', 'reflectance', 'linear'}
@@ -65,16 +67,21 @@ class Inputs:
         By what levels are corrected for range.
     """
 
-    path: Path
+    paths: tuple[Path, ...]
     dimension: str
     kind: Kind
     poses: PoseModel
     reference: ReferenceCurve | str | None
 
+    @property
+    def name(self) -> str:
+        """What errors about all of them name."""
+        return str(self.paths[0]) if len(self.paths) == 1 else f"{self.paths[0]} and {len(self.paths) - 1} more files"
+
 
 @dataclass(frozen=True)
 class FileMembers:
-    """What is found in a file.
+    """What is found in files.
 
     Attributes
     ----------
@@ -98,7 +105,7 @@ class FileMembers:
 
 
 def find_members(inputs: Inputs, begin: Begin) -> FileMembers:
-    """Find the members of a scan file, their faces and spots.
+    """Find the members of scan files, their faces and spots.
 
     Memory grows with the surface that was scanned, not with the points.
 
@@ -113,22 +120,16 @@ def find_members(inputs: Inputs, begin: Begin) -> FileMembers:
     UserError
         If the file cannot be read, is in degrees, has no usable intensity, or scans without a position.
     """
-    path = inputs.path
-    header = read_header(path)
-    if header.crs is not None and header.crs.is_geographic:
-        raise UserError(
-            f"{path}: its coordinates are degrees, {describe_crs(header.crs)}, and a structure is measured in metres;"
-            " transform the file into a projected system"
-        )
-    require_dimension(path, inputs.dimension, header.dimensions, "--intensity")
+    headers = [_usable(path, inputs.dimension) for path in inputs.paths]
+    total = sum(header.points for header in headers)
     values = _Values(inputs)
-    moments = VoxelMoments(_middle(inputs.poses.station, header))
-    for points, scan in _read(inputs, values, begin("points", header.points)):
+    moments = VoxelMoments(_middle(inputs.poses.station, headers))
+    for points, scan in _read(inputs, values, begin("points", total)):
         moments.add(points.xyz, scan)
     values.require()
     if not len(moments):
         raise UserError(
-            f"{path}: all points lie more than {REACH:g} m from the middle of the scanner positions, which is"
+            f"{inputs.name}: all points lie more than {REACH:g} m from the middle of the scanner positions, which is"
             f" {_place(moments.origin)}: are they in the file's coordinates?"
         )
     begin("faces", None)
@@ -136,7 +137,7 @@ def find_members(inputs: Inputs, begin: Begin) -> FileMembers:
     segmentation = find_faces(moments, inputs.poses.station)
     del moments
     sums, images = Sums.empty(segmentation.layout.size), RangeImages(segmentation.stations)
-    progress = begin("intensity", header.points)
+    progress = begin("intensity", total)
     for points, scan in _read(inputs, None, progress):
         level = to_decibel(points.intensity, inputs.kind).astype(np.float32)
         segmentation.finder.add(points.xyz, scan, level, sums)
@@ -150,8 +151,20 @@ def find_members(inputs: Inputs, begin: Begin) -> FileMembers:
     )
 
 
+def _usable(path: Path, dimension: str) -> ScanHeader:
+    """Header of a file, if it says that the file can be used."""
+    header = read_header(path)
+    if header.crs is not None and header.crs.is_geographic:
+        raise UserError(
+            f"{path}: its coordinates are degrees, {describe_crs(header.crs)}, and a structure is measured in metres;"
+            " transform the file into a projected system"
+        )
+    require_dimension(path, dimension, header.dimensions, "--intensity")
+    return header
+
+
 def numbers_of_points(inputs: Inputs, members: FileMembers) -> Iterator[tuple[UInt32, UInt32, UInt32]]:
-    """Face, member and spot of all points, in the order of the file, chunk by chunk; 0 is none."""
+    """Face, member and spot of all points, in the order of the files, chunk by chunk; 0 is none."""
     finder, found = members.segmentation.finder, members.found
     for points, scan, use in _read_all(inputs, lambda count: None):
         out = np.zeros((3, len(points)), np.uint32)
@@ -211,7 +224,7 @@ class _Values:
 
     def require(self) -> None:
         """Raise a UserError where there is nothing to be told by the values."""
-        what = f"{self.inputs.path}: {self.inputs.dimension}"
+        what = f"{self.inputs.name}: {self.inputs.dimension}"
         if not np.isfinite(self.most):
             raise UserError(f"{what}: no value is a number, so nothing can be told by it; choose another --intensity")
         if self.least == self.most:
@@ -237,13 +250,14 @@ def _read(inputs: Inputs, values: _Values | None, progress: Callable[[float], No
 
 def _refuse_unknown(inputs: Inputs, points: Points, values: _Values) -> None:
     if values.unknown > max(UNKNOWN * values.count, 1000):
-        raise UserError(f"{inputs.path}: {inputs.poses.faults(points).text() or 'points without a scanner position'}")
+        raise UserError(f"{inputs.name}: {inputs.poses.faults(points).text() or 'points without a scanner position'}")
 
 
 def _read_all(inputs: Inputs, progress: Callable[[float], None]) -> Iterator[tuple[Points, Int32, Int64]]:
     """All points, the place of their scan among the stations, and which of them have one."""
     ids = inputs.poses.scan_id
-    with closing(prefetch(read_chunks(inputs.path, inputs.dimension))) as chunks:
+    files = chain.from_iterable(read_chunks(path, inputs.dimension) for path in inputs.paths)
+    with closing(prefetch(files)) as chunks:
         for points in chunks:
             scan = np.minimum(np.searchsorted(ids, points.scan_id), len(ids) - 1).astype(np.int32)
             yield points, scan, np.flatnonzero(ids[scan] == points.scan_id)
@@ -286,9 +300,11 @@ def _samples(segmentation: Segmentation, sums: Sums) -> IntensitySamples:
     )
 
 
-def _middle(stations: Float, header: ScanHeader) -> Float:
+def _middle(stations: Float, headers: Sequence[ScanHeader]) -> Float:
     """Middle of the scanner positions near the box of the points: a list may hold those of other files, too."""
-    aside = np.maximum(header.low - stations, stations - header.high).max(axis=1)
+    low = np.min([header.low for header in headers], axis=0)
+    high = np.max([header.high for header in headers], axis=0)
+    aside = np.maximum(low - stations, stations - high).max(axis=1)
     near = stations[aside < REACH]
     return np.asarray((near if len(near) else stations).mean(axis=0))
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import psycopg
 
+from tunneldb.arrays import Single
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
@@ -101,6 +102,35 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
         "kilometres": row[5],
         **({"note": note} if note else {}),
     }
+
+
+def read_headers(paths: Sequence[Path]) -> list[ScanHeader]:
+    """Read the headers of scan files, none of which may have the name of another.
+
+    Raises
+    ------
+    UserError
+        For a file that is unreadable, or two of one name.
+    """
+    names: dict[str, Path] = {}
+    for path in paths:
+        if path.name in names:
+            raise UserError(f"{path} and {names[path.name]} have the same name: a survey's files are known by their names")
+        names[path.name] = path
+    return [read_header(path) for path in paths]
+
+
+def require_kind(survey: Survey, path: Path, sample: Single) -> None:
+    """Refuse a file a sample of whose intensity cannot be of the kind that the survey was declared to have."""
+    kind = survey.intensity_kind
+    if kind == "none" or len(sample) < FEWEST_INTENSITIES:
+        return
+    reason = contradiction(kind, sample)
+    if reason is not None:
+        raise UserError(
+            f"{path}: {survey.intensity_dimension} is no intensity of kind {kind}: {reason}"
+            f" (tunneldb inspect {path.name}; tunneldb survey set {survey.name} --intensity-kind KIND)"
+        )
 
 
 @dataclass(frozen=True)
@@ -255,20 +285,8 @@ class Reading:
             counts = filter_file(
                 header.path, dimension, self.alignment, self.poses, self.settings, survivors, 0, progress, self.memory
             )
-            self._require_kind(header.path, counts)
+            require_kind(self.survey, header.path, counts.intensity_sample)
             return counts, digest.result()
-
-    def _require_kind(self, path: Path, counts: FilterCounts) -> None:
-        """Refuse a file whose intensity cannot be of the kind that the survey was declared to have."""
-        kind = self.survey.intensity_kind
-        if kind == "none" or len(counts.intensity_sample) < FEWEST_INTENSITIES:
-            return
-        reason = contradiction(kind, counts.intensity_sample)
-        if reason is not None:
-            raise UserError(
-                f"{path}: {self.survey.intensity_dimension} is no intensity of kind {kind}: {reason}"
-                f" (tunneldb inspect {path.name}; tunneldb survey set {self.survey.name} --intensity-kind KIND)"
-            )
 
     def leave(self, former: Recorded) -> list[int]:
         """Drop what waits of a file's former content; returns the kilometres that may hold rows of it."""

@@ -86,7 +86,7 @@ class FilterCounts:
         Points read; without a finite coordinate, or a finite time or intensity that is needed; beyond the ends of the axis or
         too far from it; of unknown scanner position; noise; kept after thinning.
     chainage : (float, float)
-        Least and greatest chainage of the points kept, m.
+        Least and greatest chainage of the points kept, m; infinite while there is none.
     extent : (6,) float64 array
         Least and greatest x, y, z of the points kept: x0, y0, z0, x1, y1, z1, m.
     intensities : list of float32 arrays

@@ -77,6 +77,21 @@ def add_tunnel(
     return alignment
 
 
+def add_site(connection: psycopg.Connection[Any], name: str, srid: int) -> None:
+    """Add a site: a structure without an axis.
+
+    Raises
+    ------
+    UserError
+        For a name that is taken, or an SRID that is unknown or not in metres.
+    """
+    require_new_tunnel(connection, name, srid)
+    try:
+        connection.execute("INSERT INTO tunnel.tunnel (name, srid) VALUES (%s, %s)", [name, srid])
+    except psycopg.errors.UniqueViolation:
+        raise _taken(name) from None
+
+
 def require_new_tunnel(connection: psycopg.Connection[Any], name: str, srid: int) -> None:
     """Raise UserError for a tunnel's name that is taken or won't do, or an SRID that is unknown or not in metres."""
     _require_name(name)
@@ -143,6 +158,8 @@ def add_survey(
         require_no_range(intensity.kind)
     if reference == "auto":
         require_range(intensity.kind)
+    if alignment is None and poses is None:
+        raise UserError("structures are judged by range and incidence, from scanner positions: --no-poses is not for a site")
     curve = read_reference(reference) if isinstance(reference, Path) else None
     try:
         row = connection.execute(
@@ -263,14 +280,16 @@ def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyCha
     return notes, reload
 
 
-def _alignment(connection: psycopg.Connection[Any], tunnel: str) -> tuple[int, int, Alignment]:
-    """Return a tunnel's key, SRID and given axis."""
+def _alignment(connection: psycopg.Connection[Any], tunnel: str) -> tuple[int, int, Alignment | None]:
+    """Return a tunnel's key, SRID and given axis; a site has none."""
     row = connection.execute(
         "SELECT id, srid, start_chainage, spacing, ST_AsBinary(alignment) FROM tunnel.tunnel WHERE name = %s", [tunnel]
     ).fetchone()
     if row is None:
         raise _unknown(connection, tunnel)
     key, srid, start, spacing, wkb = row
+    if wkb is None:
+        return key, srid, None
     xyz = shapely.get_coordinates(shapely.from_wkb(wkb), include_z=True)
     return key, srid, Alignment.from_polyline(xyz, start, spacing)
 

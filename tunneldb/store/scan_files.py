@@ -122,6 +122,7 @@ def outcome(conn: psycopg.Connection[Any], file_id: int, state: str, seconds: fl
 def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content) -> int:
     """Enter a file, in the place of one of the same name, with none of its points loaded yet; returns its id."""
     counts = content.counts
+    chainage = counts.chainage if counts.kept else (None, None)
     row = conn.execute(
         """
         INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, invalid, unposed,
@@ -147,7 +148,7 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
             counts.invalid,
             counts.unposed,
             counts.thinned,
-            *counts.chainage,
+            *chainage,
             counts.extent.tolist(),
             content.srid,
         ],

@@ -53,7 +53,7 @@ class Positions:
 
 
 def read_positions(
-    paths: Sequence[Path] | None, alignment: Alignment, tunnel: str, *, mobile: bool, backwards: bool
+    paths: Sequence[Path] | None, alignment: Alignment | None, tunnel: str, *, mobile: bool, backwards: bool
 ) -> Positions:
     """Read the scanner's positions, and leave out poses of a trajectory that cannot be.
 
@@ -63,7 +63,7 @@ def read_positions(
         The one CSV of the trajectory (time,x,y,z) when `mobile`, else the files of the stations, see
         `tunneldb.pointcloud.stations.read_stations`; None where nobody knows where the scanner was: there are none then.
     alignment, tunnel
-        The given axis, and the tunnel's name, for errors.
+        The given axis, None of a site, of which it is not asked where they lie; and the tunnel's name, for errors.
     backwards
         Whether the trajectory was driven towards falling chainage.
 
@@ -76,6 +76,8 @@ def read_positions(
         return Positions(False, np.empty(0, np.int32), np.empty((0, 3)))
     if not mobile:
         stations = read_stations(paths)
+        if alignment is None:
+            return Positions(False, stations.scan_id, stations.xyz)
         _require_near(paths, stations.xyz, alignment, tunnel)
         far = far_from_axis(stations.xyz, alignment)
         if far.any():
@@ -89,6 +91,8 @@ def read_positions(
         return Positions(False, stations.scan_id, stations.xyz)
     table = _read_trajectory(paths[0])
     time, xyz = table["time"], table.columns(XYZ)
+    if alignment is None:
+        raise UserError(f"{tunnel!r} is a site; it takes the --stations of a static scanner")
     _require_near(paths, xyz, alignment, tunnel)
     far = far_from_axis(xyz, alignment)
     wild = (far > 0.0) | jumps(time, xyz)

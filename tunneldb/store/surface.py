@@ -14,7 +14,7 @@ from tunneldb.store.survey import Survey
 
 
 def load_alignment(conn: psycopg.Connection[Any], survey: Survey) -> Alignment:
-    """Given axis of a survey's tunnel."""
+    """Given axis of a survey's tunnel, which is no site."""
     vertices = conn.execute(
         "SELECT ST_X(d.geom), ST_Y(d.geom), ST_Z(d.geom)"
         " FROM tunnel.tunnel t, ST_DumpPoints(t.alignment) d WHERE t.id = %s ORDER BY d.path",

@@ -30,6 +30,8 @@ class Survey:
         Key and name of its tunnel.
     srid
         Spatial reference of the tunnel, projected, metres.
+    site
+        Whether it is of a site, which has no axis, and so no chainage, sections or unrolled lining.
     start_chainage
         Chainage of the given axis's first vertex, m.
     spacing
@@ -51,6 +53,7 @@ class Survey:
     tunnel_id: int
     tunnel: str
     srid: int
+    site: bool
     start_chainage: float
     spacing: float
     date: dt.date
@@ -65,19 +68,24 @@ class Survey:
         return UNPOSED if self.platform == "unknown" and self.intensity_kind != "none" else None
 
 
-def get_survey(conn: psycopg.Connection[Any], name: str) -> Survey:
+def get_survey(conn: psycopg.Connection[Any], name: str, *, site: bool = False) -> Survey:
     """Return the survey of that name.
+
+    Parameters
+    ----------
+    site
+        Whether it may be of a site; else the survey of one is refused, as what is asked for needs an axis.
 
     Raises
     ------
     UserError
-        When there is none; the message lists those that exist.
+        When there is none, the message lists those that exist; or when it is of a site and may not be.
     """
     with conn.cursor(row_factory=class_row(Survey)) as cursor:
         survey = cursor.execute(
             """
-            SELECT s.id, s.name, s.tunnel_id, t.name AS tunnel, t.srid, t.start_chainage, t.spacing,
-                   s.date, s.intensity_dimension, s.intensity_kind, s.platform, s.reference
+            SELECT s.id, s.name, s.tunnel_id, t.name AS tunnel, t.srid, t.alignment IS NULL AS site, t.start_chainage,
+                   t.spacing, s.date, s.intensity_dimension, s.intensity_kind, s.platform, s.reference
               FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
              WHERE s.name = %s
             """,
@@ -87,4 +95,9 @@ def get_survey(conn: psycopg.Connection[Any], name: str) -> Survey:
         known = [row[0] for row in conn.execute("SELECT name FROM tunnel.survey ORDER BY name")]
         there = f"the database has {', '.join(known)}" if known else "the database has none: tunneldb survey add"
         raise UserError(f"there is no survey {name!r}; {there}")
+    if survey.site and not site:
+        raise UserError(
+            f"survey {name} is of the site {survey.tunnel!r}, which has no axis, and this needs one; structures are found"
+            f" without: tunneldb members {name}"
+        )
     return survey

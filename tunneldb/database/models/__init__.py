@@ -10,6 +10,7 @@ from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
 from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
 from tunneldb.database.models.ground import Cluster, Ground, Lining, TargetSphere
 from tunneldb.database.models.leak import Anomaly, AnomalyPart, Coverage, Image, Radiometry, RangeCurve, Region, Waterproof
+from tunneldb.database.models.structures import Face, Member, Spot
 from tunneldb.database.models.work import Audit, Goal, Run, Stage, Worker
 
 __all__ = [
@@ -23,12 +24,14 @@ __all__ = [
     "Base",
     "Cluster",
     "Coverage",
+    "Face",
     "FileKm",
     "Goal",
     "Ground",
     "Image",
     "Incoming",
     "Lining",
+    "Member",
     "Point",
     "Pose",
     "Radiometry",
@@ -40,6 +43,7 @@ __all__ = [
     "Section",
     "SectionClass",
     "Segment",
+    "Spot",
     "Stage",
     "Station",
     "StationEquation",

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from geoalchemy2 import Geometry
 from sqlalchemy import REAL, CheckConstraint, DateTime, Double, ForeignKey, Integer, LargeBinary, MetaData, Text, text
 from sqlalchemy.dialects.postgresql import ARRAY, JSONB
-from sqlalchemy.orm import DeclarativeBase, mapped_column
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 SCHEMA = "tunnel"
 AUDIT_SCHEMA = "tunnel_audit"
@@ -61,3 +61,15 @@ SURVEY = "Survey that the row belongs to"
 KM = "Kilometre: floor(chainage / 1000)"
 NOW = text("now()")
 CLOCK = text("clock_timestamp()")
+
+
+class Review:
+    """What an inspector says of a finding, and whether the last detection found it; a mixin of tables of findings."""
+
+    review: Mapped[str] = mapped_column(server_default=text("'open'"), comment="open, confirmed or rejected, by an inspector")
+    reviewed_by: Mapped[str | None] = mapped_column(comment="Who reviewed it")
+    reviewed_at: Mapped[dt.datetime | None] = mapped_column(comment="When it was reviewed")
+    remark: Mapped[str | None] = mapped_column(comment="Inspector's remark")
+    detected: Mapped[bool] = mapped_column(server_default=text("true"), comment="Whether the last detection found it again")
+    created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was first found")
+    detected_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was last found")

@@ -12,7 +12,7 @@ from tunneldb.database.models.base import NOW, SURVEY, TUNNEL, Base, geometry, o
 
 
 class Tunnel(Base):
-    """A structure with its given axis."""
+    """A structure with its given axis; a site has none."""
 
     __tablename__ = "tunnel"
     __table_args__ = (
@@ -29,8 +29,9 @@ class Tunnel(Base):
     spacing: Mapped[float] = mapped_column(
         server_default=text("10"), comment="Distance between vertices of the averaged axis, m of chainage"
     )
-    alignment: Mapped[WKBElement] = mapped_column(
-        geometry("LINESTRINGZ"), comment="Axis as given, in growing chainage, in the tunnel's SRID"
+    alignment: Mapped[WKBElement | None] = mapped_column(
+        geometry("LINESTRINGZ"),
+        comment="Axis as given, in growing chainage, in the tunnel's SRID; NULL of a site",
     )
     design: Mapped[str | None] = mapped_column(
         comment="What the given axis was read from or found in: file and alignment, file and layer, or scan; NULL of a table"

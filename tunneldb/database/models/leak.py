@@ -9,7 +9,7 @@ from sqlalchemy import BigInteger, Computed, ForeignKey, Identity, Index, Intege
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
-from tunneldb.database.models.base import KM, NOW, SURVEY, Base, Floats, Reals, geometry, one_of, parent
+from tunneldb.database.models.base import KM, NOW, SURVEY, Base, Floats, Reals, Review, geometry, one_of, parent
 
 
 class Radiometry(Base):
@@ -149,7 +149,7 @@ class Image(Base):
     tiff: Mapped[bytes] = mapped_column(comment="GeoTIFF in the unrolled plane (chainage, arc), m")
 
 
-class Anomaly(Base):
+class Anomaly(Review, Base):
     """A leak, or what is dark but dry."""
 
     __tablename__ = "anomaly"
@@ -199,13 +199,6 @@ class Anomaly(Base):
     unrolled: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="In the unrolled plane (chainage, arc), m")
     map: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="On the map strip beside the axis, tunnel's SRID, m")
     surface: Mapped[WKBElement] = mapped_column(geometry("POLYGONZ"), comment="On the lining in space, tunnel's SRID, m")
-    review: Mapped[str] = mapped_column(server_default=text("'open'"), comment="open, confirmed or rejected, by an inspector")
-    reviewed_by: Mapped[str | None] = mapped_column(comment="Who reviewed it")
-    reviewed_at: Mapped[dt.datetime | None] = mapped_column(comment="When it was reviewed")
-    remark: Mapped[str | None] = mapped_column(comment="Inspector's remark")
-    detected: Mapped[bool] = mapped_column(server_default=text("true"), comment="Whether the last detection found it again")
-    created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was first found")
-    detected_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was last found")
 
 
 class AnomalyPart(Base):

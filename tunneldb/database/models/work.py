@@ -71,7 +71,7 @@ class Run(Base):
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     km: Mapped[int | None] = mapped_column(comment="Kilometre; none for the whole survey")
-    stage: Mapped[str] = mapped_column(comment="read, load, axis, segments, sections, ground, detect; spheres")
+    stage: Mapped[str] = mapped_column(comment="read, load, axis, segments, sections, ground, detect; spheres, members")
     parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Parameters that it ran with")
     versions: Mapped[dict[str, Any]] = mapped_column(
         server_default=text("'{}'"), comment="Versions of the program and of its libraries"
@@ -107,7 +107,7 @@ class Audit(Base):
     at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When")
     who: Mapped[str] = mapped_column(server_default=text("SESSION_USER"), comment="Who was logged in")
     survey: Mapped[str] = mapped_column(comment="Name of the survey")
-    view: Mapped[str] = mapped_column(comment="What was changed: anomaly, axis_vertex or region")
+    view: Mapped[str] = mapped_column(comment="What was changed: anomaly, spot, axis_vertex or region")
     row_id: Mapped[int] = mapped_column(BigInteger, comment="Its id there")
     action: Mapped[str] = mapped_column(comment="insert, update or delete")
     before: Mapped[dict[str, Any] | None] = mapped_column(comment="Columns that changed, as they were; none of an insert")

@@ -39,7 +39,7 @@ def check_target(source: Path, target: Path) -> None:
 
 
 def export_members(inputs: Inputs, target: Path | None, begin: Begin) -> FileMembers:
-    """Find the members of a scan file, and write its points or polygons, if a target is given.
+    """Find the members of one scan file, and write its points or polygons, if a target is given.
 
     Raises
     ------
@@ -47,16 +47,16 @@ def export_members(inputs: Inputs, target: Path | None, begin: Begin) -> FileMem
         If the file cannot be used, see `find_members`; if the target cannot be written.
     """
     if target is not None:
-        check_target(inputs.path, target)
+        check_target(inputs.paths[0], target)
     members = find_members(inputs, begin)
     if target is None:
         return members
-    header = read_header(inputs.path)
+    header = read_header(inputs.paths[0])
     with replacing(target) as temporary:
         if target.suffix.lower() == ".gpkg":
             write_members(temporary, members.found.structures, header.crs)
         else:
             rewrite_with_numbers(
-                inputs.path, temporary, numbers_of_points(inputs, members), DIMENSIONS, begin("writing", header.points)
+                inputs.paths[0], temporary, numbers_of_points(inputs, members), DIMENSIONS, begin("writing", header.points)
             )
     return members

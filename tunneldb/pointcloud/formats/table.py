@@ -55,12 +55,17 @@ def require_known(path: Path) -> None:
     ------
     UserError
     """
-    if path.suffix.lower() in (*_FORMATS, *_SUFFIXES_OF_LAS) or not path.is_file():
+    if path.suffix.lower() in scan_suffixes() or not path.is_file():
         return
     with path.open("rb") as file:
         if file.read(len(SIGNATURE)) != SIGNATURE:
-            known = ", ".join((*_SUFFIXES_OF_LAS, *_FORMATS))
+            known = ", ".join(scan_suffixes())
             raise UserError(f"{path}: a file of points is known by how its name ends: {known}")
+
+
+def scan_suffixes() -> tuple[str, ...]:
+    """How names of scan files end, lower-case."""
+    return (*_SUFFIXES_OF_LAS, *_FORMATS)
 
 
 def has_scans(path: Path) -> bool:

@@ -1,0 +1,118 @@
+"""The verb ``spots``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect
+from tunneldb.errors import UserError
+from tunneldb.files import replacing
+from tunneldb.store.survey import get_survey
+
+if TYPE_CHECKING:
+    from tunneldb.export.tables.spots import Geometry, SpotList
+
+_BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
+
+
+@verb(
+    examples=[
+        "tunneldb spots hall-2024",
+        "tunneldb spots hall-2024 --kind dark --min-area 0.01 -o spots.gpkg --geometry 3d",
+    ],
+    wrong="done, but members were never looked for, or files or settings have changed since: what, is said first",
+)
+@click.argument("survey")
+@click.option(
+    "--kind", type=click.Choice(["dark", "bright", "all"]), default="all", show_default=True, help="Against their own surface."
+)
+@click.option(
+    "--geometry",
+    type=click.Choice(["face", "map", "3d"]),
+    default="face",
+    show_default=True,
+    help="Coordinates: the face's own plane, of a pipe unrolled; the map; in space.",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["table", "csv", "geojson", "gpkg"]),
+    help="Default: by the ending of -o, else a table.",
+)
+@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write.")
+@click.option("--min-area", type=click.FloatRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
+@click.option(
+    "--min-confidence",
+    type=click.FloatRange(0, 1),
+    default=0.0,
+    metavar="SHARE",
+    help="Only those that detection is at least so sure of, 0 to 1.",
+)
+@click.pass_context
+def spots(
+    context: click.Context,
+    survey: str,
+    kind: str,
+    geometry: str,
+    form: str | None,
+    output: Path | None,
+    min_area: float,
+    min_confidence: float,
+) -> None:
+    """List what on the members of SURVEY is dark or bright against its own surface, or export it.
+
+    First it says for what the list can't be vouched: what of the faces could not be judged, and whether files or settings have
+    changed since tunneldb members. Listed, but not counted, are those that an inspector rejected, or confirmed and the last run
+    did not find again.
+    """
+    from tunneldb.export.tables.spots import Kind, SpotSelection, as_csv, as_geojson, read_spots, write_gpkg
+
+    settings: Settings = context.obj
+    chosen = cast("Geometry", geometry)
+    form = form or (_BY_SUFFIX.get(output.suffix.lower(), "table") if output else "table")
+    if form == "gpkg" and output is None:
+        raise UserError("a GeoPackage needs a file to be written to: add -o spots.gpkg")
+    if form == "table" and output is not None:
+        raise UserError(f"{output}: spots are written as .csv, .geojson or .gpkg: let its name end so, or say --format")
+    with connect(settings.dsn) as conn:
+        found = get_survey(conn, survey, site=True)
+        listed = read_spots(conn, found, chosen, SpotSelection(cast(Kind, kind), min_area, min_confidence))
+    tell(survey=survey, statement=listed.statement, count=listed.count, area=listed.area, face_area=listed.face_area)
+    tell(seen_area=listed.seen_area, geometry=geometry, spots=listed.rows, file=output)
+    if listed.statement:
+        click.echo(f"survey {survey}: {listed.statement}", err=form != "table")
+    if form == "table":
+        _print(listed)
+    elif output is None:
+        click.echo(as_csv(listed) if form == "csv" else as_geojson(listed, chosen, found.srid), nl=False)
+    else:
+        with replacing(output) as temporary:
+            if form == "gpkg":
+                write_gpkg(temporary, listed, chosen, found.srid)
+            else:
+                text = as_csv(listed) if form == "csv" else as_geojson(listed, chosen, found.srid)
+                temporary.write_text(text, encoding="utf-8")
+        click.echo(f"{listed.total} to {output}", err=True)
+    if not listed.searched:
+        context.exit(1)
+
+
+def _print(listed: SpotList) -> None:
+    rows = [
+        [
+            str(spot.number), "" if spot.member is None else f"{spot.member} {spot.member_kind}", spot.label or "", spot.kind,
+            f"{1e4 * spot.area:.0f}", f"{spot.difference:.1f}", f"{spot.contrast:.1f}", f"{spot.confidence:.2f}",
+            ", ".join(spot.reasons), spot.review if spot.detected else f"{spot.review}, not found again",
+        ]
+        for spot in listed.rows
+    ]  # fmt: skip
+    if rows:
+        header = ["number", "member", "chainage", "kind", "cm²", "dB", "σ", "confidence", "shape", "review"]
+        print_table(header, rows, right=(0, 4, 5, 6, 7))
+    click.echo(listed.total)

@@ -1,0 +1,236 @@
+"""Spots of structures as a table, CSV, GeoJSON or GeoPackage, with what of the members could be judged."""
+
+from __future__ import annotations
+
+import csv
+import datetime as dt
+import io
+import json
+import warnings
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import psycopg
+import pyogrio.raw
+import shapely
+from psycopg import sql
+from shapely.geometry import Polygon, mapping
+
+from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
+from tunneldb.export.tables.leak_files import DECIMALS
+from tunneldb.store.survey import Survey
+
+Geometry = Literal["face", "map", "3d"]
+"""The face's own plane; the map; in space."""
+
+Kind = Literal["dark", "bright", "all"]
+
+_COLUMN = {"face": "outline", "map": "map", "3d": "surface"}
+
+
+@dataclass(frozen=True)
+class ListedSpot:
+    """A spot as it is listed; see the columns of view ``spot``."""
+
+    id: int
+    number: int
+    member: int | None
+    member_kind: str | None
+    face: int | None
+    kind: str
+    chainage: float | None
+    label: str | None
+    reasons: list[str]
+    confidence: float
+    contrast: float
+    difference: float
+    area: float
+    points: int
+    scans: int
+    review: str
+    reviewed_by: str | None
+    reviewed_at: dt.datetime | None
+    remark: str | None
+    detected: bool
+    counted: bool
+    geometry: Polygon
+
+
+COLUMNS = tuple(field.name for field in fields(ListedSpot) if field.name != "geometry")
+
+
+@dataclass(frozen=True)
+class SpotSelection:
+    """Which spots to read: of a kind, of at least so many m², of which detection is at least so sure."""
+
+    kind: Kind = "all"
+    min_area: float = 0.0
+    min_confidence: float = 0.0
+
+
+@dataclass(frozen=True)
+class SpotList:
+    """Spots of a survey.
+
+    Attributes
+    ----------
+    rows : list of ListedSpot
+        By member and number: those that the last run found, and those that an inspector confirmed although it did not.
+    count : int
+        How many of them sums count: found last, and not rejected.
+    area : float
+        Area of these, m².
+    face_area, seen_area : float
+        Area of all faces, and what of it could be judged, m².
+    statement : str or None
+        For what the list can't be vouched for, if for anything.
+    searched : bool
+        Whether members were found at all, in the files and with the settings that the survey has now.
+    """
+
+    rows: list[ListedSpot]
+    count: int
+    area: float
+    face_area: float
+    seen_area: float
+    statement: str | None
+    searched: bool
+
+    @property
+    def total(self) -> str:
+        """How many there are, how large together, and of how much."""
+        if not self.rows and not self.seen_area:
+            return "spots were not searched for"
+        return (
+            f"{self.count} spots, {self.area:.4f} m², on {self.seen_area:.1f} m² that were judged,"
+            f" of {self.face_area:.1f} m² of faces"
+        )
+
+
+def read_spots(
+    conn: psycopg.Connection[Any], survey: Survey, geometry: Geometry = "face", selection: SpotSelection | None = None
+) -> SpotList:
+    """Read the spots of a survey, and what can be said of the rest."""
+    chosen = SpotSelection() if selection is None else selection
+    query = sql.SQL(
+        "SELECT {}, public.ST_AsBinary({}) FROM tunnel_api.spot WHERE survey_id = %(survey)s"
+        " AND (detected OR review = 'confirmed') AND %(kind)s IN (kind, 'all') AND area >= %(min_area)s"
+        " AND confidence >= %(min_confidence)s ORDER BY member, number"
+    ).format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)), sql.Identifier(_COLUMN[geometry]))
+    asked = {
+        "survey": survey.id,
+        "kind": chosen.kind,
+        "min_area": chosen.min_area,
+        "min_confidence": chosen.min_confidence,
+    }
+    rows = [
+        ListedSpot(**dict(zip(COLUMNS, row[:-1], strict=True)), geometry=shapely.from_wkb(bytes(row[-1])))
+        for row in conn.execute(query, asked).fetchall()
+    ]
+    counted = [row for row in rows if row.counted]
+    face_area, seen_area, statement, searched = _coverage(conn, survey)
+    return SpotList(rows, len(counted), sum(row.area for row in counted), face_area, seen_area, statement, searched)
+
+
+def _coverage(conn: psycopg.Connection[Any], survey: Survey) -> tuple[float, float, str | None, bool]:
+    """Area of the faces and what of it was judged, m², for what nothing is said, and whether the search is up to date."""
+    row = conn.execute(
+        """
+        SELECT (SELECT coalesce(sum(f.area), 0) FROM tunnel.face f WHERE f.survey_id = s.id),
+               (SELECT coalesce(sum(f.area * f.seen_share), 0) FROM tunnel.face f WHERE f.survey_id = s.id),
+               (SELECT r.parameters @> tunnel_api.members_inputs(s.id) FROM tunnel.run r
+                 WHERE r.survey_id = s.id AND r.stage = 'members' AND r.outcome = 'done' ORDER BY r.id DESC LIMIT 1),
+               (SELECT string_agg(m.number::text, ', ' ORDER BY m.number) FROM tunnel.member m
+                 WHERE m.survey_id = s.id AND m.bimodal)
+          FROM tunnel.survey s WHERE s.id = %s
+        """,
+        [survey.id],
+    ).fetchone()
+    assert row is not None
+    face_area, seen_area, current, bimodal = row
+    if current is None:
+        return 0.0, 0.0, f"members were never looked for: tunneldb members {survey.name}", False
+    said = []
+    if not current:
+        said.append(f"files or settings have changed since members were found: tunneldb members {survey.name}")
+    if seen_area < face_area:
+        share = 1.0 - seen_area / face_area
+        said.append(f"{100 * share:.0f} % of the faces ({face_area - seen_area:.1f} m²) could not be judged")
+    if bimodal:
+        said.append(f"more than half differs of member {bimodal}: which half is its own surface is open")
+    return face_area, seen_area, "; ".join(said) or None, current
+
+
+def as_csv(spots: SpotList) -> str:
+    """Write spots as CSV with a header; the last column, ``geometry``, is WKT.
+
+    Where the list can't be vouched for, its first row says so: ``kind`` is unseen, ``remark`` says why, ``counted`` is False.
+    """
+    out = io.StringIO()
+    writer = csv.DictWriter(out, [*COLUMNS, "geometry"], lineterminator="\n")
+    writer.writeheader()
+    if spots.statement:
+        writer.writerow({"kind": "unseen", "remark": spots.statement, "counted": False})
+    for spot in spots.rows:
+        wkt = shapely.to_wkt(spot.geometry, rounding_precision=DECIMALS)
+        writer.writerow({**{name: _plain(getattr(spot, name)) for name in COLUMNS}, "geometry": wkt})
+    return out.getvalue()
+
+
+def as_geojson(spots: SpotList, geometry: Geometry, srid: int) -> str:
+    """Write spots as a GeoJSON FeatureCollection; ``statement``, ``count`` and ``area`` are further members of it."""
+    collection: dict[str, Any] = {"type": "FeatureCollection", "name": f"spot_{geometry}"}
+    if geometry != "face":
+        collection["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{srid}"}}
+    collection |= {"statement": spots.statement, "count": spots.count, "area": round(spots.area, DECIMALS)}
+    collection["features"] = [
+        {
+            "type": "Feature",
+            "id": spot.id,
+            "geometry": mapping(shapely.set_precision(spot.geometry, 10.0**-DECIMALS)),
+            "properties": {name: _plain(getattr(spot, name)) for name in COLUMNS},
+        }
+        for spot in spots.rows
+    ]
+    return json.dumps(collection, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_gpkg(path: Path, spots: SpotList, geometry: Geometry, srid: int) -> None:
+    """Write spots as a GeoPackage with one layer, whose description says for what they can't be vouched."""
+    data = [_column(spots, name) for name in COLUMNS]
+    said = f"{spots.statement}. {spots.total}" if spots.statement else spots.total
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "'crs' was not provided")  # a face's own plane has none
+        pyogrio.raw.write(
+            str(path),
+            shapely.to_wkb(np.array([spot.geometry for spot in spots.rows], dtype=object)),
+            data,
+            np.array(COLUMNS),
+            geometry_type="Polygon Z" if geometry == "3d" else "Polygon",
+            crs=None if geometry == "face" else f"EPSG:{srid}",
+            driver="GPKG",
+            layer=f"spot_{geometry}",
+            DESCRIPTION=said,
+            **(UNDEFINED_CARTESIAN if geometry == "face" else {}),
+        )
+
+
+def _column(spots: SpotList, name: str) -> np.ndarray[Any, Any]:
+    values = [getattr(spot, name) for spot in spots.rows]
+    if name in ("id", "number", "points", "scans"):
+        return np.array(values, dtype=np.int64)
+    if name in ("member", "face", "chainage", "confidence", "contrast", "difference", "area"):
+        return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+    if name in ("detected", "counted"):
+        return np.array(values, dtype=np.bool_)
+    return np.array([_plain(value) for value in values], dtype=object)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return round(value, DECIMALS)
+    if isinstance(value, list):
+        return ", ".join(value)
+    return value.isoformat() if isinstance(value, dt.datetime) else value

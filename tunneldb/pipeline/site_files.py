@@ -1,0 +1,131 @@
+"""Files of a survey of a site: looked through and recorded, their points left where they are."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+
+from tunneldb.errors import UserError
+from tunneldb.pipeline.read import Begin, read_headers, require_kind, silent
+from tunneldb.pointcloud.formats.raw import read_raw
+from tunneldb.pointcloud.points import Points
+from tunneldb.pointcloud.poses import PoseFaults, PoseModel
+from tunneldb.pointcloud.reader import CHUNK, ScanHeader, check_header, crs_note
+from tunneldb.pointcloud.selection import SAMPLED, FilterCounts
+from tunneldb.store.ledger import stage_run
+from tunneldb.store.scan_files import COUNTED, Content, Loaded, checksum, outcome, record_file, recorded_files, unchanged
+from tunneldb.store.sources import load_poses
+from tunneldb.store.survey import Survey
+
+
+def register_files(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    paths: Sequence[Path],
+    max_left_out: float,
+    begin: Begin = silent,
+) -> Iterator[Loaded]:
+    """Record scan files of a site, each in a transaction of its own.
+
+    There is no axis by which points could be filtered, thinned and put in order, and nothing that would read them so: what
+    is found on a site is found in the files.
+
+    Parameters
+    ----------
+    conn : Connection
+        Idle.
+    survey : Survey
+        Of a site.
+    paths : sequence of Path
+        Known by their names, as with `tunneldb.pipeline.load.load_files`.
+    max_left_out : float
+        Share of a file's points that may be invalid or without a scanner position.
+    begin : callable
+        Told of each file that begins; returns what is told of its progress.
+
+    Yields
+    ------
+    Loaded
+        One a file, as soon as it is committed.
+
+    Raises
+    ------
+    UserError
+        For a file that is unreadable or does not fit the survey. The headers of all are looked at before the first is read.
+    """
+    poses = load_poses(conn, survey)
+    headers = read_headers(paths)
+    for header in headers:
+        check_header(header, survey.intensity_dimension, survey.srid, needs_time=poses.mobile)
+    for header in headers:
+        note = crs_note(header, survey.srid)
+        recorded = recorded_files(conn, survey).get(header.path.name)
+        there = unchanged(conn, header.path, recorded)
+        conn.commit()
+        if there is None:
+            there = _register(conn, survey, header, poses, max_left_out, begin, replaces=recorded is not None)
+        yield replace(there, note=note)
+
+
+def remove_site_files(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[str]) -> None:
+    """Withdraw files of a site, by their names; what was found in them stays until members are found anew."""
+    with stage_run(conn, survey.id, None, "load", {"removed": list(names)}):
+        conn.execute("DELETE FROM tunnel.scan_file WHERE survey_id = %s AND name = ANY (%s)", [survey.id, list(names)])
+
+
+def _register(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    header: ScanHeader,
+    poses: PoseModel,
+    max_left_out: float,
+    begin: Begin,
+    *,
+    replaces: bool,
+) -> Loaded:
+    path, started = header.path, time.monotonic()
+    with stage_run(conn, survey.id, None, "load", {"files": [path.name]}) as run:
+        with ThreadPoolExecutor(1, "checksum") as pool:
+            digest = pool.submit(checksum, path)
+            counts = _look_through(survey, header, poses, max_left_out, begin)
+            content = Content(path, digest.result(), path.stat().st_size, survey.srid if header.crs else None, counts)
+        file_id = record_file(conn, survey, content)
+        loaded = outcome(conn, file_id, "replaced" if replaces else "loaded", time.monotonic() - started)
+        run.counts.update({name: getattr(loaded, name) for name in COUNTED})
+    return loaded
+
+
+def _look_through(survey: Survey, header: ScanHeader, poses: PoseModel, max_left_out: float, begin: Begin) -> FilterCounts:
+    """Count what of a file can't be used, and its extent; refuse it where that is too much."""
+    counts, faults = FilterCounts(), PoseFaults()
+    low, high = counts.extent[:3], counts.extent[3:]
+    progress = begin(header.path.name, header.points)
+    for points in map(Points.of, read_raw(header.path, survey.intensity_dimension, CHUNK)):
+        counts.points += len(points)
+        progress(len(points))
+        finite = points.finite(time=poses.mobile, intensity=survey.intensity_dimension is not None)
+        if finite is not None:
+            counts.invalid += int(np.count_nonzero(~finite))
+            points = points.some(finite)
+        if len(points):
+            faults += poses.faults(points)
+            np.minimum(low, points.xyz.min(axis=0), out=low)
+            np.maximum(high, points.xyz.max(axis=0), out=high)
+            counts.intensities.append(points.intensity[::SAMPLED].copy())
+    counts.unposed = faults.points
+    invalid = "coordinates, times or intensities that are no numbers; mend the file"
+    for count, reason in ((counts.invalid, invalid), (counts.unposed, faults.text())):
+        if count > max_left_out * counts.points or count == counts.points:
+            raise UserError(
+                f"{header.path}: {reason} ({100.0 * count / max(counts.points, 1):.2g} % of its points; "
+                f"--max-left-out {100.0 * max_left_out:g} allows less)"
+            )
+    require_kind(survey, header.path, counts.intensity_sample)
+    return counts

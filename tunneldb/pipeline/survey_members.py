@@ -1,0 +1,96 @@
+"""Members, faces and spots of a survey: found in its scan files at full density, kept in the database."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import psycopg
+
+from tunneldb.database import snapshot
+from tunneldb.errors import UserError
+from tunneldb.pipeline.members import AUTO, Begin, FileMembers, Inputs, find_members
+from tunneldb.radiometry.correction import Kind
+from tunneldb.store.images import load_reference
+from tunneldb.store.ledger import stage_run
+from tunneldb.store.sources import load_poses, unchanged_file
+from tunneldb.store.structures import SavedSpots, save_structures
+from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey
+
+
+@dataclass(frozen=True)
+class SurveyMembers:
+    """What was found, and what became of the spots of an earlier run."""
+
+    members: FileMembers
+    spots: SavedSpots
+
+
+def find_survey_members(conn: psycopg.Connection[Any], survey: Survey, begin: Begin) -> SurveyMembers:
+    """Find the members of a survey in its scan files, and put them in the place of those found before.
+
+    What is found is written in one short transaction, after the files have been read; cut off before, it leaves what was there.
+
+    Parameters
+    ----------
+    conn : Connection
+        Idle.
+    survey : Survey
+        Of a site or of a tunnel; of the latter members have a chainage after stage sections.
+    begin : callable
+        Called with a text and the number of points before each pass; returns what takes the points that are done.
+
+    Raises
+    ------
+    UserError
+        If nothing is loaded, a file is gone or was changed, or there is no intensity, or no station.
+    """
+    with snapshot(conn):
+        inputs = _inputs(conn, survey)
+        row = conn.execute("SELECT tunnel_api.members_inputs(%s)", [survey.id]).fetchone()
+        assert row is not None
+        made_from = row[0]
+        try:
+            surface = None if survey.site else load_surface(conn, survey)
+        except UserError:  # before stage sections
+            surface = None
+    found = find_members(inputs, begin)
+    structures = found.found.structures
+    with stage_run(conn, survey.id, None, "members", made_from) as run:
+        saved = save_structures(conn, survey, structures, surface)
+        run.counts.update(
+            points=found.points,
+            far=found.far,
+            unposed=found.unknown,
+            members=len(structures.members),
+            faces=len(structures.faces),
+            spots=len(structures.spots),
+            area=sum(face.area for face in structures.faces),
+            seen_area=sum(face.area * face.seen_share for face in structures.faces),
+        )
+        if found.notes:
+            run.counts["note"] = "; ".join(found.notes)
+    return SurveyMembers(found, saved)
+
+
+def _inputs(conn: psycopg.Connection[Any], survey: Survey) -> Inputs:
+    if survey.intensity_dimension is None:
+        raise UserError(
+            f"survey {survey.name} has no intensity, by which spots differ:"
+            f" tunneldb survey set {survey.name} --intensity DIMENSION --intensity-kind KIND"
+        )
+    if survey.platform != "static":
+        raise UserError(f"survey {survey.name} is {survey.platform}; members are found in the scans of a static scanner")
+    rows = conn.execute(
+        "SELECT path, bytes, checksum FROM tunnel.scan_file WHERE survey_id = %s ORDER BY name", [survey.id]
+    ).fetchall()
+    if not rows:
+        raise UserError(f"survey {survey.name} holds no files yet: tunneldb load {survey.name} FILE...")
+    return Inputs(
+        tuple(unchanged_file(*row) for row in rows),
+        survey.intensity_dimension,
+        cast(Kind, survey.intensity_kind),
+        load_poses(conn, survey),
+        AUTO if survey.reference == AUTO else load_reference(conn, survey),
+    )
