@@ -4,7 +4,7 @@
     python -m benchmarks.any_scan --only d5 profiles-0.5           # some of them
     python -m benchmarks.any_scan --table docs/real-scans.md       # the page, from the JSON of the last runs; runs nothing
 
-Scans are made by a generator of its own, which shares no code with ``tunneldb simulate``: reflection, noise and shapes are its own.
+Scans are made by a generator of its own, which shares no code with ``tunneldb simulate``: reflection, noise and shapes too.
 Each is taken through ``inspect``, ``tunnel add``, ``survey add``, ``load``, ``run``, ``leaks`` and ``report`` on one server.
 """
 
@@ -29,7 +29,9 @@ from benchmarks.common import RESULTS, print_table, progress
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.any_scan", description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="+", metavar="NAME", help="only these scenes")
-    parser.add_argument("--json", type=Path, default=RESULTS / "any_scan.json", metavar="FILE", help="verdicts, kept from run to run")
+    parser.add_argument(
+        "--json", type=Path, default=RESULTS / "any_scan.json", metavar="FILE", help="verdicts, kept from run to run"
+    )
     parser.add_argument("--table", type=Path, metavar="FILE", help="write the page from the JSON, and run nothing")
     parser.add_argument("--folder", type=Path, help="keep files and server here")
     arguments = parser.parse_args()
@@ -61,7 +63,9 @@ def main() -> None:
                 verdicts[scene.name] = asdict(verdict)
                 arguments.json.write_text(json.dumps(verdicts, indent=1, ensure_ascii=False) + "\n")
                 mark = "right" if verdict.right else "WRONG"
-                progress(f"{mark} {scene.name} ({verdict.seconds:.0f} s): {verdict.seen}; {'; '.join(verdict.faults) or verdict.said}")
+                progress(
+                    f"{mark} {scene.name} ({verdict.seconds:.0f} s): {verdict.seen}; {'; '.join(verdict.faults) or verdict.said}"
+                )
                 for path in here.glob("*.la[sz]"):
                     path.unlink()
         finally:

@@ -19,7 +19,9 @@ from benchmarks.any_scan.tube import Array
 SRID = 25832
 
 
-def las(path: Path, cloud: Cloud, *, version: str = "1.4", srid: int | None = SRID, scans: bool = True, times: bool = True) -> Path:
+def las(
+    path: Path, cloud: Cloud, *, version: str = "1.4", srid: int | None = SRID, scans: bool = True, times: bool = True
+) -> Path:
     """Write LAS or LAZ: ``Amplitude`` in dB, what `cloud.extra` holds, and counts as ``intensity``."""
     header = laspy.LasHeader(version=version, point_format=6 if version == "1.4" else 1)
     header.offsets = np.floor(cloud.xyz.min(axis=0)) if len(cloud) else [0, 0, 0]
@@ -146,9 +148,7 @@ def line(path: Path, points: Array, driver: str, srid: int | None = SRID) -> Pat
     """Write a line as GeoPackage, Shapefile or GeoJSON, by `driver`."""
     geometry = np.array([shapely.to_wkb(shapely.LineString(points), output_dimension=3)], dtype=object)
     crs = None if srid is None else f"EPSG:{srid}"
-    pyogrio.raw.write(
-        path, geometry, [], fields=[], driver=driver, layer=path.stem, geometry_type="LineString Z", crs=crs
-    )
+    pyogrio.raw.write(path, geometry, [], fields=[], driver=driver, layer=path.stem, geometry_type="LineString Z", crs=crs)
     return path
 
 
@@ -159,7 +159,8 @@ def landxml(path: Path, points: Array) -> Path:
     path.write_text(
         f"""<?xml version="1.0"?>
 <LandXML xmlns="http://www.landxml.org/schema/LandXML-1.2" version="1.2"><Alignments><Alignment name="A" length="{length:.4f}"
-staStart="0"><CoordGeom><Line length="{length:.4f}"><Start>{y0:.4f} {x0:.4f}</Start><End>{y1:.4f} {x1:.4f}</End></Line></CoordGeom>
+staStart="0"><CoordGeom><Line length="{length:.4f}"><Start>{y0:.4f} {x0:.4f}</Start>
+<End>{y1:.4f} {x1:.4f}</End></Line></CoordGeom>
 <Profile name="P"><ProfAlign name="P"><PVI>0 {z0:.4f}</PVI><PVI>{length:.4f} {z1:.4f}</PVI></ProfAlign></Profile>
 </Alignment></Alignments></LandXML>"""
     )

@@ -1,4 +1,4 @@
-"""A process that has the program's libraries loaded, and forks one of its own for each verb; it writes and reads no scan itself.
+"""A process that has the program's libraries loaded, and forks one of its own for each verb.
 
 Asked by lines of JSON: ``{"folder": …, "words": […]}``; answers ``{"code": …, "out": …, "err": …}``.
 """
@@ -16,8 +16,21 @@ from pathlib import Path
 
 LIMIT = 300
 """s; a verb that isn't over by then is ended by a signal."""
-LIBRARIES = ("laspy", "matplotlib.figure", "numba", "psycopg", "pyproj", "rasterio", "rich.table", "scipy.ndimage", "scipy.optimize",
-             "scipy.spatial", "shapely", "sqlalchemy", "tunneldb.cli.main")  # fmt: skip
+LIBRARIES = (
+    "laspy",
+    "matplotlib.figure",
+    "numba",
+    "psycopg",
+    "pyproj",
+    "rasterio",
+    "rich.table",
+    "scipy.ndimage",
+    "scipy.optimize",
+    "scipy.spatial",
+    "shapely",
+    "sqlalchemy",
+    "tunneldb.cli.main",
+)
 
 
 def serve() -> None:

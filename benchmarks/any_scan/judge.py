@@ -81,7 +81,7 @@ def judge(scene: Scene, folder: Path, program: Program) -> tuple[Verdict, list[C
     plan = scene.build(folder)
     calls = _run(scene, plan, folder, program)
     faults = [f"traceback: {call.line}" for call in calls if "Traceback" in call.text or call.code not in (0, 1, 2)]
-    spoken = "\n".join(call.text for call in calls if call.words[0] != "inspect").replace(scene.name, "NAME")
+    spoken = _spoken(scene, calls)
     said = next((line.strip() for line in spoken.splitlines() if scene.word and re.search(scene.word, line.lower())), "")
     refused = next((call for call in calls if call.code == 2), None)
     found = false = 0
@@ -105,6 +105,12 @@ def judge(scene: Scene, folder: Path, program: Program) -> tuple[Verdict, list[C
         round(sum(call.seconds for call in calls), 1), (refused or calls[-1]).line,
     )  # fmt: skip
     return verdict, calls
+
+
+def _spoken(scene: Scene, calls: list[Call]) -> str:
+    """Return what was said on the way, but for what ``inspect`` guesses, names and the heads of tables."""
+    lines = "\n".join(call.text for call in calls if call.words[0] != "inspect").replace(scene.name, "NAME").splitlines()
+    return "\n".join(line for line in lines if not re.match(r"(file +points|.*┃)", line))
 
 
 def _run(scene: Scene, plan: Plan, folder: Path, program: Program) -> list[Call]:
@@ -146,7 +152,8 @@ def _refusal(scene: Scene, call: Call, folder: Path, program: Program) -> tuple[
         if re.search(rf"\b{re.escape(scene.name)}\b", rows):
             faults.append(f"{verb} was refused, but the {verb.split()[0]} is there")
     if call.words[0] == "load":
-        rows = program(folder, "psql", "-tAc", f"SELECT count(*) FROM tunnel_api.file WHERE survey = '{scene.name}' AND kept > 0").out
+        query = f"SELECT count(*) FROM tunnel_api.file WHERE survey = '{scene.name}' AND kept > 0"
+        rows = program(folder, "psql", "-tAc", query).out
         if rows.strip() not in ("0", ""):
             faults.append(f"load was refused, but {rows.strip()} files are there")
     return said, faults

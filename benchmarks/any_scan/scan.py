@@ -1,8 +1,8 @@
 """Scans: points on a tube's lining, and what a scanner would have noted of them.
 
 The echo is that of a dull surface (Lambert) whose light spreads over a sphere, with an optic that loses near ranges:
-``dB = C + 10 lg(albedo) + 10 lg(cos incidence) - 10 lg(r² + NEAR²)``. Albedo wanders slowly along the lining; wet lining is darker
-by its leak's contrast; each echo carries noise. Points lie evenly at random (a static scanner) or on profiles (a moving one).
+``dB = C + 10 lg(albedo) + 10 lg(cos incidence) - 10 lg(r² + NEAR²)``. Albedo wanders slowly along the lining; wet lining
+is darker by its leak's contrast; each echo carries noise. Points lie evenly at random (a static scanner) or on profiles (a moving one).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Leak:
         angle = np.linspace(0.0, 2 * np.pi, 60, endpoint=False)
         wander = 1 + 0.12 * np.sin(3 * angle + self.s) + 0.06 * np.sin(5 * angle + self.a)
         rim = np.column_stack([self.along / 2 * np.cos(angle), self.around / 2 * np.sin(angle)]) * wander[:, None]
-        return shapely.Polygon(rim + [self.s, self.a])
+        return shapely.Polygon(rim + np.array([self.s, self.a]))
 
 
 LEAKS = (
