@@ -5,7 +5,7 @@
     python -m benchmarks.any_scan --table docs/real-scans.md       # the page, from the JSON of the last runs; runs nothing
 
 Scans are made by a generator of its own, which shares no code with ``tunneldb simulate``: reflection, noise and shapes too.
-Each is taken through ``inspect``, ``tunnel add``, ``survey add``, ``load``, ``run``, ``leaks`` and ``report`` on one server.
+Each is taken through ``tunnel add``, ``survey add``, ``load``, ``run``, ``leaks`` and ``report`` on one server.
 """
 
 from __future__ import annotations
@@ -62,10 +62,9 @@ def main() -> None:
                 (here / "log.txt").write_text(log)
                 verdicts[scene.name] = asdict(verdict)
                 arguments.json.write_text(json.dumps(verdicts, indent=1, ensure_ascii=False) + "\n")
+                said = "; ".join(verdict.faults) or verdict.said
                 mark = "right" if verdict.right else "WRONG"
-                progress(
-                    f"{mark} {scene.name} ({verdict.seconds:.0f} s): {verdict.seen}; {'; '.join(verdict.faults) or verdict.said}"
-                )
+                progress(f"{mark} {scene.name} ({verdict.seconds:.0f} s): {verdict.seen}; {said}")
                 for path in here.glob("*.la[sz]"):
                     path.unlink()
         finally:

@@ -60,6 +60,7 @@ def _verb(folder: Path, words: list[str], out: int, err: int) -> None:
         os.dup2(err, 2)
         os.chdir(folder)
         sys.argv = ["tunneldb", *words]
+        sys.modules["__main__"].__package__ = ""  # else the program takes its name from this module
         from tunneldb.cli.main import main
 
         main()

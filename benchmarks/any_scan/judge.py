@@ -38,6 +38,8 @@ class Plan:
     between: Callable[[Path], None] | None = None
     """Done to the files between ``load`` and ``run``."""
     inspect: bool = False
+    unit: float = 1.0
+    """m; of the coordinates in the files."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,7 @@ def judge(scene: Scene, folder: Path, program: Program) -> tuple[Verdict, list[C
 def _spoken(scene: Scene, calls: list[Call]) -> str:
     """Return what was said on the way, but for what ``inspect`` guesses, names and the heads of tables."""
     lines = "\n".join(call.text for call in calls if call.words[0] != "inspect").replace(scene.name, "NAME").splitlines()
-    return "\n".join(line for line in lines if not re.match(r"(file +points|.*┃)", line))
+    return "\n".join(line for line in lines if not re.match(r"(file +points|.*┃|\S+: [\d ]+ (stations|poses) of NAME)", line))
 
 
 def _run(scene: Scene, plan: Plan, folder: Path, program: Program) -> list[Call]:
@@ -166,7 +168,9 @@ def _leaks(scene: Scene, plan: Plan, folder: Path, calls: list[Call]) -> tuple[i
         leaks = listed.json
     except json.JSONDecodeError:
         return 0, 0, [f"{listed.line} gives no JSON: {listed.err.strip()[-200:]}"]
-    polygons = [polygon for row in leaks.get("leaks", []) if (polygon := unrolled(plan.tube, row["geometry"])) is not None]
+    polygons = [
+        polygon for row in leaks.get("leaks", []) if (polygon := unrolled(plan.tube, row["geometry"], plan.unit)) is not None
+    ]
     wet = [leak.polygon() for leak in plan.leaks]
     found = sum(_covered(leak, polygons) >= LEAST for leak in wet)
     around = shapely.union_all([leak.buffer(NEAR) for leak in wet]) if wet else shapely.Polygon()
@@ -185,7 +189,7 @@ def _leaks(scene: Scene, plan: Plan, folder: Path, calls: list[Call]) -> tuple[i
         ratio = sum(p.area for p in polygons if p not in strange) / sum(leak.area for leak in hit)
         if not AREA[0] <= ratio <= AREA[1]:
             faults.append(f"area {ratio:.2f} times the true one")
-    if wet and not found and listed.code == 0 and not leaks.get("gaps") and not leaks.get("statement"):
+    if wet and not leaks["count"] and listed.code == 0 and not leaks.get("gaps") and not leaks.get("statement"):
         faults.append("a silent all-clear")
     if report.code == 0:
         told = report.json
@@ -204,14 +208,14 @@ def _covered(leak: shapely.Polygon, polygons: list[shapely.Polygon]) -> float:
     return sum(leak.intersection(polygon).area for polygon in polygons) / leak.area
 
 
-def unrolled(tube: Tube, geometry: dict[str, Any] | None) -> shapely.Geometry | None:
+def unrolled(tube: Tube, geometry: dict[str, Any] | None, unit: float) -> shapely.Geometry | None:
     """Bring a polygon in space into the plane (s, a), by the scene's own shape."""
     if geometry is None:
         return None
     parts = geometry["coordinates"] if geometry["type"] == "MultiPolygon" else [geometry["coordinates"]]
     flat = []
     for rings in parts:
-        shell = np.asarray(rings[0], float)
+        shell = np.asarray(rings[0], float) * unit
         s, u, w = tube.unplace(shell)
         flat.append(shapely.Polygon(np.column_stack([s, tube.section.arc(np.column_stack([u, w]))])).buffer(0))
     return shapely.union_all(flat)

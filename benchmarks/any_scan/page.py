@@ -9,8 +9,8 @@ HEAD = """# Any real scan
 <!-- Written by python -m benchmarks.any_scan --table; edit benchmarks/any_scan/page.py, not this page. -->
 
 What becomes of scans as people have them: {count} small ones, made by a generator of the benchmark's own, with its own
-reflection law, noise and shapes. Each was taken through `tunnel add`, `survey add`, `load`, `run`, `leaks` and `report` as its user would type them, and held
-against what had been written down beforehand as right. Of {count}, {right} came out right.
+reflection law, noise and shapes. Each was taken through `tunnel add`, `survey add`, `load`, `run`, `leaks` and `report` as its
+user would type them, and held against what had been written down beforehand as right. Of {count}, {right} came out right.
 
 ```sh
 python -m benchmarks.any_scan                               # all, about {minutes} minutes
@@ -25,7 +25,8 @@ python -m benchmarks.any_scan --table docs/real-scans.md    # this page
 | refusal | exit code 2, one line that names the matter, nothing half-written |
 
 Never right, whatever was expected: an all-clear without a word of what was not looked at, a traceback, `leaks` and report
-with different counts. Found and true are leaks; a leak is found when at least 30 % of it is covered. Where several are right, any is.
+with different counts. Found and true are leaks; a leak is found when at least 30 % of it is covered. Where several are right,
+any is.
 
 | scene | what is special | expected | seen | found of true | false | right |
 |---|---|---|---|---|---|---|

@@ -2,7 +2,8 @@
 
 The echo is that of a dull surface (Lambert) whose light spreads over a sphere, with an optic that loses near ranges:
 ``dB = C + 10 lg(albedo) + 10 lg(cos incidence) - 10 lg(r² + NEAR²)``. Albedo wanders slowly along the lining; wet lining
-is darker by its leak's contrast; each echo carries noise. Points lie evenly at random (a static scanner) or on profiles (a moving one).
+is darker by its leak's contrast; each echo carries noise. Points lie evenly at random (a static scanner) or on profiles (a
+moving one).
 """
 
 from __future__ import annotations
