@@ -36,7 +36,7 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, help="keep files and server here")
     arguments = parser.parse_args()
     if arguments.table:
-        arguments.table.write_text(page(json.loads(arguments.json.read_text())))
+        arguments.table.write_text(page(json.loads(arguments.json.read_text()), [scene.name for scene in SCENES]))
         return
     known = {scene.name: scene for scene in SCENES}
     unknown = set(arguments.only or ()) - set(known)

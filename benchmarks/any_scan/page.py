@@ -33,8 +33,10 @@ any is.
 """
 
 
-def page(verdicts: dict[str, Any]) -> str:
-    """Return the page as Markdown."""
+def page(verdicts: dict[str, Any], names: list[str]) -> str:
+    """Return the page as Markdown, in the order of the scenes' `names`."""
+    missing = [name for name in names if name not in verdicts]
+    verdicts = {name: verdicts[name] for name in names if name in verdicts}
     rows = []
     for v in verdicts.values():
         counted = v["seen"] != "refusal"
@@ -46,6 +48,8 @@ def page(verdicts: dict[str, Any]) -> str:
     text = HEAD.format(count=len(verdicts), right=sum(v["right"] for v in verdicts.values()), minutes=minutes)
     wrong = [v for v in verdicts.values() if not v["right"]]
     text += "\n".join(rows) + "\n"
+    if missing:
+        text += f"\nOf the matrix, but not in this table as not run yet: {', '.join(missing)}.\n"
     if wrong:
         text += "\n## Not right\n\n"
         text += "\n".join(f"- **{v['name']}**: {'; '.join(v['faults'])}".replace("<", "&lt;") for v in wrong) + "\n"

@@ -528,6 +528,8 @@ SCENES: tuple[Scene, ...] = (
         0,
     ),
     Scene("linear", "16-bit counts declared linear, measured curve", "result", linear_counts(False)),
+    # The program refuses where range and incidence can't be told apart, as its pages say; on 24 m that may be right,
+    # and a result too much to ask.
     Scene("linear-auto", "16-bit counts declared linear, curve found on the lining", "result", linear_counts(True)),
     Scene(
         "nan-0.1",
