@@ -119,7 +119,8 @@ def test_make_targets_exist(page: Path) -> None:
 def gone(text: str) -> list[str]:
     """Paths of the project and modules of benchmarks that a text names between backquotes, or runs, and that are not there."""
     named = set(re.findall(rf"`((?:{'|'.join(FOLDERS)})/[^`\s]*)`", text))
-    named |= {f"{name.replace('.', '/')}.py" for name in re.findall(r"python -m (benchmarks\.\w+)", text)}
+    modules = {name.replace(".", "/") for name in re.findall(r"python -m (benchmarks\.\w+)", text)}
+    named |= {f"{name}/__main__.py" if (ROOT / name).is_dir() else f"{name}.py" for name in modules}
     return sorted(path for path in named if path != "benchmarks/results/" and not (ROOT / path).exists())
 
 
