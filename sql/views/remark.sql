@@ -32,11 +32,15 @@ SELECT 8 * f.id::bigint + b.k, f.survey_id, s.name, NULL, 'load', f.name,
  CROSS JOIN LATERAL (VALUES
        (4, f.beyond_before, f.reach_before, n.near, 'beyond the beginning'),
        (5, f.beyond_after, f.reach_after, n.near, 'beyond the end')) AS b (k, points, reach, near, side)
- WHERE b.points > 0.01 * b.near;
+ WHERE b.points > 0.01 * b.near
+ UNION ALL
+SELECT 8 * s.id::bigint + 6, s.id, s.name, NULL, 'survey', NULL, s.positions_note
+  FROM tunnel.survey s
+ WHERE s.positions_note IS NOT NULL;
 COMMENT ON VIEW tunnel_api.remark IS
-    'What a reader of the results is to know: notes of the stages by kilometre, and points that were left out by file';
-COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file';
-COMMENT ON COLUMN tunnel_api.remark.stage IS 'Stage that says so';
+    'What a reader of the results is to know: notes of the stages by kilometre, points that were left out by file, and what is to be known of the scanner positions';
+COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file, and for the survey as a whole';
+COMMENT ON COLUMN tunnel_api.remark.stage IS 'Stage that says so; survey for what was said when the survey was added or set';
 COMMENT ON COLUMN tunnel_api.remark.file IS 'Name of the scan file; NULL for a kilometre';
 COMMENT ON COLUMN tunnel_api.remark.remark IS 'What is to be known';
 
@@ -71,7 +75,9 @@ AS $$
     SELECT w.file, w.stage,
            ARRAY(SELECT h.km FROM here h
                   WHERE h.km IS NOT NULL AND (h.stage, h.remark) = (w.stage, w.remark) AND w.file IS NULL ORDER BY h.km),
-           w.remark, coalesce(w.file, format('km %s, %s', w.spans, w.stage)) || ': ' || w.remark
+           w.remark, 
+           coalesce(w.file, CASE WHEN w.spans <> '' THEN format('km %s, %s', w.spans, w.stage) END, 'scanner positions')
+               || ': ' || w.remark
       FROM whole w
      ORDER BY w.file NULLS LAST, w.first, w.stage, w.remark
 $$;

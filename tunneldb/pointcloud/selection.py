@@ -266,7 +266,7 @@ class _Filter:
         for count, reason in ((counts.invalid, self.invalid), (counts.unposed, self.faults.text())):
             if count > self.settings.max_left_out * near or (nothing and count):
                 raise UserError(
-                    f"{self.path}: {reason} ({100.0 * count / near:.2g} % of the points near the axis; "
+                    f"{self.path}: {reason} ({100.0 * count / near:.3g} % of the points near the axis; "
                     f"--max-left-out {100.0 * self.settings.max_left_out:g} allows less)"
                 )
 
