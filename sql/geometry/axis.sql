@@ -57,7 +57,8 @@ COMMENT ON FUNCTION tunnel_api.axis_frame(int[], float8[], float8[], float8[]) I
 -- vault (45° about the upward direction) against the level of the floor. Medians leave niches, cables and
 -- equipment without weight. In a tunnel more than twice as wide as high most of those pairs lie on vault and floor: there only
 -- those count that are 0.8 of its width apart or more, and within 10 % as far as they are in the other slabs, where no train
--- stands before a wall; a vertex without any is left out. Where fewer than three pairs of classes are filled it is the plain
+-- stands before a wall; a vertex without any is left out. So is one with a floor and no roof, where others have one: in an open
+-- cut the walls' tops and the slopes say nothing of the tunnel's centre. Where fewer than three pairs of classes are filled it is the plain
 -- mean of the points, as the paper has it. A vertex whose slab holds fewer than min_points points is left out.
 CREATE OR REPLACE FUNCTION tunnel_api.axis_shift(
     survey_id int, n int[], x float8[], y float8[], z float8[],
@@ -128,6 +129,11 @@ BEGIN
             FROM pair p JOIN usual u ON u.angle = p.angle CROSS JOIN low l
             GROUP BY p.n, l.is_low
             HAVING count(*) >= 3
+        ), roofed AS (  -- as section_roofed says it
+            SELECT c.n, count(*) FILTER (WHERE abs(c.angle) < 45) * 3 * $5 >= 90 AS has_roof,
+                count(*) FILTER (WHERE abs(c.angle) > 135) * 3 * $5 >= 90 AS has_floor
+            FROM class c
+            GROUP BY c.n
         ), total AS (
             SELECT c.n, sum(c.points)::bigint AS points, sum(c.u) / sum(c.points) AS u, sum(c.w) / sum(c.points) AS w
             FROM class c
@@ -137,7 +143,8 @@ BEGIN
         FROM total t
         LEFT JOIN sideward s ON s.n = t.n
         LEFT JOIN upward u ON u.n = t.n
-        WHERE t.points >= $6 AND (s.shift IS NOT NULL OR s.is_low IS NOT TRUE)
+        JOIN roofed r ON r.n = t.n
+        WHERE (r.has_roof OR NOT r.has_floor OR NOT (SELECT bool_or(o.has_roof) FROM roofed o)) AND t.points >= $6 AND (s.shift IS NOT NULL OR s.is_low IS NOT TRUE)
         ORDER BY t.n
     $query$, tunnel_api.partition_source(axis_shift.survey_id, floor(low / 1000)::int, floor(high / 1000)::int))
     USING low, high, spacing, axis_shift.half_width, axis_shift.angle_step, axis_shift.min_points,

@@ -2,9 +2,10 @@
 
 -- Notes of the stages whose results are in the database, and points that were left out
 -- of files. A fifth of a scan's points is noise only where the filter does not suit the scan: it is made for those that strike
--- nothing (dust, edges, people), which are a few percent.
+-- nothing (dust, edges, people), which are a few percent. Of points beyond the ends of the given axis one in a hundred is told:
+-- a scan sees some of what lies before a portal, but a tunnel that goes on is to be looked at.
 CREATE OR REPLACE VIEW tunnel_api.remark AS
-SELECT 4 * r.id AS id, r.survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file, r.counts ->> 'note' AS remark
+SELECT 8 * r.id AS id, r.survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file, r.counts ->> 'note' AS remark
   FROM (SELECT DISTINCT ON (d.survey_id, d.km, d.stage) d.*
           FROM tunnel.run d
          WHERE d.outcome = 'done' AND d.km IS NOT NULL
@@ -12,7 +13,7 @@ SELECT 4 * r.id AS id, r.survey_id, s.name AS survey, r.km, r.stage, NULL::text 
   JOIN tunnel.survey s ON s.id = r.survey_id
  WHERE r.counts ? 'note'
  UNION ALL
-SELECT 4 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, format('%s points (%s %%) left out: %s', w.points,
+SELECT 8 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, format('%s points (%s %%) left out: %s', w.points,
        round(100 * w.points / greatest(f.points - f.outside, 1)::numeric, 2), w.why)
   FROM tunnel.scan_file f
   JOIN tunnel.survey s ON s.id = f.survey_id
@@ -20,11 +21,26 @@ SELECT 4 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, format
        (1, f.invalid, 0.0, 'a coordinate, their time or their intensity is no number'),
        (2, f.unposed, 0.0, 'the scanner''s position is not known'),
        (3, f.noise, 0.2, 'they count as noise; is the scan too sparse for load --noise-points?')) AS w (k, points, share, why)
- WHERE w.points > w.share * (f.points - f.outside);
+ WHERE w.points > w.share * (f.points - f.outside)
+ UNION ALL
+SELECT 8 * f.id::bigint + b.k, f.survey_id, s.name, NULL, 'load', f.name,
+       format('%s points (%s %%) lie %s of the given axis, up to %s m: they are not loaded, and nothing is looked for there',
+              b.points, round(100 * b.points / b.near::numeric, 1), b.side, b.reach)
+  FROM tunnel.scan_file f
+  JOIN tunnel.survey s ON s.id = f.survey_id
+ CROSS JOIN LATERAL (SELECT greatest(f.points - f.outside + f.beyond_before + f.beyond_after, 1) AS near) n
+ CROSS JOIN LATERAL (VALUES
+       (4, f.beyond_before, f.reach_before, n.near, 'beyond the beginning'),
+       (5, f.beyond_after, f.reach_after, n.near, 'beyond the end')) AS b (k, points, reach, near, side)
+ WHERE b.points > 0.01 * b.near
+ UNION ALL
+SELECT 8 * s.id::bigint + 6, s.id, s.name, NULL, 'survey', NULL, s.positions_note
+  FROM tunnel.survey s
+ WHERE s.positions_note IS NOT NULL;
 COMMENT ON VIEW tunnel_api.remark IS
-    'What a reader of the results is to know: notes of the stages by kilometre, and points that were left out by file';
-COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file';
-COMMENT ON COLUMN tunnel_api.remark.stage IS 'Stage that says so';
+    'What a reader of the results is to know: notes of the stages by kilometre, points that were left out by file, and what is to be known of the scanner positions';
+COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file, and for the survey as a whole';
+COMMENT ON COLUMN tunnel_api.remark.stage IS 'Stage that says so; survey for what was said when the survey was added or set';
 COMMENT ON COLUMN tunnel_api.remark.file IS 'Name of the scan file; NULL for a kilometre';
 COMMENT ON COLUMN tunnel_api.remark.remark IS 'What is to be known';
 
@@ -59,7 +75,9 @@ AS $$
     SELECT w.file, w.stage,
            ARRAY(SELECT h.km FROM here h
                   WHERE h.km IS NOT NULL AND (h.stage, h.remark) = (w.stage, w.remark) AND w.file IS NULL ORDER BY h.km),
-           w.remark, coalesce(w.file, format('km %s, %s', w.spans, w.stage)) || ': ' || w.remark
+           w.remark, 
+           coalesce(w.file, CASE WHEN w.spans <> '' THEN format('km %s, %s', w.spans, w.stage) END, 'scanner positions')
+               || ': ' || w.remark
       FROM whole w
      ORDER BY w.file NULLS LAST, w.first, w.stage, w.remark
 $$;

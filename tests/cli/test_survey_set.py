@@ -109,8 +109,11 @@ def test_poses_that_cannot_be_are_left_out_and_told(folder: Path, conn: psycopg.
     path = tmp_path / "poses.csv"
     np.savetxt(path, rows, "%.4f", ",", header="time,x,y,z", comments="")
     said = add(folder, "--intensity-kind", "none", trajectory=path).stderr
-    assert f"1 of {len(rows)} poses cannot be the scanner's, and are left out: the first in line {len(rows) // 2 + 2}" in said
+    assert f"1 of {len(rows)} poses left out, where no scanner can have been: the first in line {len(rows) // 2 + 2}" in said
     assert conn.execute("SELECT count(*) FROM tunnel.pose").fetchone() == (len(rows) - 1,)
+    # and every result says it
+    remarks = conn.execute("SELECT said FROM tunnel_api.remarks((SELECT id FROM tunnel.survey))").fetchall()
+    assert [text.partition(" poses")[0] for (text,) in remarks] == ["scanner positions: 1 of " + str(len(rows))]
 
 
 def test_a_station_that_cannot_be_is_refused_by_its_number(folder: Path, conn: psycopg.Connection, tmp_path: Path) -> None:

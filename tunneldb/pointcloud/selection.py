@@ -22,6 +22,7 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.misplacement import explain_misplacement
 from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.pointcloud.beyond_ends import BeyondEnds
 from tunneldb.pointcloud.chainage_lookup import STRETCHING, ChainageLookup
 from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.noise import DIAMETER, POINTS, is_noise, search_radii, typical_density
@@ -89,6 +90,10 @@ class FilterCounts:
         Least and greatest chainage of the points kept, m; infinite while there is none.
     extent : (6,) float64 array
         Least and greatest x, y, z of the points kept: x0, y0, z0, x1, y1, z1, m.
+    beyond : (int, int)
+        Of the points outside, those that lie before the beginning of the axis, and after its end, where the tunnel may go on.
+    beyond_reach : (float, float)
+        How far beyond nearly all of these lie, m.
     intensities : list of float32 arrays
         Raw intensities of some points near the axis.
     ranges : dict of int to list of (int, int)
@@ -106,6 +111,8 @@ class FilterCounts:
     chainage: tuple[float, float] = (math.inf, -math.inf)
     extent: Float = field(default_factory=lambda: np.array([np.inf] * 3 + [-np.inf] * 3))
     ranges: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
+    beyond: tuple[int, int] = (0, 0)
+    beyond_reach: tuple[float, float] = (0.0, 0.0)
     intensities: list[Single] = field(default_factory=list)
     density: float = 0.0
 
@@ -217,6 +224,7 @@ class _Filter:
         self.counts, self.cells = FilterCounts(), CellCounts()
         self.faults, self.invalid = PoseFaults(), ""
         self.places = ChainageLookup(alignment, settings.max_distance, self.cells.edge)
+        self.beyond = BeyondEnds(alignment, settings.max_distance)
         self.rows, self.cloud = Spool(memory // 2), Spool(memory // 2, PLACE)
 
     def __enter__(self) -> _Filter:
@@ -239,6 +247,7 @@ class _Filter:
                     if guess is None and len(some):
                         guess = explain_misplacement(some, vertices, self.settings.max_distance)
                 progress(len(points))
+        counts.beyond, counts.beyond_reach = self.beyond.points, self.beyond.reach
         for ranges in counts.ranges.values():
             ranges[-1] = (ranges[-1][0], min(ranges[-1][1], counts.points))
         if counts.outside and counts.outside + counts.invalid == counts.points:
@@ -257,7 +266,7 @@ class _Filter:
         for count, reason in ((counts.invalid, self.invalid), (counts.unposed, self.faults.text())):
             if count > self.settings.max_left_out * near or (nothing and count):
                 raise UserError(
-                    f"{self.path}: {reason} ({100.0 * count / near:.2g} % of the points near the axis; "
+                    f"{self.path}: {reason} ({100.0 * count / near:.3g} % of the points near the axis; "
                     f"--max-left-out {100.0 * self.settings.max_left_out:g} allows less)"
                 )
 
@@ -276,6 +285,7 @@ class _Filter:
         outside = self.places.outside(points, cell)
         self.counts.outside += len(outside)
         if len(outside):
+            self.beyond.add(points.xyz[outside])
             number, cell, points = self._drop(number, cell, points, outside)
         faults = self.poses.faults(points)
         if faults:

@@ -126,14 +126,16 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
     row = conn.execute(
         """
         INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, invalid, unposed,
-                                      thinned, kept, chainage_from, chainage_to, extent, srid)
-        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s)
+                                      thinned, kept, chainage_from, chainage_to, extent, srid,
+                                      beyond_before, beyond_after, reach_before, reach_after)
+        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s, %s, %s, %s, %s)
         ON CONFLICT (survey_id, name) DO UPDATE
            SET path = excluded.path, checksum = excluded.checksum, bytes = excluded.bytes, points = excluded.points,
                noise = excluded.noise, outside = excluded.outside, invalid = excluded.invalid, unposed = excluded.unposed,
                thinned = excluded.thinned, kept = 0,
                chainage_from = excluded.chainage_from, chainage_to = excluded.chainage_to, extent = excluded.extent,
-               srid = excluded.srid
+               srid = excluded.srid, beyond_before = excluded.beyond_before, beyond_after = excluded.beyond_after,
+               reach_before = excluded.reach_before, reach_after = excluded.reach_after
         RETURNING id
         """,
         [
@@ -151,6 +153,8 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
             *chainage,
             counts.extent.tolist(),
             content.srid,
+            *counts.beyond,
+            *counts.beyond_reach,
         ],
     ).fetchone()
     assert row is not None

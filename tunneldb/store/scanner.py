@@ -81,10 +81,11 @@ def read_positions(
         _require_near(paths, stations.xyz, alignment, tunnel)
         far = far_from_axis(stations.xyz, alignment)
         if far.any():
-            worst = int(np.argmax(far))
+            worst, more = int(np.argmax(far)), np.count_nonzero(far) - 1
+            others = f", and {more} more as far" if more else ""
             raise UserError(
                 f"{', '.join(map(str, paths))}: the station of scan_id {stations.scan_id[worst]} lies {far[worst]:.0f} m"
-                f" from the axis of {tunnel!r}, and {np.count_nonzero(far) - 1} others like it; no scanner stands more than"
+                f" from the axis of {tunnel!r}{others}; no scanner stands more than"
                 f" {FARTHEST_ASIDE:g} m aside of it or {FARTHEST_BEYOND:g} m beyond its ends: mend the position, or take the"
                 " row out, and the points of that scan are left out"
             )
@@ -106,7 +107,7 @@ def read_positions(
     if wild.any():
         first = int(np.argmax(wild))
         notes.append(
-            f"{np.count_nonzero(wild)} of {len(time)} poses cannot be the scanner's, and are left out: the first in line"
+            f"{np.count_nonzero(wild)} of {len(time)} poses left out, where no scanner can have been: the first in line"
             f" {table.lines[first]}, {f'{far[first]:.0f} m from the axis' if far[first] else 'a jump there and back'}"
         )
     time, xyz = time[~wild], xyz[~wild]
@@ -122,7 +123,9 @@ def read_positions(
 
 
 def save_positions(connection: psycopg.Connection[Any], survey: int, positions: Positions, srid: int) -> None:
-    """Write the positions of a survey, by its key, that has none."""
+    """Write the positions of a survey, by its key, that has none, and what is to be known of them."""
+    note = "; ".join(positions.notes) or None
+    connection.execute("UPDATE tunnel.survey SET positions_note = %s WHERE id = %s", [note, survey])
     if not len(positions):
         return
     table, key = ("pose", "time") if positions.mobile else ("station", "scan_id")

@@ -120,6 +120,9 @@ class Survey(Base):
         comment="Range curve: none, measured on a target (rows in reference) or auto, from the lining of each kilometre",
     )
     created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was added")
+    positions_note: Mapped[str | None] = mapped_column(
+        comment="What is to be known of its scanner positions: poses left out, gaps"
+    )
     settings_at: Mapped[dt.datetime | None] = mapped_column(
         comment="When scanner positions, reference or intensity were last set to others"
     )

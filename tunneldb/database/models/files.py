@@ -43,6 +43,18 @@ class ScanFile(Base):
     extent: Mapped[list[float] | None] = mapped_column(
         comment="Box of the kept points: xmin, ymin, zmin, xmax, ymax, zmax, tunnel's SRID, m"
     )
+    beyond_before: Mapped[int] = mapped_column(
+        BigInteger, server_default="0", comment="Of the points outside, those before the beginning of the given axis, drawn on"
+    )
+    beyond_after: Mapped[int] = mapped_column(
+        BigInteger, server_default="0", comment="Of the points outside, those after the end of the given axis, drawn on"
+    )
+    reach_before: Mapped[float] = mapped_column(
+        server_default="0", comment="How far before the beginning of the given axis nearly all of these lie, m"
+    )
+    reach_after: Mapped[float] = mapped_column(
+        server_default="0", comment="How far after the end of the given axis nearly all of these lie, m"
+    )
     srid: Mapped[int | None] = mapped_column(comment="Spatial reference that the file states, if it states one")
     loaded_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was loaded")
 

@@ -1,0 +1,60 @@
+"""Points that lie where a tunnel would go on beyond the ends of its given axis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tunneldb.arrays import Float, Int64
+from tunneldb.geometry.alignment import Alignment
+
+FARTHEST = 200  # m beyond an end that are looked at
+NEARLY_ALL = 0.99  # of the points there lie within what is called their reach, so that one stray does not make it
+
+
+class BeyondEnds:
+    """Points before the beginning and after the end of an axis, counted by metres.
+
+    Parameters
+    ----------
+    alignment : Alignment
+        The given axis, drawn on straight.
+    limit : float
+        Points farther than this from it lie elsewhere, m.
+    """
+
+    def __init__(self, alignment: Alignment, limit: float) -> None:
+        self.limit = limit
+        # Vertices stand at whole spacings, the first and the last beyond the line that was given.
+        line, chainage = alignment.vertices, alignment.number * alignment.spacing
+        self.ends = tuple(
+            (a + (b - a) * (end - at) / (next_ - at), (b - a) / np.linalg.norm(b - a))
+            for a, b, at, next_, end in (
+                (line[1], line[0], chainage[1], chainage[0], alignment.start),
+                (line[-2], line[-1], chainage[-2], chainage[-1], alignment.end),
+            )
+        )
+        self.metres: Int64 = np.zeros((2, FARTHEST), np.int64)
+
+    def add(self, xyz: Float) -> None:
+        """Count points (n, 3), m, of which it is known that they lie outside."""
+        for metres, (end, outwards) in zip(self.metres, self.ends, strict=True):
+            apart = xyz - end
+            beyond = apart @ outwards
+            aside = np.sqrt(np.maximum((apart**2).sum(axis=1) - beyond**2, 0.0))
+            held = (beyond > 0.0) & (beyond < FARTHEST) & (aside <= self.limit)
+            metres += np.bincount(beyond[held].astype(np.int64), minlength=FARTHEST)
+
+    @property
+    def points(self) -> tuple[int, int]:
+        """How many lie before the beginning, and how many after the end."""
+        return int(self.metres[0].sum()), int(self.metres[1].sum())
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """How far from there nearly all of them lie, m; 0 where there is none."""
+        before, after = (self._reach(metres) for metres in self.metres)
+        return before, after
+
+    def _reach(self, metres: Int64) -> float:
+        total = int(metres.sum())
+        return float(np.searchsorted(np.cumsum(metres), NEARLY_ALL * total)) + 1.0 if total else 0.0
