@@ -248,63 +248,63 @@
       <rule key="{tunneldb-3d-0}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 0" description="Member 8, 8, …">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
-          <material ambient="105,158,149,255" diffuse="49,73,69,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="176,211,206,255" diffuse="113,135,132,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="1" color="90,90,90,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-1}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 1" description="Member 1, 9, …">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
-          <material ambient="189,153,129,255" diffuse="88,71,60,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="230,209,193,255" diffuse="147,134,123,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="1" color="90,90,90,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-2}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 2" description="Member 2, 10, …">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
-          <material ambient="142,139,163,255" diffuse="66,65,76,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="202,200,215,255" diffuse="129,128,137,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="1" color="90,90,90,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-3}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 3" description="Member 3, 11, …">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
-          <material ambient="134,153,170,255" diffuse="62,71,79,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="196,209,219,255" diffuse="126,134,140,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="1" color="90,90,90,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-4}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 4" description="Member 4, 12, …">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
-          <material ambient="189,153,171,255" diffuse="88,71,80,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="229,209,219,255" diffuse="147,134,140,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="1" color="90,90,90,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-5}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 5" description="Member 5, 13, …">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
-          <material ambient="153,176,147,255" diffuse="71,82,68,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="208,222,205,255" diffuse="133,142,131,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="1" color="90,90,90,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-6}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 6" description="Member 6, 14, …">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
-          <material ambient="166,152,135,255" diffuse="77,71,62,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="216,208,197,255" diffuse="139,133,126,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="1" color="90,90,90,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-7}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 7" description="Member 7, 15, …">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
-          <material ambient="172,183,150,255" diffuse="80,85,70,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="220,226,207,255" diffuse="141,145,132,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="1" color="90,90,90,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-8}" filter="&quot;seen_share&quot; &lt; 0.5" description="Less than half of it could be judged">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
-          <material ambient="90,90,90,255" diffuse="42,42,42,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="164,164,164,255" diffuse="105,105,105,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="1" color="60,60,60,255"/>
         </symbol>
       </rule>

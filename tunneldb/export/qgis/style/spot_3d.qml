@@ -468,42 +468,42 @@
       <rule key="{tunneldb-3d-0}" filter="&quot;kind&quot; = 'dark' and &quot;review&quot; = 'open'" description="Dark, open">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="45,22,15,255" diffuse="21,10,7,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="119,87,72,255" diffuse="76,56,46,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="3" color="200,80,0,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-1}" filter="&quot;kind&quot; = 'dark' and &quot;review&quot; = 'confirmed'" description="Dark, confirmed">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="45,22,15,255" diffuse="21,10,7,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="119,87,72,255" diffuse="76,56,46,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="3" color="0,92,175,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-2}" filter="&quot;kind&quot; = 'dark' and &quot;review&quot; = 'rejected'" description="Dark, rejected">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="112,112,112,255" diffuse="52,52,52,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="181,181,181,255" diffuse="116,116,116,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="3" color="110,110,110,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-3}" filter="&quot;kind&quot; = 'bright' and &quot;review&quot; = 'open'" description="Bright, open">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="191,160,30,255" diffuse="89,74,14,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="230,213,99,255" diffuse="148,136,64,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="3" color="200,80,0,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-4}" filter="&quot;kind&quot; = 'bright' and &quot;review&quot; = 'confirmed'" description="Bright, confirmed">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="191,160,30,255" diffuse="89,74,14,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="230,213,99,255" diffuse="148,136,64,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="3" color="0,92,175,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-5}" filter="&quot;kind&quot; = 'bright' and &quot;review&quot; = 'rejected'" description="Bright, rejected">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="112,112,112,255" diffuse="52,52,52,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="181,181,181,255" diffuse="116,116,116,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="3" color="110,110,110,255"/>
         </symbol>
       </rule>
