@@ -52,7 +52,7 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     members = rows(text, "Members")
     assert [(row[0], row[7], row[10]) for row in members] == [
         ("1", "1", ""),
-        ("2", "1", "more than half differs; hardly judged"),
+        ("2", "1", "more than half differs"),
     ]
     assert "spot 2</td>" in text, "the record of edits knows it by its number"
 

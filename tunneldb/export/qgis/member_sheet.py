@@ -45,8 +45,9 @@ _COLUMNS: tuple[Column, ...] = (
     ("σ", 'format_number("contrast", 1)', 9, 2),
     ("Sure", "round(100 * \"confidence\") || ' %'", 10, 2),
     ("Review", '"review"', 17, 1),
-    ("Remark", cut('"remark"', 24), 32, 1),
+    ("Remark", cut('"remark"', "{0}"), 32, 1),
 )
+_LINE = 20  # letters that a line of a remark holds at the least
 _TABLE_WIDTH = sum(column[2] + 2 * CELL_MARGIN for column in _COLUMNS)
 _ON_MEMBER = f'"member" = {_MEMBER.format("number")} and "detected"'
 
@@ -166,5 +167,10 @@ def _spots(spots: tuple[str, str]) -> list[ET.Element]:
                     multiFrameTemplateUuid=own, hidePageIfEmpty=str(int(page > 0 and half == 0)), hideBackgroundIfEmpty="0",
                 )
             )  # fmt: skip
-    listed = table(MEMBERS, frames, spots, _COLUMNS, '"number"', rows, _ON_MEMBER, name="Spots")
-    return [*frames, listed]
+    count = _MEMBER.format("spots")
+    # The more spots there are, the less there is room for of their remarks.
+    letters = f"({_LINE} * max(1, floor({rows} / max({count}, 1))))"
+    columns = [(heading, expression.format(letters), width, align) for heading, expression, width, align in _COLUMNS]
+    text = f"[% if({count} > {rows}, '… and ' || ({count} - {rows}) || ' more spots: table of the report', '') %]"
+    more = label(MEMBERS, "more", text, (_MARGIN, _FOOT + 1, 150, 6), 11, page=PAGES - 1, bold=True)
+    return [*frames, table(MEMBERS, frames, spots, columns, '"number"', rows, _ON_MEMBER, name="Spots"), more]

@@ -14,6 +14,13 @@
     </rules>
     <symbols>
       <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
             <Option type="QString" name="color" value="141,211,199,150"/>
@@ -25,8 +32,17 @@
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
         </layer>
+          </symbol>
+        </layer>
       </symbol>
       <symbol name="1" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
             <Option type="QString" name="color" value="253,205,172,150"/>
@@ -38,8 +54,17 @@
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
         </layer>
+          </symbol>
+        </layer>
       </symbol>
       <symbol name="2" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
             <Option type="QString" name="color" value="190,186,218,150"/>
@@ -51,8 +76,17 @@
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
         </layer>
+          </symbol>
+        </layer>
       </symbol>
       <symbol name="3" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
             <Option type="QString" name="color" value="179,205,227,150"/>
@@ -64,8 +98,17 @@
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
         </layer>
+          </symbol>
+        </layer>
       </symbol>
       <symbol name="4" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
             <Option type="QString" name="color" value="252,205,229,150"/>
@@ -77,8 +120,17 @@
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
         </layer>
+          </symbol>
+        </layer>
       </symbol>
       <symbol name="5" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
             <Option type="QString" name="color" value="204,235,197,150"/>
@@ -90,8 +142,17 @@
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
         </layer>
+          </symbol>
+        </layer>
       </symbol>
       <symbol name="6" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
             <Option type="QString" name="color" value="222,203,180,150"/>
@@ -103,8 +164,17 @@
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
         </layer>
+          </symbol>
+        </layer>
       </symbol>
       <symbol name="7" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
             <Option type="QString" name="color" value="230,245,201,150"/>
@@ -116,8 +186,17 @@
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
         </layer>
+          </symbol>
+        </layer>
       </symbol>
       <symbol name="8" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
             <Option type="QString" name="color" value="120,120,120,120"/>
@@ -128,6 +207,8 @@
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
+        </layer>
+          </symbol>
         </layer>
       </symbol>
     </symbols>
