@@ -147,7 +147,7 @@ BEGIN
         EXECUTE format('CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.%I FOR EACH ROW EXECUTE FUNCTION'
                        ' tunnel_api.review_finding(''anomaly'', ''a leak or another anomaly'', ''leak'', ''joint'', ''dark'')', name);
     END LOOP;
-    FOREACH name IN ARRAY ARRAY['spot', 'spot_face', 'spot_map', 'spot_3d'] LOOP
+    FOREACH name IN ARRAY ARRAY['spot', 'spot_face', 'spot_map', 'spot_3d', 'spot_sheet'] LOOP
         EXECUTE format('CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.%I FOR EACH ROW EXECUTE FUNCTION'
                        ' tunnel_api.review_finding(''spot'', ''a spot'')', name);
     END LOOP;

@@ -1,5 +1,6 @@
 -- Views of structures: members, faces, and spots that differ from their own surface (Ono et al.). A spot has three geometries,
--- each with a view of its own for QGIS: in its face's own plane (SRID 0), on the map and in space. finding has leaks and
+-- each with a view of its own for QGIS: in its face's own plane (SRID 0), on the map and in space. A fourth view has those of
+-- the face laid out to be drawn, member below member, as *_sheet has members and faces. finding has leaks and
 -- spots together. Needs stationing (geometry/stationing.sql) and views/anomaly.sql.
 
 -- What members of a survey are found from: its files' checksums by name, and when its settings were last changed. A search is up
@@ -76,58 +77,6 @@ SELECT p.id, p.survey_id, s.name AS survey, p.number, m.number AS member, m.kind
 COMMENT ON VIEW tunnel_api.spot IS
     'Spots on members that are darker or brighter than their own surface, with three geometries; review and remark can be updated';
 
--- The views of one geometry, and the comments on the columns of all four.
-DO $$
-DECLARE
-    shown record;
-    comment record;
-    others text;
-BEGIN
-    SELECT string_agg(quote_ident(attname), ', ' ORDER BY attnum) INTO others
-      FROM pg_attribute
-     WHERE attrelid = 'tunnel_api.spot'::regclass AND attnum > 0 AND attname NOT IN ('outline', 'map', 'surface');
-    FOR shown IN SELECT * FROM (VALUES
-        ('spot_face', 'outline', 'in their face''s own plane, SRID 0'),
-        ('spot_map', 'map', 'on the map, in the tunnel''s SRID'),
-        ('spot_3d', 'surface', 'in space, in the tunnel''s SRID')) AS g (view, geometry, text)
-    LOOP
-        EXECUTE format('CREATE OR REPLACE VIEW tunnel_api.%I AS SELECT %s, %I AS geom FROM tunnel_api.spot',
-                       shown.view, others, shown.geometry);
-        EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.geom IS %L', shown.view, initcap(left(shown.text, 1)) || substr(shown.text, 2));
-        EXECUTE format('COMMENT ON VIEW tunnel_api.%I IS %L', shown.view,
-                       'Spots ' || shown.text || '; review and remark can be updated');
-    END LOOP;
-    FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
-        ('number', 'Its number in the tunnel or site: the same in the next survey'),
-        ('member', 'Number of the member that it is on; NULL where the last run found it no more'),
-        ('member_kind', 'flat or pipe'),
-        ('face', 'Number of its face'),
-        ('kind', 'dark or bright, against its own surface; what caused it, the inspector says'),
-        ('chainage', 'Chainage of its middle, m; NULL of a site or beyond the sections'),
-        ('label', 'Station of its middle, as 12+345.678'),
-        ('reasons', 'What speaks for it or against it'),
-        ('confidence', 'How sure detection is that it differs, 0-1'),
-        ('contrast', 'Mean difference from its surface, in standard deviations of that'),
-        ('difference', 'Mean difference from its surface, dB'),
-        ('area', 'Area on its face, m²'),
-        ('points', 'Points of the scans on it'),
-        ('scans', 'Scans that saw it'),
-        ('review', 'open, confirmed or rejected'),
-        ('reviewed_by', 'Who reviewed it last, set by the database'),
-        ('reviewed_at', 'When it was reviewed last, set by the database'),
-        ('remark', 'The reviewer''s remark'),
-        ('detected', 'False when the last run found it no more (kept for its review)'),
-        ('counted', 'Whether sums count it: found last, and not rejected')) AS t (name, text)
-      JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
-      JOIN pg_class c ON c.oid = a.attrelid
-     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v'
-       AND c.relname IN ('spot', 'spot_face', 'spot_map', 'spot_3d')
-    LOOP
-        EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', comment.view, comment."column", comment.text);
-    END LOOP;
-END
-$$;
-
 CREATE OR REPLACE VIEW tunnel_api.member_statistics AS
 SELECT m.id, m.survey_id, s.name AS survey, m.number, m.kind, m.length, m.chainage,
        a.faces, m.area, a.seen_area / nullif(m.area, 0) AS seen_share, m.bimodal,
@@ -154,6 +103,203 @@ COMMENT ON COLUMN tunnel_api.member_statistics.dark_area IS 'Area of those that 
 COMMENT ON COLUMN tunnel_api.member_statistics.bright_area IS 'Area of those that are brighter, m²';
 COMMENT ON COLUMN tunnel_api.member_statistics.spot_share IS 'Share of what could be judged that differs, 0 to 1';
 COMMENT ON COLUMN tunnel_api.member_statistics.geom IS 'Its middle line, in the tunnel''s SRID';
+
+-- Products of vectors in space, as arrays of three numbers.
+CREATE OR REPLACE FUNCTION tunnel_api.dot(a float8[], b float8[]) RETURNS float8
+LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
+RETURN a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+COMMENT ON FUNCTION tunnel_api.dot(float8[], float8[]) IS 'Inner product of two vectors in space';
+
+CREATE OR REPLACE FUNCTION tunnel_api.cross_product(a float8[], b float8[]) RETURNS float8[]
+LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
+RETURN ARRAY[a[2] * b[3] - a[3] * b[2], a[3] * b[1] - a[1] * b[3], a[1] * b[2] - a[2] * b[1]];
+COMMENT ON FUNCTION tunnel_api.cross_product(float8[], float8[]) IS 'Vector product of two vectors in space';
+
+-- A spot lies on its face, and of two surfaces in one place a 3D view shows now the one, now the other.
+CREATE OR REPLACE VIEW tunnel_api.face_3d AS
+SELECT f.id, f.survey_id, s.name AS survey, m.number AS member, f.number, f.kind, f.radius, f.area, f.seen_share, f.bimodal,
+       CASE WHEN f.kind = 'flat' THEN public.st_translate(f.surface, -0.01 * f.axis[1], -0.01 * f.axis[2], -0.01 * f.axis[3])
+            ELSE public.st_affine(f.surface,
+                     k.k + (1 - k.k) * f.axis[1] * f.axis[1], (1 - k.k) * f.axis[1] * f.axis[2], (1 - k.k) * f.axis[1] * f.axis[3],
+                     (1 - k.k) * f.axis[2] * f.axis[1], k.k + (1 - k.k) * f.axis[2] * f.axis[2], (1 - k.k) * f.axis[2] * f.axis[3],
+                     (1 - k.k) * f.axis[3] * f.axis[1], (1 - k.k) * f.axis[3] * f.axis[2], k.k + (1 - k.k) * f.axis[3] * f.axis[3],
+                     (1 - k.k) * (f.origin[1] - k.along * f.axis[1]), (1 - k.k) * (f.origin[2] - k.along * f.axis[2]),
+                     (1 - k.k) * (f.origin[3] - k.along * f.axis[3]))
+       END::public.geometry AS geom
+  FROM tunnel.face f
+  JOIN tunnel.member m ON m.id = f.member_id
+  JOIN tunnel.survey s ON s.id = f.survey_id
+ CROSS JOIN LATERAL (SELECT 1 + CASE WHEN f.inside THEN 1 ELSE -1 END * least(0.01 / f.radius, 0.25) AS k,
+                            tunnel_api.dot(f.origin, f.axis) AS along) k;
+COMMENT ON VIEW tunnel_api.face_3d IS
+    'Faces in space, to be drawn: 1 cm behind where they are, of a thin pipe a quarter of its radius, so that spots are seen before them';
+COMMENT ON COLUMN tunnel_api.face_3d.member IS 'Number of the member that it belongs to';
+COMMENT ON COLUMN tunnel_api.face_3d.number IS 'Its number in the survey';
+COMMENT ON COLUMN tunnel_api.face_3d.kind IS 'flat (a plane) or pipe (a part of a cylinder)';
+COMMENT ON COLUMN tunnel_api.face_3d.radius IS 'Radius of a pipe, m; NULL of a plane';
+COMMENT ON COLUMN tunnel_api.face_3d.area IS 'Area within its outline, m²';
+COMMENT ON COLUMN tunnel_api.face_3d.seen_share IS 'Share of it that could be judged, 0 to 1';
+COMMENT ON COLUMN tunnel_api.face_3d.bimodal IS 'Whether more than half of it differs, so that nobody knows which half is its own';
+COMMENT ON COLUMN tunnel_api.face_3d.geom IS 'Its outline in space, in the tunnel''s SRID, behind where it is';
+
+-- How the faces of a survey are laid out on one plane to be drawn (SRID 0, m), member below member, so that no two lie on each
+-- other. The faces of a member lie there as they do in its plane or, of a pipe, about its axis: in the frame of its largest
+-- face, which goes over into the drawing by a rotation, a shift and, of a pipe seen from outside, a reflection, for u, v and
+-- the direction to the scanner are a right-handed frame in planes and in pipes seen from inside only. Each member has a cell of
+-- the proportions of the strip on its page (277 mm by 110 mm) with a margin of a twentieth. A window function is counted by
+-- survey and its name, so that a condition on either reaches the tables.
+CREATE OR REPLACE VIEW tunnel_api.face_placement AS
+WITH placed AS NOT MATERIALIZED (
+    SELECT f.id, f.survey_id, s.name AS survey, f.member_id, m.number, f.outline, t.*
+      FROM tunnel.face f
+      JOIN tunnel.member m ON m.id = f.member_id
+      JOIN tunnel.survey s ON s.id = f.survey_id
+     CROSS JOIN LATERAL (SELECT g.origin, g.axis, g.across, tunnel_api.cross_product(g.axis, g.across) AS other, g.radius, g.inside
+                           FROM tunnel.face g WHERE g.member_id = m.id ORDER BY g.area DESC, g.id LIMIT 1) b
+     CROSS JOIN LATERAL (SELECT ARRAY[f.origin[1] - b.origin[1], f.origin[2] - b.origin[2], f.origin[3] - b.origin[3]] AS shift,
+                                tunnel_api.cross_product(f.axis, f.across) AS other,
+                                CASE WHEN tunnel_api.dot(f.axis, b.axis) < 0 THEN -1.0 ELSE 1.0 END AS way,
+                                CASE WHEN b.inside THEN 1.0 ELSE -1.0 END AS side) o
+     CROSS JOIN LATERAL (
+            SELECT tunnel_api.dot(f.across, b.across) AS xx, tunnel_api.dot(o.other, b.across) AS xy,
+                   tunnel_api.dot(f.across, b.other) AS yx, tunnel_api.dot(o.other, b.other) AS yy,
+                   tunnel_api.dot(o.shift, b.across) AS x, tunnel_api.dot(o.shift, b.other) AS y
+             WHERE m.kind = 'flat'
+             UNION ALL
+            SELECT o.way, 0.0, 0.0, o.side * o.way, tunnel_api.dot(o.shift, b.axis),
+                   o.side * b.radius * atan2(tunnel_api.dot(f.across, b.other), tunnel_api.dot(f.across, b.across))
+             WHERE m.kind = 'pipe') t
+), boxed AS (
+    SELECT p.member_id, p.survey_id, p.survey, p.number,
+           public.st_extent(public.st_affine(p.outline, p.xx, p.xy, p.yx, p.yy, p.x, p.y)) AS box
+      FROM placed p
+     GROUP BY p.member_id, p.survey_id, p.survey, p.number
+), sized AS (
+    SELECT b.*, (public.st_xmin(b.box) + public.st_xmax(b.box)) / 2 AS x, (public.st_ymin(b.box) + public.st_ymax(b.box)) / 2 AS y,
+           1.1 * greatest(public.st_xmax(b.box) - public.st_xmin(b.box),
+                          (public.st_ymax(b.box) - public.st_ymin(b.box)) * 277 / 110) AS width
+      FROM boxed b
+), cell AS (
+    SELECT z.*, sum(z.width) OVER (PARTITION BY z.survey_id, z.survey ORDER BY z.number) * 110 / 277 AS depth FROM sized z
+)
+SELECT p.id, p.survey_id, p.survey, p.member_id, p.xx, p.xy, p.yx, p.yy,
+       p.x - c.x + c.width / 2 AS x, p.y - c.y - c.depth + c.width * 55 / 277 AS y,
+       public.st_makeenvelope(0, -c.depth, c.width, c.width * 110 / 277 - c.depth, 0) AS cell
+  FROM placed p
+  JOIN cell c ON c.member_id = p.member_id AND c.survey_id = p.survey_id AND c.survey = p.survey;
+COMMENT ON VIEW tunnel_api.face_placement IS
+    'How faces are laid out on one plane to be drawn, member below member: drawn x = xx u + xy v + x, y = yx u + yy v + y';
+COMMENT ON COLUMN tunnel_api.face_placement.id IS 'Key of the face';
+COMMENT ON COLUMN tunnel_api.face_placement.member_id IS 'Key of its member';
+COMMENT ON COLUMN tunnel_api.face_placement.xx IS 'Of its unrolled u in the drawn x';
+COMMENT ON COLUMN tunnel_api.face_placement.xy IS 'Of its unrolled v in the drawn x';
+COMMENT ON COLUMN tunnel_api.face_placement.yx IS 'Of its unrolled u in the drawn y';
+COMMENT ON COLUMN tunnel_api.face_placement.yy IS 'Of its unrolled v in the drawn y';
+COMMENT ON COLUMN tunnel_api.face_placement.x IS 'Drawn x of its unrolled origin, m';
+COMMENT ON COLUMN tunnel_api.face_placement.y IS 'Drawn y of its unrolled origin, m';
+COMMENT ON COLUMN tunnel_api.face_placement.cell IS 'Rectangle that its member is drawn in; SRID 0, m';
+
+CREATE OR REPLACE VIEW tunnel_api.member_sheet AS
+SELECT m.id, m.survey_id, m.survey, m.number, m.kind, m.length, m.chainage,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, m.chainage) l) AS label,
+       m.faces, m.area, m.seen_share, m.bimodal, m.spots, m.dark_area, m.bright_area, m.spot_share,
+       c.cell::public.geometry(Polygon, 0) AS geom
+  FROM tunnel_api.member_statistics m
+  JOIN tunnel.survey s ON s.id = m.survey_id
+  JOIN (SELECT DISTINCT p.survey_id, p.survey, p.member_id, p.cell FROM tunnel_api.face_placement p) c
+    ON c.member_id = m.id AND c.survey_id = m.survey_id AND c.survey = m.survey;
+COMMENT ON VIEW tunnel_api.member_sheet IS 'Pages of members: where each is drawn, its faces unrolled, with what could be judged of it';
+COMMENT ON COLUMN tunnel_api.member_sheet.number IS 'Its number in the survey';
+COMMENT ON COLUMN tunnel_api.member_sheet.kind IS 'flat or pipe';
+COMMENT ON COLUMN tunnel_api.member_sheet.length IS 'Length along its line, gaps counted, m';
+COMMENT ON COLUMN tunnel_api.member_sheet.chainage IS 'Chainage of its middle, m; NULL of a site or beyond the sections';
+COMMENT ON COLUMN tunnel_api.member_sheet.label IS 'Station of its middle, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.member_sheet.faces IS 'Its faces';
+COMMENT ON COLUMN tunnel_api.member_sheet.area IS 'Area of its faces, m²';
+COMMENT ON COLUMN tunnel_api.member_sheet.seen_share IS 'Share of that which could be judged, 0 to 1';
+COMMENT ON COLUMN tunnel_api.member_sheet.bimodal IS 'Whether so much of it differs from the rest that neither is known to be its own surface';
+COMMENT ON COLUMN tunnel_api.member_sheet.spots IS 'Spots on it that count';
+COMMENT ON COLUMN tunnel_api.member_sheet.dark_area IS 'Area of those that are darker, m²';
+COMMENT ON COLUMN tunnel_api.member_sheet.bright_area IS 'Area of those that are brighter, m²';
+COMMENT ON COLUMN tunnel_api.member_sheet.spot_share IS 'Share of what could be judged that differs, 0 to 1';
+COMMENT ON COLUMN tunnel_api.member_sheet.geom IS 'Rectangle that it is drawn in; SRID 0, m';
+
+CREATE OR REPLACE VIEW tunnel_api.face_sheet AS
+SELECT f.id, f.survey_id, p.survey, m.number AS member, f.number, f.kind, f.radius, f.area, f.seen_share, f.bimodal,
+       public.st_affine(f.outline, p.xx, p.xy, p.yx, p.yy, p.x, p.y)::public.geometry(MultiPolygon, 0) AS geom
+  FROM tunnel_api.face_placement p
+  JOIN tunnel.face f ON f.id = p.id
+  JOIN tunnel.member m ON m.id = p.member_id;
+COMMENT ON VIEW tunnel_api.face_sheet IS 'Faces unrolled, member below member, as seen from the scanner''s side';
+COMMENT ON COLUMN tunnel_api.face_sheet.member IS 'Number of the member that it belongs to';
+COMMENT ON COLUMN tunnel_api.face_sheet.number IS 'Its number in the survey';
+COMMENT ON COLUMN tunnel_api.face_sheet.kind IS 'flat (a plane) or pipe (a part of a cylinder)';
+COMMENT ON COLUMN tunnel_api.face_sheet.radius IS 'Radius of a pipe, m; NULL of a plane';
+COMMENT ON COLUMN tunnel_api.face_sheet.area IS 'Area within its outline, m²';
+COMMENT ON COLUMN tunnel_api.face_sheet.seen_share IS 'Share of it that could be judged, 0 to 1';
+COMMENT ON COLUMN tunnel_api.face_sheet.bimodal IS 'Whether more than half of it differs, so that nobody knows which half is its own';
+COMMENT ON COLUMN tunnel_api.face_sheet.geom IS 'Its outline where it is drawn; SRID 0, m';
+
+-- The views of one geometry, and the comments on the columns of all five.
+DO $$
+DECLARE
+    shown record;
+    comment record;
+    others text;
+BEGIN
+    SELECT string_agg(quote_ident(attname), ', ' ORDER BY attnum) INTO others
+      FROM pg_attribute
+     WHERE attrelid = 'tunnel_api.spot'::regclass AND attnum > 0 AND attname NOT IN ('outline', 'map', 'surface');
+    FOR shown IN SELECT * FROM (VALUES
+        ('spot_face', 'outline', 'in their face''s own plane, SRID 0'),
+        ('spot_map', 'map', 'on the map, in the tunnel''s SRID'),
+        ('spot_3d', 'surface', 'in space, in the tunnel''s SRID')) AS g (view, geometry, text)
+    LOOP
+        EXECUTE format('CREATE OR REPLACE VIEW tunnel_api.%I AS SELECT %s, %I AS geom FROM tunnel_api.spot',
+                       shown.view, others, shown.geometry);
+        EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.geom IS %L', shown.view, initcap(left(shown.text, 1)) || substr(shown.text, 2));
+        EXECUTE format('COMMENT ON VIEW tunnel_api.%I IS %L', shown.view,
+                       'Spots ' || shown.text || '; review and remark can be updated');
+    END LOOP;
+    EXECUTE format('CREATE OR REPLACE VIEW tunnel_api.spot_sheet AS SELECT %s, public.st_affine(q.outline, f.xx, f.xy, f.yx, f.yy, f.x,'
+                   ' f.y)::public.geometry(Polygon, 0) AS geom'
+                   ' FROM tunnel_api.spot q JOIN tunnel.spot r ON r.id = q.id'
+                   ' JOIN tunnel_api.face_placement f ON f.id = r.face_id AND f.survey = q.survey AND f.survey_id = q.survey_id',
+                   (SELECT string_agg('q.' || quote_ident(attname), ', ' ORDER BY attnum) FROM pg_attribute
+                     WHERE attrelid = 'tunnel_api.spot'::regclass AND attnum > 0 AND attname NOT IN ('outline', 'map', 'surface')));
+    COMMENT ON VIEW tunnel_api.spot_sheet IS
+        'Spots on the faces unrolled, member below member, where face_sheet draws these; review and remark can be updated';
+    COMMENT ON COLUMN tunnel_api.spot_sheet.geom IS 'Its outline where it is drawn; SRID 0, m';
+    FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
+        ('number', 'Its number in the tunnel or site: the same in the next survey'),
+        ('member', 'Number of the member that it is on; NULL where the last run found it no more'),
+        ('member_kind', 'flat or pipe'),
+        ('face', 'Number of its face'),
+        ('kind', 'dark or bright, against its own surface; what caused it, the inspector says'),
+        ('chainage', 'Chainage of its middle, m; NULL of a site or beyond the sections'),
+        ('label', 'Station of its middle, as 12+345.678'),
+        ('reasons', 'What speaks for it or against it'),
+        ('confidence', 'How sure detection is that it differs, 0-1'),
+        ('contrast', 'Mean difference from its surface, in standard deviations of that'),
+        ('difference', 'Mean difference from its surface, dB'),
+        ('area', 'Area on its face, m²'),
+        ('points', 'Points of the scans on it'),
+        ('scans', 'Scans that saw it'),
+        ('review', 'open, confirmed or rejected'),
+        ('reviewed_by', 'Who reviewed it last, set by the database'),
+        ('reviewed_at', 'When it was reviewed last, set by the database'),
+        ('remark', 'The reviewer''s remark'),
+        ('detected', 'False when the last run found it no more (kept for its review)'),
+        ('counted', 'Whether sums count it: found last, and not rejected')) AS t (name, text)
+      JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
+      JOIN pg_class c ON c.oid = a.attrelid
+     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v'
+       AND c.relname IN ('spot', 'spot_face', 'spot_map', 'spot_3d', 'spot_sheet')
+    LOOP
+        EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', comment.view, comment."column", comment.text);
+    END LOOP;
+END
+$$;
 
 CREATE OR REPLACE VIEW tunnel_api.finding AS
 SELECT 2 * l.id AS id, 'leak' AS finding, l.id AS row_id, l.survey_id, l.survey, l.id AS number, l.kind,

@@ -2,7 +2,7 @@
 
 Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK [LAYER [KIND]]
        | draw KIND | add VIEW | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG
-       | atlas PDF | preview | where CHAINAGE ARC | labels LAYER | space [PNG]
+       | atlas PDF [LAYOUT] | preview | where CHAINAGE ARC | labels LAYER | space [PNG]
 """
 
 from __future__ import annotations
@@ -120,9 +120,9 @@ def draw_layer(project: QgsProject, layer_id: str, box: str, path: str) -> dict[
     return _paint(settings, QgsRectangle(*map(float, box.split(","))), path)
 
 
-def atlas(project: QgsProject, path: str) -> dict[str, Any]:
-    """Print the inspection sheets to one PDF."""
-    layout = project.layoutManager().layoutByName("Inspection sheets")
+def atlas(project: QgsProject, path: str, name: str = "Inspection sheets") -> dict[str, Any]:
+    """Print the pages of an atlas to one PDF."""
+    layout = project.layoutManager().layoutByName(name)
     sheets = layout.atlas()
     settings = QgsLayoutExporter.PdfExportSettings()
     wanted = int(layout.customProperty("pdfTextFormat"))  # as the dialogue takes it from there

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
 import re
 import shutil
 import subprocess
@@ -11,7 +9,6 @@ import unicodedata
 import warnings
 import zipfile
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +22,13 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from rasterio.errors import NotGeoreferencedWarning
 from support.example_survey import LEAKS, example_surface, without_intensity
+from support.qgis import ENVIRONMENT, PYTHON, SCRIPT, act
 from support.system import missing
 
 from tunneldb.classification.classes import PointClass
 from tunneldb.cli.main import main
 from tunneldb.export.images.palette import COLOURS, PALETTES, hexadecimal
-
-SCRIPT = Path(__file__).with_name("open_in_qgis.py")
-PYTHON = "/usr/bin/python3"
-ENVIRONMENT = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "LC_ALL": "C.UTF-8", "PYTHONPATH": ""}
+from tunneldb.export.qgis.layer import STRUCTURE_LAYERS
 
 ON_MAP = {
     "axis": "LineStringZ",
@@ -57,15 +52,6 @@ NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet"}
 STYLED = {*ON_MAP, *UNROLLED} - {"leak_sheet"}
 
 
-@cache
-def has_qgis() -> bool:
-    try:
-        found = subprocess.run([PYTHON, "-c", "import qgis.core, qgis._3d"], env=ENVIRONMENT, capture_output=True, check=False)
-    except FileNotFoundError:
-        return False
-    return found.returncode == 0
-
-
 @pytest.fixture(scope="session")
 def template(example_template: str) -> str:
     return example_template
@@ -75,23 +61,6 @@ def write(output: Path | None, *options: str, dsn: str | None = None) -> Result:
     where = [] if dsn is None else ["--dsn", dsn]
     file = [] if output is None else ["-o", str(output)]
     return CliRunner().invoke(main, [*where, "qgis", "demo-2024", *file, *options])
-
-
-def act(project: Path | str, *arguments: str, before: tuple[str, ...] = (), **environment: str) -> dict[str, Any]:
-    """Run an action on a project in QGIS, by a command if one is to stand before it."""
-    if not has_qgis():
-        missing("QGIS")
-    done = subprocess.run(
-        [*before, PYTHON, str(SCRIPT), str(project), *arguments],
-        env=ENVIRONMENT | environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    result = json.loads(done.stdout.splitlines()[-1])
-    assert isinstance(result, dict)
-    return result
 
 
 @pytest.fixture(scope="module")
@@ -535,7 +504,8 @@ def test_styles_have_one_default_a_layer_and_are_replaced(conn: psycopg.Connecti
     first = styles()
     assert {(row[0], row[1]) for row in first} == {
         *((name, "geom") for name in STYLED), ("leak", "unrolled"), ("leak", "map"), ("leak", "surface"),
-        ("anomaly", "unrolled"), ("anomaly", "map"),
+        ("anomaly", "unrolled"), ("anomaly", "map"), ("spot", "map"), ("spot", "surface"),
+        *((layer.view, "geom") for layer in STRUCTURE_LAYERS), ("spot_face", "geom"),
     }  # fmt: skip
     assert all(row[2:] == (1, 1, True) for row in first)
     conn.execute(

@@ -15,6 +15,7 @@ from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.images.image import export_filled, export_kilometre, image_kilometres
 from tunneldb.export.qgis import store_project, store_styles, write_project
+from tunneldb.export.tables.spots import read_spots
 from tunneldb.files import make_folder
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
@@ -48,6 +49,9 @@ def qgis(
 ) -> None:
     """Write a QGIS project of SURVEY: map, unrolled lining, 3D and inspection sheets, with styled layers.
 
+    Where members of structures were found, they are in it, with their faces and spots on the map, in space and unrolled, and an
+    atlas with a page for each; of a site they are all that there is.
+
     Leaks can be reviewed and axis vertices moved in it. Without intensity it shows the offset, over the same with gaps between
     profiles up to 0.6 m apart filled. The styles also go into the database, where QGIS finds them
     for layers that are added by hand. A project in the database holds the images by their absolute paths.
@@ -59,10 +63,11 @@ def qgis(
     if output is not None and not output.parent.is_dir():
         raise UserError(f"{output}: there is no folder {output.parent}")
     with connect(settings.dsn) as conn:
-        found = get_survey(conn, survey)
-        coverage, remarks = read_coverage(conn, found), read_remarks(conn, found)
+        found = get_survey(conn, survey, site=True)
+        coverage = None if found.site else read_coverage(conn, found)
+        spots, remarks = read_spots(conn, found), read_remarks(conn, found)
         beside = Path(f"{found.name}-images") if output is None else output.with_name(f"{output.stem}-images")
-        images = _export_images(conn, found, folder or beside)
+        images = [] if found.site else _export_images(conn, found, folder or beside)
         written = []
         if output is not None:
             write_project(conn, found, output, images, service)
@@ -73,7 +78,10 @@ def qgis(
         styles = _store_styles(conn)
         socket = conn.info.host.startswith("/")
     tell(survey=survey, written=written, images=images, styles=styles)
-    say_coverage(coverage, found)
+    if coverage is not None:
+        say_coverage(coverage, found)
+    if spots.statement and (found.site or spots.face_area):
+        click.echo(f"survey {survey}: {spots.statement}", err=True)
     say_remarks(remarks, found)
     click.echo(f"{', '.join(written)}: {len(images)} images, {styles}", err=True)
     if settings.dsn is None and service is None:

@@ -17,7 +17,7 @@ from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import replacing, told_to_end
-from tunneldb.report.page import CARDS, write_html
+from tunneldb.report.page import CARDS, write_html, write_site_html
 from tunneldb.report.pdf import find_browser, print_pdf
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.survey import Survey, get_survey
@@ -47,7 +47,9 @@ def report(settings: Settings, survey: str, output: Path, start: str | None, end
 
     It says first where leaks could be missed: what was not searched for them, is out of date or was hardly seen. It states
     what was scanned and how much of the lining was seen, class of waterproofing, the unrolled lining with its
-    leaks, each leak with picture and cross-section, statistics, parameters and versions, and who reviewed what.
+    leaks, each leak with picture and cross-section, statistics, parameters and versions, and who reviewed what. Where members
+    of structures were found, a chapter states what of them could be judged, their spots, and each member's faces unrolled; of a
+    site that is all.
 
     The HTML file is whole in itself: it asks nothing of the network. Its table of leaks can be sorted and searched, and it
     prints on A4. The PDF is what it prints; of pictures of single leaks it holds those of the 400 largest. It is printed by
@@ -58,7 +60,11 @@ def report(settings: Settings, survey: str, output: Path, start: str | None, end
         raise UserError(f"{output}: a report ends in .html or .pdf")
     browser = find_browser() if suffix == ".pdf" else None
     with connect(settings.dsn) as conn:
-        found = get_survey(conn, survey)
+        found = get_survey(conn, survey, site=True)
+        if found.site:
+            conn.rollback()
+            _write_site(conn, found, output, browser, start or end)
+            return
         stretch = parse_stretch(conn, found, start, end)
         coverage = read_coverage(conn, found, stretch.low, stretch.high)
         conn.rollback()
@@ -75,6 +81,25 @@ def report(settings: Settings, survey: str, output: Path, start: str | None, end
     say_coverage(coverage, found)
     sought = leaks or coverage.searched_share
     click.echo(f"{output}: {leaks} leaks" if sought else f"{output}: leaks were not searched for", err=True)
+
+
+def _write_site(conn: psycopg.Connection, survey: Survey, output: Path, browser: str | None, asked: str | None) -> None:
+    """Write the report of a site, of which structures are all there is, and say what it counts."""
+    if asked:
+        raise UserError(f"{asked}: survey {survey.name} is of a site, which has no chainage: leave --from and --to out")
+    with told_to_end(), replacing(output) as temporary, bar("reports") as shown:
+        if browser is None:
+            spots = write_site_html(conn, survey, temporary)
+        else:
+            with tempfile.TemporaryDirectory(prefix="tunneldb-report-") as folder:
+                page = Path(folder) / "report.html"
+                task = shown.add_task(f"report of {survey.name}", total=1)
+                spots = write_site_html(conn, survey, page)
+                shown.update(task, completed=1)
+                conn.close()
+                _print(browser, page, temporary, shown)
+    tell(survey=survey.name, file=output, spots=spots, bytes=output.stat().st_size)
+    click.echo(f"{output}: {spots} spots", err=True)
 
 
 def _write(conn: psycopg.Connection, survey: Survey, stretch: Stretch, page: Path, shown: Progress, *, paper: bool) -> int:

@@ -193,6 +193,25 @@ def read_files(conn: psycopg.Connection[Any], survey: Survey, low: float, high: 
     )
 
 
+def read_files_of_site(conn: psycopg.Connection[Any], survey: Survey) -> list[Row]:
+    """Read the scan files of a survey of a site."""
+    return _rows(
+        conn,
+        "SELECT name, checksum, bytes, points, loaded_at FROM tunnel_api.file WHERE survey_id = %s ORDER BY name",
+        [survey.id],
+    )
+
+
+def read_member_runs(conn: psycopg.Connection[Any], survey: Survey) -> list[Row]:
+    """Read how members were last found: when, with which versions, and what was counted."""
+    return _rows(
+        conn,
+        "SELECT r.finished_at, r.versions, r.counts FROM tunnel.run r"
+        " WHERE r.survey_id = %s AND r.stage = 'members' AND r.outcome = 'done' ORDER BY r.id DESC LIMIT 1",
+        [survey.id],
+    )
+
+
 def read_runs(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
     """Read how each stage last succeeded, the same parameters and versions together, with the kilometres they hold for."""
     return _rows(

@@ -14,10 +14,12 @@ from markupsafe import Markup
 
 from tunneldb import __version__
 from tunneldb.database import snapshot
+from tunneldb.errors import UserError
 from tunneldb.report import data, text
 from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, without_detection
 from tunneldb.report.lining import Form
 from tunneldb.report.strip import LETTERS, Progress, Strips
+from tunneldb.report.structures import StructuresChapter, read_structures
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.coverage import Coverage, read_coverage
 from tunneldb.store.remarks import read_remarks
@@ -59,11 +61,57 @@ def write_html(
         search = read_coverage(conn, survey, low, high)
         report = _Report(conn, survey, *data.find_stretch(conn, survey, low, high), search, progress, pictures, form)
         with path.open("w", encoding="utf-8") as file:
-            file.writelines(_template().generate(report.context()))
+            file.writelines(_template("report.html").generate(report.context()))
         return sum(leak.counts for leak in report.leaks)
 
 
-def _template() -> jinja2.Template:
+def write_site_html(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> int:
+    """Write the report of a survey of a site, which is the chapter on structures; the connection must be idle.
+
+    Returns
+    -------
+    int
+        Number of spots that it counts: found last, and not rejected.
+
+    Raises
+    ------
+    UserError
+        Members were never looked for.
+    """
+    with snapshot(conn):
+        found = read_structures(conn, survey)
+        if found is None:
+            raise UserError(f"survey {survey.name} has nothing to report yet: tunneldb members {survey.name}")
+        numbers = {spot.id: spot.number for spot in found.spots.rows}
+        edits_in_all, edits = data.read_edits(conn, survey)
+        context = {
+            "survey": survey,
+            "version": __version__,
+            "now": dt.datetime.now(dt.UTC),
+            "digest": _digest_spots(hashlib.sha256(survey.name.encode()), found).hexdigest()[:16],
+            "structures": found,
+            "files": data.read_files_of_site(conn, survey),
+            "remarks": read_remarks(conn, survey),
+            "runs": data.read_member_runs(conn, survey),
+            "edits": [text.edit(edit, numbers) for edit in edits],
+            "edits_in_all": edits_in_all,
+            "crs": text.crs(crs_text(conn, survey.srid)),
+        }
+        with path.open("w", encoding="utf-8") as file:
+            file.writelines(_template("site.html").generate(context))
+        return found.spots.count
+
+
+def _digest_spots(digest: hashlib._Hash, found: StructuresChapter) -> hashlib._Hash:
+    """Add what is reported of the spots."""
+    for spot in sorted(found.spots.rows, key=lambda spot: spot.number):
+        wkb = spot.geometry.wkb_hex
+        stated = (spot.number, spot.review, spot.detected, spot.reviewed_by, spot.remark, f"{spot.area:.4f}", wkb)
+        digest.update(repr(stated).encode())
+    return digest
+
+
+def _template(name: str) -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("tunneldb.report"),
         autoescape=jinja2.select_autoescape(["html"]),
@@ -75,7 +123,7 @@ def _template() -> jinja2.Template:
         "percent": text.percent, "number": text.number, "whole": text.whole, "when": text.when, "day": text.day,
         "kilometres": text.kilometres, "size": text.size, "css": text.css,
     }  # fmt: skip
-    return environment.get_template("report.html")
+    return environment.get_template(name)
 
 
 class _Report:
@@ -108,6 +156,8 @@ class _Report:
         self.strips = Strips(conn, survey, low, high, self.leaks, self.coverage, pictured, form, progress)
         self.place = data.place_name(conn, survey)
         self.cards = min(CARDS, len(pictured))
+        found = read_structures(conn, survey)
+        self.structures = found if found and found.spots.face_area > 0.0 else None
 
     def context(self) -> dict[str, Any]:
         """Return all that the template shows."""
@@ -117,6 +167,7 @@ class _Report:
         runs = data.read_runs(conn, survey, low, high)
         counted = [leak for leak in self.leaks if leak.counts]
         edits_in_all, edits = data.read_edits(conn, survey)
+        numbers = {spot.id: spot.number for spot in self.structures.spots.rows} if self.structures else {}
         return {
             "survey": survey,
             "version": __version__,
@@ -144,7 +195,8 @@ class _Report:
             "versions": text.versions(runs),
             "radiometry": data.read_radiometry(conn, survey, low, high),
             "people": text.reviewers(self.leaks),
-            "edits": [text.edit(edit) for edit in edits],
+            "structures": self.structures,
+            "edits": [text.edit(edit, numbers) for edit in edits],
             "edits_in_all": edits_in_all,
             "part": (low, high) != data.find_stretch(conn, survey, -np.inf, np.inf),
             "sought": survey.intensity_kind != "none",
@@ -183,6 +235,8 @@ class _Report:
             wkb = leak.outline.wkb_hex
             stated = (leak.id, leak.review, leak.detected, leak.reviewed_by, leak.remark, f"{leak.area:.4f}", wkb)
             digest.update(repr(stated).encode())
+        if self.structures:
+            _digest_spots(digest, self.structures)
         return digest.hexdigest()[:16]
 
     def _glance(self) -> dict[str, Any]:

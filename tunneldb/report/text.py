@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby, pairwise
 from typing import Any
 
@@ -175,15 +175,19 @@ def reviewers(leaks: Sequence[Leak]) -> list[dict[str, Any]]:
     return people
 
 
-_WHAT = {"anomaly": "leak or dark spot", "axis_vertex": "axis vertex", "region": "region"}
+_WHAT = {"anomaly": "leak or dark spot", "axis_vertex": "axis vertex", "region": "region", "spot": "spot"}
 
 
-def edit(entry: Edit) -> dict[str, str]:
-    """Return a change made by hand in words: who, when, of what, and each column from what to what."""
+def edit(entry: Edit, spots: Mapping[int, int]) -> dict[str, str]:
+    """Return a change made by hand in words: who, when, of what, and each column from what to what.
+
+    People know spots by their numbers, which ``spots`` has by key; of one that is gone the key is all that is left.
+    """
     before, after = entry.before or {}, entry.after or {}
     names = sorted({*before, *after}) if entry.action == "update" else ["geom"]  # only regions come and go
     changes = "; ".join(_change(name, before.get(name), after.get(name)) for name in names)
-    return {"at": when(entry.at), "who": entry.who, "what": f"{_WHAT[entry.view]} {entry.row_id}", "change": changes}
+    which = entry.row_id if entry.view != "spot" else spots.get(entry.row_id, f"that is gone, key {entry.row_id}")
+    return {"at": when(entry.at), "who": entry.who, "what": f"{_WHAT[entry.view]} {which}", "change": changes}
 
 
 def _change(name: str, before: Any, after: Any) -> str:

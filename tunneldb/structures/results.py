@@ -104,7 +104,10 @@ class Face:
     def in_space(self, shape: shapely.Geometry) -> shapely.Geometry:
         """A geometry of unrolled coordinates on the face, with Z, in the coordinates of the points."""
         if self.radius > 0.0:
+            parts = isinstance(shape, MultiPolygon)
             shape = shapely.segmentize(shape, 2.0 * float(np.sqrt(2.0 * self.radius * _CHORD)))
+            if parts and isinstance(shape, Polygon):  # GEOS makes one part of one
+                shape = MultiPolygon([shape])
 
         def place(at: Float) -> Float:
             return to_space(self.model, at[:, 0], at[:, 1])[:, :3] + self.origin

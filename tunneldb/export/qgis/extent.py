@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import psycopg
 
 from tunneldb.errors import UserError
+from tunneldb.store.survey import Survey
 
 MARGIN = 0.08
 """Margin around what is shown, as a share of its size."""
@@ -16,6 +17,10 @@ WINDOW = 60.0
 
 PANEL = 3.5
 """Width of the panel that shows it, of its height: a narrower extent would be widened over the end of the tunnel."""
+
+
+MEMBERS_SHOWN = 6
+"""So many members theme Faces shows at first."""
 
 
 @dataclass(frozen=True)
@@ -59,22 +64,25 @@ class View:
     extent: Extent
 
 
-def map_extent(conn: psycopg.Connection, survey: str) -> Extent:
-    """Return the extent of a survey's axis and of the leaks beside it, with a margin.
+def map_extent(conn: psycopg.Connection, survey: Survey) -> Extent:
+    """Return the extent of a survey's axis, of the leaks beside it and of the faces of structures, with a margin.
 
     Raises
     ------
     UserError
-        The survey has no axis yet.
+        The survey has neither an axis nor faces yet.
     """
     row = conn.execute(
         "SELECT ST_XMin(e), ST_YMin(e), ST_XMax(e), ST_YMax(e) FROM (SELECT ST_Extent(g) AS e FROM ("
         "SELECT geom AS g FROM tunnel_api.axis_vertex WHERE survey = %(survey)s "
-        "UNION ALL SELECT geom FROM tunnel_api.leak_map WHERE survey = %(survey)s) a) b WHERE e IS NOT NULL",
-        {"survey": survey},
+        "UNION ALL SELECT geom FROM tunnel_api.leak_map WHERE survey = %(survey)s "
+        "UNION ALL SELECT geom FROM tunnel_api.face WHERE survey = %(survey)s) a) b WHERE e IS NOT NULL",
+        {"survey": survey.name},
     ).fetchone()
+    if row is None and survey.site:
+        raise UserError(f"no members were found in survey {survey.name} yet: tunneldb members {survey.name}")
     if row is None:
-        raise UserError(f"survey {survey} has no axis yet: load its files, then run 'tunneldb run {survey}'")
+        raise UserError(f"survey {survey.name} has no axis yet: load its files, then run 'tunneldb run {survey.name}'")
     return Extent(*row).grown()
 
 
@@ -94,6 +102,16 @@ def sheet_extent(conn: psycopg.Connection, survey: str) -> Extent | None:
         "SELECT ST_XMin(geom), ST_YMin(geom), ST_XMax(geom), ST_YMax(geom) FROM tunnel_api.sheet "
         "WHERE survey = %s ORDER BY number LIMIT 1",
         (survey,),
+    ).fetchone()
+    return None if row is None else Extent(*row)
+
+
+def first_members(conn: psycopg.Connection, survey: str) -> Extent | None:
+    """Return where the largest members of a survey are drawn, MEMBERS_SHOWN at most; None if it has none."""
+    row = conn.execute(
+        "SELECT ST_XMin(e), ST_YMin(e), ST_XMax(e), ST_YMax(e) FROM (SELECT ST_Extent(g.geom) AS e FROM ("
+        "SELECT geom FROM tunnel_api.member_sheet WHERE survey = %s ORDER BY number LIMIT %s) g) b WHERE e IS NOT NULL",
+        (survey, MEMBERS_SHOWN),
     ).fetchone()
     return None if row is None else Extent(*row)
 

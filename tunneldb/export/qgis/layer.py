@@ -11,6 +11,13 @@ SHEETS = "Inspection sheets"
 """The print layout, and the map theme that it shows."""
 
 
+STRUCTURES, FACES = "Structures", "Faces"
+"""Group of the layers of structures, and within it that of faces unrolled, with a map theme of its name."""
+
+MEMBERS = "Members"
+"""The print layout with a page for each member."""
+
+
 @dataclass(frozen=True)
 class VectorLayer:
     """A layer on a view of schema tunnel_api.
@@ -52,13 +59,18 @@ class VectorLayer:
 
     @property
     def on_map(self) -> bool:
-        """Whether its coordinates are the tunnel's SRID; otherwise they are the unrolled plane's."""
-        return self.group != UNROLLED
+        """Whether its coordinates are the tunnel's SRID; otherwise they are those of a plane on which things are unrolled."""
+        return self.group not in (UNROLLED, FACES)
+
+    @property
+    def path(self) -> tuple[str, ...]:
+        """Groups of the layer tree that it stands in, from the outermost."""
+        return (STRUCTURES, FACES) if self.group == FACES else (self.group,)
 
     @property
     def geometry(self) -> str:
         """Kind of geometry without dimension, as QGIS names it in a project: Point, Line or Polygon."""
-        return {"Point": "Point", "LineString": "Line", "Polygon": "Polygon"}[self.wkb.removesuffix("Z")]
+        return {"Point": "Point", "LineString": "Line", "Polygon": "Polygon"}[self.wkb.removesuffix("Z").removeprefix("Multi")]
 
 
 _DRY = "\"kind\" <> 'leak'"
@@ -97,3 +109,15 @@ LAYERS = (
     VectorLayer("leak_3d", "Leaks in space (review)", "leak_3d", "PolygonZ", "leak_3d", SPACE, (SPACE,), True),
     VectorLayer("ground", "Ground", "ground", "LineStringZ", "ground", SPACE, (SPACE,)),
 )  # fmt: skip
+
+STRUCTURE_LAYERS = (
+    VectorLayer("spot_map", "Spots on the map (review)", "spot_map", "Polygon", "spot", STRUCTURES, (MAP,), True),
+    VectorLayer("member", "Members", "member", "LineStringZ", "member", STRUCTURES, (MAP,)),
+    VectorLayer("spot_3d", "Spots in space (review)", "spot_3d", "PolygonZ", "spot_3d", STRUCTURES, (SPACE,), True),
+    VectorLayer("face", "Faces", "face", "MultiPolygonZ", "face", STRUCTURES, (MAP,)),
+    VectorLayer("face_3d", "Faces in space", "face_3d", "MultiPolygonZ", "face_3d", STRUCTURES, (SPACE,)),
+    VectorLayer("spot_sheet", "Spots on faces (review)", "spot_sheet", "Polygon", "spot", FACES, (FACES,), True),
+    VectorLayer("member_sheet", "Pages of members", "member_sheet", "Polygon", "member_sheet", FACES, (FACES,)),
+    VectorLayer("face_sheet", "Faces, unrolled", "face_sheet", "MultiPolygon", "face_sheet", FACES, (FACES,)),
+)
+"""The same of structures: of a site, and of a survey of a tunnel in which members were found."""

@@ -16,13 +16,24 @@ import psycopg
 
 from tunneldb import __version__
 from tunneldb.export.qgis.crs import crs_element, no_crs
-from tunneldb.export.qgis.extent import Extent, View, first_window, largest_leak, map_extent, sheet_extent, unrolled_extents
-from tunneldb.export.qgis.layer import LAYERS, MAP, SHEETS, SPACE, UNROLLED, VectorLayer
+from tunneldb.export.qgis.extent import (
+    Extent,
+    View,
+    first_members,
+    first_window,
+    largest_leak,
+    map_extent,
+    sheet_extent,
+    unrolled_extents,
+)
+from tunneldb.export.qgis.layer import FACES, LAYERS, MAP, SHEETS, SPACE, STRUCTURE_LAYERS, STRUCTURES, UNROLLED, VectorLayer
+from tunneldb.export.qgis.member_sheet import member_layout
 from tunneldb.export.qgis.raster import FILLED, KINDS, image_kind, pipe
-from tunneldb.export.qgis.sheet import layouts
+from tunneldb.export.qgis.sheet import sheet_layout
 from tunneldb.export.qgis.source import RECOMPUTED_FROM, Source, recompute
-from tunneldb.export.qgis.space import docks, filled_layers, scene, viewpoint
+from tunneldb.export.qgis.space import docks, filled_layers, scene, site_viewpoint, viewpoint
 from tunneldb.export.qgis.styles import require_table, style_elements
+from tunneldb.export.tables.spots import read_spots
 from tunneldb.files import replacing
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
@@ -78,7 +89,7 @@ def write_project(
     Raises
     ------
     UserError
-        The survey has no axis, or its SRID is unknown.
+        The survey has no axis, of a site no members, or its SRID is unknown.
     """
     text = _text(_project(conn, survey, images, output.parent, service))
     with replacing(output) as temporary:
@@ -127,11 +138,16 @@ def _project(
     """The project's root; with paths relative to its folder, or absolute if it is in none."""
     crs = crs_element(conn, survey.srid)
     source = Source.of_connection(conn) if service is None else Source.of_service(service)
-    filled = filled_layers(conn, survey.name)
-    entries = [_remarks(source, survey)]
-    entries += [_vector(layer, source, survey, crs, in_space=layer.id in filled) for layer in LAYERS]
+    cells = first_members(conn, survey.name)
+    structures = survey.site or cells is not None
+    layers = (*(() if survey.site else LAYERS), *(STRUCTURE_LAYERS if structures else ()))
+    filled = filled_layers(conn, survey.name, layers)
+    entries = [_table(source, survey, "remark", "What is to be known (table)", counted=True)]
+    if structures:
+        entries.append(_table(source, survey, "member_statistics", "Members (table)"))
+    entries += [_vector(layer, source, survey, crs, in_space=layer.id in filled) for layer in layers]
     entries += _rasters(images, folder)
-    views = _views(conn, survey.name)
+    views = _views(conn, survey, cells)
     root = ET.Element("qgis", version=QGIS_VERSION, projectname=survey.name, saveUser="", saveUserFull="")
     ET.SubElement(root, "homePath", path="")
     ET.SubElement(root, "title").text = survey.name
@@ -141,27 +157,34 @@ def _project(
     ET.SubElement(root, "projectCrs").append(deepcopy(crs))
     root.append(_tree(entries))
     _canvases(root, views, crs)
-    view = viewpoint(conn, survey.name, largest_leak(conn, survey.name))
-    shown = [layer_id(layer.id) for layer in LAYERS if layer.id in filled]
+    name = survey.name
+    view = site_viewpoint(conn, name) if survey.site else viewpoint(conn, name, largest_leak(conn, name))
+    shown = [layer_id(layer.id) for layer in layers if layer.id in filled]
     root.append(docks(view, scene(view, views[0].extent, crs, shown)))
-    layers = ET.SubElement(root, "projectlayers")
-    layers.extend(entry.element for entry in entries)
-    root.append(_themes(entries))
+    ET.SubElement(root, "projectlayers").extend(entry.element for entry in entries)
+    root.append(_themes(entries, site=survey.site))
     root.append(_bookmarks(views, crs))
     root.append(_properties(absolute=folder is None))
+    known = {layer.id: (layer_id(layer.id), source.layer(layer, survey.name, survey.srid)) for layer in layers}
+    layouts = ET.Element("Layouts")
     sheet = sheet_extent(conn, survey.name)
     if sheet is not None:
-        known = {layer.id: (layer_id(layer.id), source.layer(layer, survey.name, survey.srid)) for layer in LAYERS}
-        root.append(layouts(survey, sheet, known["sheet"], known["leak_sheet"]))
+        layouts.append(sheet_layout(survey, sheet, known["sheet"], known["leak_sheet"]))
+    if cells is not None:
+        layouts.append(member_layout(survey, known["member_sheet"], known["spot_sheet"]))
+    if len(layouts):
+        root.append(layouts)
     view_settings = ET.SubElement(root, "ProjectViewSettings", UseProjectScales="0")
     # Else the full extent would hold the unrolled plane, too, and new 3D views begin far from the tunnel.
     for tag in ("DefaultViewExtent", "PresetFullExtent"):
         _extent(view_settings, views[0].extent, tag).append(deepcopy(crs))
     metadata = ET.SubElement(root, "projectMetadata")
     ET.SubElement(metadata, "title").text = survey.name
-    said = [read_coverage(conn, survey).statement, *(remark.said for remark in read_remarks(conn, survey))]
+    said = [] if survey.site else [read_coverage(conn, survey).statement]
+    said += [read_spots(conn, survey).statement] if structures else []
+    said += [remark.said for remark in read_remarks(conn, survey)]
     ET.SubElement(metadata, "abstract").text = "\n".join(
-        [f"Tunnel {survey.tunnel}, written by tunneldb {__version__}", *filter(None, said)]
+        [f"{'Site' if survey.site else 'Tunnel'} {survey.tunnel}, written by tunneldb {__version__}", *filter(None, said)]
     )
     return root
 
@@ -192,23 +215,22 @@ def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element,
         for column, value in (("survey", survey.name), ("kind", "dry")):
             quoted = value.replace("'", "''")
             ET.SubElement(defaults, "default", field=column, expression=f"'{quoted}'", applyOnUpdate="0")
-    return _Entry(layer_id(layer.id), layer.title, (layer.group,), layer.themes, element)
+    return _Entry(layer_id(layer.id), layer.title, layer.path, layer.themes, element)
 
 
-def _remarks(source: Source, survey: Survey) -> _Entry:
-    """The table of what is to be known of the results; how many lines it has, stands beside its name."""
-    title = "What is to be known (table)"
+def _table(source: Source, survey: Survey, view: str, title: str, *, counted: bool = False) -> _Entry:
+    """A table; if counted, how many lines it has stands beside its name."""
     element = ET.Element(
         "maplayer", type="vector", geometry="No geometry", wkbType="NoGeometry", readOnly="1", autoRefreshEnabled="0",
         refreshOnNotifyEnabled="0", hasScaleBasedVisibilityFlag="0", minScale="0", maxScale="0",
         styleCategories="AllStyleCategories",
     )  # fmt: skip
-    ET.SubElement(element, "id").text = layer_id("remark")
-    ET.SubElement(element, "datasource").text = source.table("remark", survey.name)
+    ET.SubElement(element, "id").text = layer_id(view)
+    ET.SubElement(element, "datasource").text = source.table(view, survey.name)
     ET.SubElement(element, "layername").text = title
     ET.SubElement(element, "srs").append(no_crs())
     ET.SubElement(element, "provider", encoding="UTF-8").text = "postgres"
-    return _Entry(layer_id("remark"), title, (), (), element, counted=True)
+    return _Entry(layer_id(view), title, (), (), element, counted)
 
 
 def _rasters(images: Sequence[Path], folder: Path | None) -> list[_Entry]:
@@ -256,7 +278,7 @@ def _tree(entries: Iterable[_Entry]) -> ET.Element:
 
 def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
     element = ET.Element(
-        "layer-tree-group", name=name, expanded=str(int(name in ("", MAP, UNROLLED))),
+        "layer-tree-group", name=name, expanded=str(int(name in ("", MAP, UNROLLED, STRUCTURES))),
         checked="Qt::Checked" if checked else "Qt::Unchecked",
     )  # fmt: skip
     for entry in group.entries:
@@ -268,14 +290,15 @@ def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
             shown = ET.SubElement(ET.SubElement(leaf, "customproperties"), "Option", type="Map")
             ET.SubElement(shown, "Option", type="int", name="showFeatureCount", value="1")
     for title, part in group.groups.items():
-        element.append(_group_element(part, title, title == MAP))
+        element.append(_group_element(part, title, title in (MAP, STRUCTURES)))
     return element
 
 
-def _themes(entries: Sequence[_Entry]) -> ET.Element:
-    """Map themes: which layers are visible, and the groups that must be switched on for it."""
+def _themes(entries: Sequence[_Entry], *, site: bool) -> ET.Element:
+    """Map themes: which layers are visible, and the groups that must be switched on for it; of a tunnel all of its own."""
     presets = ET.Element("visibility-presets")
-    for theme in (MAP, UNROLLED, SPACE, SHEETS):
+    used = {theme for entry in entries for theme in entry.themes} | (set() if site else {MAP, UNROLLED, SPACE, SHEETS})
+    for theme in (theme for theme in (MAP, UNROLLED, SPACE, SHEETS, FACES) if theme in used):
         preset = ET.SubElement(presets, "visibility-preset", {"name": theme, "has-expanded-info": "1"})
         shown = [entry for entry in entries if theme in entry.themes]
         for entry in shown:
@@ -287,26 +310,28 @@ def _themes(entries: Sequence[_Entry]) -> ET.Element:
     return presets
 
 
-def _views(conn: psycopg.Connection, survey: str) -> list[View]:
-    """Where to start: the whole map first, then a window on the unrolled lining, then each of its kilometres."""
+def _views(conn: psycopg.Connection, survey: Survey, cells: Extent | None) -> list[View]:
+    """Where to start: the whole map first, then a window on the unrolled lining, each of its kilometres, faces unrolled."""
     views = [View("Map", MAP, map_extent(conn, survey))]
-    kilometres = unrolled_extents(conn, survey)
+    kilometres = unrolled_extents(conn, survey.name)
     if kilometres:
-        views.append(View("Unrolled", UNROLLED, first_window(conn, survey, kilometres)))
+        views.append(View("Unrolled", UNROLLED, first_window(conn, survey.name, kilometres)))
         views += [View(f"Unrolled, km {km}", UNROLLED, extent.grown()) for km, extent in kilometres]
+    if cells is not None:
+        views.append(View(FACES, FACES, cells.grown()))
     return views
 
 
 def _canvases(root: ET.Element, views: Sequence[View], crs: ET.Element) -> None:
-    """The main canvas with the map, and below it a second one that follows theme Unrolled."""
+    """The main canvas with the map, and below it a second one that follows theme Unrolled, or Faces of a site."""
     _canvas(root, "theMapCanvas", views[0], crs)
     docks = ET.SubElement(root, "mapViewDocks")
     if len(views) > 1:
         # Its layers have no reference system and are drawn as they are; the tunnel's gives the canvas its unit, the metre.
-        _canvas(root, UNROLLED, views[1], crs).set("theme", UNROLLED)
+        _canvas(root, views[1].theme, views[1], crs).set("theme", views[1].theme)
         # area 8 is the bottom edge of the window
         ET.SubElement(
-            docks, "view", name=UNROLLED, area="8", floating="0", x="0", y="0", width="1200", height="360",
+            docks, "view", name=views[1].theme, area="8", floating="0", x="0", y="0", width="1200", height="360",
             synced="0", showCursor="0", showExtent="0", scaleSynced="0", scaleFactor="1", showLabels="1",
             zoomSelected="0",
         )  # fmt: skip

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-import uuid
 import xml.etree.ElementTree as ET
 
 from tunneldb import __version__
 from tunneldb.export.qgis.extent import Extent
 from tunneldb.export.qgis.layer import SHEETS
+from tunneldb.export.qgis.layout_items import (
+    CELL_MARGIN,
+    FRAME,
+    MAP_ITEM,
+    PAGE,
+    PAGE_ITEM,
+    ROW,
+    SCALE_BAR,
+    cut,
+    item,
+    key,
+    label,
+    table,
+    text_style,
+)  # fmt: skip
 from tunneldb.raster.gap_fill import TOLD
 from tunneldb.store.survey import Survey
 
 LENGTH = 50.0
 """Length of tunnel on a sheet, m, as in the view."""
-
-PAGE = (297.0, 210.0)
-"""A4, across, mm."""
 
 PAGES = 6
 """The sheet itself, and those that its table goes on to if it is long."""
@@ -25,11 +36,6 @@ _MARGIN = 10.0
 _TOP = 24.0  # where the strip begins, mm
 _TABLE_LEAST = 40.0  # what is kept for the table, mm
 _FOOT = 196.0  # where the foot begins, mm
-_GAP = 10.0  # between the pages of a layout, mm
-_FONT = "Sans Serif"
-
-# Numbers by which QGIS knows kinds of layout items.
-_LABEL, _MAP, _SCALE_BAR, _FRAME, _TABLE, _PAGE = 65641, 65639, 65646, 65647, 65649, 65638
 
 _SHEET = "attribute(@atlas_feature, '{}')"
 _TICK = "(@grid_number - attribute(@atlas_feature, 'chainage_from')) / 10"
@@ -39,14 +45,6 @@ _CHAINAGE_LABEL = (
     f"array_get(attribute(@atlas_feature, 'ticks'), round({_TICK})), '')"
 )
 _ARC_LABEL = "if(@grid_axis = 'y', to_string(round(@grid_number)), '')"
-
-
-def _cut(text: str, letters: int | str, more: str = "") -> str:
-    """Expression: a text on one line or several, cut where there is no room for all of it, which says so, and where more is."""
-    return (
-        f"with_variable('said', coalesce(regexp_replace({text}, '\\\\s+', ' '), ''), "
-        f"if(length(@said) > {letters}, left(@said, {letters} - 1) || '…{more}', @said))"
-    )
 
 
 # Heading, expression, width in mm, alignment (1 left, 2 right), what rows are sorted by.
@@ -59,14 +57,12 @@ _COLUMNS = (
     ("Drop, dB", 'format_number("drop_mean", 1)', 12.5, 2),
     ("Sure", "coalesce(round(100 * \"confidence\") || ' %', '')", 9, 2),
     ("Review", '"review"', 15, 1),
-    ("Remark", _cut('"remark"', "{0}"), 23, 1),
+    ("Remark", cut('"remark"', "{0}"), 23, 1),
 )
 # As the sheet's sums count them: one that only touches its edge is not on it.
 _ON_SHEET = f'"chainage_to" > {_SHEET.format("chainage_from")} and "chainage_from" < {_SHEET.format("chainage_to")}'
-_CELL_MARGIN = 0.7
-_ROW = 4.1  # height of a row of one line at the most, mm; with DejaVu it is 3.9
 _LINE_LEAST, _LINE = 10, 12  # letters that a line of a remark holds at the least, and of several, which break between words
-_TABLE_WIDTH = sum(column[2] + 2 * _CELL_MARGIN for column in _COLUMNS)
+_TABLE_WIDTH = sum(column[2] + 2 * CELL_MARGIN for column in _COLUMNS)
 
 
 def strip_scale(extent: Extent, *, table: bool) -> int:
@@ -78,11 +74,11 @@ def strip_scale(extent: Extent, *, table: bool) -> int:
 
 def table_rows(top: float) -> int:
     """Return how many rows of one line a sheet's table has room for, which begins on its first page at ``top``, mm."""
-    return sum(2 * (int((_FOOT - 1 - y) / _ROW) - 1) for y in (top, *(PAGES - 1) * [_TOP]))
+    return sum(2 * (int((_FOOT - 1 - y) / ROW) - 1) for y in (top, *(PAGES - 1) * [_TOP]))
 
 
-def layouts(survey: Survey, extent: Extent, coverage: tuple[str, str], leaks: tuple[str, str]) -> ET.Element:
-    """Return the element ``Layouts`` of a project.
+def sheet_layout(survey: Survey, extent: Extent, coverage: tuple[str, str], leaks: tuple[str, str]) -> ET.Element:
+    """Return the element ``Layout`` of the inspection sheets.
 
     Parameters
     ----------
@@ -95,11 +91,10 @@ def layouts(survey: Survey, extent: Extent, coverage: tuple[str, str], leaks: tu
     """
     sought = survey.intensity_kind != "none"  # else no leaks were, and there is no table of them
     pages = PAGES if sought else 1
-    root = ET.Element("Layouts")
-    layout = ET.SubElement(root, "Layout", name=SHEETS, units="mm", printResolution="300")
+    layout = ET.Element("Layout", name=SHEETS, units="mm", printResolution="300")
     collection = ET.SubElement(layout, "PageCollection")
     for page in range(pages):
-        collection.append(_item(_PAGE, f"page {page + 1}", (0.0, 0.0, *PAGE), page, background="true"))
+        collection.append(item(SHEETS, PAGE_ITEM, f"page {page + 1}", (0.0, 0.0, *PAGE), page, background="true"))
     scale = strip_scale(extent, table=sought)
     strip = _strip(scale, extent)
     top = _TOP + (extent.ymax - extent.ymin) * 1000.0 / scale + 8.0  # of the table
@@ -118,29 +113,15 @@ def layouts(survey: Survey, extent: Extent, coverage: tuple[str, str], leaks: tu
     options = ET.SubElement(ET.SubElement(layout, "customproperties"), "Option", type="Map")
     ET.SubElement(options, "Option", type="bool", name="singleFile", value="true")
     ET.SubElement(options, "Option", type="int", name="pdfTextFormat", value="1")  # text that can be searched, not outlines
-    return root
-
-
-def _item(kind: int, name: str, box: tuple[float, float, float, float], page: int = 0, **more: str) -> ET.Element:
-    """An item of a layout; box: left, top, width and height on its page, mm."""
-    x, y, width, height = box
-    key = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, f'{SHEETS} {name}')}}}"
-    element = ET.Element(
-        "LayoutItem", type=str(kind), id=name, uuid=key, templateUuid=key, position=f"{x:g},{y + page * (PAGE[1] + _GAP):g},mm",
-        positionOnPage=f"{x:g},{y:g},mm", size=f"{width:g},{height:g},mm", referencePoint="0", visibility="1", opacity="1",
-        outlineWidthM="0.2,mm",
-    )  # fmt: skip
-    element.attrib.update({"frame": "false", "background": "false", **more})
-    ET.SubElement(element, "FrameColor", red="90", green="90", blue="90", alpha="255")
-    ET.SubElement(element, "BackgroundColor", red="255", green="255", blue="255", alpha="255")
-    return element
+    return layout
 
 
 def _strip(scale: int, extent: Extent) -> ET.Element:
     """The unrolled lining of the sheet, with a metre beyond its ends, under a grid of 10 m by 2 m."""
     width, height = (LENGTH + 2) * 1000.0 / scale, (extent.ymax - extent.ymin) * 1000.0 / scale
-    element = _item(
-        _MAP, "strip", ((PAGE[0] - width) / 2 + 4, _TOP, width, height), frame="true", background="true", followPreset="true",
+    element = item(
+        SHEETS, MAP_ITEM, "strip", ((PAGE[0] - width) / 2 + 4, _TOP, width, height), frame="true", background="true",
+        followPreset="true",
         followPresetName=SHEETS, mapRotation="0", drawCanvasItems="false", labelMargin="0,mm", keepLayerSet="false",
     )  # fmt: skip
     sides = {"xmin": extent.xmin - 1, "xmax": extent.xmax + 1, "ymin": extent.ymin, "ymax": extent.ymax}
@@ -160,7 +141,7 @@ def _grid(name: str, x: str, y: str, label: str, *, bottom: bool) -> ET.Element:
     for side in ("left", "right", "top", "bottom"):
         sides |= {f"{side}AnnotationDisplay": shown if side == labelled else hidden, f"{side}AnnotationPosition": "1"}
     element = ET.Element(
-        "ComposerMapGrid", sides, name=name, uuid=f"{{{uuid.uuid5(uuid.NAMESPACE_OID, f'{SHEETS} grid {name}')}}}", show="1",
+        "ComposerMapGrid", sides, name=name, uuid=key(SHEETS, f"grid {name}"), show="1",
         position="3", gridStyle="0", unit="0", intervalX=x, intervalY=y, offsetX="0", offsetY="0", blendMode="0",
         showAnnotation="1", annotationFormat="8", annotationExpression=label, annotationPrecision="0",
         frameAnnotationDistance="1", gridFrameStyle="0",
@@ -168,9 +149,9 @@ def _grid(name: str, x: str, y: str, label: str, *, bottom: bool) -> ET.Element:
     line = ET.SubElement(ET.SubElement(element, "lineStyle"), "symbol", type="line", name="", alpha="1", clip_to_extent="1")
     layer = ET.SubElement(line, "layer", {"class": "SimpleLine", "enabled": "1", "pass": "0", "locked": "0"})
     style = ET.SubElement(layer, "Option", type="Map")
-    for key, value in (("line_color", "0,120,130,110"), ("line_width", "0.12"), ("line_width_unit", "MM")):
-        ET.SubElement(style, "Option", type="QString", name=key, value=value)
-    element.append(_text_style(7.0))
+    for option, value in (("line_color", "0,120,130,110"), ("line_width", "0.12"), ("line_width_unit", "MM")):
+        ET.SubElement(style, "Option", type="QString", name=option, value=value)
+    element.append(text_style(7.0))
     return element
 
 
@@ -194,30 +175,38 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
     else:
         how += "Orange: open, blue: confirmed, with the leak's number; purple: leaks could be missed."
     texts = [
-        _label("stretch", stretch, (left, 5, 150, 8), 15, bold=True),
-        _label("number", f"Inspection sheet {number}", (right - 110, 5, 110, 8), 10, align="right"),
-        _label("what", what, (left, 12.5, 140, 5), 8),
-        _label("sums", sums, (right - 140, 12.5, 140, 5), 8, align="right"),
-        _label("how", how, (left + 60, _FOOT + 1, wide - 60, 4), 6.5, align="right"),
-        _label(
-            "signature", "Inspected by ______________________________   on ____________________",
+        label(SHEETS, "stretch", stretch, (left, 5, 150, 8), 15, bold=True),
+        label(SHEETS, "number", f"Inspection sheet {number}", (right - 110, 5, 110, 8), 10, align="right"),
+        label(SHEETS, "what", what, (left, 12.5, 140, 5), 8),
+        label(SHEETS, "sums", sums, (right - 140, 12.5, 140, 5), 8, align="right"),
+        label(SHEETS, "how", how, (left + 60, _FOOT + 1, wide - 60, 4), 6.5, align="right"),
+        label(
+            SHEETS, "signature", "Inspected by ______________________________   on ____________________",
             (left + 55, _FOOT + 6, wide - 55 - 60, 5), 8,
         ),
-        _label(
-            "made", f"tunneldb {__version__}, [% format_date(now(), 'yyyy-MM-dd') %]", (right - 60, _FOOT + 6, 60, 5), 6.5,
-            align="right",
+        label(
+            SHEETS, "made", f"tunneldb {__version__}, [% format_date(now(), 'yyyy-MM-dd') %]",
+            (right - 60, _FOOT + 6, 60, 5), 6.5, align="right",
         ),
     ]  # fmt: skip
     if survey.intensity_kind != "none":
-        texts.append(_label("gaps", f"[% {_cut(gaps, 170, ' (all: report)')} %]", (left, 17, wide, 3.5), 7, bold=True))
+        texts.append(label(SHEETS, "gaps", f"[% {cut(gaps, 170, ' (all: report)')} %]", (left, 17, wide, 3.5), 7, bold=True))
     texts.append(
-        _label("remarks", f"[% {_cut(_SHEET.format('remarks'), 205, ' (all: report)')} %]", (left, 20.5, wide, 3.5), 6.5)
+        label(SHEETS, "remarks", f"[% {cut(_SHEET.format('remarks'), 205, ' (all: report)')} %]", (left, 20.5, wide, 3.5), 6.5)
     )
     for page in range(1, pages):
         texts += [
-            _label(f"stretch {page + 1}", f"{stretch}, leaks continued", (left, 7, 150, 8), 12, page=page, bold=True),
-            _label(f"number {page + 1}", f"Inspection sheet {number}", (right - 110, 7, 110, 8), 10, page=page, align="right"),
-            _label(f"what {page + 1}", what, (left, 15.5, 140, 5), 8, page=page),
+            label(SHEETS, f"stretch {page + 1}", f"{stretch}, leaks continued", (left, 7, 150, 8), 12, page=page, bold=True),
+            label(
+                SHEETS,
+                f"number {page + 1}",
+                f"Inspection sheet {number}",
+                (right - 110, 7, 110, 8),
+                10,
+                page=page,
+                align="right",
+            ),
+            label(SHEETS, f"what {page + 1}", what, (left, 15.5, 140, 5), 8, page=page),
         ]
     return texts
 
@@ -226,31 +215,17 @@ def _more(rows: int) -> ET.Element:
     """What the last page says where there are more leaks than rows."""
     count = _SHEET.format("leaks")
     text = f"[% if({count} > {rows}, '… and ' || ({count} - {rows}) || ' more leaks: table of the report', '') %]"
-    return _label("more", text, (_MARGIN, _FOOT + 1, 150, 6), 11, page=PAGES - 1, bold=True)
-
-
-def _label(
-    name: str, text: str, box: tuple[float, float, float, float], size: float, *, page: int = 0, bold: bool = False,
-    align: str = "left",
-) -> ET.Element:  # fmt: skip
-    """A text with expressions between ``[%`` and ``%]``; size in points."""
-    element = _item(
-        _LABEL, name, box, page, labelText=text, htmlState="0", marginX="0", marginY="0",
-        halign={"left": "1", "right": "2"}[align], valign="128",
-    )  # fmt: skip
-    ET.SubElement(element, "LabelFont", description=f"{_FONT},{size:g},-1,5,{75 if bold else 50},0,0,0,0,0", style="")
-    ET.SubElement(element, "FontColor", red="20", green="20", blue="20", alpha="255")
-    return element
+    return label(SHEETS, "more", text, (_MARGIN, _FOOT + 1, 150, 6), 11, page=PAGES - 1, bold=True)
 
 
 def _scale_bar(strip: str) -> ET.Element:
-    element = _item(
-        _SCALE_BAR, "scale bar", (_MARGIN, _FOOT, 50, 10), style="Line Ticks Up", mapUuid=strip, unitType="meters",
+    element = item(
+        SHEETS, SCALE_BAR, "scale bar", (_MARGIN, _FOOT, 50, 10), style="Line Ticks Up", mapUuid=strip, unitType="meters",
         unitLabel="m", numUnitsPerSegment="5", numSegments="2", numSegmentsLeft="0", numMapUnitsPerScaleBarUnit="1",
         segmentSizeMode="0", height="1.5", labelBarSpace="1", boxContentSpace="1", outlineWidth="0.2", alignment="0",
         numSubdivisions="1", minBarWidth="10", maxBarWidth="100", lineJoinStyle="miter", lineCapStyle="square",
     )  # fmt: skip
-    element.append(_text_style(7.0))
+    element.append(text_style(7.0))
     return element
 
 
@@ -262,48 +237,18 @@ def _table(leaks: tuple[str, str], top: float) -> list[ET.Element]:
     rows = table_rows(top)
     lines = f"floor({rows} / max({_SHEET.format('leaks')}, 1))"
     letters = f"if({lines} > 1, {_LINE} * {lines}, {_LINE_LEAST})"
-    key = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, f'{SHEETS} table')}}}"
+    own = key(SHEETS, "table")
     frames = []
     for page in range(PAGES):
         y = top if page == 0 else _TOP
         for half in range(2):
             x = _MARGIN + half * (PAGE[0] - 2 * _MARGIN - _TABLE_WIDTH)
             frames.append(
-                _item(
-                    _FRAME, f"leaks {2 * page + half + 1}", (x, y, _TABLE_WIDTH, _FOOT - 1 - y), page, multiFrame=key,
-                    multiFrameTemplateUuid=key, hidePageIfEmpty=str(int(page > 0 and half == 0)), hideBackgroundIfEmpty="0",
+                item(
+                    SHEETS, FRAME, f"leaks {2 * page + half + 1}", (x, y, _TABLE_WIDTH, _FOOT - 1 - y), page, multiFrame=own,
+                    multiFrameTemplateUuid=own, hidePageIfEmpty=str(int(page > 0 and half == 0)), hideBackgroundIfEmpty="0",
                 )
             )  # fmt: skip
-    table = ET.Element(
-        "LayoutMultiFrame", type=str(_TABLE), uuid=key, templateUuid=key, source="0", vectorLayer=leaks[0],
-        vectorLayerName="Leaks", vectorLayerSource=leaks[1], vectorLayerProvider="postgres", maxFeatures=str(rows),
-        filterToAtlasIntersection="1", filterFeatures="true", featureFilter=_ON_SHEET, resizeMode="0", headerMode="1",
-        headerHAlignment="0", emptyTableMode="0", emptyTableMessage="", showEmptyRows="1", showUniqueRowsOnly="0",
-        showOnlyVisibleFeatures="0", useConditionalStyling="0", wrapBehavior="1", wrapString="",
-        cellMargin=str(_CELL_MARGIN), showGrid="1", horizontalGrid="1", verticalGrid="0", gridStrokeWidth="0.1",
-        gridColor="150,150,150,255", backgroundColor="255,255,255,0",
-    )  # fmt: skip
-    for frame in frames:
-        ET.SubElement(table, "childFrame", uuid=frame.attrib["uuid"], templateUuid=frame.attrib["uuid"])
-    ET.SubElement(table, "headerTextFormat").append(_text_style(6.5, bold=True))
-    ET.SubElement(table, "contentTextFormat").append(_text_style(7.0))
-    columns = ET.SubElement(table, "displayColumns")
-    for heading, expression, width, align in _COLUMNS:
-        _column(columns, heading, expression.format(letters), width, align)
-    order = ET.SubElement(table, "sortColumns")
-    _column(order, "", '"chainage_from" + "chainage_to"', 0, 1)
-    return [*frames, table]
-
-
-def _column(parent: ET.Element, heading: str, expression: str, width: float, align: int) -> None:
-    ET.SubElement(
-        parent, "column", heading=heading, attribute=expression, width=f"{width:g}", hAlignment=str(align), vAlignment="128",
-        sortOrder="0", sortByRank="0",
-    )  # fmt: skip
-
-
-def _text_style(size: float, *, bold: bool = False) -> ET.Element:
-    return ET.Element(
-        "text-style", fontFamily=_FONT, namedStyle="Bold" if bold else "Regular", fontWeight="75" if bold else "50",
-        fontSize=f"{size:g}", fontSizeUnit="Point", textColor="20,20,20,255", textOpacity="1", multilineHeight="1",
-    )  # fmt: skip
+    columns = [(heading, expression.format(letters), width, align) for heading, expression, width, align in _COLUMNS]
+    order = '"chainage_from" + "chainage_to"'
+    return [*frames, table(SHEETS, frames, leaks, columns, order, rows, _ON_SHEET, name="Leaks", touching=True)]

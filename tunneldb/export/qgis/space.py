@@ -12,7 +12,7 @@ import psycopg
 from psycopg import sql
 
 from tunneldb.export.qgis.extent import Extent
-from tunneldb.export.qgis.layer import LAYERS, SPACE
+from tunneldb.export.qgis.layer import SPACE, VectorLayer
 
 DISTANCE = 60.0
 """From the camera to the point that it looks at, m: some 50 m of tunnel are in a square picture."""
@@ -22,6 +22,9 @@ PITCH = 65.0
 
 ASIDE = 50.0
 """Between the camera's direction and the axis', in plan, degrees."""
+
+VIEW_SIZES = 1.2
+"""From the camera to the middle of a site, diagonals of it."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +39,15 @@ class Viewpoint:
         The axis' height there, m.
     bearing : float
         Direction of the axis there, degrees from grid north, clockwise.
+    distance : float
+        From the camera, m.
     """
 
     x: float
     y: float
     height: float
     bearing: float
+    distance: float = DISTANCE
 
     @property
     def yaw(self) -> float:
@@ -73,14 +79,31 @@ def viewpoint(conn: psycopg.Connection, survey: str, chainage: float | None) -> 
     return Viewpoint(x, y, z, math.degrees(math.atan2(end[0] - start[0], end[1] - start[1])))
 
 
-def filled_layers(conn: psycopg.Connection, survey: str) -> set[str]:
-    """Return the ids of the layers in space that have rows.
+def site_viewpoint(conn: psycopg.Connection, survey: str) -> Viewpoint:
+    """Return the middle of a survey's faces, from such a distance that all are seen, from where most of them face.
+
+    The camera looks against the normals of its planes, by area; ASIDE is taken off again.
+    """
+    row = conn.execute(
+        "SELECT (ST_XMin(e) + ST_XMax(e)) / 2, (ST_YMin(e) + ST_YMax(e)) / 2, (ST_ZMin(e) + ST_ZMax(e)) / 2, "
+        "sqrt((ST_XMax(e) - ST_XMin(e)) ^ 2 + (ST_YMax(e) - ST_YMin(e)) ^ 2 + (ST_ZMax(e) - ST_ZMin(e)) ^ 2), x, y "
+        "FROM (SELECT ST_3DExtent(geom) AS e, coalesce(sum(area * axis[1]) FILTER (WHERE kind = 'flat'), 0) AS x, "
+        "coalesce(sum(area * axis[2]) FILTER (WHERE kind = 'flat'), 0) AS y FROM tunnel_api.face WHERE survey = %s) f",
+        (survey,),
+    ).fetchone()
+    assert row is not None
+    x, y, z, size, east, north = row
+    return Viewpoint(x, y, z, math.degrees(math.atan2(-east, -north)) + ASIDE, VIEW_SIZES * size)
+
+
+def filled_layers(conn: psycopg.Connection, survey: str, layers: Sequence[VectorLayer]) -> set[str]:
+    """Return the ids of those layers in space that have rows.
 
     A single layer that has a 3D style and no rows leaves the whole view blank in QGIS 3.22.
     """
     query = sql.SQL("SELECT EXISTS (SELECT FROM tunnel_api.{} WHERE survey = %s)")
     found = set()
-    for layer in LAYERS:
+    for layer in layers:
         if SPACE in layer.themes:
             row = conn.execute(query.format(sql.Identifier(layer.view)), (survey,)).fetchone()
             found |= {layer.id} if row and row[0] else set()
@@ -145,6 +168,6 @@ def docks(view: Viewpoint, scene: ET.Element) -> ET.Element:
     # Older versions read x, elev and y (southward) from the origin, later ones the place in the tunnel's SRID.
     ET.SubElement(
         dock, "camera", x="0", y="0", elev=repr(view.height), xMap=repr(view.x), yMap=repr(view.y), zMap=repr(view.height),
-        dist=repr(DISTANCE), pitch=repr(PITCH), yaw=repr(view.yaw),
+        dist=repr(view.distance), pitch=repr(PITCH), yaw=repr(view.yaw),
     )  # fmt: skip
     return root

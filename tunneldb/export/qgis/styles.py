@@ -8,7 +8,7 @@ from importlib import resources
 import psycopg
 
 from tunneldb.errors import UserError
-from tunneldb.export.qgis.layer import LAYERS
+from tunneldb.export.qgis.layer import LAYERS, STRUCTURE_LAYERS
 
 STYLE_NAME = "tunneldb"
 
@@ -77,10 +77,15 @@ def styled_columns() -> list[tuple[str, str, str, str]]:
 
     Of a view that is in a project twice, the layer of its own name has the style.
     """
-    return [(layer.view, layer.column, layer.style, layer.title) for layer in LAYERS if layer.id == layer.view] + [
+    return [
+        (layer.view, layer.column, layer.style, layer.title) for layer in (*LAYERS, *STRUCTURE_LAYERS) if layer.id == layer.view
+    ] + [
         ("anomaly", "unrolled", "anomaly", "Leaks, joints and dark spots, unrolled"),
         ("anomaly", "map", "anomaly", "Leaks, joints and dark spots beside the axis"),
         ("leak", "unrolled", "leak", "Leaks, unrolled"),
         ("leak", "map", "leak", "Leaks beside the axis"),
         ("leak", "surface", "leak_3d", "Leaks in space"),
+        ("spot", "map", "spot", "Spots on the map"),
+        ("spot", "surface", "spot_3d", "Spots in space"),
+        ("spot_face", "geom", "spot", "Spots, each in its face's own plane"),
     ]

@@ -1,0 +1,395 @@
+<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
+<qgis version="3.22.0" styleCategories="AllStyleCategories" hasScaleBasedVisibilityFlag="0" minScale="0" maxScale="0" readOnly="0">
+  <renderer-v2 type="RuleRenderer" forceraster="0" enableorderby="0" symbollevels="0">
+    <rules key="{tunneldb-rules}">
+      <rule key="{tunneldb-0}" symbol="0" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 0" label="Member 8, 8, …"/>
+      <rule key="{tunneldb-1}" symbol="1" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 1" label="Member 1, 9, …"/>
+      <rule key="{tunneldb-2}" symbol="2" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 2" label="Member 2, 10, …"/>
+      <rule key="{tunneldb-3}" symbol="3" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 3" label="Member 3, 11, …"/>
+      <rule key="{tunneldb-4}" symbol="4" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 4" label="Member 4, 12, …"/>
+      <rule key="{tunneldb-5}" symbol="5" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 5" label="Member 5, 13, …"/>
+      <rule key="{tunneldb-6}" symbol="6" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 6" label="Member 6, 14, …"/>
+      <rule key="{tunneldb-7}" symbol="7" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 7" label="Member 7, 15, …"/>
+      <rule key="{tunneldb-8}" symbol="8" filter="&quot;seen_share&quot; &lt; 0.5" label="Less than half of it could be judged"/>
+    </rules>
+    <symbols>
+      <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="141,211,199,150"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="90,90,90,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.2"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+          </symbol>
+        </layer>
+      </symbol>
+      <symbol name="1" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="253,205,172,150"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="90,90,90,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.2"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+          </symbol>
+        </layer>
+      </symbol>
+      <symbol name="2" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="190,186,218,150"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="90,90,90,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.2"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+          </symbol>
+        </layer>
+      </symbol>
+      <symbol name="3" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="179,205,227,150"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="90,90,90,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.2"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+          </symbol>
+        </layer>
+      </symbol>
+      <symbol name="4" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="252,205,229,150"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="90,90,90,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.2"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+          </symbol>
+        </layer>
+      </symbol>
+      <symbol name="5" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="204,235,197,150"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="90,90,90,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.2"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+          </symbol>
+        </layer>
+      </symbol>
+      <symbol name="6" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="222,203,180,150"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="90,90,90,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.2"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+          </symbol>
+        </layer>
+      </symbol>
+      <symbol name="7" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="230,245,201,150"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="90,90,90,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.2"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+          </symbol>
+        </layer>
+      </symbol>
+      <symbol name="8" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="GeometryGenerator" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="SymbolType" value="Fill"/>
+            <Option type="QString" name="geometryModifier" value="if(&quot;kind&quot; = 'pipe', convex_hull($geometry), $geometry)"/>
+            <Option type="QString" name="units" value="MapUnit"/>
+          </Option>
+          <symbol name="@0@0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
+        <layer class="SimpleFill" enabled="1" locked="0" pass="0">
+          <Option type="Map">
+            <Option type="QString" name="color" value="120,120,120,120"/>
+            <Option type="QString" name="style" value="solid"/>
+            <Option type="QString" name="outline_color" value="60,60,60,255"/>
+            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_width" value="0.2"/>
+            <Option type="QString" name="outline_width_unit" value="MM"/>
+            <Option type="QString" name="joinstyle" value="round"/>
+          </Option>
+        </layer>
+          </symbol>
+        </layer>
+      </symbol>
+    </symbols>
+  </renderer-v2>
+  <fieldConfiguration>
+    <field name="id" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="survey_id" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="survey" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="member" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="number" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="kind" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="radius" configurationFlags="None">
+      <editWidget type="Range">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="AllowNull" value="true"/>
+            <Option type="int" name="Precision" value="3"/>
+            <Option type="QString" name="Style" value="SpinBox"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="area" configurationFlags="None">
+      <editWidget type="Range">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="AllowNull" value="true"/>
+            <Option type="int" name="Precision" value="2"/>
+            <Option type="QString" name="Style" value="SpinBox"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="seen_share" configurationFlags="None">
+      <editWidget type="Range">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="AllowNull" value="true"/>
+            <Option type="int" name="Precision" value="3"/>
+            <Option type="QString" name="Style" value="SpinBox"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="bimodal" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+  </fieldConfiguration>
+  <aliases>
+    <alias index="0" field="id" name="Key"/>
+    <alias index="1" field="survey_id" name="Survey key"/>
+    <alias index="2" field="survey" name="Survey"/>
+    <alias index="3" field="member" name="Member"/>
+    <alias index="4" field="number" name="Face"/>
+    <alias index="5" field="kind" name="Kind"/>
+    <alias index="6" field="radius" name="Radius (m)"/>
+    <alias index="7" field="area" name="Area (m²)"/>
+    <alias index="8" field="seen_share" name="Share judged"/>
+    <alias index="9" field="bimodal" name="More than half differs"/>
+  </aliases>
+  <editable>
+    <field name="id" editable="0"/>
+    <field name="survey_id" editable="0"/>
+    <field name="survey" editable="0"/>
+    <field name="member" editable="0"/>
+    <field name="number" editable="0"/>
+    <field name="kind" editable="0"/>
+    <field name="radius" editable="0"/>
+    <field name="area" editable="0"/>
+    <field name="seen_share" editable="0"/>
+    <field name="bimodal" editable="0"/>
+  </editable>
+  <previewExpression>"number"</previewExpression>
+  <mapTip>&lt;b&gt;Face [% "number" %]&lt;/b&gt; of member [% "member" %], [% "kind" %]&lt;br&gt;[% format_number("area", 2) %] m², of which [% format_number(100 * "seen_share", 0) %] % could be judged[% if("bimodal", '&lt;br&gt;more than half differs: which half is its own surface is open', '') %]</mapTip>
+  <renderer-3d type="rulebased">
+    <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
+    <rules key="{tunneldb-3d}">
+      <rule key="{tunneldb-3d-0}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 0" description="Member 8, 8, …">
+        <symbol type="polygon" material_type="phong">
+          <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
+          <material ambient="176,211,206,255" diffuse="113,135,132,255" specular="0,0,0,255" shininess="0"/>
+          <edges enabled="1" width="1" color="90,90,90,255"/>
+        </symbol>
+      </rule>
+      <rule key="{tunneldb-3d-1}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 1" description="Member 1, 9, …">
+        <symbol type="polygon" material_type="phong">
+          <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
+          <material ambient="230,209,193,255" diffuse="147,134,123,255" specular="0,0,0,255" shininess="0"/>
+          <edges enabled="1" width="1" color="90,90,90,255"/>
+        </symbol>
+      </rule>
+      <rule key="{tunneldb-3d-2}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 2" description="Member 2, 10, …">
+        <symbol type="polygon" material_type="phong">
+          <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
+          <material ambient="202,200,215,255" diffuse="129,128,137,255" specular="0,0,0,255" shininess="0"/>
+          <edges enabled="1" width="1" color="90,90,90,255"/>
+        </symbol>
+      </rule>
+      <rule key="{tunneldb-3d-3}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 3" description="Member 3, 11, …">
+        <symbol type="polygon" material_type="phong">
+          <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
+          <material ambient="196,209,219,255" diffuse="126,134,140,255" specular="0,0,0,255" shininess="0"/>
+          <edges enabled="1" width="1" color="90,90,90,255"/>
+        </symbol>
+      </rule>
+      <rule key="{tunneldb-3d-4}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 4" description="Member 4, 12, …">
+        <symbol type="polygon" material_type="phong">
+          <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
+          <material ambient="229,209,219,255" diffuse="147,134,140,255" specular="0,0,0,255" shininess="0"/>
+          <edges enabled="1" width="1" color="90,90,90,255"/>
+        </symbol>
+      </rule>
+      <rule key="{tunneldb-3d-5}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 5" description="Member 5, 13, …">
+        <symbol type="polygon" material_type="phong">
+          <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
+          <material ambient="208,222,205,255" diffuse="133,142,131,255" specular="0,0,0,255" shininess="0"/>
+          <edges enabled="1" width="1" color="90,90,90,255"/>
+        </symbol>
+      </rule>
+      <rule key="{tunneldb-3d-6}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 6" description="Member 6, 14, …">
+        <symbol type="polygon" material_type="phong">
+          <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
+          <material ambient="216,208,197,255" diffuse="139,133,126,255" specular="0,0,0,255" shininess="0"/>
+          <edges enabled="1" width="1" color="90,90,90,255"/>
+        </symbol>
+      </rule>
+      <rule key="{tunneldb-3d-7}" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 7" description="Member 7, 15, …">
+        <symbol type="polygon" material_type="phong">
+          <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
+          <material ambient="220,226,207,255" diffuse="141,145,132,255" specular="0,0,0,255" shininess="0"/>
+          <edges enabled="1" width="1" color="90,90,90,255"/>
+        </symbol>
+      </rule>
+      <rule key="{tunneldb-3d-8}" filter="&quot;seen_share&quot; &lt; 0.5" description="Less than half of it could be judged">
+        <symbol type="polygon" material_type="phong">
+          <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="0" rendered-facade="3"/>
+          <material ambient="164,164,164,255" diffuse="105,105,105,255" specular="0,0,0,255" shininess="0"/>
+          <edges enabled="1" width="1" color="60,60,60,255"/>
+        </symbol>
+      </rule>
+    </rules>
+  </renderer-3d>
+  <layerGeometryType>2</layerGeometryType>
+</qgis>
