@@ -15,7 +15,6 @@ A row "all" counts every point of every anomaly. Points of mixed pixels, wires a
 from __future__ import annotations
 
 import argparse
-import os
 import tempfile
 from collections.abc import Sequence
 from contextlib import nullcontext
@@ -288,7 +287,7 @@ def large(points: int, folder: Path) -> None:
     output = folder / "large.found.laz"
     intensity = ["--intensity", "Amplitude", "--intensity-kind", "amplitude"]
     seconds, memory, _ = run(["members", files.cloud, "--stations", files.stations, *intensity, "-o", output, "--json"])
-    size = os.path.getsize(files.cloud) / 1e6
+    size = files.cloud.stat().st_size / 1e6
     rows = [
         ("points", files.points),
         ("MB of LAZ", size),

@@ -19,6 +19,7 @@ import subprocess
 import time
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +44,7 @@ def program() -> Path | None:
     source = Path(__file__).with_name("region_growing.cpp")
     if BUILD.exists() and BUILD.stat().st_mtime > source.stat().st_mtime:
         return BUILD
-    roots = [p for p in Path("/usr/include").glob("pcl-*")]
+    roots = list(Path("/usr/include").glob("pcl-*"))
     if not roots:
         return None
     BUILD.parent.mkdir(exist_ok=True)
@@ -117,7 +118,7 @@ def _cluster(number: int, xyz: Float) -> _Cluster | None:
         return None
     corners = middle + np.asarray(box.exterior.coords) @ np.array([u, v])
     sides = []
-    for one, other in zip(corners[:-1], corners[1:], strict=True):
+    for one, other in pairwise(corners):
         way = other - one
         sides.append((one, way / max(np.linalg.norm(way), 1e-9)))
     return _Cluster(number, middle, normal, sides, xyz)

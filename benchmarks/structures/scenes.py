@@ -19,24 +19,28 @@ from tunneldb.simulate.structure import StructureParameters, StructureScan, writ
 
 OWN = tuple(range(1, 13))
 JUDGE = tuple(range(1001, 1013))
+FINE_EVERY = 6  # one is scanned from one station at 0.035 degrees
 CLEAN_EVERY = 4  # one scene of so many has no anomaly
 
 
 def parameters(seed: int, name: str, **other: Any) -> StructureParameters:
-    """A scene of a seed: 1 to 4 stations, 1 to 3 mm, 0.05 to 0.12 degrees, 5 to 14 m, by day and by night."""
+    """A scene of a seed: 1 to 4 stations, 1 to 3 mm, 0.035 to 0.12 degrees, 5 to 14 m, by day and by night."""
     rng = np.random.default_rng([17, seed])
     values: dict[str, Any] = {
         "stations": int(rng.integers(1, 5)),
         "range_noise": float(rng.uniform(0.001, 0.003)),
         "angular_step": float(rng.uniform(0.05, 0.12)),
         "distance": float(rng.uniform(5.0, 14.0)),
-        "width": float(rng.uniform(5.0, 9.0)),
+        "width": float(rng.uniform(4.0, 7.0)),
         "fronts": int(rng.integers(1, 5)),
         "night": bool(rng.random() < 0.4),
         "anomalies": 0 if seed % CLEAN_EVERY == 0 else int(rng.integers(8, 20)),
     }
-    # Far scenes are scanned finely, as one would.
-    values["angular_step"] = min(values["angular_step"], 0.6 / values["distance"])
+    # Far scenes are scanned finely and few stations, too, as one would; so all have some hundred thousand points.
+    values["angular_step"] = min(values["angular_step"], 0.7 / values["distance"])
+    values["angular_step"] = max(values["angular_step"], 0.05 * values["stations"] ** 0.5)
+    if seed % FINE_EVERY == 1:
+        values |= {"stations": 1, "angular_step": 0.035}
     return StructureParameters(**{"name": name, "seed": seed, **values, **other})
 
 

@@ -129,7 +129,11 @@ class StructureScan:
             for face in np.unique(owner[owner > 0]).tolist():
                 seen.setdefault(face, []).append(self.structure.faces[face - 1].unroll(xyz[owner == face]))
         places = {face: np.vstack(parts) for face, parts in seen.items()}
-        faces = [f for f in self.structure.faces if f.row[0] <= TUBE and len(places.get(f.id, ())) >= LEAST_PLACES]
+        faces = [
+            f
+            for f in self.structure.faces
+            if f.row[0] <= TUBE and f.surfaces == 1 and len(places.get(f.id, ())) >= LEAST_PLACES
+        ]
         out: list[Anomaly] = []
         if not faces:
             return out

@@ -20,7 +20,7 @@ from tunneldb.simulate.output import CREATED, SCALE
 from tunneldb.simulate.radiometry import reference_curve
 from tunneldb.simulate.structure.anomalies import Anomaly
 from tunneldb.simulate.structure.generate import FURTHEST, StructureCloud, StructureScan
-from tunneldb.simulate.structure.shapes import Face
+from tunneldb.simulate.structure.shapes import RING, Face
 
 DIMENSIONS = [
     laspy.ExtraBytesParams("Amplitude", np.float32, "echo amplitude, dB"),
@@ -97,7 +97,7 @@ def _write(scan: StructureScan, folder: Path, name: str, progress: Callable[[int
     header.add_extra_dims(DIMENSIONS)
     header.add_crs(parameters.crs())
     header.scales, header.offsets = np.full(3, SCALE), np.floor(origin)
-    header.generating_software = f"tunneldb {tunneldb.__version__} simulate-structure"
+    header.generating_software = f"tunneldb {tunneldb.__version__} simulate"
     header.system_identifier = "SIMULATION"
     header.creation_date = CREATED
     faces, anomalies = [_Tally() for _ in scan.structure.faces], [_Tally() for _ in scan.anomalies]
@@ -166,10 +166,10 @@ def _face(face: Face, tally: _Tally, origin: Float) -> dict[str, Any]:
         shape |= {"radius": float(face.row[13]), "length": float(face.row[14])}
     elif face.kind == "bend":
         shape |= {"bend_radius": float(face.row[13]), "radius": float(face.row[14]), "angle": float(face.row[15])}
-    elif face.row[0] == 0.0:
-        shape |= {"size": list(face.size())}
-    else:
+    elif face.row[0] == RING:
         shape |= {"radii": face.row[13:15].tolist()}
+    elif face.surfaces == 1:
+        shape |= {"size": list(face.size())}
     return {
         "id": face.id,
         "member": face.member,

@@ -58,6 +58,8 @@ class Face:
     row : (17,) array
         The surface whose frame is the face's: u, v are along its first two axes (plane), or along the axis and around
         it (cylinder).
+    surfaces : int
+        Of how many surfaces it is made; the end of a profile has several in one plane.
     """
 
     id: int
@@ -65,6 +67,7 @@ class Face:
     kind: str
     material: str
     row: Float
+    surfaces: int = 1
 
     def unroll(self, xyz: Float) -> Float:
         """Coordinates (n, 2) on the face of points (n, 3), m."""
@@ -120,7 +123,7 @@ class Structure:
 
     def face(self, member: Member, kind: str, material: str, rows: Sequence[Float]) -> Face:
         """Add a face, made of one or more surfaces of one plane, or of one cylinder or bend."""
-        face = Face(len(self.faces) + 1, member.id, kind, material, rows[0])
+        face = Face(len(self.faces) + 1, member.id, kind, material, rows[0], len(rows))
         self.faces.append(face)
         member.faces.append(face.id)
         self._add(rows, face.id, material)
