@@ -57,6 +57,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "psql": ("tunneldb.cli.psql:psql", "Open psql on the database."),
     "server": ("tunneldb.cli.server:server", "Start, stop or look at the embedded server."),
     "simulate": ("tunneldb.cli.simulate:simulate", "Make a simulated scan of a tunnel, with its truth."),
+    "simulate-structure": (
+        "tunneldb.cli.simulate_structure:simulate_structure",
+        "Make a simulated scan of a structure, with its truth.",
+    ),
 }
 
 MANUAL: dict[str, list[tuple[str, str]]] = {

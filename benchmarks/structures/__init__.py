@@ -1,0 +1,1 @@
+"""Members, faces and spots of simulated structures against their truth; see __main__.py."""
