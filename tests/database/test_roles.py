@@ -19,7 +19,7 @@ EDITABLE = {
     "axis_vertex": {"geom"},
     "region": {"kind", "geom", "INSERT", "DELETE"},
     **{base + part: KEEP for base in ("anomaly", "leak") for part in ("", "_unrolled", "_map", "_3d")},
-    **{"spot" + part: {"review", "remark"} for part in ("", "_face", "_map", "_3d")},
+    **{"spot" + part: {"review", "remark"} for part in ("", "_face", "_map", "_3d", "_sheet")},
 }
 """What inspectors and operators may change of the views, and nobody else of any: columns, new rows, rows deleted."""
 
