@@ -13,7 +13,9 @@ import psycopg
 from PIL import Image
 from scipy import ndimage
 
-from tunneldb.arrays import Intp, Single, UInt8
+from tunneldb.anomalies.threshold import filter_size, seen_lining
+from tunneldb.anomalies.windows import on_lining
+from tunneldb.arrays import Bool, Intp, Single, UInt8
 from tunneldb.raster.gap_fill import FILL, fill_gaps
 from tunneldb.raster.geotiff import Raster, decode
 from tunneldb.raster.grid import BLOCK
@@ -28,10 +30,6 @@ KEPT = 7
 
 NO_STATE = 255
 """Where a block has no state."""
-
-HELD = 0.2
-"""Lining is shown as seen where at least this share of its pixels holds points: the same share as the median filter needs to
-tell whether it is wet."""
 
 FILLED = 0.14
 """Pixels without points take the mean of those about them, in a square so wide, m: about what the median filter looks at."""
@@ -101,6 +99,14 @@ class _Block:
     shown: Raster
     state: UInt8
 
+    def unseen(self, size: int) -> Bool:
+        """Lining that detection did not see, by the rule of `seen_lining` and its filter's side, pixels."""
+        about = size // 2
+        # What lies beyond the block is not known here; as it lies within, so that no line runs along its edges.
+        seen = [seen for _, seen in seen_lining(np.pad(self.state, about, "reflect"), size)]
+        inner = slice(about, -about or None)
+        return (self.state == PixelState.EMPTY) & ~np.concatenate(seen)[inner, inner]
+
     def lining(self) -> Single:
         """What is shown of its lining, thinned, dB or m."""
         thin = (slice(None, None, 4), slice(None, None, 4))
@@ -110,9 +116,13 @@ class _Block:
 
 @dataclass(frozen=True)
 class _Kilometre:
-    """How a kilometre is drawn: side of its pixels, m, and values shown black and white, dB or m."""
+    """How a kilometre is drawn.
+
+    Side of its pixels, m, and of the median filter, pixels; values shown black and white, dB or m.
+    """
 
     pixel: float
+    size: int
     low: float
     high: float
 
@@ -137,6 +147,7 @@ class Lining:
         self._km: dict[int, int] = dict(rows)
         self._kept: OrderedDict[int, _Block] = OrderedDict()
         self._known: dict[int, _Kilometre] = {}
+        self._unseen: OrderedDict[int, Bool] = OrderedDict()
 
     def picture(self, window: Window, pixel: float) -> Picture | None:
         """Draw a window, None where there is no image.
@@ -153,7 +164,7 @@ class Lining:
         canvas = np.full((round(window.height / side), round(window.width / side), 3), NOTHING, np.uint8)
         offset = self._offset(window, side) if self._kind == "offset" else None
         for number, kilometre in there.items():
-            place = _Place.of(self._block(number), window, side)
+            place = _Place.of(self._block(number), self._hidden(number, kilometre.size), window, side)
             if place is not None:
                 canvas[place.there] = _seen(place, side, kilometre) if offset is None else _grey(offset[place.there], kilometre)
         out = io.BytesIO()
@@ -166,7 +177,10 @@ class Lining:
         about = Window(*(end + way * edge * side for end, way in zip(astuple(window), (-1, 1, -1, 1), strict=True)))
         sums = np.zeros((2, round(about.height / side), round(about.width / side)), np.float32)
         for number in range(int(np.floor(about.west / BLOCK)), int(np.ceil(about.east / BLOCK))):
-            place = _Place.of(self._block(number), about, side) if number in self._km else None
+            if number not in self._km:
+                continue
+            block = self._block(number)
+            place = _Place.of(block, np.zeros(block.state.shape, np.bool_), about, side)
             if place is not None:
                 sums[:, *place.there] += place.sums()[:2]
         return fill_gaps(_ratio(sums[1], sums[0]), FILL / side)[edge:-edge, edge:-edge]
@@ -192,6 +206,17 @@ class Lining:
             self._kept.popitem(last=False)
         return block
 
+    def _hidden(self, number: int, size: int) -> Bool:
+        """Lining of a block that was not seen; none where there is no intensity."""
+        if self._kind == "offset":
+            return np.zeros(self._block(number).state.shape, np.bool_)
+        if number not in self._unseen:
+            self._unseen[number] = self._block(number).unseen(size)
+            while len(self._unseen) > KEPT:
+                self._unseen.popitem(last=False)
+        self._unseen.move_to_end(number)
+        return self._unseen[number]
+
     def _kilometre(self, km: int) -> _Kilometre:
         """Values are drawn from the 1st to the 98th percentile of the lining in up to three of the kilometre's blocks."""
         if km not in self._known:
@@ -200,7 +225,10 @@ class Lining:
             values = np.concatenate([block.lining() for block in blocks])
             low, high = (float(v) for v in np.percentile(values, [1, 98])) if len(values) else (0.0, 1.0)
             pixel = blocks[0].shown.transform.a
-            self._known[km] = _Kilometre(pixel, low, max(high, low + LEAST[self._kind]))
+            empty = sum(int(np.count_nonzero(block.state == PixelState.EMPTY)) for block in blocks)
+            filled = sum(int(np.count_nonzero(on_lining(block.state))) for block in blocks)
+            size = filter_size(max(filled, 1) / max(filled + empty, 1))
+            self._known[km] = _Kilometre(pixel, size, low, max(high, low + LEAST[self._kind]))
         return self._known[km]
 
 
@@ -212,8 +240,8 @@ class _Place:
     ----------
     there : (slice, slice)
         Rows and columns of the window's picture.
-    values, state : (rows, columns) arrays
-        Of the block's pixels in it.
+    values, state, hidden : (rows, columns) arrays
+        Of the block's pixels in it; hidden are those of lining that was not seen.
     row, column : (rows,), (columns,) arrays
         Row and column of the picture that they fall into, from the first of these on; both grow without gaps.
     """
@@ -221,11 +249,12 @@ class _Place:
     there: tuple[slice, slice]
     values: Single
     state: UInt8
+    hidden: Bool
     row: Intp
     column: Intp
 
     @classmethod
-    def of(cls, block: _Block, window: Window, side: float) -> _Place | None:
+    def of(cls, block: _Block, hidden: Bool, window: Window, side: float) -> _Place | None:
         """Find the place of a block in a window whose picture has pixels of that side, m; None if it has none."""
         transform, (height, width) = block.shown.transform, block.shown.values.shape
         column = np.floor((transform.c + transform.a * (np.arange(width) + 0.5) - window.west) / side).astype(np.intp)
@@ -235,11 +264,11 @@ class _Place:
         if not len(row) or not len(column):
             return None
         there = slice(row[0], row[-1] + 1), slice(column[0], column[-1] + 1)
-        return cls(there, block.shown.values[part], block.state[part], row - row[0], column - column[0])
+        return cls(there, block.shown.values[part], block.state[part], hidden[part], row - row[0], column - column[0])
 
     def sums(self) -> Single:
         """Sum up the block's pixels, see :func:`_accumulate`."""
-        return _accumulate(self.values, self.state, self.row, self.column)
+        return _accumulate(self.values, self.state, self.hidden, self.row, self.column)
 
 
 def _inside(place: Intp, count: int) -> slice:
@@ -257,8 +286,8 @@ def _grey(values: Single, kilometre: _Kilometre) -> UInt8:
 
 def _seen(place: _Place, side: float, kilometre: _Kilometre) -> UInt8:
     """Colours of corrected intensity and of lining that was not seen, is hidden or no lining."""
-    held, level, lining, empty, off, floor = place.sums()
-    about = 2 * round(FILLED / side / 2) + 1
+    held, level, lining, unseen, off, floor = place.sums()
+    about = 2 * round(max(FILLED, kilometre.size * kilometre.pixel) / side / 2) + 1
 
     def smooth(what: Single) -> Single:
         return ndimage.uniform_filter(what, about, mode="nearest") if about > 1 else what
@@ -266,23 +295,24 @@ def _seen(place: _Place, side: float, kilometre: _Kilometre) -> UInt8:
     mean = np.where(held > 0, _ratio(level, held), _ratio(smooth(level), smooth(held)))
     shade = np.clip((mean - kilometre.low) / (kilometre.high - kilometre.low), 0.0, 1.0)
     grey = np.repeat(255.0 * np.nan_to_num(shade, nan=0.75), 3).reshape(*shade.shape, 3)
-    unseen = smooth(lining - empty) < HELD * smooth(lining)
     other = lining + off + floor
-    for mask, colour, opaque in ((unseen, UNSEEN, 1.0), (off > other / 2, COVERED, 0.55), (floor > other / 2, FLOOR, 0.92)):
+    tints = ((unseen, UNSEEN, 1.0), (off, COVERED, 0.55), (floor, FLOOR, 0.92))
+    for part, colour, opaque in tints:
+        mask = part > other / 2
         grey[mask] = (1 - opaque) * grey[mask] + opaque * np.array(colour, np.float32)
     return grey.astype(np.uint8)
 
 
-def _accumulate(values: Single, state: UInt8, row: Intp, column: Intp) -> Single:
+def _accumulate(values: Single, state: UInt8, hidden: Bool, row: Intp, column: Intp) -> Single:
     """Sum up the pixels that fall into each coarser one.
 
-    How many hold points, their intensities added up, how many are lining, lining without points, what hangs before it, floor.
-    (6, rows, columns).
+    How many hold points, their intensities added up, how many are lining, lining that was not seen, what hangs before it,
+    floor. (6, rows, columns).
     """
     floor = (state == PixelState.FLOOR) | (state == NO_STATE)
     off = state == PixelState.OFF
     held = np.isfinite(values)
-    layers = (held, np.where(held, values, 0.0), ~(floor | off), state == PixelState.EMPTY, off, floor)
+    layers = (held, np.where(held, values, 0.0), ~(floor | off), hidden, off, floor)
     first = [np.flatnonzero(np.diff(place, prepend=-1)) for place in (row, column)]
     sums = np.empty((len(layers), len(first[0]), len(first[1])), np.float32)
     for k, layer in enumerate(layers):
