@@ -26,7 +26,7 @@ import numpy as np
 
 from benchmarks.common import print_table, progress, save
 from benchmarks.structures import judge
-from benchmarks.structures.detector import Found, detect
+from benchmarks.structures.detector import CrashedError, Found, detect, nothing
 from benchmarks.structures.literal import Literal, literal, program
 from benchmarks.structures.scenes import JUDGE, OWN, Scene, make, one_scan, parameters
 
@@ -102,11 +102,16 @@ def compare(seeds: Sequence[int], folder: Path, peer: bool, reference: bool, lis
     methods = [ours, fit, moments] if peer else [ours]
     area = clean_area = 0.0
     points = clean = 0
+    crashed = 0
     pcl = 0.0
     missed: list[list[object]] = []
     for seed in seeds:
         scene = make(parameters(seed, f"seed{seed}"), folder)
-        found = detect(scene, folder, reference=reference)
+        try:
+            found = detect(scene, folder, reference=reference)
+        except CrashedError as error:
+            progress(f"seed {seed}: counted as nothing found: {error}")
+            found, crashed = nothing(scene), crashed + 1
         seen = judge.area_seen(scene)
         is_clean = not scene.truth["anomalies"]
         area, points = area + seen, points + len(scene.xyz)
@@ -134,6 +139,7 @@ def compare(seeds: Sequence[int], folder: Path, peer: bool, reference: bool, lis
         ("false regions", ours.false),
         ("false regions per 100 m²", 100.0 * ours.false / area),
         (f"false regions in {clean} clean scenes of {clean_area:.0f} m²", ours.false_clean),
+        ("scenes on which it crashed", crashed),
         ("points a second", points / ours.seconds),
         ("peak memory, MB", ours.memory / 1e6),
     ]

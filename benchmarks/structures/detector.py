@@ -38,6 +38,10 @@ class Found:
     answer: dict[str, Any]
 
 
+class CrashedError(Exception):
+    """The program ended otherwise than well; the last line that it wrote."""
+
+
 def run(arguments: list[object]) -> tuple[float, float, str]:
     """Run a command of tunneldb; its seconds, its peak memory (bytes) and what it printed."""
     start = time.perf_counter()
@@ -50,7 +54,7 @@ def run(arguments: list[object]) -> tuple[float, float, str]:
         err.seek(0)
         text = out.read()
         if process.returncode:
-            raise SystemExit(f"tunneldb {' '.join(map(str, arguments))}\n{text}{err.read()}")
+            raise CrashedError(f"tunneldb {' '.join(map(str, arguments))}: {(err.read().strip() or text).splitlines()[-1]}")
     return seconds, usage.ru_maxrss * 1024.0, text
 
 
@@ -79,6 +83,12 @@ def detect(scene: Scene, folder: Path, models: bool = True, reference: bool = Fa
         memory,
         json.loads(text),
     )
+
+
+def nothing(scene: Scene) -> Found:
+    """What a run that crashed has found."""
+    none = np.zeros(len(scene.xyz), dtype=np.int64)
+    return Found(none, none, none, {}, 0.0, 0.0, {})
 
 
 def _faces(path: Path) -> dict[int, dict[str, Any]]:
