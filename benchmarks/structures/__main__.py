@@ -26,7 +26,7 @@ import numpy as np
 
 from benchmarks.common import print_table, progress, save
 from benchmarks.structures import judge
-from benchmarks.structures.detector import CrashedError, Found, detect, nothing
+from benchmarks.structures.detector import Found, attempt
 from benchmarks.structures.literal import Literal, literal, program
 from benchmarks.structures.scenes import JUDGE, OWN, Scene, make, one_scan, parameters
 
@@ -107,11 +107,8 @@ def compare(seeds: Sequence[int], folder: Path, peer: bool, reference: bool, lis
     missed: list[list[object]] = []
     for seed in seeds:
         scene = make(parameters(seed, f"seed{seed}"), folder)
-        try:
-            found = detect(scene, folder, reference=reference)
-        except CrashedError as error:
-            progress(f"seed {seed}: counted as nothing found: {error}")
-            found, crashed = nothing(scene), crashed + 1
+        found, ran = attempt(scene, folder, reference=reference)
+        crashed += not ran
         seen = judge.area_seen(scene)
         is_clean = not scene.truth["anomalies"]
         area, points = area + seen, points + len(scene.xyz)
@@ -248,7 +245,7 @@ def limits(seeds: Sequence[int], folder: Path, reference: bool) -> None:
     spots: list[judge.Spot] = []
     for seed in seeds:
         scene = make(parameters(seed, f"limits{seed}", anomalies=60, stations=3, contrast=(0.5, 6.0), width=9.0), folder)
-        found = detect(scene, folder, models=False, reference=reference)
+        found, _ = attempt(scene, folder, models=False, reference=reference)
         spots += judge.spots(scene, found.anomaly > 0)
         progress(f"seed {seed}: {len(scene.xyz):,} points, {found.seconds:.1f} s, {_line(scene, found.anomaly > 0)}")
     for k in range(len(INCIDENCES) - 1):
@@ -271,7 +268,7 @@ def pairs(seeds: Sequence[int], folder: Path) -> None:
         day = make(base, folder)
         night = make(replace(base, name=f"pair{seed}-night", night=True), folder)
         single = [one_scan(day, number, folder) for number in (1, 2)]
-        called = [detect(scene, folder, models=False).anomaly > 0 for scene in (day, night, *single)]
+        called = [attempt(scene, folder, models=False)[0].anomaly > 0 for scene in (day, night, *single)]
         one = judge.same_surface(single[0], called[2], single[1], called[3])
         other = judge.same_surface(day, called[0], night, called[1])
         progress(f"seed {seed}: viewpoints {one.iou:.3f}, day and night {other.iou:.3f}")

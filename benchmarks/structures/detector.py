@@ -17,7 +17,7 @@ import pyogrio.raw
 import shapely
 from scipy.optimize import least_squares
 
-from benchmarks.common import COMMAND
+from benchmarks.common import COMMAND, progress
 from benchmarks.structures.scenes import Scene
 from tunneldb.arrays import Float, Int64
 
@@ -85,10 +85,14 @@ def detect(scene: Scene, folder: Path, models: bool = True, reference: bool = Fa
     )
 
 
-def nothing(scene: Scene) -> Found:
-    """What a run that crashed has found."""
+def attempt(scene: Scene, folder: Path, models: bool = True, reference: bool = False) -> tuple[Found, bool]:
+    """The same, and whether it ran: what crashed has found nothing."""
+    try:
+        return detect(scene, folder, models, reference), True
+    except CrashedError as error:
+        progress(f"counted as nothing found: {error}")
     none = np.zeros(len(scene.xyz), dtype=np.int64)
-    return Found(none, none, none, {}, 0.0, 0.0, {})
+    return Found(none, none, none, {}, 0.0, 0.0, {}), False
 
 
 def _faces(path: Path) -> dict[int, dict[str, Any]]:
