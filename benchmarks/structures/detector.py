@@ -17,7 +17,7 @@ import pyogrio.raw
 import shapely
 from scipy.optimize import least_squares
 
-from benchmarks.common import COMMAND
+from benchmarks.common import COMMAND, progress
 from benchmarks.structures.scenes import Scene
 from tunneldb.arrays import Float, Int64
 
@@ -38,6 +38,10 @@ class Found:
     answer: dict[str, Any]
 
 
+class CrashedError(Exception):
+    """The program ended otherwise than well; the last line that it wrote."""
+
+
 def run(arguments: list[object]) -> tuple[float, float, str]:
     """Run a command of tunneldb; its seconds, its peak memory (bytes) and what it printed."""
     start = time.perf_counter()
@@ -50,7 +54,7 @@ def run(arguments: list[object]) -> tuple[float, float, str]:
         err.seek(0)
         text = out.read()
         if process.returncode:
-            raise SystemExit(f"tunneldb {' '.join(map(str, arguments))}\n{text}{err.read()}")
+            raise CrashedError(f"tunneldb {' '.join(map(str, arguments))}: {(err.read().strip() or text).splitlines()[-1]}")
     return seconds, usage.ru_maxrss * 1024.0, text
 
 
@@ -79,6 +83,16 @@ def detect(scene: Scene, folder: Path, models: bool = True, reference: bool = Fa
         memory,
         json.loads(text),
     )
+
+
+def attempt(scene: Scene, folder: Path, models: bool = True, reference: bool = False) -> tuple[Found, bool]:
+    """The same, and whether it ran: what crashed has found nothing."""
+    try:
+        return detect(scene, folder, models, reference), True
+    except CrashedError as error:
+        progress(f"counted as nothing found: {error}")
+    none = np.zeros(len(scene.xyz), dtype=np.int64)
+    return Found(none, none, none, {}, 0.0, 0.0, {}), False
 
 
 def _faces(path: Path) -> dict[int, dict[str, Any]]:

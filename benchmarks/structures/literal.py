@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import subprocess
 import time
+import warnings
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -24,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from scipy.optimize import curve_fit
+from scipy.optimize import OptimizeWarning, curve_fit
 from scipy.spatial import cKDTree
 
 from benchmarks.structures.scenes import Scene
@@ -208,7 +209,9 @@ def _decide(xyz: Float, normal: Float, group: Int64, level: Float) -> tuple[Bool
         if len(middle) > 3 and sigma > 0.0:
             try:
                 start = (float(count.max()), float(middle[count.argmax()]), sigma)
-                (_, mean, sigma), _ = curve_fit(_bell, middle, count, start)
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", OptimizeWarning)  # few bins: the covariance is not asked for
+                    (_, mean, sigma), _ = curve_fit(_bell, middle, count, start)
             except RuntimeError:
                 pass  # no fit: mean and standard deviation stand
         fit[rows] = np.abs(values - mean) > SIGMAS * abs(sigma)

@@ -18,7 +18,7 @@ from tunneldb.arrays import Float, Int64
 from tunneldb.simulate.structure import StructureParameters, StructureScan, write_structure
 
 OWN = tuple(range(1, 13))
-JUDGE = tuple(range(1001, 1013))
+JUDGE = tuple(range(2001, 2013))
 FINE_EVERY = 6  # one is scanned from one station at 0.035 degrees
 CLEAN_EVERY = 4  # one scene of so many has no anomaly
 
