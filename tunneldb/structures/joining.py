@@ -176,6 +176,8 @@ def _joined(one: Extent, other: Extent, images: RangeImages) -> bool:
     if not _of_one_material(one, other):
         return False
     moved = _unrolled_on(one, other)
+    if one.outline.is_empty or moved.is_empty:
+        return False
     if one.model[RADIUS] == 0.0:
         pixel = max(one.pixel, other.pixel)
         common = _common_rims(one.outline, moved, pixel)
@@ -201,13 +203,13 @@ def _longest_gap(one: Extent, other: Extent, pixel: float) -> float:
 
 
 def _unrolled_on(one: Extent, other: Extent) -> shapely.MultiPolygon:
-    """Outline of a face in the unrolled coordinates of another."""
+    """Outline of a face in the unrolled coordinates of another; empty where nothing of an area is left of it there."""
 
     def move(at: Float) -> Float:
         u, v, _ = unroll(one.model, to_space(other.model, at[:, 0], at[:, 1]))
         return np.column_stack([u, v])
 
-    return shapely.make_valid(shapely.transform(other.outline, move))
+    return shapely.make_valid(shapely.transform(other.outline, move), method="structure", keep_collapsed=False)
 
 
 def _common_rims(one: shapely.Geometry, other: shapely.Geometry, pixel: float) -> list[Float]:
