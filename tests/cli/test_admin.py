@@ -236,7 +236,7 @@ def test_status_shows_a_run_whose_program_is_gone(example: str, conn: psycopg.Co
 
 
 def test_a_bug_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch, dsn: str) -> None:
-    monkeypatch.setattr("tunneldb.cli.status.get_survey", lambda *_: 1 / 0)
+    monkeypatch.setattr("tunneldb.cli.status.get_survey", lambda *_, **__: 1 / 0)
     result = run("status", "x")
     assert isinstance(result.exception, ZeroDivisionError)
 

@@ -10,7 +10,7 @@ from tunneldb.pointcloud.spool import ROW
 from tunneldb.store.point_rows import by_chainage, pack_rows
 from tunneldb.store.survey import Survey
 
-SURVEY = Survey(7, "s", 1, "t", 25830, 0.0, 10.0, dt.date(2024, 5, 4), None, "none", "static", "none")
+SURVEY = Survey(7, "s", 1, "t", 25830, False, 0.0, 10.0, dt.date(2024, 5, 4), None, "none", "static", "none")
 
 
 def test_rows_are_packed_as_columns_are() -> None:
