@@ -34,6 +34,14 @@ SELECT 8 * f.id::bigint + b.k, f.survey_id, s.name, NULL, 'load', f.name,
        (5, f.beyond_after, f.reach_after, n.near, 'beyond the end')) AS b (k, points, reach, near, side)
  WHERE b.points > 0.01 * b.near
  UNION ALL
+SELECT 8 * f.id::bigint + 7, f.survey_id, s.name, NULL, 'load', f.name,
+       format('has the same content as %s: all its points count twice; tunneldb survey remove-file %s %s', o.name, s.name, f.name)
+  FROM tunnel.scan_file f
+  JOIN tunnel.survey s ON s.id = f.survey_id
+ CROSS JOIN LATERAL (SELECT min(e.name) AS name FROM tunnel.scan_file e
+                      WHERE e.survey_id = f.survey_id AND e.checksum = f.checksum AND e.id < f.id AND e.checksum <> '') o
+ WHERE o.name IS NOT NULL
+ UNION ALL
 SELECT 8 * s.id::bigint + 6, s.id, s.name, NULL, 'survey', NULL, s.positions_note
   FROM tunnel.survey s
  WHERE s.positions_note IS NOT NULL;

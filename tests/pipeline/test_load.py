@@ -84,6 +84,18 @@ def test_loading_twice_changes_nothing(survey: psycopg.Connection, tmp_path: Pat
     assert (survey.execute("SELECT * FROM tunnel.scan_file").fetchall(), rows(survey), runs(survey)) == before
 
 
+def test_the_same_content_under_another_name_is_told(survey: psycopg.Connection, tmp_path: Path) -> None:
+    path = write(tmp_path / "a.laz", tube(980, 1020, 200, seed=1))
+    load(survey, [path, write(tmp_path / "other.laz", tube(980, 1020, 200, seed=2))])
+    assert survey.execute("SELECT count(*) FROM tunnel_api.remark").fetchone() == (0,)
+    (tmp_path / "copy.laz").write_bytes(path.read_bytes())
+    load(survey, [tmp_path / "copy.laz"])
+    ((name, remark),) = survey.execute("SELECT file, remark FROM tunnel_api.remark").fetchall()
+    assert name == "copy.laz"
+    assert remark.startswith("has the same content as a.laz: ")
+    assert remark.endswith("remove-file s copy.laz")
+
+
 def test_a_file_that_was_moved_is_known_and_found(survey: psycopg.Connection, tmp_path: Path) -> None:
     path = write(tmp_path / "a.laz", tube(980, 1020, 200, seed=1))
     load(survey, [path])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -40,7 +41,8 @@ def require_dimension(path: Path, dimension: str | None, dimensions: Collection[
         return
     alike = next((name for name in dimensions if name.lower() == dimension.lower()), None)
     needed = f", which {use} needs" if use else ""
-    meant = f" (did you mean {alike!r}? capitals matter)" if alike else ""
+    near = difflib.get_close_matches(dimension, dimensions, 1)
+    meant = f" (did you mean {alike!r}? capitals matter)" if alike else f" (did you mean {near[0]!r}?)" if near else ""
     raise UserError(f"{path}: no dimension {dimension!r}{needed}{meant}; the file has {', '.join(dimensions) or 'none'}")
 
 
