@@ -305,11 +305,18 @@ def without_intensity(conn: psycopg.Connection, every: int = 1) -> None:
         conn.execute(sql.SQL("DELETE FROM tunnel.{}").format(sql.Identifier(table)))
     conn.execute("DELETE FROM tunnel.image WHERE kind <> 'offset'")
     conn.execute("UPDATE tunnel.survey SET intensity_kind = 'none', intensity_dimension = NULL, reference = 'none'")
-    for block, tiff in conn.execute("SELECT block, tiff FROM tunnel.image", binary=True).fetchall():
+    thin_images(conn, "offset", every)
+
+
+def thin_images(conn: psycopg.Connection, kind: str, every: int) -> None:
+    """Leave points in every so manyth column of the images of a kind."""
+    query = "SELECT block, tiff FROM tunnel.image WHERE kind = %s"
+    for block, tiff in conn.execute(query, [kind], binary=True).fetchall():
         image = decode(bytes(tiff))
         number = np.arange(image.values.shape[1]) + block * image.values.shape[1]
         image.values[:, number % every > 0] = np.nan
-        conn.execute("UPDATE tunnel.image SET tiff = %s WHERE block = %s", [encode(image, "offset"), block])
+        tiff = encode(image, kind)
+        conn.execute("UPDATE tunnel.image SET tiff = %s WHERE kind = %s AND block = %s", [tiff, kind, block])
     conn.commit()
 
 

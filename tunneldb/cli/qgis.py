@@ -52,8 +52,8 @@ def qgis(
     Where members of structures were found, they are in it, with their faces and spots on the map, in space and unrolled, and an
     atlas with a page for each; of a site they are all that there is.
 
-    Leaks can be reviewed and axis vertices moved in it. Without intensity it shows the offset, over the same with gaps between
-    profiles up to 0.6 m apart filled. The styles also go into the database, where QGIS finds them
+    Leaks can be reviewed and axis vertices moved in it. It shows the intensity, or the offset where there is none, over the same
+    with gaps up to 0.6 m filled. The styles also go into the database, where QGIS finds them
     for layers that are added by hand. A project in the database holds the images by their absolute paths.
     """
     if output is None and name is None:
@@ -91,7 +91,7 @@ def qgis(
 
 
 def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> list[Path]:
-    """Write the images of all kilometres and return the GeoTIFFs; where only the offset can be looked at, also without gaps."""
+    """Write the images of all kilometres and return the GeoTIFFs, with what is looked at also without gaps."""
     kilometres = image_kilometres(conn, survey)
     conn.rollback()
     if kilometres:
@@ -101,8 +101,8 @@ def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> li
         advance = step(progress)("images", len(kilometres))
         for km in kilometres:
             written += export_kilometre(conn, survey, km, folder)
-            if survey.intensity_kind == "none":
-                written.append(export_filled(conn, survey, km, folder))
+            filled = export_filled(conn, survey, km, folder)
+            written += [] if filled is None else [filled]
             advance(1)
     return [path for path in written if path.suffix == ".tif"]
 

@@ -1,8 +1,7 @@
 """Gaps between profiles, closed in what is only looked at: previews, the lining in QGIS and in the report.
 
 Where profiles lie far apart, an image has gaps between them. A pixel without a point takes the value of the nearest one within
-0.3 m, so that profiles up to 0.6 m apart join. Nobody measured there: what is filled says so, and intensity, in which a gap is
-lining that was not seen, is filled in previews only.
+0.3 m, so that profiles up to 0.6 m apart join. Nobody measured there: what is filled says so, and nothing is computed from it.
 """
 
 from __future__ import annotations

@@ -52,42 +52,47 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
         return [path for kind in (*KINDS, *PALETTES) for path in _export_kind(conn, survey, km, kind, folder)]
 
 
-def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> Path:
-    """Write the offset image of a kilometre with its gaps filled, ``SURVEY-kmNNN-offset-filled.tif``, and return its path.
+def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> Path | None:
+    """Write what is looked at of a kilometre with its gaps filled, ``SURVEY-kmNNN-KIND-filled.tif``; its path.
 
-    Its pixels are those of a preview: it is there to be looked at, under the offset that was measured. Its band's name and
-    metadata say what it is. A profile beyond the end of the kilometre fills, too. The connection must be idle.
+    The kind is corrected intensity, or the offset where there is none; None without either. Its pixels are those of a preview:
+    it is there to be looked at, under the image that was measured. Its band's name and metadata say what it is. A profile
+    beyond the end of the kilometre fills, too. The connection must be idle.
     """
     with snapshot(conn):
-        blocks = _blocks(conn, survey, km, "offset")
-        first = _read(conn, survey, km, "offset", blocks[0])
+        by_kind = {kind: _blocks(conn, survey, km, kind) for kind in ("offset", "corrected")}
+        kind = "corrected" if by_kind["corrected"] else "offset"
+        blocks = by_kind[kind]
+        if not blocks:
+            return None
+        first = _read(conn, survey, km, kind, blocks[0])
         factor = preview_factor(first.transform.a)
         rows, columns = (-(-n // factor) for n in first.values.shape)
         extent = Extent(first.transform @ Affine.scale(factor), rows, columns * (blocks[-1] - blocks[0] + 1))
         around = [
-            *_beside(conn, survey, blocks[0] - 1),
+            *_beside(conn, survey, kind, blocks[0] - 1),
             *((km, block) for block in blocks),
-            *_beside(conn, survey, blocks[-1] + 1),
+            *_beside(conn, survey, kind, blocks[-1] + 1),
         ]
 
         def shrunk() -> Iterator[tuple[int, Single]]:
             for other, block in around:
-                raster = _read(conn, survey, other, "offset", block)
+                raster = _read(conn, survey, other, kind, block)
                 if raster.transform.a == first.transform.a:
                     pixels = raster.values if other == km else _laid(raster, first)
                     yield (block - blocks[0]) * columns, preview.shrink(pixels, factor)
 
-        path = folder / f"{survey.name}-km{km:03d}-offset-filled.tif"
+        path = folder / f"{survey.name}-km{km:03d}-{kind}-filled.tif"
         filled = fill_blocks(shrunk(), FILL / extent.transform.a)
         with replacing(path) as temporary:
-            write_cog(temporary, "offset", extent, (b for b in filled if 0 <= b[0] < extent.columns), f"offset, {TOLD}")
+            write_cog(temporary, kind, extent, (b for b in filled if 0 <= b[0] < extent.columns), f"{kind}, {TOLD}")
     return path
 
 
-def _beside(conn: psycopg.Connection, survey: Survey, block: int) -> list[tuple[int, int]]:
-    """Kilometre and number of a block of offset, if there is one."""
-    query = "SELECT km, block FROM tunnel.image WHERE survey_id = %s AND kind = 'offset' AND block = %s"
-    return conn.execute(query, (survey.id, block)).fetchall()
+def _beside(conn: psycopg.Connection, survey: Survey, kind: str, block: int) -> list[tuple[int, int]]:
+    """Kilometre and number of a block of a kind, if there is one."""
+    query = "SELECT km, block FROM tunnel.image WHERE survey_id = %s AND kind = %s AND block = %s"
+    return conn.execute(query, (survey.id, kind, block)).fetchall()
 
 
 def _laid(raster: Raster, like: Raster) -> Single:

@@ -236,14 +236,14 @@ def _table(source: Source, survey: Survey, view: str, title: str, *, counted: bo
 def _rasters(images: Sequence[Path], folder: Path | None) -> list[_Entry]:
     """Layers of the images, a group for each kind; the first kind that there is is shown.
 
-    Without intensity that is the offset, over the same with gaps filled.
+    It lies over the same with gaps filled.
     """
     entries = []
     of_kind = {kind: sorted(path for path in images if image_kind(path) == kind) for kind in KINDS}
     shown = next((kind for kind, paths in of_kind.items() if paths), None)
     for kind, title in KINDS.items():
         paths = of_kind[kind]
-        drawn = pipe(kind, of_kind["offset"] if kind == FILLED else paths)
+        drawn = pipe(kind, of_kind[kind.removesuffix(FILLED)])
         for path in paths:
             element = ET.Element("maplayer", type="raster", styleCategories="AllStyleCategories")
             ET.SubElement(element, "id").text = layer_id(path.stem)
@@ -253,7 +253,7 @@ def _rasters(images: Sequence[Path], folder: Path | None) -> list[_Entry]:
             ET.SubElement(element, "provider").text = "gdal"
             element.append(deepcopy(drawn))
             ET.SubElement(element, "blendMode").text = "0"
-            themes = (UNROLLED, SHEETS) if kind in (shown, FILLED) else ()
+            themes = (UNROLLED, SHEETS) if kind.removesuffix(FILLED) == shown else ()
             entries.append(_Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))
     return entries
 

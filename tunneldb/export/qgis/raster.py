@@ -13,14 +13,15 @@ from tunneldb.arrays import Float
 from tunneldb.export.images.palette import PALETTES, hexadecimal
 from tunneldb.raster.gap_fill import TOLD
 
-FILLED = "offset-filled"
-"""Kind of image that lies under the offset measured, where there is nothing else to show."""
+FILLED = "-filled"
+"""End of the kinds of image with gaps filled: each lies under the image of its kind as it was measured."""
 
 KINDS = {
     "corrected": "Intensity, corrected",
+    f"corrected{FILLED}": f"Intensity, corrected, {TOLD}",
     "raw": "Intensity, raw",
     "offset": "Offset",
-    FILLED: f"Offset, {TOLD}",
+    f"offset{FILLED}": f"Offset, {TOLD}",
     "state": "States: seen, unseen, dark",
     "class": "Classes",
 }
@@ -82,7 +83,7 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
         entries = ET.SubElement(renderer, "colorPalette")
         for code, (name, rgb) in PALETTES[kind].entries.items():
             ET.SubElement(entries, "paletteEntry", value=str(code), color=hexadecimal(rgb), label=name, alpha="255")
-    elif kind in ("offset", FILLED):
+    elif kind.removesuffix(FILLED) == "offset":
         limit = offset_range(paths)
         renderer = ET.SubElement(
             element, "rasterrenderer", type="singlebandpseudocolor", band="1",

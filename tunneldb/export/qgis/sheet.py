@@ -168,10 +168,10 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
         f"Lining [% coalesce(format_number({lining}, 0) || ' m², ' || format_number(100 * {seen}, 1) || ' % of it seen',"
         f" 'not seen yet') %]; leaks [% coalesce({leaks} || ', ' || format_number({wet}, 2) || ' m²', 'not searched for') %]"
     )
-    how = f"Unrolled lining seen from inside, 1:{scale} on A4; up it arc from the crown, m, the right wall above. "
+    how = f"Unrolled lining from inside, 1:{scale} on A4; up it arc from the crown, m, right wall above; {TOLD}. "
     if survey.intensity_kind == "none":
         sums = "No intensity: leaks were not sought"
-        how += f"Red: inwards, blue: outwards; {TOLD}."
+        how += "Red: inwards, blue: outwards."
     else:
         how += "Orange: open, blue: confirmed, with the leak's number; purple: leaks could be missed."
     texts = [
