@@ -52,9 +52,9 @@ def qgis(
     Where members of structures were found, they are in it, with their faces and spots on the map, in space and unrolled, and an
     atlas with a page for each; of a site they are all that there is.
 
-    Leaks can be reviewed and axis vertices moved in it. It shows the intensity, or the offset where there is none, over the same
-    with gaps up to 0.6 m filled. The styles also go into the database, where QGIS finds them
-    for layers that are added by hand. A project in the database holds the images by their absolute paths.
+    Leaks can be reviewed and axis vertices moved in it. It shows the intensity, or the offset where there is none, over the
+    same with gaps up to 0.6 m filled. The styles also go into the database, where QGIS finds them for layers that are added by
+    hand. A project in the database holds the images by their absolute paths.
     """
     if output is None and name is None:
         raise UserError("say where the project goes: -o FILE.qgz, or --database")
