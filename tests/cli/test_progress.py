@@ -80,7 +80,7 @@ def test_a_bar_shows_rate_and_time_left_and_leaves_the_pipe_to_results(survey: P
 def test_lines_are_printed_above_the_bar_and_not_into_it(survey: Path) -> None:
     on_a_terminal("load", SURVEY, survey)
     shown, _ = on_a_terminal("run", SURVEY, "--to", "segments", output_too=True)
-    for line in (r"\[1/2\] axis km 1: iterations", r"\[2/2\] segments km 1: segments"):
+    for line in (r"\[1/2\] axis km 1: vertices: ", r"\[2/2\] segments km 1: [0-9]+ segments? with"):
         assert re.search(rf"(^|[\r\n]){line}", shown)
     assert not re.search(r"left\[", shown)
 

@@ -10,13 +10,17 @@ import click
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say
+from tunneldb.cli.stage_sentence import number, stage_sentence
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.pipeline.parameters import PARAMETERS, settings
+from tunneldb.store.coverage import sum_leaks
 from tunneldb.store.ledger import Run
-from tunneldb.store.survey import get_survey
+from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
+    import psycopg
+
     from tunneldb.pipeline.stages import Stage
 
 
@@ -58,7 +62,8 @@ def run(
     """Run the stages of SURVEY: axis, segments, sections, ground, detect.
 
     Each stage of each kilometre is one transaction that replaces what the stage made there before, so a run may be
-    stopped at any moment and repeated. Axis vertices moved by hand and reviews of leaks stay.
+    stopped at any moment and repeated. Axis vertices moved by hand and reviews of leaks stay. All that each stage has
+    counted is in --json.
     """
     from tunneldb.pipeline.run import choose_stages, loaded_kilometres, parse_km, run_tasks, stage_tasks, stale_tasks
 
@@ -82,10 +87,12 @@ def run(
         tell(survey=survey, stages=shown.stages)
         with shown.progress:
             run_tasks(conn, found, tasks, shown.begin, shown.end)
+        if any(task.stage.name == "detect" for task in tasks):
+            _say_result(conn, found)
 
 
 class _Shown:
-    """A bar on a terminal that each stage of each kilometre moves on, and a line for each when it is done."""
+    """A bar on a terminal that each stage of each kilometre moves on, and a sentence for each when it is done."""
 
     def __init__(self, total: int) -> None:
         self.progress = bar("stages")
@@ -102,9 +109,18 @@ class _Shown:
         self.stages.append({"stage": stage.name, "km": km, "counts": run.counts})
         done = len(self.stages)
         self.progress.update(self.task, completed=done)
-        counts = ", ".join(f"{name} {_short(value)}" for name, value in run.counts.items())
-        say(f"[{done}/{self.total}] {stage.name} km {km}: {counts}")
+        counts = dict(run.counts)
+        note = counts.pop("note", None)
+        say(f"[{done}/{self.total}] {stage.name} km {km}: {stage_sentence(stage.name, counts)}")
+        if note:
+            say(f"  to be known: {note}")
 
 
-def _short(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else f"{value}"
+def _say_result(conn: psycopg.Connection[Any], survey: Survey) -> None:
+    """Say how much leaks, and what to type to see it."""
+    if survey.intensity_kind == "none":
+        click.echo(f"no leaks were sought; the lining: tunneldb image {survey.name}, tunneldb qgis {survey.name} -o FILE.qgz")
+        return
+    leaks, area = sum_leaks(conn, survey)
+    tell(leaks=leaks, wet_area=area)
+    click.echo(f"{survey.name}: {number(leaks, 'leak')}, {area:.2f} m²: tunneldb leaks {survey.name}")

@@ -104,3 +104,12 @@ def seen_share(conn: psycopg.Connection[Any], survey: Survey, km: int) -> float:
         [survey.name, survey.id, km],
     ).fetchone()
     return 0.0 if row is None or row[0] is None else float(row[0])
+
+
+def sum_leaks(conn: psycopg.Connection[Any], survey: Survey) -> tuple[int, float]:
+    """How many leaks a survey has, found last and not rejected, and their area, m²."""
+    row = conn.execute(
+        "SELECT coalesce(patches, 0), coalesce(wet_area, 0) FROM tunnel_api.leak_statistics(%s, '-infinity', 'infinity')",
+        [survey.name],
+    ).fetchone()
+    return (0, 0.0) if row is None else (int(row[0]), float(row[1]))
