@@ -363,7 +363,7 @@ def test_other_programs_read_the_drawing(files: Path) -> None:
         (["-o", "x.dxf", "--km", "12"], "--km goes with --classified"),
         (["-o", "x", "--classified", "--from", "12+300"], "--classified writes whole scan files"),
         (["-o", "x.dxf", "--from", "14+000"], "--from 14+000: tunnel demo has no such station"),
-        (["-o", "x.dxf", "--to", "12+3"], "--to takes a station as 12+345.678, or a chainage in metres, not '12+3'"),
+        (["-o", "x.dxf", "--to", "12+3"], "metres, as 345.678, not '12+3'"),
         (["-o", "x.gpkg", "--from", "12+300", "--to", "12300"], "between them lies no tunnel"),
         (
             ["-o", "x.dxf", "--from", "14000"],

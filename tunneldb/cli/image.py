@@ -10,10 +10,9 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.database import connect
-from tunneldb.errors import UserError
 from tunneldb.export.images.image import export_kilometre, image_kilometres
 from tunneldb.files import make_folder
-from tunneldb.pipeline.run import parse_km
+from tunneldb.pipeline.run import nothing_yet, parse_km
 from tunneldb.store.survey import get_survey
 
 
@@ -40,7 +39,7 @@ def image(settings: Settings, survey: str, output: Path, km: str | None) -> None
         found = get_survey(conn, survey)
         there = image_kilometres(conn, found)
         if not there:
-            raise UserError(f"survey {survey} has no images yet: tunneldb run {survey}")
+            raise nothing_yet(conn, found, "has no images")
         wanted = parse_km(km, there)
         conn.rollback()
         make_folder(output)

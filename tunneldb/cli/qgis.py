@@ -85,7 +85,7 @@ def qgis(
     say_remarks(remarks, found)
     click.echo(f"{', '.join(written)}: {len(images)} images, {styles}", err=True)
     if settings.dsn is None and service is None:
-        click.echo("QGIS reads your own server; should it be stopped: tunneldb server start", err=True)
+        click.echo("the project works while the database runs; after a restart of the machine: tunneldb server start", err=True)
     if name is not None and socket:
         click.echo("QGIS finds projects behind a socket only by an entry of pg_service.conf: docs/howto-qgis.md", err=True)
 

@@ -67,7 +67,10 @@ def _chainage(conn: psycopg.Connection[Any], survey: Survey, option: str, place:
                 "SELECT chainage FROM tunnel_api.station_chainages(%s, %s) AS chainage ORDER BY 1", [survey.tunnel_id, place]
             ).fetchall()
     except psycopg.errors.InvalidTextRepresentation:
-        raise UserError(f"{option} takes a station as 12+345.678, or a chainage in metres, not {place!r}") from None
+        raise UserError(
+            f"{option} takes a station as 12+345.678 (three digits after the +, 0+010, and a decimal point), or a chainage in"
+            f" metres, as 345.678, not {place!r}"
+        ) from None
     if not rows:
         raise UserError(
             f"{option} {place}: tunnel {survey.tunnel} has no such station: tunneldb tunnel stationing {survey.tunnel} --show"

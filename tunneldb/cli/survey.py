@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -23,6 +24,23 @@ def survey() -> None:
     """Add, list, set or remove the scanning campaigns of a tunnel, and withdraw files."""
 
 
+class Day(click.DateTime):
+    """A date as ISO 8601 has it, and words that say so."""
+
+    def __init__(self) -> None:
+        super().__init__(["%Y-%m-%d"])
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the day."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter:
+            self.fail(f"{value!r} is no day as YYYY-MM-DD: year, month, day, as 2024-05-31", param, ctx)
+
+
+DAY = Day()
+
+
 @survey.command(
     examples=[
         "tunneldb survey add ringo-2024 --tunnel ringo --date 2024-05-04 --stations stations.csv --intensity-kind none",
@@ -32,7 +50,7 @@ def survey() -> None:
 )
 @click.argument("name")
 @click.option("--tunnel", required=True, help="Tunnel that was scanned.")
-@click.option("--date", type=click.DateTime(["%Y-%m-%d"]), required=True, metavar="YYYY-MM-DD", help="Day of the scan.")
+@click.option("--date", type=DAY, required=True, metavar="YYYY-MM-DD", help="Day of the scan.")
 @click.option("--trajectory", type=FILE, help="CSV with time,x,y,z of a mobile scanner; time as gps_time in the files.")
 @click.option(
     "--stations",
@@ -119,7 +137,7 @@ def add(
     ],
 )
 @click.argument("name")
-@click.option("--date", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD", help="Day of the scan.")
+@click.option("--date", type=DAY, metavar="YYYY-MM-DD", help="Day of the scan.")
 @click.option("--trajectory", type=FILE, help="Takes the place of the scanner's positions; as for survey add.")
 @click.option("--stations", type=FILE, multiple=True, help="The same for a static scanner; may be given several times.")
 @click.option("--backwards", is_flag=True, help="The trajectory was driven towards falling chainage.")

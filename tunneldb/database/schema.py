@@ -213,7 +213,7 @@ def _newer(revision: str) -> str:
 def _require_postgis(connection: psycopg.Connection[Any], *, create: bool) -> None:
     version = postgis_version(connection)
     if version is None and not create:
-        raise UserError("the database has no PostGIS: tunneldb init, or CREATE EXTENSION postgis by a superuser")
+        raise UserError("the database is not set up for tunneldb yet: tunneldb init")
     if version is None:
         try:
             with connection.transaction():

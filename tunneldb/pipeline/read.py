@@ -19,6 +19,7 @@ from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import require_same_density
 from tunneldb.pipeline.parameters import PARAMETERS
+from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import ScanHeader, check_header, crs_note, read_header
 from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
@@ -183,7 +184,9 @@ class Reading:
 
     def check(self, header: ScanHeader) -> None:
         """Check a file against its survey."""
-        check_header(header, self.survey.intensity_dimension, self.survey.srid, needs_time=self.poses.mobile)
+        dimension, mend = self.survey.intensity_dimension, f"tunneldb survey set {self.survey.name} --intensity"
+        require_dimension(header.path, dimension, header.dimensions, "the survey's intensity", mend)
+        check_header(header, dimension, self.survey.srid, needs_time=self.poses.mobile)
 
     def read(self, headers: Sequence[ScanHeader], given: Sequence[Path], begin: Begin = silent) -> list[Read]:
         """Read files, none of which is there unchanged, then those that have to be read again because of them.

@@ -63,6 +63,14 @@ def loaded_kilometres(conn: psycopg.Connection[Any], survey: Survey) -> list[int
     return [row[0] for row in rows]
 
 
+def nothing_yet(conn: psycopg.Connection[Any], survey: Survey, lack: str) -> UserError:
+    """Return what to raise where a survey lacks what its stages make: what to type is to load it, or to run it."""
+    run = f"tunneldb run {survey.name}"
+    if not loaded_kilometres(conn, survey):
+        run = f"it holds no points: tunneldb load {survey.name} FILE..., then {run}"
+    return UserError(f"survey {survey.name} {lack} yet: {run}")
+
+
 def choose_stages(first: str | None, last: str | None) -> list[Stage]:
     """Stages from ``first`` to ``last``, both by name and included.
 

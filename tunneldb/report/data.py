@@ -16,6 +16,7 @@ from shapely.geometry import Polygon
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
+from tunneldb.pipeline.run import nothing_yet
 from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
@@ -128,7 +129,7 @@ def find_stretch(conn: psycopg.Connection[Any], survey: Survey, low: float, high
     """
     ends = survey_ends(conn, survey)
     if ends is None:
-        raise UserError(f"survey {survey.name} has nothing to report yet: tunneldb run {survey.name}")
+        raise nothing_yet(conn, survey, "has nothing to report")
     start, end = max(ends[0], low), min(ends[1], high)
     if start >= end:
         asked = f"from chainage {max(low, -1e9):.3f} to {min(high, 1e9):.3f} m"

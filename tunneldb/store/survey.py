@@ -68,6 +68,11 @@ class Survey:
         return UNPOSED if self.platform == "unknown" and self.intensity_kind != "none" else None
 
 
+_OF_TUNNEL = (
+    "SELECT s.name FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE t.name = %s ORDER BY s.date, s.name"
+)
+
+
 def get_survey(conn: psycopg.Connection[Any], name: str, *, site: bool = False) -> Survey:
     """Return the survey of that name.
 
@@ -93,6 +98,9 @@ def get_survey(conn: psycopg.Connection[Any], name: str, *, site: bool = False) 
         ).fetchone()
     if survey is None:
         known = [row[0] for row in conn.execute("SELECT name FROM tunnel.survey ORDER BY name")]
+        own = [row[0] for row in conn.execute(_OF_TUNNEL, [name])]
+        if own:
+            raise UserError(f"{name!r} is a tunnel; say which of its surveys: {', '.join(own)}")
         there = f"the database has {', '.join(known)}" if known else "the database has none: tunneldb survey add"
         raise UserError(f"there is no survey {name!r}; {there}")
     if survey.site and not site:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import psycopg
 
 from tunneldb.errors import UserError
+from tunneldb.pipeline.run import nothing_yet
 from tunneldb.store.survey import Survey
 
 MARGIN = 0.08
@@ -82,7 +83,7 @@ def map_extent(conn: psycopg.Connection, survey: Survey) -> Extent:
     if row is None and survey.site:
         raise UserError(f"no members were found in survey {survey.name} yet: tunneldb members {survey.name}")
     if row is None:
-        raise UserError(f"survey {survey.name} has no axis yet: load its files, then run 'tunneldb run {survey.name}'")
+        raise nothing_yet(conn, survey, "has no axis")
     return Extent(*row).grown()
 
 

@@ -35,15 +35,21 @@ def line_of(error: BaseException) -> str:
     return str(error).strip().split("\n", 1)[0] or type(error).__name__
 
 
-def require_dimension(path: Path, dimension: str | None, dimensions: Collection[str], use: str | None = None) -> None:
-    """Raise a UserError that lists the file's dimensions, unless `dimension`, needed for `use`, is one of them."""
+def require_dimension(
+    path: Path, dimension: str | None, dimensions: Collection[str], use: str | None = None, mend: str | None = None
+) -> None:
+    """Raise a UserError that lists the file's dimensions, unless `dimension`, needed for `use`, is one of them.
+
+    What to type is `mend` with the dimension that is meant.
+    """
     if dimension is None or dimension in dimensions:
         return
     alike = next((name for name in dimensions if name.lower() == dimension.lower()), None)
     needed = f", which {use} needs" if use else ""
-    near = difflib.get_close_matches(dimension, dimensions, 1)
-    meant = f" (did you mean {alike!r}? capitals matter)" if alike else f" (did you mean {near[0]!r}?)" if near else ""
-    raise UserError(f"{path}: no dimension {dimension!r}{needed}{meant}; the file has {', '.join(dimensions) or 'none'}")
+    near = alike or next(iter(difflib.get_close_matches(dimension, dimensions, 1)), None)
+    meant = f" (did you mean {near!r}?{' capitals matter' if alike else ''})" if near else ""
+    typed = f": {mend} {near or 'DIMENSION'}" if mend else ""
+    raise UserError(f"{path}: no dimension {dimension!r}{needed}{meant}; the file has {', '.join(dimensions) or 'none'}{typed}")
 
 
 def check_ranges(path: Path, ranges: Ranges | None, count: int) -> Ranges:
