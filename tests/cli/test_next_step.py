@@ -37,7 +37,7 @@ def empty(conn: psycopg.Connection, example: str) -> str:
     """Return the name of a survey of the example's tunnel that holds nothing."""
     conn.execute(
         "INSERT INTO tunnel.survey (name, tunnel_id, date, platform, intensity_kind, intensity_dimension, reference)"
-        " SELECT 'empty', tunnel_id, date, platform, 'reflectance', 'Reflectanze', 'none' FROM tunnel.survey WHERE name = %s",
+        " SELECT 'empty', tunnel_id, date, 'unknown', 'reflectance', 'Reflectanze', 'none' FROM tunnel.survey WHERE name = %s",
         [example],
     )
     conn.commit()
