@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -10,12 +10,22 @@ from scipy import ndimage
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.radiometry.robust_statistics import robust_statistics
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import FaceGrid
 from tunneldb.raster.pixel_state import PixelState
-from tunneldb.structures.face_raster import BEAM, DIVERGENCE, STEP, Layout, Sums
-from tunneldb.structures.level import CLASS, FEWEST, LevelCurve, level_curve
+from tunneldb.structures.face_raster import BEAM, DIVERGENCE, STEP, TOLERANCE, Layout, Sums
+from tunneldb.structures.level import FEWEST, OWN, SHORTH, LevelCurve, level_curve
 from tunneldb.structures.models import RADIUS, normals_at, to_space
+
+LAGS = (2, 5)
+"""How many pixels lie between places whose levels are held against each other: the edge of a spot is between few of these."""
+
+LEAST_OWN = 0.2
+"""Share of a face that lies at its member's level at least, or its own counts."""
+
+UNIFORM = 0.6
+"""If so much of it lies at that: it is of another material then."""
 
 CLOSING = 2
 """Holes of so many pixels are no holes of the face, but places between points."""
@@ -28,13 +38,16 @@ class Observed:
     Attributes
     ----------
     scan : int
+    columns : int
+        Of the face.
     pixel : (n,) int array
-        Row × columns + column.
+        Row × columns + column, in growing order.
     cosine, range_m, value, points : (n,) float arrays
         Of incidence, m, mean level corrected for range where that is known, dB, number of points.
     """
 
     scan: int
+    columns: int
     pixel: Int64
     cosine: Float
     range_m: Float
@@ -93,15 +106,78 @@ def observe_face(layout: Layout, sums: Sums, face: int, stations: Float, referen
         value = sums.level[part][pixel] * STEP / points
         if reference is not None:
             value = value - reference(range_m)
-        found.append(Observed(scan, pixel, cosine, range_m, value, points))
+        found.append(Observed(scan, columns, pixel, cosine, range_m, value, points))
     return found
 
 
-def curve_of(observed: list[Observed], model: Float, *, by_range: bool) -> LevelCurve:
+def member_levels(parts: list[list[Observed]], model: Float, *, by_range: bool) -> dict[int, LevelCurve]:
+    """Level of the surface of a member as each scan saw it: of all its faces, and of the same places for all scans.
+
+    Where one scan saw more rust than paint, the others tell it which is which.
+
+    Parameters
+    ----------
+    parts : list of list of Observed
+        Each face as the scans saw it.
+    model : (WIDTH,) float array
+        Of the largest of the faces.
+    by_range : bool
+        Whether levels go by range.
+    """
+    by_scan: dict[int, list[tuple[int, Observed]]] = {}
+    for face, part in enumerate(parts):
+        for one in part:
+            by_scan.setdefault(one.scan, []).append((face, one))
+    points = {scan: sum(one.points.sum() for _, one in seen) for scan, seen in by_scan.items()}
+    known: dict[int, list[Int64]] = {}
+    curves = {}
+    for scan in sorted(by_scan, key=lambda scan: -points[scan]):
+        faces, seen = zip(*by_scan[scan], strict=True)
+        own = [np.isin(one.pixel, np.concatenate(known[face])) if face in known else np.zeros(len(one.pixel), np.bool_)
+               for face, one in by_scan[scan]]  # fmt: skip
+        curve = curves[scan] = curve_of(list(seen), model, np.concatenate(own), by_range=by_range)
+        for face, one in zip(faces, seen, strict=True):
+            use = curve.known(one.cosine)
+            use[use] = curve.own(one.cosine[use], one.range_m[use], one.value[use])
+            known.setdefault(face, []).append(one.pixel[use])
+    return curves
+
+
+def face_level(curve: LevelCurve, one: Observed) -> LevelCurve:
+    """Level of a face by its member's, moved by what the face itself lies off it; its own place where it is all off."""
+    use = np.flatnonzero(curve.known(one.cosine))
+    if one.points[use].sum() < FEWEST:
+        return curve
+    rest = one.value[use] - curve(one.cosine[use], one.range_m[use])
+    sigma = curve.sigmas(one.cosine[use])
+    own = np.abs(rest) < OWN * sigma
+    if own.mean() < LEAST_OWN:
+        mode = robust_statistics(rest, SHORTH, two_sided=True)
+        own = np.abs(rest - mode.mean) < OWN * sigma
+        if own.mean() < UNIFORM:
+            return curve
+    return replace(curve, level=curve.level + float(np.mean(rest[own])))
+
+
+def curve_of(observed: list[Observed], model: Float, own: Bool | None = None, *, by_range: bool) -> LevelCurve:
     """Level of what one scan saw, of one face or of the faces of a member."""
     names = ("cosine", "range_m", "value", "points")
     arrays = [np.concatenate([getattr(one, name) for one in observed]) for name in names]
-    return level_curve(*arrays, by_range=by_range and model[RADIUS] > 0.0)
+    starts = np.cumsum([0, *(len(one.pixel) for one in observed)])
+    pairs = np.concatenate([_pairs(one) + start for one, start in zip(observed, starts[:-1], strict=True)])
+    return level_curve(*arrays, pairs, own, by_range=by_range and model[RADIUS] > 0.0)
+
+
+def _pairs(one: Observed) -> Int64:
+    """Pairs (m, 2) of pixels that lie close to each other in their row or column."""
+    row, column = np.divmod(one.pixel, one.columns)
+    found = [np.empty((0, 2), np.int64)]
+    for lag in LAGS:
+        for apart, inside in ((lag, column + lag < one.columns), (lag * one.columns, np.ones(len(row), np.bool_))):
+            there = np.searchsorted(one.pixel, one.pixel + apart)
+            held = inside & (one.pixel[np.minimum(there, len(there) - 1)] == one.pixel + apart)
+            found.append(np.column_stack([np.flatnonzero(held), there[held]]))
+    return np.concatenate(found)
 
 
 def some_pixels(observed: list[Observed], inside: Bool) -> list[Observed]:
@@ -111,23 +187,13 @@ def some_pixels(observed: list[Observed], inside: Bool) -> list[Observed]:
         use = inside.ravel()[one.pixel]
         if use.any():
             rest = (array[use] for array in (one.cosine, one.range_m, one.value, one.points))
-            found.append(Observed(one.scan, one.pixel[use], *rest))
+            found.append(Observed(one.scan, one.columns, one.pixel[use], *rest))
     return found
 
 
-def class_levels(observed: list[Observed]) -> dict[tuple[int, int], float]:
-    """Median level of each class of cos θ of each scan that holds enough points, dB."""
-    found = {}
-    for one in observed:
-        number = np.floor(one.cosine / CLASS).astype(np.int64)
-        for klass in np.unique(number).tolist():
-            use = number == klass
-            if one.points[use].sum() >= FEWEST:
-                found[one.scan, klass] = float(np.median(one.value[use]))
-    return found
-
-
-def contrast_of(layout: Layout, face: int, observed: list[Observed], curves: list[list[LevelCurve]]) -> FaceContrast:
+def contrast_of(
+    layout: Layout, face: int, observed: list[Observed], curves: list[LevelCurve], noise: float
+) -> FaceContrast:
     """Hold the pixels of a face against its level.
 
     Parameters
@@ -136,8 +202,10 @@ def contrast_of(layout: Layout, face: int, observed: list[Observed], curves: lis
         Which.
     observed : list of Observed
         By scan.
-    curves : list of list of LevelCurve
-        For each of these the face's own level, and what takes its place where that is not known, in this order.
+    curves : list of LevelCurve
+        The face's level for each of these.
+    noise : float
+        Of ranges, m: so near its edge what adjoins a face may lie on it.
     """
     left, bottom, columns, rows = layout.shape[face].tolist()
     side, size = float(layout.pixel[face]), rows * columns
@@ -145,25 +213,20 @@ def contrast_of(layout: Layout, face: int, observed: list[Observed], curves: lis
     held, scans = np.zeros(size, np.int64), np.zeros(size, np.int64)
     cosines, levels, sigmas = [np.empty(0)], [np.empty(0)], [np.empty(0)]
     far = [np.empty(0)]
-    for one, known_by in zip(observed, curves, strict=True):
+    for one, curve in zip(observed, curves, strict=True):
         held[one.pixel] += one.points.astype(np.int64)
         far.append(one.range_m)
-        free = np.ones(len(one.pixel), np.bool_)
-        for curve in known_by:
-            use = np.flatnonzero(free & curve.known(one.cosine))
-            if not len(use):
-                continue
-            free[use] = False
-            at, n = one.pixel[use], one.points[use]
-            level = curve(one.cosine[use], one.range_m[use])
-            sigma = curve.sigmas(one.cosine[use])
-            drop[at] += n * (level - one.value[use])
-            weight[at] += n
-            variance[at] += (n * sigma) ** 2
-            scans[at] |= 1 << min(one.scan, 30)
-            cosines.append(one.cosine[use])
-            levels.append(level)
-            sigmas.append(sigma)
+        use = np.flatnonzero(curve.known(one.cosine))
+        at, n = one.pixel[use], one.points[use]
+        level = curve(one.cosine[use], one.range_m[use])
+        sigma = curve.sigmas(one.cosine[use])
+        drop[at] += n * (level - one.value[use])
+        weight[at] += n
+        variance[at] += (n * sigma) ** 2
+        scans[at] |= 1 << min(one.scan, 30)
+        cosines.append(one.cosine[use])
+        levels.append(level)
+        sigmas.append(sigma)
     judged = weight > 0.0
     safe = np.where(judged, weight, 1.0)
     drop, sigma = drop / safe, np.sqrt(variance) / safe
@@ -173,7 +236,7 @@ def contrast_of(layout: Layout, face: int, observed: list[Observed], curves: lis
     whole = ndimage.binary_closing(whole, iterations=CLOSING)[CLOSING:-CLOSING, CLOSING:-CLOSING]
     every = np.concatenate(far)
     footprint = BEAM + DIVERGENCE * (float(np.median(every)) if len(every) else 0.0)
-    rim = round(0.5 * footprint / side)
+    rim = int(np.ceil((0.5 * footprint + TOLERANCE * noise) / side))
     within = ndimage.binary_erosion(whole, iterations=rim) if rim else whole
     if within.sum() < 0.3 * whole.sum():  # a strip as narrow as the beam is all rim
         within = whole

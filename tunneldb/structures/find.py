@@ -7,19 +7,20 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from scipy import ndimage
+from scipy import ndimage, sparse
 
 from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.radiometry.reference_curve import ReferenceCurve
-from tunneldb.structures.contrast import FaceContrast, Observed, class_levels, contrast_of, curve_of, observe_face, some_pixels
+from tunneldb.structures.contrast import FaceContrast, contrast_of, face_level, member_levels, observe_face, some_pixels
 from tunneldb.structures.face_raster import Layout, Sums
-from tunneldb.structures.joining import Extent, RangeImages, join
-from tunneldb.structures.level import FEWEST
-from tunneldb.structures.materials import LEAST_WIDTH as LEAST_PART
-from tunneldb.structures.materials import part_by_material
+from tunneldb.structures.joining import Extent, RangeImages, coplanar, join
+from tunneldb.structures.level import UNKNOWN
+from tunneldb.structures.materials import parts_of_plane
 from tunneldb.structures.models import AXIS, RADIUS, to_space, unroll
 from tunneldb.structures.results import Face, Member, Spot, Structures, kind_of, outline_of
 from tunneldb.structures.segmentation import Segmentation
+from tunneldb.structures.significance import Scatter
+from tunneldb.structures.solidity import closed, ray_densities, solid_faces
 from tunneldb.structures.spots import BIMODAL, FaceSpots, find_spots
 
 LEAST_AREA = 0.002
@@ -30,6 +31,10 @@ LEAST_FILLED = 0.35
 
 LEAST_WIDTH = 2.0
 """Mean width of a face, in pixels: less is a cable or an edge."""
+
+
+TURNS = 2
+"""Times that the level is found."""
 
 
 @dataclass(frozen=True)
@@ -98,11 +103,12 @@ def find_structures(
     spots: list[Spot] = []
     members: list[Member] = []
     face_number, member_number = np.zeros(count + 1, np.int32), np.zeros(count + 1, np.int32)
+    pixels, scatter = int(np.count_nonzero(sums.count)), Scatter()
     sizes = np.bincount(member_of, [part.extent.outline.area for part in parts])
     for number, member in enumerate(np.argsort(-sizes, kind="stable").tolist(), start=1):
         of = [parts[k] for k in np.flatnonzero(member_of == member).tolist()]
         first = len(faces)
-        for part, (contrast, here) in zip(of, _judge(found, sums, of, reference, by_range=by_range), strict=True):
+        for part, (contrast, here) in zip(of, _judge(found, sums, of, reference, pixels, scatter, by_range=by_range), strict=True):
             faces.append(_face(found, part, len(faces) + 1, number, contrast, here))
             face_number[part.face], member_number[part.face] = len(faces), number
             if part.inside is not None:
@@ -145,34 +151,44 @@ class _Part:
 
 def _parts(found: Segmentation, sums: Sums, reference: ReferenceCurve | None) -> list[_Part]:
     """Faces that are large and filled enough to be some, parted by material."""
-    layout, parts = found.layout, []
+    layout = found.layout
+    held, extents, densities = {}, {}, []
     for face in range(len(layout.models)):
-        held, scans = _points(layout, sums, face)
+        points, scans = _points(layout, sums, face)
         columns, rows = layout.shape[face, 2:]
-        held = held.reshape(rows, columns)
-        extent = _extent(layout, face, held, scans)
-        if extent is None:
+        points = points.reshape(rows, columns)
+        extent = _extent(layout, face, points, scans)
+        if extent is not None:
+            held[face], extents[face] = points, extent
+            seen = observe_face(layout, sums, face, found.stations, reference)
+            densities.append(ray_densities(layout, face, seen, found.stations))
+    solid = solid_faces(np.array(densities).reshape(len(extents), len(found.stations), 2))
+    for face in [face for face, good in zip(extents, solid, strict=True) if not good]:
+        del held[face], extents[face]
+    parts = {face: [_Part(face, None, extent)] for face, extent in extents.items()}
+    for number, faces in enumerate(_planes(extents, found.noise)):
+        seen = [observe_face(layout, sums, face, found.stations, reference) for face in faces]
+        materials = parts_of_plane(layout, faces, seen)
+        if materials is None:
             continue
-        observed, material = [], None
-        if extent.model[RADIUS] == 0.0 and max(rows, columns) * extent.pixel > 2.0 * LEAST_PART:
-            observed = observe_face(layout, sums, face, found.stations, reference)
-            material = _materials(layout, face, observed)
-        if material is None:
-            parts.append(_Part(face, None, extent))
-            continue
-        for number in range(int(material.max()) + 1):
-            inside = material == number
-            own = _extent(layout, face, np.where(inside, held, 0), scans)
-            if own is not None:
-                levels = class_levels(some_pixels(observed, inside))
-                parts.append(_Part(face, inside, replace(own, levels=levels)))
-    # Others are compared with these.
-    if any(part.extent.levels is not None for part in parts):
-        for k, part in enumerate(parts):
-            if part.extent.levels is None and part.extent.model[RADIUS] == 0.0:
-                levels = class_levels(observe_face(layout, sums, part.face, found.stations, reference))
-                parts[k] = replace(part, extent=replace(part.extent, others=levels))
-    return sorted(parts, key=lambda part: -part.extent.points)
+        for face, material in zip(faces, materials, strict=True):
+            parts[face] = []
+            of = material.reshape(held[face].shape)
+            for which in np.unique(of[held[face] > 0]).tolist():
+                inside = of == which
+                own = _extent(layout, face, np.where(inside, held[face], 0), extents[face].scans)
+                if own is not None:
+                    parts[face].append(_Part(face, inside, replace(own, material=(number, which))))
+    return sorted((part for of in parts.values() for part in of), key=lambda part: -part.extent.points)
+
+
+def _planes(extents: dict[int, Extent], noise: float) -> list[list[int]]:
+    """Flat faces that lie in one plane, the largest first; a face by itself is a plane, too."""
+    flat = sorted((face for face in extents if extents[face].model[RADIUS] == 0.0), key=lambda face: -extents[face].points)
+    pairs = np.array(coplanar([extents[face] for face in flat], noise), np.int64).reshape(-1, 2)
+    graph = sparse.coo_array((np.ones(len(pairs), np.int8), tuple(pairs.T)), shape=(len(flat), len(flat)))
+    label = sparse.csgraph.connected_components(graph, directed=False)[1] if flat else np.empty(0, np.int32)
+    return [[flat[k] for k in np.flatnonzero(label == number).tolist()] for number in np.unique(label).tolist()]
 
 
 def _extent(layout: Layout, face: int, held: Int64, scans: tuple[int, ...]) -> Extent | None:
@@ -181,37 +197,13 @@ def _extent(layout: Layout, face: int, held: Int64, scans: tuple[int, ...]) -> E
     if not occupied.any():
         return None
     side = float(layout.pixel[face])
-    outline = outline_of(_closed(occupied), int(layout.shape[face, 0]), int(layout.shape[face, 1]), side)
+    outline = outline_of(closed(occupied, 2), int(layout.shape[face, 0]), int(layout.shape[face, 1]), side)
     area = outline.area
     if area < LEAST_AREA or occupied.sum() * side**2 < LEAST_FILLED * area:
         return None
     if 2.0 * area / max(outline.length, 1e-9) < LEAST_WIDTH * side:
         return None
     return Extent(layout.models[face], outline, side, scans, float(held.sum()))
-
-
-def _materials(layout: Layout, face: int, observed: list[Observed]) -> Int32 | None:
-    """Part of each pixel of a face; None where it is of one material."""
-    if not observed:
-        return None
-    most = max(observed, key=lambda one: len(one.pixel))
-    columns, rows = layout.shape[face, 2:]
-    value, held = np.zeros(rows * columns), np.zeros(rows * columns, np.bool_)
-    value[most.pixel], held[most.pixel] = most.value, True
-    for one in observed:  # where the others saw what this one did not, by what they have in common
-        shared = held[one.pixel]
-        if one is most or shared.sum() < FEWEST:
-            continue
-        offset = float(np.median(one.value[shared] - value[one.pixel[shared]]))
-        value[one.pixel[~shared]] = one.value[~shared] - offset
-        held[one.pixel] = True
-    parts = part_by_material(value.reshape(rows, columns), held.reshape(rows, columns), float(layout.pixel[face]))
-    return parts if parts.any() else None
-
-
-def _closed(occupied: Bool) -> Bool:
-    padded = np.pad(occupied, 2)
-    return np.asarray(ndimage.binary_closing(padded, iterations=2)[2:-2, 2:-2])
 
 
 def _points(layout: Layout, sums: Sums, face: int) -> tuple[Int64, tuple[int, ...]]:
@@ -227,28 +219,44 @@ def _points(layout: Layout, sums: Sums, face: int) -> tuple[Int64, tuple[int, ..
 
 
 def _judge(
-    found: Segmentation, sums: Sums, parts: list[_Part], reference: ReferenceCurve | None, *, by_range: bool
+    found: Segmentation,
+    sums: Sums,
+    parts: list[_Part],
+    reference: ReferenceCurve | None,
+    pixels: int,
+    scatter: Scatter,
+    *,
+    by_range: bool,
 ) -> list[tuple[FaceContrast, FaceSpots]]:
-    """Contrast and spots of the faces of a member; where a face has too few points it borrows the member's level."""
+    """Contrast and spots of the faces of a member.
+
+    Where there are spots the level is found once more without them: it is bent by what they cover.
+    """
     layout = found.layout
     observed = []
     for part in parts:
         seen_by = observe_face(layout, sums, part.face, found.stations, reference)
         observed.append(seen_by if part.inside is None else some_pixels(seen_by, part.inside))
-    by_scan: dict[int, list[Observed]] = {}
-    for one in observed:
-        for seen in one:
-            by_scan.setdefault(seen.scan, []).append(seen)
-    model = layout.models[parts[0].face]
-    common = {scan: curve_of(seen, model, by_range=by_range) for scan, seen in by_scan.items() if len(parts) > 1}
-    out = []
-    for part, one in zip(parts, observed, strict=True):
-        curves = [
-            [curve_of([seen], model, by_range=by_range), *([common[seen.scan]] if seen.scan in common else [])] for seen in one
-        ]
-        contrast = contrast_of(layout, part.face, one, curves)
-        out.append((contrast, find_spots(contrast)))
+    out: list[tuple[FaceContrast, FaceSpots]] = []
+    bare = observed
+    for turn in range(TURNS):
+        levels = member_levels(bare, layout.models[parts[0].face], by_range=by_range)
+        before, out = scatter.copy(), []
+        for part, seen, rest in zip(parts, observed, bare, strict=True):
+            own = {one.scan: face_level(levels[one.scan], one) for one in rest}
+            curves = [own.get(one.scan, levels.get(one.scan, UNKNOWN)) for one in seen]
+            contrast = contrast_of(layout, part.face, seen, curves, found.noise)
+            out.append((contrast, find_spots(contrast, pixels, scatter)))
+        if turn == TURNS - 1 or not any(spots.spots for _, spots in out):
+            break
+        scatter.restore(before)
+        bare = [some_pixels(seen, ~_about(spots.numbers > 0)) for seen, (_, spots) in zip(observed, out, strict=True)]
     return out
+
+
+def _about(spots: Bool) -> Bool:
+    """Spots with what lies beside them."""
+    return np.asarray(ndimage.binary_dilation(spots, iterations=2)) if spots.any() else spots
 
 
 def _face(found: Segmentation, part: _Part, number: int, member: int, contrast: FaceContrast, spots: FaceSpots) -> Face:

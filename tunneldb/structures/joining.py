@@ -7,7 +7,6 @@ Two faces are joined if they lie on one plane or cylinder (3.2.1), have two rims
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,11 +46,6 @@ LEAST_FACING, LEAST_FACING_PIPE = 0.1, 0.5
 CELL = 0.1
 """Angle of a cell of the range image, degrees."""
 
-
-SAME_LEVEL = 0.75
-"""Parts of faces of several materials are joined with what differs by less, dB."""
-
-
 class RangeImages:
     """How far each scan sees in each direction: the nearest point of each cell.
 
@@ -74,10 +68,7 @@ class RangeImages:
 
     def closed(self, places: Float, scan: int) -> Bool:
         """To which places (n, 3), or not even so far, a scan sees: what is behind them it does not."""
-        towards = places - self.stations[scan]
-        far = np.linalg.norm(towards, axis=1)
-        row = np.clip(((np.arcsin(towards[:, 2] / far) + math.pi / 2) / self.cell).astype(np.int64), 0, self.rows - 1)
-        column = ((np.arctan2(towards[:, 1], towards[:, 0]) + math.pi) / self.cell).astype(np.int64) % self.columns
+        row, column, far = self._cell(places, scan)
         nearest = self.nearest[scan]
         seen = nearest[row, column]
         # An empty cell takes the nearest of those about it: rays may lie farther apart than cells.
@@ -87,6 +78,14 @@ class RangeImages:
                 about = nearest[np.clip(row[empty] + i, 0, self.rows - 1), (column[empty] + j) % self.columns]
                 seen[empty] = np.minimum(seen[empty], about)
         return np.asarray(seen < far + CLEARANCE)
+
+    def _cell(self, places: Float, scan: int) -> tuple[Int64, Int64, Float]:
+        """Row, column and distance of places (n, 3)."""
+        towards = places - self.stations[scan]
+        far = np.linalg.norm(towards, axis=1)
+        row = np.clip(((np.arcsin(towards[:, 2] / far) + math.pi / 2) / self.cell).astype(np.int64), 0, self.rows - 1)
+        column = ((np.arctan2(towards[:, 1], towards[:, 0]) + math.pi) / self.cell).astype(np.int64) % self.columns
+        return row, column, far
 
 
 @dataclass(frozen=True)
@@ -103,10 +102,8 @@ class Extent:
     scans : tuple of int
         Scans that saw it.
     points : float
-    levels : mapping or None
-        Of a part of a face of several materials, its level by scan and class of cos θ, dB.
-    others : mapping or None
-        The same of another face, to be held against such parts.
+    material : (int, int) or None
+        Of a face in a plane of several materials: number of the plane and of the material there.
     """
 
     model: Float
@@ -114,8 +111,7 @@ class Extent:
     pixel: float
     scans: tuple[int, ...]
     points: float
-    levels: Mapping[tuple[int, int], float] | None = None
-    others: Mapping[tuple[int, int], float] | None = None
+    material: tuple[int, int] | None = None
 
 
 def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
@@ -129,7 +125,7 @@ def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
     noise : float
         Of ranges, m.
     """
-    pairs = [(a, b) for a, b in _coplanar(faces, max(APART, 3.0 * noise)) if _joined(faces[a], faces[b], images)]
+    pairs = [(a, b) for a, b in coplanar(faces, noise) if _joined(faces[a], faces[b], images)]
     first, second = np.array(pairs, np.int64).reshape(-1, 2).T
     graph = sparse.coo_array((np.ones(len(first), np.int8), (first, second)), shape=(len(faces), len(faces)))
     label = sparse.csgraph.connected_components(graph, directed=False)[1]
@@ -137,10 +133,11 @@ def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
     return np.argsort(np.argsort(place))[member].astype(np.int64)
 
 
-def _coplanar(faces: list[Extent], apart: float) -> list[tuple[int, int]]:
+def coplanar(faces: list[Extent], noise: float) -> list[tuple[int, int]]:
     """Pairs of faces on one plane or cylinder (3.2.1): the smaller lies on the surface of the larger."""
     if not faces:
         return []
+    apart = max(APART, 3.0 * noise)
     models = np.array([face.model for face in faces])
     places = [_corners(face) for face in faces]
     middles = np.array([at.mean(axis=0) for at in places])
@@ -189,12 +186,10 @@ def _joined(one: Extent, other: Extent, images: RangeImages) -> bool:
 
 
 def _of_one_material(one: Extent, other: Extent) -> bool:
-    """Whether the levels of two faces agree, where one is a part of a face of several materials."""
-    if one.levels is None and other.levels is None:
+    """Whether two faces are not of unlike materials of one plane."""
+    if one.material is None or other.material is None or one.material[0] != other.material[0]:
         return True
-    mine, yours = one.levels or one.others or {}, other.levels or other.others or {}
-    steps = [mine[key] - yours[key] for key in mine.keys() & yours.keys()]
-    return bool(steps) and abs(float(np.median(steps))) < SAME_LEVEL
+    return one.material == other.material
 
 
 def _longest_gap(one: Extent, other: Extent, pixel: float) -> float:

@@ -2,14 +2,20 @@
 
 Geometry alone cannot tell a brick wall from the concrete beside it, and the paper's histogram of both has two heads. A stain or
 rust does not end on a straight line over the whole of a wide face; a wall of another material does. The step is looked for
-between places that lie close to each other, so that neither incidence nor range has a part in it.
+between places that lie close to each other, so that neither incidence nor range has a part in it, and over the whole of a plane:
+what stands before a wall parts it into faces, of which each shows but a piece of the line.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from tunneldb.arrays import Bool, Float, Int32
+from tunneldb.arrays import Bool, Float, Int32, Int64
+from tunneldb.structures.contrast import Observed, member_levels
+from tunneldb.structures.face_raster import Layout
+from tunneldb.structures.models import to_space, unroll
 
 LEAST_WIDTH = 0.4
 """Both sides of the line are at least so wide, and the line as long, m: on a beam rust may well go from rim to rim."""
@@ -29,8 +35,77 @@ BLOCKS = 4
 FEWEST = 6
 """Blocks along the line that tell anything."""
 
+MOST_PIXELS = 2_000_000
+"""Pixels of a plane; beyond that they are made larger."""
+
 DEPTH = 3
 """How many times a face is parted, at most."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Faces that lie in one plane, drawn together.
+
+    Attributes
+    ----------
+    pixel : float
+        Side of a pixel, m.
+    place : list of int arrays
+        Pixel of the plane in which each pixel of each face lies.
+    shape : (int, int)
+        Rows and columns.
+    """
+
+    pixel: float
+    place: list[Int64]
+    shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, layout: Layout, faces: list[int]) -> Plane:
+        """Draw faces, the largest first, in the unrolled coordinates of the first."""
+        model = layout.models[faces[0]]
+        places = []
+        for face in faces:
+            u, v = layout.centres(face)
+            if face == faces[0]:
+                places.append(np.column_stack([np.tile(u, len(v)), np.repeat(v, len(u))]))
+                continue
+            space = to_space(layout.models[face], np.tile(u, len(v)), np.repeat(v, len(u)))
+            places.append(np.column_stack(unroll(model, space)[:2]))
+        low = np.min([at.min(axis=0) for at in places], axis=0)
+        size = np.max([at.max(axis=0) for at in places], axis=0) - low
+        pixel = max(float(np.median(layout.pixel[faces])), float(np.sqrt(size.prod() / MOST_PIXELS)))
+        columns, rows = (np.floor(size / pixel).astype(np.int64) + 1).tolist()
+        cells = [np.floor((at - low) / pixel).astype(np.int64) for at in places]
+        return cls(pixel, [at[:, 1] * columns + at[:, 0] for at in cells], (rows, columns))
+
+
+def parts_of_plane(layout: Layout, faces: list[int], seen: list[list[Observed]]) -> list[Int32] | None:
+    """Material of each pixel of the faces of a plane, the largest first, numbered from 0; None where it is all one.
+
+    Parameters
+    ----------
+    layout : Layout
+    faces : list of int
+    seen : list of list of Observed
+        Each of the faces as the scans saw it.
+    """
+    plane = Plane.of(layout, faces)
+    if max(plane.shape) * plane.pixel < 2.0 * LEAST_WIDTH:
+        return None
+    curves = member_levels(seen, layout.models[faces[0]], by_range=False)
+    total, count = np.zeros(plane.shape).ravel(), np.zeros(plane.shape).ravel()
+    for place, by_scan in zip(plane.place, seen, strict=True):
+        for one in by_scan:
+            use = np.flatnonzero(curves[one.scan].known(one.cosine))
+            rest = one.value[use] - curves[one.scan](one.cosine[use], one.range_m[use])
+            at = place[one.pixel[use]]
+            total += np.bincount(at, one.points[use] * rest, len(total))
+            count += np.bincount(at, one.points[use], len(total))
+    held = count > 0.0
+    value = np.where(held, total / np.maximum(count, 1.0), 0.0)
+    parts = part_by_material(value.reshape(plane.shape), held.reshape(plane.shape), plane.pixel).ravel()
+    return [parts[place] for place in plane.place] if parts.any() else None
 
 
 def part_by_material(value: Float, held: Bool, pixel: float) -> Int32:

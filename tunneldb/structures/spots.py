@@ -12,12 +12,14 @@ from shapely.geometry import Polygon
 from tunneldb.anomalies.boundary import refine_boundary
 from tunneldb.anomalies.region_shape import measure_shape
 from tunneldb.anomalies.regions import Region, find_regions
-from tunneldb.anomalies.threshold import dark_pixels, filter_size, seen_lining
-from tunneldb.anomalies.verdict import degrees_of, detectability
-from tunneldb.arrays import Bool, Int32
+from tunneldb.anomalies.threshold import filter_size, seen_lining
+from tunneldb.anomalies.verdict import degrees_of
+from tunneldb.arrays import Bool, Int32, Single
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.structures.contrast import FaceContrast
+from tunneldb.structures.face_raster import STEP
+from tunneldb.structures.significance import Scatter, significance
 
 LEAST_AREA = 0.0016
 """Smaller spots are left out, m²: 4 cm × 4 cm."""
@@ -25,8 +27,8 @@ LEAST_AREA = 0.0016
 LEAST_POINTS = 30
 """Spots of fewer points are left out."""
 
-FAINT = 0.5
-"""Degree from which a region is too faint to be told from noise."""
+LEAST_JUDGED = 150
+"""Of a face of fewer points it is not told what is its own: a spot of the least points would be a fifth of it."""
 
 RIM = 0.75
 """A region of which more lies along the face's own edge is what the beam loses there."""
@@ -75,12 +77,25 @@ class FaceSpots:
     seen: int
 
 
-def find_spots(face: FaceContrast) -> FaceSpots:
-    """Find what differs from a face's own level, darker or brighter."""
+def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
+    """Find what differs from a face's own level, darker or brighter.
+
+    Parameters
+    ----------
+    face : FaceContrast
+    pixels : int
+        Of all faces of the structure that hold points.
+    scatter : Scatter
+        Of the faces before.
+    """
     numbers = np.zeros(face.face.shape, np.int32)
     judged = int(face.judged.sum())
-    if not judged:
+    if not judged or face.points[face.judged].sum() < LEAST_JUDGED:
         return FaceSpots([], numbers, 0.0, 0)
+    told = face.image.state == PixelState.LINING
+    drop = np.where(told, face.image.drop, np.int16(0)) * np.float32(STEP)
+    differs = significance(drop, told, face.image.sigma, pixels, scatter)
+    on_face = face.image.state != PixelState.OFF
     empty = int((face.image.state == PixelState.EMPTY).sum())
     size = filter_size(judged / (judged + empty))
     rim = face.face & ~ndimage.binary_erosion(face.face, np.ones((3, 3), np.bool_), iterations=2)
@@ -90,9 +105,9 @@ def find_spots(face: FaceContrast) -> FaceSpots:
         image = face.image
         if sign < 0:
             image = replace(image, drop=np.where(image.drop == NODATA, np.int16(NODATA), -image.drop).astype(np.int16))
-        marked = refine_boundary(dark_pixels(image, size), image, size)
+        marked = refine_boundary((sign * differs > 1.0) & on_face, image, size)
         for region in find_regions(marked, marked, image, LEAST_AREA, None):
-            spot = _judge(region, kind, face, rim)
+            spot = _judge(region, kind, face, sign * differs[::-1], rim)
             if spot is None:
                 continue
             found.append(spot)
@@ -104,7 +119,9 @@ def find_spots(face: FaceContrast) -> FaceSpots:
     return FaceSpots(found, numbers, share, seen)
 
 
-def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, rim: Bool) -> FoundSpot | None:
+def _judge(
+    region: Region, kind: Literal["dark", "bright"], face: FaceContrast, differs: Single, rim: Bool
+) -> FoundSpot | None:
     """What a region is; None if it is nothing."""
     if not region.filled:
         return None
@@ -116,8 +133,6 @@ def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, 
         return None
     shape = measure_shape(region.mask, region.pixel)
     degrees = degrees_of(region, shape)
-    if degrees["faint"] > FAINT:
-        return None
     along = float(rim[box][region.mask].mean())
     if along > RIM and not rim[face.judged].mean() > 0.5:
         return None
@@ -126,7 +141,7 @@ def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, 
     return FoundSpot(
         kind,
         tuple(told),
-        detectability(region) * (1.0 - degrees["faint"]),
+        1.0 - 0.5 * float(np.exp(1.0 - max(differs[box][region.mask].max(), 1.0))),
         region.contrast,
         region.drop_mean,
         region.area,

@@ -1,0 +1,111 @@
+"""Which pixels of a face differ by more than chance lets any: means over windows of several sizes.
+
+The paper asks 3σ of a single point (Ono et al., 3.4). Of hundred thousand pixels some hundred lie beyond that by chance, while a
+patch of a thousand that differ by 2σ each is none. So means over windows are held against the scatter of such means on the face
+itself, unevenness of the surface with it, and asked so much that in a whole structure hardly one window passes by chance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import ndimage
+from scipy.stats import norm
+
+from tunneldb.arrays import Bool, Single
+from tunneldb.radiometry.robust_statistics import robust_statistics
+from tunneldb.structures.level import SHORTH
+
+WINDOWS = (3, 5, 9)
+"""Sides of the windows, pixels."""
+
+ALARMS = 0.05
+"""Windows that pass by chance in a whole structure, on average, of each size."""
+
+LEAST_FILLED = 0.5
+"""Share of the pixels of a window that were judged, or its mean tells nothing."""
+
+USUAL = 30.0
+"""Windows beside each other for which the usual scatter of all faces stands in: of few the own is not known."""
+
+LEVEL_SIGMA = 0.15
+"""A level is known no better than this, dB."""
+
+MOST_SAMPLES = 50_000
+
+
+@dataclass
+class Scatter:
+    """Scatter of means over windows of each size, in standard deviations of a pixel, as it is on the faces so far."""
+
+    sigma: dict[int, list[float]] = field(default_factory=dict)
+    weight: dict[int, list[float]] = field(default_factory=dict)
+
+    def copy(self) -> Scatter:
+        """As it is now."""
+        return Scatter(*({window: list(values) for window, values in part.items()} for part in (self.sigma, self.weight)))
+
+    def restore(self, other: Scatter) -> None:
+        """Go back to what it was."""
+        self.sigma, self.weight = other.sigma, other.weight
+
+    def blended(self, window: int, sigma: float, number: float) -> float:
+        """Scatter of a face of so many windows by its own and the usual one, and remember it."""
+        known, weights = self.sigma.setdefault(window, []), self.weight.setdefault(window, [])
+        usual = 1.0 / window
+        if known:
+            order = np.argsort(known)
+            share = np.cumsum(np.array(weights)[order])
+            usual = known[order[int(np.searchsorted(share, 0.5 * share[-1]))]]
+        if number >= 1.0:
+            known.append(sigma)
+            weights.append(number)
+        return float(np.sqrt((number * sigma**2 + USUAL * usual**2) / (number + USUAL)))
+
+
+def limit(pixels: int, window: int) -> float:
+    """How many standard deviations of a window's mean are none by chance, of a structure of so many pixels."""
+    return float(norm.isf(min(ALARMS * window**2 / max(pixels, 1), 0.01)))
+
+
+def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter: Scatter) -> Single:
+    """Mean of the window about each pixel that differs most, over what is none by chance: from 1 on it differs.
+
+    Parameters
+    ----------
+    drop : (rows, columns) float32 array
+        Contrast, dB.
+    judged : (rows, columns) bool array
+    sigma : (rows, columns) float32 array
+        Standard deviation of a pixel, dB.
+    pixels : int
+        Of all faces together.
+    scatter : Scatter
+        Of the faces before; this one's is added.
+
+    Returns
+    -------
+    (rows, columns) float32 array
+        With the sign of the drop.
+    """
+    most = np.zeros(drop.shape, np.float32)
+    count = judged.astype(np.float32)
+    ratio = np.where(judged, drop / np.maximum(sigma, 1e-3), np.float32(0.0)).astype(np.float32)
+    usual = float(np.median(sigma[judged])) if judged.any() else 1.0
+    for window in WINDOWS:
+        filled = ndimage.uniform_filter(count, window, mode="constant")
+        known = filled >= LEAST_FILLED
+        mean = ndimage.uniform_filter(ratio, window, mode="constant")
+        # Of fewer pixels a mean scatters more.
+        mean = np.where(known, mean / np.sqrt(np.maximum(filled, LEAST_FILLED)), np.float32(0.0))
+        whole = mean[known & judged]
+        if not len(whole):
+            continue
+        step = -(-len(whole) // MOST_SAMPLES)
+        own = robust_statistics(whole[::step], SHORTH, two_sided=True).sigma
+        wide = scatter.blended(window, own, len(whole) / window**2)
+        wide = float(np.hypot(wide, LEVEL_SIGMA / max(usual, 1e-3)))
+        scaled = mean / np.float32(wide * limit(pixels, window))
+        most = np.where(np.abs(scaled) > np.abs(most), scaled, most)
+    return most

@@ -1,0 +1,75 @@
+"""Which faces are solid: what sends back every beam. A grating, a fence or leaves let most of them through.
+
+A scanner turns by even steps, so that what is solid holds the same number of points in the same angle, wherever it is and
+however it is turned. Of a scan in which that does not hold, one that was thinned out, nothing is told.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from tunneldb.arrays import Bool, Float
+from tunneldb.structures.contrast import Observed
+from tunneldb.structures.face_raster import Layout
+from tunneldb.structures.models import to_space
+
+LEAST_RETURNED = 0.7
+"""Share of the beams that come back from a face at least."""
+
+EVEN = 0.3
+"""Of nine tenths of a scan's points the density differs by no more, or the scan was thinned out."""
+
+FEWEST = 60
+"""Fewer points of a face tell no density."""
+
+
+def closed(occupied: Bool, pixels: int) -> Bool:
+    """Pixels (rows, columns) with those between them, holes of so many pixels being none."""
+    padded = np.pad(occupied, pixels)
+    out = ndimage.binary_closing(padded, iterations=pixels)
+    return np.asarray(out[pixels : out.shape[0] - pixels, pixels : out.shape[1] - pixels])
+
+
+def ray_densities(layout: Layout, face: int, seen: list[Observed], stations: Float) -> Float:
+    """Points of a face per step of azimuth and zenith (radians) for each scan (k, 2): density and points; NaN of too few."""
+    u, v = layout.centres(face)
+    out = np.full((len(stations), 2), np.nan)
+    for one in seen:
+        points = float(one.points.sum())
+        if points < FEWEST:
+            continue
+        row, column = np.divmod(one.pixel, one.columns)
+        towards = stations[one.scan] - to_space(layout.models[face], u[column], v[row])
+        # The steps of azimuth lie the closer to each other the farther up or down a beam goes.
+        level = np.hypot(towards[:, 0], towards[:, 1]) / one.range_m
+        occupied = np.zeros((len(v), len(u)), np.bool_)
+        occupied[row, column] = True
+        pixels = np.count_nonzero(closed(occupied, 2))
+        angle = pixels * layout.pixel[face] ** 2 * np.mean(one.cosine / (one.range_m**2 * np.maximum(level, 1e-3)))
+        out[one.scan] = points / max(float(angle), 1e-12), points
+    return out
+
+
+def solid_faces(densities: Float) -> Bool:
+    """Which faces are solid (n,).
+
+    Parameters
+    ----------
+    densities : (n, k, 2) float array
+        Of all faces and scans, see `ray_densities`.
+    """
+    total, came_back = np.zeros(len(densities)), np.zeros(len(densities))
+    for scan in range(densities.shape[1]):
+        held = np.flatnonzero(np.isfinite(densities[:, scan, 0]))
+        if not len(held):
+            continue
+        density, points = densities[held, scan].T
+        order = np.argsort(density)
+        share = np.cumsum(points[order]) / points.sum()
+        low, usual, high = density[order[np.searchsorted(share, (0.05, 0.5, 0.95)).clip(max=len(order) - 1)]]
+        if low < usual * (1.0 - EVEN) or high > usual * (1.0 + EVEN):
+            continue
+        total[held] += points
+        came_back[held] += points * np.minimum(density / usual, 1.0)
+    return came_back >= LEAST_RETURNED * total
