@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.compiled import kernel
 from tunneldb.radiometry.robust_statistics import robust_statistics
 from tunneldb.robust import MAD_TO_SIGMA
 
@@ -45,7 +46,7 @@ RANGE_SLOPE = 20.0
 TUKEY = 4.0
 """Differences count less the greater they are, and from so many standard deviations on not at all."""
 
-MOST_PAIRS = 40_000
+MOST_PAIRS = 20_000
 """Pairs of places by which the shape is found."""
 
 MOST_POINTS = 8.0
@@ -59,6 +60,9 @@ MOST_WIDE = 1.5
 
 OWN = 2.5
 """Pixels within so many standard deviations of the level are of the surface itself."""
+
+OWN_MAD = 0.98
+"""Median deviation of a normal distribution cut off there, over that of a whole one."""
 
 LEAST_SIGMA = 0.01
 """The level scatters by no less, dB: rounding."""
@@ -139,18 +143,16 @@ def level_curve(
     by_range = by_range and float(np.ptp(log_range)) > LEAST_SPAN
     low, high = float(angle.min()), float(angle.max())
     knots = np.linspace(low, max(high, low + 1e-6), max(int(np.ceil((high - low) / CLASS)), 1) + 1)
-    columns = _rises(angle, knots)
-    if by_range:
-        columns = np.column_stack([columns, log_range - middle])
-    prior = _prior(len(knots) - 1, by_range=by_range)
-    found = _shape(columns, value, points, pairs, prior)
-    bare = value - columns @ found
+    basis = _Basis((angle - low) / (knots[1] - low), log_range - middle, len(knots), by_range)
+    weight = np.minimum(points, MOST_POINTS)
+    found = _shape(basis, value, weight, pairs)
+    bare = value - basis(found)
     told = own[usable] if own is not None else np.zeros(len(bare), np.bool_)
     start = robust_statistics(bare[told] if points[told].sum() >= FEWEST else bare, SHORTH, two_sided=True)
-    found, level, spread = _fit(columns, value, points, prior, found, start.mean, max(start.sigma, LEAST_SIGMA))
-    shape = level + np.concatenate([[0.0], np.cumsum(found[: len(knots) - 1])])
-    sigma = _sigmas(angle, value - level - columns @ found, knots, spread)
-    return LevelCurve(knots, shape, sigma, seen, middle, float(found[-1]) if by_range else 0.0)
+    found[: len(knots)] += start.mean
+    found, spread = _fit(basis, value, weight, found, max(start.sigma, LEAST_SIGMA))
+    sigma = _sigmas(angle, value - basis(found), knots, spread)
+    return LevelCurve(knots, found[: len(knots)], sigma, seen, middle, float(found[-1]) if by_range else 0.0)
 
 
 def _seen(angle: Float, points: Float) -> Int64:
@@ -159,67 +161,110 @@ def _seen(angle: Float, points: Float) -> Int64:
     return np.flatnonzero(np.bincount(number, points) >= FEWEST)
 
 
-def _rises(angle: Float, knots: Float) -> Float:
-    """Which share of the rise from each knot to the next lies below angles (n,): (n, knots - 1)."""
-    place = (angle - knots[0]) / (knots[1] - knots[0])
-    return np.clip(place[:, None] - np.arange(len(knots) - 1), 0.0, 1.0)
+class _Basis:
+    """Level at knots, between which it is straight, and a slope over lg R.
+
+    Parameters
+    ----------
+    place : (n,) float array
+        Of the pixels, in knots from the first.
+    along : (n,) float array
+        lg R.
+    knots : int
+    by_range : bool
+    """
+
+    def __init__(self, place: Float, along: Float, knots: int, by_range: bool) -> None:
+        self.first = np.clip(place.astype(np.int64), 0, knots - 2)
+        self.share = place - self.first
+        self.along, self.by_range = along, by_range
+        self.prior = self._prior(knots)
+
+    def _prior(self, knots: int) -> Float:
+        """Inverse covariance of the unknowns: rises from knot to knot are about 0 and change little, and so is the slope."""
+        rise, bend = np.diff(np.eye(knots), axis=0), np.diff(np.eye(knots), n=2, axis=0)
+        prior = np.zeros((knots + 1, knots + 1))
+        prior[:knots, :knots] = bend.T @ bend / BEND**2 + rise.T @ rise / SLOPE**2 + 1e-9 * np.eye(knots)
+        prior[-1, -1] = 1.0 / RANGE_SLOPE**2 if self.by_range else 1e12
+        return prior
+
+    def __call__(self, found: Float) -> Float:
+        """Level of the pixels (n,)."""
+        return np.asarray(
+            (1.0 - self.share) * found[self.first] + self.share * found[self.first + 1] + found[-1] * self.along
+        )
+
+    def solve(self, one: Int64, other: Int64, seen: Float, weight: Float) -> Float:
+        """Unknowns by weighted least squares of levels ``one``, less those of ``other`` where that is not empty."""
+        size = len(self.prior)
+        matrix, right = self.prior.copy(), np.zeros(size)
+        _accumulate(self.first, self.share, self.along, one, other, seen, weight, matrix, right)
+        return np.asarray(np.linalg.solve(matrix, right))
 
 
-def _prior(rises: int, *, by_range: bool) -> Float:
-    """Inverse covariance of the rises and of the slope over lg R: they are about 0, and rises change little."""
-    bend = np.diff(np.eye(rises), axis=0)
-    prior = np.zeros((rises + by_range, rises + by_range))
-    prior[:rises, :rises] = bend.T @ bend / BEND**2 + np.eye(rises) / SLOPE**2
-    if by_range:
-        prior[-1, -1] = 1.0 / RANGE_SLOPE**2
-    return prior
-
-
-def _shape(columns: Float, value: Float, points: Float, pairs: Int64, prior: Float) -> Float:
-    """Rises of the level: least squares of differences, with Huber's weights and then Tukey's."""
-    found = np.zeros(columns.shape[1])
+def _shape(basis: _Basis, value: Float, weight: Float, pairs: Int64) -> Float:
+    """Level up to a constant: least squares of differences, with Huber's weights and then Tukey's."""
+    found = np.zeros(len(basis.prior))
     if not len(pairs):
         return found
     if len(pairs) > MOST_PAIRS:
         pairs = pairs[:: -(-len(pairs) // MOST_PAIRS)]
-    one, other = pairs.T
-    design = columns[one] - columns[other]
+    one, other = np.ascontiguousarray(pairs.T)
     seen = value[one] - value[other]
-    weight = 1.0 / (1.0 / np.minimum(points[one], MOST_POINTS) + 1.0 / np.minimum(points[other], MOST_POINTS))
-    weight /= weight.mean()
+    both = weight[one] * weight[other] / (weight[one] + weight[other])
+    both /= both.mean()
     for turn in range(FITS):
-        rest = np.abs(seen - design @ found)
-        sigma = max(MAD_TO_SIGMA * float(np.median(rest)), LEAST_SIGMA)
-        size = rest / (TUKEY * sigma)
+        rest = value - basis(found)
+        off = np.abs(rest[one] - rest[other])
+        sigma = max(MAD_TO_SIGMA * float(np.median(off)), LEAST_SIGMA)
+        size = off / (TUKEY * sigma)
         # The start may be far off.
         robust = np.minimum(1.0, 0.4 / np.maximum(size, 1e-12)) if turn < 3 else np.maximum(1.0 - size**2, 0.0) ** 2
-        counted = weight * robust / sigma**2
-        found = np.linalg.solve(design.T @ (counted[:, None] * design) + prior, design.T @ (counted * seen))
+        found = basis.solve(one, other, seen, both * robust / sigma**2)
     return found
 
 
-def _fit(
-    columns: Float, value: Float, points: Float, prior: Float, found: Float, level: float, spread: float
-) -> tuple[Float, float, float]:
-    """Rises, level at the first knot and standard deviation of what lies about the level: least squares with Tukey's weights."""
-    if len(value) > MOST_PAIRS:
-        step = -(-len(value) // MOST_PAIRS)
-        columns, value, points = columns[::step], value[::step], points[::step]
-    design = np.column_stack([columns, np.ones(len(columns))])
-    whole = np.zeros((design.shape[1], design.shape[1]))
-    whole[:-1, :-1] = prior
-    weight = np.minimum(points, MOST_POINTS)
-    weight = weight / weight.mean()
+def _fit(basis: _Basis, value: Float, weight: Float, found: Float, spread: float) -> tuple[Float, float]:
+    """Level, and standard deviation of what lies about it: least squares with Tukey's weights."""
+    every = np.arange(len(value))
+    if len(every) > MOST_PAIRS:
+        every = every[:: -(-len(every) // MOST_PAIRS)]
+    weight = weight[every] / weight[every].mean()
+    nothing = np.empty(0, np.int64)
     for _ in range(FITS):
-        rest = value - level - columns @ found
+        rest = (value - basis(found))[every]
         near = np.abs(rest) < OWN * spread
         if near.sum() < FEWEST:
             break
-        spread = max(robust_statistics(rest[near], two_sided=True).sigma, LEAST_SIGMA)
+        spread = max(float(MAD_TO_SIGMA * np.median(np.abs(rest[near]))) / OWN_MAD, LEAST_SIGMA)
         counted = weight * np.maximum(1.0 - (rest / (TUKEY * spread)) ** 2, 0.0) ** 2 / spread**2
-        solved = np.linalg.solve(design.T @ (counted[:, None] * design) + whole, design.T @ (counted * value))
-        found, level = solved[:-1], float(solved[-1])
-    return found, level, spread
+        found = basis.solve(every, nothing, value[every], counted)
+    return found, spread
+
+
+@kernel
+def _accumulate(
+    first: Int64, share: Float, along: Float, one: Int64, other: Int64, seen: Float, weight: Float, matrix: Float, right: Float
+) -> None:  # pragma: no cover - compiled
+    last = len(right) - 1
+    at, part = np.empty(5, np.int64), np.empty(5)
+    for m in range(len(one)):
+        w = weight[m]
+        if w <= 0.0:
+            continue
+        i = one[m]
+        at[0], at[1], at[4] = first[i], first[i] + 1, last
+        part[0], part[1], part[4] = 1.0 - share[i], share[i], along[i]
+        at[2], at[3], part[2], part[3] = 0, 0, 0.0, 0.0
+        if len(other):
+            j = other[m]
+            at[2], at[3] = first[j], first[j] + 1
+            part[2], part[3] = share[j] - 1.0, -share[j]
+            part[4] -= along[j]
+        for a in range(5):
+            right[at[a]] += w * part[a] * seen[m]
+            for b in range(5):
+                matrix[at[a], at[b]] += w * part[a] * part[b]
 
 
 def _sigmas(angle: Float, rest: Float, knots: Float, spread: float) -> Float:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int32, Int64
+from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.structures.contrast import Observed, member_levels
 from tunneldb.structures.face_raster import Layout
 from tunneldb.structures.models import to_space, unroll
@@ -177,21 +178,27 @@ def _blocks(lines: Float) -> tuple[Float, float]:
     padded[: lines.shape[0], : lines.shape[1]] = lines
     cells = padded.reshape(rows, ACROSS, columns, ALONG).transpose(0, 2, 1, 3).reshape(rows, columns, -1)
     known = np.isfinite(cells).sum(axis=2)
-    medians = np.full((rows, columns), np.nan)
-    full = known >= ACROSS * ALONG // 3
+    medians = np.where(known >= ACROSS * ALONG // 3, _nan_median(np.moveaxis(cells, 2, 0)), np.nan)
+    full = np.isfinite(medians)
     if not full.any():
         return medians, np.inf
-    medians[full] = np.nanmedian(cells[full], axis=1)
-    sigma = 1.4826 * float(np.nanmedian(np.abs(cells[full] - medians[full][:, None])))
+    off = np.abs(cells[full] - medians[full][:, None])
+    sigma = MAD_TO_SIGMA * float(np.median(off[np.isfinite(off)]))
     return medians, max(sigma, 0.05)
 
 
 def _medians(blocks: Float) -> Float:
     """Median of each column of blocks; NaN where less than half of them are known."""
-    out = np.full(blocks.shape[1], np.nan)
-    use = np.isfinite(blocks).sum(axis=0) * 2 >= len(blocks)
-    out[use] = np.nanmedian(blocks[:, use], axis=0)
-    return out
+    return np.where(np.isfinite(blocks).sum(axis=0) * 2 >= len(blocks), _nan_median(blocks), np.nan)
+
+
+def _nan_median(values: Float) -> Float:
+    """Median over the first axis of what is known; NaN where nothing is. NumPy's own takes many times as long."""
+    ordered = np.sort(values, axis=0)
+    count = np.isfinite(ordered).sum(axis=0)
+    low, high = np.maximum(count - 1, 0) // 2, np.minimum(count // 2, len(ordered) - 1)
+    both = [np.take_along_axis(ordered, at[None], axis=0)[0] for at in (low, high)]
+    return np.asarray(0.5 * (both[0] + both[1]))
 
 
 def _sharpest(lines: Float, about: int) -> int:
@@ -200,12 +207,10 @@ def _sharpest(lines: Float, about: int) -> int:
     best, at = -1.0, about
     medians = np.full(len(lines), np.nan)
     near = slice(max(about - 2 * reach, 0), about + 2 * reach)
-    known = np.isfinite(lines[near]).any(axis=1)
-    medians[near][known] = np.nanmedian(lines[near][known], axis=1)
+    medians[near] = _nan_median(lines[near].T)
     for k in range(max(about - reach, 1), min(about + reach, len(lines) - 1) + 1):
         sides = medians[max(k - ACROSS, 0) : k], medians[k : k + ACROSS]
-        if all(np.isfinite(side).any() for side in sides):
-            step = abs(float(np.nanmedian(sides[1]) - np.nanmedian(sides[0])))
-            if step > best:
-                best, at = step, k
+        step = abs(float(_nan_median(sides[1]) - _nan_median(sides[0])))
+        if step > best:
+            best, at = step, k
     return at
