@@ -11,7 +11,6 @@ from support.structure_scene import Pipe, Plate, Seen, scan
 from tunneldb.structures.face_raster import Sums
 from tunneldb.structures.find import Found, find_structures
 from tunneldb.structures.joining import RangeImages
-from tunneldb.structures.level import level_curve
 from tunneldb.structures.materials import part_by_material
 from tunneldb.structures.models import normals_at, to_space, unroll
 from tunneldb.structures.segmentation import Segmentation, find_faces
@@ -217,24 +216,6 @@ def test_a_plate_seen_from_both_sides_has_two_faces() -> None:
     found = find(both, *levels(both, [], np.array([30.0, 30.0])), stations=stations)
     assert len(found.found.structures.faces) == 2
     assert all(len(np.unique(both.surface[found.face == number])) == 1 for number in (1, 2))
-
-
-def test_a_class_that_a_spot_covers_keeps_the_level_of_the_others() -> None:
-    rng = np.random.default_rng(2)
-    cosine = rng.uniform(0.3, 1.0, 20_000)
-    range_m = np.full(20_000, 8.0)
-    clean = 5.0 + 10.0 * np.log10(cosine)
-    covered = (cosine > 0.5) & (cosine < 0.6)
-    value = clean + rng.normal(0, 0.3, 20_000) - 4.0 * covered
-    curve = level_curve(cosine, range_m, value, np.ones(20_000), by_range=False)
-    assert np.abs(curve(cosine, range_m) - clean).max() < 0.35
-    assert curve.known(np.array([0.31, 0.9])).all()
-    assert not curve.known(np.array([0.1])).any()  # beyond 80° nothing is judged
-
-
-def test_few_points_tell_no_level() -> None:
-    curve = level_curve(np.full(20, 0.8), np.full(20, 5.0), np.zeros(20), np.ones(20), by_range=False)
-    assert not curve.known(np.array([0.8])).any()
 
 
 def test_materials_are_parted_and_stains_are_not() -> None:

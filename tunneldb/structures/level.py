@@ -145,10 +145,11 @@ def level_curve(
     knots = np.linspace(low, max(high, low + 1e-6), max(int(np.ceil((high - low) / CLASS)), 1) + 1)
     basis = _Basis((angle - low) / (knots[1] - low), log_range - middle, len(knots), by_range)
     weight = np.minimum(points, MOST_POINTS)
-    found = _shape(basis, value, weight, pairs)
-    bare = value - basis(found)
-    told = own[usable] if own is not None else np.zeros(len(bare), np.bool_)
-    start = robust_statistics(bare[told] if points[told].sum() >= FEWEST else bare, SHORTH, two_sided=True)
+    told = own[usable] if own is not None else np.zeros(len(value), np.bool_)
+    if points[told].sum() < FEWEST:
+        told = np.ones(len(value), np.bool_)
+    found = _shape(basis, value, weight, pairs[told[pairs].all(axis=1)])
+    start = robust_statistics((value - basis(found))[told], SHORTH, two_sided=True)
     found[: len(knots)] += start.mean
     found, spread = _fit(basis, value, weight, found, max(start.sigma, LEAST_SIGMA))
     sigma = _sigmas(angle, value - basis(found), knots, spread)

@@ -202,15 +202,13 @@ def _nan_median(values: Float) -> Float:
 
 
 def _sharpest(lines: Float, about: int) -> int:
-    """First line behind the sharpest step near a place: between the medians of the few lines before and behind it."""
+    """First line behind a step near a place: where most pixels before it lie on one side of the step's middle and most behind on
+    the other."""
     reach = (BLOCKS + 1) * ACROSS
-    best, at = -1.0, about
-    medians = np.full(len(lines), np.nan)
-    near = slice(max(about - 2 * reach, 0), about + 2 * reach)
-    medians[near] = _nan_median(lines[near].T)
-    for k in range(max(about - reach, 1), min(about + reach, len(lines) - 1) + 1):
-        sides = medians[max(k - ACROSS, 0) : k], medians[k : k + ACROSS]
-        step = abs(float(_nan_median(sides[1]) - _nan_median(sides[0])))
-        if step > best:
-            best, at = step, k
-    return at
+    first = max(about - 2 * reach, 0)
+    near = lines[first : about + 2 * reach]
+    before, after = (_nan_median(part[np.isfinite(part)][:, None])[0] for part in (near[: about - first], near[about - first :]))
+    votes = np.where(np.isfinite(near), np.sign((near - 0.5 * (before + after)) * (after - before)), 0.0).sum(axis=1)
+    score = votes.sum() - 2.0 * np.concatenate([[0.0], np.cumsum(votes)])
+    inner = slice(max(about - reach - first, 1), about + reach - first)
+    return first + inner.start + int(np.argmax(score[inner]))
