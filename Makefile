@@ -39,6 +39,11 @@ $(VENV)/tests: | $(VENV)/server
 	scripts/system-packages.sh server tests
 	touch $@
 
+# Loops are compiled once, while linting takes the other core: workers of tests that start together would each compile them all.
+$(VENV)/compiled: $(VENV)/wheel
+	scripts/compile.sh $(abspath $(BIN))/tunneldb
+	touch $@
+
 demo: install
 	scripts/demo.sh $(abspath $(BIN))/tunneldb
 
@@ -49,7 +54,7 @@ lint: install
 	$(BIN)/lint-imports --no-logo
 
 # Not `python -m pytest`: that would put the source tree before the wheel. Linting takes a core for a minute, beside the tests.
-tests: $(VENV)/wheel $(VENV)/tests
+tests: $(VENV)/wheel $(VENV)/tests $(VENV)/compiled
 	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -rs
 
 quick: $(VENV)/wheel
@@ -58,7 +63,7 @@ quick: $(VENV)/wheel
 test: $(VENV)/wheel $(VENV)/tests
 	$(MAKE) -j 2 lint tests
 
-faults: install $(VENV)/tests
+faults: install $(VENV)/tests $(VENV)/compiled
 	KILLS=$${KILLS:-100} $(BIN)/pytest -n 0 -s tests/faults/test_kills.py
 
 docs: $(VENV)/dependencies

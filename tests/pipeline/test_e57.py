@@ -34,7 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write(
         Simulation(
             Parameters(
-                name="t", start_chainage=START, length=24.0, scanner="static", station_spacing=12.0, angular_step=0.25,
+                name="t", start_chainage=START, length=24.0, scanner="static", station_spacing=12.0, angular_step=0.35,
                 leaks=6, leak_area=(0.2, 1.5), seed=1,
             )
         ),
@@ -78,7 +78,7 @@ def process(folder: Path, survey: str, stations: list[Path], dimension: str, fil
         "--reference", folder / "t.reference.csv", "--intensity-kind", "amplitude", "--intensity", dimension,
     )  # fmt: skip
     command("load", survey, *files)
-    command("run", survey)
+    command("run", survey, "--set", "image.pixel=0.04")
 
 
 def leaks(conn: psycopg.Connection, survey: str) -> list[tuple[shapely.Geometry, float]]:

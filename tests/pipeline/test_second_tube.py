@@ -77,7 +77,9 @@ def test_nothing_else_is_a_tube(beside: np.ndarray) -> None:
 
 def test_results_are_those_of_the_tunnel(conn: psycopg.Connection, tmp_path: Path) -> None:
     """The same tunnel again, 15 m to the side and scanned thrice as dense, neither turns the sections nor adds leaks."""
-    simulation = Simulation(parameters("profiler", 1, profile_spacing=0.04, profile_points=800, radius=0.0, niches=False))
+    simulation = Simulation(
+        parameters("profiler", 1, length=16.0, leaks=4, profile_spacing=0.04, profile_points=600, radius=0.0, niches=False)
+    )
     write(simulation, tmp_path)
     (path,) = tmp_path.glob("*.laz")
     las = laspy.read(path)

@@ -43,4 +43,7 @@ def boxed(surface: Surface, thing: tuple[float, ...], step: float) -> np.ndarray
     sides = np.arange(across - width / 2, across + width / 2, step) + step / 2
     heights = np.arange(low, high, step) + step / 2
     along = np.arange(chainage - length / 2, chainage + length / 2, step) + step / 2
-    return np.concatenate([beside(surface, c, sides, h) for c in along for h in heights])
+    origin, _, right, _ = surface.frames(along).transpose(1, 0, 2)
+    points = (origin[:, None] + sides[:, None] * right[:, None])[:, None].repeat(len(heights), axis=1)
+    points[..., 2] += (heights - FLOOR)[:, None]
+    return points.reshape(-1, 3)
