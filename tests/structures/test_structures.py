@@ -223,8 +223,8 @@ def test_materials_are_parted_and_stains_are_not() -> None:
     value = rng.normal(0, 0.4, (150, 200))
     held = rng.random((150, 200)) < 0.9
     two = value + 2.0 * (np.arange(200) >= 120)
-    parts = part_by_material(two, held, 0.01)
+    parts = part_by_material([np.where(held, two, np.nan)], 0.01)
     assert (parts == (np.arange(200) >= 120)[None, :]).mean() > 0.99 or (parts == (np.arange(200) < 120)[None, :]).mean() > 0.99
     row, column = np.mgrid[:150, :200]
     stained = value - 3.0 * (np.hypot(row - 60, column - 90) < 40)
-    assert not part_by_material(stained, held, 0.01).any()
+    assert not part_by_material([np.where(held, stained, np.nan)], 0.01).any()

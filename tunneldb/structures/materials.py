@@ -9,10 +9,11 @@ what stands before a wall parts it into faces, of which each shows but a piece o
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
-from tunneldb.arrays import Bool, Float, Int32, Int64
+from tunneldb.arrays import Float, Int32, Int64
 from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.structures.contrast import Observed, member_levels
 from tunneldb.structures.face_raster import Layout
@@ -95,29 +96,30 @@ def parts_of_plane(layout: Layout, faces: list[int], seen: list[list[Observed]])
     if max(plane.shape) * plane.pixel < 2.0 * LEAST_WIDTH:
         return None
     curves = member_levels(seen, layout.models[faces[0]], by_range=False)
-    total, count = np.zeros(plane.shape).ravel(), np.zeros(plane.shape).ravel()
-    for place, by_scan in zip(plane.place, seen, strict=True):
-        for one in by_scan:
-            use = np.flatnonzero(curves[one.scan].known(one.cosine))
-            rest = one.value[use] - curves[one.scan](one.cosine[use], one.range_m[use])
-            at = place[one.pixel[use]]
-            total += np.bincount(at, one.points[use] * rest, len(total))
-            count += np.bincount(at, one.points[use], len(total))
-    held = count > 0.0
-    value = np.where(held, total / np.maximum(count, 1.0), 0.0)
-    parts = part_by_material(value.reshape(plane.shape), held.reshape(plane.shape), plane.pixel).ravel()
+    images = []
+    for scan, curve in curves.items():  # by itself: where one saw more of another material, its level is that one's
+        total, count = np.zeros(plane.shape).ravel(), np.zeros(plane.shape).ravel()
+        for place, by_scan in zip(plane.place, seen, strict=True):
+            for one in by_scan:
+                if one.scan != scan:
+                    continue
+                use = np.flatnonzero(curve.known(one.cosine))
+                rest = one.value[use] - curve(one.cosine[use], one.range_m[use])
+                at = place[one.pixel[use]]
+                total += np.bincount(at, one.points[use] * rest, len(total))
+                count += np.bincount(at, one.points[use], len(total))
+        images.append(np.where(count > 0.0, total / np.maximum(count, 1.0), np.nan).reshape(plane.shape))
+    parts = part_by_material(images, plane.pixel).ravel()
     return [parts[place] for place in plane.place] if parts.any() else None
 
 
-def part_by_material(value: Float, held: Bool, pixel: float) -> Int32:
-    """Part a face.
+def part_by_material(images: list[Float], pixel: float) -> Int32:
+    """Part a plane.
 
     Parameters
     ----------
-    value : (rows, columns) float array
-        Level, dB.
-    held : (rows, columns) bool array
-        Where it is known.
+    images : list of (rows, columns) float arrays
+        Level as each scan saw it, dB; NaN where it did not.
     pixel : float
         Side of a pixel, m.
 
@@ -126,16 +128,16 @@ def part_by_material(value: Float, held: Bool, pixel: float) -> Int32:
     (rows, columns) int32 array
         Number of the part of each pixel, 0 being the first; all 0 where there is but one.
     """
-    parts = np.zeros(held.shape, np.int32)
+    parts = np.zeros(images[0].shape, np.int32)
     waiting, count = [(0, 0)], 1
     while waiting:
         number, depth = waiting.pop()
         inside = parts == number
-        found = _best_line(value, held & inside, pixel) if depth < DEPTH else None
+        found = _best_line([np.where(inside, image, np.nan) for image in images], pixel) if depth < DEPTH else None
         if found is None:
             continue
         axis, at = found
-        beyond = np.zeros(held.shape, np.bool_)
+        beyond = np.zeros(inside.shape, np.bool_)
         np.moveaxis(beyond, axis, 0)[at:] = True
         parts[inside & beyond] = count
         waiting += [(number, depth + 1), (count, depth + 1)]
@@ -143,12 +145,12 @@ def part_by_material(value: Float, held: Bool, pixel: float) -> Int32:
     return parts
 
 
-def _best_line(value: Float, held: Bool, pixel: float) -> tuple[int, int] | None:
-    """Axis and place of the line over which the level steps most; None where it steps over none."""
-    best: tuple[float, int, int] | None = None
-    for axis in (0, 1):
-        lines, there = np.moveaxis(np.where(held, value, np.nan), axis, 0), np.moveaxis(held, axis, 0)
-        place = np.flatnonzero(there.any(axis=1))
+def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
+    """Axis and place of the line over which the level steps most surely; None where it steps over none."""
+    best: tuple[float, int, int, Float] | None = None
+    for image, axis in product(images, (0, 1)):
+        lines = np.moveaxis(image, axis, 0)
+        place = np.flatnonzero(np.isfinite(lines).any(axis=1))
         if len(place) * pixel < 2.0 * LEAST_WIDTH:
             continue
         first = int(place[0])
@@ -161,14 +163,15 @@ def _best_line(value: Float, held: Bool, pixel: float) -> tuple[int, int] | None
                 continue
             step = float(np.median(steps))
             size = abs(step) / sigma
-            if size < LEAST_STEP or (best is not None and size <= best[0]):
+            sure = size * float(np.sqrt(len(steps)))
+            if size < LEAST_STEP or (best is not None and sure <= best[0]):
                 continue
             if (steps * np.sign(step) > 0.5 * abs(step)).mean() >= EVEN:
-                best = (size, axis, first + ACROSS * k)
+                best = (sure, axis, first + ACROSS * k, lines)
     if best is None:
         return None
-    _, axis, about = best
-    return axis, _sharpest(np.moveaxis(np.where(held, value, np.nan), axis, 0), about)
+    _, axis, about, lines = best
+    return axis, _sharpest(lines, about)
 
 
 def _blocks(lines: Float) -> tuple[Float, float]:
