@@ -67,6 +67,8 @@ class FaceContrast:
         What belongs to the face.
     judged : (rows, columns) bool array
         Where its level is known and points are.
+    rim : int
+        Pixels along its edge that are not judged.
     points : (rows, columns) int array
     scans : (rows, columns) int array
         Bits of the scans that count; of more than 31 the last ones share one.
@@ -79,6 +81,7 @@ class FaceContrast:
     image: ContrastImage
     face: Bool
     judged: Bool
+    rim: int
     points: Int32
     scans: Int32
     incidence: tuple[float, float]
@@ -239,7 +242,7 @@ def contrast_of(
     rim = int(np.ceil((0.5 * footprint + TOLERANCE * noise) / side))
     within = ndimage.binary_erosion(whole, iterations=rim) if rim else whole
     if within.sum() < 0.3 * whole.sum():  # a strip as narrow as the beam is all rim
-        within = whole
+        within, rim = whole, 0
     judged2 = judged.reshape(shape) & within
     state = np.full(shape, PixelState.OFF, np.uint8)
     state[within & ~occupied] = PixelState.EMPTY
@@ -261,6 +264,7 @@ def contrast_of(
         image,
         whole,
         judged2,
+        rim,
         held.reshape(shape).astype(np.int32),
         scans.reshape(shape).astype(np.int32),
         incidence,

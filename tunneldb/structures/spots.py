@@ -159,9 +159,10 @@ def _box(spot: FoundSpot) -> tuple[slice, slice]:
 
 
 def _over_rim(face: FaceContrast, numbers: Int32, found: list[FoundSpot]) -> None:
-    """Let spots reach over the face's rim, which was not judged, as far as they lie beside it."""
-    if not found:
+    """Let spots reach over the face's rim, which was not judged: it is what lies nearest to it."""
+    off = face.image.state[::-1] == PixelState.OFF
+    if not found or not face.rim or off.all():
         return
-    left = face.face & (numbers == 0) & (face.image.state[::-1] == PixelState.OFF) & (face.points > 0)
-    grown = ndimage.grey_dilation(numbers, size=(3, 3))
-    numbers[left] = grown[left]
+    row, column = ndimage.distance_transform_edt(off, return_distances=False, return_indices=True)
+    left = face.face & off & (face.points > 0)
+    numbers[left] = numbers[row[left], column[left]]
