@@ -11,7 +11,7 @@ import psycopg
 from psycopg import sql
 from rich.console import Console
 
-from tunneldb.cli.coverage import say_coverage, say_remarks
+from tunneldb.cli.coverage import say_coverage, say_no_crs, say_remarks
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import records, tell, verb
 from tunneldb.cli.stretch import parse_stretch, stretch_options
@@ -142,6 +142,8 @@ def leaks(
                 _write_file(listed, form, chosen, found, output)
                 say_coverage(coverage, found)
                 click.echo(f"{listed.total} to {output}", err=True)
+            if form == "geojson" and chosen != "unrolled":
+                say_no_crs(found.srid)
             tell(survey=survey, kind=listed.kind, count=listed.count, area=listed.area, listed=len(listed.rows))
     if not coverage.complete:
         context.exit(1)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tunneldb.geometry.crs import outside_area
 from tunneldb.pipeline.inspection import FileLook, IntensityLook
 from tunneldb.radiometry.intensity_kind import KindGuess
 
@@ -148,9 +149,17 @@ def _srid(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> s
     codes = [code for code in named.values() if code is not None]
     doubts += [f"{look.path.name}: its coordinate system can't be read: {look.unread_crs}" for look in looks if look.unread_crs]
     if codes:
+        doubts += [
+            f"{look.path.name}: {place}"
+            for look in looks
+            if (place := outside_area(look.srid, np.array([look.low[:2], look.high[:2]])))
+        ]
         return str(codes[0])
     why = f"that of {next(iter(named))} has no EPSG code" if named else "no file states one"
-    missing.append(f"the coordinate system, as EPSG code in place of SRID: {why}; it must be projected and in metres")
+    missing.append(
+        f"the coordinate system, as EPSG code in place of SRID: {why}; it must be projected and in metres; or local, if the "
+        "coordinates are the site's own, in metres"
+    )
     return "SRID"
 
 
