@@ -103,9 +103,9 @@ def leaks(
     interpolated, in doubt. The same is in every file; see tunnel_api.coverage_gap and tunnel_api.remark.
 
     In the table arc is counted from the crown, to the right looking up-chainage. clock is where the middle lies: 12:00 is the
-    crown, 3:00 right. conf. is how sure detection is that it is of its kind, 0 to 1, and contrast how many times the scatter of
-    the dry lining about it it is darker, in the mean. drop and max are how much darker than dry lining it is, in the mean and at
-    the most. image is the share of its area on which the image holds measurements.
+    crown, 3:00 right. conf. is how sure detection is of its kind, 0 to 1. drop is how much darker than dry lining it is in the
+    mean, max at the most, and contrast the mean drop in standard deviations of the dry lining about it. image is the share of
+    its area on which the image holds measurements.
 
     With --by-km a line for each kilometre, and one for all: wet area and number of leaks, the most in any 100 m² of lining, and
     the best class of GB 50108-2008 that the lining seen keeps, as far as a scan can tell. Any other stretch, and what breaks a

@@ -124,7 +124,7 @@ def sheet_layout(survey: Survey, extent: Extent, coverage: tuple[str, str], leak
 
 
 def _strip(scale: int, extent: Extent) -> ET.Element:
-    """The unrolled lining of the sheet, from edge to edge, so that what is seen is in its table, under a grid of 10 m by 2 m."""
+    """The unrolled lining of the sheet, from edge to edge as its table, under a grid of 10 m by 2 m."""
     width, height = LENGTH * 1000.0 / scale, (extent.ymax - extent.ymin) * 1000.0 / scale
     element = item(
         SHEETS, MAP_ITEM, "strip", ((PAGE[0] - width) / 2 + 4, _TOP, width, height), frame="true", background="true",
@@ -219,7 +219,7 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
 
 
 def _fits(layer: str, rows: int) -> str:
-    """Return the expression that a sheet's leaks surely need no more than so many rows; text broken between words fills half."""
+    """Return the expression that a sheet's leaks surely need no more rows; lines broken between words are half full."""
     lines = f"1 + floor(length(coalesce(\"remark\", '')) / {_LINE // 2})"
     needed = f"aggregate(layer:='{layer}', aggregate:='sum', expression:={lines}, filter:={_ON_SHEET})"
     return f"coalesce({needed}, 0) <= {rows}"
