@@ -214,10 +214,16 @@ def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None
     click.echo(f"{name}: a site, without an axis", err=True)
 
 
-@tunnel.command("find-axis", examples=["tunneldb tunnel find-axis ringo.laz -o ringo.axis.csv"])
+@tunnel.command(
+    "find-axis",
+    examples=["tunneldb tunnel find-axis ringo.laz", "tunneldb tunnel find-axis ringo-1.laz ringo-2.laz -o ringo.axis.csv"],
+)
 @click.argument("scans", metavar="SCAN...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
-    "-o", "--output", required=True, type=click.Path(dir_okay=False, path_type=Path), help="Axis to write, .csv with x,y,z."
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Axis to write, .csv with x,y,z. [default: NAME.found-axis.csv, NAME being what the SCAN files are called]",
 )
 @click.option(
     "--picture",
@@ -226,7 +232,7 @@ def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None
     help="Picture to write, .png. [default: beside the axis, of its name]",
 )
 @click.option("--reverse", is_flag=True, help="Let chainage grow the other way.")
-def find_axis(scans: tuple[Path, ...], output: Path, picture: Path | None, reverse: bool) -> None:
+def find_axis(scans: tuple[Path, ...], output: Path | None, picture: Path | None, reverse: bool) -> None:
     """Find the axis of the tunnel in SCAN files; needs no database.
 
     It needs a roof, two walls and a floor along most of one tunnel, and nothing else: straight or curved, rising or falling,
@@ -234,11 +240,13 @@ def find_axis(scans: tuple[Path, ...], output: Path, picture: Path | None, rever
     shows the line over the points in plan and profile: look at it, then tunneldb tunnel add --axis.
     """
     from tunneldb.alignment.drawing import describe_line
+    from tunneldb.files import common_name
     from tunneldb.pipeline.axis_search import found_given
 
+    name = common_name(scans)
     with told_to_end(), bar("points") as progress:
         _, found = found_given(scans, None, step(progress), None, reverse)
-    _keep(found, output, picture, 0.0, scans[0].stem)
+    _keep(found, output or Path(f"{name}.found-axis.csv"), picture, 0.0, name)
     click.echo(f"chainage grows over {describe_line(found.xyz)}; --reverse turns it round", err=True)
 
 
