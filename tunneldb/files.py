@@ -1,16 +1,19 @@
-"""Files that are there whole or not at all."""
+"""Files that are there whole or not at all, and what they are called together."""
 
 from __future__ import annotations
 
 import os
+import re
 import signal
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
 from tunneldb.errors import UserError
+
+_PLAIN = re.compile(r"[^A-Za-z0-9_]+")
 
 
 @contextmanager
@@ -59,3 +62,11 @@ def make_folder(path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"{path}: the folder cannot be made: {error.strerror}") from error
+
+
+def common_name(paths: Sequence[Path]) -> str:
+    """What the names of files begin with, without numbers that tell them apart, in letters that a tunnel's name may have."""
+    stems = [path.name.split(".", 1)[0] for path in paths]
+    same = [len(set(letters)) == 1 for letters in zip(*stems, strict=False)]
+    common = stems[0][: same.index(False) if False in same else len(same)]
+    return _PLAIN.sub("-", common).strip("-_0123456789" if len(stems) > 1 else "-_") or "tunnel"

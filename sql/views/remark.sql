@@ -5,13 +5,14 @@
 -- nothing (dust, edges, people), which are a few percent. Of points beyond the ends of the given axis one in a hundred is told:
 -- a scan sees some of what lies before a portal, but a tunnel that goes on is to be looked at.
 CREATE OR REPLACE VIEW tunnel_api.remark AS
-SELECT 8 * r.id AS id, r.survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file, r.counts ->> 'note' AS remark
+SELECT 8 * r.id AS id, r.survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file,
+       concat_ws('; ', r.counts ->> 'note', r.counts ->> 'place') AS remark
   FROM (SELECT DISTINCT ON (d.survey_id, d.km, d.stage) d.*
           FROM tunnel.run d
          WHERE d.outcome = 'done' AND d.km IS NOT NULL
          ORDER BY d.survey_id, d.km, d.stage, d.started_at DESC, d.id DESC) r
   JOIN tunnel.survey s ON s.id = r.survey_id
- WHERE r.counts ? 'note'
+ WHERE r.counts ?| ARRAY['note', 'place']
  UNION ALL
 SELECT 8 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, format('%s points (%s %%) left out: %s', w.points,
        round(100 * w.points / greatest(f.points - f.outside, 1)::numeric, 2), w.why)

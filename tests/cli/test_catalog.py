@@ -65,6 +65,21 @@ def test_a_tunnel_keeps_its_axis_as_given(tunnel: Path, conn: psycopg.Connection
     assert "0+950.000" in run("tunnel", "list").stdout
 
 
+def test_a_tunnel_in_local_coordinates(dsn: str, files: Path, conn: psycopg.Connection) -> None:
+    result = run("tunnel", "add", "t", "--srid", "local", "--axis", "axis.csv")
+    assert result.exit_code == 0, result.stderr
+    assert conn.execute("SELECT srid, ST_SRID(alignment) FROM tunnel.tunnel").fetchone() == (0, 0)
+    assert run("tunnel", "list").stdout.splitlines()[1].split()[:2] == ["t", "local"]
+    refused(run("tunnel", "add", "u", "--srid", "somewhere", "--axis", "axis.csv"), "nor local")
+
+
+def test_a_wrong_system_is_told_where_the_tunnel_is_added(dsn: str, files: Path) -> None:
+    (files / "near.csv").write_text("x,y,z\n100,100,5\n200,150,6\n")
+    assert "outside the area" in run("tunnel", "add", "t", "--srid", "25830", "--axis", "near.csv").stderr
+    assert "outside the area" not in run("tunnel", "add", "u", "--srid", "local", "--axis", "near.csv").stderr
+    assert "outside the area" not in run("tunnel", "add", "v", "--srid", "25830", "--axis", "axis.csv").stderr
+
+
 def test_a_mobile_survey(tunnel: Path, conn: psycopg.Connection) -> None:
     result = run(*ADD, "--trajectory", "trajectory.csv", "--reference", "reference.csv")
     assert result.exit_code == 0, result.stderr

@@ -52,6 +52,23 @@ def changed(source: Path, target: Path, scale: float = 1.0, crs: int | None = No
     return target
 
 
+def test_stations_of_another_name_are_taken_where_there_is_one_table_of_them(tls: Path, tmp_path: Path) -> None:
+    scan = tmp_path / "scan.laz"
+    scan.symlink_to(tls)
+    table = tls.with_name("bend.stations.csv").read_text()
+    own, far = tmp_path / "positions-stations.csv", tmp_path / "far-stations.csv"
+    own.write_text(table)
+    far.write_text("scan_id,x,y,z\n" + "".join(f"{n},1000,1000,5\n" for n in range(1, 9)))  # in another place
+    (tmp_path / "stations.csv").write_text("name,x\nA,1\n")  # another table
+    said = inspected(scan)
+    (added,) = [command for command in said["commands"] if "survey add" in command]
+    assert f"--stations {own}" in added
+    assert "survey add scan-1 --tunnel scan" in added
+    assert any(doubt.startswith("positions-stations.csv has stations") for doubt in said["doubts"])
+    (tmp_path / "again-stations.csv").write_text(table)  # which of the two?
+    assert not any("-stations.csv" in command for command in inspected(scan)["commands"])
+
+
 def test_what_a_scan_holds(tls: Path) -> None:
     said = inspected(tls)
     (look,) = said["files"]

@@ -284,7 +284,7 @@ def test_a_newer_database_is_refused(conn: psycopg.Connection, dsn: str) -> None
 
 
 def test_a_database_without_postgis_or_schema_is_refused(empty_dsn: str) -> None:
-    with pytest.raises(UserError, match="no PostGIS"):
+    with pytest.raises(UserError, match="not set up for tunneldb yet: tunneldb init"):
         connect(empty_dsn)
     with open_connection(empty_dsn) as connection:
         connection.execute("CREATE EXTENSION postgis")

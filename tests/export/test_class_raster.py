@@ -148,3 +148,19 @@ def test_preview_paints_classes_and_names_those_there(tmp_path: Path) -> None:
     assert painted[PointClass.GROUND] == pytest.approx(46 * 2000, rel=0.03)
     # less than a legend's square of 15 × 15; letters are drawn in greys
     assert all(painted[klass] < 50 for klass in PointClass if klass not in (PointClass.LINING, PointClass.GROUND))
+
+
+@pytest.mark.parametrize(("begin", "end", "metres"), [(0.0, 61.3, 70), (43.0, 58.0, 20), (0.0, 100.0, 100), (10.0, 60.0, 50)])
+def test_a_preview_is_as_long_as_what_is_held(tmp_path: Path, begin: float, end: float, metres: int) -> None:
+    """From ten metres to ten metres; the title has its room beside."""
+    values = np.full((40, 1000), np.nan, np.float32)
+    values[:, round(begin / 0.1) : round(end / 0.1)] = PointClass.LINING
+    preview.draw(tmp_path / "a.png", "x", "class", [preview.Strip(1000.0, values)], Stationing(), 2.0, 0.1)
+    strip = np.asarray(Image.open(tmp_path / "a.png").convert("RGB"))
+    coloured = np.flatnonzero((strip == COLOURS[PointClass.LINING]).all(axis=2).sum(axis=0) > 20)
+    assert len(coloured) == pytest.approx(10 * (end - begin), abs=10)  # lines of the grid take a column each
+    assert strip.shape[1] - 10 * metres < 120
+    whole = np.full((40, 1000), PointClass.LINING, np.float32)
+    both = [preview.Strip(1000.0, whole), preview.Strip(1100.0, values)]
+    preview.draw(tmp_path / "b.png", "x", "class", both, Stationing(), 2.0, 0.1)
+    assert 1000 < Image.open(tmp_path / "b.png").width < 1120

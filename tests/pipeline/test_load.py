@@ -249,6 +249,23 @@ def test_a_table_of_points_is_the_same_survey(survey: psycopg.Connection, tmp_pa
     assert load(survey, [tmp_path / "a.txt"])[0].state == "replaced"
 
 
+def test_what_lies_outside_of_its_system_is_told_in_every_result(survey: psycopg.Connection, tmp_path: Path) -> None:
+    def told() -> list[str]:
+        found = survey.execute("SELECT remark FROM tunnel_api.remark WHERE stage = 'load' ORDER BY km").fetchall()
+        survey.commit()
+        return [remark for (remark,) in found if "outside the area" in remark]
+
+    path = write(tmp_path / "a.laz", tube(980, 1020, 100, seed=1))
+    load(survey, [path])
+    assert told() == []
+    survey.execute("UPDATE tunnel.tunnel SET srid = 3794, alignment = ST_SetSRID(alignment, 3794)")
+    survey.commit()
+    (loaded,) = load(survey, [write(path, tube(980, 1020, 100, seed=2))])
+    assert "outside the area" in str(loaded.note)
+    assert len(told()) == 2  # kilometres 0 and 1
+    assert "Slovenia" in told()[0]
+
+
 @pytest.fixture
 def cli(survey: psycopg.Connection, dsn: str) -> Callable[..., tuple[int, str, str]]:
     def run(*arguments: object) -> tuple[int, str, str]:

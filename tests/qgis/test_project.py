@@ -29,6 +29,7 @@ from tunneldb.classification.classes import PointClass
 from tunneldb.cli.main import main
 from tunneldb.export.images.palette import COLOURS, PALETTES, hexadecimal
 from tunneldb.export.qgis.layer import STRUCTURE_LAYERS
+from tunneldb.export.tables.leaks import clock_label
 
 ON_MAP = {
     "axis": "LineStringZ",
@@ -279,6 +280,35 @@ def test_a_sheet_lists_its_leaks_and_no_others(sheets: Path) -> None:
         assert listed == pytest.approx([m for m in middles if 0 <= m - 12300 - 50 * number < 50], abs=0.5)
         assert f"leaks {len(listed)}, " in page
         assert page.count("confirmed") == 1 + (2 if number == 2 else 0), "beside the legend"
+        assert page.count("Drop, dB") == 1, "no second table where the first has room"
+
+
+def test_the_sheet_writes_the_clock_as_the_list_of_leaks_does(rows: psycopg.Connection, sheets: Path) -> None:
+    stated = rows.execute("SELECT label, clock FROM tunnel_api.leak WHERE counted").fetchall()
+    assert len(stated) > 3
+    for label, clock in stated:
+        (page,) = [page for page in words(sheets) if label in page]
+        assert clock_label(clock) in page.split(label)[1][:16], label
+
+
+def test_a_leak_over_the_edge_of_a_sheet_is_in_both_tables(conn: psycopg.Connection, project: Path, tmp_path: Path) -> None:
+    """And one beside the edge in its own sheet's, and seen on no other: a sheet shows its own 50 m."""
+    crowd(conn, 2, 0.5, "No %s")  # from 12351.5 and 12352.0
+    for number, (start, end) in {1: (12349.9, 12350.2), 2: (12350.3, 12350.8)}.items():
+        conn.execute(
+            "UPDATE tunnel.anomaly SET chainage_from = %s, chainage_to = %s, unrolled = ST_MakeEnvelope(%s, 0, %s, 0.5)"
+            " WHERE remark = %s",
+            (start, end, start, end, f"No {number}"),
+        )
+    conn.commit()
+    act(project, "atlas", str(tmp_path / "edge.pdf"))
+    pages = words(tmp_path / "edge.pdf")
+    assert ["No 1" in page for page in pages] == [True, True, False, False]
+    assert ["No 2" in page for page in pages] == [False, True, False, False]
+    strip = re.search(r'<LayoutItem[^>]*id="strip".*?<Extent ([^>]*)/>', project.read_text("utf-8"), re.DOTALL)
+    assert strip is not None
+    sides = {side: float(value) for side, value in re.findall(r'(\w+)="([^"]*)"', strip[1])}
+    assert sides["xmax"] - sides["xmin"] == pytest.approx(50.0)
 
 
 def crowd(conn: psycopg.Connection, count: int, apart: float, remark: str) -> None:
@@ -300,6 +330,7 @@ def test_long_tables_go_on_on_another_page(conn: psycopg.Connection, project: Pa
     assert act(project, "atlas", str(tmp_path / "long.pdf"))["sheets"] == 4
     pages = words(tmp_path / "long.pdf")
     assert ["leaks continued" in page for page in pages] == [False, False, True, False, False]
+    assert [page.count("Drop, dB") for page in pages] == [1, 2, 2, 1, 1]
     remarks = [int(number) for page in pages for number in re.findall(r"\bNo (\d+)\b", page)]
     assert remarks == list(range(1, 61))
     assert "more leaks" not in "".join(pages)

@@ -13,7 +13,7 @@ from pyproj.exceptions import CRSError
 from tunneldb.alignment.joining import join_pieces
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.geometry.crs import describe_crs, same_horizontally
+from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, is_local
 
 CHORD_ERROR = 0.0005  # m, of arcs and splines
 LONGEST_STEP = 1.0  # m between vertices of a drawing with arcs: the spline through them shall keep straights straight
@@ -102,7 +102,7 @@ def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
     layer
         Which layer; needed where several hold lines.
     srid
-        EPSG code that its coordinates must be in; None: not checked.
+        EPSG code, or LOCAL, that its coordinates must be in; None: not checked.
 
     Raises
     ------
@@ -166,15 +166,18 @@ def _check_crs(path: Path, stated: str | None, srid: int | None) -> tuple[str, .
     if srid is None:
         return ()
     if stated is None:
-        return (f"names no coordinate system; its coordinates are taken to be EPSG:{srid}",)
+        return () if srid == LOCAL else (f"names no coordinate system; its coordinates are taken to be EPSG:{srid}",)
     try:
-        own, wanted = CRS.from_user_input(stated), CRS.from_epsg(srid)
+        own = CRS.from_user_input(stated)
+        fits, wanted = fits_srid(own, srid), describe_srid(srid)
     except CRSError as error:
         raise UserError(f"{path}: SRID {srid} or the file's coordinate system is not known: {error}") from None
-    if not same_horizontally(own, wanted):
+    if not fits:
+        there = "in the scan's own coordinates" if srid == LOCAL else f"in EPSG:{srid}"
+        mend = "--srid local" if is_local(own) else "the line's SRID"
         raise UserError(
-            f"{path}: its coordinate system is {describe_crs(own)}, the tunnel's is {describe_crs(wanted)}; save the line in "
-            f"EPSG:{srid} (in QGIS: Export, Save Features As), or add the tunnel with the line's SRID"
+            f"{path}: its coordinate system is {describe_crs(own)}, the tunnel's is {wanted}; save the line {there} (in QGIS: "
+            f"Export, Save Features As), or add the tunnel with {mend}"
         )
     return ()
 

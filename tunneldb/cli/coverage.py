@@ -8,6 +8,7 @@ import click
 from rich.console import Console
 
 from tunneldb.cli.output import tell
+from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.coverage import Coverage
 from tunneldb.store.remarks import Remark
 from tunneldb.store.survey import Survey
@@ -44,3 +45,12 @@ def say_coverage(coverage: Coverage, survey: Survey, *, on_stdout: bool = False)
             click.echo(coverage.statement)
     elif coverage.statement is not None:
         click.echo(coverage.statement, err=True)
+
+
+def say_no_crs(srid: int) -> None:
+    """Say on standard error what becomes of local coordinates in GeoJSON, which can't state that they are."""
+    if srid == LOCAL:
+        click.echo(
+            "GeoJSON can't say that coordinates are local: programs take them for longitude and latitude; a GeoPackage says it",
+            err=True,
+        )

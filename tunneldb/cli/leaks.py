@@ -11,7 +11,7 @@ import psycopg
 from psycopg import sql
 from rich.console import Console
 
-from tunneldb.cli.coverage import say_coverage, say_remarks
+from tunneldb.cli.coverage import say_coverage, say_no_crs, say_remarks
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import records, tell, verb
 from tunneldb.cli.stretch import parse_stretch, stretch_options
@@ -102,6 +102,11 @@ def leaks(
     date, or of whose lining less than half was seen; then what else is to be known: left out,
     interpolated, in doubt. The same is in every file; see tunnel_api.coverage_gap and tunnel_api.remark.
 
+    In the table arc is counted from the crown, to the right looking up-chainage. clock is where the middle lies: 12:00 is the
+    crown, 3:00 right. conf. is how sure detection is of its kind, 0 to 1. drop is how much darker than dry lining it is in the
+    mean, max at the most, and contrast the mean drop in standard deviations of the dry lining about it. image is the share of
+    its area on which the image holds measurements.
+
     With --by-km a line for each kilometre, and one for all: wet area and number of leaks, the most in any 100 m² of lining, and
     the best class of GB 50108-2008 that the lining seen keeps, as far as a scan can tell. Any other stretch, and what breaks a
     class: SELECT * FROM tunnel_api.waterproof_class(survey, from, to).
@@ -142,6 +147,8 @@ def leaks(
                 _write_file(listed, form, chosen, found, output)
                 say_coverage(coverage, found)
                 click.echo(f"{listed.total} to {output}", err=True)
+            if form == "geojson" and chosen != "unrolled":
+                say_no_crs(found.srid)
             tell(survey=survey, kind=listed.kind, count=listed.count, area=listed.area, listed=len(listed.rows))
     if not coverage.complete:
         context.exit(1)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
+from tunneldb.cli.coverage import say_no_crs
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.tables import print_table
@@ -85,6 +86,8 @@ def spots(
         listed = read_spots(conn, found, chosen, SpotSelection(cast(Kind, kind), min_area, min_confidence))
     tell(survey=survey, statement=listed.statement, count=listed.count, area=listed.area, face_area=listed.face_area)
     tell(seen_area=listed.seen_area, geometry=geometry, spots=listed.rows, file=output)
+    if form == "geojson" and chosen != "face":
+        say_no_crs(found.srid)
     if listed.statement:
         click.echo(f"survey {survey}: {listed.statement}", err=form != "table")
     if form == "table":

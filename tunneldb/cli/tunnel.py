@@ -23,6 +23,26 @@ AUTO = "auto"
 """Stands for a file of the axis that is to be found in the scan."""
 
 
+class Srid(click.ParamType[int]):
+    """An EPSG number, or the word for local coordinates."""
+
+    name = "EPSG|local"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Return the number, LOCAL for ``local``."""
+        from tunneldb.geometry.crs import LOCAL
+
+        if value == "local":
+            return LOCAL
+        try:
+            number = int(value)
+        except ValueError:
+            raise UserError(f"--srid {value!r} is neither an EPSG number, such as 25830, nor local") from None
+        if number == LOCAL:  # PostGIS's number for it would be typed by mistake
+            raise UserError(f"PostGIS does not know SRID {number}; use an EPSG number, such as 25830, or local")
+        return number
+
+
 @click.group(cls=VerbGroup)
 def tunnel() -> None:
     """Add, list or remove tunnels, and give them a stationing."""
@@ -35,11 +55,17 @@ def tunnel() -> None:
         "tunneldb tunnel add ringo --srid 3794 --axis drawn.gpkg --axis-layer axis --reverse ringo.laz",
         "tunneldb tunnel add ringo --srid 3794 --axis ringo.xml --alignment Mainline",
         "tunneldb tunnel add hall --srid 25829 --site",
+        "tunneldb tunnel add adit --srid local --axis auto adit.laz",
     ]
 )
 @click.argument("name")
 @click.argument("scans", metavar="[SCAN...]", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--srid", type=int, required=True, help="Spatial reference of all coordinates; projected, metres.")
+@click.option(
+    "--srid",
+    type=Srid(),
+    required=True,
+    help="Spatial reference of all coordinates, an EPSG number: projected, metres; or local: metres of no place on Earth.",
+)
 @click.option(
     "--axis",
     metavar="FILE|auto",
@@ -111,6 +137,7 @@ def add(
     """
     from tunneldb.alignment.drawing import describe_line
     from tunneldb.alignment.given import read_given
+    from tunneldb.geometry.crs import outside_area
     from tunneldb.pipeline.axis_search import complete, found_given
     from tunneldb.store.alignment import read_equations, save_equations
     from tunneldb.store.catalog import add_tunnel, get_tunnel, require_new_tunnel
@@ -140,7 +167,7 @@ def add(
             if not scans:
                 raise UserError(
                     f"{axis}: its line has no heights; give the scan files too, which have them: "
-                    f"tunneldb tunnel add {name} --srid {srid} --axis {axis} SCAN..."
+                    f"tunneldb tunnel add {name} --srid {srid or 'local'} --axis {axis} SCAN..."
                 )
             with told_to_end(), bar("points") as progress:
                 given, found = complete(given, scans, srid, step(progress))
@@ -152,6 +179,8 @@ def add(
             save_equations(connection, get_tunnel(connection, name), own)
         if found is not None:
             _keep(found, axis_out or Path(f"{name}.found-axis.csv"), None, line.start, name)
+    place = outside_area(srid, given.xyz[:, :2])
+    notes = (*given.notes, place) if place else given.notes
     tell(
         tunnel=name,
         srid=srid,
@@ -160,7 +189,7 @@ def add(
         source=given.source,
         begins_at=given.xyz[0].tolist(),
         ends_at=given.xyz[-1].tolist(),
-        notes=given.notes,
+        notes=notes,
     )
     click.echo(f"{name}: {line.end - line.start:.3f} m of axis, chainage {line.start:.3f} to {line.end:.3f} m", err=True)
     turn = "" if given.design is not None else "; --reverse turns it round"
@@ -169,7 +198,7 @@ def add(
         plan, profiles = len(given.design.plan), len(given.design.profile)
         tell(plan_elements=plan, profile_elements=profiles)
         click.echo(f"{given.source}: {plan} elements in plan, {profiles} in profile", err=True)
-    for note in given.notes:
+    for note in notes:
         click.echo(f"{axis}: {note}", err=True)
 
 
@@ -185,10 +214,16 @@ def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None
     click.echo(f"{name}: a site, without an axis", err=True)
 
 
-@tunnel.command("find-axis", examples=["tunneldb tunnel find-axis ringo.laz -o ringo.axis.csv"])
+@tunnel.command(
+    "find-axis",
+    examples=["tunneldb tunnel find-axis ringo.laz", "tunneldb tunnel find-axis ringo-1.laz ringo-2.laz -o ringo.axis.csv"],
+)
 @click.argument("scans", metavar="SCAN...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
-    "-o", "--output", required=True, type=click.Path(dir_okay=False, path_type=Path), help="Axis to write, .csv with x,y,z."
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Axis to write, .csv with x,y,z. [default: NAME.found-axis.csv, NAME being what the SCAN files are called]",
 )
 @click.option(
     "--picture",
@@ -197,7 +232,7 @@ def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None
     help="Picture to write, .png. [default: beside the axis, of its name]",
 )
 @click.option("--reverse", is_flag=True, help="Let chainage grow the other way.")
-def find_axis(scans: tuple[Path, ...], output: Path, picture: Path | None, reverse: bool) -> None:
+def find_axis(scans: tuple[Path, ...], output: Path | None, picture: Path | None, reverse: bool) -> None:
     """Find the axis of the tunnel in SCAN files; needs no database.
 
     It needs a roof, two walls and a floor along most of one tunnel, and nothing else: straight or curved, rising or falling,
@@ -205,11 +240,13 @@ def find_axis(scans: tuple[Path, ...], output: Path, picture: Path | None, rever
     shows the line over the points in plan and profile: look at it, then tunneldb tunnel add --axis.
     """
     from tunneldb.alignment.drawing import describe_line
+    from tunneldb.files import common_name
     from tunneldb.pipeline.axis_search import found_given
 
+    name = common_name(scans)
     with told_to_end(), bar("points") as progress:
         _, found = found_given(scans, None, step(progress), None, reverse)
-    _keep(found, output, picture, 0.0, scans[0].stem)
+    _keep(found, output or Path(f"{name}.found-axis.csv"), picture, 0.0, name)
     click.echo(f"chainage grows over {describe_line(found.xyz)}; --reverse turns it round", err=True)
 
 
@@ -274,6 +311,8 @@ def stationing(settings: Settings, name: str, file: Path | None, show: bool, cle
 @click.pass_obj
 def list_(settings: Settings) -> None:
     """List the tunnels."""
+    from tunneldb.geometry.crs import LOCAL
+
     with connect(settings.dsn) as connection:
         rows = connection.execute(
             """
@@ -284,7 +323,8 @@ def list_(settings: Settings) -> None:
             """
         ).fetchall()
     tell(tunnels=records(("name", "srid", "label_from", "length", "spacing", "surveys"), rows))
-    print_table(["tunnel", "SRID", "starts at", "length m", "spacing m", "surveys"], rows, right=(1, 2, 3, 4, 5))
+    shown = [(name, "local" if srid == LOCAL else srid, *others) for name, srid, *others in rows]
+    print_table(["tunnel", "SRID", "starts at", "length m", "spacing m", "surveys"], shown, right=(1, 2, 3, 4, 5))
 
 
 @tunnel.command(examples=["tunneldb tunnel remove ringo"])

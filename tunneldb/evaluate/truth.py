@@ -19,6 +19,7 @@ from pyproj.exceptions import CRSError
 from shapely.geometry import MultiPolygon, Polygon
 
 from tunneldb.errors import UserError
+from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.survey import Survey
 
 LAYER = "leak"
@@ -133,13 +134,12 @@ def _in_space(path: Path, given: str | None, survey: Survey, where: str) -> bool
     if crs is not None and crs.is_engineering:
         return False
     flat = crs.sub_crs_list[0] if crs is not None and crs.is_compound else crs
-    if flat is not None and flat.equals(pyproj.CRS.from_epsg(survey.srid), ignore_axis_order=True):
+    local = survey.srid == LOCAL
+    if flat is not None and not local and flat.equals(pyproj.CRS.from_epsg(survey.srid), ignore_axis_order=True):
         return True
     name = crs.name if crs is not None else given
-    raise UserError(
-        f"{where} is in {name}: polygons must be in the unrolled plane, without a coordinate system,"
-        f" or 3D in the tunnel's, EPSG:{survey.srid}"
-    )
+    space = "" if local else f", or 3D in the tunnel's, EPSG:{survey.srid}"
+    raise UserError(f"{where} is in {name}: polygons must be in the unrolled plane, without a coordinate system{space}")
 
 
 def _bare_geojson(path: Path) -> bool:

@@ -10,8 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
+from tunneldb.errors import UserError
+from tunneldb.files import common_name
+from tunneldb.geometry.crs import outside_area
 from tunneldb.pipeline.inspection import FileLook, IntensityLook
+from tunneldb.pointcloud.stations import read_stations
 from tunneldb.radiometry.intensity_kind import KindGuess
+from tunneldb.store.scanner import FARTHEST_SCANNER
 
 FAR_APART = 0.1
 """Profiles farther apart than this leave room for leaks that are worth a report, m."""
@@ -20,7 +25,6 @@ _MOST_FILES = 5  # named one by one
 _PREFERRED = ("reflectance", "amplitude", "linear")
 _INTENSITY = re.compile("intens|ampl|reflect|refl")
 _SAME_PLACE = 0.001  # m
-_PLAIN = re.compile(r"[^A-Za-z0-9_]+")
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,7 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         )
         metric = [_quoted(path.with_name(f"TRANSFORMED-{path.name}")) for path in foreign]
         return FirstSteps(missing, doubts, [f"tunneldb inspect {' '.join(metric)}"])
-    name, files = _name(looks), _files(looks)
+    name, files = common_name([look.path for look in looks]), _files(looks)
     srid = _srid(looks, missing, doubts)
     axis = _beside(looks, "axis.csv")
     if axis is not None:
@@ -125,19 +129,11 @@ def _files(looks: Sequence[FileLook]) -> str:
     return " ".join(_quoted(look.path) for look in looks)
 
 
-def _name(looks: Sequence[FileLook]) -> str:
-    """What the names of the files begin with, without numbers that tell them apart."""
-    stems = [look.path.name.split(".", 1)[0] for look in looks]
-    same = [len(set(letters)) == 1 for letters in zip(*stems, strict=False)]
-    common = stems[0][: same.index(False) if False in same else len(same)]
-    return _PLAIN.sub("-", common).strip("-_0123456789" if len(stems) > 1 else "-_") or "tunnel"
-
-
 def _survey(looks: Sequence[FileLook], name: str, missing: list[str]) -> tuple[str, str]:
     dates = [look.date for look in looks if look.date is not None]
     if not dates:
         missing.append("the day of the scan, in place of YYYY-MM-DD")
-        return f"{name}-scan", "YYYY-MM-DD"
+        return f"{name}-1" if name.lower().endswith("scan") else f"{name}-scan", "YYYY-MM-DD"
     return f"{name}-{min(dates).year}", min(dates).isoformat()
 
 
@@ -148,9 +144,17 @@ def _srid(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> s
     codes = [code for code in named.values() if code is not None]
     doubts += [f"{look.path.name}: its coordinate system can't be read: {look.unread_crs}" for look in looks if look.unread_crs]
     if codes:
+        doubts += [
+            f"{look.path.name}: {place}"
+            for look in looks
+            if (place := outside_area(look.srid, np.array([look.low[:2], look.high[:2]])))
+        ]
         return str(codes[0])
     why = f"that of {next(iter(named))} has no EPSG code" if named else "no file states one"
-    missing.append(f"the coordinate system, as EPSG code in place of SRID: {why}; it must be projected and in metres")
+    missing.append(
+        f"the coordinate system, as EPSG code in place of SRID: {why}; it must be projected and in metres; or local, if the "
+        "coordinates are the site's own, in metres"
+    )
     return "SRID"
 
 
@@ -175,6 +179,12 @@ def _poses(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> 
         return f"--trajectory {_quoted(trajectory)}"
     if stations is not None:
         return f"--stations {_quoted(stations)}"
+    other = _stations_in_folder(looks)
+    if other is not None:
+        doubts.append(
+            f"{other.name} has stations of the files' scan_id, near their points, and another name: are they of this scan?"
+        )
+        return f"--stations {_quoted(other)}"
     scans = sorted({scan for look in looks for scan in look.scans})
     times = [time for look in looks if look.times for time in look.times]
     if times and len(scans) < 3:
@@ -191,6 +201,24 @@ def _poses(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> 
             "--stations, with intensity of kind reflectance or none"
         )
     return "--stations STATIONS.csv"
+
+
+def _stations_in_folder(looks: Sequence[FileLook]) -> Path | None:
+    """The one table in the files' folders that is called stations and has one, near the points, for each scan; else None."""
+    scans = {scan for look in looks for scan in look.scans}
+    low = np.min([look.low for look in looks], axis=0) - FARTHEST_SCANNER
+    high = np.max([look.high for look in looks], axis=0) + FARTHEST_SCANNER
+    found = []
+    for path in sorted({path for look in looks for path in look.path.parent.glob("*stations*.csv")}):
+        try:
+            stations = read_stations([path])
+        except UserError:  # another table
+            continue
+        own = np.isin(stations.scan_id, sorted(scans))
+        near = np.all((stations.xyz >= low) & (stations.xyz <= high), axis=1)
+        if scans <= set(stations.scan_id.tolist()) and near[own].all():
+            found.append(path)
+    return found[0] if len(found) == 1 else None
 
 
 def _doubt_positions(posed: Sequence[FileLook], doubts: list[str]) -> None:

@@ -15,6 +15,7 @@ from psycopg.types.json import Jsonb
 
 from tunneldb.arrays import Float
 from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.crs import outside_area
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import parameters_of, require_same_density, settings_of
 from tunneldb.pipeline.read import Begin, Counts, Reading, read_headers, silent
@@ -150,17 +151,19 @@ def merge(
     if tubes.any:
         points = int(beside.sum()) + int(note.get("second_tube", 0))
         note = {"second_tube": points, "note": tubes.note(points)}
+    if place := outside_area(survey.srid, alignment.vertices[:, :2]):
+        note = {**note, "place": place}
     return Merged(km, len(waiting), int(written.sum()), changes, note)
 
 
 def _told(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Counts:
-    """What the ledger has of a second tube that was left out of a kilometre when it was loaded last."""
+    """What the ledger has of a second tube that was left out of a kilometre when it was loaded last, and of its place."""
     row = conn.execute(
         "SELECT counts FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage = 'load' AND outcome = 'done'"
         " ORDER BY started_at DESC, id DESC LIMIT 1",
         [survey.id, km],
     ).fetchone()
-    return {} if row is None else {name: row[0][name] for name in ("second_tube", "note") if name in row[0]}
+    return {} if row is None else {name: row[0][name] for name in ("second_tube", "note", "place") if name in row[0]}
 
 
 def finish(conn: psycopg.Connection[Any], survey: Survey, merged: Sequence[Merged]) -> None:
@@ -219,13 +222,14 @@ def load_files(
     headers = read_headers(paths)
     for header in headers:
         reading.check(header)
-    notes = {header.path.name: crs_note(header, survey.srid) for header in headers}
+    place = outside_area(survey.srid, reading.alignment.vertices[:, :2])
+    notes = {header.path.name: "; ".join(filter(None, (crs_note(header, survey.srid), place))) for header in headers}
     for batch in _batches(headers, reading.alignment, settings.max_distance):
         recorded = recorded_files(conn, survey)
         there = {header.path: unchanged(conn, header.path, recorded.get(header.path.name)) for header in batch}
         _withdraw(conn, survey, [path.name for path, loaded in there.items() if loaded is not None])
         conn.commit()
-        yield from (replace(loaded, note=notes[loaded.name]) for loaded in there.values() if loaded is not None)
+        yield from (replace(loaded, note=notes[loaded.name] or None) for loaded in there.values() if loaded is not None)
         changed = [header for header in batch if there[header.path] is None]
         if changed:
             for loaded in _load_batch(reading, changed, paths, begin):

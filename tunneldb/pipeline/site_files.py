@@ -13,6 +13,7 @@ import numpy as np
 import psycopg
 
 from tunneldb.errors import UserError
+from tunneldb.geometry.crs import outside_area
 from tunneldb.pipeline.read import Begin, read_headers, require_kind, silent
 from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.points import Points
@@ -65,7 +66,8 @@ def register_files(
     for header in headers:
         check_header(header, survey.intensity_dimension, survey.srid, needs_time=poses.mobile)
     for header in headers:
-        note = crs_note(header, survey.srid)
+        corners = np.array([header.low[:2], header.high[:2]])
+        note = "; ".join(filter(None, (crs_note(header, survey.srid), outside_area(survey.srid, corners)))) or None
         recorded = recorded_files(conn, survey).get(header.path.name)
         there = unchanged(conn, header.path, recorded)
         conn.commit()

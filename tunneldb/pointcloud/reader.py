@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from pyproj import CRS
 
 from tunneldb.errors import UserError
-from tunneldb.geometry.crs import describe_crs, horizontal, same_horizontally
+from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, horizontal, is_local, srid_name
 from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.formats.table import format_of, require_known
@@ -55,7 +54,7 @@ def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_tim
     dimension : str or None
         The survey's intensity dimension.
     srid : int
-        EPSG code of the tunnel.
+        EPSG code of the tunnel, or LOCAL.
     needs_time : bool
         Whether scanner positions come from a trajectory, by ``gps_time``.
 
@@ -66,19 +65,23 @@ def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_tim
     """
     require_dimension(header.path, dimension, header.dimensions, "the survey's intensity")
     require_dimension(header.path, "gps_time" if needs_time else None, header.dimensions, "the trajectory")
-    if header.crs is not None and not same_horizontally(header.crs, CRS.from_epsg(srid)):
+    if header.crs is not None and not fits_srid(header.crs, srid):
+        mend = "with --srid local" if is_local(header.crs) else "with the file's SRID"
         raise UserError(
-            f"{header.path}: its coordinate system is {describe_crs(header.crs)}, the tunnel's is "
-            f"{describe_crs(CRS.from_epsg(srid))}; transform the file or add the tunnel with the file's SRID"
+            f"{header.path}: its coordinate system is {describe_crs(header.crs)}, the tunnel's is {describe_srid(srid)}; "
+            f"transform the file or add the tunnel {mend}"
         )
 
 
 def crs_note(header: ScanHeader, srid: int) -> str | None:
-    """Say that a file's coordinates are taken to be the tunnel's (EPSG code) without its saying so; None if it does."""
-    if header.crs is not None:
+    """Say that a file's coordinates are taken to be the tunnel's (EPSG code, LOCAL) without its saying so; None if it does.
+
+    Of local coordinates a file that states no system says enough.
+    """
+    if header.crs is not None or (srid == LOCAL and not header.unread_crs):
         return None
     said = f"a coordinate system that can't be read ({header.unread_crs})" if header.unread_crs else "no coordinate system"
-    return f"states {said}: taken to be in the tunnel's, EPSG:{srid}"
+    return f"states {said}: taken to be in the tunnel's, {srid_name(srid)}"
 
 
 def read_chunks(path: Path, dimension: str | None, size: int = CHUNK, ranges: Ranges | None = None) -> Iterator[Points]:

@@ -15,6 +15,7 @@ from markupsafe import Markup
 from tunneldb import __version__
 from tunneldb.database import snapshot
 from tunneldb.errors import UserError
+from tunneldb.export.tables.leaks import clock_label
 from tunneldb.report import data, text
 from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, without_detection
 from tunneldb.report.lining import Form
@@ -270,11 +271,11 @@ class _Report:
         rows = [
             [
                 leak.id, round(leak.middle, 3), leak.label, round(leak.chainage_to - leak.chainage_from, 2),
-                round(leak.arc_from, 2), round(leak.arc_to, 2), round(leak.clock, 3), round(leak.area, 3),
-                round(leak.inside, 3), round(leak.drop_mean, 1), round(leak.drop_max, 1), text.rounded(leak.contrast, 1),
-                text.rounded(leak.confidence, 2), round(leak.image_share, 2), leak.review, leak.reviewed_by or "",
-                text.when(leak.reviewed_at) if leak.reviewed_at else "", leak.remark or "", int(leak.detected),
-                self.strips.of(leak),
+                round(leak.arc_from, 2), round(leak.arc_to, 2), round(leak.clock, 3), clock_label(leak.clock),
+                round(leak.area, 3), round(leak.inside, 3), round(leak.drop_mean, 1), round(leak.drop_max, 1),
+                text.rounded(leak.contrast, 1), text.rounded(leak.confidence, 2), round(leak.image_share, 2), leak.review,
+                leak.reviewed_by or "", text.when(leak.reviewed_at) if leak.reviewed_at else "",
+                leak.remark or "", int(leak.detected), self.strips.of(leak),
             ]
             for leak in self.leaks
         ]  # fmt: skip
@@ -295,6 +296,7 @@ TABLE = [
         "arcFrom",
         "arcTo",
         "clock",
+        "clockLabel",
         "area",
         "inside",
         "drop",

@@ -17,6 +17,7 @@ import shapely
 from tunneldb.alignment.given import GivenAxis
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.crs import LOCAL, LOCAL_NAME
 from tunneldb.store.alignment import save_design
 from tunneldb.store.scanner import (
     Positions,
@@ -111,9 +112,11 @@ def _require_name(name: str) -> None:
 
 
 def _require_metres(connection: psycopg.Connection[Any], srid: int) -> None:
+    if srid == LOCAL:
+        return
     row = connection.execute("SELECT srtext FROM spatial_ref_sys WHERE srid = %s", [srid]).fetchone()
     if row is None:
-        raise UserError(f"PostGIS does not know SRID {srid}; use an EPSG number, such as 25830")
+        raise UserError(f"PostGIS does not know SRID {srid}; use an EPSG number, such as 25830, or local")
     crs = pyproj.CRS.from_wkt(row[0])
     if not crs.is_projected:
         raise UserError(f"SRID {srid} ({crs.name}) is not projected; lengths and chainage need one in metres")
@@ -333,13 +336,15 @@ def remove_tunnel(connection: psycopg.Connection[Any], name: str) -> None:
 
 
 def crs_text(conn: psycopg.Connection[Any], srid: int) -> str:
-    """A coordinate system of the database as other programs know it: AUTHORITY:CODE, or its definition.
+    """A coordinate system of the database as other programs know it: AUTHORITY:CODE, its definition, or that it is local.
 
     Raises
     ------
     UserError
         The SRID isn't in ``spatial_ref_sys``.
     """
+    if srid == LOCAL:
+        return LOCAL_NAME
     row = conn.execute("SELECT auth_name, auth_srid, srtext FROM spatial_ref_sys WHERE srid = %s", [srid]).fetchone()
     if row is None:
         raise UserError(f"SRID {srid} is not in the database's spatial_ref_sys; add its definition there")

@@ -19,6 +19,7 @@ from tunneldb.export.exchange.table import Column, Table, read_table
 from tunneldb.export.qgis.layer import LAYERS, VectorLayer
 from tunneldb.export.qgis.styles import STYLE_NAME, style_text
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN, write_remarks
+from tunneldb.geometry.crs import LOCAL
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.alignment import labels
 from tunneldb.store.catalog import crs_text
@@ -68,9 +69,9 @@ def write_survey_gpkg(
 ) -> dict[str, int]:
     """Write a stretch of a survey as a GeoPackage, and return the number of rows of each layer.
 
-    Layers on the map and in space are in the tunnel's SRID; those of the unrolled plane (chainage, arc; m) in an undefined
-    Cartesian system. QGIS finds the styles in the table ``layer_styles``. What is to be known of the results is in the table
-    ``remark``.
+    Layers on the map and in space are in the tunnel's SRID; those of the unrolled plane (chainage, arc; m), and of local
+    coordinates, in an undefined Cartesian system. QGIS finds the styles in the table ``layer_styles``. What is to be known of
+    the results is in the table ``remark``.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def write_survey_gpkg(
     UserError
         The tunnel's coordinate system isn't known.
     """
-    crs = crs_text(conn, survey.srid)
+    crs = None if survey.srid == LOCAL else crs_text(conn, survey.srid)
     ends = survey_ends(conn, survey) or (low, high)
     inside = max(low, ends[0]), min(high, ends[1])
     counts: dict[str, int] = {}
@@ -121,7 +122,7 @@ def write_survey_gpkg(
 
 def _write(path: Path, name: str, table: Table, wkb: str, crs: str | None) -> None:
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "'crs' was not provided")  # the unrolled plane has none
+        warnings.filterwarnings("ignore", "'crs' was not provided")  # the unrolled plane has none, nor have local coordinates
         pyogrio.raw.write(
             str(path),
             table.geometry,

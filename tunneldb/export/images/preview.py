@@ -1,4 +1,4 @@
-"""PNG previews of a kilometre's image: one strip a hectometre, with a grid, ticks and a scale.
+"""PNG previews of a kilometre's image: one strip a hectometre, or what is held of it, with a grid, ticks and a scale.
 
 Gaps between profiles are filled in it, see :mod:`tunneldb.raster.gap_fill`.
 """
@@ -6,7 +6,7 @@ Gaps between profiles are filled in it, see :mod:`tunneldb.raster.gap_fill`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,14 +28,15 @@ PIXEL = 0.05
 OFFSET_SPANS = (0.02, 0.05, 0.1, 0.2, 0.5)
 """Offsets beyond one of these are shown in the full colour, m: the first that nine tenths of the image stay within."""
 
-_MARGIN, _HEAD, _GAP = 64, 40, 26
+_MARGIN, _HEAD, _GAP = 84, 40, 26
+_TICK = 10  # of chainage, m
 _BACK, _INK, _GRID, _EMPTY, _LEAK = (255, 255, 255), (40, 40, 40), (150, 170, 200), (226, 229, 233), (0, 200, 255)
 _BLUE, _WHITE, _RED = np.array([33, 102, 172.0]), np.array([247, 247, 247.0]), np.array([178, 24, 43.0])
 
 
 @dataclass(frozen=True)
 class Strip:
-    """A hectometre of an image at the preview's pixel.
+    """A hectometre of an image, or a part of one, at the preview's pixel.
 
     Attributes
     ----------
@@ -110,7 +111,8 @@ def draw(
     strips : sequence of Strip
         In order of chainage.
     stationing : Stationing
-        What is written at their ticks, which stand every 10 m of chainage.
+        What is written at their ticks, which stand every 10 m of chainage. What none of the strips holds before the first
+        tick or behind the last is left out.
     top : float
         Arc of the upper edge, m.
     pixel : float
@@ -118,32 +120,62 @@ def draw(
     leaks : sequence of Polygon
         Outlines to draw, (chainage, arc), m.
     """
-    width, height = round(STRIP / pixel), max(s.values.shape[0] for s in strips)
-    sheet = Image.new("RGB", (width + _MARGIN + 20, _HEAD + len(strips) * (height + _GAP) + 10), _BACK)
-    pen = ImageDraw.Draw(sheet)
+    strips = _held(strips, pixel)
+    height, width = (max(s.values.shape[side] for s in strips) for side in (0, 1))
     low, high = _span(kind, strips)
     large, small = ImageFont.load_default(18), ImageFont.load_default(13)
-    if kind in PALETTES:
-        pen.text((_MARGIN, 8), f"{title}:", _INK, large)
-        _legend(pen, _MARGIN + int(pen.textlength(f"{title}:  ", large)), kind, strips, large)
-    else:
-        scale = (
-            f"blue {low:+.2f} m (outside) to red {high:+.2f} m (inside)"
-            if kind == "offset"
-            else f"black {low:.2f} dB to white {high:.2f} dB"
-        )
-        pen.text((_MARGIN, 8), f"{title}:  {scale}", _INK, large)
+    head = _head(ImageDraw.Draw(Image.new("RGB", (1, 1))), title, kind, strips, (low, high), large)
+    sheet = Image.new("RGB", (max(width + _MARGIN, head) + 20, _HEAD + len(strips) * (height + _GAP) + 10), _BACK)
+    pen = ImageDraw.Draw(sheet)
+    _head(pen, title, kind, strips, (low, high), large)
     for number, strip in enumerate(strips):
         y = _HEAD + number * (height + _GAP)
         colours = _colours(kind, _filled(kind, strip.values, FILL / pixel), low, high)
         sheet.paste(Image.fromarray(colours), (_MARGIN, y))
         _ticks(pen, strip, stationing, (_MARGIN, y), (width, height), top, pixel, small)
         for leak in leaks:
-            if leak.bounds[0] < strip.start + STRIP and leak.bounds[2] > strip.start:
+            if leak.bounds[0] < strip.start + width * pixel and leak.bounds[2] > strip.start:
                 for ring in (leak.exterior, *leak.interiors):
                     line = [(_MARGIN + (c - strip.start) / pixel, y + (top - a) / pixel) for c, a in ring.coords]
                     pen.line(_clip(line, _MARGIN, _MARGIN + width), _LEAK, 2)
     sheet.save(path, "PNG")
+
+
+def _held(strips: Sequence[Strip], pixel: float) -> list[Strip]:
+    """The strips from the first tick before what any of them holds to the last behind it."""
+    there = np.zeros(max(s.values.shape[1] for s in strips), dtype=bool)
+    for strip in strips:
+        there[: strip.values.shape[1]] |= np.isfinite(strip.values).any(axis=0)
+    at = np.flatnonzero(there)
+    if len(at) == 0:
+        return list(strips)
+    # An edge may stand in the middle of a pixel.
+    first = int((at[0] + 0.5) * pixel / _TICK) * _TICK
+    last = int(np.ceil((at[-1] + 0.5) * pixel / _TICK)) * _TICK
+    columns = slice(round(first / pixel), round(last / pixel))
+    return [replace(strip, start=strip.start + first, values=strip.values[:, columns]) for strip in strips]
+
+
+def _head(
+    pen: ImageDraw.ImageDraw,
+    title: str,
+    kind: str,
+    strips: Sequence[Strip],
+    span: tuple[float, float],
+    font: ImageFont.ImageFont | ImageFont.FreeTypeFont,
+) -> int:
+    """Write the title, and what colours mean; returns where it ends, pixels."""
+    if kind in PALETTES:
+        pen.text((_MARGIN, 8), f"{title}:", _INK, font)
+        return _legend(pen, _MARGIN + int(pen.textlength(f"{title}:  ", font)), kind, strips, font)
+    low, high = span
+    scale = (
+        f"blue {low:+.2f} m (outside) to red {high:+.2f} m (inside)"
+        if kind == "offset"
+        else f"black {low:.2f} dB to white {high:.2f} dB"
+    )
+    pen.text((_MARGIN, 8), f"{title}:  {scale}", _INK, font)
+    return _MARGIN + int(pen.textlength(f"{title}:  {scale}", font))
 
 
 def _clip(line: list[tuple[float, float]], left: float, right: float) -> list[tuple[float, float]]:
@@ -156,14 +188,15 @@ def _legend(
     kind: str,
     strips: Sequence[Strip],
     font: ImageFont.ImageFont | ImageFont.FreeTypeFont,
-) -> None:
-    """Colour and name of each code that is there."""
+) -> int:
+    """Colour and name of each code that is there; returns where they end, pixels."""
     there = np.unique(np.concatenate([np.nan_to_num(s.values) for s in strips]))
     for code, (name, colour) in PALETTES[kind].entries.items():
         if code in there:
             pen.rectangle([(x, 11), (x + 14, 25)], colour, _INK)
             pen.text((x + 20, 8), name, _INK, font)
             x += 40 + int(pen.textlength(name, font))
+    return x
 
 
 def _span(kind: str, strips: Sequence[Strip]) -> tuple[float, float]:
@@ -205,15 +238,16 @@ def _ticks(
     pixel: float,
     font: ImageFont.ImageFont | ImageFont.FreeTypeFont,
 ) -> None:
-    """Grid every 10 m along the tunnel and every 5 m across, with labels."""
+    """Grid every 10 m along the tunnel and every 5 m across, with labels; right and left are those looking up-chainage."""
     (x0, y0), (width, height) = corner, size
-    for metre in range(0, round(STRIP) + 1, 10):
+    length = round(width * pixel)
+    for metre in range(0, length + 1, _TICK):
         x = x0 + round(metre / pixel)
         pen.line([(x, y0), (x, y0 + height)], _GRID, 1)
-        if metre < STRIP:
+        if metre < length:
             pen.text((x + 2, y0 + height + 4), stationing.label(strip.start + metre, 0), _INK, font)
     bottom = top - height * pixel
     for arc in range(int(np.ceil(bottom / 5)) * 5, int(np.floor(top)) + 1, 5):
         y = y0 + round((top - arc) / pixel)
         pen.line([(x0, y), (x0 + width, y)], _GRID, 1)
-        pen.text((6, y - 8), f"{arc:+d} m" if arc else "crown", _INK, font)
+        pen.text((6, y - 8), f"{'right' if arc > 0 else 'left'} {abs(arc)} m" if arc else "crown", _INK, font)

@@ -9,16 +9,19 @@ import pyproj
 from pyproj.exceptions import CRSError
 
 from tunneldb.errors import UserError
+from tunneldb.geometry.crs import LOCAL
 
 
 def crs_element(conn: psycopg.Connection, srid: int) -> ET.Element:
-    """Return the element ``spatialrefsys`` of an SRID of the database.
+    """Return the element ``spatialrefsys`` of an SRID of the database; of local coordinates it is that of no system.
 
     Raises
     ------
     UserError
         The SRID isn't in ``spatial_ref_sys``, or its definition can't be understood.
     """
+    if srid == LOCAL:
+        return no_crs()
     row = conn.execute("SELECT auth_name, auth_srid, srtext FROM spatial_ref_sys WHERE srid = %s", (srid,)).fetchone()
     if row is None:
         raise UserError(f"SRID {srid} is not in the database's spatial_ref_sys; add its definition there")
@@ -45,5 +48,5 @@ def crs_element(conn: psycopg.Connection, srid: int) -> ET.Element:
 
 
 def no_crs() -> ET.Element:
-    """Return the element ``spatialrefsys`` of the unrolled plane, which has no coordinate reference system."""
+    """Return the element ``spatialrefsys`` of what has no coordinate reference system, such as the unrolled plane."""
     return ET.Element("spatialrefsys")

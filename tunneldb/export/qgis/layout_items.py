@@ -72,6 +72,20 @@ def label(
     return element
 
 
+def unless(condition: str) -> ET.Element:
+    """Return what keeps an item from being printed where the expression is true."""
+    element = ET.Element("LayoutObject")
+    options = ET.SubElement(ET.SubElement(element, "dataDefinedProperties"), "Option", type="Map")
+    ET.SubElement(options, "Option", type="QString", name="name", value="")
+    properties = ET.SubElement(options, "Option", type="Map", name="properties")
+    one = ET.SubElement(properties, "Option", type="Map", name="dataDefinedExcludeExports")
+    ET.SubElement(one, "Option", type="bool", name="active", value="true")
+    ET.SubElement(one, "Option", type="QString", name="expression", value=condition)
+    ET.SubElement(one, "Option", type="int", name="type", value="3")
+    ET.SubElement(options, "Option", type="QString", name="type", value="collection")
+    return element
+
+
 def table(
     layout: str,
     frames: Sequence[ET.Element],

@@ -184,7 +184,11 @@ def _project(
     said += [read_spots(conn, survey).statement] if structures else []
     said += [remark.said for remark in read_remarks(conn, survey)]
     ET.SubElement(metadata, "abstract").text = "\n".join(
-        [f"{'Site' if survey.site else 'Tunnel'} {survey.tunnel}, written by tunneldb {__version__}", *filter(None, said)]
+        [
+            f"{'Site' if survey.site else 'Tunnel'} {survey.tunnel}, written by tunneldb {__version__}; works while the"
+            " database runs: tunneldb server start, where it is tunneldb's own",
+            *filter(None, said),
+        ]
     )
     return root
 

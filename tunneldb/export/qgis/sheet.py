@@ -21,6 +21,7 @@ from tunneldb.export.qgis.layout_items import (
     label,
     table,
     text_style,
+    unless,
 )  # fmt: skip
 from tunneldb.raster.gap_fill import TOLD
 from tunneldb.store.survey import Survey
@@ -37,6 +38,12 @@ _TOP = 24.0  # where the strip begins, mm
 _TABLE_LEAST = 40.0  # what is kept for the table, mm
 _FOOT = 196.0  # where the foot begins, mm
 
+CLOCK = (
+    "with_variable('minutes', round(\"clock\" * 60) % 720, to_string(if(@minutes < 60, 12, floor(@minutes / 60))) || ':' "
+    "|| lpad(to_string(@minutes % 60), 2, '0'))"
+)
+"""A clock position as `tunneldb.export.tables.leaks.clock_label` writes it, which QGIS can't call; the styles have it too."""
+
 _SHEET = "attribute(@atlas_feature, '{}')"
 _TICK = "(@grid_number - attribute(@atlas_feature, 'chainage_from')) / 10"
 # Stations are the tunnel's own and may jump: they come with the sheet, a label each 10 m.
@@ -52,7 +59,7 @@ _COLUMNS = (
     ("Leak", 'to_string("id")', 11, 2),
     ("Chainage", '"label"', 19, 2),
     ("Arc, m", 'format_number(("arc_from" + "arc_to") / 2, 1)', 10, 2),
-    ("Clock", 'format_number("clock", 1)', 9, 2),
+    ("Clock", CLOCK, 9, 2),
     ("Area, m²", 'format_number("area", 2)', 12.5, 2),
     ("Drop, dB", 'format_number("drop_mean", 1)', 12.5, 2),
     ("Sure", "coalesce(round(100 * \"confidence\") || ' %', '')", 9, 2),
@@ -117,14 +124,14 @@ def sheet_layout(survey: Survey, extent: Extent, coverage: tuple[str, str], leak
 
 
 def _strip(scale: int, extent: Extent) -> ET.Element:
-    """The unrolled lining of the sheet, with a metre beyond its ends, under a grid of 10 m by 2 m."""
-    width, height = (LENGTH + 2) * 1000.0 / scale, (extent.ymax - extent.ymin) * 1000.0 / scale
+    """The unrolled lining of the sheet, from edge to edge as its table, under a grid of 10 m by 2 m."""
+    width, height = LENGTH * 1000.0 / scale, (extent.ymax - extent.ymin) * 1000.0 / scale
     element = item(
         SHEETS, MAP_ITEM, "strip", ((PAGE[0] - width) / 2 + 4, _TOP, width, height), frame="true", background="true",
         followPreset="true",
         followPresetName=SHEETS, mapRotation="0", drawCanvasItems="false", labelMargin="0,mm", keepLayerSet="false",
     )  # fmt: skip
-    sides = {"xmin": extent.xmin - 1, "xmax": extent.xmax + 1, "ymin": extent.ymin, "ymax": extent.ymax}
+    sides = {"xmin": extent.xmin, "xmax": extent.xmax, "ymin": extent.ymin, "ymax": extent.ymax}
     ET.SubElement(element, "Extent", {side: repr(value) for side, value in sides.items()})
     element.append(_grid("chainage", "10", "0", _CHAINAGE_LABEL, bottom=True))
     element.append(_grid("arc", "0", "2", _ARC_LABEL, bottom=False))
@@ -211,6 +218,13 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
     return texts
 
 
+def _fits(layer: str, rows: int) -> str:
+    """Return the expression that a sheet's leaks surely need no more rows; lines broken between words are half full."""
+    lines = f"1 + floor(length(coalesce(\"remark\", '')) / {_LINE // 2})"
+    needed = f"aggregate(layer:='{layer}', aggregate:='sum', expression:={lines}, filter:={_ON_SHEET})"
+    return f"coalesce({needed}, 0) <= {rows}"
+
+
 def _more(rows: int) -> ET.Element:
     """What the last page says where there are more leaks than rows."""
     count = _SHEET.format("leaks")
@@ -230,7 +244,7 @@ def _scale_bar(strip: str) -> ET.Element:
 
 
 def _table(leaks: tuple[str, str], top: float) -> list[ET.Element]:
-    """The table of leaks and its frames, two abreast on each page; a page whose first frame is empty is not printed.
+    """The table of leaks and its frames, two abreast on each page; what is empty is not printed, but for the first frame.
 
     The more leaks there are on a sheet, the less there is room for of their remarks; what is left out of one is marked.
     """
@@ -249,6 +263,7 @@ def _table(leaks: tuple[str, str], top: float) -> list[ET.Element]:
                     multiFrameTemplateUuid=own, hidePageIfEmpty=str(int(page > 0 and half == 0)), hideBackgroundIfEmpty="0",
                 )
             )  # fmt: skip
+    frames[1].append(unless(_fits(leaks[0], int((_FOOT - 1 - top) / ROW) - 1)))
     columns = [(heading, expression.format(letters), width, align) for heading, expression, width, align in _COLUMNS]
     order = '"chainage_from" + "chainage_to"'
     return [*frames, table(SHEETS, frames, leaks, columns, order, rows, _ON_SHEET, name="Leaks", touching=True)]

@@ -14,7 +14,7 @@ from tunneldb.store.coverage import Coverage, CoverageGap
 from tunneldb.store.remarks import Remark
 
 UNDEFINED_CARTESIAN = {"SRID": "-1"}
-"""Coordinate system of the unrolled plane in a GeoPackage, by its standard."""
+"""Coordinate system of the unrolled plane, and of local coordinates, in a GeoPackage, by its standard."""
 
 
 def write_gaps(path: Path, coverage: Coverage) -> None:

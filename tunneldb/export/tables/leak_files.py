@@ -20,6 +20,7 @@ from shapely.geometry import mapping
 
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN, write_gaps, write_remarks
 from tunneldb.export.tables.leaks import COLUMNS, Anomaly, Geometry, Kind, LeakList
+from tunneldb.geometry.crs import LOCAL
 
 DECIMALS = 4
 """Decimals of coordinates in text, m."""
@@ -49,11 +50,11 @@ def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:
     """Write leaks as a GeoJSON FeatureCollection in the coordinates of the chosen geometry.
 
     Map and space carry the tunnel's coordinate system in a ``crs`` member, as GDAL and QGIS read it; the
-    unrolled plane has none. Further members are what ``--json`` tells, too: ``statement`` and ``gaps`` say for which
-    stretches the list can't be vouched for, ``remarks`` what else is to be known, ``count`` and ``area`` sum up.
+    unrolled plane and local coordinates have none. Further members are what ``--json`` tells, too: ``statement`` and ``gaps``
+    say for which stretches the list can't be vouched for, ``remarks`` what else is to be known, ``count`` and ``area`` sum up.
     """
     collection: dict[str, Any] = {"type": "FeatureCollection", "name": layer_name(geometry, leaks.kind)}
-    if geometry != "unrolled":
+    if geometry != "unrolled" and srid != LOCAL:
         collection["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{srid}"}}
     collection["statement"] = leaks.coverage.statement
     collection["gaps"] = [asdict(gap) for gap in leaks.coverage.gaps]
@@ -72,7 +73,7 @@ def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:
 
 
 def write_gpkg(path: Path, leaks: LeakList, geometry: Geometry, srid: int) -> None:
-    """Write leaks as a GeoPackage with one layer; the unrolled plane is an undefined Cartesian system there.
+    """Write leaks as a GeoPackage with one layer; the unrolled plane and local coordinates are undefined Cartesian there.
 
     Where the list can't be vouched for, is in a table ``coverage_gap`` beside it, if there is such a stretch, and what else is
     to be known in a table ``remark``, if there is anything; both are in the description of the layer, too.
@@ -86,7 +87,7 @@ def write_gpkg(path: Path, leaks: LeakList, geometry: Geometry, srid: int) -> No
     )
     said = ". ".join(filter(None, (leaks.coverage.statement, leaks.total, *(remark.said for remark in leaks.remarks))))
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "'crs' was not provided")  # the unrolled plane has none
+        warnings.filterwarnings("ignore", "'crs' was not provided")  # the unrolled plane has none, nor have local coordinates
         _write_layer(path, rows, data, geometry, srid, layer_name(geometry, leaks.kind), said)
     if leaks.coverage.gaps:
         write_gaps(path, leaks.coverage)
@@ -97,17 +98,18 @@ def write_gpkg(path: Path, leaks: LeakList, geometry: Geometry, srid: int) -> No
 def _write_layer(
     path: Path, leaks: Sequence[Anomaly], data: list[NDArray[Any]], geometry: Geometry, srid: int, layer: str, said: str
 ) -> None:
+    bare = geometry == "unrolled" or srid == LOCAL
     pyogrio.raw.write(
         str(path),
         shapely.to_wkb(np.array([leak.geometry for leak in leaks], dtype=object)),
         data,
         np.array(COLUMNS),
         geometry_type="Polygon Z" if geometry == "3d" else "Polygon",
-        crs=None if geometry == "unrolled" else f"EPSG:{srid}",
+        crs=None if bare else f"EPSG:{srid}",
         driver="GPKG",
         layer=layer,
         DESCRIPTION=said,
-        **(UNDEFINED_CARTESIAN if geometry == "unrolled" else {}),
+        **(UNDEFINED_CARTESIAN if bare else {}),
     )
 
 

@@ -20,6 +20,7 @@ from shapely.geometry import Polygon, mapping
 
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
 from tunneldb.export.tables.leak_files import DECIMALS
+from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.survey import Survey
 
 Geometry = Literal["face", "map", "3d"]
@@ -182,7 +183,7 @@ def as_csv(spots: SpotList) -> str:
 def as_geojson(spots: SpotList, geometry: Geometry, srid: int) -> str:
     """Write spots as a GeoJSON FeatureCollection; ``statement``, ``count`` and ``area`` are further members of it."""
     collection: dict[str, Any] = {"type": "FeatureCollection", "name": f"spot_{geometry}"}
-    if geometry != "face":
+    if geometry != "face" and srid != LOCAL:
         collection["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{srid}"}}
     collection |= {"statement": spots.statement, "count": spots.count, "area": round(spots.area, DECIMALS)}
     collection["features"] = [
@@ -201,19 +202,20 @@ def write_gpkg(path: Path, spots: SpotList, geometry: Geometry, srid: int) -> No
     """Write spots as a GeoPackage with one layer, whose description says for what they can't be vouched."""
     data = [_column(spots, name) for name in COLUMNS]
     said = f"{spots.statement}. {spots.total}" if spots.statement else spots.total
+    bare = geometry == "face" or srid == LOCAL
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "'crs' was not provided")  # a face's own plane has none
+        warnings.filterwarnings("ignore", "'crs' was not provided")  # a face's own plane has none, nor have local coordinates
         pyogrio.raw.write(
             str(path),
             shapely.to_wkb(np.array([spot.geometry for spot in spots.rows], dtype=object)),
             data,
             np.array(COLUMNS),
             geometry_type="Polygon Z" if geometry == "3d" else "Polygon",
-            crs=None if geometry == "face" else f"EPSG:{srid}",
+            crs=None if bare else f"EPSG:{srid}",
             driver="GPKG",
             layer=f"spot_{geometry}",
             DESCRIPTION=said,
-            **(UNDEFINED_CARTESIAN if geometry == "face" else {}),
+            **(UNDEFINED_CARTESIAN if bare else {}),
         )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from tunneldb.geometry.crs import srid_name
 from tunneldb.geometry.stationing import Stationing
 from tunneldb.pipeline.target_control import Comparison, mean_centres
 from tunneldb.pipeline.targets import Search, TargetObservation
@@ -58,7 +59,7 @@ def report(
     spheres = len({row.number for row in found.spheres})
     parts = [
         f"# Target spheres of {survey.name}",
-        f"Tunnel {survey.tunnel}, scanned {survey.date}, EPSG:{survey.srid}. Spheres of {1e3 * radius:g} mm radius"
+        f"Tunnel {survey.tunnel}, scanned {survey.date}, {srid_name(survey.srid)}. Spheres of {1e3 * radius:g} mm radius"
         f" ± {1e3 * tolerance:g} mm; {found.points} points read. {spheres} spheres, seen {len(found.spheres)} times.",
         "Centres are from a fit with the nominal radius; radius is that of the best sphere of any radius, as a check."
         " sigma is the standard deviation of the centre in space.",

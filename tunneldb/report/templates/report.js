@@ -23,10 +23,6 @@
 
   const fixed = (value, decimals) => (value === null ? "–" : value.toFixed(decimals));
   const signed = (value) => (value > 0 ? "+" : value < 0 ? "−" : "") + Math.abs(value).toFixed(2);
-  const clock = (hours) => {
-    const minutes = Math.round(hours * 60) % 720;
-    return `${Math.floor(minutes / 60) || 12}:${String(minutes % 60).padStart(2, "0")}`;
-  };
   const arc = (leak) => `${signed(leak.arcFrom)} to ${signed(leak.arcTo)}`;
   const review = (leak) => make("span", { class: `review ${leak.review}` }, leak.review + (leak.detected ? "" : ", not found again"));
 
@@ -34,7 +30,7 @@
   const columns = [
     ["No.", "id", (l) => l.id, "n"],
     [data.place, "chainage", (l) => l.label, ""],
-    ["Clock", "clock", (l) => clock(l.clock), "n"],
+    ["Clock", "clock", (l) => l.clockLabel, "n"],
     ["Arc m", "arcFrom", arc, "n minor"],
     ["Length m", "length", (l) => fixed(l.length, 2), "n minor"],
     ["Area m²", "area", (l) => fixed(l.area, 2), "n"],
@@ -170,7 +166,7 @@
   function card(leak) {
     const shown = detail(leak);
     const facts = [
-      ["Area", `${fixed(leak.area, 2)} m²`], ["Clock", clock(leak.clock)], ["Arc, m", arc(leak)], ["Length", `${fixed(leak.length, 2)} m`],
+      ["Area", `${fixed(leak.area, 2)} m²`], ["Clock", leak.clockLabel], ["Arc, m", arc(leak)], ["Length", `${fixed(leak.length, 2)} m`],
       ["Drop, most", `${fixed(leak.drop, 1)}, ${fixed(leak.dropMax, 1)} dB`], ["Contrast", `${fixed(leak.contrast, 1)} σ`],
       ["Confidence", fixed(leak.confidence, 2)], ["Measured", `${Math.round(100 * leak.imageShare)} % of it`],
     ];
