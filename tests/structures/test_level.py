@@ -89,7 +89,7 @@ def test_a_face_of_another_material_has_its_own_level() -> None:
     curve = curve_of([one], FLAT, by_range=False)
     darker, _ = wall(lambda cosine: lambert(cosine) - 3.0, 0.0, seed=3)
     assert np.median(off(face_level(curve, darker), darker, lambda cosine: lambert(cosine) - 3.0)) < 0.1
-    rusty, covered = wall(lambert, -3.0, seed=4)
+    rusty, _ = wall(lambert, -3.0, seed=4)
     half = some_pixels([rusty], (np.arange(30_000) % 300 < 150).reshape(100, 300))[0]
     assert np.median(off(face_level(curve, half), half, lambert)) < 0.1
 

@@ -164,11 +164,12 @@ def face_level(curve: LevelCurve, one: Observed) -> LevelCurve:
 
 def curve_of(observed: list[Observed], model: Float, own: Bool | None = None, *, by_range: bool) -> LevelCurve:
     """Level of what one scan saw, of one face or of the faces of a member."""
-    names = ("cosine", "range_m", "value", "points")
-    arrays = [np.concatenate([getattr(one, name) for one in observed]) for name in names]
+    cosine, range_m, value, points = (
+        np.concatenate([getattr(one, name) for one in observed]) for name in ("cosine", "range_m", "value", "points")
+    )
     starts = np.cumsum([0, *(len(one.pixel) for one in observed)])
     pairs = np.concatenate([_pairs(one) + start for one, start in zip(observed, starts[:-1], strict=True)])
-    return level_curve(*arrays, pairs, own, by_range=by_range and model[RADIUS] > 0.0)
+    return level_curve(cosine, range_m, value, points, pairs, own, by_range=by_range and model[RADIUS] > 0.0)
 
 
 def _pairs(one: Observed) -> Int64:
@@ -194,9 +195,7 @@ def some_pixels(observed: list[Observed], inside: Bool) -> list[Observed]:
     return found
 
 
-def contrast_of(
-    layout: Layout, face: int, observed: list[Observed], curves: list[LevelCurve], noise: float
-) -> FaceContrast:
+def contrast_of(layout: Layout, face: int, observed: list[Observed], curves: list[LevelCurve], noise: float) -> FaceContrast:
     """Hold the pixels of a face against its level.
 
     Parameters

@@ -108,7 +108,8 @@ def find_structures(
     for number, member in enumerate(np.argsort(-sizes, kind="stable").tolist(), start=1):
         of = [parts[k] for k in np.flatnonzero(member_of == member).tolist()]
         first = len(faces)
-        for part, (contrast, here) in zip(of, _judge(found, sums, of, reference, pixels, scatter, by_range=by_range), strict=True):
+        judged = _judge(found, sums, of, reference, pixels, scatter, by_range=by_range)
+        for part, (contrast, here) in zip(of, judged, strict=True):
             faces.append(_face(found, part, len(faces) + 1, number, contrast, here))
             face_number[part.face], member_number[part.face] = len(faces), number
             if part.inside is not None:
@@ -167,8 +168,8 @@ def _parts(found: Segmentation, sums: Sums, reference: ReferenceCurve | None) ->
         del held[face], extents[face]
     parts = {face: [_Part(face, None, extent)] for face, extent in extents.items()}
     for number, faces in enumerate(_planes(extents, found.noise)):
-        seen = [observe_face(layout, sums, face, found.stations, reference) for face in faces]
-        materials = parts_of_plane(layout, faces, seen)
+        by_face = [observe_face(layout, sums, face, found.stations, reference) for face in faces]
+        materials = parts_of_plane(layout, faces, by_face)
         if materials is None:
             continue
         for face, material in zip(faces, materials, strict=True):

@@ -46,6 +46,7 @@ LEAST_FACING, LEAST_FACING_PIPE = 0.1, 0.5
 CELL = 0.1
 """Angle of a cell of the range image, degrees."""
 
+
 class RangeImages:
     """How far each scan sees in each direction: the nearest point of each cell.
 

@@ -1,10 +1,10 @@
 """The level of a surface by incidence: what it shows where it is as it should be (Ono et al., 3.3 and 3.4).
 
-The paper parts a cluster into classes of cos θ and fits a normal distribution to the histogram of each. A class may be covered by
-rust altogether, though, and then its own histogram cannot tell; and 0.05 of cos θ is 18° at right angles to a surface, over which
-gloss loses several decibels. Here the shape of the level over θ comes from differences between places that lie close to each
-other: those across the edge of a spot are few, and outliers, however large the spot is. Where most pixels then lie is the level,
-and the robust mode of each class mends what is left of the shape.
+The paper parts a cluster into classes of cos θ and fits a normal distribution to the histogram of each. A class may be covered
+by rust altogether, though, and then its own histogram cannot tell; and 0.05 of cos θ is 18° at right angles to a surface, over
+which gloss loses several decibels. Here the shape of the level over θ comes from differences between places that lie close to
+each other: those across the edge of a spot are few, and outliers, however large the spot is. Where most pixels then lie is the
+level, and what lies there fits it once more.
 """
 
 from __future__ import annotations
@@ -53,7 +53,10 @@ MOST_POINTS = 8.0
 """Pixels of more points count no more than these: what is uneven about a surface does not go by how often it is measured."""
 
 FITS = 8
-"""Times that their weights are found again."""
+"""Times that their weights are found again, at most …"""
+
+SETTLED = 0.005
+"""… until the level changes by less, dB."""
 
 MOST_WIDE = 1.5
 """Where the surface scatters more than so many times as much as elsewhere, something else covers it."""
@@ -191,9 +194,7 @@ class _Basis:
 
     def __call__(self, found: Float) -> Float:
         """Level of the pixels (n,)."""
-        return np.asarray(
-            (1.0 - self.share) * found[self.first] + self.share * found[self.first + 1] + found[-1] * self.along
-        )
+        return np.asarray((1.0 - self.share) * found[self.first] + self.share * found[self.first + 1] + found[-1] * self.along)
 
     def solve(self, one: Int64, other: Int64, seen: Float, weight: Float) -> Float:
         """Unknowns by weighted least squares of levels ``one``, less those of ``other`` where that is not empty."""
@@ -221,7 +222,9 @@ def _shape(basis: _Basis, value: Float, weight: Float, pairs: Int64) -> Float:
         size = off / (TUKEY * sigma)
         # The start may be far off.
         robust = np.minimum(1.0, 0.4 / np.maximum(size, 1e-12)) if turn < 3 else np.maximum(1.0 - size**2, 0.0) ** 2
-        found = basis.solve(one, other, seen, both * robust / sigma**2)
+        before, found = found, basis.solve(one, other, seen, both * robust / sigma**2)
+        if turn > 3 and np.ptp(np.diff(found[:-1] - before[:-1], prepend=0.0)) < SETTLED:
+            break
     return found
 
 
@@ -239,7 +242,9 @@ def _fit(basis: _Basis, value: Float, weight: Float, found: Float, spread: float
             break
         spread = max(float(MAD_TO_SIGMA * np.median(np.abs(rest[near]))) / OWN_MAD, LEAST_SIGMA)
         counted = weight * np.maximum(1.0 - (rest / (TUKEY * spread)) ** 2, 0.0) ** 2 / spread**2
-        found = basis.solve(every, nothing, value[every], counted)
+        before, found = found, basis.solve(every, nothing, value[every], counted)
+        if np.abs(found[:-1] - before[:-1]).max() < SETTLED:
+            break
     return found, spread
 
 

@@ -2,8 +2,8 @@
 
 Geometry alone cannot tell a brick wall from the concrete beside it, and the paper's histogram of both has two heads. A stain or
 rust does not end on a straight line over the whole of a wide face; a wall of another material does. The step is looked for
-between places that lie close to each other, so that neither incidence nor range has a part in it, and over the whole of a plane:
-what stands before a wall parts it into faces, of which each shows but a piece of the line.
+between places that lie close to each other, so that neither incidence nor range has a part in it, and over the whole of a
+plane: what stands before a wall parts it into faces, of which each shows but a piece of the line.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from tunneldb.arrays import Float, Int32, Int64
 from tunneldb.robust import MAD_TO_SIGMA
@@ -156,9 +157,12 @@ def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
         first = int(place[0])
         blocks, sigma = _blocks(lines[first : place[-1] + 1])
         edge = max(BLOCKS, int(np.ceil(LEAST_WIDTH / (ACROSS * pixel))))
+        if len(blocks) <= 2 * edge:
+            continue
+        medians = _medians(np.moveaxis(sliding_window_view(blocks, BLOCKS, axis=0), -1, 0))
         for k in range(edge, len(blocks) - edge):
-            before, after = _medians(blocks[k - BLOCKS : k]), _medians(blocks[k : k + BLOCKS])
-            steps = (after - before)[np.isfinite(after - before)]
+            steps = medians[k] - medians[k - BLOCKS]
+            steps = steps[np.isfinite(steps)]
             if len(steps) < FEWEST or len(steps) * ALONG * pixel < LEAST_WIDTH:
                 continue
             step = float(np.median(steps))
@@ -191,7 +195,7 @@ def _blocks(lines: Float) -> tuple[Float, float]:
 
 
 def _medians(blocks: Float) -> Float:
-    """Median of each column of blocks; NaN where less than half of them are known."""
+    """Median over the first axis; NaN where less than half of the blocks are known."""
     return np.where(np.isfinite(blocks).sum(axis=0) * 2 >= len(blocks), _nan_median(blocks), np.nan)
 
 
@@ -205,12 +209,11 @@ def _nan_median(values: Float) -> Float:
 
 
 def _sharpest(lines: Float, about: int) -> int:
-    """First line behind a step near a place: where most pixels before it lie on one side of the step's middle and most behind on
-    the other."""
+    """First line behind a step near a place: of the pixels before it most lie below its middle, and behind it above."""
     reach = (BLOCKS + 1) * ACROSS
     first = max(about - 2 * reach, 0)
     near = lines[first : about + 2 * reach]
-    before, after = (_nan_median(part[np.isfinite(part)][:, None])[0] for part in (near[: about - first], near[about - first :]))
+    before, after = (float(np.median(part[np.isfinite(part)])) for part in (near[: about - first], near[about - first :]))
     votes = np.where(np.isfinite(near), np.sign((near - 0.5 * (before + after)) * (after - before)), 0.0).sum(axis=1)
     score = votes.sum() - 2.0 * np.concatenate([[0.0], np.cumsum(votes)])
     inner = slice(max(about - reach - first, 1), about + reach - first)

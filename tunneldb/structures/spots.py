@@ -119,9 +119,7 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
     return FaceSpots(found, numbers, share, seen)
 
 
-def _judge(
-    region: Region, kind: Literal["dark", "bright"], face: FaceContrast, differs: Single, rim: Bool
-) -> FoundSpot | None:
+def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, differs: Single, rim: Bool) -> FoundSpot | None:
     """What a region is; None if it is nothing."""
     if not region.filled:
         return None
