@@ -10,9 +10,9 @@ import numpy as np
 
 from tunneldb.arrays import Float, Int32, Int64
 from tunneldb.compiled import kernel
-from tunneldb.structures.growing import LEAST_TOLERANCE, TOLERANCE, Grown
+from tunneldb.structures.growing import MOST_NOISE, Grown
 from tunneldb.structures.models import AXIS, POINT, RADIUS, SIDE, distance, fit_cylinder, fit_plane
-from tunneldb.structures.voxel_grid import AXIS_BITS, VoxelGrid, VoxelPlanes
+from tunneldb.structures.voxel_grid import AXIS_BITS, VoxelGrid
 
 ANGLE = 10.0
 """Two faces are no farther turned against each other, degrees (Ono et al., Table 1)."""
@@ -28,17 +28,8 @@ ROUNDS = 6
 BLOCK = 100_000
 """Voxels whose neighbours are looked at together."""
 
-WITHIN = 7
-"""A voxel within a face touches at least so many others of it."""
-
 LARGE = 250
-"""Nothing that is rock or foliage is as flat as noise over so many voxels."""
-
-SMOOTH_TURN = 25.0
-"""Where a face ends and what touches it there is turned against it by less, the surface goes on, degrees."""
-
-GOES_ON = 0.5
-"""Share of a face's rim over which the surface may go on so: rock, soil, bends and foliage have no rims of their own."""
+"""Where what is flattest is rougher than a scanner's noise, rock or soil, faces of fewer voxels are flat by chance."""
 
 
 @dataclass(frozen=True)
@@ -62,17 +53,13 @@ class Faces:
     rms: Float
 
 
-def merge(
-    grid: VoxelGrid, starts: Int64, neighbours: Int32, planes: VoxelPlanes, towards: Float, grown: Grown, noise: float
-) -> Faces:
+def merge(grid: VoxelGrid, starts: Int64, neighbours: Int32, towards: Float, grown: Grown, noise: float) -> Faces:
     """Merge faces that touch and fit one model, within a scan and across scans.
 
     Parameters
     ----------
     grid, starts, neighbours
         Voxels, and which touch.
-    planes : VoxelPlanes
-        The plane of each.
     towards : (n, 3) float array
         Unit vectors to the scanner.
     grown : Grown
@@ -112,44 +99,10 @@ def merge(
         sums = _sums(grid, owner, count)
         for a in np.unique(into[changed]).tolist():
             refit(grid, centroid, sums[a], held(a), noise, models[a])
-    goes_on = _goes_on(owner, starts, neighbours, planes, centroid, towards, models, noise)
-    return _ordered(grid, centroid, towards, owner, models, noise, goes_on)
+    return _ordered(grid, centroid, towards, owner, models, noise)
 
 
-def _goes_on(
-    owner: Int32,
-    starts: Int64,
-    neighbours: Int32,
-    planes: VoxelPlanes,
-    centroid: Float,
-    towards: Float,
-    models: Float,
-    noise: float,
-) -> Float:
-    """Share of the rim of each face over which the surface goes on beyond it, bent, about."""
-    contacts = [(mine[owner[mine] >= 0], other[owner[mine] >= 0]) for mine, other in _contacts(owner, starts, neighbours)]
-    mine, other = (np.concatenate(part) for part in zip(*contacts, strict=True))
-    own = np.diff(starts) - np.bincount(mine, minlength=len(owner))
-    # What is beyond has a normal of its own, is smooth, and lies off the face.
-    turn = np.einsum("ni,ni->n", planes.normal[mine], planes.normal[other])
-    smooth = (turn > math.cos(math.radians(SMOOTH_TURN))) & (planes.rms[other] < 3.0 * noise)
-    mine, other = mine[smooth], other[smooth]
-    off = np.empty(len(mine))
-    for face in np.unique(owner[mine]).tolist():
-        of = owner[mine] == face
-        off[of] = np.abs(distances(models[face], centroid[other[of]]))
-    sigma = noise * np.abs(np.einsum("ni,ni->n", planes.normal[mine], towards[mine]))
-    touching = np.unique(mine[off > np.maximum(TOLERANCE * sigma, LEAST_TOLERANCE)])
-    edge = np.flatnonzero((owner >= 0) & (own < WITHIN))
-    around = np.bincount(owner[np.union1d(edge, touching)], minlength=len(models))
-    share = np.bincount(owner[touching], minlength=len(models)) / np.maximum(around, 1)
-    size = np.bincount(owner[owner >= 0], minlength=len(models))
-    return np.where(size < LARGE, share, 0.0)
-
-
-def _ordered(
-    grid: VoxelGrid, centroid: Float, towards: Float, owner: Int32, models: Float, noise: float, goes_on: Float
-) -> Faces:
+def _ordered(grid: VoxelGrid, centroid: Float, towards: Float, owner: Int32, models: Float, noise: float) -> Faces:
     """Faces in order of size, seen from the right side; what scatters as no face does is left out."""
     count = len(models)
     sums, held = _sums(grid, owner, count), _Members(owner, count)
@@ -168,7 +121,7 @@ def _ordered(
         else:
             rms[k] = float(np.sqrt(np.mean(distances(models[k], centroid[voxels]) ** 2)))
             cosine = 1.0
-        good[k] = rms[k] < 3.0 * max(noise * cosine, 0.0005) and goes_on[k] < GOES_ON
+        good[k] = rms[k] < 3.0 * max(noise * cosine, 0.0005) and (noise < MOST_NOISE or len(voxels) >= LARGE)
     order = np.lexsort([models[:, 0], -sums[:, 0]])
     order = order[good[order]]
     number = np.full(count + 1, -1, np.int32)
