@@ -48,7 +48,8 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     spots = rows(text, "Spots")
     assert [row[0] for row in spots] == [str(spot["number"]) for spot in listed["spots"]]
     assert [float(row[5].replace("\u202f", "")) for row in spots] == [round(1e4 * spot["area"]) for spot in listed["spots"]]
-    assert [(row[10], row[12]) for row in spots] == [("open", ""), ("rejected", "a &lt;shadow&gt;"), ("open", "")]
+    assert [row[10] for row in spots] == ['<i class="colour" style="background: rgb(120, 60, 30)"></i>120, 60, 30', "–", "–"]
+    assert [(row[11], row[13]) for row in spots] == [("open", ""), ("rejected", "a &lt;shadow&gt;"), ("open", "")]
     members = rows(text, "Members")
     assert [(row[0], row[7], row[10]) for row in members] == [
         ("1", "1", ""),

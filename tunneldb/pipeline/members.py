@@ -166,7 +166,7 @@ def _usable(path: Path, dimension: str) -> ScanHeader:
 def numbers_of_points(inputs: Inputs, members: FileMembers) -> Iterator[tuple[UInt32, UInt32, UInt32]]:
     """Face, member and spot of all points, in the order of the files, chunk by chunk; 0 is none."""
     finder, found = members.segmentation.finder, members.found
-    for points, scan, use in _read_all(inputs, lambda count: None):
+    for points, scan, use in read_all(inputs, lambda count: None):
         out = np.zeros((3, len(points)), np.uint32)
         face, pixel = finder.find(points.xyz[use], scan[use])
         out[:, use] = found.of_points(face, pixel)
@@ -241,7 +241,7 @@ class _Values:
 
 def _read(inputs: Inputs, values: _Values | None, progress: Callable[[float], None]) -> Iterator[tuple[Points, Int32]]:
     """Points whose scanner position is known, with the place of their scan among the stations."""
-    for points, scan, use in _read_all(inputs, progress):
+    for points, scan, use in read_all(inputs, progress):
         if values is not None:
             values.add(points, int(use.size))
             _refuse_unknown(inputs, points, values)
@@ -253,10 +253,12 @@ def _refuse_unknown(inputs: Inputs, points: Points, values: _Values) -> None:
         raise UserError(f"{inputs.name}: {inputs.poses.faults(points).text() or 'points without a scanner position'}")
 
 
-def _read_all(inputs: Inputs, progress: Callable[[float], None]) -> Iterator[tuple[Points, Int32, Int64]]:
+def read_all(
+    inputs: Inputs, progress: Callable[[float], None], *, colours: bool = False
+) -> Iterator[tuple[Points, Int32, Int64]]:
     """All points, the place of their scan among the stations, and which of them have one."""
     ids = inputs.poses.scan_id
-    files = chain.from_iterable(read_chunks(path, inputs.dimension) for path in inputs.paths)
+    files = chain.from_iterable(read_chunks(path, inputs.dimension, colours=colours) for path in inputs.paths)
     with closing(prefetch(files)) as chunks:
         for points in chunks:
             scan = np.minimum(np.searchsorted(ids, points.scan_id), len(ids) - 1).astype(np.int32)

@@ -90,6 +90,11 @@ class StructuresChapter:
     by_review: dict[str, int]
 
     @property
+    def coloured(self) -> bool:
+        """Whether any of the spots has a colour."""
+        return any(spot.rgb for spot in self.spots.rows)
+
+    @property
     def lost(self) -> list[ListedSpot]:
         """Spots that an inspector confirmed and the last run did not find again."""
         return [spot for spot in self.spots.rows if not spot.detected]

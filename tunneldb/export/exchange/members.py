@@ -87,6 +87,7 @@ def spot_row(spot: Spot) -> dict[str, Any]:
         "area": spot.area,
         "points": spot.points,
         "scans": spot.scans,
+        "rgb": None if spot.rgb is None else ", ".join(map(str, spot.rgb)),
     }
 
 

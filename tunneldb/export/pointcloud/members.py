@@ -9,7 +9,8 @@ from tunneldb.errors import UserError
 from tunneldb.export.exchange.members import write_members
 from tunneldb.export.pointcloud.survey import same_file
 from tunneldb.files import replacing
-from tunneldb.pipeline.members import FileMembers, Inputs, find_members, numbers_of_points
+from tunneldb.pipeline.members import FileMembers, Inputs, numbers_of_points
+from tunneldb.pipeline.spot_colours import find_coloured_members
 from tunneldb.pointcloud.reader import read_header
 from tunneldb.pointcloud.rewrite import rewrite_with_numbers
 
@@ -44,11 +45,11 @@ def export_members(inputs: Inputs, target: Path | None, begin: Begin) -> FileMem
     Raises
     ------
     UserError
-        If the file cannot be used, see `find_members`; if the target cannot be written.
+        If the file cannot be used, see `find_members` of `pipeline.members`; if the target cannot be written.
     """
     if target is not None:
         check_target(inputs.paths[0], target)
-    members = find_members(inputs, begin)
+    members = find_coloured_members(inputs, begin)
     if target is None:
         return members
     header = read_header(inputs.paths[0])

@@ -56,6 +56,7 @@ class ListedSpot:
     remark: str | None
     detected: bool
     counted: bool
+    rgb: list[int] | None
     geometry: Polygon
 
 
@@ -234,5 +235,5 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return round(value, DECIMALS)
     if isinstance(value, list):
-        return ", ".join(value)
+        return ", ".join(map(str, value))
     return value.isoformat() if isinstance(value, dt.datetime) else value
