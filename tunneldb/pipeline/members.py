@@ -23,7 +23,7 @@ from tunneldb.pointcloud.stations import read_stations
 from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
 from tunneldb.radiometry.intensity_kind import contradiction
-from tunneldb.radiometry.range_curve import estimate_range_curve
+from tunneldb.radiometry.range_curve import ADVICE, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.structures.contrast import observe_face
 from tunneldb.structures.face_raster import Sums
@@ -45,6 +45,8 @@ NOTED_SATURATED = 0.01
 
 UNKNOWN = 0.01
 """Share of points without a scanner position that may be left out."""
+
+_WITHOUT = "on each flat face the level goes by incidence, which tells the range there, on each pipe by both"
 
 _SAMPLES = 400_000
 _SAMPLE_OF_VALUES = 100_000
@@ -273,12 +275,13 @@ def _reference(inputs: Inputs, segmentation: Segmentation, sums: Sums) -> tuple[
     if isinstance(inputs.reference, ReferenceCurve):
         return inputs.reference, None
     if inputs.reference is None:
-        return None, (
-            "no reference curve: on each flat face the level goes by incidence, which tells the range there, on each pipe by"
-            " both; --reference auto has it found from the faces"
-        )
-    found = estimate_range_curve(_samples(segmentation, sums), unrolled=False)
-    found.require()
+        return None, f"no reference curve: {_WITHOUT}; --reference auto has it found from the faces"
+    try:
+        found = estimate_range_curve(_samples(segmentation, sums), unrolled=False)
+        found.require()
+    except UserError as error:
+        why = str(error).removesuffix(f"; {ADVICE}").replace("lining", "surface")
+        return None, f"no reference curve could be found from the faces ({why}), so none is used: {_WITHOUT}"
     return found.curve, f"reference curve found from the faces, {found.nearest:.1f} to {found.farthest:.1f} m"
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tunneldb.errors import UserError
-from tunneldb.export.exchange.members import write_members
+from tunneldb.export.exchange.members import Geometry, write_members
 from tunneldb.export.pointcloud.survey import same_file
 from tunneldb.files import replacing
 from tunneldb.pipeline.members import FileMembers, Inputs, numbers_of_points
@@ -39,8 +39,8 @@ def check_target(source: Path, target: Path) -> None:
         raise UserError(f"{target.parent}: no such folder")
 
 
-def export_members(inputs: Inputs, target: Path | None, begin: Begin) -> FileMembers:
-    """Find the members of one scan file, and write its points or polygons, if a target is given.
+def export_members(inputs: Inputs, target: Path | None, begin: Begin, geometry: Geometry = "3d") -> FileMembers:
+    """Find the members of one scan file, and write its points, or polygons of a geometry, if a target is given.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def export_members(inputs: Inputs, target: Path | None, begin: Begin) -> FileMem
     header = read_header(inputs.paths[0])
     with replacing(target) as temporary:
         if target.suffix.lower() == ".gpkg":
-            write_members(temporary, members.found.structures, header.crs)
+            write_members(temporary, members.found.structures, header.crs, geometry)
         else:
             rewrite_with_numbers(
                 inputs.paths[0], temporary, numbers_of_points(inputs, members), DIMENSIONS, begin("writing", header.points)
