@@ -145,6 +145,20 @@ def test_the_simulator_s_truth(conn: psycopg.Connection, tmp_path: Path) -> None
     assert "EPSG:25830" in command("evaluate", "hall-1", path, code=2).stderr
 
 
+def test_local_coordinates_and_spots_in_a_tunnel(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    save_example_structures(conn, "demo-2024")
+    conn.execute(
+        "INSERT INTO tunnel.station (survey_id, scan_id, geom) SELECT s.id, 1, v.geom FROM tunnel.survey s, tunnel.axis_vertex v"
+        " ORDER BY v.n LIMIT 1"
+    )
+    conn.execute("UPDATE tunnel.tunnel SET srid = 0")
+    conn.commit()
+    command("spots", "demo-2024", "--geometry", "3d", "-o", tmp_path / "spots.gpkg")
+    told = json.loads(command("evaluate", "demo-2024", tmp_path / "spots.gpkg", "--spots", "--json").stdout)["groups"][0]
+    assert (told["true"], told["found"], told["called"], told["right"]) == (3, 3, 3, 3)
+    assert told["area_iou"] == pytest.approx(1.0, abs=1e-3)
+
+
 def test_what_cannot_be_compared_is_refused_in_a_line(conn: psycopg.Connection, tmp_path: Path) -> None:
     add_example_site(tmp_path)
     save_example_structures(conn, "hall-1")

@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from tunneldb.arrays import Bool
 from tunneldb.errors import UserError
 from tunneldb.evaluate.truth import read_polygons
+from tunneldb.geometry.crs import LOCAL, srid_name
 from tunneldb.store.survey import Survey
 
 FEWEST, STEEPEST = 100, 75.0
@@ -59,8 +60,8 @@ def read_spot_truth(survey: Survey, path: Path, layer: str | None = None) -> Spo
     if simulated is not None:
         return _of_simulation(survey, path, simulated)
     given = read_polygons(path, survey, layer, "spot")
-    if not given.in_space:
-        raise UserError(f"{given.where} has no coordinate system: polygons of spots must be 3D, in EPSG:{survey.srid}")
+    if not given.in_space and survey.srid != LOCAL:
+        raise UserError(f"{given.where} has no coordinate system: polygons of spots must be 3D, in {srid_name(survey.srid)}")
     for key, shape in zip(given.ids, given.shapes, strict=True):
         if not shape.has_z:
             raise UserError(f"{given.naming(key)} has no heights: polygons of spots must be 3D, on their surface")
@@ -80,8 +81,8 @@ def _simulated(path: Path) -> dict[str, Any] | None:
 
 def _of_simulation(survey: Survey, path: Path, content: dict[str, Any]) -> SpotTruth:
     srid = content["parameters"]["srid"]
-    if srid != survey.srid:
-        raise UserError(f"{path} is in EPSG:{srid}, survey {survey.name} in EPSG:{survey.srid}")
+    if survey.srid not in (srid, LOCAL):
+        raise UserError(f"{path} is in EPSG:{srid}, survey {survey.name} in {srid_name(survey.srid)}")
     rows = [row for row in content["anomalies"] if row["points"]]
     if not rows:
         raise UserError(f"{path} has no anomaly that the scanner saw: there is nothing to compare with")
