@@ -1,5 +1,5 @@
 # make demo   a simulated tunnel from its scan to leaks in QGIS, in ./demo
-# make demo-structure   the same for a simulated steel structure and its spots, in less than a minute
+# make demo-structure   the same for a simulated steel structure and its spots: 40 s, and half a minute more on first use
 # make quick  those of the tests that need no server and are over soon
 # make test   lint, types and all tests, against the wheel as a user would install it
 # make faults 100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
