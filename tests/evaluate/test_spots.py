@@ -148,8 +148,8 @@ def test_the_simulator_s_truth(conn: psycopg.Connection, tmp_path: Path) -> None
 def test_local_coordinates_and_spots_in_a_tunnel(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
     save_example_structures(conn, "demo-2024")
     conn.execute(
-        "INSERT INTO tunnel.station (survey_id, scan_id, geom) SELECT s.id, 1, v.geom FROM tunnel.survey s, tunnel.axis_vertex v"
-        " ORDER BY v.n LIMIT 1"
+        "INSERT INTO tunnel.station (survey_id, scan_id, geom) SELECT s.id, 1, v.geom"
+        " FROM tunnel.survey s, tunnel.axis_vertex v ORDER BY v.n LIMIT 1"
     )
     conn.execute("UPDATE tunnel.tunnel SET srid = 0")
     conn.commit()
