@@ -68,7 +68,7 @@ SELECT p.id, p.survey_id, s.name AS survey, p.number, m.number AS member, m.kind
        p.chainage, (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, p.chainage) l) AS label,
        p.reasons, p.confidence, p.contrast, p.difference, p.area, p.points, p.scans,
        p.review, p.reviewed_by, p.reviewed_at, p.remark, p.detected, p.created_at, p.detected_at,
-       p.detected AND p.review <> 'rejected' AS counted,
+       p.detected AND p.review <> 'rejected' AS counted, p.rgb,
        p.outline::public.geometry(Polygon, 0) AS outline, p.map::public.geometry AS map, p.surface::public.geometry AS surface
   FROM tunnel.spot p
   JOIN tunnel.survey s ON s.id = p.survey_id
@@ -290,7 +290,8 @@ BEGIN
         ('reviewed_at', 'When it was reviewed last, set by the database'),
         ('remark', 'The reviewer''s remark'),
         ('detected', 'False when the last run found it no more (kept for its review)'),
-        ('counted', 'Whether sums count it: found last, and not rejected')) AS t (name, text)
+        ('counted', 'Whether sums count it: found last, and not rejected'),
+        ('rgb', 'Mean colour of its points: red, green, blue, 0 to 255; NULL where the scan files have none')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
       JOIN pg_class c ON c.oid = a.attrelid
      WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v'

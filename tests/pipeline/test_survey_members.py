@@ -19,6 +19,7 @@ STATION = (0.0, 0.0, 1.5)
 WALL = Plate((-1.5, 5.0, 0.0), (3.0, 0.0, 0.0), (0.0, 0.0, 3.0))
 PIPE = Pipe((-1.4, 4.0, 0.4), (1.4, 4.0, 0.4), 0.15)
 RUST = (-0.6, 1.5, 0.25)  # x, z and radius of a dark disc on the wall
+WALL_COLOUR, RUST_COLOUR = (150, 152, 160), (120, 60, 30)
 FLAKE = (0.7, 2.0, 0.2)  # of a bright one
 WINDOW = (-0.4, 0.4, -0.35, 0.35)
 
@@ -40,12 +41,17 @@ def write(path: Path, seed: int, flake: bool = True) -> None:
     level[disc(seen, *RUST)] -= 4.0
     if flake:
         level[disc(seen, *FLAKE)] += 3.0
-    header = laspy.LasHeader(version="1.4", point_format=6)
+    header = laspy.LasHeader(version="1.4", point_format=7)
     header.scales = np.full(3, 1e-4)
     header.add_extra_dim(laspy.ExtraBytesParams("Reflectance", np.float32))
     las = laspy.LasData(header)
     las.xyz = seen.xyz
     las["Reflectance"] = level.astype(np.float32)
+    # By colour the rust is brown, what is not the wall blue; the flake, and half of the rust, have no colour, so are black.
+    colour = np.where((seen.surface == 0)[:, None], WALL_COLOUR, (0, 0, 250))
+    colour[disc(seen, *RUST)] = RUST_COLOUR
+    colour[disc(seen, *FLAKE) | (disc(seen, *RUST) & (seen.xyz[:, 0] > RUST[0]))] = 0
+    las.red, las.green, las.blue = (colour * 257).T.astype(np.uint16)
     las.point_source_id = np.ones(len(seen.xyz), np.uint16)
     las.write(path)
 
@@ -94,6 +100,10 @@ def test_spots_of_a_site(files: Path, conn: psycopg.Connection, tmp_path: Path) 
         np.testing.assert_allclose(middle, [x, 5.0, z], atol=0.03)
         assert row[1] == pytest.approx(np.pi * radius**2, rel=0.1)
         assert row[2:] == ("flat", None)
+    colours = dict(conn.execute("SELECT kind, rgb FROM tunnel_api.spot_map").fetchall())
+    # On the outline's pixels a few points of the wall are among those of the rust.
+    np.testing.assert_allclose(colours["dark"], RUST_COLOUR, atol=6)
+    assert colours["bright"] is None or np.abs(np.subtract(colours["bright"], WALL_COLOUR)).max() <= 1
     radius, seen = conn.execute(
         "SELECT f.radius, m.seen_share FROM tunnel_api.face f JOIN tunnel_api.member_statistics m"
         " ON m.survey_id = f.survey_id AND m.number = f.member WHERE f.kind = 'pipe'"
@@ -136,6 +146,9 @@ def test_spots_of_a_site(files: Path, conn: psycopg.Connection, tmp_path: Path) 
     assert "rust" in (tmp_path / "spots.csv").read_text()
     features = json.loads((tmp_path / "spots.geojson").read_text())["features"]
     assert {f["properties"]["number"] for f in features} == {row[1] for row in found.values()}
+    written = {f["properties"]["kind"]: f["properties"]["rgb"] for f in features}
+    assert written["dark"] == ", ".join(map(str, colours["dark"]))
+    assert {spot["kind"]: spot["rgb"] for spot in told["spots"]} == colours
 
     # A reviewed spot that is not found again stays; files that changed make the list out of date.
     (tmp_path / "first.laz").write_bytes((files / "mended.laz").read_bytes())

@@ -12,6 +12,7 @@ from support.real_scans import real_scan
 
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.e57 import read_e57_scans, scan_number
+from tunneldb.pointcloud.formats.table import has_colours
 from tunneldb.pointcloud.reader import check_header, crs_note, read_chunks, read_header
 from tunneldb.pointcloud.stations import read_stations
 
@@ -36,7 +37,8 @@ def own(fields: Mapping[str, np.ndarray]) -> np.ndarray:
 
 def read(path: Path, dimension: str | None = "intensity", **options: Any) -> dict[str, np.ndarray]:
     chunks = list(read_chunks(path, dimension, **options))
-    return {name: np.concatenate([getattr(chunk, name) for chunk in chunks]) for name in chunks[0].__dataclass_fields__}
+    names = [name for name in chunks[0].__dataclass_fields__ if getattr(chunks[0], name) is not None]
+    return {name: np.concatenate([getattr(chunk, name) for chunk in chunks]) for name in names}
 
 
 def test_pose_turns_and_moves_points(tmp_path: Path) -> None:
@@ -48,6 +50,27 @@ def test_pose_turns_and_moves_points(tmp_path: Path) -> None:
     assert not points["time"].any()
     assert not points["classification"].any()
     assert set(points["scan_id"]) == {scan_number("{A}", STATION)}
+
+
+def test_colours_have_16_bits_whatever_the_file_s(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    colour = rng.integers(0, 1024, (3, 1000))
+    names = ("colorRed", "colorGreen", "colorBlue")
+    hidden = np.arange(1000) % 7 == 0
+    flags = {"isColorInvalid": hidden.astype(int)}
+    limits = {f"{name}{end}": value for name in names for end, value in (("Minimum", 0.0), ("Maximum", 1023.0))}
+    bytes_ = dict(zip(names, rng.integers(0, 256, (3, 1000)), strict=True))
+    path = e57.write(
+        tmp_path / "a.e57",
+        [e57.Scan({**cloud(), **dict(zip(names, colour, strict=True)), **flags}, STATION, colour_limits=limits),
+         e57.Scan({**cloud(), **bytes_}, STATION, guid="{B}")],
+    )  # fmt: skip
+    assert has_colours(path)
+    assert "colour" not in read(path)
+    read_ = read(path, colours=True)["colour"]
+    np.testing.assert_array_equal(read_[:1000], np.rint(np.where(hidden, 0, colour) * 65535 / 1023).astype(int).T)
+    np.testing.assert_array_equal(read_[1000:], np.array(list(bytes_.values())).T * 257)
+    assert not has_colours(e57.write(tmp_path / "b.e57", [e57.Scan(cloud(), STATION)]))
 
 
 def test_points_are_where_pye57_puts_them(tmp_path: Path) -> None:

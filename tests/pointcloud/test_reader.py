@@ -13,6 +13,7 @@ from support.real_scans import real_scan
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.las_bounds import header_box
 from tunneldb.pointcloud.formats.raw import read_raw
+from tunneldb.pointcloud.formats.table import has_colours
 from tunneldb.pointcloud.reader import check_header, crs_note, read_chunks, read_header
 
 
@@ -151,6 +152,21 @@ def test_raw_points_are_the_stored_ones(tmp_path: Path) -> None:
     np.testing.assert_array_equal(raw.offsets, [500_000, 4_500_000, 100])
     (bare,) = read_raw(tmp_path / "a.laz", None)
     assert bare.intensity is None
+
+
+@pytest.mark.parametrize("dimension", [None, "intensity", "Amplitude"])
+def test_colours_are_read_where_they_are_asked_for(tmp_path: Path, dimension: str | None) -> None:
+    write(tmp_path / "plain.laz", 100)
+    assert not has_colours(tmp_path / "plain.laz")
+    assert next(read_chunks(tmp_path / "plain.laz", dimension, colours=True)).colour is None
+    las = write(tmp_path / "a.laz", 1000, point_format=7)
+    las.red, las.green, las.blue = np.random.default_rng(1).integers(0, 65536, (3, 1000))
+    las.write(tmp_path / "a.laz")
+    assert has_colours(tmp_path / "a.laz")
+    assert next(read_chunks(tmp_path / "a.laz", dimension)).colour is None
+    chunks = list(read_chunks(tmp_path / "a.laz", dimension, 300, [(0, 500), (700, 1000)], colours=True))
+    whole = np.column_stack([las.red, las.green, las.blue])
+    np.testing.assert_array_equal(np.vstack([chunk.colour for chunk in chunks]), np.vstack([whole[:500], whole[700:]]))
 
 
 def test_without_a_dimension_intensity_is_nought(tmp_path: Path) -> None:

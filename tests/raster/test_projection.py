@@ -164,7 +164,7 @@ def test_each_point_is_what_the_steps_in_numpy_make_of_it(kind: str, mobile: boo
 def test_the_order_of_points_does_not_change_where_they_fall() -> None:
     points = cloud(30_000, 2)
     order = np.random.default_rng(3).permutation(len(points))
-    mixed = Points(*(getattr(points, name)[order] for name in Points.__dataclass_fields__))
+    mixed = points.some(order)
     projector = Projector.of(observer("amplitude", True), grid(), ROUGHNESS)
     straight = [array[: len(points)].copy() for array in projector.project(points)[0]]
     shuffled = [array[: len(points)].copy() for array in projector.project(mixed)[0]]
@@ -185,7 +185,7 @@ def read(monkeypatch: pytest.MonkeyPatch, look: Observer, parts: list[list[Point
 
 
 def part(points: Points, chosen: np.ndarray) -> Points:
-    return Points(*(getattr(points, name)[chosen] for name in Points.__dataclass_fields__))
+    return points.some(chosen)
 
 
 def test_the_image_depends_neither_on_files_nor_on_threads(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -48,7 +48,8 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     spots = rows(text, "Spots")
     assert [row[0] for row in spots] == [str(spot["number"]) for spot in listed["spots"]]
     assert [float(row[5].replace("\u202f", "")) for row in spots] == [round(1e4 * spot["area"]) for spot in listed["spots"]]
-    assert [(row[10], row[12]) for row in spots] == [("open", ""), ("rejected", "a &lt;shadow&gt;"), ("open", "")]
+    assert [row[10] for row in spots] == ['<i class="colour" style="background: rgb(120, 60, 30)"></i>120, 60, 30', "–", "–"]
+    assert [(row[11], row[13]) for row in spots] == [("open", ""), ("rejected", "a &lt;shadow&gt;"), ("open", "")]
     members = rows(text, "Members")
     assert [(row[0], row[7], row[10]) for row in members] == [
         ("1", "1", ""),
@@ -79,8 +80,26 @@ def test_a_tunnel(conn: psycopg.Connection, example: str, tmp_path: Path) -> Non
     save_example_structures(conn, "demo-2024")
     conn.execute("UPDATE tunnel_api.spot SET review = 'confirmed' WHERE number = 3")
     conn.commit()
-    command("report", "demo-2024", "-o", tmp_path / "with.html", "--from", "12+400")
+    command("report", "demo-2024", "-o", tmp_path / "with.html")
     text = (tmp_path / "with.html").read_text()
     assert [row[0] for row in rows(text, "Spots")] == ["1", "2", "3"]
-    assert "on the whole survey, not on the stretch alone" in text
     assert "Leaks one by one" in text
+
+
+def test_a_stretch_of_a_tunnel(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    save_example_structures(conn, "demo-2024")
+    # Of the wall one face of 4 m² lies before 12+400 and one of 2 m² behind it, each with a spot; the pipe has no chainage.
+    conn.execute("UPDATE tunnel.member SET chainage = 12390 WHERE number = 1")
+    for number, chainage in ((1, 12350.0), (2, 12450.0)):
+        conn.execute("UPDATE tunnel.face SET chainage = %s WHERE number = %s", [chainage, number])
+        conn.execute("UPDATE tunnel.spot SET chainage = %s WHERE number = %s", [chainage, number])
+    conn.commit()
+    for ends, spots, area in ((("--from", "12+400"), ["2"], "2.0"), (("--to", "12+400"), ["1"], "4.0")):
+        command("report", "demo-2024", "-o", tmp_path / "part.html", *ends)
+        text = (tmp_path / "part.html").read_text()
+        assert [row[0] for row in rows(text, "Spots")] == spots
+        assert [row[0] for row in rows(text, "Members")] == ["1"], "the member whose middle is elsewhere, for its spot"
+        assert f"<dt>Faces</dt><dd>{area} " in text
+        assert "0.9 m² of faces have no chainage" in text
+        assert f"<title>spot {spots[0]}</title>" in text
+        assert text.count("<title>spot ") == 1

@@ -21,6 +21,7 @@ class Scan:
     start: float | None = None
     bounds: tuple[np.ndarray, np.ndarray] | None = None
     scaled: Mapping[str, float] = field(default_factory=dict)  # scale of the fields stored as scaled integers
+    colour_limits: Mapping[str, float] = field(default_factory=dict)  # as colorRedMaximum
 
 
 def write(path: Path, scans: Sequence[Scan], metadata: str = "") -> Path:
@@ -63,6 +64,8 @@ def _write_scan(image: libe57.ImageFile, nodes: libe57.VectorNode, name: str, sc
         box = {f"{axis}Minimum": value for axis, value in zip("xyz", low, strict=True)}
         box |= {f"{axis}Maximum": value for axis, value in zip("xyz", high, strict=True)}
         node.set("cartesianBounds", structure(image, **box))
+    if scan.colour_limits:
+        node.set("colorLimits", structure(image, **scan.colour_limits))
     prototype = libe57.StructureNode(image)
     for name, values in scan.fields.items():
         if name in scan.scaled:

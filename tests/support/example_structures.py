@@ -59,9 +59,10 @@ def example_structures() -> Structures:
     ]  # fmt: skip
     places = [(1, 1, Point(1.5, 1.0).buffer(0.3)), (2, 1, Point(0.5, 1.5).buffer(0.2)), (3, 2, box(0.2, -0.1, 0.4, 0.1))]
     spots = [
-        Spot(n + 1, face, member, SPOTS[n + 1], ("sharp",), 0.9, 10.0, 3.0, outline.area, 200, 1, outline)  # type: ignore[arg-type]
+        Spot(n + 1, face, member, SPOTS[n + 1], ("sharp",), 0.9, 10.0, 3.0, outline.area, 200, 1, outline,  # type: ignore[arg-type]
+             (120, 60, 30) if n == 0 else None)
         for n, (face, member, outline) in enumerate(places)
-    ]
+    ]  # fmt: skip
     line = np.array([np.zeros(3), 3.4 * ALONG]) + ORIGIN
     pipe = np.array([centre, centre + 1.9 * axis]) + ORIGIN
     members = [

@@ -18,6 +18,7 @@ from tunneldb.radiometry.correction import Kind
 from tunneldb.store.survey import get_survey
 
 if TYPE_CHECKING:
+    from tunneldb.export.exchange.members import Geometry
     from tunneldb.pipeline.members import FileMembers
     from tunneldb.radiometry.reference_curve import ReferenceCurve
 
@@ -47,6 +48,11 @@ _MOST = 20  # rows of a table that are printed
     help="Curve of a reference target by which range is corrected; auto finds one from the faces.",
 )
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write: .laz or .gpkg; not FILE.")
+@click.option(
+    "--geometry",
+    type=click.Choice(["face", "map", "3d"]),
+    help="Coordinates of a .gpkg: each face's own plane, of a pipe unrolled; the map; in space [3d].",
+)
 @click.pass_obj
 def members(
     settings: Settings,
@@ -56,6 +62,7 @@ def members(
     intensity_kind: str | None,
     reference: str | None,
     output: Path | None,
+    geometry: str | None,
 ) -> None:
     """Find the members of a structure in the files of SURVEY or in a scan FILE, and what differs from its own surface there.
 
@@ -69,9 +76,9 @@ def members(
     from tunneldb.pointcloud.formats.table import scan_suffixes
 
     if survey.lower().endswith(scan_suffixes()):
-        _of_file(Path(survey), stations, intensity, intensity_kind, reference, output)
+        _of_file(Path(survey), stations, intensity, intensity_kind, reference, output, geometry)
         return
-    if stations or output is not None or {intensity, intensity_kind, reference} != {None}:
+    if stations or output is not None or {intensity, intensity_kind, reference, geometry} != {None}:
         raise UserError(f"these options are for a scan file by itself; the survey {survey} has its own: tunneldb survey set")
     _of_survey(settings, survey)
 
@@ -101,6 +108,7 @@ def _of_file(
     intensity_kind: str | None,
     reference: str | None,
     output: Path | None,
+    geometry: str | None,
 ) -> None:
     from tunneldb.export.pointcloud.members import check_target, export_members
     from tunneldb.pipeline.members import Inputs, stations_for
@@ -111,9 +119,11 @@ def _of_file(
         raise UserError(f"{file}: say what {intensity} is: --intensity-kind {'|'.join(get_args(Kind))}")
     if output is not None:
         check_target(file, output)
+    if geometry is not None and (output is None or output.suffix.lower() != ".gpkg"):
+        raise UserError("--geometry is of the polygons of a GeoPackage: add -o out.gpkg")
     inputs = Inputs((file,), intensity, cast(Kind, intensity_kind), stations_for(file, list(stations)), _reference(reference))
     with told_to_end(), bar("points") as progress:
-        found = export_members(inputs, output, step(progress))
+        found = export_members(inputs, output, step(progress), cast("Geometry", geometry or "3d"))
     _tell(found, output)
     _print(found)
     if output is not None:

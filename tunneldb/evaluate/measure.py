@@ -117,8 +117,9 @@ def compare(
     min_area: float,
     stretch: BaseGeometry | None = None,
     progress: Callable[[float], None] = lambda count: None,
+    asked: Bool | None = None,
 ) -> Comparison:
-    """Hold found leaks against true ones.
+    """Hold found leaks, or what else is found, against true ones.
 
     True leaks smaller than ``min_area`` are neither demanded nor do they harm: what is found of them is left out, and so is
     a found leak that touches only such ones. A found leak smaller than ``min_area`` counts only where it touches a leak that
@@ -135,11 +136,14 @@ def compare(
         Leaks are cut to it. Its own edges are no edges of leaks.
     progress : callable
         Given how many leaks, of both, were compared since it was called last; all of them in the end.
+    asked : (n,) bool array, optional
+        Which true leaks may be demanded, as far as ``min_area`` goes; the others are treated as too small.
     """
     whole, called = _cut(true, stretch), _cut(found, stretch)
     areas, called_areas = shapely.area(whole), shapely.area(called)
-    demanded = np.flatnonzero((areas >= min_area) & (areas > 0.0))
-    small = whole[(areas < min_area) & (areas > 0.0)]
+    large = (areas >= min_area) & (True if asked is None else asked)
+    demanded = np.flatnonzero(large & (areas > 0.0))
+    small = whole[~large & (areas > 0.0)]
     t, f = _touching(whole[demanded], called)
     _, unharmed = _touching(small, called)
     hits = np.isin(np.arange(len(called)), f)

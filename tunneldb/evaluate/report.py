@@ -16,29 +16,68 @@ import shapely
 from tunneldb.arrays import Float
 from tunneldb.evaluate.measure import HALF, Comparison, Figures, figures
 
-SIZES = (0.3, 1.0)
-"""Limits between groups of leaks by area, m²."""
-
 DISTANCES = (5.0, 10.0)
 """Limits between groups of leaks by the distance from the nearest scanner position, m."""
 
-COUNT_HEADER = ("leaks", "true", "touched", "found", "recall", "called", "right", "false", "precision", "F1", "IoU")
+COUNT_HEADER = ("true", "touched", "found", "recall", "called", "right", "false", "precision", "F1", "IoU")
 AREA_HEADER = (
     "area", "true m²", "found m²", "recall", "precision", "F1", "IoU", "area error", "p95", "edge mm", "p95",
 )  # fmt: skip
-LIST_HEADER = ("", "id", "chainage", "arc m", "area m²", "of it", "distance m")
 
 
 @dataclass(frozen=True)
-class Leak:
-    """A leak that was held against the others.
+class Subject:
+    """What is held against a truth, and how it is told.
+
+    Attributes
+    ----------
+    name : str
+        Of several.
+    surface : str
+        On what they are sought.
+    square_metres : int
+        Area to which false ones are told.
+    sizes : tuple of float
+        Limits between groups by area, m².
+    decimals : int
+        Of areas, m².
+    place : dict of str to (str, str)
+        Heading and format of what tells the place of one.
+    """
+
+    name: str
+    surface: str
+    square_metres: int
+    sizes: tuple[float, ...]
+    decimals: int
+    place: dict[str, tuple[str, str]]
+
+    @property
+    def count_header(self) -> tuple[str, ...]:
+        """Headings of `count_rows`."""
+        return (self.name, *COUNT_HEADER)
+
+    @property
+    def list_header(self) -> tuple[str, ...]:
+        """Headings of `list_rows`."""
+        return ("", "id", *(heading for heading, _ in self.place.values()), "area m²", "of it", "distance m")
+
+
+LEAKS = Subject("leaks", "lining", 1000, (0.3, 1.0), 2, {"chainage": ("chainage", ".2f"), "arc": ("arc m", "+.2f")})
+SPOTS = Subject("spots", "faces", 100, (0.03, 0.1), 4, {"member": ("member", "d"), "face": ("face", "d")})
+
+
+@dataclass(frozen=True)
+class Item:
+    """A leak or spot that was held against the others.
 
     Attributes
     ----------
     id : str
         What its file or the database calls it.
-    chainage, arc : float
-        Of a point inside it, m.
+    place : dict
+        Where it is: of a leak chainage and arc of a point inside it, m; of a spot member and face, None where it lies on none,
+        and x, y and z of a point inside it, m.
     area : float
         m².
     share : float
@@ -52,8 +91,7 @@ class Leak:
     """
 
     id: str
-    chainage: float
-    arc: float
+    place: dict[str, Any]
     area: float
     share: float
     touched: bool
@@ -70,24 +108,26 @@ class Report:
     ----------
     groups : dict of str to Figures
         Of all leaks under ``all``, then by size, then by distance.
-    true, found : list of Leak
+    true, found : list of Item
         True leaks that are demanded and found leaks that count.
     seen : float
         Lining that was seen, m².
+    subject : Subject
     """
 
     groups: dict[str, Figures]
-    true: list[Leak]
-    found: list[Leak]
+    true: list[Item]
+    found: list[Item]
     seen: float
+    subject: Subject
 
     @property
-    def missed(self) -> list[Leak]:
+    def missed(self) -> list[Item]:
         """True leaks of which less than half was found."""
         return [leak for leak in self.true if leak.share < HALF]
 
     @property
-    def wrong(self) -> list[Leak]:
+    def wrong(self) -> list[Item]:
         """Found leaks of which less than half is true; those that touch no true leak are false."""
         return [leak for leak in self.found if leak.share < HALF]
 
@@ -99,6 +139,8 @@ def make_report(
     distances: tuple[Float, Float],
     min_area: float,
     seen: float,
+    subject: Subject = LEAKS,
+    places: tuple[Sequence[dict[str, Any]], Sequence[dict[str, Any]]] | None = None,
 ) -> Report:
     """Sum a comparison up, for all leaks and by groups.
 
@@ -114,21 +156,37 @@ def make_report(
         m²; the first group by size begins there.
     seen : float
         Lining that was seen, m².
+    subject : Subject
+        What they are; here they are called leaks.
+    places : two sequences of dict, optional
+        Of the n true and the m found leaks; by default chainage and arc, of shapes in the unrolled plane.
     """
     c = comparison
+    if places is None:
+        places = [_unrolled(shape) for shape in c.true_shape], [_unrolled(shape) for shape in c.found_shape]
     groups = {"all": figures(c, seen)}
-    for name, low, high in _ranges(min_area, SIZES, "m²"):
+    for name, low, high in _ranges(min_area, subject.sizes, "m²"):
         groups[name] = figures(c, np.nan, *((low <= area) & (area < high) for area in (c.true_area, c.found_area)))
     for name, low, high in _ranges(0.0, DISTANCES, "m"):
         groups[name] = figures(c, np.nan, *((low <= far) & (far < high) for far in distances))
     true = [
-        _leak(true_ids[k], c.true_shape[i], c.covered[i], c.true_group[i], distances[0][i], c.iou[i], c.area_error[i])
+        _item(
+            true_ids[k],
+            places[0][i],
+            c.true_shape[i],
+            c.covered[i],
+            c.true_group[i],
+            distances[0][i],
+            c.iou[i],
+            c.area_error[i],
+        )
         for i, k in enumerate(c.true)
     ]
     found = [
-        _leak(found_ids[k], c.found_shape[i], c.right[i], c.found_group[i], distances[1][i]) for i, k in enumerate(c.found)
+        _item(found_ids[k], places[1][i], c.found_shape[i], c.right[i], c.found_group[i], distances[1][i])
+        for i, k in enumerate(c.found)
     ]
-    return Report(groups, true, found, seen)
+    return Report(groups, true, found, seen, subject)
 
 
 def _ranges(first: float, limits: Sequence[float], unit: str) -> list[tuple[str, float, float]]:
@@ -141,14 +199,18 @@ def _ranges(first: float, limits: Sequence[float], unit: str) -> list[tuple[str,
     ]
 
 
-def _leak(
-    key: str, shape: Any, share: float, group: int, distance: float, iou: float = math.nan, area_error: float = math.nan
-) -> Leak:
+def _unrolled(shape: Any) -> dict[str, Any]:
     inside = shapely.point_on_surface(shape)
-    return Leak(
-        key, float(inside.x), float(inside.y), float(shape.area), float(share), bool(group >= 0),
-        _known(iou), _known(area_error), _known(distance),
-    )  # fmt: skip
+    return {"chainage": float(inside.x), "arc": float(inside.y)}
+
+
+def _item(
+    key: str, place: dict[str, Any], shape: Any, share: float, group: int, distance: float, iou: float = math.nan,
+    area_error: float = math.nan,
+) -> Item:  # fmt: skip
+    return Item(
+        key, place, float(shape.area), float(share), bool(group >= 0), _known(iou), _known(area_error), _known(distance)
+    )
 
 
 def count_rows(report: Report) -> list[list[str]]:
@@ -162,8 +224,9 @@ def count_rows(report: Report) -> list[list[str]]:
 
 def area_rows(report: Report) -> list[list[str]]:
     """How much of their area was found, and how near to their edges, group by group."""
+    size = report.subject.decimals
     return [
-        [name, f"{f.true_area:.2f}", f"{f.found_area:.2f}", _share(f.area_recall), _share(f.area_precision),
+        [name, f"{f.true_area:.{size}f}", f"{f.found_area:.{size}f}", _share(f.area_recall), _share(f.area_precision),
          _share(f.area_f1), _share(f.area_iou), _percent(f.area_error), _percent(f.area_error_p95),
          _millimetres(f.edge), _millimetres(f.edge_p95)]
         for name, f in report.groups.items()
@@ -172,22 +235,26 @@ def area_rows(report: Report) -> list[list[str]]:
 
 def list_rows(report: Report) -> list[list[str]]:
     """True leaks that were missed, and found ones that are wrong."""
-    rows = []
+    rows, subject = [], report.subject
     for what, leaks in (("missed", report.missed), ("wrong", report.wrong)):
         for leak in leaks:
             word = what if leak.touched or what == "missed" else "false"
             far = "" if leak.distance is None else f"{leak.distance:.1f}"
-            at = f"{leak.chainage:.2f}", f"{leak.arc:+.2f}", f"{leak.area:.2f}", _percent(leak.share)
-            rows.append([word, leak.id, *at, far])
+            at = ["" if leak.place[key] is None else f"{leak.place[key]:{form}}" for key, (_, form) in subject.place.items()]
+            rows.append([word, leak.id, *at, f"{leak.area:.{subject.decimals}f}", _percent(leak.share), far])
     return rows
 
 
 def false_line(report: Report) -> str:
-    """Say how many false leaks there are for each 1000 m² of lining."""
-    of_all = report.groups["all"]
+    """Say how many false leaks there are for each 1000 m² of lining, or what else they are and lie on."""
+    of_all, subject = report.groups["all"], report.subject
     if not math.isfinite(of_all.false_per_1000):
-        return f"{of_all.false} false leaks; how much lining was seen is not known"
-    return f"{of_all.false_per_1000:.2f} false leaks for each 1000 m² of the {report.seen:.0f} m² of lining that were seen"
+        return f"{of_all.false} false {subject.name}; how much {subject.surface} was seen is not known"
+    false = of_all.false_per_1000 * subject.square_metres / 1000.0
+    return (
+        f"{false:.2f} false {subject.name} for each {subject.square_metres} m² of the {report.seen:.0f} m² of"
+        f" {subject.surface} that were seen"
+    )
 
 
 def as_values(report: Report, about: dict[str, Any]) -> dict[str, Any]:
@@ -196,8 +263,8 @@ def as_values(report: Report, about: dict[str, Any]) -> dict[str, Any]:
         **about,
         "seen_m2": _known(report.seen),
         "groups": [{"group": name, **_plain(of)} for name, of in report.groups.items()],
-        "true": [asdict(leak) for leak in report.true],
-        "found": [asdict(leak) for leak in report.found],
+        "true": [_plain_item(leak) for leak in report.true],
+        "found": [_plain_item(leak) for leak in report.found],
     }
 
 
@@ -213,6 +280,11 @@ def as_csv(report: Report) -> str:
     writer.writerow(["group", *(field.name for field in fields(Figures))])
     writer.writerows([name, *_plain(of).values()] for name, of in report.groups.items())
     return out.getvalue()
+
+
+def _plain_item(item: Item) -> dict[str, Any]:
+    values = asdict(item)
+    return {"id": values.pop("id"), **values.pop("place"), **values}
 
 
 def _plain(of: Figures) -> dict[str, int | float | None]:

@@ -22,9 +22,6 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.survey import Survey
 
-LAYER = "leak"
-"""Layer that is read where a file has several."""
-
 
 @dataclass(frozen=True)
 class Truth:
@@ -63,27 +60,66 @@ def read_truth(conn: psycopg.Connection[Any], survey: Survey, path: Path, layer:
         The file can't be read, has no such layer or no polygon, another coordinate system, or a geometry that is no valid
         polygon or lies off the tunnel.
     """
-    chosen = _layer(path, layer)
+    given = read_polygons(path, survey, layer, "leak")
+    ids, shapes = given.ids, given.shapes
+    if given.in_space:
+        shapes = [_unrolled(conn, survey, shape, given.naming(key)) for key, shape in zip(ids, shapes, strict=True)]
+    for key, shape in zip(ids, shapes, strict=True):
+        if not shape.is_valid:
+            raise UserError(
+                f"{given.naming(key)} is no valid polygon ({shapely.is_valid_reason(shape)}): mend it, and try again"
+            )
+    return Truth(ids, shapes)
+
+
+@dataclass(frozen=True)
+class Polygons:
+    """Polygons of a layer.
+
+    Attributes
+    ----------
+    where : str
+        File and layer, for messages.
+    noun : str
+        What one of them is.
+    ids : list of str
+    shapes : list of Polygon or MultiPolygon
+    in_space : bool
+        Whether they are in the tunnel's system; else they have none.
+    """
+
+    where: str
+    noun: str
+    ids: list[str]
+    shapes: list[Polygon | MultiPolygon]
+    in_space: bool
+
+    def naming(self, key: str) -> str:
+        """What a message calls one of them."""
+        return f"{self.where}, {self.noun} {key}"
+
+
+def read_polygons(path: Path, survey: Survey, layer: str | None, noun: str) -> Polygons:
+    """Read the polygons of a layer, by default of the only one or of that called ``noun``.
+
+    Raises
+    ------
+    UserError
+        See `read_truth`.
+    """
+    chosen = _layer(path, layer, noun)
     where = f"{path}, layer {chosen}"
     try:
         meta, _, wkb, columns = pyogrio.raw.read(str(path), layer=chosen)
     except (DataSourceError, DataLayerError, RuntimeError) as error:
         raise UserError(f"{where}: cannot be read: {_line(error)}") from None
     if wkb is None or not len(wkb):
-        raise UserError(f"{where} is empty: there must be at least one polygon; what has no leak has nothing to compare with")
+        raise UserError(f"{where} is empty: there must be at least one polygon; what has no {noun} has nothing to compare with")
     ids = _ids(meta, columns, len(wkb))
-    shapes = _polygons(wkb, ids, where)
-    if _in_space(path, meta["crs"], survey, where):
-        shapes = [_unrolled(conn, survey, shape, f"{where}, leak {key}") for key, shape in zip(ids, shapes, strict=True)]
-    for key, shape in zip(ids, shapes, strict=True):
-        if not shape.is_valid:
-            raise UserError(
-                f"{where}, leak {key} is no valid polygon ({shapely.is_valid_reason(shape)}): mend it, and try again"
-            )
-    return Truth(ids, shapes)
+    return Polygons(where, noun, ids, _polygons(wkb, ids, where, noun), _in_space(path, meta["crs"], survey, where, noun))
 
 
-def _layer(path: Path, wanted: str | None) -> str:
+def _layer(path: Path, wanted: str | None, noun: str) -> str:
     """Layer of a file that is to be read."""
     if not path.is_file():
         raise UserError(f"{path}: there is no such file")
@@ -96,9 +132,9 @@ def _layer(path: Path, wanted: str | None) -> str:
         if wanted not in there:
             raise UserError(f"{path} has no layer {wanted}; it has {listed}")
         return wanted
-    if len(there) != 1 and LAYER not in there:
-        raise UserError(f"{path} has the layers {listed}: say by --layer which holds the true leaks")
-    return LAYER if LAYER in there else there[0]
+    if len(there) != 1 and noun not in there:
+        raise UserError(f"{path} has the layers {listed}: say by --layer which holds the true {noun}s")
+    return noun if noun in there else there[0]
 
 
 def _ids(meta: dict[str, Any], columns: list[NDArray[Any]], count: int) -> list[str]:
@@ -106,24 +142,24 @@ def _ids(meta: dict[str, Any], columns: list[NDArray[Any]], count: int) -> list[
     return [str(v) for v in columns[names.index("id")]] if "id" in names else [str(k + 1) for k in range(count)]
 
 
-def _polygons(wkb: NDArray[np.object_], ids: list[str], where: str) -> list[Polygon | MultiPolygon]:
+def _polygons(wkb: NDArray[np.object_], ids: list[str], where: str, noun: str) -> list[Polygon | MultiPolygon]:
     """Geometries, each of which must be a polygon, or several."""
     shapes = []
     for key, data in zip(ids, wkb, strict=True):
         try:
             shape = None if data is None else shapely.from_wkb(data)
         except shapely.errors.GEOSException as error:
-            raise UserError(f"{where}, leak {key} is no valid polygon ({_line(error)}): mend it, and try again") from None
+            raise UserError(f"{where}, {noun} {key} is no valid polygon ({_line(error)}): mend it, and try again") from None
         if not isinstance(shape, Polygon | MultiPolygon) or shape.is_empty:
             kind = "nothing" if shape is None or shape.is_empty else shape.geom_type
-            raise UserError(f"{where}, leak {key} is {kind}: each leak must be a polygon")
+            raise UserError(f"{where}, {noun} {key} is {kind}: each {noun} must be a polygon")
         if not np.isfinite(shapely.get_coordinates(shape)).all():
-            raise UserError(f"{where}, leak {key} has a coordinate that is no number: mend it, and try again")
+            raise UserError(f"{where}, {noun} {key} has a coordinate that is no number: mend it, and try again")
         shapes.append(shape)
     return shapes
 
 
-def _in_space(path: Path, given: str | None, survey: Survey, where: str) -> bool:
+def _in_space(path: Path, given: str | None, survey: Survey, where: str, noun: str) -> bool:
     """Whether the polygons are in the tunnel's system, and not in the unrolled plane, which has none."""
     if given is None or _bare_geojson(path):
         return False
@@ -138,6 +174,9 @@ def _in_space(path: Path, given: str | None, survey: Survey, where: str) -> bool
     if flat is not None and not local and flat.equals(pyproj.CRS.from_epsg(survey.srid), ignore_axis_order=True):
         return True
     name = crs.name if crs is not None else given
+    if noun == "spot":
+        system = "without a coordinate system" if local else f"in EPSG:{survey.srid}"
+        raise UserError(f"{where} is in {name}: polygons of spots must be 3D, {system}")
     space = "" if local else f", or 3D in the tunnel's, EPSG:{survey.srid}"
     raise UserError(f"{where} is in {name}: polygons must be in the unrolled plane, without a coordinate system{space}")
 

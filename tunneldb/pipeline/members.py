@@ -23,7 +23,7 @@ from tunneldb.pointcloud.stations import read_stations
 from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
 from tunneldb.radiometry.intensity_kind import contradiction
-from tunneldb.radiometry.range_curve import estimate_range_curve
+from tunneldb.radiometry.range_curve import ADVICE, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.structures.contrast import observe_face
 from tunneldb.structures.face_raster import Sums
@@ -45,6 +45,8 @@ NOTED_SATURATED = 0.01
 
 UNKNOWN = 0.01
 """Share of points without a scanner position that may be left out."""
+
+_WITHOUT = "on each flat face the level goes by incidence, which tells the range there, on each pipe by both"
 
 _SAMPLES = 400_000
 _SAMPLE_OF_VALUES = 100_000
@@ -166,7 +168,7 @@ def _usable(path: Path, dimension: str) -> ScanHeader:
 def numbers_of_points(inputs: Inputs, members: FileMembers) -> Iterator[tuple[UInt32, UInt32, UInt32]]:
     """Face, member and spot of all points, in the order of the files, chunk by chunk; 0 is none."""
     finder, found = members.segmentation.finder, members.found
-    for points, scan, use in _read_all(inputs, lambda count: None):
+    for points, scan, use in read_all(inputs, lambda count: None):
         out = np.zeros((3, len(points)), np.uint32)
         face, pixel = finder.find(points.xyz[use], scan[use])
         out[:, use] = found.of_points(face, pixel)
@@ -241,7 +243,7 @@ class _Values:
 
 def _read(inputs: Inputs, values: _Values | None, progress: Callable[[float], None]) -> Iterator[tuple[Points, Int32]]:
     """Points whose scanner position is known, with the place of their scan among the stations."""
-    for points, scan, use in _read_all(inputs, progress):
+    for points, scan, use in read_all(inputs, progress):
         if values is not None:
             values.add(points, int(use.size))
             _refuse_unknown(inputs, points, values)
@@ -253,10 +255,12 @@ def _refuse_unknown(inputs: Inputs, points: Points, values: _Values) -> None:
         raise UserError(f"{inputs.name}: {inputs.poses.faults(points).text() or 'points without a scanner position'}")
 
 
-def _read_all(inputs: Inputs, progress: Callable[[float], None]) -> Iterator[tuple[Points, Int32, Int64]]:
+def read_all(
+    inputs: Inputs, progress: Callable[[float], None], *, colours: bool = False
+) -> Iterator[tuple[Points, Int32, Int64]]:
     """All points, the place of their scan among the stations, and which of them have one."""
     ids = inputs.poses.scan_id
-    files = chain.from_iterable(read_chunks(path, inputs.dimension) for path in inputs.paths)
+    files = chain.from_iterable(read_chunks(path, inputs.dimension, colours=colours) for path in inputs.paths)
     with closing(prefetch(files)) as chunks:
         for points in chunks:
             scan = np.minimum(np.searchsorted(ids, points.scan_id), len(ids) - 1).astype(np.int32)
@@ -271,12 +275,13 @@ def _reference(inputs: Inputs, segmentation: Segmentation, sums: Sums) -> tuple[
     if isinstance(inputs.reference, ReferenceCurve):
         return inputs.reference, None
     if inputs.reference is None:
-        return None, (
-            "no reference curve: on each flat face the level goes by incidence, which tells the range there, on each pipe by"
-            " both; --reference auto has it found from the faces"
-        )
-    found = estimate_range_curve(_samples(segmentation, sums), unrolled=False)
-    found.require()
+        return None, f"no reference curve: {_WITHOUT}; --reference auto has it found from the faces"
+    try:
+        found = estimate_range_curve(_samples(segmentation, sums), unrolled=False)
+        found.require()
+    except UserError as error:
+        why = str(error).removesuffix(f"; {ADVICE}").replace("lining", "surface")
+        return None, f"no reference curve could be found from the faces ({why}), so none is used: {_WITHOUT}"
     return found.curve, f"reference curve found from the faces, {found.nearest:.1f} to {found.farthest:.1f} m"
 
 

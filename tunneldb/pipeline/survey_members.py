@@ -9,7 +9,8 @@ import psycopg
 
 from tunneldb.database import snapshot
 from tunneldb.errors import UserError
-from tunneldb.pipeline.members import AUTO, Begin, FileMembers, Inputs, find_members
+from tunneldb.pipeline.members import AUTO, Begin, FileMembers, Inputs
+from tunneldb.pipeline.spot_colours import find_coloured_members
 from tunneldb.radiometry.correction import Kind
 from tunneldb.store.images import load_reference
 from tunneldb.store.ledger import stage_run
@@ -55,7 +56,7 @@ def find_survey_members(conn: psycopg.Connection[Any], survey: Survey, begin: Be
             surface = None if survey.site else load_surface(conn, survey)
         except UserError:  # before stage sections
             surface = None
-    found = find_members(inputs, begin)
+    found = find_coloured_members(inputs, begin)
     structures = found.found.structures
     with stage_run(conn, survey.id, None, "members", made_from) as run:
         saved = save_structures(conn, survey, structures, surface)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pyproj import CRS
 
-from tunneldb.arrays import Bool, Float, Int32, Single, UInt8
+from tunneldb.arrays import Bool, Float, Int32, Single, UInt8, UInt16
 
 CHUNK = 1_000_000
 
@@ -39,6 +39,9 @@ class Raw:
         The chosen dimension in its own unit, with the scale and offset that the file gives it; None when none was chosen.
     classification : (n,) uint8 array or None
         Class code; None where the file has none.
+    colour : (n, 3) uint16 array or None
+        Red, green, blue as the file has them, black where a point has none; None where they were not asked for, or the file
+        has none.
     """
 
     x: NDArray[Any]
@@ -50,6 +53,7 @@ class Raw:
     scan_id: NDArray[Any]
     intensity: NDArray[Any] | None
     classification: UInt8 | None
+    colour: UInt16 | None = None
 
     def __len__(self) -> int:
         return len(self.x)
@@ -66,6 +70,7 @@ class Raw:
             scan_id=self.scan_id[chosen],
             intensity=None if self.intensity is None else self.intensity[chosen],
             classification=None if self.classification is None else self.classification[chosen],
+            colour=None if self.colour is None else self.colour[chosen],
         )
 
 
@@ -85,6 +90,8 @@ class Points:
         The raw values of the chosen dimension, in its own unit; 0 when none was chosen.
     classification : (n,) uint8 array
         Class code of the file; 0 where it has none.
+    colour : (n, 3) uint16 array or None
+        As of `Raw`.
     """
 
     xyz: Float
@@ -92,6 +99,7 @@ class Points:
     scan_id: Int32
     intensity: Single
     classification: UInt8
+    colour: UInt16 | None = None
 
     def __len__(self) -> int:
         return len(self.xyz)
@@ -99,8 +107,9 @@ class Points:
     def some(self, chosen: NDArray[Any]) -> Points:
         """The chosen points, by number or by mask."""
         return Points(
-            self.xyz[chosen], self.time[chosen], self.scan_id[chosen], self.intensity[chosen], self.classification[chosen]
-        )
+            self.xyz[chosen], self.time[chosen], self.scan_id[chosen], self.intensity[chosen], self.classification[chosen],
+            None if self.colour is None else self.colour[chosen],
+        )  # fmt: skip
 
     def finite(self, *, time: bool, intensity: bool) -> Bool | None:
         """Which points have finite coordinates, and a finite time and intensity where these are asked for; None if all have."""
@@ -129,6 +138,7 @@ class Points:
             np.array(raw.scan_id, np.int32),
             np.zeros(count, np.float32) if raw.intensity is None else np.array(raw.intensity, np.float32),
             np.zeros(count, np.uint8) if raw.classification is None else np.array(raw.classification, np.uint8),
+            raw.colour,
         )
 
 

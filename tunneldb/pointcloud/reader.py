@@ -84,7 +84,9 @@ def crs_note(header: ScanHeader, srid: int) -> str | None:
     return f"states {said}: taken to be in the tunnel's, {srid_name(srid)}"
 
 
-def read_chunks(path: Path, dimension: str | None, size: int = CHUNK, ranges: Ranges | None = None) -> Iterator[Points]:
+def read_chunks(
+    path: Path, dimension: str | None, size: int = CHUNK, ranges: Ranges | None = None, *, colours: bool = False
+) -> Iterator[Points]:
     """Read a scan file chunk by chunk.
 
     Parameters, order and errors are those of `pointcloud.formats.raw.read_raw`; without a dimension the intensity is 0.
@@ -94,7 +96,7 @@ def read_chunks(path: Path, dimension: str | None, size: int = CHUNK, ranges: Ra
     Points
         In file order within a range; those without finite coordinates are left out.
     """
-    for points in map(Points.of, read_raw(path, dimension, size, ranges)):
+    for points in map(Points.of, read_raw(path, dimension, size, ranges, colours=colours)):
         finite = points.finite(time=False, intensity=False)
         yield points if finite is None else points.some(finite)
 

@@ -157,8 +157,9 @@ class _Report:
         self.strips = Strips(conn, survey, low, high, self.leaks, self.coverage, pictured, form, progress)
         self.place = data.place_name(conn, survey)
         self.cards = min(CARDS, len(pictured))
-        found = read_structures(conn, survey)
-        self.structures = found if found and found.spots.face_area > 0.0 else None
+        self.part = (low, high) != data.find_stretch(conn, survey, -np.inf, np.inf)
+        found = read_structures(conn, survey, (low, high) if self.part else None)
+        self.structures = found if found and (found.spots.face_area > 0.0 or (self.part and found.spots.statement)) else None
 
     def context(self) -> dict[str, Any]:
         """Return all that the template shows."""
@@ -199,7 +200,7 @@ class _Report:
             "structures": self.structures,
             "edits": [text.edit(edit, numbers) for edit in edits],
             "edits_in_all": edits_in_all,
-            "part": (low, high) != data.find_stretch(conn, survey, -np.inf, np.inf),
+            "part": self.part,
             "sought": survey.intensity_kind != "none",
             "unposed": survey.note,
             "crs": text.crs(crs_text(conn, survey.srid)),

@@ -9,7 +9,7 @@ import psycopg
 import shapely
 from psycopg.rows import dict_row
 
-from tunneldb.export.tables.spots import ListedSpot, SpotList, read_spots
+from tunneldb.export.tables.spots import ListedSpot, SpotList, SpotSelection, read_spots
 from tunneldb.report.drawing import outline_path, step_for
 from tunneldb.store.survey import Survey
 
@@ -90,23 +90,40 @@ class StructuresChapter:
     by_review: dict[str, int]
 
     @property
+    def coloured(self) -> bool:
+        """Whether any of the spots has a colour."""
+        return any(spot.rgb for spot in self.spots.rows)
+
+    @property
     def lost(self) -> list[ListedSpot]:
         """Spots that an inspector confirmed and the last run did not find again."""
         return [spot for spot in self.spots.rows if not spot.detected]
 
 
-def read_structures(conn: psycopg.Connection[Any], survey: Survey) -> StructuresChapter | None:
-    """Read what is stated of a survey's structures; None where members were never found, nor looked for."""
-    spots = read_spots(conn, survey)
+def read_structures(
+    conn: psycopg.Connection[Any], survey: Survey, stretch: tuple[float, float] | None = None
+) -> StructuresChapter | None:
+    """Read what is stated of a survey's structures; None where members were never found, nor looked for.
+
+    Parameters
+    ----------
+    conn, survey
+        Where from.
+    stretch : (float, float), optional
+        Only spots, faces and members whose middles lie between these chainages, m, and members that spots in there are on.
+    """
+    spots = read_spots(conn, survey, selection=SpotSelection(stretch=stretch))
     with conn.cursor(row_factory=dict_row) as cursor:
         rows = cursor.execute(
-            "SELECT number, kind, length, label, faces, area, coalesce(seen_share, 0) AS seen_share, bimodal, spots, dark_area,"
-            " bright_area, spot_share FROM tunnel_api.member_sheet WHERE survey = %s ORDER BY number",
+            "SELECT number, kind, length, chainage, label, faces, area, coalesce(seen_share, 0) AS seen_share, bimodal, spots,"
+            " dark_area, bright_area, spot_share FROM tunnel_api.member_sheet WHERE survey = %s ORDER BY number",
             [survey.name],
         ).fetchall()
     if not rows and not spots.searched:
         return None
     shown = {spot.member for spot in spots.rows if spot.member is not None}
+    if stretch is not None:
+        rows = [row for row in rows if row["number"] in shown or _between(row["chainage"], stretch)]
     listed = [row for row in rows if row["number"] in shown or row["bimodal"] or row["seen_share"] < HIDDEN]
     named = {row["number"] for row in listed}
     others = [row for row in rows if row["number"] not in named]
@@ -116,6 +133,10 @@ def read_structures(conn: psycopg.Connection[Any], survey: Survey) -> Structures
         _pictures(conn, survey, sorted(pictured), {spot.number for spot in spots.rows}),
         {review: sum(spot.review == review for spot in spots.rows) for review in ("open", "confirmed", "rejected")},
     )  # fmt: skip
+
+
+def _between(chainage: float | None, stretch: tuple[float, float]) -> bool:
+    return chainage is not None and stretch[0] <= chainage <= stretch[1]
 
 
 def _pictures(conn: psycopg.Connection[Any], survey: Survey, members: list[int], listed: set[int]) -> list[Picture]:

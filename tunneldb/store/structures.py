@@ -22,9 +22,6 @@ from tunneldb.structures.results import Face, Member, Spot, Structures
 NEAR = 0.05
 """An earlier spot lies on a face if no vertex of it is farther from it, m: registration of scans is better than that."""
 
-UPRIGHT = 0.02
-"""Width on the map of what stands upright there, m."""
-
 
 @dataclass(frozen=True)
 class SavedSpots:
@@ -189,25 +186,24 @@ def _insert_face(conn: psycopg.Connection[Any], survey: Survey, face: Face, memb
 
 _INSERT = """
     INSERT INTO tunnel.spot (survey_id, number, face_id, kind, reasons, confidence, contrast, difference, area, points, scans,
-                             chainage, outline, map, surface)
+                             rgb, chainage, outline, map, surface)
     VALUES (%(survey_id)s, %(number)s, %(face_id)s, %(kind)s, %(reasons)s, %(confidence)s, %(contrast)s, %(difference)s,
-            %(area)s, %(points)s, %(scans)s, %(chainage)s, public.ST_GeomFromWKB(%(outline)s, 0),
+            %(area)s, %(points)s, %(scans)s, %(rgb)s, %(chainage)s, public.ST_GeomFromWKB(%(outline)s, 0),
             public.ST_GeomFromWKB(%(map)s, %(srid)s::int), public.ST_GeomFromWKB(%(surface)s, %(srid)s::int))
 """
 _UPDATE = """
     UPDATE tunnel.spot
        SET face_id = %(face_id)s, reasons = %(reasons)s, confidence = %(confidence)s, contrast = %(contrast)s,
-           difference = %(difference)s, area = %(area)s, points = %(points)s, scans = %(scans)s, chainage = %(chainage)s,
-           outline = public.ST_GeomFromWKB(%(outline)s, 0), map = public.ST_GeomFromWKB(%(map)s, %(srid)s::int),
-           surface = public.ST_GeomFromWKB(%(surface)s, %(srid)s::int), detected = true, detected_at = now()
+           difference = %(difference)s, area = %(area)s, points = %(points)s, scans = %(scans)s, rgb = %(rgb)s,
+           chainage = %(chainage)s, outline = public.ST_GeomFromWKB(%(outline)s, 0),
+           map = public.ST_GeomFromWKB(%(map)s, %(srid)s::int), surface = public.ST_GeomFromWKB(%(surface)s, %(srid)s::int),
+           detected = true, detected_at = now()
      WHERE id = %(id)s
 """
 
 
 def _spot_row(spot: Spot, face: Face, surface: Surface | None, survey: Survey) -> dict[str, Any]:
     solid = face.in_space(spot.outline)
-    plan = face.on_map(spot.outline)
-    plan = plan if isinstance(plan, Polygon) else plan.convex_hull.buffer(UPRIGHT / 2.0, cap_style="flat")
     return {
         "kind": spot.kind,
         "reasons": list(spot.reasons),
@@ -217,9 +213,10 @@ def _spot_row(spot: Spot, face: Face, surface: Surface | None, survey: Survey) -
         "area": spot.area,
         "points": spot.points,
         "scans": spot.scans,
+        "rgb": None if spot.rgb is None else list(spot.rgb),
         "chainage": _chainage(shapely.get_coordinates(solid, include_z=True).mean(axis=0), surface),
         "outline": shapely.to_wkb(spot.outline),
-        "map": shapely.to_wkb(plan),
+        "map": shapely.to_wkb(face.on_map(spot.outline)),
         "surface": shapely.to_wkb(solid),
         "srid": survey.srid,
     }

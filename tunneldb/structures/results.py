@@ -17,6 +17,9 @@ from tunneldb.structures.models import RADIUS, to_space
 SIMPLIFY = 0.75
 """Tolerance by which outlines of faces are simplified, pixels."""
 
+UPRIGHT = 0.02
+"""Width on the map of what stands upright there, m."""
+
 _CHORD = 0.005  # m by which an edge of a polygon may cut the corner of a curved face
 
 Kind = Literal["flat", "pipe"]
@@ -117,10 +120,11 @@ class Face:
         lifted = shapely.force_3d(shape)
         return shapely.set_coordinates(lifted, raised)
 
-    def on_map(self, shape: shapely.Geometry) -> shapely.Geometry:
-        """Where a geometry of unrolled coordinates lies in plan; what stands upright is a line there."""
+    def on_map(self, shape: Polygon) -> Polygon:
+        """Where a polygon of unrolled coordinates lies in plan, m; what stands upright is a strip there, `UPRIGHT` wide."""
         placed = shapely.force_2d(self.in_space(shape))
-        return placed if placed.is_valid and placed.area > 0.05 * shape.area else placed.convex_hull
+        plan = placed if placed.is_valid and placed.area > 0.05 * shape.area else placed.convex_hull
+        return plan if isinstance(plan, Polygon) else plan.buffer(UPRIGHT / 2.0, cap_style="flat")
 
 
 @dataclass(frozen=True)
@@ -148,6 +152,8 @@ class Spot:
         Scans that saw it.
     outline : Polygon
         Of unrolled (u, v), m.
+    rgb : (int, int, int) or None
+        Mean colour of its points, 0 to 255; None where they have none.
     """
 
     number: int
@@ -162,6 +168,7 @@ class Spot:
     points: int
     scans: int
     outline: Polygon
+    rgb: tuple[int, int, int] | None = None
 
 
 @dataclass(frozen=True)

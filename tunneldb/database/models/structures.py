@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from geoalchemy2 import WKBElement
-from sqlalchemy import BigInteger, ForeignKey, Identity, Index, Text, UniqueConstraint, text
+from sqlalchemy import BigInteger, ForeignKey, Identity, Index, SmallInteger, Text, UniqueConstraint, text
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
@@ -102,6 +102,9 @@ class Spot(Review, Base):
     area: Mapped[float] = mapped_column(comment="Area on its face, m²")
     points: Mapped[int] = mapped_column(BigInteger, comment="Points of the scans on it")
     scans: Mapped[int] = mapped_column(comment="Scans that saw it")
+    rgb: Mapped[list[int] | None] = mapped_column(
+        ARRAY(SmallInteger), comment="Mean colour of its points: red, green, blue, 0 to 255; NULL where they have none"
+    )
     chainage: Mapped[float | None] = mapped_column(comment="Chainage of its middle, m; NULL of a site or beyond the sections")
     outline: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="In its face's own plane, m")
     map: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="On the map, m; what stands upright is 2 cm wide")

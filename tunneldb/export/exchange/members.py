@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pyogrio
@@ -14,14 +14,19 @@ from pyproj import CRS
 
 from tunneldb.export.exchange.gpkg import VERSION
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
+from tunneldb.structures.models import AXIS, POINT, SIDE
 from tunneldb.structures.results import Face, Member, Spot, Structures
 
-MEMBER = "Faces of one surface, joined over what stands before it; in space"
-FACE = "Planes and parts of cylinders; in space. Of what was not seen (1 - seen_share) nothing is known"
-SPOT = "What is darker or brighter than its own surface; in space"
+Geometry = Literal["face", "map", "3d"]
+"""Each face's own plane, of a pipe unrolled; the map; in space."""
+
+_WHERE = {"face": "in each face's own plane", "map": "on the map", "3d": "in space"}
+_MEMBER = "Faces of one surface, joined over what stands before it; {}"
+_FACE = "Planes and parts of cylinders; {}. Of what was not seen (1 - seen_share) nothing is known"
+_SPOT = "What is darker or brighter than its own surface; {}"
 
 
-def write_members(path: Path, found: Structures, crs: CRS | None) -> dict[str, int]:
+def write_members(path: Path, found: Structures, crs: CRS | None, geometry: Geometry = "3d") -> dict[str, int]:
     """Write the layers member, face and spot; how many of each.
 
     Parameters
@@ -30,16 +35,27 @@ def write_members(path: Path, found: Structures, crs: CRS | None) -> dict[str, i
         File that isn't there yet.
     found : Structures
     crs : CRS or None
-        Of the points, where it is known.
+        Of the points, where it is known; a face's own plane has none.
+    geometry : {'face', 'map', '3d'}
+        Members have no plane of their own: with ``face`` their layer has the faces' outlines, each in its own plane.
     """
     faces = {face.number: face for face in found.faces}
-    shapes = {number: _solid(face.in_space(face.outline)) for number, face in faces.items()}
+    shapes = {number: _placed(face, face.outline, geometry) for number, face in faces.items()}
     members = [_together([shapes[number] for number in member.faces]) for member in found.members]
-    spots = [_solid(faces[spot.face].in_space(spot.outline)) for spot in found.spots]
-    _write(path, "member", [member_row(member) for member in found.members], members, crs, MEMBER)
-    _write(path, "face", [face_row(face) for face in found.faces], list(shapes.values()), crs, FACE)
-    _write(path, "spot", [spot_row(spot) for spot in found.spots], spots, crs, SPOT)
+    spots = [_placed(faces[spot.face], spot.outline, geometry) for spot in found.spots]
+    crs, where = None if geometry == "face" else crs, _WHERE[geometry]
+    form = "MultiPolygon Z" if geometry == "3d" else "MultiPolygon"
+    _write(path, "member", [member_row(member) for member in found.members], members, crs, _MEMBER.format(where), form)
+    _write(path, "face", [face_row(face) for face in found.faces], list(shapes.values()), crs, _FACE.format(where), form)
+    _write(path, "spot", [spot_row(spot) for spot in found.spots], spots, crs, _SPOT.format(where), form)
     return {"member": len(members), "face": len(shapes), "spot": len(spots)}
+
+
+def _placed(face: Face, shape: shapely.Geometry, geometry: Geometry) -> shapely.Geometry:
+    """An outline on a face, in the coordinates asked for."""
+    if geometry == "map":
+        return _solid(shapely.union_all([face.on_map(part) for part in shapely.get_parts(shape)]))
+    return _solid(face.in_space(shape) if geometry == "3d" else shape)
 
 
 def member_row(member: Member) -> dict[str, Any]:
@@ -55,7 +71,7 @@ def member_row(member: Member) -> dict[str, Any]:
 
 
 def face_row(face: Face) -> dict[str, Any]:
-    """A face as a row; m, m², degrees, dB."""
+    """A face as a row; m, m², degrees, dB. Of a pipe a point of its axis and this, of a plane a point of it and its normal."""
     return {
         "face": face.number,
         "member": face.member,
@@ -63,6 +79,9 @@ def face_row(face: Face) -> dict[str, Any]:
         "points": face.points,
         "area": face.area,
         "radius": face.radius,
+        "origin": (face.origin + face.model[POINT]).tolist(),
+        "axis": face.model[AXIS].tolist(),
+        "inside": bool(face.model[SIDE] < 0.0),
         "rms": face.rms,
         "seen_share": face.seen_share,
         "incidence_from": face.incidence[0],
@@ -87,6 +106,7 @@ def spot_row(spot: Spot) -> dict[str, Any]:
         "area": spot.area,
         "points": spot.points,
         "scans": spot.scans,
+        "rgb": None if spot.rgb is None else list(spot.rgb),
     }
 
 
@@ -98,9 +118,24 @@ def _together(shapes: Sequence[shapely.Geometry]) -> shapely.Geometry:
     return shapely.MultiPolygon([part for shape in shapes for part in shapely.get_parts(shape)])
 
 
+def _flat(row: dict[str, Any]) -> dict[str, Any]:
+    """A row with a column for each coordinate, and colours as QGIS reads them."""
+    out: dict[str, Any] = {}
+    for name, value in row.items():
+        if name == "rgb":
+            out[name] = None if value is None else ", ".join(map(str, value))
+        elif isinstance(value, list):
+            out |= {f"{name}_{axis}": part for axis, part in zip("xyz", value, strict=True)}
+        else:
+            out[name] = value
+    return out
+
+
 def _write(
-    path: Path, name: str, rows: list[dict[str, Any]], shapes: Sequence[shapely.Geometry], crs: CRS | None, text: str
-) -> None:
+    path: Path, name: str, rows: list[dict[str, Any]], shapes: Sequence[shapely.Geometry], crs: CRS | None, text: str,
+    form: str,
+) -> None:  # fmt: skip
+    rows = [_flat(row) for row in rows]
     names = list(rows[0]) if rows else [name]
     columns = [np.array([row[column] for row in rows]) for column in names] if rows else [np.empty(0, np.int64)]
     columns = [column.astype(object) if column.dtype.kind == "U" else column for column in columns]
@@ -112,7 +147,7 @@ def _write(
             columns,
             np.array(names),
             field_mask=[None] * len(columns),
-            geometry_type="MultiPolygon Z",
+            geometry_type=form,
             crs=crs.to_wkt() if crs is not None else None,
             driver="GPKG",
             layer=name,

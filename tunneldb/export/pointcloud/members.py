@@ -6,10 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tunneldb.errors import UserError
-from tunneldb.export.exchange.members import write_members
+from tunneldb.export.exchange.members import Geometry, write_members
 from tunneldb.export.pointcloud.survey import same_file
 from tunneldb.files import replacing
-from tunneldb.pipeline.members import FileMembers, Inputs, find_members, numbers_of_points
+from tunneldb.pipeline.members import FileMembers, Inputs, numbers_of_points
+from tunneldb.pipeline.spot_colours import find_coloured_members
 from tunneldb.pointcloud.reader import read_header
 from tunneldb.pointcloud.rewrite import rewrite_with_numbers
 
@@ -38,23 +39,23 @@ def check_target(source: Path, target: Path) -> None:
         raise UserError(f"{target.parent}: no such folder")
 
 
-def export_members(inputs: Inputs, target: Path | None, begin: Begin) -> FileMembers:
-    """Find the members of one scan file, and write its points or polygons, if a target is given.
+def export_members(inputs: Inputs, target: Path | None, begin: Begin, geometry: Geometry = "3d") -> FileMembers:
+    """Find the members of one scan file, and write its points, or polygons of a geometry, if a target is given.
 
     Raises
     ------
     UserError
-        If the file cannot be used, see `find_members`; if the target cannot be written.
+        If the file cannot be used, see `find_members` of `pipeline.members`; if the target cannot be written.
     """
     if target is not None:
         check_target(inputs.paths[0], target)
-    members = find_members(inputs, begin)
+    members = find_coloured_members(inputs, begin)
     if target is None:
         return members
     header = read_header(inputs.paths[0])
     with replacing(target) as temporary:
         if target.suffix.lower() == ".gpkg":
-            write_members(temporary, members.found.structures, header.crs)
+            write_members(temporary, members.found.structures, header.crs, geometry)
         else:
             rewrite_with_numbers(
                 inputs.paths[0], temporary, numbers_of_points(inputs, members), DIMENSIONS, begin("writing", header.points)

@@ -56,6 +56,7 @@ class ListedSpot:
     remark: str | None
     detected: bool
     counted: bool
+    rgb: list[int] | None
     geometry: Polygon
 
 
@@ -64,11 +65,21 @@ COLUMNS = tuple(field.name for field in fields(ListedSpot) if field.name != "geo
 
 @dataclass(frozen=True)
 class SpotSelection:
-    """Which spots to read: of a kind, of at least so many m², of which detection is at least so sure."""
+    """Which spots to read.
+
+    Attributes
+    ----------
+    kind : {'dark', 'bright', 'all'}
+    min_area, min_confidence : float
+        Of at least so many m², of which detection is at least so sure.
+    stretch : (float, float) or None
+        Those whose middle has a chainage in between, m, and faces and members likewise; None for all, also those without one.
+    """
 
     kind: Kind = "all"
     min_area: float = 0.0
     min_confidence: float = 0.0
+    stretch: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -118,39 +129,54 @@ def read_spots(
     query = sql.SQL(
         "SELECT {}, public.ST_AsBinary({}) FROM tunnel_api.spot WHERE survey_id = %(survey)s"
         " AND (detected OR review = 'confirmed') AND %(kind)s IN (kind, 'all') AND area >= %(min_area)s"
-        " AND confidence >= %(min_confidence)s ORDER BY member, number"
+        " AND confidence >= %(min_confidence)s"
+        " AND (%(low)s::float8 IS NULL OR chainage BETWEEN %(low)s AND %(high)s) ORDER BY member, number"
     ).format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)), sql.Identifier(_COLUMN[geometry]))
+    low, high = chosen.stretch or (None, None)
     asked = {
         "survey": survey.id,
         "kind": chosen.kind,
         "min_area": chosen.min_area,
         "min_confidence": chosen.min_confidence,
+        "low": low,
+        "high": high,
     }
     rows = [
         ListedSpot(**dict(zip(COLUMNS, row[:-1], strict=True)), geometry=shapely.from_wkb(bytes(row[-1])))
         for row in conn.execute(query, asked).fetchall()
     ]
     counted = [row for row in rows if row.counted]
-    face_area, seen_area, statement, searched = _coverage(conn, survey)
+    face_area, seen_area, statement, searched = _coverage(conn, survey, low, high)
     return SpotList(rows, len(counted), sum(row.area for row in counted), face_area, seen_area, statement, searched)
 
 
-def _coverage(conn: psycopg.Connection[Any], survey: Survey) -> tuple[float, float, str | None, bool]:
+def _coverage(
+    conn: psycopg.Connection[Any], survey: Survey, low: float | None, high: float | None
+) -> tuple[float, float, str | None, bool]:
     """Area of the faces and what of it was judged, m², for what nothing is said, and whether the search is up to date."""
     row = conn.execute(
         """
-        SELECT (SELECT coalesce(sum(f.area), 0) FROM tunnel.face f WHERE f.survey_id = s.id),
-               (SELECT coalesce(sum(f.area * f.seen_share), 0) FROM tunnel.face f WHERE f.survey_id = s.id),
+        SELECT a.area, a.seen, a.unplaced,
                (SELECT r.parameters @> tunnel_api.members_inputs(s.id) FROM tunnel.run r
                  WHERE r.survey_id = s.id AND r.stage = 'members' AND r.outcome = 'done' ORDER BY r.id DESC LIMIT 1),
                (SELECT string_agg(m.number::text, ', ' ORDER BY m.number) FROM tunnel.member m
-                 WHERE m.survey_id = s.id AND m.bimodal)
-          FROM tunnel.survey s WHERE s.id = %s
+                 WHERE m.survey_id = s.id AND m.bimodal
+                   AND (%(low)s::float8 IS NULL OR m.chainage BETWEEN %(low)s AND %(high)s))
+          FROM tunnel.survey s
+         CROSS JOIN LATERAL (
+            SELECT coalesce(sum(f.area) FILTER (WHERE t.inside), 0) AS area,
+                   coalesce(sum(f.area * f.seen_share) FILTER (WHERE t.inside), 0) AS seen,
+                   coalesce(sum(f.area) FILTER (WHERE t.inside IS NULL), 0) AS unplaced
+              FROM tunnel.face f
+             CROSS JOIN LATERAL (SELECT CASE WHEN %(low)s::float8 IS NULL THEN true
+                                             ELSE f.chainage BETWEEN %(low)s AND %(high)s END AS inside) t
+             WHERE f.survey_id = s.id) a
+         WHERE s.id = %(survey)s
         """,
-        [survey.id],
+        {"survey": survey.id, "low": low, "high": high},
     ).fetchone()
     assert row is not None
-    face_area, seen_area, current, bimodal = row
+    face_area, seen_area, unplaced, current, bimodal = row
     if current is None:
         return 0.0, 0.0, f"members were never looked for: tunneldb members {survey.name}", False
     said = []
@@ -159,6 +185,8 @@ def _coverage(conn: psycopg.Connection[Any], survey: Survey) -> tuple[float, flo
     if seen_area < face_area:
         share = 1.0 - seen_area / face_area
         said.append(f"{100 * share:.0f} % of the faces ({face_area - seen_area:.1f} m²) could not be judged")
+    if unplaced:
+        said.append(f"{unplaced:.1f} m² of faces have no chainage, and are not in the stretch")
     if bimodal:
         said.append(f"more than half differs of member {bimodal}: which half is its own surface is open")
     return face_area, seen_area, "; ".join(said) or None, current
@@ -234,5 +262,5 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return round(value, DECIMALS)
     if isinstance(value, list):
-        return ", ".join(value)
+        return ", ".join(map(str, value))
     return value.isoformat() if isinstance(value, dt.datetime) else value

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from tunneldb.arrays import Bool, Float
+from tunneldb.arrays import Bool, Float, UInt16
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
 from tunneldb.pointcloud.formats.scans import scan_number
@@ -28,6 +28,8 @@ from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
 
 KIND = "an E57"
 CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
+COLOURS = ("colorRed", "colorGreen", "colorBlue")
+NO_COLOUR = "isColorInvalid"
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
 FARTHEST = 1e8  # m; bounds beyond are those of an exporter that had none
 
@@ -80,6 +82,11 @@ class Scan:
         if dimension == "intensity":
             names.append("isIntensityInvalid")
         return [name for name in names if name in self.fields]
+
+    @property
+    def has_colours(self) -> bool:
+        """Whether its points have a colour."""
+        return self.fields.issuperset(COLOURS)
 
     @property
     def coordinates(self) -> tuple[str, str, str]:
@@ -135,7 +142,9 @@ def _dimensions(scans: Sequence[Scan]) -> list[str]:
     return [name for name in ("intensity", "gps_time", *extensions) if all(scan.has(name) for scan in scans)]
 
 
-def read_e57(path: Path, dimension: str | None, size: int, ranges: Ranges | None = None) -> Iterator[Raw]:
+def read_e57(
+    path: Path, dimension: str | None, size: int, ranges: Ranges | None = None, colours: bool = False
+) -> Iterator[Raw]:
     """Read the valid points of an E57 file chunk by chunk; see `tunneldb.pointcloud.formats.raw.read_raw`.
 
     Points are numbered through all scans, invalid ones left out. A scan before a range is passed over, for libE57Format
@@ -150,7 +159,7 @@ def read_e57(path: Path, dimension: str | None, size: int, ranges: Ranges | None
             raise UserError(f"{path}: gps_time is no intensity; the file has {', '.join(names)}")
         records = sum(scan.records for scan in scans)
         wanted = check_ranges(path, ranges, records)
-        cursor = _Cursor(path, image, scans, dimension, size)
+        cursor = _Cursor(path, image, scans, dimension, size, colours)
         if ranges is None:
             yield from cursor.all()
             return
@@ -161,7 +170,8 @@ def read_e57(path: Path, dimension: str | None, size: int, ranges: Ranges | None
 class _Cursor:
     """Reads good points by their number, going on from the last one where it can."""
 
-    def __init__(self, path: Path, image: Any, scans: Sequence[Scan], dimension: str | None, size: int) -> None:
+    def __init__(self, path: Path, image: Any, scans: Sequence[Scan], dimension: str | None, size: int, colours: bool) -> None:
+        self.colours = colours
         self.path, self.image, self.scans, self.dimension, self.size = path, image, scans, dimension, size
         self.stream: Iterator[Raw] = iter(())
         self.piece: Raw | None = None
@@ -208,7 +218,7 @@ class _Cursor:
     def _from(self, scan: int) -> Iterator[Raw]:
         for one in self.scans[scan:]:
             with decoding(self.path, KIND):
-                yield from _read_scan(self.image, one, self.dimension, self.size)
+                yield from _read_scan(self.image, one, self.dimension, self.size, self.colours)
 
 
 @cache
@@ -230,12 +240,15 @@ def require_good(path: Path, scans: Sequence[Scan], good: int) -> None:
         raise UserError(f"{path}: all {sum(scan.records for scan in scans)} points are marked as invalid")
 
 
-def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int) -> Iterator[Raw]:
+def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int, colours: bool = False) -> Iterator[Raw]:
     """Points of a scan, turned into the file's frame; their position is added by the offsets."""
+    coloured = colours and scan.has_colours
+    limits = _colour_limits(image, scan) if coloured else np.ones(3)
     flags = scan.flags(dimension)
     names = [*scan.coordinates, *flags]
     names += [dimension] if dimension is not None else []
     names += ["timeStamp"] if scan.has_time else []
+    names += [name for name in (*COLOURS, NO_COLOUR) if coloured and name in scan.fields]
     offsets = np.zeros(3) if scan.position is None else scan.position
     for fields in read_fields(image, scan, names, size):
         if flags:
@@ -253,7 +266,23 @@ def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int) -> Iter
                 np.full(len(turned), scan.number, np.int32),
                 None if dimension is None else fields[dimension].copy(),
                 None,
+                _colours(fields, limits) if coloured else None,
             )
+
+
+def _colours(fields: dict[str, NDArray[Any]], limits: Float) -> UInt16:
+    """Colours (n, 3) of 16 bits; black of points that have none."""
+    colour = np.column_stack([fields[name] for name in COLOURS]) * (65535.0 / limits)
+    if NO_COLOUR in fields:
+        colour[fields[NO_COLOUR] != 0] = 0.0
+    return np.rint(np.clip(colour, 0.0, 65535.0)).astype(np.uint16)
+
+
+def _colour_limits(image: Any, scan: Scan) -> Float:
+    """Greatest red, green and blue of a scan; 255 where its header does not say."""
+    node = image.root()["data3D"][scan.index]
+    limits = [value_of(node, f"colorLimits/{name}Maximum", 255.0) for name in COLOURS]
+    return np.array([limit if limit and limit > 0.0 else 255.0 for limit in limits], np.float64)
 
 
 def own_coordinates(scan: Scan, fields: dict[str, NDArray[Any]]) -> Float:

@@ -91,7 +91,9 @@ def read_las_facts(path: Path) -> tuple[str, str | None]:
         return name, "adjusted standard GPS time" if standard else "seconds of the GPS week, or no GPS time"
 
 
-def read_las(path: Path, dimension: str | None, size: int, ranges: Ranges | None = None) -> Iterator[Raw]:
+def read_las(
+    path: Path, dimension: str | None, size: int, ranges: Ranges | None = None, colours: bool = False
+) -> Iterator[Raw]:
     """Read a LAS or LAZ file chunk by chunk; see `tunneldb.pointcloud.formats.raw.read_raw`.
 
     Of compressed points, only what is wanted of them is decoded where the point format allows it, in one thread or in
@@ -105,7 +107,7 @@ def read_las(path: Path, dimension: str | None, size: int, ranges: Ranges | None
             header = las.header
             require_dimension(path, dimension, _dimensions(header))
             _check_scales(path, header.scales, header.offsets)
-            take = _Taker(path, header, dimension)
+            take = _Taker(path, header, dimension, colours)
             las.decompression_selection = take.selection()
             varied = VariedChunks(source, header, take.selection()) if VariedChunks.has(header) else None
         for begin, end in check_ranges(path, ranges, int(header.point_count)):
@@ -132,10 +134,11 @@ def _read(las: laspy.LasReader, begin: int, end: int, size: int) -> Iterator[las
 class _Taker:
     """Takes the wanted dimensions out of records."""
 
-    def __init__(self, path: Path, header: laspy.LasHeader, dimension: str | None) -> None:
+    def __init__(self, path: Path, header: laspy.LasHeader, dimension: str | None, colours: bool) -> None:
         self.path = path
         self.dimension = dimension
         self.has_time = "gps_time" in header.point_format.dimension_names
+        self.coloured = colours and "red" in header.point_format.dimension_names
         self.before = header.point_format.size - header.point_format.num_extra_bytes
         self.extra = next((extra for extra in _extra_bytes(header) if extra.name == dimension), None)
         if self.extra is not None and self.extra.dtype.subdtype is not None:
@@ -145,6 +148,8 @@ class _Taker:
         """What of a point is decompressed; the extra bytes come all or none."""
         every = DecompressionSelection
         wanted = every.base() | every.Z | every.CLASSIFICATION | every.POINT_SOURCE_ID | every.GPS_TIME
+        if self.coloured:
+            wanted |= every.RGB
         if self.dimension is None:
             return wanted
         if self.extra is not None:
@@ -163,6 +168,7 @@ class _Taker:
             array["point_source_id"],
             self._intensity(record),
             np.asarray(record["classification"]),
+            np.column_stack([array[name] for name in ("red", "green", "blue")]) if self.coloured else None,
         )
 
     def _intensity(self, record: Any) -> NDArray[Any] | None:

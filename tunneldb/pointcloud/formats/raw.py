@@ -9,7 +9,9 @@ from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.points import CHUNK, Ranges, Raw
 
 
-def read_raw(path: Path, dimension: str | None, size: int = CHUNK, ranges: Ranges | None = None) -> Iterator[Raw]:
+def read_raw(
+    path: Path, dimension: str | None, size: int = CHUNK, ranges: Ranges | None = None, *, colours: bool = False
+) -> Iterator[Raw]:
     """Read a scan file chunk by chunk, without turning its numbers into others.
 
     Parameters
@@ -24,6 +26,8 @@ def read_raw(path: Path, dimension: str | None, size: int = CHUNK, ranges: Range
         Half-open ranges of point numbers, from 0, that are read, in this order; None reads the whole file. The numbers
         are those that counting the points of the whole file gives. What lies between ranges is skipped without
         decoding, to the bounds of the file's own chunks (LAZ: 50 000 points by default; E57: the scans; text: blocks of lines).
+    colours : bool
+        Whether colours are wanted, of the formats whose colours are read (LAS, LAZ, E57).
 
     Yields
     ------
@@ -36,4 +40,7 @@ def read_raw(path: Path, dimension: str | None, size: int = CHUNK, ranges: Range
     UserError
         If the file is missing, truncated or corrupt, has fewer points than the ranges say, or lacks the dimension.
     """
-    return format_of(path).read(path, dimension, size, ranges)
+    form = format_of(path)
+    if colours and form.has_colours is not None:
+        return form.read(path, dimension, size, ranges, True)
+    return form.read(path, dimension, size, ranges)

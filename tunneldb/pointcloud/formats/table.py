@@ -15,7 +15,7 @@ from tunneldb.pointcloud.formats.ptx import read_ptx, read_ptx_scans
 from tunneldb.pointcloud.formats.scans import PosedScan
 from tunneldb.pointcloud.formats.text import TextCloud, read_cloud
 from tunneldb.pointcloud.formats.xyz import read_table
-from tunneldb.pointcloud.points import Ranges, Raw, ScanHeader
+from tunneldb.pointcloud.points import Raw, ScanHeader
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,17 @@ class Format:
         Gives the scans of a file with their positions; None where the format has none.
     is_las : bool
         Whether it is LAS or LAZ.
+    has_colours : callable or None
+        Tells whether the points of a file have colours; ``read`` then takes as one more argument whether they are wanted. None
+        where they are not read.
     """
 
     name: str
     header: Callable[[Path], ScanHeader]
-    read: Callable[[Path, str | None, int, Ranges | None], Iterator[Raw]]
+    read: Callable[..., Iterator[Raw]]
     scans: Callable[[Path], Sequence[PosedScan]] | None = None
     is_las: bool = False
+    has_colours: Callable[[Path], bool] | None = None
 
 
 def format_of(path: Path) -> Format:
@@ -85,6 +89,18 @@ def posed_scans(path: Path) -> list[PosedScan]:
     return [] if scans is None else list(scans(path))
 
 
+def has_colours(path: Path) -> bool:
+    """Whether the points of a file have colours that are read.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read or holds no points.
+    """
+    told = format_of(path).has_colours
+    return told is not None and told(path)
+
+
 def _scans_of_e57(path: Path) -> list[PosedScan]:
     return [PosedScan(scan.index, scan.name, scan.number, scan.position) for scan in read_e57_scans(path)]
 
@@ -101,10 +117,22 @@ def _of_text(
 
 
 _SUFFIXES_OF_LAS = (".las", ".laz")
-_LAS = Format("LAS or LAZ", read_las_header, read_las, is_las=True)
+_LAS = Format(
+    "LAS or LAZ",
+    read_las_header,
+    read_las,
+    is_las=True,
+    has_colours=lambda path: "red" in read_las_header(path).dimensions,
+)
 _TABLE = _of_text("table of points", read_table)
 _FORMATS = {
-    ".e57": Format("E57", read_e57_header, read_e57, _scans_of_e57),
+    ".e57": Format(
+        "E57",
+        read_e57_header,
+        read_e57,
+        _scans_of_e57,
+        has_colours=lambda path: any(scan.has_colours for scan in read_e57_scans(path)),
+    ),
     ".ptx": _of_text("PTX", read_ptx, read_ptx_scans),
     ".pts": _of_text("PTS", read_table),
     ".ply": Format("PLY", read_ply_header, read_ply),

@@ -388,6 +388,13 @@
         </config>
       </editWidget>
     </field>
+    <field name="rgb" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
   </fieldConfiguration>
   <aliases>
     <alias index="0" field="id" name="Key"/>
@@ -415,6 +422,7 @@
     <alias index="22" field="created_at" name="First found"/>
     <alias index="23" field="detected_at" name="Last found"/>
     <alias index="24" field="counted" name="Counted in sums"/>
+    <alias index="25" field="rgb" name="Mean colour (RGB)"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -442,6 +450,7 @@
     <field name="created_at" editable="0"/>
     <field name="detected_at" editable="0"/>
     <field name="counted" editable="0"/>
+    <field name="rgb" editable="0"/>
   </editable>
   <editorlayout>tablayout</editorlayout>
   <attributeEditorForm>
@@ -465,6 +474,7 @@
       <attributeEditorField name="reasons" index="10" showLabel="1"/>
       <attributeEditorField name="points" index="15" showLabel="1"/>
       <attributeEditorField name="scans" index="16" showLabel="1"/>
+      <attributeEditorField name="rgb" index="25" showLabel="1"/>
       <attributeEditorField name="detected" index="21" showLabel="1"/>
       <attributeEditorField name="created_at" index="22" showLabel="1"/>
       <attributeEditorField name="detected_at" index="23" showLabel="1"/>

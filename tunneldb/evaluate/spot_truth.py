@@ -1,0 +1,91 @@
+"""True spots of a structure from a file: polygons in space, or what ``simulate-structure`` writes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from tunneldb.arrays import Bool
+from tunneldb.errors import UserError
+from tunneldb.evaluate.truth import read_polygons
+from tunneldb.geometry.crs import LOCAL, srid_name
+from tunneldb.store.survey import Survey
+
+FEWEST, STEEPEST = 100, 75.0
+"""Simulated spots of fewer points, or seen at more degrees of incidence in the median, are not demanded."""
+
+
+@dataclass(frozen=True)
+class SpotTruth:
+    """True spots.
+
+    Attributes
+    ----------
+    ids : list of str
+    shapes : list of Polygon or MultiPolygon
+        With Z, in the survey's system, m.
+    asked : (n,) bool array
+        Which of them can be demanded: of a simulated one it is known how it was seen.
+    """
+
+    ids: list[str]
+    shapes: list[BaseGeometry]
+    asked: Bool
+
+
+def read_spot_truth(survey: Survey, path: Path, layer: str | None = None) -> SpotTruth:
+    """Read true spots from a ``.truth.json`` of ``simulate-structure``, or 3D polygons from a GeoPackage or GeoJSON file.
+
+    Parameters
+    ----------
+    survey : Survey
+        In whose system they lie.
+    path : Path
+    layer : str, optional
+        Layer to read; by default the only one, or ``spot``.
+
+    Raises
+    ------
+    UserError
+        The file can't be read or holds no polygon, they are in another coordinate system or have no heights.
+    """
+    simulated = _simulated(path)
+    if simulated is not None:
+        return _of_simulation(survey, path, simulated)
+    given = read_polygons(path, survey, layer, "spot")
+    if not given.in_space and survey.srid != LOCAL:
+        raise UserError(f"{given.where} has no coordinate system: polygons of spots must be 3D, in {srid_name(survey.srid)}")
+    for key, shape in zip(given.ids, given.shapes, strict=True):
+        if not shape.has_z:
+            raise UserError(f"{given.naming(key)} has no heights: polygons of spots must be 3D, on their surface")
+    return SpotTruth(given.ids, list(given.shapes), np.ones(len(given.ids), np.bool_))
+
+
+def _simulated(path: Path) -> dict[str, Any] | None:
+    """Content of a truth that ``simulate-structure`` wrote; None for other files."""
+    if path.suffix.lower() != ".json" or not path.is_file():
+        return None
+    try:
+        content = json.loads(path.read_text("utf-8"))
+    except ValueError as error:
+        raise UserError(f"{path} is no JSON: {error}") from None
+    return content if isinstance(content, dict) and "anomalies" in content and "parameters" in content else None
+
+
+def _of_simulation(survey: Survey, path: Path, content: dict[str, Any]) -> SpotTruth:
+    srid = content["parameters"]["srid"]
+    if survey.srid not in (srid, LOCAL):
+        raise UserError(f"{path} is in EPSG:{srid}, survey {survey.name} in {srid_name(survey.srid)}")
+    rows = [row for row in content["anomalies"] if row["points"]]
+    if not rows:
+        raise UserError(f"{path} has no anomaly that the scanner saw: there is nothing to compare with")
+    asked = [row["points"] >= FEWEST and row["incidence"][1] <= STEEPEST for row in rows]
+    shapes = [shapely.force_3d(Polygon(row["outline_3d"])) for row in rows]
+    return SpotTruth([str(row["id"]) for row in rows], list(shapes), np.array(asked, np.bool_))
