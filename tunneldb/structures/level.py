@@ -67,8 +67,8 @@ OWN = 2.5
 OWN_MAD = 0.98
 """Median deviation of a normal distribution cut off there, over that of a whole one."""
 
-LEAST_SIGMA = 0.01
-"""The level scatters by no less, dB: rounding."""
+LEAST_SIGMA = 0.05
+"""The level scatters by no less, dB: of values that were rounded most may be alike."""
 
 
 @dataclass(frozen=True)
