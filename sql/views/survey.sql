@@ -1,5 +1,5 @@
--- Views of a tunnel and its geometry: tunnel, survey, file, point, axis, axis_vertex, segment, section, wall,
--- section_unrolled, region. Each has a stable integer key first and its geometry last; all lengths are metres. Labels are
+-- Views of a tunnel and its geometry: tunnel, survey, file, point, axis, axis_vertex, segment, section, section_unrolled,
+-- region. Each has a stable integer key first and its geometry last; all lengths are metres. Labels are
 -- stations. Needs stationing (geometry/stationing.sql).
 --
 -- Tunnels differ in SRID, so what lies on the map is cast to plain geometry: a column that states a type but no SRID
@@ -126,27 +126,6 @@ COMMENT ON COLUMN tunnel_api.section.half IS 'Place in the segment, %: 25 or 75'
 COMMENT ON COLUMN tunnel_api.section.half_width IS 'Half the length of tunnel whose points the section was made from, m';
 COMMENT ON COLUMN tunnel_api.section.angle_step IS 'Width of an angular class, degrees';
 COMMENT ON COLUMN tunnel_api.section.interpolated IS 'Angular classes that are not measured: empty, or rejected as something hung on the wall; filled from their neighbours';
-
--- A plan is a cut at one height: that of the axis, where the angle from the crown is -90° and 90°. Lines end where sections are
--- missing, those without a roof among them.
-CREATE OR REPLACE VIEW tunnel_api.wall AS
-SELECT min(w.id) * 2 + (w.side = 'right')::int AS id, w.survey_id, s.name AS survey, w.side,
-       min(w.chainage) AS chainage_from, max(w.chainage) AS chainage_to,
-       public.st_makeline(w.place ORDER BY w.chainage)::public.geometry AS geom
-  FROM (SELECT c.id, c.survey_id, c.chainage, p.side, public.st_pointn(c.geom, p.n) AS place,
-               c.segment - dense_rank() OVER (PARTITION BY c.survey_id ORDER BY c.segment) AS stretch
-          FROM tunnel.section c
-         CROSS JOIN (VALUES ('left', 91), ('right', 271)) p (side, n)) w
-  JOIN tunnel.survey s ON s.id = w.survey_id
- GROUP BY w.survey_id, s.name, w.side, w.stretch
-HAVING count(*) > 1;
-COMMENT ON VIEW tunnel_api.wall IS
-    'The tunnel''s walls at the height of its axis, a line on each side for each stretch with sections: its outline in a plan';
-COMMENT ON COLUMN tunnel_api.wall.id IS 'Key: twice that of the first section, and one more on the right';
-COMMENT ON COLUMN tunnel_api.wall.chainage_from IS 'Chainage of its first section, m';
-COMMENT ON COLUMN tunnel_api.wall.chainage_to IS 'Chainage of its last section, m';
-COMMENT ON COLUMN tunnel_api.wall.geom IS 'Line in space, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel_api.wall.side IS 'left or right, looking up-chainage';
 
 CREATE OR REPLACE VIEW tunnel_api.section_unrolled AS
 SELECT c.id, c.survey_id, s.name AS survey, c.km, c.segment, c.half, c.chainage,

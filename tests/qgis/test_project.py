@@ -36,7 +36,6 @@ ON_MAP = {
     "axis_vertex": "PointZ",
     "segment": "LineStringZ",
     "section": "LineStringZ",
-    "wall": "LineStringZ",
     "leak_map": "Polygon",
     "anomaly_map": "Polygon",
     "target_sphere": "PointZ",
@@ -153,7 +152,6 @@ def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
             "axis",
             "segment",
             "section",
-            "wall",
             "section_unrolled",
             "target_sphere",
             "cluster",
@@ -171,7 +169,7 @@ def test_themes_and_views(seen: dict[str, Any]) -> None:
         "coverage_gap", "leak_sheet", "demo-2024-km012-corrected", "demo-2024-km012-corrected-filled",
     }  # fmt: skip
     assert set(seen["themes"]["Map"]) == {
-        "axis", "axis_vertex", "wall", "section", "leak_map", "target_sphere", "cluster",
+        "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster",
     }  # fmt: skip
     assert set(seen["themes"]["3D"]) == {"axis", "section", "leak_3d", "target_sphere", "ground"}
     images = {"demo-2024-km012-corrected", "demo-2024-km012-corrected-filled"}

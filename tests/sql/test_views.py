@@ -22,7 +22,6 @@ GEOMETRIES = {
     "axis_vertex": "PointZ",
     "segment": "LineStringZ",
     "section": "LineStringZ",
-    "wall": "LineStringZ",
     "ground": "LineStringZ",
     "target_sphere": "PointZ",
 }
@@ -170,24 +169,6 @@ def test_section_is_unrolled_at_its_chainage_over_its_whole_girth(conn: psycopg.
     girth = 4 * half_angle + np.sqrt(4**2 - 2.5**2)
     assert (-low, high) == pytest.approx((girth, girth), abs=0.03)
     assert shapely.get_coordinates(shapely.from_wkb(bytes(wkb))).tolist() == [[chainage, low], [chainage, high]]
-
-
-def test_walls_lie_beside_the_axis_as_far_as_the_section_is_wide(conn: psycopg.Connection, example: str) -> None:
-    rows = conn.execute(
-        "SELECT side, ST_NumPoints(geom), chainage_from, chainage_to FROM tunnel_api.wall ORDER BY side"
-    ).fetchall()
-    sections, first, last = one(conn, "SELECT count(*), min(chainage), max(chainage) FROM tunnel.section")
-    assert rows == [("left", sections, first, last), ("right", sections, first, last)]
-    axis, far = one(
-        conn,
-        "SELECT a.geom, ARRAY[c.radius[91], c.radius[271]] FROM tunnel_api.axis a, tunnel.section c"
-        " ORDER BY c.chainage LIMIT 1 OFFSET 8",
-    )
-    left, right = conn.execute(
-        "SELECT ST_3DDistance(%s::geometry, ST_PointN(geom, 9)) FROM tunnel_api.wall ORDER BY side", (axis,)
-    ).fetchall()
-    assert [left[0], right[0]] == pytest.approx(far, abs=0.05)  # the axis is straight between its vertices
-    assert one(conn, "SELECT count(*) FROM tunnel_api.wall WHERE ST_Intersects(geom, %s::geometry)", axis) == 0
 
 
 def test_leak_lies_in_the_segment_that_holds_its_middle(conn: psycopg.Connection, example: str) -> None:

@@ -85,8 +85,7 @@ LAYERS = (
     ),
     VectorLayer("target_sphere", "Target spheres", "target_sphere", "PointZ", "target_sphere", MAP, (MAP, SPACE)),
     VectorLayer("axis", "Axis", "axis", "LineStringZ", "axis", MAP, (MAP, SPACE)),
-    VectorLayer("wall", "Walls at the height of the axis", "wall", "LineStringZ", "wall", MAP, (MAP,)),
-    VectorLayer("segment", "Segments", "segment", "LineStringZ", "segment", MAP, ()),
+    VectorLayer("segment", "Segments", "segment", "LineStringZ", "segment", MAP, (MAP,)),
     VectorLayer("section", "Sections", "section", "LineStringZ", "section", MAP, (MAP, SPACE)),
     VectorLayer("cluster", "Objects, rails, appendages", "cluster", "Polygon", "cluster", MAP, (MAP,)),
     VectorLayer(

@@ -106,7 +106,7 @@
           <Option type="Map" name="properties">
             <Option type="Map" name="Show">
               <Option type="bool" name="active" value="true"/>
-              <Option type="QString" name="expression" value="&quot;class_name&quot; = 'object' AND &quot;height_to&quot; >= 0.5"/>
+              <Option type="QString" name="expression" value="&quot;class_name&quot; = 'object'"/>
               <Option type="int" name="type" value="3"/>
             </Option>
           </Option>
