@@ -40,6 +40,7 @@ ON_MAP = {
     "anomaly_map": "Polygon",
     "target_sphere": "PointZ",
     "cluster": "Polygon",
+    "outline": "LineString",
     "ground": "LineStringZ",
     "leak_3d": "PolygonZ",
 }
@@ -155,6 +156,7 @@ def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
             "section_unrolled",
             "target_sphere",
             "cluster",
+            "outline",
             "ground",
             "sheet",
             "leak_sheet",
@@ -169,7 +171,7 @@ def test_themes_and_views(seen: dict[str, Any]) -> None:
         "coverage_gap", "leak_sheet", "demo-2024-km012-corrected", "demo-2024-km012-corrected-filled",
     }  # fmt: skip
     assert set(seen["themes"]["Map"]) == {
-        "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster",
+        "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster", "outline",
     }  # fmt: skip
     assert set(seen["themes"]["3D"]) == {"axis", "section", "leak_3d", "target_sphere", "ground"}
     images = {"demo-2024-km012-corrected", "demo-2024-km012-corrected-filled"}

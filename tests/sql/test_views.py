@@ -171,6 +171,22 @@ def test_section_is_unrolled_at_its_chainage_over_its_whole_girth(conn: psycopg.
     assert shapely.get_coordinates(shapely.from_wkb(bytes(wkb))).tolist() == [[chainage, low], [chainage, high]]
 
 
+def test_walls_lie_on_both_sides_in_plan_where_the_lining_is_widest(conn: psycopg.Connection, example: str) -> None:
+    query = (
+        "SELECT side, o.chainage_from, o.chainage_to, nearest, farthest, ST_AsBinary(o.geom), ST_AsBinary(ST_Force2D(a.geom))"
+    )
+    rows = conn.execute(f"{query} FROM tunnel_api.outline o JOIN tunnel_api.axis a USING (survey) ORDER BY side").fetchall()  # type: ignore[arg-type]
+    assert [row[0] for row in rows] == ["left", "right"]
+    for side, low, high, nearest, farthest, wall, axis in rows:
+        assert (low, high) == pytest.approx((12300, 12500), abs=0.5)
+        # the lining is a circle of 4 m about the axis
+        assert (nearest, farthest) == pytest.approx((4, 4), abs=0.03)
+        line = shapely.from_wkb(bytes(axis))
+        away = [shapely.distance(line, shapely.Point(at)) for at in shapely.get_coordinates(shapely.from_wkb(bytes(wall)))]
+        assert away == pytest.approx([4.0] * len(away), abs=0.1)
+        assert line.parallel_offset(4, side).hausdorff_distance(shapely.from_wkb(bytes(wall))) < 0.7
+
+
 def test_leak_lies_in_the_segment_that_holds_its_middle(conn: psycopg.Connection, example: str) -> None:
     rows = conn.execute("SELECT segment, chainage_from, chainage_to, label FROM tunnel_api.leak").fetchall()
     for segment, low, high, label in rows:

@@ -78,7 +78,7 @@ _DRY = "\"kind\" <> 'leak'"
 # In drawing order within a group, from the top.
 LAYERS = (
     VectorLayer("axis_vertex", "Axis vertices (editable)", "axis_vertex", "PointZ", "axis_vertex", MAP, (MAP,), True),
-    VectorLayer("leak_map", "Leaks on the map (review)", "leak_map", "Polygon", "leak", MAP, (MAP,), True),
+    VectorLayer("leak_map", "Leaks beside the axis, unrolled (review)", "leak_map", "Polygon", "leak", MAP, (MAP,), True),
     VectorLayer(
         "anomaly_map", "Dark but dry, map (review)", "anomaly_map", "Polygon", "anomaly", MAP, (), True,
         where=_DRY,
@@ -87,6 +87,7 @@ LAYERS = (
     VectorLayer("axis", "Axis", "axis", "LineStringZ", "axis", MAP, (MAP, SPACE)),
     VectorLayer("segment", "Segments", "segment", "LineStringZ", "segment", MAP, (MAP,)),
     VectorLayer("section", "Sections", "section", "LineStringZ", "section", MAP, (MAP, SPACE)),
+    VectorLayer("outline", "Walls, at their widest", "outline", "LineString", "outline", MAP, (MAP,)),
     VectorLayer("cluster", "Objects, rails, appendages", "cluster", "Polygon", "cluster", MAP, (MAP,)),
     VectorLayer(
         "coverage_gap", "Where leaks could be missed", "coverage_gap", "Polygon", "coverage_gap", UNROLLED, (UNROLLED, SHEETS)

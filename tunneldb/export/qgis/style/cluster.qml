@@ -26,10 +26,10 @@
       <symbol name="1" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="59,59,59,0"/>
+            <Option type="QString" name="color" value="59,59,59,30"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="59,59,59,255"/>
-            <Option type="QString" name="outline_style" value="solid"/>
+            <Option type="QString" name="outline_style" value="no"/>
             <Option type="QString" name="outline_width" value="0.45"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
@@ -92,21 +92,21 @@
   </renderer-v2>
   <labeling type="simple">
     <settings calloutType="simple">
-      <text-style fieldName="&quot;class_name&quot; || if(&quot;height_to&quot; >= 0.05, ' ' || format_number(&quot;height_to&quot;, 1) || ' m', '')" isExpression="1" fontFamily="Sans Serif" namedStyle="Regular" fontWeight="50" fontSize="7" fontSizeUnit="Point" textColor="40,52,64,255" textOpacity="1" multilineHeight="1" allowHtml="0">
+      <text-style fieldName="&quot;class_name&quot; || ' ' || format_number(&quot;height_to&quot;, 1) || ' m'" isExpression="1" fontFamily="Sans Serif" namedStyle="Regular" fontWeight="50" fontSize="7" fontSizeUnit="Point" textColor="40,52,64,255" textOpacity="1" multilineHeight="1" allowHtml="0">
         <text-buffer bufferDraw="1" bufferSize="0.7" bufferSizeUnits="MM" bufferColor="255,255,255,215" bufferOpacity="1" bufferJoinStyle="128" bufferNoFill="1"/>
         <background shapeDraw="0"/>
         <shadow shadowDraw="0"/>
       </text-style>
       <text-format multilineAlign="1"/>
       <placement placement="8" dist="1.5" distUnits="MM" polygonPlacementFlags="3" priority="5"/>
-      <rendering scaleVisibility="1" scaleMin="0" scaleMax="600" obstacle="1" obstacleFactor="1" displayAll="0" drawLabels="1" upsidedownLabels="0" fontLimitPixelSize="0" mergeLines="0" limitNumLabels="0" minFeatureSize="0"/>
+      <rendering scaleVisibility="1" scaleMin="0" scaleMax="400" obstacle="1" obstacleFactor="1" displayAll="0" drawLabels="1" upsidedownLabels="0" fontLimitPixelSize="0" mergeLines="0" limitNumLabels="0" minFeatureSize="0"/>
       <dd_properties>
         <Option type="Map">
           <Option type="QString" name="name" value=""/>
           <Option type="Map" name="properties">
             <Option type="Map" name="Show">
               <Option type="bool" name="active" value="true"/>
-              <Option type="QString" name="expression" value="&quot;class_name&quot; = 'object'"/>
+              <Option type="QString" name="expression" value="&quot;class_name&quot; = 'object' AND &quot;height_to&quot; &gt;= 0.5"/>
               <Option type="int" name="type" value="3"/>
             </Option>
           </Option>
