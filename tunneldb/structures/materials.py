@@ -26,6 +26,12 @@ LEAST_WIDTH = 0.4
 LEAST_STEP = 1.0
 """The level steps by so many standard deviations of a pixel at least."""
 
+LEAST_STEP_DB = 1.0
+"""And by so many decibels: materials that differ by less are not told from unevenness."""
+
+USUAL_STEPS = 4.0
+"""And it is so many times as large as the steps over other lines usually are: where a surface is uneven these are large, too."""
+
 EVEN = 0.85
 """Share of the blocks along the line where it steps so, by half of the whole step and more."""
 
@@ -40,6 +46,9 @@ FEWEST = 6
 
 MOST_PIXELS = 2_000_000
 """Pixels of a plane; beyond that they are made larger."""
+
+MANY = 12
+"""Lines that tell what is usual: about the right one some four show its step."""
 
 DEPTH = 3
 """How many times a face is parted, at most."""
@@ -160,15 +169,17 @@ def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
         if len(blocks) <= 2 * edge:
             continue
         medians = _medians(np.moveaxis(sliding_window_view(blocks, BLOCKS, axis=0), -1, 0))
+        found = []
         for k in range(edge, len(blocks) - edge):
             steps = medians[k] - medians[k - BLOCKS]
             steps = steps[np.isfinite(steps)]
-            if len(steps) < FEWEST or len(steps) * ALONG * pixel < LEAST_WIDTH:
-                continue
-            step = float(np.median(steps))
-            size = abs(step) / sigma
-            sure = size * float(np.sqrt(len(steps)))
-            if size < LEAST_STEP or (best is not None and sure <= best[0]):
+            if len(steps) >= FEWEST and len(steps) * ALONG * pixel >= LEAST_WIDTH:
+                found.append((k, steps, float(np.median(steps))))
+        usual = MAD_TO_SIGMA * float(np.median([abs(step) for _, _, step in found])) if len(found) >= MANY else 0.0
+        least = max(LEAST_STEP * sigma, LEAST_STEP_DB, USUAL_STEPS * usual)
+        for k, steps, step in found:
+            sure = abs(step) / sigma * float(np.sqrt(len(steps)))
+            if abs(step) < least or (best is not None and sure <= best[0]):
                 continue
             if (steps * np.sign(step) > 0.5 * abs(step)).mean() >= EVEN:
                 best = (sure, axis, first + ACROSS * k, lines)
