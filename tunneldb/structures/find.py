@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -94,8 +94,8 @@ def find_structures(
         Whether levels go by range otherwise.
     """
     layout = found.layout
-    parts = _parts(found, sums, reference)
-    member_of = join([part.extent for part in parts], images, found.noise)
+    parts = _parts(found, sums, images, reference)
+    member_of = np.unique([part.member for part in parts], axis=0, return_inverse=True)[1] if parts else np.empty(0, np.int64)
     count = len(layout.models)
     places: list[Int32 | None] = [None] * count
     anomaly: list[Int32 | None] = [None] * count
@@ -143,15 +143,18 @@ class _Part:
     inside : (rows, columns) bool array or None
         Its pixels; None for all.
     extent : Extent
+    member : (int, int)
+        Number of what the whole face is joined to, and of the material.
     """
 
     face: int
     inside: Bool | None
     extent: Extent
+    member: tuple[int, int]
 
 
-def _parts(found: Segmentation, sums: Sums, reference: ReferenceCurve | None) -> list[_Part]:
-    """Faces that are large and filled enough to be some, parted by material."""
+def _parts(found: Segmentation, sums: Sums, images: RangeImages, reference: ReferenceCurve | None) -> list[_Part]:
+    """Faces that are large and filled enough to be some, joined over what stands before them, parted by material."""
     layout = found.layout
     held, extents, densities = {}, {}, []
     for face in range(len(layout.models)):
@@ -166,8 +169,10 @@ def _parts(found: Segmentation, sums: Sums, reference: ReferenceCurve | None) ->
     solid = solid_faces(np.array(densities).reshape(len(extents), len(found.stations), 2))
     for face in [face for face, good in zip(extents, solid, strict=True) if not good]:
         del held[face], extents[face]
-    parts = {face: [_Part(face, None, extent)] for face, extent in extents.items()}
-    for number, faces in enumerate(_planes(extents, found.noise)):
+    order = sorted(extents, key=lambda face: -extents[face].points)
+    joined = dict(zip(order, join([extents[face] for face in order], images, found.noise).tolist(), strict=True))
+    parts = {face: [_Part(face, None, extents[face], (joined[face], 0))] for face in order}
+    for faces in _planes(extents, found.noise):
         by_face = [observe_face(layout, sums, face, found.stations, reference) for face in faces]
         materials = parts_of_plane(layout, faces, by_face)
         if materials is None:
@@ -179,7 +184,7 @@ def _parts(found: Segmentation, sums: Sums, reference: ReferenceCurve | None) ->
                 inside = of == which
                 own = _extent(layout, face, np.where(inside, held[face], 0), extents[face].scans)
                 if own is not None:
-                    parts[face].append(_Part(face, inside, replace(own, material=(number, which))))
+                    parts[face].append(_Part(face, inside, own, (joined[face], which)))
     return sorted((part for of in parts.values() for part in of), key=lambda part: -part.extent.points)
 
 

@@ -103,8 +103,6 @@ class Extent:
     scans : tuple of int
         Scans that saw it.
     points : float
-    material : (int, int) or None
-        Of a face in a plane of several materials: number of the plane and of the material there.
     """
 
     model: Float
@@ -112,7 +110,6 @@ class Extent:
     pixel: float
     scans: tuple[int, ...]
     points: float
-    material: tuple[int, int] | None = None
 
 
 def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
@@ -171,8 +168,6 @@ def _corners(face: Extent) -> Float:
 
 def _joined(one: Extent, other: Extent, images: RangeImages) -> bool:
     """Whether two faces of one surface are parted by what stands before it alone."""
-    if not _of_one_material(one, other):
-        return False
     moved = _unrolled_on(one, other)
     if one.outline.is_empty or moved.is_empty:
         return False
@@ -184,13 +179,6 @@ def _joined(one: Extent, other: Extent, images: RangeImages) -> bool:
         if len(common) == 1 and _gap_along(common[0], one.outline, moved) > _longest_gap(one, other, pixel):
             return False
     return _occluded(one, moved, set(one.scans) | set(other.scans), images)
-
-
-def _of_one_material(one: Extent, other: Extent) -> bool:
-    """Whether two faces are not of unlike materials of one plane."""
-    if one.material is None or other.material is None or one.material[0] != other.material[0]:
-        return True
-    return one.material == other.material
 
 
 def _longest_gap(one: Extent, other: Extent, pixel: float) -> float:

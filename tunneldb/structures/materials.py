@@ -30,7 +30,7 @@ LEAST_STEP_DB = 1.0
 """And by so many decibels: materials that differ by less are not told from unevenness."""
 
 USUAL_STEPS = 4.0
-"""And it is so many times as large as the steps over other lines usually are: where a surface is uneven these are large, too."""
+"""And it is so many times as large as the steps over other lines are: where a surface is uneven these are large, too."""
 
 EVEN = 0.85
 """Share of the blocks along the line where it steps so, by half of the whole step and more."""
