@@ -33,6 +33,7 @@ from qgis.core import (
     QgsMapLayer,
     QgsMapRendererParallelJob,
     QgsMapSettings,
+    QgsPalLayerSettings,
     QgsPalettedRasterRenderer,
     QgsPointXY,
     QgsPrintLayout,
@@ -219,14 +220,17 @@ def where(project: QgsProject, chainage: str, arc: str) -> dict[str, Any]:
 
 
 def labels(project: QgsProject, layer_id: str) -> dict[str, Any]:
-    """What is written beside the features of a layer."""
+    """What is written beside the features of a layer, where its rule shows a label."""
     layer = project.mapLayer(PREFIX + layer_id)
-    expression = QgsExpression(layer.labeling().settings().fieldName)
+    settings = layer.labeling().settings()
+    expression = QgsExpression(settings.fieldName)
+    shown = settings.dataDefinedProperties().property(QgsPalLayerSettings.Show)
     context = QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
     texts = []
     for feature in layer.getFeatures():
         context.setFeature(feature)
-        texts.append(expression.evaluate(context))
+        if not shown.isActive() or shown.valueAsBool(context, True)[0]:
+            texts.append(expression.evaluate(context))
     return {"texts": texts, "error": expression.evalErrorString()}
 
 
