@@ -38,11 +38,11 @@ def wall(law: Law, spot: float = -4.0, scan: int = 0, *, seed: int = 1, left: fl
     cosine = 4.0 / range_m
     covered = (x > 1.5 + 0.2 * z) & (x < 2.5)
     value = law(cosine) + spot * covered + np.random.default_rng(seed).normal(0.0, NOISE, len(x))
-    return Observed(scan, columns, np.arange(len(x)), cosine, range_m, value, np.full(len(x), 2.0)), covered
+    return Observed(scan, columns, np.arange(len(x)), np.arccos(cosine), range_m, value, np.full(len(x), 2.0)), covered
 
 
 def off(curve: LevelCurve, one: Observed, law: Law) -> np.ndarray:
-    return np.abs(curve(one.cosine, one.range_m) - law(one.cosine))
+    return np.abs(curve(one.angle, one.range_m) - law(np.cos(one.angle)))
 
 
 @pytest.mark.parametrize("law", [lambert, gloss])
@@ -50,7 +50,7 @@ def test_a_spot_over_all_of_some_incidences_does_not_bend_the_level(law: Law) ->
     one, _ = wall(law)
     curve = curve_of([one], FLAT, by_range=False)
     assert off(curve, one, law).max() < 0.35
-    assert np.median(curve.sigmas(one.cosine)) == pytest.approx(NOISE, rel=0.1)
+    assert np.median(curve.sigmas(one.angle)) == pytest.approx(NOISE, rel=0.1)
 
 
 def test_gloss_at_right_angles_is_no_spot() -> None:
@@ -62,10 +62,10 @@ def test_gloss_at_right_angles_is_no_spot() -> None:
 def test_beyond_what_was_seen_and_of_few_points_no_level_is_known() -> None:
     one, _ = wall(lambert)
     curve = curve_of([one], FLAT, by_range=False)
-    assert curve.known(one.cosine).all()
-    assert not curve.known(np.cos(np.radians([65.0, 85.0]))).any()
+    assert curve.known(one.angle).all()
+    assert not curve.known(np.radians([65.0, 85.0])).any()
     few = some_pixels([one], np.arange(len(one.pixel)).reshape(100, 300) < 14)
-    assert not curve_of(few, FLAT, by_range=False).known(few[0].cosine).any()
+    assert not curve_of(few, FLAT, by_range=False).known(few[0].angle).any()
 
 
 def test_what_one_scan_sees_mostly_covered_another_tells() -> None:
@@ -73,9 +73,9 @@ def test_what_one_scan_sees_mostly_covered_another_tells() -> None:
         return np.asarray(6.0 + 2.0 * np.log10(cosine))
 
     front, covered = wall(gloss, 0.0)
-    front = Observed(**{**vars(front), "value": np.where(covered, rust(front.cosine), front.value)})
+    front = Observed(**{**vars(front), "value": np.where(covered, rust(np.cos(front.angle)), front.value)})
     side, _ = wall(gloss, 0.0, 1, seed=2, left=2.0)
-    side = Observed(**{**vars(side), "value": np.where(covered, rust(side.cosine), side.value)})
+    side = Observed(**{**vars(side), "value": np.where(covered, rust(np.cos(side.angle)), side.value)})
     at = np.arange(30_000) % 300
     mostly_rust = some_pixels([side], ((at > 60) & (at < 140)).reshape(100, 300))[0]
     levels = member_levels([[front, mostly_rust]], FLAT, by_range=False)

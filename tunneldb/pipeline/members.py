@@ -298,7 +298,7 @@ def _samples(segmentation: Segmentation, sums: Sums) -> IntensitySamples:
             place.append(to_space(layout.models[face], u[column], v[row]))
             scans.append(np.full(len(row), seen.scan, np.int32))
             ranges.append(seen.range_m[::step])
-            cosines.append(seen.cosine[::step])
+            cosines.append(np.cos(seen.angle[::step]))
             levels.append(seen.value[::step])
     return IntensitySamples(
         np.concatenate(place), np.concatenate(scans), np.concatenate(ranges), np.concatenate(cosines), np.concatenate(levels)

@@ -15,7 +15,7 @@ from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import FaceGrid
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.structures.face_raster import BEAM, DIVERGENCE, STEP, TOLERANCE, Layout, Sums
-from tunneldb.structures.level import FEWEST, OWN, SHORTH, LevelCurve, level_curve
+from tunneldb.structures.level import FEWEST, MOST_PAIRS, OWN, SHORTH, LevelCurve, level_curve
 from tunneldb.structures.models import RADIUS, normals_at, to_space
 
 LAGS = (2, 5)
@@ -42,14 +42,14 @@ class Observed:
         Of the face.
     pixel : (n,) int array
         Row × columns + column, in growing order.
-    cosine, range_m, value, points : (n,) float arrays
-        Of incidence, m, mean level corrected for range where that is known, dB, number of points.
+    angle, range_m, value, points : (n,) float arrays
+        Of incidence, radians, m, mean level corrected for range where that is known, dB, number of points.
     """
 
     scan: int
     columns: int
     pixel: Int64
-    cosine: Float
+    angle: Float
     range_m: Float
     value: Float
     points: Float
@@ -109,7 +109,8 @@ def observe_face(layout: Layout, sums: Sums, face: int, stations: Float, referen
         value = sums.level[part][pixel] * STEP / points
         if reference is not None:
             value = value - reference(range_m)
-        found.append(Observed(scan, columns, pixel, cosine, range_m, value, points))
+        angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+        found.append(Observed(scan, columns, pixel, angle, range_m, value, points))
     return found
 
 
@@ -140,19 +141,19 @@ def member_levels(parts: list[list[Observed]], model: Float, *, by_range: bool) 
                for face, one in by_scan[scan]]  # fmt: skip
         curve = curves[scan] = curve_of(list(seen), model, np.concatenate(own), by_range=by_range)
         for face, one in zip(faces, seen, strict=True):
-            use = curve.known(one.cosine)
-            use[use] = curve.own(one.cosine[use], one.range_m[use], one.value[use])
+            use = curve.known(one.angle)
+            use[use] = curve.own(one.angle[use], one.range_m[use], one.value[use])
             known.setdefault(face, []).append(one.pixel[use])
     return curves
 
 
 def face_level(curve: LevelCurve, one: Observed) -> LevelCurve:
     """Level of a face by its member's, moved by what the face itself lies off it; its own place where it is all off."""
-    use = np.flatnonzero(curve.known(one.cosine))
+    use = np.flatnonzero(curve.known(one.angle))
     if one.points[use].sum() < FEWEST:
         return curve
-    rest = one.value[use] - curve(one.cosine[use], one.range_m[use])
-    sigma = curve.sigmas(one.cosine[use])
+    rest = one.value[use] - curve(one.angle[use], one.range_m[use])
+    sigma = curve.sigmas(one.angle[use])
     own = np.abs(rest) < OWN * sigma
     if own.mean() < LEAST_OWN:
         mode = robust_statistics(rest, SHORTH, two_sided=True)
@@ -164,23 +165,26 @@ def face_level(curve: LevelCurve, one: Observed) -> LevelCurve:
 
 def curve_of(observed: list[Observed], model: Float, own: Bool | None = None, *, by_range: bool) -> LevelCurve:
     """Level of what one scan saw, of one face or of the faces of a member."""
-    cosine, range_m, value, points = (
-        np.concatenate([getattr(one, name) for one in observed]) for name in ("cosine", "range_m", "value", "points")
+    angle, range_m, value, points = (
+        np.concatenate([getattr(one, name) for one in observed]) for name in ("angle", "range_m", "value", "points")
     )
     starts = np.cumsum([0, *(len(one.pixel) for one in observed)])
-    pairs = np.concatenate([_pairs(one) + start for one, start in zip(observed, starts[:-1], strict=True)])
-    return level_curve(cosine, range_m, value, points, pairs, own, by_range=by_range and model[RADIUS] > 0.0)
+    step = -(-2 * len(LAGS) * len(value) // MOST_PAIRS)
+    pairs = np.concatenate([_pairs(one, step) + start for one, start in zip(observed, starts[:-1], strict=True)])
+    return level_curve(angle, range_m, value, points, pairs, own, by_range=by_range and model[RADIUS] > 0.0)
 
 
-def _pairs(one: Observed) -> Int64:
-    """Pairs (m, 2) of pixels that lie close to each other in their row or column."""
-    row, column = np.divmod(one.pixel, one.columns)
+def _pairs(one: Observed, step: int) -> Int64:
+    """Pairs (m, 2) of pixels that lie close to each other in their row or column, every so manieth of each kind."""
     found = [np.empty((0, 2), np.int64)]
-    for lag in LAGS:
-        for apart, inside in ((lag, column + lag < one.columns), (lag * one.columns, np.ones(len(row), np.bool_))):
-            there = np.searchsorted(one.pixel, one.pixel + apart)
-            held = inside & (one.pixel[np.minimum(there, len(there) - 1)] == one.pixel + apart)
-            found.append(np.column_stack([np.flatnonzero(held), there[held]]))
+    aparts = [lag * width for lag in LAGS for width in (1, one.columns)]
+    for number, apart in enumerate(aparts):
+        first = np.arange(number * step // len(aparts), len(one.pixel), step)
+        pixel = one.pixel[first]
+        inside = pixel % one.columns + apart < one.columns if apart < one.columns else np.ones(len(first), np.bool_)
+        there = np.searchsorted(one.pixel, pixel + apart)
+        held = inside & (one.pixel[np.minimum(there, len(one.pixel) - 1)] == pixel + apart)
+        found.append(np.column_stack([first[held], there[held]]))
     return np.concatenate(found)
 
 
@@ -190,7 +194,7 @@ def some_pixels(observed: list[Observed], inside: Bool) -> list[Observed]:
     for one in observed:
         use = inside.ravel()[one.pixel]
         if use.any():
-            rest = (array[use] for array in (one.cosine, one.range_m, one.value, one.points))
+            rest = (array[use] for array in (one.angle, one.range_m, one.value, one.points))
             found.append(Observed(one.scan, one.columns, one.pixel[use], *rest))
     return found
 
@@ -213,20 +217,20 @@ def contrast_of(layout: Layout, face: int, observed: list[Observed], curves: lis
     side, size = float(layout.pixel[face]), rows * columns
     drop, weight, variance = np.zeros(size), np.zeros(size), np.zeros(size)
     held, scans = np.zeros(size, np.int64), np.zeros(size, np.int64)
-    cosines, levels, sigmas = [np.empty(0)], [np.empty(0)], [np.empty(0)]
+    angles, levels, sigmas = [np.empty(0)], [np.empty(0)], [np.empty(0)]
     far = [np.empty(0)]
     for one, curve in zip(observed, curves, strict=True):
         held[one.pixel] += one.points.astype(np.int64)
         far.append(one.range_m)
-        use = np.flatnonzero(curve.known(one.cosine))
+        use = np.flatnonzero(curve.known(one.angle))
         at, n = one.pixel[use], one.points[use]
-        level = curve(one.cosine[use], one.range_m[use])
-        sigma = curve.sigmas(one.cosine[use])
+        level = curve(one.angle[use], one.range_m[use])
+        sigma = curve.sigmas(one.angle[use])
         drop[at] += n * (level - one.value[use])
         weight[at] += n
         variance[at] += (n * sigma) ** 2
         scans[at] |= 1 << min(one.scan, 30)
-        cosines.append(one.cosine[use])
+        angles.append(one.angle[use])
         levels.append(level)
         sigmas.append(sigma)
     judged = weight > 0.0
@@ -255,10 +259,10 @@ def contrast_of(layout: Layout, face: int, observed: list[Observed], curves: lis
         1,
         np.ascontiguousarray(sigma.reshape(shape)[::-1].astype(np.float32)),
     )
-    cosine, nothing = np.concatenate(cosines), float("nan")
+    angle, nothing = np.concatenate(angles), float("nan")
     incidence = (nothing, nothing)
-    if len(cosine):
-        incidence = tuple(float(a) for a in np.degrees(np.arccos(np.clip([cosine.max(), cosine.min()], -1.0, 1.0))))  # type: ignore[assignment]
+    if len(angle):
+        incidence = float(np.degrees(angle.min())), float(np.degrees(angle.max()))
     return FaceContrast(
         image,
         whole,
@@ -267,6 +271,6 @@ def contrast_of(layout: Layout, face: int, observed: list[Observed], curves: lis
         held.reshape(shape).astype(np.int32),
         scans.reshape(shape).astype(np.int32),
         incidence,
-        float(np.median(np.concatenate(levels))) if len(cosine) else nothing,
-        float(np.median(np.concatenate(sigmas))) if len(cosine) else nothing,
+        float(np.median(np.concatenate(levels))) if len(angle) else nothing,
+        float(np.median(np.concatenate(sigmas))) if len(angle) else nothing,
     )

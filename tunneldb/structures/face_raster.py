@@ -142,7 +142,8 @@ def lay_out(grid: VoxelGrid, faces: Faces, scans: int) -> Layout:
         of = order[starts[k] : starts[k + 1]]
         u, v, _ = unroll(faces.models[k], centroid[of])
         box[k] = u.min(), v.min(), u.max(), v.max()
-        cells = np.unique(np.column_stack([np.floor(u / grid.edge), np.floor(v / grid.edge)]), axis=0)
+        column, row = (np.floor(at / grid.edge).astype(np.int64) for at in (u, v))
+        cells = np.unique((row - row.min()) * (np.ptp(column) + 1) + column - column.min())
         spacing = math.sqrt(len(cells) * grid.edge**2 / faces.points[k])
         pixel[k] = min(max(math.sqrt(POINTS_A_PIXEL) * spacing, FINEST), COARSEST)
     seen = np.zeros((count, scans), np.bool_)

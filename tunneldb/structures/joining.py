@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from scipy import sparse
+from scipy.cluster.hierarchy import DisjointSet
 from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float, Int32, Int64, Single
@@ -123,12 +123,15 @@ def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
     noise : float
         Of ranges, m.
     """
-    pairs = [(a, b) for a, b in coplanar(faces, noise) if _joined(faces[a], faces[b], images)]
-    first, second = np.array(pairs, np.int64).reshape(-1, 2).T
-    graph = sparse.coo_array((np.ones(len(first), np.int8), (first, second)), shape=(len(faces), len(faces)))
-    label = sparse.csgraph.connected_components(graph, directed=False)[1]
-    _, place, member = np.unique(label, return_index=True, return_inverse=True)
-    return np.argsort(np.argsort(place))[member].astype(np.int64)
+    found = DisjointSet(range(len(faces)))
+    rims = [_rims(face.outline, face.pixel) if face.model[RADIUS] == 0.0 else np.empty((0, 5)) for face in faces]
+    for a, b in coplanar(faces, noise):
+        if not found.connected(a, b) and _joined(faces[a], faces[b], rims[a], rims[b], images):
+            found.merge(a, b)
+    member = np.empty(len(faces), np.int64)
+    for number, of in enumerate(sorted(min(subset) for subset in found.subsets())):
+        member[list(found.subset(of))] = number
+    return member
 
 
 def coplanar(faces: list[Extent], noise: float) -> list[tuple[int, int]]:
@@ -166,18 +169,19 @@ def _corners(face: Extent) -> Float:
     return to_space(face.model, at[:, 0], at[:, 1])
 
 
-def _joined(one: Extent, other: Extent, images: RangeImages) -> bool:
-    """Whether two faces of one surface are parted by what stands before it alone."""
+def _joined(one: Extent, other: Extent, rims: Float, others: Float, images: RangeImages) -> bool:
+    """Whether two faces of one surface, with their rims, are parted by what stands before it alone."""
+    common: list[Float] = []
+    pixel = max(one.pixel, other.pixel)
+    if one.model[RADIUS] == 0.0:
+        common = _common_rims(rims, _rims_on(one.model, other.model, others), pixel)
+        if not common:
+            return False
     moved = _unrolled_on(one, other)
     if one.outline.is_empty or moved.is_empty:
         return False
-    if one.model[RADIUS] == 0.0:
-        pixel = max(one.pixel, other.pixel)
-        common = _common_rims(one.outline, moved, pixel)
-        if not common:
-            return False
-        if len(common) == 1 and _gap_along(common[0], one.outline, moved) > _longest_gap(one, other, pixel):
-            return False
+    if len(common) == 1 and _gap_along(common[0], one.outline, moved) > _longest_gap(one, other, pixel):
+        return False
     return _occluded(one, moved, set(one.scans) | set(other.scans), images)
 
 
@@ -196,42 +200,48 @@ def _unrolled_on(one: Extent, other: Extent) -> shapely.MultiPolygon:
     return shapely.make_valid(shapely.transform(other.outline, move), method="structure", keep_collapsed=False)
 
 
-def _common_rims(one: shapely.Geometry, other: shapely.Geometry, pixel: float) -> list[Float]:
-    """Lines (point, direction) that are rims of both (3.2.2), each once."""
-    mine, yours = _rims(one, pixel), _rims(other, pixel)
+def _rims(outline: shapely.Geometry, pixel: float) -> Float:
+    """Straight pieces of an outline (n, 5), the longest first: middle (2), direction (2), length."""
+    found = [np.empty((0, 5))]
+    for part in shapely.get_parts(outline):
+        ring = shapely.get_coordinates(shapely.simplify(part.exterior, 2.0 * pixel))
+        step = np.diff(ring, axis=0)
+        length = np.linalg.norm(step, axis=1)
+        long = length >= LEAST_RIM * pixel
+        middle, along = 0.5 * (ring[:-1] + ring[1:])[long], step[long] / length[long, None]
+        found.append(np.column_stack([middle, along, length[long]]))
+    rims = np.concatenate(found)
+    return rims[np.argsort(-rims[:, 4], kind="stable")]
+
+
+def _rims_on(plane: Float, other: Float, rims: Float) -> Float:
+    """Rims of a plane in the unrolled coordinates of another."""
+    half = 0.5 * rims[:, 4:] * rims[:, 2:4]
+    ends = (to_space(other, at[:, 0], at[:, 1]) for at in (rims[:, :2] - half, rims[:, :2] + half))
+    first, last = (np.column_stack(unroll(plane, at)[:2]) for at in ends)
+    step = last - first
+    length = np.linalg.norm(step, axis=1)
+    return np.column_stack([0.5 * (first + last), step / np.maximum(length, 1e-12)[:, None], length])
+
+
+def _common_rims(mine: Float, yours: Float, pixel: float) -> list[Float]:
+    """Lines (middle, direction, length) that are rims of both (3.2.2), each once."""
     found: list[Float] = []
     least = math.cos(math.radians(COMMON_ANGLE))
-    for a in mine:
-        for b in yours:
-            if abs(a[2:4] @ b[2:4]) < least:
-                continue
-            longer, shorter = (a, b) if a[4] >= b[4] else (b, a)
-            across = np.array([-longer[3], longer[2]])
-            ends = np.array([shorter[:2] - 0.5 * shorter[4] * shorter[2:4], shorter[:2] + 0.5 * shorter[4] * shorter[2:4]])
-            if np.abs((ends - longer[:2]) @ across).mean() > COMMON_APART * pixel:
-                continue
-            if all(abs(line[2:4] @ longer[2:4]) < least or _apart(line, longer) > COMMON_APART * pixel for line in found):
-                found.append(longer)
+    for i, j in np.argwhere(np.abs(mine[:, 2:4] @ yours[:, 2:4].T) >= least).tolist():
+        longer, shorter = (mine[i], yours[j]) if mine[i, 4] >= yours[j, 4] else (yours[j], mine[i])
+        across = np.array([-longer[3], longer[2]])
+        half = 0.5 * shorter[4] * shorter[2:4]
+        ends = np.array([shorter[:2] - half, shorter[:2] + half])
+        if np.abs((ends - longer[:2]) @ across).mean() > COMMON_APART * pixel:
+            continue
+        if all(abs(line[2:4] @ longer[2:4]) < least or _apart(line, longer) > COMMON_APART * pixel for line in found):
+            found.append(longer)
     return found
 
 
 def _apart(one: Float, other: Float) -> float:
     return float(abs((other[:2] - one[:2]) @ np.array([-one[3], one[2]])))
-
-
-def _rims(shape: shapely.Geometry, pixel: float) -> list[Float]:
-    """Straight pieces of an outline: middle (2), direction (2), length; pieces of one line put together."""
-    rims: list[Float] = []
-    for part in shapely.get_parts(shape):
-        if not isinstance(part, shapely.Polygon):
-            continue
-        ring = shapely.get_coordinates(shapely.simplify(part.exterior, 2.0 * pixel))
-        step = np.diff(ring, axis=0)
-        length = np.linalg.norm(step, axis=1)
-        for k in np.flatnonzero(length >= LEAST_RIM * pixel).tolist():
-            middle, along = 0.5 * (ring[k] + ring[k + 1]), step[k] / length[k]
-            rims.append(np.array([*middle, *along, length[k]]))
-    return sorted(rims, key=lambda rim: -rim[4])
 
 
 def _gap_along(line: Float, one: shapely.Geometry, other: shapely.Geometry) -> float:
@@ -278,9 +288,9 @@ def _gap_places(one: shapely.Geometry, other: shapely.Geometry, pixel: float) ->
         way = there[which[chosen]] - here[chosen]
         found += [here[chosen] + share * way for share in (0.2, 0.35, 0.5, 0.65, 0.8)]
     places = np.concatenate(found)
-    free = ~shapely.contains_xy(shapely.buffer(one, pixel), places[:, 0], places[:, 1])
-    free &= ~shapely.contains_xy(shapely.buffer(other, pixel), places[:, 0], places[:, 1])
-    return places[free]
+    points = shapely.points(places)
+    shapely.prepare([one, other])
+    return places[~shapely.dwithin(one, points, pixel) & ~shapely.dwithin(other, points, pixel)]
 
 
 @kernel

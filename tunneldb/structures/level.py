@@ -21,6 +21,8 @@ from tunneldb.robust import MAD_TO_SIGMA
 CLASS = 0.05
 """Width of a class of θ, radians: at 45° about what the paper's 0.05 of cos θ is (Table 1)."""
 
+CLASSES = int(np.pi / CLASS) + 1
+
 FEWEST = 30
 """Fewer points tell no level."""
 
@@ -46,8 +48,8 @@ RANGE_SLOPE = 20.0
 TUKEY = 4.0
 """Differences count less the greater they are, and from so many standard deviations on not at all."""
 
-MOST_PAIRS = 20_000
-"""Pairs of places by which the shape is found."""
+MOST_PAIRS, MOST_PIXELS = 20_000, 40_000
+"""Pairs of places by which the shape is found, and pixels by which the level is, about."""
 
 MOST_POINTS = 8.0
 """Pixels of more points count no more than these: what is uneven about a surface does not go by how often it is measured."""
@@ -92,26 +94,26 @@ class LevelCurve:
     middle: float
     slope: float
 
-    def known(self, cosine: Float) -> Bool:
+    def known(self, angle: Float) -> Bool:
         """Where the level is known (n,): within a class that holds enough points, or half a class beside it."""
-        if not len(self.seen):
-            return np.zeros(np.shape(cosine), np.bool_)
-        place = np.arccos(cosine) / CLASS
-        near = np.isin(np.floor(place - 0.5), self.seen) | np.isin(np.floor(place + 0.5), self.seen)
-        return np.asarray(near & (place <= np.radians(STEEPEST) / CLASS))
+        enough = np.zeros(CLASSES + 2, np.bool_)
+        enough[self.seen + 1] = True
+        place = angle / CLASS
+        at = np.floor(place + 0.5).astype(np.int64)
+        return np.asarray((enough[at] | enough[at + 1]) & (place <= np.radians(STEEPEST) / CLASS))
 
-    def __call__(self, cosine: Float, range_m: Float) -> Float:
-        """Level at incidences and ranges (n,), dB."""
-        by_angle = np.interp(np.arccos(cosine), self.angle, self.level)
-        return np.asarray(by_angle + self.slope * (np.log10(range_m) - self.middle))
+    def __call__(self, angle: Float, range_m: Float) -> Float:
+        """Level at angles of incidence, radians, and ranges (n,), dB."""
+        by_angle = np.interp(angle, self.angle, self.level)
+        return np.asarray(by_angle + self.slope * (np.log10(range_m) - self.middle)) if self.slope else by_angle
 
-    def sigmas(self, cosine: Float) -> Float:
+    def sigmas(self, angle: Float) -> Float:
         """Standard deviation there, dB."""
-        return np.interp(np.arccos(cosine), self.angle, self.sigma)
+        return np.interp(angle, self.angle, self.sigma)
 
-    def own(self, cosine: Float, range_m: Float, value: Float) -> Bool:
+    def own(self, angle: Float, range_m: Float, value: Float) -> Bool:
         """Which pixels (n,) lie at the level."""
-        return np.asarray(np.abs(value - self(cosine, range_m)) < OWN * self.sigmas(cosine))
+        return np.asarray(np.abs(value - self(angle, range_m)) < OWN * self.sigmas(angle))
 
 
 UNKNOWN = LevelCurve(np.zeros(1), np.zeros(1), np.ones(1), np.empty(0, np.int64), 0.0, 0.0)
@@ -119,14 +121,14 @@ UNKNOWN = LevelCurve(np.zeros(1), np.zeros(1), np.ones(1), np.empty(0, np.int64)
 
 
 def level_curve(
-    cosine: Float, range_m: Float, value: Float, points: Float, pairs: Int64, own: Bool | None = None, *, by_range: bool
+    angle: Float, range_m: Float, value: Float, points: Float, pairs: Int64, own: Bool | None = None, *, by_range: bool
 ) -> LevelCurve:
     """Find the level of a surface from its pixels.
 
     Parameters
     ----------
-    cosine, range_m, value, points : (n,) float arrays
-        Cosine of incidence, range, m, mean level, dB, and number of points of each pixel.
+    angle, range_m, value, points : (n,) float arrays
+        Angle of incidence, radians, range, m, mean level, dB, and number of points of each pixel.
     pairs : (m, 2) int array
         Pixels that lie close to each other.
     own : (n,) bool array or None
@@ -134,21 +136,22 @@ def level_curve(
     by_range : bool
         Whether the level may also go by range. On a plane it need not: there θ tells the range.
     """
-    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
     usable = angle <= np.radians(STEEPEST)
     seen = _seen(angle[usable], points[usable])
     if not len(seen):
         return UNKNOWN
     pairs = pairs[usable[pairs].all(axis=1)]
-    angle, value, points, log_range = angle[usable], value[usable], points[usable], np.log10(range_m[usable])
-    pairs = (np.cumsum(usable) - 1)[pairs]
+    taken = np.flatnonzero(usable)
+    taken = np.union1d(taken[:: -(-len(taken) // MOST_PIXELS)], pairs)
+    pairs = np.searchsorted(taken, pairs)
+    angle, value, points, log_range = angle[taken], value[taken], points[taken], np.log10(range_m[taken])
     middle = float(np.median(log_range))
     by_range = by_range and float(np.ptp(log_range)) > LEAST_SPAN
     low, high = float(angle.min()), float(angle.max())
     knots = np.linspace(low, max(high, low + 1e-6), max(int(np.ceil((high - low) / CLASS)), 1) + 1)
     basis = _Basis((angle - low) / (knots[1] - low), log_range - middle, len(knots), by_range)
     weight = np.minimum(points, MOST_POINTS)
-    told = own[usable] if own is not None else np.zeros(len(value), np.bool_)
+    told = own[taken] if own is not None else np.zeros(len(value), np.bool_)
     if points[told].sum() < FEWEST:
         told = np.ones(len(value), np.bool_)
     found = _shape(basis, value, weight, pairs[told[pairs].all(axis=1)])
@@ -181,7 +184,7 @@ class _Basis:
     def __init__(self, place: Float, along: Float, knots: int, by_range: bool) -> None:
         self.first = np.clip(place.astype(np.int64), 0, knots - 2)
         self.share = place - self.first
-        self.along, self.by_range = along, by_range
+        self.along, self.by_range = along if by_range else np.zeros(len(place)), by_range
         self.prior = self._prior(knots)
 
     def _prior(self, knots: int) -> Float:
@@ -189,12 +192,13 @@ class _Basis:
         rise, bend = np.diff(np.eye(knots), axis=0), np.diff(np.eye(knots), n=2, axis=0)
         prior = np.zeros((knots + 1, knots + 1))
         prior[:knots, :knots] = bend.T @ bend / BEND**2 + rise.T @ rise / SLOPE**2 + 1e-9 * np.eye(knots)
-        prior[-1, -1] = 1.0 / RANGE_SLOPE**2 if self.by_range else 1e12
+        prior[-1, -1] = 1.0 / RANGE_SLOPE**2
         return prior
 
     def __call__(self, found: Float) -> Float:
         """Level of the pixels (n,)."""
-        return np.asarray((1.0 - self.share) * found[self.first] + self.share * found[self.first + 1] + found[-1] * self.along)
+        level = found[self.first] + self.share * np.diff(found)[self.first]
+        return np.asarray(level + found[-1] * self.along if self.by_range else level)
 
     def solve(self, one: Int64, other: Int64, seen: Float, weight: Float) -> Float:
         """Unknowns by weighted least squares of levels ``one``, less those of ``other`` where that is not empty."""
@@ -209,8 +213,6 @@ def _shape(basis: _Basis, value: Float, weight: Float, pairs: Int64) -> Float:
     found = np.zeros(len(basis.prior))
     if not len(pairs):
         return found
-    if len(pairs) > MOST_PAIRS:
-        pairs = pairs[:: -(-len(pairs) // MOST_PAIRS)]
     one, other = np.ascontiguousarray(pairs.T)
     seen = value[one] - value[other]
     both = weight[one] * weight[other] / (weight[one] + weight[other])
@@ -230,19 +232,16 @@ def _shape(basis: _Basis, value: Float, weight: Float, pairs: Int64) -> Float:
 
 def _fit(basis: _Basis, value: Float, weight: Float, found: Float, spread: float) -> tuple[Float, float]:
     """Level, and standard deviation of what lies about it: least squares with Tukey's weights."""
-    every = np.arange(len(value))
-    if len(every) > MOST_PAIRS:
-        every = every[:: -(-len(every) // MOST_PAIRS)]
-    weight = weight[every] / weight[every].mean()
-    nothing = np.empty(0, np.int64)
+    every, nothing = np.arange(len(value)), np.empty(0, np.int64)
+    weight = weight / weight.mean()
     for _ in range(FITS):
-        rest = (value - basis(found))[every]
+        rest = value - basis(found)
         near = np.abs(rest) < OWN * spread
         if near.sum() < FEWEST:
             break
         spread = max(float(MAD_TO_SIGMA * np.median(np.abs(rest[near]))) / OWN_MAD, LEAST_SIGMA)
         counted = weight * np.maximum(1.0 - (rest / (TUKEY * spread)) ** 2, 0.0) ** 2 / spread**2
-        before, found = found, basis.solve(every, nothing, value[every], counted)
+        before, found = found, basis.solve(every, nothing, value, counted)
         if np.abs(found[:-1] - before[:-1]).max() < SETTLED:
             break
     return found, spread
@@ -258,18 +257,19 @@ def _accumulate(
         w = weight[m]
         if w <= 0.0:
             continue
-        i = one[m]
-        at[0], at[1], at[4] = first[i], first[i] + 1, last
-        part[0], part[1], part[4] = 1.0 - share[i], share[i], along[i]
-        at[2], at[3], part[2], part[3] = 0, 0, 0.0, 0.0
+        i, size = one[m], 2
+        at[0], at[1], part[0], part[1] = first[i], first[i] + 1, 1.0 - share[i], share[i]
+        beyond = along[i]
         if len(other):
-            j = other[m]
-            at[2], at[3] = first[j], first[j] + 1
-            part[2], part[3] = share[j] - 1.0, -share[j]
-            part[4] -= along[j]
-        for a in range(5):
+            j, size = other[m], 4
+            at[2], at[3], part[2], part[3] = first[j], first[j] + 1, share[j] - 1.0, -share[j]
+            beyond -= along[j]
+        if beyond != 0.0:
+            at[size], part[size] = last, beyond
+            size += 1
+        for a in range(size):
             right[at[a]] += w * part[a] * seen[m]
-            for b in range(5):
+            for b in range(size):
                 matrix[at[a], at[b]] += w * part[a] * part[b]
 
 

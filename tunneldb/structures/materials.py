@@ -113,8 +113,8 @@ def parts_of_plane(layout: Layout, faces: list[int], seen: list[list[Observed]])
             for one in by_scan:
                 if one.scan != scan:
                     continue
-                use = np.flatnonzero(curve.known(one.cosine))
-                rest = one.value[use] - curve(one.cosine[use], one.range_m[use])
+                use = np.flatnonzero(curve.known(one.angle))
+                rest = one.value[use] - curve(one.angle[use], one.range_m[use])
                 at = place[one.pixel[use]]
                 total += np.bincount(at, one.points[use] * rest, len(total))
                 count += np.bincount(at, one.points[use], len(total))

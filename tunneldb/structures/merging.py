@@ -235,8 +235,9 @@ def _at_one_place(keys: Int64, owner: Int32) -> Int64:
 
 def _sums(grid: VoxelGrid, owner: Int32, count: int) -> Float:
     """Moments (count, 10) of faces."""
-    held = owner >= 0
-    return np.column_stack([np.bincount(owner[held], grid.moments[held, k], count) for k in range(10)])
+    out = np.zeros((count, grid.moments.shape[1]))
+    _add_moments(owner, grid.moments, out)
+    return out
 
 
 class _Members:
@@ -248,6 +249,14 @@ class _Members:
 
     def __call__(self, face: int) -> Int64:
         return self.order[self.starts[face] : self.starts[face + 1]]
+
+
+@kernel
+def _add_moments(owner: Int32, moments: Float, out: Float) -> None:  # pragma: no cover - compiled
+    for i in range(owner.shape[0]):
+        if owner[i] >= 0:
+            for k in range(out.shape[1]):
+                out[owner[i], k] += moments[i, k]
 
 
 @kernel

@@ -46,7 +46,7 @@ def ray_densities(layout: Layout, face: int, seen: list[Observed], stations: Flo
         occupied = np.zeros((len(v), len(u)), np.bool_)
         occupied[row, column] = True
         pixels = np.count_nonzero(closed(occupied, 2))
-        angle = pixels * layout.pixel[face] ** 2 * np.mean(one.cosine / (one.range_m**2 * np.maximum(level, 1e-3)))
+        angle = pixels * layout.pixel[face] ** 2 * np.mean(np.cos(one.angle) / (one.range_m**2 * np.maximum(level, 1e-3)))
         out[one.scan] = points / max(float(angle), 1e-12), points
     return out
 

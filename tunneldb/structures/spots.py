@@ -105,7 +105,10 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
         image = face.image
         if sign < 0:
             image = replace(image, drop=np.where(image.drop == NODATA, np.int16(NODATA), -image.drop).astype(np.int16))
-        marked = refine_boundary((sign * differs > 1.0) & on_face, image, size)
+        marked = (sign * differs > 1.0) & on_face
+        if not marked.any():
+            continue
+        marked = refine_boundary(marked, image, size)
         for region in find_regions(marked, marked, image, LEAST_AREA, None):
             spot = _judge(region, kind, face, sign * differs[::-1], rim)
             if spot is None:
