@@ -17,6 +17,7 @@ from tunneldb.compiled import inner, kernel
 from tunneldb.geometry.normals import eigenvalues, normal
 from tunneldb.structures.models import WIDTH, distance, fit_cylinder, fit_plane, gradient, seen_angle
 from tunneldb.structures.voxel_grid import VoxelGrid, VoxelPlanes
+from tunneldb.threads import in_blocks
 
 TOLERANCE = 2.5
 """A centroid lies no farther from the face, in standard deviations of the noise."""
@@ -87,9 +88,7 @@ def noise_of(planes: VoxelPlanes, towards: Float) -> float:
     return float(np.clip(np.median(planes.rms[flat] / cosine[flat]), LEAST_NOISE, MOST_NOISE))
 
 
-def grow(
-    grid: VoxelGrid, starts: Int64, neighbours: Int32, planes: VoxelPlanes, towards: Float, noise: float, taken: Int32
-) -> Grown:
+def grow(grid: VoxelGrid, starts: Int64, neighbours: Int32, planes: VoxelPlanes, towards: Float, noise: float) -> Grown:
     """Grow the faces of a grid.
 
     Parameters
@@ -100,22 +99,33 @@ def grow(
         Unit vectors to the scanner: noise lies along the beam, so that a surface at a slant shows less of it.
     noise : float
         Of ranges, m.
-    taken : (n,) int32 array
-        Voxels with 0 or more belong to faces already and are left out.
     """
     # What is as flat as noise lets it be is equally so; of that, where most points are comes first.
     cosine = np.einsum("ni,ni->n", planes.normal, towards)
     rough = np.maximum(planes.rms / np.maximum(noise * cosine, LEAST_NOISE), 1.2)
-    order = np.lexsort([grid.keys, -planes.support, np.round(rough, 1)])
-    order = order[(planes.variation[order] < ROUGH) & (taken[order] < 0)]
-    owner = np.where(taken >= 0, np.int32(-2), np.int32(-1)).astype(np.int32)
-    most = len(grid) // LEAST_VOXELS + 1
-    models, rms = np.zeros((most, WIDTH)), np.zeros(most)
-    count = _grow_all(
-        order, grid.moments, grid.centroids, planes.normal, towards, starts, neighbours, noise, grid.edge, owner, models, rms
-    )
-    owner[owner == -2] = -1
-    return Grown(owner, models[:count], rms[:count])
+    owner = np.full(len(grid), -1, np.int32)
+    centroid, bounds = grid.centroids, np.append(np.unique(grid.scan, return_index=True)[1], len(grid))
+    found: list[tuple[Float, Float]] = [(np.empty((0, WIDTH)), np.empty(0))] * (len(bounds) - 1)
+
+    def of_scan(number: int, _: int) -> None:
+        here = slice(bounds[number], bounds[number + 1])
+        order = np.lexsort([-planes.support[here], np.round(rough[here], 1)])
+        order = order[planes.variation[here][order] < ROUGH]
+        beside = starts[here.start : here.stop + 1]
+        most = (here.stop - here.start) // LEAST_VOXELS + 1
+        models, rms = np.zeros((most, WIDTH)), np.zeros(most)
+        count = _grow_all(
+            order, grid.moments[here], centroid[here], planes.normal[here], towards[here], beside - beside[0],
+            neighbours[beside[0] : beside[-1]] - np.int32(here.start), noise, grid.edge, owner[here], models, rms,
+        )  # fmt: skip
+        found[number] = models[:count], rms[:count]
+
+    in_blocks(of_scan, len(found), 1)
+    first = np.cumsum([0, *(len(rms) for _, rms in found)])
+    for number, start in enumerate(first[:-1].tolist()):
+        part = owner[bounds[number] : bounds[number + 1]]
+        part[part >= 0] += start
+    return Grown(owner, *(np.concatenate(part) for part in zip(*found, strict=True)))
 
 
 @inner

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -196,26 +195,14 @@ def _fits(one: Float, other: Float, grid: VoxelGrid, centroid: Float, sums: Floa
 
 def _touching(owner: Int32, starts: Int64, neighbours: Int32) -> Int64:
     """Pairs of faces (m, 2) whose voxels touch, or touch one voxel between them."""
-    pairs = []
-    for at, there in _contacts(owner, starts, neighbours):
-        mine, other = owner[at], owner[there]
-        direct = (mine >= 0) & (other > mine)
-        pairs.append(np.unique(np.column_stack([mine[direct], other[direct]]), axis=0))
-        free = (mine < 0) & (other >= 0)
-        beside = np.unique(np.column_stack([at[free], other[free]]), axis=0)
-        same = beside[1:, 0] == beside[:-1, 0]
-        pairs.append(np.column_stack([beside[:-1, 1][same], beside[1:, 1][same]]))
-    return np.unique(np.concatenate(pairs).astype(np.int64), axis=0)
-
-
-def _contacts(owner: Int32, starts: Int64, neighbours: Int32) -> Iterator[tuple[Int64, Int32]]:
-    """Voxels and what touches them that is not of the same face, for some voxels at a time."""
-    for begin in range(0, max(len(owner), 1), BLOCK):
+    most, number = max(int(owner.max(initial=-1)) + 1, 1), 0
+    pairs = np.empty(0, np.int64)
+    for begin in range(0, len(owner), BLOCK):
         end = min(begin + BLOCK, len(owner))
-        at = np.repeat(np.arange(begin, end), np.diff(starts[begin : end + 1]))
-        other = neighbours[starts[begin] : starts[end]]
-        differ = owner[at] != owner[other]
-        yield at[differ], other[differ]
+        found = np.empty(starts[end] - starts[begin], np.int64)
+        number = _contacts(owner, starts, neighbours, begin, end, most, found)
+        pairs = np.union1d(pairs, found[:number])
+    return np.column_stack([pairs // most, pairs % most])
 
 
 def _at_one_place(keys: Int64, owner: Int32) -> Int64:
@@ -249,6 +236,36 @@ class _Members:
 
     def __call__(self, face: int) -> Int64:
         return self.order[self.starts[face] : self.starts[face + 1]]
+
+
+@kernel
+def _contacts(
+    owner: Int32, starts: Int64, neighbours: Int32, begin: int, end: int, most: int, found: Int64
+) -> int:  # pragma: no cover - compiled
+    """Pairs of faces of voxels that touch, as first × most + second, into ``found``; how many. Runs of one pair count once."""
+    beside, number, before = np.empty(27, np.int32), 0, np.int64(-1)
+    for i in range(begin, end):
+        many = 0
+        for e in range(starts[i], starts[i + 1]):
+            other = owner[neighbours[e]]
+            if other < 0 or other == owner[i]:
+                continue
+            k = 0
+            while k < many and beside[k] < other:
+                k += 1
+            if k < many and beside[k] == other:
+                continue
+            for m in range(many, k, -1):
+                beside[m] = beside[m - 1]
+            beside[k] = other
+            many += 1
+        for k in range(many if owner[i] >= 0 else many - 1):
+            first, second = (owner[i], beside[k]) if owner[i] >= 0 else (beside[k], beside[k + 1])
+            pair = min(first, second) * most + max(first, second)
+            if pair != before:
+                found[number], before = pair, pair
+                number += 1
+    return number
 
 
 @kernel

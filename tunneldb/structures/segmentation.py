@@ -66,7 +66,7 @@ def find_faces(moments: VoxelMoments, stations: Float) -> Segmentation:
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     noise = noise_of(voxel_planes(grid, starts, neighbours, at, UNKNOWN_NOISE), towards)
     planes = voxel_planes(grid, starts, neighbours, at, noise)
-    grown = grow(grid, starts, neighbours, planes, towards, noise, np.full(len(grid), -1, np.int32))
+    grown = grow(grid, starts, neighbours, planes, towards, noise)
     faces = merge(grid, starts, neighbours, towards, grown, noise)
     round_ = np.append(faces.models[:, RADIUS] > 0.0, False)[faces.owner]
     if round_.any():
