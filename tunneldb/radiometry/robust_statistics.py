@@ -66,12 +66,12 @@ def robust_statistics(values: NDArray[np.floating], shorth: float = SHORTH, *, t
         return plain_statistics(ordered)
     width = max(2, int(np.ceil(shorth * count)))
     start = int(np.argmin(ordered[width - 1 :] - ordered[: count - width + 1]))
-    mean = float(np.median(ordered[start : start + width]))
+    mean = float(_middle(ordered[start : start + width]).mean())
     above = ordered[np.searchsorted(ordered, mean, side="right") :]
-    sigma = MAD_TO_SIGMA * float(np.median(above - mean)) if len(above) else 0.0
+    sigma = MAD_TO_SIGMA * float((_middle(above) - mean).mean()) if len(above) else 0.0
     if two_sided:
         below = ordered[: np.searchsorted(ordered, mean, side="left")]
-        sigma = min(sigma, MAD_TO_SIGMA * float(np.median(mean - below))) if len(below) else sigma
+        sigma = min(sigma, MAD_TO_SIGMA * float((mean - _middle(below)).mean())) if len(below) else sigma
     total = np.concatenate([[0.0], np.cumsum(ordered)])
     squares = np.concatenate([[0.0], np.cumsum(ordered**2)])
     first, last = 0, count
@@ -85,3 +85,8 @@ def robust_statistics(values: NDArray[np.floating], shorth: float = SHORTH, *, t
         variance = float(squares[last] - squares[first]) / kept - mean * mean
         sigma = np.sqrt(max(variance, 0.0)) / CLIPPED_SIGMA
     return DryLevel(mean, float(sigma), last - first)
+
+
+def _middle(ordered: NDArray[np.floating]) -> NDArray[np.floating]:
+    """The one or two values in the middle of growing ones: their mean is the median."""
+    return ordered[(len(ordered) - 1) // 2 : len(ordered) // 2 + 1]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import ndimage
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from tunneldb.arrays import Bool, Single
 from tunneldb.radiometry.robust_statistics import robust_statistics
@@ -66,7 +66,7 @@ class Scatter:
 
 def limit(pixels: int, window: int) -> float:
     """How many standard deviations of a window's mean are none by chance, of a structure of so many pixels."""
-    return float(norm.isf(min(ALARMS * window**2 / max(pixels, 1), 0.01)))
+    return -float(ndtri(min(ALARMS * window**2 / max(pixels, 1), 0.01)))
 
 
 def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter: Scatter) -> Single:
