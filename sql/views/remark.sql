@@ -1,11 +1,11 @@
 -- What a reader of a survey's results is to know, as every document says it.
 
--- Notes of the stages whose results are in the database, and points that were left out
--- of files. A fifth of a scan's points is noise only where the filter does not suit the scan: it is made for those that strike
--- nothing (dust, edges, people), which are a few percent. Of points beyond the ends of the given axis one in a hundred is told:
--- a scan sees some of what lies before a portal, but a tunnel that goes on is to be looked at.
+-- Notes of the stages whose results are in the database, points that were left out of files, and what gives to doubt about
+-- their intensity. A fifth of a scan's points is noise only where the filter does not suit the scan: it is made for those that
+-- strike nothing (dust, edges, people), which are a few percent. Of points beyond the ends of the given axis one in a hundred is
+-- told: a scan sees some of what lies before a portal, but a tunnel that goes on is to be looked at.
 CREATE OR REPLACE VIEW tunnel_api.remark AS
-SELECT 8 * r.id AS id, r.survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file,
+SELECT 16 * r.id AS id, r.survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file,
        concat_ws('; ', r.counts ->> 'note', r.counts ->> 'place') AS remark
   FROM (SELECT DISTINCT ON (d.survey_id, d.km, d.stage) d.*
           FROM tunnel.run d
@@ -14,7 +14,7 @@ SELECT 8 * r.id AS id, r.survey_id, s.name AS survey, r.km, r.stage, NULL::text 
   JOIN tunnel.survey s ON s.id = r.survey_id
  WHERE r.counts ?| ARRAY['note', 'place']
  UNION ALL
-SELECT 8 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, format('%s points (%s %%) left out: %s', w.points,
+SELECT 16 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, format('%s points (%s %%) left out: %s', w.points,
        round(100 * w.points / greatest(f.points - f.outside, 1)::numeric, 2), w.why)
   FROM tunnel.scan_file f
   JOIN tunnel.survey s ON s.id = f.survey_id
@@ -24,7 +24,7 @@ SELECT 8 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, format
        (3, f.noise, 0.2, 'they count as noise; is the scan too sparse for load --noise-points?')) AS w (k, points, share, why)
  WHERE w.points > w.share * (f.points - f.outside)
  UNION ALL
-SELECT 8 * f.id::bigint + b.k, f.survey_id, s.name, NULL, 'load', f.name,
+SELECT 16 * f.id::bigint + b.k, f.survey_id, s.name, NULL, 'load', f.name,
        format('%s points (%s %%) lie %s of the given axis, up to %s m: they are not loaded, and nothing is looked for there',
               b.points, round(100 * b.points / b.near::numeric, 1), b.side, b.reach)
   FROM tunnel.scan_file f
@@ -35,7 +35,7 @@ SELECT 8 * f.id::bigint + b.k, f.survey_id, s.name, NULL, 'load', f.name,
        (5, f.beyond_after, f.reach_after, n.near, 'beyond the end')) AS b (k, points, reach, near, side)
  WHERE b.points > 0.01 * b.near
  UNION ALL
-SELECT 8 * f.id::bigint + 7, f.survey_id, s.name, NULL, 'load', f.name,
+SELECT 16 * f.id::bigint + 7, f.survey_id, s.name, NULL, 'load', f.name,
        format('has the same content as %s: all its points count twice; tunneldb survey remove-file %s %s', o.name, s.name, f.name)
   FROM tunnel.scan_file f
   JOIN tunnel.survey s ON s.id = f.survey_id
@@ -43,11 +43,16 @@ SELECT 8 * f.id::bigint + 7, f.survey_id, s.name, NULL, 'load', f.name,
                       WHERE e.survey_id = f.survey_id AND e.checksum = f.checksum AND e.id < f.id AND e.checksum <> '') o
  WHERE o.name IS NOT NULL
  UNION ALL
-SELECT 8 * s.id::bigint + 6, s.id, s.name, NULL, 'survey', NULL, s.positions_note
+SELECT 16 * f.id::bigint + 8, f.survey_id, s.name, NULL, 'load', f.name, f.intensity_note
+  FROM tunnel.scan_file f
+  JOIN tunnel.survey s ON s.id = f.survey_id
+ WHERE f.intensity_note IS NOT NULL
+ UNION ALL
+SELECT 16 * s.id::bigint + 6, s.id, s.name, NULL, 'survey', NULL, s.positions_note
   FROM tunnel.survey s
  WHERE s.positions_note IS NOT NULL;
 COMMENT ON VIEW tunnel_api.remark IS
-    'What a reader of the results is to know: notes of the stages by kilometre, points that were left out by file, and what is to be known of the scanner positions';
+    'What a reader of the results is to know: notes of the stages by kilometre, points that were left out by file and what its intensity gives to doubt, and what is to be known of the scanner positions';
 COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file, and for the survey as a whole';
 COMMENT ON COLUMN tunnel_api.remark.stage IS 'Stage that says so; survey for what was said when the survey was added or set';
 COMMENT ON COLUMN tunnel_api.remark.file IS 'Name of the scan file; NULL for a kilometre';

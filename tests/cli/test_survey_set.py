@@ -103,6 +103,19 @@ def test_values_that_are_no_decibels_are_refused_as_such(
     assert conn.execute("SELECT count(*) FROM tunnel.scan_file").fetchone() == (0,)
 
 
+def test_a_saturated_scan_is_loaded_and_every_result_says_so(folder: Path, conn: psycopg.Connection, tmp_path: Path) -> None:
+    (path,) = folder.glob("*.laz")
+    las = laspy.read(path)
+    las.Amplitude = np.minimum(las.Amplitude, np.quantile(las.Amplitude, 0.75))
+    las.write(tmp_path / "a.laz")
+    add(folder, "--intensity", "Amplitude", "--intensity-kind", "amplitude", "--reference", "auto")
+    assert "the scan is saturated" in command("load", NAME, tmp_path / "a.laz").stderr
+    ((said,),) = conn.execute("SELECT said FROM tunnel_api.remarks((SELECT id FROM tunnel.survey))").fetchall()
+    share, _, rest = said.removeprefix("a.laz: ").partition(" % of the intensities are the greatest value")
+    assert float(share) == pytest.approx(25.0, abs=2.0)
+    assert rest
+
+
 def test_poses_that_cannot_be_are_left_out_and_told(folder: Path, conn: psycopg.Connection, tmp_path: Path) -> None:
     rows = np.genfromtxt(folder / f"{NAME}.trajectory.csv", delimiter=",", skip_header=1)
     rows[len(rows) // 2, 1:] = 0.0

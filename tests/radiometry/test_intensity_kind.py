@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tunneldb.radiometry.intensity_kind import contradiction, guess_kind, value_range
+from tunneldb.radiometry.intensity_kind import contradiction, doubt, guess_kind, value_range
 from tunneldb.simulate.radiometry import Radiometry, counts
 
 RNG = np.random.default_rng(5)
@@ -40,6 +40,22 @@ def test_the_first_guess_is_what_it_is(name: str) -> None:
 def test_what_it_is_contradicts_nothing(name: str) -> None:
     kind, values = KINDS[name]
     assert contradiction(kind, values) is None
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_nothing_is_doubted_about_what_is_right(name: str) -> None:
+    assert doubt(*KINDS[name]) is None
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.25, "25 %"), (0.02, "2 %")])
+def test_a_scan_whose_receiver_is_at_its_stop_is_called_saturated(share: float, said: str) -> None:
+    stopped = np.minimum(AMPLITUDE, np.quantile(AMPLITUDE, 1.0 - share))
+    assert str(doubt("amplitude", stopped)).startswith(f"{said} of the intensities are the greatest value")
+    assert "saturated" in str(doubt("linear", np.minimum(COUNTS, np.quantile(COUNTS, 1.0 - share)).round()))
+
+
+def test_decibels_that_are_declared_counts_are_doubted() -> None:
+    assert "--intensity-kind amplitude?" in str(doubt("linear", AMPLITUDE))
 
 
 @pytest.mark.parametrize("kind", ["amplitude", "reflectance"])

@@ -22,7 +22,7 @@ from tunneldb.pointcloud.reader import read_chunks, read_header
 from tunneldb.pointcloud.stations import read_stations
 from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
-from tunneldb.radiometry.intensity_kind import contradiction
+from tunneldb.radiometry.intensity_kind import contradiction, doubt
 from tunneldb.radiometry.range_curve import ADVICE, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.structures.contrast import observe_face
@@ -39,9 +39,6 @@ AUTO = "auto"
 
 SATURATED = 0.5
 """Share of the points that have the greatest value of all from which there is nothing to be told by it."""
-
-NOTED_SATURATED = 0.01
-"""Share from which it is said."""
 
 UNKNOWN = 0.01
 """Share of points without a scanner position that may be left out."""
@@ -148,9 +145,8 @@ def find_members(inputs: Inputs, begin: Begin) -> FileMembers:
     reference, note = _reference(inputs, segmentation, sums)
     by_range = needs_reference(inputs.kind) and reference is None
     found = find_structures(segmentation, sums, images, reference, by_range=by_range)
-    return FileMembers(
-        found, segmentation, values.count, far, values.unknown, values.untold, values.saturated, tuple(filter(None, [note]))
-    )
+    notes = tuple(filter(None, [values.note, note]))
+    return FileMembers(found, segmentation, values.count, far, values.unknown, values.untold, values.saturated, notes)
 
 
 def _usable(path: Path, dimension: str) -> ScanHeader:
@@ -223,6 +219,11 @@ class _Values:
     @property
     def saturated(self) -> float:
         return self.at_most / max(self.count, 1)
+
+    @property
+    def note(self) -> str | None:
+        """What gives to doubt about them."""
+        return doubt(self.inputs.kind, np.concatenate(self.sample)) if self.sample else None
 
     def require(self) -> None:
         """Raise a UserError where there is nothing to be told by the values."""

@@ -24,7 +24,7 @@ from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import ScanHeader, check_header, crs_note, read_header
 from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
 from tunneldb.pointcloud.spool import Spool
-from tunneldb.radiometry.intensity_kind import contradiction
+from tunneldb.radiometry.intensity_kind import contradiction, doubt
 from tunneldb.store.partition import drop_fragments, write_fragments
 from tunneldb.store.scan_files import (
     Content,
@@ -256,9 +256,10 @@ class Reading:
         survivors = Spool(self.memory // self.share)
         try:
             counts, digest = self._filter(header, survivors, begin(path.name, 2 * header.points))
+            doubtful = doubt(self.survey.intensity_kind, counts.intensity_sample)
             stated = None if header.crs is None else self.survey.srid
             left = [] if former is None else self.leave(former)
-            content = Content(path, digest, path.stat().st_size, stated, counts)
+            content = Content(path, digest, path.stat().st_size, stated, doubtful, counts)
             file_id = record_file(self.conn, self.survey, content)
             record_kilometres(self.conn, file_id, survivors.kilometres(), counts.ranges, left)
             if self.held is None:
@@ -268,7 +269,8 @@ class Reading:
         finally:
             if self.held is None or survivors not in self.held.values():
                 survivors.close()
-        return Read(file_id, state, time.monotonic() - started, self._density_note(counts))
+        note = "; ".join(filter(None, (doubtful, self._density_note(counts)))) or None
+        return Read(file_id, state, time.monotonic() - started, note)
 
     def _density_note(self, counts: FilterCounts) -> str | None:
         """Say that most of a file's points lie where there are too few for leaks to be sought."""

@@ -20,6 +20,7 @@ from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.poses import PoseFaults, PoseModel
 from tunneldb.pointcloud.reader import CHUNK, ScanHeader, check_header, crs_note
 from tunneldb.pointcloud.selection import SAMPLED, FilterCounts
+from tunneldb.radiometry.intensity_kind import doubt
 from tunneldb.store.ledger import stage_run
 from tunneldb.store.scan_files import COUNTED, Content, Loaded, checksum, outcome, record_file, recorded_files, unchanged
 from tunneldb.store.sources import load_poses
@@ -67,13 +68,13 @@ def register_files(
         check_header(header, survey.intensity_dimension, survey.srid, needs_time=poses.mobile)
     for header in headers:
         corners = np.array([header.low[:2], header.high[:2]])
-        note = "; ".join(filter(None, (crs_note(header, survey.srid), outside_area(survey.srid, corners)))) or None
         recorded = recorded_files(conn, survey).get(header.path.name)
         there = unchanged(conn, header.path, recorded)
         conn.commit()
         if there is None:
             there = _register(conn, survey, header, poses, max_left_out, begin, replaces=recorded is not None)
-        yield replace(there, note=note)
+        notes = (crs_note(header, survey.srid), outside_area(survey.srid, corners), there.note)
+        yield replace(there, note="; ".join(filter(None, notes)) or None)
 
 
 def remove_site_files(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[str]) -> None:
@@ -97,9 +98,12 @@ def _register(
         with ThreadPoolExecutor(1, "checksum") as pool:
             digest = pool.submit(checksum, path)
             counts = _look_through(survey, header, poses, max_left_out, begin)
-            content = Content(path, digest.result(), path.stat().st_size, survey.srid if header.crs else None, counts)
+            doubtful = doubt(survey.intensity_kind, counts.intensity_sample)
+            stated = survey.srid if header.crs else None
+            content = Content(path, digest.result(), path.stat().st_size, stated, doubtful, counts)
         file_id = record_file(conn, survey, content)
         loaded = outcome(conn, file_id, "replaced" if replaces else "loaded", time.monotonic() - started)
+        loaded = replace(loaded, note=doubtful)
         run.counts.update({name: getattr(loaded, name) for name in COUNTED})
     return loaded
 

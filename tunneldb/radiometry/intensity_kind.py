@@ -31,6 +31,15 @@ WIDEST_DB = 60.0
 FARTHEST_DB = 150.0
 """Size of a level in dB that no scanner tells: 10¹⁵ times the reference."""
 
+SATURATED = 0.01
+"""Share of the values that are the greatest of all from which it is said that a scan is saturated …"""
+
+STOP = 3.0
+"""… if they are so many times as many as those of the next value below: coarse steps hold many values each."""
+
+LEAST_DOUBTED = 100
+"""Of fewer values nothing is said."""
+
 _BITS = (8, 11, 12, 16)
 _SHIFTED = (-2048.0, 2047.0)  # 12 bits, as Leica's PTS has them
 
@@ -147,6 +156,41 @@ def contradiction(kind: str, values: NDArray[Any] | ValueRange) -> str | None:
         return None
     others = [guess for guess in guess_kind(found) if guess.kind != kind]
     return f"{reason}; it looks like {others[0].what}" if others else reason
+
+
+def doubt(kind: str, values: NDArray[Any]) -> str | None:
+    """Tell what about values that can be of a kind is strange all the same: to be said, not refused.
+
+    Parameters
+    ----------
+    kind : {'amplitude', 'reflectance', 'linear', 'none'}
+    values : (n,) array of any number type
+        A sample, in the file's own unit.
+
+    Returns
+    -------
+    str or None
+        A phrase for a remark; None where there is nothing to be said.
+    """
+    finite = np.asarray(values, np.float64)
+    finite = finite[np.isfinite(finite)]
+    if kind == "none" or len(finite) < LEAST_DOUBTED:
+        return None
+    said = []
+    steps, counts = np.unique(finite, return_counts=True)
+    if len(steps) > 1 and counts[-1] >= SATURATED * len(finite) and counts[-1] > STOP * counts[-2]:
+        said.append(
+            f"{100 * counts[-1] / len(finite):.2g} % of the intensities are the greatest value, {steps[-1]:g}: the scan is"
+            " saturated, and what of it is darker than its surroundings may not show"
+        )
+    found = value_range(finite)
+    likeliest = guess_kind(found)[0]
+    if kind == "linear" and likeliest.kind != "linear":
+        said.append(
+            f"the intensities, declared linear, look like {likeliest.what} ({likeliest.reason}): is it"
+            f" --intensity-kind {likeliest.kind}?"
+        )
+    return "; ".join(said) or None
 
 
 def _not_linear(found: ValueRange) -> str | None:

@@ -67,12 +67,16 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Content:
-    """A file that was read, as it is to be recorded; srid is that of the tunnel, if the file states one."""
+    """A file that was read, as it is to be recorded; srid is that of the tunnel, if the file states one.
+
+    intensity_note is what its intensity gives to doubt.
+    """
 
     path: Path
     checksum: str
     bytes: int
     srid: int | None
+    intensity_note: str | None
     counts: FilterCounts
 
 
@@ -126,15 +130,16 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
     row = conn.execute(
         """
         INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, invalid, unposed,
-                                      thinned, kept, chainage_from, chainage_to, extent, srid,
+                                      thinned, kept, chainage_from, chainage_to, extent, srid, intensity_note,
                                       beyond_before, beyond_after, reach_before, reach_after)
-        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s, %s, %s, %s, %s)
+        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s, %s, %s, %s, %s, %s)
         ON CONFLICT (survey_id, name) DO UPDATE
            SET path = excluded.path, checksum = excluded.checksum, bytes = excluded.bytes, points = excluded.points,
                noise = excluded.noise, outside = excluded.outside, invalid = excluded.invalid, unposed = excluded.unposed,
                thinned = excluded.thinned, kept = 0,
                chainage_from = excluded.chainage_from, chainage_to = excluded.chainage_to, extent = excluded.extent,
-               srid = excluded.srid, beyond_before = excluded.beyond_before, beyond_after = excluded.beyond_after,
+               srid = excluded.srid, intensity_note = excluded.intensity_note,
+               beyond_before = excluded.beyond_before, beyond_after = excluded.beyond_after,
                reach_before = excluded.reach_before, reach_after = excluded.reach_after
         RETURNING id
         """,
@@ -153,6 +158,7 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
             *chainage,
             counts.extent.tolist(),
             content.srid,
+            content.intensity_note,
             *counts.beyond,
             *counts.beyond_reach,
         ],

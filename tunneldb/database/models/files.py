@@ -55,6 +55,9 @@ class ScanFile(Base):
     reach_after: Mapped[float] = mapped_column(
         server_default="0", comment="How far after the end of the given axis nearly all of these lie, m"
     )
+    intensity_note: Mapped[str | None] = mapped_column(
+        comment="What its intensity gives to doubt: saturated, another kind by its values"
+    )
     srid: Mapped[int | None] = mapped_column(comment="Spatial reference that the file states, if it states one")
     loaded_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was loaded")
 
