@@ -163,15 +163,18 @@ def face_level(curve: LevelCurve, one: Observed) -> LevelCurve:
     return replace(curve, level=curve.level + float(np.mean(rest[own])))
 
 
-def curve_of(observed: list[Observed], model: Float, own: Bool | None = None, *, by_range: bool) -> LevelCurve:
-    """Level of what one scan saw, of one face or of the faces of a member."""
+def curve_of(
+    observed: list[Observed], model: Float, own: Bool | None = None, *, by_range: bool, one_surface: bool = True
+) -> LevelCurve:
+    """Level of what one scan saw, of one face or of the faces of a member; see `level_curve`."""
     angle, range_m, value, points = (
         np.concatenate([getattr(one, name) for one in observed]) for name in ("angle", "range_m", "value", "points")
     )
     starts = np.cumsum([0, *(len(one.pixel) for one in observed)])
     step = -(-2 * len(LAGS) * len(value) // MOST_PAIRS)
     pairs = np.concatenate([_pairs(one, step) + start for one, start in zip(observed, starts[:-1], strict=True)])
-    return level_curve(angle, range_m, value, points, pairs, own, by_range=by_range and model[RADIUS] > 0.0)
+    by_range = by_range and model[RADIUS] > 0.0
+    return level_curve(angle, range_m, value, points, pairs, own, by_range=by_range, one_surface=one_surface)
 
 
 def _pairs(one: Observed, step: int) -> Int64:

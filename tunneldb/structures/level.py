@@ -121,7 +121,15 @@ UNKNOWN = LevelCurve(np.zeros(1), np.zeros(1), np.ones(1), np.empty(0, np.int64)
 
 
 def level_curve(
-    angle: Float, range_m: Float, value: Float, points: Float, pairs: Int64, own: Bool | None = None, *, by_range: bool
+    angle: Float,
+    range_m: Float,
+    value: Float,
+    points: Float,
+    pairs: Int64,
+    own: Bool | None = None,
+    *,
+    by_range: bool,
+    one_surface: bool = True,
 ) -> LevelCurve:
     """Find the level of a surface from its pixels.
 
@@ -135,6 +143,9 @@ def level_curve(
         Pixels that another scan knows to be of the surface itself; None where none does.
     by_range : bool
         Whether the level may also go by range. On a plane it need not: there θ tells the range.
+    one_surface : bool
+        Whether most of it is of one surface, so that where most pixels lie is fitted once more. Of several materials each
+        covers its own incidences, and such a fit would go from one to the other.
     """
     usable = angle <= np.radians(STEEPEST)
     seen = _seen(angle[usable], points[usable])
@@ -157,7 +168,9 @@ def level_curve(
     found = _shape(basis, value, weight, pairs[told[pairs].all(axis=1)])
     start = robust_statistics((value - basis(found))[told], SHORTH, two_sided=True)
     found[: len(knots)] += start.mean
-    found, spread = _fit(basis, value, weight, found, max(start.sigma, LEAST_SIGMA))
+    spread = max(start.sigma, LEAST_SIGMA)
+    if one_surface:
+        found, spread = _fit(basis, value, weight, found, spread)
     sigma = _sigmas(angle, value - basis(found), knots, spread)
     return LevelCurve(knots, found[: len(knots)], sigma, seen, middle, float(found[-1]) if by_range else 0.0)
 

@@ -16,7 +16,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from tunneldb.arrays import Float, Int32, Int64
 from tunneldb.robust import MAD_TO_SIGMA
-from tunneldb.structures.contrast import Observed, member_levels
+from tunneldb.structures.contrast import Observed, curve_of
 from tunneldb.structures.face_raster import Layout
 from tunneldb.structures.models import to_space, unroll
 
@@ -105,9 +105,10 @@ def parts_of_plane(layout: Layout, faces: list[int], seen: list[list[Observed]])
     plane = Plane.of(layout, faces)
     if max(plane.shape) * plane.pixel < 2.0 * LEAST_WIDTH:
         return None
-    curves = member_levels(seen, layout.models[faces[0]], by_range=False)
     images = []
-    for scan, curve in curves.items():  # by itself: where one saw more of another material, its level is that one's
+    for scan in sorted({one.scan for by_scan in seen for one in by_scan}):  # by itself: what one saw most of is its level
+        here = [one for by_scan in seen for one in by_scan if one.scan == scan]
+        curve = curve_of(here, layout.models[faces[0]], by_range=False, one_surface=False)
         total, count = np.zeros(plane.shape).ravel(), np.zeros(plane.shape).ravel()
         for place, by_scan in zip(plane.place, seen, strict=True):
             for one in by_scan:
