@@ -18,7 +18,10 @@ LEAST_RETURNED = 0.7
 """Share of the beams that come back from a face at least."""
 
 EVEN = 0.3
-"""Of nine tenths of a scan's points the density differs by no more, or the scan was thinned out."""
+"""Of the points between the quantiles `QUANTILES` the density differs by no more, or the scan was thinned out."""
+
+QUANTILES = (0.25, 0.5, 0.95)
+"""Low, usual and high density: up to a quarter of what a scan sees may be gratings and fences."""
 
 FEWEST = 60
 """Fewer points of a face tell no density."""
@@ -67,7 +70,7 @@ def solid_faces(densities: Float) -> Bool:
         density, points = densities[held, scan].T
         order = np.argsort(density)
         share = np.cumsum(points[order]) / points.sum()
-        low, usual, high = density[order[np.searchsorted(share, (0.05, 0.5, 0.95)).clip(max=len(order) - 1)]]
+        low, usual, high = density[order[np.searchsorted(share, QUANTILES).clip(max=len(order) - 1)]]
         if low < usual * (1.0 - EVEN) or high > usual * (1.0 + EVEN):
             continue
         total[held] += points
