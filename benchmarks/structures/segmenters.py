@@ -2,7 +2,7 @@
 
 Each is given the whole cloud. Region growing of PCL is as in ``literal``. Of Open3D planar patches (Araújo and Oliveira, 2020;
 ``pip install open3d``, no dependency of the project) with its own defaults; a point is on the patch that it lies nearest to, of
-those whose box holds it, made 6 mm thick each way. Of CGAL efficient RANSAC for planes and cylinders (``libcgal-dev``; under the
+those whose box holds it, 6 mm thick each way. Of CGAL efficient RANSAC for planes and cylinders (``libcgal-dev``; under the
 GPL, so for the benchmark only), with the same 6 mm, three standard deviations of the usual noise. Time is that of the
 segmentation with its normals; that of tunneldb is all of its run, with reading, spots and writing.
 """
