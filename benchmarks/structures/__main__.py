@@ -34,7 +34,7 @@ from benchmarks.structures.scenes import JUDGE, OWN, Scene, make, one_scan, para
 
 PAIR_SEEDS = {False: tuple(range(31, 37)), True: tuple(range(2031, 2037))}
 LIMIT_SEEDS = {False: tuple(range(51, 55)), True: tuple(range(2051, 2055))}
-FEW_SEEDS = tuple(range(1, 6))
+FEW_SEEDS = (2, 3, 5)
 AREAS = (0.0, 0.003, 0.01, 0.03, 0.1, np.inf)
 CONTRASTS = (0.0, 1.0, 2.0, 4.0, np.inf)
 
