@@ -5,6 +5,8 @@
     python -m benchmarks.structures --seeds 3 5 --list    # some seeds; what was missed and what is false, one a line
     python -m benchmarks.structures --pairs               # the same surface from two viewpoints, by day and by night
     python -m benchmarks.structures --limits              # detection limits by size, contrast and incidence
+    python -m benchmarks.structures --ablation            # the detector without one of its steps at a time
+    python -m benchmarks.structures --segmenters          # faces beside those of PCL, Open3D and CGAL
     python -m benchmarks.structures --points 100000000    # time and memory of one scene of so many points
 
 --peer needs apt's libpcl-dev and g++. --folder keeps the scenes, and takes those that it has. Figures of record count true
@@ -25,16 +27,16 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import print_table, progress, save
-from benchmarks.structures import judge
+from benchmarks.structures import ablation, judge, limits, segmenters
 from benchmarks.structures.detector import Found, attempt
 from benchmarks.structures.literal import Literal, literal, program
 from benchmarks.structures.scenes import JUDGE, OWN, Scene, make, one_scan, parameters
 
-PAIR_SEEDS = {False: (31, 32, 33), True: (2031, 2032, 2033)}
-LIMIT_SEEDS = {False: (51, 52, 53), True: (2051, 2052, 2053, 2054)}
+PAIR_SEEDS = {False: tuple(range(31, 37)), True: tuple(range(2031, 2037))}
+LIMIT_SEEDS = {False: tuple(range(51, 55)), True: tuple(range(2051, 2055))}
+FEW_SEEDS = (2, 3, 5)
 AREAS = (0.0, 0.003, 0.01, 0.03, 0.1, np.inf)
 CONTRASTS = (0.0, 1.0, 2.0, 4.0, np.inf)
-INCIDENCES = (0.0, 45.0, 60.0, 75.0, 90.0)
 
 
 @dataclass
@@ -76,6 +78,8 @@ def main() -> None:
     parser.add_argument("--peer", action="store_true", help="the literal method on the same points, too")
     parser.add_argument("--pairs", action="store_true", help="two viewpoints, day and night")
     parser.add_argument("--limits", action="store_true", help="detection limits")
+    parser.add_argument("--ablation", action="store_true", help="what each step is good for")
+    parser.add_argument("--segmenters", action="store_true", help="faces beside those of PCL, Open3D and CGAL")
     parser.add_argument("--points", type=int, help="time and memory of a scene of about so many points")
     parser.add_argument("--reference", action="store_true", help="give the detector the reference curve")
     parser.add_argument("--list", action="store_true", help="list what was missed, and what is false")
@@ -92,7 +96,11 @@ def main() -> None:
         elif a.pairs:
             pairs(PAIR_SEEDS[a.judge], Path(folder))
         elif a.limits:
-            limits(LIMIT_SEEDS[a.judge], Path(folder), a.reference)
+            limits.main(LIMIT_SEEDS[a.judge], Path(folder), a.reference)
+        elif a.ablation:
+            ablation.main(a.seeds or FEW_SEEDS, Path(folder))
+        elif a.segmenters:
+            segmenters.main(a.seeds or FEW_SEEDS, Path(folder))
         else:
             seeds = a.seeds or (JUDGE if a.judge else OWN)
             compare(seeds, Path(folder), a.peer, a.reference, a.list)
@@ -147,7 +155,7 @@ def compare(seeds: Sequence[int], folder: Path, peer: bool, reference: bool, lis
     print_table("tunneldb members", ("", ""), figures)
     if peer:
         print_table("literal", ("", ""), [row for row in face_rows(fit) if np.isfinite(row[1])])
-    print_table("found by size (down, m²) and contrast (across, dB)", *_limits_table(ours.spots, INCIDENCES[0], 90.0))
+    print_table("found by size (down, m²) and contrast (across, dB)", *_found_table(ours.spots))
     if listed:
         print_table("missed and false", ("", "scene", "kind", "m²", "points", "dB", "degrees", "of it"), missed)
     result = {m.name: dict(m.rows()) for m in methods} | {"figures": {k: v for k, v in figures if np.isfinite(v)}}
@@ -219,7 +227,7 @@ def face_rows(method: Method) -> list[tuple[str, float]]:
     ]
 
 
-def _limits_table(spots: list[judge.Spot], low: float, high: float) -> tuple[list[str], list[list[object]]]:
+def _found_table(spots: list[judge.Spot]) -> tuple[list[str], list[list[object]]]:
     """Found of how many, by size and contrast."""
     header = ["", *(_bin(CONTRASTS, k) for k in range(len(CONTRASTS) - 1))]
     rows: list[list[object]] = []
@@ -229,9 +237,7 @@ def _limits_table(spots: list[judge.Spot], low: float, high: float) -> tuple[lis
             mine = [
                 s.found >= judge.HALF
                 for s in spots
-                if AREAS[i] <= s.area < AREAS[i + 1]
-                and CONTRASTS[k] <= abs(s.contrast) < CONTRASTS[k + 1]
-                and low <= s.incidence < high
+                if AREAS[i] <= s.area < AREAS[i + 1] and CONTRASTS[k] <= abs(s.contrast) < CONTRASTS[k + 1]
             ]
             row.append(f"{sum(mine)} of {len(mine)}" if mine else "")
         rows.append(row)
@@ -242,43 +248,30 @@ def _bin(edges: Sequence[float], k: int) -> str:
     return f"≥ {edges[k]:g}" if np.isinf(edges[k + 1]) else f"{edges[k]:g}–{edges[k + 1]:g}"
 
 
-def limits(seeds: Sequence[int], folder: Path, reference: bool) -> None:
-    """Detection limits: many anomalies of all sizes a scene."""
-    spots: list[judge.Spot] = []
-    for seed in seeds:
-        scene = make(parameters(seed, f"limits{seed}", anomalies=60, stations=3, contrast=(0.5, 6.0), width=9.0), folder)
-        found, _ = attempt(scene, folder, models=False, reference=reference)
-        spots += judge.spots(scene, found.anomaly > 0)
-        progress(f"seed {seed}: {len(scene.xyz):,} points, {found.seconds:.1f} s, {_line(scene, found.anomaly > 0)}")
-    for k in range(len(INCIDENCES) - 1):
-        title = f"found at {_bin(INCIDENCES, k)}°, by size (down, m²) and contrast as seen (across, dB)"
-        print_table(title, *_limits_table([s for s in spots if s.kind != "crack"], INCIDENCES[k], INCIDENCES[k + 1]))
-    widths = (0.002, 0.005, 0.01, 0.02)
-    rows = []
-    for i in range(len(widths) - 1):
-        cracks = [s for s in spots if s.kind == "crack" and widths[i] <= s.width < widths[i + 1]]
-        rows.append([f"{1000 * widths[i]:g}–{1000 * widths[i + 1]:g}", len(cracks), sum(s.found >= judge.HALF for s in cracks)])
-    print_table("cracks by width, mm", ("", "seen", "found"), rows)
-    print(f"\n{save('structures-limits', {'seeds': list(seeds), 'spots': [vars(s) for s in spots]})}")
-
-
 def pairs(seeds: Sequence[int], folder: Path) -> None:
     """The same surface from two viewpoints, each scan by itself; and by day and by night."""
-    views, nights = judge.Counts(), judge.Counts()
+    names = ("two viewpoints", "day and night")
+    found, bound = [judge.Counts() for _ in names], [judge.Counts() for _ in names]
+    rows: list[list[object]] = []
     for seed in seeds:
         base = parameters(seed, f"pair{seed}", stations=2, anomalies=15, night=False)
         day = make(base, folder)
         night = make(replace(base, name=f"pair{seed}-night", night=True), folder)
         single = [one_scan(day, number, folder) for number in (1, 2)]
-        called = [attempt(scene, folder, models=False)[0].anomaly > 0 for scene in (day, night, *single)]
-        one = judge.same_surface(single[0], called[2], single[1], called[3])
-        other = judge.same_surface(day, called[0], night, called[1])
-        progress(f"seed {seed}: viewpoints {one.iou:.3f}, day and night {other.iou:.3f}")
-        for total, part in ((views, one), (nights, other)):
-            total.tp, total.fp, total.fn = total.tp + part.tp, total.fp + part.fp, total.fn + part.fn
-    rows = [("two viewpoints, IoU", views.iou), ("day and night, IoU", nights.iou)]
-    print_table("the same surface, cells of 2 cm that both saw at up to 75°", ("", ""), rows)
-    print(f"\n{save('structures-pairs', {'seeds': list(seeds), **dict(rows)})}")
+        called = [attempt(scene, folder, models=False)[0].anomaly > 0 for scene in (*single, day, night)]
+        row: list[object] = [seed, len(day.xyz) + len(night.xyz)]
+        for k, (one, other) in enumerate((single, (day, night))):
+            part = judge.same_surface(one, called[2 * k], other, called[2 * k + 1])
+            found[k].join(part)
+            bound[k].join(judge.same_surface(one, one.anomaly > 0, other, other.anomaly > 0))
+            row.append(part.iou)
+        rows.append(row)
+        progress(f"seed {seed}: viewpoints {row[2]:.3f}, day and night {row[3]:.3f}")
+    rows.append(["all", "", *(counts.iou for counts in found)])
+    rows.append(["truth in place of what was found", "", *(counts.iou for counts in bound)])
+    print_table("IoU on the same surface, in cells of 2 cm that both saw at up to 75°", ("seed", "points", *names), rows)
+    figures = {name: {"found": f.iou, "truth": b.iou} for name, f, b in zip(names, found, bound, strict=True)}
+    print(f"\n{save('structures-pairs', {'seeds': list(seeds), 'rows': rows, **figures})}")
 
 
 def large(points: int, folder: Path) -> None:

@@ -35,6 +35,10 @@ class Counts:
         self.fp += float(weight[~truth & called].sum())
         self.fn += float(weight[truth & ~called].sum())
 
+    def join(self, other: Counts) -> None:
+        """Add another's sums."""
+        self.tp, self.fp, self.fn = self.tp + other.tp, self.fp + other.fp, self.fn + other.fn
+
     @property
     def f1(self) -> float:
         total = 2.0 * self.tp + self.fp + self.fn
