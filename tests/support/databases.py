@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import psycopg
+import pytest
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
+
+from tunneldb.database import connect
 
 SETTINGS = {"track_commit_timestamp": "on"}
 """Settings of the server by which the copies know of commits."""
@@ -49,12 +52,41 @@ class Copies:
         try:
             yield self._dsn(name)
         finally:
-            with psycopg.connect(self.server_dsn, autocommit=True) as server:
-                if before is not None and _last_commit(server) == before and _empty(server, name) and key not in self._kept:
-                    self._set_back(name, key)
-                    self._kept[key] = name
-                else:
-                    server.execute(sql.SQL("DROP DATABASE IF EXISTS {} WITH (FORCE)").format(sql.Identifier(name)))
+            if not self._kept_for_another(name, key, before):
+                self._drop(name)
+
+    def _kept_for_another(self, name: str, key: int, before: int | None) -> bool:
+        with psycopg.connect(self.server_dsn, autocommit=True) as server:
+            untouched = before is not None and _last_commit(server) == before and _empty(server, name)
+        if not untouched or key in self._kept:
+            return False
+        self._set_back(name, key)
+        self._kept[key] = name
+        return True
+
+    @contextmanager
+    def connected(self, template: str) -> Iterator[psycopg.Connection]:
+        """Connection to a copy, whose DSN is in TUNNELDB_DSN for commands. What the block does not commit is rolled back."""
+        with self.copy(template) as dsn, pytest.MonkeyPatch.context() as patch:
+            patch.setenv("TUNNELDB_DSN", dsn)
+            with connect(dsn) as connection:
+                yield connection
+                connection.rollback()
+
+    @contextmanager
+    def prepared(self, template: str, fill: Callable[[], object]) -> Iterator[str]:
+        """Name of a database to be copied: a copy of the template in which commands of ``fill`` were run."""
+        name = f"prepared_{next(_numbers)}"
+        create_database(self.server_dsn, name, template)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("TUNNELDB_DSN", self._dsn(name))
+            fill()
+        yield name
+        self._drop(name)
+
+    def _drop(self, name: str) -> None:
+        with psycopg.connect(self.server_dsn, autocommit=True) as server:
+            server.execute(sql.SQL("DROP DATABASE IF EXISTS {} WITH (FORCE)").format(sql.Identifier(name)))
 
     def _dsn(self, name: str) -> str:
         return make_conninfo(self.server_dsn, dbname=name)
