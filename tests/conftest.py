@@ -120,4 +120,5 @@ def conn(dsn: str) -> Iterator[psycopg.Connection]:
     """Connection to a fresh, installed database; not in autocommit. What the test does not commit is rolled back."""
     with connect(dsn) as connection:
         yield connection
-        connection.rollback()
+        if not connection.closed:
+            connection.rollback()

@@ -71,7 +71,8 @@ class Copies:
             patch.setenv("TUNNELDB_DSN", dsn)
             with connect(dsn) as connection:
                 yield connection
-                connection.rollback()
+                if not connection.closed:
+                    connection.rollback()
 
     @contextmanager
     def prepared(self, template: str, fill: Callable[[], object]) -> Iterator[str]:
