@@ -36,7 +36,7 @@ def disc(seen: Seen, x: float, z: float, radius: float) -> np.ndarray:
 
 def write(path: Path, seed: int, flake: bool = True) -> None:
     """Scan the wall with its spots and the pipe before it: Lambert's law, noise of 0.3 dB."""
-    seen = scan([WALL, PIPE], [STATION], step=0.0025, seed=seed, window=WINDOW)
+    seen = scan([WALL, PIPE], [STATION], step=0.0015, seed=seed, window=WINDOW)
     level = 20.0 + 10.0 * np.log10(seen.cosine) + np.random.default_rng(seed).normal(0.0, 0.3, len(seen.xyz))
     level[disc(seen, *RUST)] -= 4.0
     if flake:
