@@ -1,12 +1,11 @@
 """A PostgreSQL of the tests' own: the embedded server itself, in a folder that goes away with the session.
 
-Each test that asks for `dsn` or `conn` gets a fresh database, copied from a template that is migrated and
-installed once a session. With pytest-xdist each worker has its own server.
+Each test that asks for `dsn` or `conn` gets a database as if fresh, copied from a template that is migrated and
+installed once a session (see support/databases.py). With pytest-xdist each worker has its own server.
 """
 
 from __future__ import annotations
 
-import itertools
 import shutil
 import signal
 import tempfile
@@ -15,8 +14,9 @@ from pathlib import Path
 
 import psycopg
 import pytest
-from psycopg import sql
 from psycopg.conninfo import make_conninfo
+from support.databases import SETTINGS as DATABASES
+from support.databases import Copies, create_database
 from support.system import missing
 
 from tunneldb.database import connect, install, open_connection
@@ -27,9 +27,7 @@ pytest_plugins = ["support.example_survey"]
 
 TEMPLATE = "tunneldb_template"
 # Nothing of value is in it: no need to wait for the disk, and small enough for two workers on a small machine.
-TEST_SETTINGS = {"fsync": "off", "synchronous_commit": "off", "full_page_writes": "off", "shared_buffers": "128MB"}
-
-_numbers = itertools.count(1)
+TEST_SETTINGS = {"fsync": "off", "synchronous_commit": "off", "full_page_writes": "off", "shared_buffers": "128MB"} | DATABASES
 
 # What a script runs in the background has Ctrl-C ignored, and so would all that tests start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -92,49 +90,35 @@ def template(server_dsn: str) -> str:
     return TEMPLATE
 
 
+@pytest.fixture(scope="session")
+def copies(server_dsn: str) -> Copies:
+    """Copies of templates."""
+    return Copies(server_dsn)
+
+
 @pytest.fixture
-def empty_dsn(server_dsn: str) -> Iterator[str]:
+def empty_dsn(copies: Copies) -> Iterator[str]:
     """DSN of a fresh database without anything in it, not even PostGIS."""
-    with _temporary(server_dsn, None) as dsn:
+    with copies.copy("template0") as dsn:
         yield dsn
 
 
 @pytest.fixture
-def dsn(request: pytest.FixtureRequest, server_dsn: str, template: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+def dsn(request: pytest.FixtureRequest, copies: Copies, template: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """DSN of a fresh, installed database; also in TUNNELDB_DSN, for commands.
 
     It holds the example survey when the test asks for `example` (see support/example_survey.py).
     """
     source = request.getfixturevalue("example_template") if "example" in request.fixturenames else template
-    with _temporary(server_dsn, source) as fresh:
+    with copies.copy(source) as fresh:
         monkeypatch.setenv("TUNNELDB_DSN", fresh)
         yield fresh
 
 
 @pytest.fixture
 def conn(dsn: str) -> Iterator[psycopg.Connection]:
-    """Connection to a fresh, installed database; not in autocommit."""
+    """Connection to a fresh, installed database; not in autocommit. What the test does not commit is rolled back."""
     with connect(dsn) as connection:
         yield connection
-
-
-class _temporary:  # noqa: N801
-    """A database for the length of a with block."""
-
-    def __init__(self, server_dsn: str, template: str | None) -> None:
-        self.server_dsn, self.template = server_dsn, template
-        self.name = f"test_{next(_numbers)}"
-
-    def __enter__(self) -> str:
-        create_database(self.server_dsn, self.name, self.template)
-        return make_conninfo(self.server_dsn, dbname=self.name)
-
-    def __exit__(self, *_: object) -> None:
-        with psycopg.connect(self.server_dsn, autocommit=True) as connection:
-            connection.execute(sql.SQL("DROP DATABASE IF EXISTS {} WITH (FORCE)").format(sql.Identifier(self.name)))
-
-
-def create_database(server_dsn: str, name: str, template: str | None = None) -> None:
-    command = sql.SQL("CREATE DATABASE {} TEMPLATE {}").format(sql.Identifier(name), sql.Identifier(template or "template0"))
-    with psycopg.connect(server_dsn, autocommit=True) as connection:
-        connection.execute(command)
+        if not connection.closed:
+            connection.rollback()

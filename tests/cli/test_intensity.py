@@ -92,7 +92,8 @@ def test_detection_by_a_curve_found_on_the_lining(conn, stations):
     """It is kept, within its deviation of the simulator's, and a rerun puts it in place of the one before."""
     _add(stations, "Amplitude", "amplitude")
     _tunneldb("load", "auto", *sorted(stations.glob("*.laz")))
-    _tunneldb("run", "auto")
+    coarse = "--set", "image.pixel=0.1"  # the curve is found on samples of the points
+    _tunneldb("run", "auto", *coarse)
     curve = "SELECT range_m, intensity_db, sigma_db FROM tunnel_api.range_curve ORDER BY range_m"
     found = conn.execute(curve).fetchall()
     range_m, level, sigma = np.array(found, dtype=float).T
@@ -104,7 +105,7 @@ def test_detection_by_a_curve_found_on_the_lining(conn, stations):
     assert told[2] <= MOST_UNCERTAIN
     conn.execute("UPDATE tunnel.range_curve SET intensity_db = array_fill(7.0::float8, ARRAY[cardinality(range_m)])")
     conn.commit()
-    _tunneldb("run", "auto", "--from", "detect")
+    _tunneldb("run", "auto", "--from", "detect", *coarse)
     np.testing.assert_allclose(np.array(conn.execute(curve).fetchall(), dtype=float), np.array(found, dtype=float))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -157,6 +158,7 @@ def test_a_worker_tells_when_it_leaves(dsn: str, conn: psycopg.Connection) -> No
     with subprocess.Popen([*TUNNELDB, "worker", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as worker:
         while not rows(conn, "SELECT 1 FROM tunnel.worker"):
             assert worker.poll() is None
+            time.sleep(0.05)
         assert told(0, "stop", "--wait")["workers"] == 1
         output, errors = worker.communicate(timeout=60)
     assert (json.loads(output)["jobs"], errors) == (0, "")

@@ -58,14 +58,15 @@ def settings(conn: psycopg.Connection) -> tuple[object, ...]:
 def test_what_is_set_makes_detection_stale_and_nothing_else(folder: Path, conn: psycopg.Connection, tmp_path: Path) -> None:
     add(folder, "--intensity", "Amplitude", "--intensity-kind", "amplitude", "--reference", folder / f"{NAME}.reference.csv")
     command("load", NAME, *folder.glob("*.laz"))
-    command("run", NAME)
+    coarse = "--set", "image.pixel=0.1"
+    command("run", NAME, *coarse)
     assert stale(conn) == {}
     command("survey", "set", NAME, "--date", "2024-05-05")
     assert stale(conn) == {}
     said = command("survey", "set", NAME, "--trajectory", folder / f"{NAME}.trajectory.csv").stderr
     assert stale(conn) == {"detect": "positions, reference or intensity set since"}
     assert f"1 stages are stale: tunneldb run {NAME} --stale" in said
-    command("run", NAME, "--stale")
+    command("run", NAME, "--stale", *coarse)
     assert stale(conn) == {}
     command("survey", "set", NAME, "--reference", "auto")
     assert settings(conn) == ("2024-05-05", "amplitude", "Amplitude", "auto", "mobile")

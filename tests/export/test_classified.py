@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import laspy
@@ -9,6 +10,7 @@ import numpy as np
 import psycopg
 import pytest
 from click.testing import CliRunner
+from support.databases import Copies
 
 from tunneldb.classification.classes import PointClass
 from tunneldb.cli.main import main
@@ -17,7 +19,7 @@ from tunneldb.store.scene import load_scene
 from tunneldb.store.survey import get_survey
 
 NAME = "s"
-START, LENGTH, BORDER = 970.0, 60.0, 1015.0  # a kilometre ends in the middle of the first file
+START, LENGTH, BORDER = 980.0, 50.0, 1015.0  # a kilometre ends in the middle of the first file
 FLOOR, LINING = 1, 0  # of the truth
 FAR = 100.0  # m above the tunnel: points of nothing
 
@@ -34,7 +36,7 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, np.
     folder = tmp_path_factory.mktemp("scans")
     simulation = Simulation(
         Parameters(
-            name="whole", length=LENGTH, start_chainage=START, section="horseshoe", scanner="profiler", density=500.0,
+            name="whole", length=LENGTH, start_chainage=START, section="horseshoe", scanner="profiler", density=300.0,
             leaks=0, people=2, equipment=2, ballast=0.01,
         )
     )  # fmt: skip
@@ -53,32 +55,49 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, np.
     return folder, klass
 
 
-@pytest.fixture
-def loaded(scans: tuple[Path, dict[str, np.ndarray]], dsn: str) -> Path:
+@pytest.fixture(scope="module")
+def loaded(copies: Copies, template: str, scans: tuple[Path, dict[str, np.ndarray]]) -> Iterator[str]:
+    """Database in which both files are loaded, to be copied."""
     folder, _ = scans
-    command("tunnel", "add", NAME, "--srid", 25830, "--axis", folder / "whole.axis.csv", "--start-chainage", START)
-    command(
-        "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04", "--trajectory", folder / "whole.trajectory.csv",
-        "--intensity", "Amplitude", "--intensity-kind", "amplitude",
-    )  # fmt: skip
-    command("load", NAME, folder / "a.laz", folder / "b.las")
-    return folder
+
+    def fill() -> None:
+        command("tunnel", "add", NAME, "--srid", 25830, "--axis", folder / "whole.axis.csv", "--start-chainage", START)
+        command(
+            "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04",
+            "--trajectory", folder / "whole.trajectory.csv", "--intensity", "Amplitude", "--intensity-kind", "amplitude",
+        )  # fmt: skip
+        command("load", NAME, folder / "a.laz", folder / "b.las")
+
+    with copies.prepared(template, fill) as name:
+        yield name
+
+
+@pytest.fixture(scope="module")
+def classed(copies: Copies, loaded: str) -> Iterator[str]:
+    """The same up to its ground."""
+    with copies.prepared(loaded, lambda: command("run", NAME, "--to", "ground")) as name:
+        yield name
 
 
 def export(out: Path, *options: object, code: int = 0) -> str:
     return command("export", NAME, "--classified", "-o", out, *options, code=code)
 
 
-def test_files_get_the_classes(
-    loaded: Path, conn: psycopg.Connection, scans: tuple[Path, dict[str, np.ndarray]], tmp_path: Path
-) -> None:
-    command("run", NAME, "--to", "ground")
+@pytest.fixture
+def conn(copies: Copies, classed: str) -> Iterator[psycopg.Connection]:
+    """Connection to a copy up to its ground."""
+    with copies.connected(classed) as connection:
+        yield connection
+
+
+def test_files_get_the_classes(conn: psycopg.Connection, scans: tuple[Path, dict[str, np.ndarray]], tmp_path: Path) -> None:
+    folder = scans[0]
     text = export(tmp_path / "out")
     scene = load_scene(conn, get_survey(conn, NAME), 0, 1)
     total = np.zeros(256, int)
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.laz", "b.laz"]
     for name, klass in scans[1].items():
-        before, after = laspy.read(loaded / name), laspy.read((tmp_path / "out" / name).with_suffix(".laz"))
+        before, after = laspy.read(folder / name), laspy.read((tmp_path / "out" / name).with_suffix(".laz"))
         np.testing.assert_array_equal(before.xyz, after.xyz)
         for dimension in set(before.point_format.dimension_names) - {"classification"}:
             np.testing.assert_array_equal(before[dimension], after[dimension], err_msg=dimension)
@@ -99,10 +118,10 @@ def test_files_get_the_classes(
     export(tmp_path / "first", "--km", 0)
     assert [path.name for path in (tmp_path / "first").iterdir()] == ["a.laz"]
 
-    bytes_before = (loaded / "a.laz").read_bytes()
-    assert "never to be written over" in export(loaded, code=2)
-    assert (loaded / "a.laz").read_bytes() == bytes_before
-    assert not (loaded / "b.laz").exists()
+    bytes_before = (folder / "a.laz").read_bytes()
+    assert "never to be written over" in export(folder, code=2)
+    assert (folder / "a.laz").read_bytes() == bytes_before
+    assert not (folder / "b.laz").exists()
 
     command("run", NAME, "--km", 1, "--from", "sections", "--to", "sections")
     text = export(tmp_path / "stale", code=2)
@@ -113,7 +132,12 @@ def test_files_get_the_classes(
     export(tmp_path / "stale")
 
 
-def test_without_ground_it_says_what_to_type(loaded: Path, tmp_path: Path) -> None:
+def test_without_ground_it_says_what_to_type(copies: Copies, loaded: str, tmp_path: Path) -> None:
+    with copies.connected(loaded):
+        _without_ground(tmp_path)
+
+
+def _without_ground(tmp_path: Path) -> None:
     assert "scan files by --classified" in command("export", NAME, "-o", tmp_path / "out", code=2)
     text = export(tmp_path / "out", code=2)
     assert text.count("\n") == 1
@@ -125,9 +149,9 @@ def test_without_ground_it_says_what_to_type(loaded: Path, tmp_path: Path) -> No
     assert f"kilometre 1 without ground: tunneldb run {NAME} --km 1 --from ground --to ground" in text
 
 
-def test_a_file_that_was_changed_is_refused(loaded: Path, tmp_path: Path) -> None:
-    command("run", NAME, "--to", "ground")
-    path = loaded / "b.las"
+@pytest.mark.usefixtures("conn")
+def test_a_file_that_was_changed_is_refused(scans: tuple[Path, dict[str, np.ndarray]], tmp_path: Path) -> None:
+    path = scans[0] / "b.las"
     data = path.read_bytes()
     try:
         path.write_bytes(data[:-1] + bytes([data[-1] ^ 1]))

@@ -178,7 +178,7 @@ def _read(project: Project, kilometres: Sequence[int], seen: Seen, end: threadin
                     conn.execute("SELECT count(*), sum(area) FROM tunnel_api.leak").fetchone()
                     conn.execute("SELECT count(*) FROM tunnel_api.stage_status WHERE stale").fetchone()
                     seen.reads += 1
-                    end.wait(0.1)
+                    end.wait(0.2)
         except psycopg.OperationalError as error:
             # Away, or on its way down or up; anything else is no fault of the server's being killed.
             if error.sqlstate and not error.sqlstate.startswith(("08", "57P")):

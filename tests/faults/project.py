@@ -14,10 +14,12 @@ from typing import Any
 
 import numpy as np
 import psycopg
+from click.testing import CliRunner
 from faults.scene import NAME, SRID, THIN, Scene
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
+from tunneldb.cli.main import main
 from tunneldb.database import connect
 from tunneldb.database.fetch import fetch_array
 from tunneldb.database.server import DATABASE, Server
@@ -44,20 +46,22 @@ class Project:
         self.home = Path(tempfile.mkdtemp(prefix="tunneldb-faults-"))
         self.scratch = self.home / "scratch"
         self.scratch.mkdir()
+        self._session: psycopg.Connection[Any] | None = None
         kept = {k: v for k, v in os.environ.items() if k not in ("TUNNELDB_DSN", "TUNNELDB_HOME")}
         self.environment = {**kept, "TUNNELDB_HOME": str(self.home), "TMPDIR": str(self.scratch)}
-        self.dsn = Server(self.home).start()
+        # What is killed are processes, not the machine: what they have written stays, whether it is on the disk or not.
+        unsafe = dict.fromkeys(("fsync", "synchronous_commit", "full_page_writes"), "off")
+        self.dsn = Server(self.home, settings=unsafe).start()
         with self._server() as conn:
-            # What is killed are processes, not the machine: what they have written stays, whether it is on the disk or not.
-            for name in ("fsync", "synchronous_commit", "full_page_writes"):
+            for name in unsafe:  # for servers that commands start anew
                 conn.execute(sql.SQL("ALTER SYSTEM SET {} = off").format(sql.Identifier(name)))
             conn.execute("SELECT pg_reload_conf()")
         folder = self.home / "poses"
         folder.mkdir()
         poses = scene.write_poses(folder)
-        self.run("init")
-        self.run("tunnel", "add", NAME, "--srid", SRID, "--axis", folder / "axis.csv", "--start-chainage", scene.start)
-        self.run(
+        self.call("init")
+        self.call("tunnel", "add", NAME, "--srid", SRID, "--axis", folder / "axis.csv", "--start-chainage", scene.start)
+        self.call(
             "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04",
             *poses, "--intensity", "Amplitude", "--intensity-kind", "amplitude",
         )  # fmt: skip
@@ -74,11 +78,18 @@ class Project:
 
     def close(self) -> None:
         """Stop the server and remove the folder."""
+        if self._session is not None:
+            self._session.close()
         server = Server(self.home)
         state = server.home().state
         server.stop()
         shutil.rmtree(state, ignore_errors=True)
         shutil.rmtree(self.home, ignore_errors=True)
+
+    def call(self, *arguments: object) -> None:
+        """Run a command in this process, whose imports take seconds in one of its own."""
+        result = CliRunner().invoke(main, ["--dsn", self.dsn, *map(str, arguments)])
+        assert result.exit_code == 0, result.output
 
     def run(self, *arguments: object, code: int | None = 0) -> str:
         """Run a command to its end; returns what it says."""
@@ -108,6 +119,22 @@ class Project:
     def connect(self) -> psycopg.Connection[Any]:
         """Connect to the database, as a test does; does not start the server."""
         return psycopg.connect(self.dsn, autocommit=True)
+
+    def ask(self, query: str) -> tuple[Any, ...]:
+        """The one row of a query that is asked again and again: in one session, for to open one takes more than to answer."""
+        for again in (True, False):
+            if self._session is None or self._session.closed:
+                self._session = self.connect()
+            try:
+                row = self._session.execute(query).fetchone()
+            except psycopg.OperationalError:  # the database was made anew, or its server started
+                self._session.close()
+                if not again:
+                    raise
+            else:
+                assert row is not None
+                return row
+        raise AssertionError
 
     def _server(self) -> psycopg.Connection[Any]:
         return psycopg.connect(make_conninfo(self.dsn, dbname="postgres", user="postgres"), autocommit=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -38,29 +39,34 @@ def ways(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, dict[st
     (whole,) = split(scan, folder["whole"], lambda scan: np.zeros(len(scan.time), np.int64))
     points = scan.xyz[np.random.default_rng(3).integers(0, len(scan.xyz), 1000)]
     project = Project(scene)
+    # The same worker through all: it registers anew when its database is away for a moment.
+    worker = project.begin("--dsn", project.dsn, "worker", log="worker.log")
     try:
         yield {
-            "kilometres": _process(project, points, [(kilometres[km], range(km, km + 1)) for km in (1, 0, 2)]),
-            "parts": _process(project, points, [(parts[n], None) for n in (1, 2, 0)]),
-            "whole": _process(project, points, [(whole, None)]),
+            "kilometres": _process(project, worker, points, [(kilometres[km], range(km, km + 1)) for km in (1, 0, 2)]),
+            "parts": _process(project, worker, points, [(parts[n], None) for n in (1, 2, 0)]),
+            "whole": _process(project, worker, points, [(whole, None)]),
         }
+        project.call("stop", "--wait")
+        assert worker.wait(60) == 0
     finally:
+        worker.kill()
+        worker.wait()
         project.close()
 
 
-def _process(project: Project, points: np.ndarray, asked: list[tuple[Path, range | None]]) -> dict[str, Any]:
+def _process(
+    project: Project, worker: subprocess.Popen[bytes], points: np.ndarray, asked: list[tuple[Path, range | None]]
+) -> dict[str, Any]:
     """Ask for files, within kilometres, one after the other, each when the one before is done."""
     project.fresh()
-    worker = project.begin("worker", "--concurrency", 2, log="worker.log")
     for file, kilometres in asked:
         register(project, [file], kilometres)
         wait_for(project, lambda: done(project), worker)
-    project.run("stop", "--wait")
-    assert worker.wait(60) == 0
     found = state(project)
     table, unrolled = project.home / "points.csv", project.home / "unrolled.csv"
     np.savetxt(table, points, fmt="%.4f", delimiter=",", header="x,y,z", comments="")
-    project.run("unroll", NAME, table, "-o", unrolled)
+    project.call("unroll", NAME, table, "-o", unrolled)
     found["unrolled"] = np.genfromtxt(unrolled, delimiter=",", names=True)
     return found
 

@@ -11,8 +11,8 @@ from faults.project import Project
 PATIENCE = 180.0
 """Seconds, far more than anything takes."""
 
-INTERVAL = 0.1
-"""Seconds between two looks: each is a session of the server's, which takes from what is waited for."""
+INTERVAL = 0.2
+"""Seconds between two looks: each takes from what is waited for."""
 
 
 def wait_for(project: Project, what: Callable[[], object], process: subprocess.Popen[bytes] | None = None) -> None:
@@ -26,13 +26,11 @@ def wait_for(project: Project, what: Callable[[], object], process: subprocess.P
 
 def done(project: Project) -> bool:
     """Whether nothing is left of what was asked for that can be done."""
-    with project.connect() as conn:
-        row = conn.execute("SELECT NOT tunnel_api.queue_busy(1), count(*) FROM tunnel.goal").fetchone()
-    return row is not None and bool(row[0]) and row[1] > 0
+    idle, wanted = project.ask("SELECT NOT tunnel_api.queue_busy(1), count(*) FROM tunnel.goal")
+    return bool(idle) and wanted > 0
 
 
 def running(project: Project) -> int:
     """How many stages of kilometres are being done."""
-    with project.connect() as conn:
-        row = conn.execute("SELECT count(*) FROM tunnel_api.run WHERE outcome = 'running' AND stage <> 'read'").fetchone()
-    return row[0] if row else 0
+    (count,) = project.ask("SELECT count(*) FROM tunnel_api.run WHERE outcome = 'running' AND stage <> 'read'")
+    return int(count)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import psycopg
 import pytest
 import shapely
 from click.testing import CliRunner, Result
+from support.databases import Copies
 
 from tunneldb.cli.main import main
 from tunneldb.simulate import Parameters, Simulation, generate, write
@@ -193,11 +195,23 @@ def scan(tmp_path_factory: pytest.TempPathFactory) -> tuple[Simulation, Path]:
     return simulation, folder
 
 
+@pytest.fixture(scope="module")
+def prepared(copies: Copies, template: str, scan: tuple[Simulation, Path]) -> Iterator[str]:
+    """A database of the short tunnel through all stages, to be copied."""
+
+    def fill() -> None:
+        prepare(scan[1], "profiler")
+        command("run", NAME)
+
+    with copies.prepared(template, fill) as name:
+        yield name
+
+
 @pytest.fixture
-def detected(conn: psycopg.Connection, scan: tuple[Simulation, Path]) -> psycopg.Connection:
-    prepare(scan[1], "profiler")
-    command("run", NAME)
-    return conn
+def detected(copies: Copies, prepared: str) -> Iterator[psycopg.Connection]:
+    """Connection to a copy of the short tunnel through all stages."""
+    with copies.connected(prepared) as conn:
+        yield conn
 
 
 def test_a_rerun_gives_the_same_and_reviews_survive(detected: psycopg.Connection) -> None:

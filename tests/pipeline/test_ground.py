@@ -10,13 +10,11 @@ import laspy
 import numpy as np
 import psycopg
 import pytest
-from psycopg import sql
-from psycopg.conninfo import make_conninfo
 from scipy.spatial import cKDTree
+from support.databases import Copies
 
 from tests.pipeline.test_detect import NAME, command, parameters, prepare
 from tunneldb.classification.classes import PointClass
-from tunneldb.database import connect
 from tunneldb.pipeline import ground as stage
 from tunneldb.pipeline.parameters import settings
 from tunneldb.simulate import Simulation, write
@@ -53,32 +51,22 @@ def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def prepared(server_dsn: str, template: str, scan: Path) -> Iterator[sql.Identifier]:
+def prepared(copies: Copies, template: str, scan: Path) -> Iterator[str]:
     """A database of two kilometres up to their sections, to be copied."""
-    name = "ground_prepared"
-    with psycopg.connect(server_dsn, autocommit=True) as server:
-        server.execute(sql.SQL("CREATE DATABASE {} TEMPLATE {}").format(sql.Identifier(name), sql.Identifier(template)))
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setenv("TUNNELDB_DSN", make_conninfo(server_dsn, dbname=name))
-            prepare(scan, "profiler", start=START)
-            command("run", NAME, "--to", "sections")
-        yield sql.Identifier(name)
-        server.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(sql.Identifier(name)))
+
+    def fill() -> None:
+        prepare(scan, "profiler", start=START)
+        command("run", NAME, "--to", "sections")
+
+    with copies.prepared(template, fill) as name:
+        yield name
 
 
 @pytest.fixture
-def sections(server_dsn: str, prepared: sql.Identifier, monkeypatch: pytest.MonkeyPatch) -> Iterator[psycopg.Connection]:
+def sections(copies: Copies, prepared: str) -> Iterator[psycopg.Connection]:
     """Connection to a copy of two kilometres up to their sections."""
-    name = "ground_copy"
-    dsn = make_conninfo(server_dsn, dbname=name)
-    monkeypatch.setenv("TUNNELDB_DSN", dsn)
-    with psycopg.connect(server_dsn, autocommit=True) as server:
-        server.execute(sql.SQL("CREATE DATABASE {} TEMPLATE {}").format(sql.Identifier(name), prepared))
-        try:
-            with connect(dsn) as conn:
-                yield conn
-        finally:
-            server.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(sql.Identifier(name)))
+    with copies.connected(prepared) as conn:
+        yield conn
 
 
 def points(conn: psycopg.Connection, km: int | None = None) -> tuple[np.ndarray, np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import psycopg
 import pytest
 import shapely
 from shapely.geometry import Polygon
+from support.databases import Copies
 from support.loaded_survey import SURVEY, add_survey
 
 from tests.pipeline.test_detect import APPENDAGE, FLOOR, NAME, command, counts, outlines, parameters, prepare, share_of
@@ -64,12 +66,23 @@ def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def prepared(copies: Copies, template: str, scan: Path) -> Iterator[str]:
+    """A database of two kilometres up to their ground, to be copied."""
+
+    def fill() -> None:
+        prepare(scan, "profiler", start=START)
+        command("run", NAME, "--to", "ground")
+
+    with copies.prepared(template, fill) as name:
+        yield name
+
+
 @pytest.fixture
-def sections(conn: psycopg.Connection, scan: Path) -> psycopg.Connection:
-    """Two kilometres up to their ground."""
-    prepare(scan, "profiler", start=START)
-    command("run", NAME, "--to", "ground")
-    return conn
+def sections(copies: Copies, prepared: str) -> Iterator[psycopg.Connection]:
+    """Connection to a copy of two kilometres up to their ground."""
+    with copies.connected(prepared) as conn:
+        yield conn
 
 
 def flat(grid: Grid, mean: float, spread: float) -> BackgroundMap:

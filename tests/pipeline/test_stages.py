@@ -6,6 +6,7 @@ import csv
 import subprocess
 import sys
 import threading
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 import psycopg
 import pytest
 from click.testing import CliRunner, Result
+from support.databases import Copies
 
 from tunneldb.cli.main import main
 from tunneldb.errors import UserError
@@ -133,12 +135,27 @@ def _no_jump(conn: psycopg.Connection, survey: Survey) -> None:
         assert np.linalg.norm(before - after, axis=1)[held].max() < 0.003
 
 
+@pytest.fixture(scope="module")
+def curve_made(copies: Copies, template: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
+    """A database with a circular tunnel up to its sections, to be copied, and the scan's folder."""
+    folder = tmp_path_factory.mktemp("curve")
+    scan(folder, "circular", seed=3)
+
+    def fill() -> None:
+        prepare(folder)
+        command("run", NAME, "--to", "sections")
+
+    with copies.prepared(template, fill) as name:
+        yield name, folder
+
+
 @pytest.fixture
-def curve(conn: psycopg.Connection, tmp_path: Path) -> tuple[psycopg.Connection, Survey, Path]:
-    scan(tmp_path, "circular", seed=3)
-    prepare(tmp_path)
-    command("run", NAME, "--to", "sections")
-    return conn, get_survey(conn, NAME), tmp_path
+def curve(copies: Copies, curve_made: tuple[str, Path]) -> Iterator[tuple[psycopg.Connection, Survey, Path]]:
+    """Connection to a copy of it, the survey, and the scan's folder."""
+    with copies.connected(curve_made[0]) as conn:
+        survey = get_survey(conn, NAME)
+        conn.rollback()
+        yield conn, survey, curve_made[1]
 
 
 def state(conn: psycopg.Connection) -> list[list[tuple[object, ...]]]:
@@ -365,11 +382,10 @@ def test_too_few_points_is_one_line(loaded_curve: psycopg.Connection) -> None:
     assert loaded_curve.execute("SELECT count(*) FROM tunnel.axis_vertex").fetchone() == (0,)
 
 
-def test_readers_see_the_old_kilometre_until_the_new_one_is_whole(
-    curve: tuple[psycopg.Connection, Survey, Path], dsn: str
-) -> None:
+def test_readers_see_the_old_kilometre_until_the_new_one_is_whole(curve: tuple[psycopg.Connection, Survey, Path]) -> None:
     """While a stage is under way in one transaction, others read what was there before, and wait for nothing."""
     conn, survey, _ = curve
+    dsn = conn.info.dsn
     before = conn.execute("SELECT count(*), sum(points) FROM tunnel.section").fetchone()
     conn.rollback()
     with psycopg.connect(dsn) as worker, psycopg.connect(dsn) as reader:
@@ -379,8 +395,9 @@ def test_readers_see_the_old_kilometre_until_the_new_one_is_whole(
         assert reader.execute("SELECT count(*), sum(points) FROM tunnel.section").fetchone() == before
 
 
-def test_a_killed_stage_leaves_what_was_there(curve: tuple[psycopg.Connection, Survey, Path], dsn: str) -> None:
+def test_a_killed_stage_leaves_what_was_there(curve: tuple[psycopg.Connection, Survey, Path]) -> None:
     conn, _, _ = curve
+    dsn = conn.info.dsn
     before = state(conn)
     for delay in (0.05, 0.2, 0.5):
         killer = threading.Timer(delay, _kill_others, [dsn])

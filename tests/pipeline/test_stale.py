@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import psycopg
 import pytest
 from click.testing import CliRunner, Result
+from support.databases import Copies
 
 from tunneldb.cli.main import main
 from tunneldb.simulate import Parameters, Simulation, write
@@ -34,20 +36,31 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def prepared(copies: Copies, template: str, scans: Path) -> Iterator[str]:
+    """A database brought to sections of two widths, to be copied: those of kilometre 0 have other parameters."""
+
+    def fill() -> None:
+        command("tunnel", "add", NAME, "--srid", 25830, "--axis", scans / f"{NAME}.axis.csv", "--start-chainage", 890)
+        command(
+            "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04",
+            "--trajectory", scans / f"{NAME}.trajectory.csv", "--intensity", "Amplitude", "--intensity-kind", "reflectance",
+        )  # fmt: skip
+        command("load", NAME, *sorted(scans.glob("*.laz")))
+        command("run", NAME, "--to", "segments")
+        command("run", NAME, "--from", "sections", "--to", "sections", "--km", 0, "--set", "section.half_width=0.4")
+        command("run", NAME, "--from", "sections", "--to", "sections", "--km", 1)
+
+    with copies.prepared(template, fill) as name:
+        yield name
+
+
 @pytest.fixture
-def surveyed(conn: psycopg.Connection, scans: Path) -> psycopg.Connection:
-    """Brought to sections of two widths: those of kilometre 0 have other parameters."""
-    command("tunnel", "add", NAME, "--srid", 25830, "--axis", scans / f"{NAME}.axis.csv", "--start-chainage", 890)
-    command(
-        "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04", "--trajectory", scans / f"{NAME}.trajectory.csv",
-        "--intensity", "Amplitude", "--intensity-kind", "reflectance",
-    )  # fmt: skip
-    command("load", NAME, *sorted(scans.glob("*.laz")))
-    command("run", NAME, "--to", "segments")
-    command("run", NAME, "--from", "sections", "--to", "sections", "--km", 0, "--set", "section.half_width=0.4")
-    command("run", NAME, "--from", "sections", "--to", "sections", "--km", 1)
-    conn.autocommit = True
-    return conn
+def surveyed(copies: Copies, prepared: str) -> Iterator[psycopg.Connection]:
+    """Connection to a copy, in autocommit."""
+    with copies.connected(prepared) as conn:
+        conn.autocommit = True
+        yield conn
 
 
 def runs(conn: psycopg.Connection, since: int) -> list[tuple[Any, ...]]:

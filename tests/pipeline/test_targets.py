@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import psycopg
 import pytest
 from click.testing import CliRunner, Result
+from support.databases import Copies
 
 from tunneldb.cli.main import main
 from tunneldb.simulate import Parameters, Simulation, write
@@ -37,15 +39,30 @@ def survey(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Simulation]:
     return folder, simulation
 
 
-@pytest.fixture
-def loaded(survey: tuple[Path, Simulation], dsn: str) -> tuple[Path, Simulation]:
+@pytest.fixture(scope="module")
+def template(copies: Copies, template: str, survey: tuple[Path, Simulation]) -> Iterator[str]:
+    """The scan, loaded."""
     folder, _ = survey
-    command("tunnel", "add", NAME, "--srid", 25830, "--axis", folder / f"{NAME}.axis.csv", "--start-chainage", START)
+
+    def fill() -> None:
+        command("tunnel", "add", NAME, "--srid", 25830, "--axis", folder / f"{NAME}.axis.csv", "--start-chainage", START)
+        add(folder, NAME)
+        command("load", NAME, *sorted(folder.glob("*.laz")))
+
+    with copies.prepared(template, fill) as name:
+        yield name
+
+
+def add(folder: Path, name: str) -> None:
+    """Add a survey of the tunnel."""
     command(
-        "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04", "--stations", folder / f"{NAME}.stations.csv",
+        "survey", "add", name, "--tunnel", NAME, "--date", "2024-05-04", "--stations", folder / f"{NAME}.stations.csv",
         "--intensity-kind", "none",
     )  # fmt: skip
-    command("load", NAME, *sorted(folder.glob("*.laz")))
+
+
+@pytest.fixture
+def loaded(survey: tuple[Path, Simulation], dsn: str) -> tuple[Path, Simulation]:
     return survey
 
 
@@ -167,11 +184,6 @@ def test_spheres_of_a_radius_that_there_is_none_of(loaded: tuple[Path, Simulatio
     assert stored(conn) == []
 
 
-def test_nothing_is_loaded(survey: tuple[Path, Simulation], dsn: str) -> None:
-    folder, _ = survey
-    command("tunnel", "add", NAME, "--srid", 25830, "--axis", folder / f"{NAME}.axis.csv", "--start-chainage", START)
-    command(
-        "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04", "--stations", folder / f"{NAME}.stations.csv",
-        "--intensity-kind", "none",
-    )  # fmt: skip
-    assert "holds no points yet" in command("spheres", NAME, "--radius", 0.0725, code=2).output
+def test_nothing_is_loaded(loaded: tuple[Path, Simulation]) -> None:
+    add(loaded[0], "empty")
+    assert "holds no points yet" in command("spheres", "empty", "--radius", 0.0725, code=2).output

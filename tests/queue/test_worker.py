@@ -14,6 +14,7 @@ from typing import Any
 import psycopg
 import pytest
 from click.testing import CliRunner
+from support.databases import Copies
 
 from tunneldb.cli.main import main
 from tunneldb.errors import UserError
@@ -282,13 +283,34 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def added(copies: Copies, template: str, scans: Path) -> Iterator[str]:
+    """A database with tunnel and survey, to be copied."""
+
+    def fill() -> None:
+        command(0, "tunnel", "add", NAME, "--srid", 25830, "--axis", scans / f"{NAME}.axis.csv", "--start-chainage", 960)
+        command(
+            0, "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04",
+            "--trajectory", scans / f"{NAME}.trajectory.csv", "--intensity", "Amplitude", "--intensity-kind", "reflectance",
+        )  # fmt: skip
+
+    with copies.prepared(template, fill) as name:
+        yield name
+
+
 @pytest.fixture
-def curve(dsn: str, scans: Path) -> str:
-    command(0, "tunnel", "add", NAME, "--srid", 25830, "--axis", scans / f"{NAME}.axis.csv", "--start-chainage", 960)
-    command(
-        0, "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04", "--trajectory", scans / f"{NAME}.trajectory.csv",
-        "--intensity", "Amplitude", "--intensity-kind", "reflectance",
-    )  # fmt: skip
+def dsn(request: pytest.FixtureRequest, copies: Copies, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """DSN of a database with what the test asks for: a tunnel and its survey, the example, or neither."""
+    sources = {"curve": "added", "example": "example_template"}
+    source = next((of for name, of in sources.items() if name in request.fixturenames), "template")
+    with copies.copy(request.getfixturevalue(source)) as fresh:
+        monkeypatch.setenv("TUNNELDB_DSN", fresh)
+        yield fresh
+
+
+@pytest.fixture
+def curve(dsn: str) -> str:
+    """Name of a survey to which nothing was loaded yet."""
     return NAME
 
 
