@@ -254,7 +254,7 @@ def test_report(documents: str, case: Case, tmp_path: Path) -> None:
     figures = dict(re.findall(r"<dt>([^<]+)</dt><dd>([^<]+?) ?<", text))
     assert figures["Leaks"] == (str(len(case.counted)) if case.searched else "–")
     assert figures["Wet area"] == (f"{case.area:.2f}" if case.searched else "–")
-    assert figures["Lining seen"] == f"{100 * case.seen:.1f} %"
+    assert figures["Lining seen"] == (f"{100 * case.seen:.1f} %" if case.searched else "–")
     strips = re.findall(r'<figure class="strip" id="strip-(\d+)">(.*?)</figure>', text, re.DOTALL)
     numbered: set[str] = set()
     for start, strip in strips:
@@ -288,6 +288,8 @@ def test_words_of_the_pdf(documents: str, name: str, tmp_path: Path, chromium: P
         assert "Leaks were not searched for" in words
         assert "leaks were not searched for" in words
         assert not re.search(r"(?<!\d)0 leaks", words)
+        assert "there is nothing to be counted" in words
+        assert "0.0 %" not in words
 
 
 def test_sheets(documents: str, case: Case) -> None:
