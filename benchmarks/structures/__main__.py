@@ -255,7 +255,7 @@ def pairs(seeds: Sequence[int], folder: Path) -> None:
         night = make(replace(base, name=f"pair{seed}-night", night=True), folder)
         single = [one_scan(day, number, folder) for number in (1, 2)]
         called = [attempt(scene, folder, models=False)[0].anomaly > 0 for scene in (*single, day, night)]
-        row: list[object] = [seed, len(day.xyz) + len(night.xyz)]
+        row: list[object] = [str(seed), len(day.xyz) + len(night.xyz)]
         for k, (one, other) in enumerate((single, (day, night))):
             part = judge.same_surface(one, called[2 * k], other, called[2 * k + 1])
             found[k].join(part)
