@@ -187,6 +187,15 @@ def test_walls_lie_on_both_sides_in_plan_where_the_lining_is_widest(conn: psycop
         assert line.parallel_offset(4, side).hausdorff_distance(shapely.from_wkb(bytes(wall))) < 0.7
 
 
+def test_walls_break_where_a_segment_has_no_sections(conn: psycopg.Connection, example: str) -> None:
+    pieces = "SELECT chainage_from, chainage_to FROM tunnel_api.outline WHERE side = %s ORDER BY chainage_from"
+    ((first, last),) = conn.execute(pieces, ("left",)).fetchall()
+    n, low, high = one(conn, "SELECT n, chainage_from, chainage_to FROM tunnel.segment ORDER BY n LIMIT 1 OFFSET 4")
+    conn.execute("DELETE FROM tunnel.section WHERE segment = %s", (n,))
+    for side in ("left", "right"):
+        assert conn.execute(pieces, (side,)).fetchall() == [(first, low), (high, last)]
+
+
 def test_leak_lies_in_the_segment_that_holds_its_middle(conn: psycopg.Connection, example: str) -> None:
     rows = conn.execute("SELECT segment, chainage_from, chainage_to, label FROM tunnel_api.leak").fetchall()
     for segment, low, high, label in rows:

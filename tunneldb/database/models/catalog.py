@@ -22,7 +22,9 @@ class Tunnel(Base):
 
     id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
     name: Mapped[str] = mapped_column(unique=True, comment="Name that the commands use")
-    srid: Mapped[int] = mapped_column(comment="Spatial reference of all coordinates of this tunnel; projected, metres")
+    srid: Mapped[int] = mapped_column(
+        comment="Spatial reference of all coordinates of this tunnel; projected, metres; 0: local metres, of no place on Earth"
+    )
     start_chainage: Mapped[float] = mapped_column(
         server_default=text("0"), comment="Chainage of the given axis's first vertex, m"
     )
