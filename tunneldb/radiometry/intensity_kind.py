@@ -37,7 +37,7 @@ SATURATED = 0.01
 STOP = 3.0
 """… if they are so many times as many as those of the next value below: coarse steps hold many values each."""
 
-LEAST_DOUBTED = 100
+LEAST_DOUBTED = 30
 """Of fewer values nothing is said."""
 
 _BITS = (8, 11, 12, 16)
