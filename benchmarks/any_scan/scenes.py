@@ -544,7 +544,7 @@ SCENES: tuple[Scene, ...] = (
         "a quarter of the intensities at the upper stop",
         "warning|refusal",
         with_intensity(lambda c: np.minimum(c.db, np.quantile(c.db, 0.75)), "amplitude"),
-        r"saturat|clipped|same value|one value|stop|highest|largest",
+        r"saturat|clipped|same value|one value|stop|highest|largest|greatest",
     ),
     Scene(
         "constant",

@@ -269,8 +269,7 @@ class Reading:
         finally:
             if self.held is None or survivors not in self.held.values():
                 survivors.close()
-        note = "; ".join(filter(None, (doubtful, self._density_note(counts)))) or None
-        return Read(file_id, state, time.monotonic() - started, note)
+        return Read(file_id, state, time.monotonic() - started, self._density_note(counts))
 
     def _density_note(self, counts: FilterCounts) -> str | None:
         """Say that most of a file's points lie where there are too few for leaks to be sought."""
