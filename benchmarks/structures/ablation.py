@@ -46,15 +46,15 @@ class Step:
             yield
 
 
-def _point_by_point(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter: Any) -> tuple[Single, Single]:
+def _point_by_point(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter: Any) -> Single:
     """Each pixel by itself against 3σ, in place of `significance`."""
     single = np.where(judged, drop / (SIGMAS * np.maximum(sigma, 1e-3)), 0.0)
-    return np.asarray(single, dtype=np.float32), np.zeros(drop.shape, np.float32)
+    return np.asarray(single, dtype=np.float32)
 
 
-def _white(scatter: Any, window: int, sigma: float, number: float, *, beside: bool) -> float:
+def _white(scatter: Any, window: int, sigma: float, number: float) -> float:
     """Scatter of a window's mean if pixels knew nothing of each other, in place of `Scatter.blended`."""
-    return float(np.sqrt(1.0 + beside / (significance.AROUND**2 - 1))) / window
+    return 1.0 / window
 
 
 def _one_level(parts: list[list[Any]], model: Float, *, by_range: bool) -> dict[int, LevelCurve]:
@@ -67,15 +67,7 @@ def _one_level(parts: list[list[Any]], model: Float, *, by_range: bool) -> dict[
 
 
 def _by_histogram(
-    angle: Float,
-    range_m: Float,
-    value: Float,
-    points: Float,
-    pairs: Int64,
-    own: Bool | None = None,
-    *,
-    by_range: bool,
-    one_surface: bool = True,
+    angle: Float, range_m: Float, value: Float, points: Float, pairs: Int64, own: Bool | None = None, *, by_range: bool
 ) -> LevelCurve:
     """A robust mode for each class of incidence by itself (Ono et al., 3.3, with a mode that bears rust), no shape over θ."""
     usable = angle <= np.radians(level.STEEPEST)
@@ -102,7 +94,6 @@ STEPS = (
     Step("regions along the rim kept", [(spots, "RIM", np.inf)]),
     Step("each pixel against 3σ", [(spots, "significance", _point_by_point)]),
     Step("windows against 3σ", [(significance, "limit", lambda pixels, window: SIGMAS)]),
-    Step("nothing held against what is beside it", [(spots, "BESIDE", np.inf)]),
     Step("windows as of white noise", [(significance.Scatter, "blended", _white)]),
     Step("no boundary at half of the contrast", [(spots, "refine_boundary", lambda marked, image, size: marked)]),
 )

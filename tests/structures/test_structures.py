@@ -228,3 +228,18 @@ def test_materials_are_parted_and_stains_are_not() -> None:
     row, column = np.mgrid[:150, :200]
     stained = value - 3.0 * (np.hypot(row - 60, column - 90) < 40)
     assert not part_by_material([np.where(held, stained, np.nan)], 0.01).any()
+
+
+def test_all_scans_say_where_a_material_ends_and_whether_it_does() -> None:
+    rng = np.random.default_rng(5)
+    noise = rng.normal(0, 0.4, (3, 150, 200))
+    column = np.arange(200)
+    two = noise + 2.0 * (column >= 120)
+    gap = np.where((column > 105) & (column < 140), np.nan, two[0])  # sees most of both materials, and not the line between
+    parts = part_by_material([gap, np.where(np.arange(150)[:, None] < 80, np.nan, two[1])], 0.01)
+    assert np.unique(parts[:, :120]).size == np.unique(parts[:, 120:]).size == 1
+    assert parts[0, 119] != parts[0, 120]
+    stain = noise - 2.0 * ((column >= 120) & (np.arange(150)[:, None] < 60))
+    few = np.where(np.arange(150)[:, None] < 55, stain[0], np.nan)  # sees nothing but what the stain ends on
+    assert part_by_material([few], 0.01).any()
+    assert not part_by_material([few, stain[1], stain[2]], 0.01).any()

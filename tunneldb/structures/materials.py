@@ -9,7 +9,6 @@ plane: what stands before a wall parts it into faces, of which each shows but a 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -157,25 +156,27 @@ def part_by_material(images: list[Float], pixel: float) -> Int32:
 
 
 def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
-    """Axis and place of the line over which the level steps most surely; None where it steps over none."""
-    best: tuple[float, int, int, Float] | None = None
-    for image, axis in product(images, (0, 1)):
-        lines = np.moveaxis(image, axis, 0)
-        place = np.flatnonzero(np.isfinite(lines).any(axis=1))
+    """Axis and place of the line over which the level steps most surely, as all scans see it; None where it steps over none."""
+    best: tuple[float, int, int] | None = None
+    for axis in (0, 1):
+        turned = [np.moveaxis(image, axis, 0) for image in images]
+        place = np.flatnonzero(np.any([np.isfinite(lines).any(axis=1) for lines in turned], axis=0))
         if len(place) * pixel < 2.0 * LEAST_WIDTH:
             continue
         first = int(place[0])
-        blocks, sigma = _blocks(lines[first : place[-1] + 1])
+        blocks, sigmas = zip(*(_blocks(lines[first : place[-1] + 1]) for lines in turned), strict=True)
+        sigma = float(np.median(sigmas))
         edge = max(BLOCKS, int(np.ceil(LEAST_WIDTH / (ACROSS * pixel))))
-        if len(blocks) <= 2 * edge:
+        if len(blocks[0]) <= 2 * edge:
             continue
-        medians = _medians(np.moveaxis(sliding_window_view(blocks, BLOCKS, axis=0), -1, 0))
+        medians = _medians(np.moveaxis(sliding_window_view(np.array(blocks), BLOCKS, axis=1), -1, 0))
         found = []
-        for k in range(edge, len(blocks) - edge):
-            steps = medians[k] - medians[k - BLOCKS]
-            steps = steps[np.isfinite(steps)]
-            if len(steps) >= FEWEST and len(steps) * ALONG * pixel >= LEAST_WIDTH:
-                found.append((k, steps, float(np.median(steps))))
+        for k in range(edge, len(blocks[0]) - edge):
+            steps = medians[:, k] - medians[:, k - BLOCKS]
+            seen = np.isfinite(steps)
+            length = int(seen.any(axis=0).sum())
+            if length >= FEWEST and length * ALONG * pixel >= LEAST_WIDTH:
+                found.append((k, steps[seen], float(np.median(steps[seen]))))
         usual = MAD_TO_SIGMA * float(np.median([abs(step) for _, _, step in found])) if len(found) >= MANY else 0.0
         least = max(LEAST_STEP * sigma, LEAST_STEP_DB, USUAL_STEPS * usual)
         for k, steps, step in found:
@@ -183,11 +184,11 @@ def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
             if abs(step) < least or (best is not None and sure <= best[0]):
                 continue
             if (steps * np.sign(step) > 0.5 * abs(step)).mean() >= EVEN:
-                best = (sure, axis, first + ACROSS * k, lines)
+                best = (sure, axis, first + ACROSS * k)
     if best is None:
         return None
-    _, axis, about, lines = best
-    return axis, _sharpest(lines, about)
+    _, axis, about = best
+    return axis, _sharpest([np.moveaxis(image, axis, 0) for image in images], about)
 
 
 def _blocks(lines: Float) -> tuple[Float, float]:
@@ -220,13 +221,21 @@ def _nan_median(values: Float) -> Float:
     return np.asarray(0.5 * (both[0] + both[1]))
 
 
-def _sharpest(lines: Float, about: int) -> int:
-    """First line behind a step near a place: of the pixels before it most lie below its middle, and behind it above."""
+def _sharpest(images: list[Float], about: int) -> int:
+    """First line behind a step near a place: of the pixels before it most lie below its middle, and behind it above.
+
+    All scans vote: where something hides the step from one, another sees it.
+    """
     reach = (BLOCKS + 1) * ACROSS
     first = max(about - 2 * reach, 0)
-    near = lines[first : about + 2 * reach]
-    before, after = (float(np.median(part[np.isfinite(part)])) for part in (near[: about - first], near[about - first :]))
-    votes = np.where(np.isfinite(near), np.sign((near - 0.5 * (before + after)) * (after - before)), 0.0).sum(axis=1)
+    votes = np.zeros(len(images[0][first : about + 2 * reach]))
+    for image in images:
+        near = image[first : about + 2 * reach]
+        known = np.isfinite(near)
+        before, after = near[: about - first][known[: about - first]], near[about - first :][known[about - first :]]
+        if len(before) and len(after):
+            low, high = float(np.median(before)), float(np.median(after))
+            votes += np.where(known, np.sign((near - 0.5 * (low + high)) * (high - low)), 0.0).sum(axis=1)
     score = votes.sum() - 2.0 * np.concatenate([[0.0], np.cumsum(votes)])
     inner = slice(max(about - reach - first, 1), about + reach - first)
     return first + inner.start + int(np.argmax(score[inner]))

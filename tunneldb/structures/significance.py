@@ -23,9 +23,6 @@ WINDOWS = (3, 5, 9)
 ALARMS = 0.05
 """Windows that pass by chance in a whole structure, on average, of each size."""
 
-AROUND = 3
-"""What lies about a window, to so many times its side, is held against it as well: unevenness that is wider cancels."""
-
 LEAST_FILLED = 0.5
 """Share of the pixels of a window that were judged, or its mean tells nothing."""
 
@@ -42,20 +39,20 @@ MOST_SAMPLES = 50_000
 class Scatter:
     """Scatter of means over windows of each size, in standard deviations of a pixel, as it is on the faces so far."""
 
-    sigma: dict[tuple[int, bool], list[float]] = field(default_factory=dict)
-    weight: dict[tuple[int, bool], list[float]] = field(default_factory=dict)
+    sigma: dict[int, list[float]] = field(default_factory=dict)
+    weight: dict[int, list[float]] = field(default_factory=dict)
 
     def copy(self) -> Scatter:
         """As it is now."""
-        return Scatter(*({which: list(values) for which, values in part.items()} for part in (self.sigma, self.weight)))
+        return Scatter(*({window: list(values) for window, values in part.items()} for part in (self.sigma, self.weight)))
 
     def restore(self, other: Scatter) -> None:
         """Go back to what it was."""
         self.sigma, self.weight = other.sigma, other.weight
 
-    def blended(self, window: int, sigma: float, number: float, *, beside: bool) -> float:
-        """Scatter of a face of so many windows, by itself or beside what is about them, by its own and the usual one."""
-        known, weights = (part.setdefault((window, beside), []) for part in (self.sigma, self.weight))
+    def blended(self, window: int, sigma: float, number: float) -> float:
+        """Scatter of a face of so many windows by its own and the usual one, and remember it."""
+        known, weights = self.sigma.setdefault(window, []), self.weight.setdefault(window, [])
         usual = 1.0 / window
         if known:
             order = np.argsort(known)
@@ -72,7 +69,7 @@ def limit(pixels: int, window: int) -> float:
     return -float(ndtri(min(ALARMS * window**2 / max(pixels, 1), 0.01)))
 
 
-def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter: Scatter) -> tuple[Single, Single]:
+def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter: Scatter) -> Single:
     """Mean of the window about each pixel that differs most, over what is none by chance: from 1 on it differs.
 
     Parameters
@@ -89,42 +86,26 @@ def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter
 
     Returns
     -------
-    itself, beside : (rows, columns) float32 arrays
-        By the mean itself, and by how far it lies off that of what is about the window, both with the sign of the drop.
+    (rows, columns) float32 array
+        With the sign of the drop.
     """
-    itself, beside = np.zeros(drop.shape, np.float32), np.zeros(drop.shape, np.float32)
+    most = np.zeros(drop.shape, np.float32)
+    count = judged.astype(np.float32)
     ratio = np.where(judged, drop / np.maximum(sigma, 1e-3), np.float32(0.0)).astype(np.float32)
     usual = float(np.median(sigma[judged])) if judged.any() else 1.0
     for window in WINDOWS:
-        filled, total = _shares(judged, ratio, window)
-        about, around = _shares(judged, ratio, AROUND * window)
-        ring, in_ring = ((AROUND**2 * wide - inner) / (AROUND**2 - 1) for wide, inner in ((about, filled), (around, total)))
+        filled = ndimage.uniform_filter(count, window, mode="constant")
         known = filled >= LEAST_FILLED
+        mean = ndimage.uniform_filter(ratio, window, mode="constant")
         # Of fewer pixels a mean scatters more.
-        mean = np.where(known, total / np.sqrt(filled.clip(LEAST_FILLED)), np.float32(0.0))
-        least = LEVEL_SIGMA / max(usual, 1e-3)
-        itself = _farther(itself, mean, known & judged, window, pixels, scatter, least, beside=False)
-        known &= ring >= LEAST_FILLED
-        off = np.where(known, total / filled.clip(LEAST_FILLED) - in_ring / ring.clip(LEAST_FILLED), np.float32(0.0))
-        beside = _farther(beside, off, known & judged, window, pixels, scatter, 0.0, beside=True)
-    return itself, beside
-
-
-def _shares(judged: Bool, ratio: Single, window: int) -> tuple[Single, Single]:
-    """Share of a window about each pixel that was judged, and the sum over that by the pixels of the whole window."""
-    first, second = (ndimage.uniform_filter(part, window, mode="constant") for part in (judged.astype(np.float32), ratio))
-    return first, second
-
-
-def _farther(
-    most: Single, mean: Single, told: Bool, window: int, pixels: int, scatter: Scatter, least: float, *, beside: bool
-) -> Single:
-    """What is farther from 0: what was so far, or means over windows by what is none by chance."""
-    whole = mean[told]
-    if not len(whole):
-        return most
-    step = -(-len(whole) // MOST_SAMPLES)
-    own = robust_statistics(whole[::step], SHORTH, two_sided=True).sigma
-    wide = float(np.hypot(scatter.blended(window, own, len(whole) / window**2, beside=beside), least))
-    scaled = mean / np.float32(wide * limit(pixels, window))
-    return np.where(np.abs(scaled) > np.abs(most), scaled, most)
+        mean = np.where(known, mean / np.sqrt(np.maximum(filled, LEAST_FILLED)), np.float32(0.0))
+        whole = mean[known & judged]
+        if not len(whole):
+            continue
+        step = -(-len(whole) // MOST_SAMPLES)
+        own = robust_statistics(whole[::step], SHORTH, two_sided=True).sigma
+        wide = scatter.blended(window, own, len(whole) / window**2)
+        wide = float(np.hypot(wide, LEVEL_SIGMA / max(usual, 1e-3)))
+        scaled = mean / np.float32(wide * limit(pixels, window))
+        most = np.where(np.abs(scaled) > np.abs(most), scaled, most)
+    return most

@@ -19,7 +19,7 @@ from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.structures.contrast import FaceContrast
 from tunneldb.structures.face_raster import STEP
-from tunneldb.structures.significance import WINDOWS, Scatter, significance
+from tunneldb.structures.significance import Scatter, significance
 
 LEAST_AREA = 0.0016
 """Smaller spots are left out, m²: 4 cm × 4 cm."""
@@ -35,13 +35,6 @@ RIM = 0.75
 
 LEAST_DIFFERENCE = 1.0
 """What differs from its surface by less, dB, is not told from unevenness."""
-
-BESIDE, ITSELF = 1.5, 0.7
-"""Where a window differs so many times as much from what lies about it as chance lets any, differing by itself so many times as
-much is enough: unevenness is wider than it, but means over rings have longer tails."""
-
-REACH = max(WINDOWS)
-"""As far about that, pixels, it is looked for what differs by half as much."""
 
 BIMODAL = 0.5
 """Share of what was judged that differs, from which it is not known which of both is the surface itself."""
@@ -104,7 +97,7 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
         return FaceSpots([], numbers, 0.0, 0)
     told = face.image.state == PixelState.LINING
     drop = np.where(told, face.image.drop, np.int16(0)) * np.float32(STEP)
-    differs, beside = significance(drop, told, face.image.sigma, pixels, scatter)
+    differs = significance(drop, told, face.image.sigma, pixels, scatter)
     on_face = face.image.state != PixelState.OFF
     empty = int((face.image.state == PixelState.EMPTY).sum())
     size = filter_size(judged / (judged + empty))
@@ -116,7 +109,6 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
         if sign < 0:
             image = replace(image, drop=np.where(image.drop == NODATA, np.int16(NODATA), -image.drop).astype(np.int16))
         marked = (sign * differs > 1.0) & on_face
-        marked |= _grown((sign * beside > BESIDE) & (sign * differs > ITSELF) & told, sign * drop, told)
         if not marked.any():
             continue
         marked = refine_boundary(marked, image, size)
@@ -131,22 +123,6 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
     share = float((numbers[face.judged] > 0).sum()) / judged
     seen = sum(int(np.count_nonzero(part)) for _, part in seen_lining(face.image.state, size))
     return FaceSpots(found, numbers, share, seen)
-
-
-def _grown(cores: Bool, drop: Single, judged: Bool) -> Bool:
-    """Cores with what lies about them, up to `REACH`, and differs by more than half as much as they do."""
-    if not cores.any():
-        return cores
-    filled = ndimage.uniform_filter(judged.astype(np.float32), 5, mode="constant")
-    mean = ndimage.uniform_filter(np.where(judged, drop, np.float32(0.0)), 5, mode="constant") / np.maximum(filled, 0.2)
-    labels, count = ndimage.label(cores, np.ones((3, 3)))
-    level = ndimage.median(mean, labels, np.arange(1, count + 1))
-    out = cores.copy()
-    for number, box in enumerate(ndimage.find_objects(labels), start=1):
-        near = tuple(slice(max(part.start - REACH, 0), part.stop + REACH) for part in box)
-        like = (mean[near] > 0.5 * level[number - 1]) & judged[near]
-        out[near] |= ndimage.binary_dilation(labels[near] == number, mask=like, iterations=REACH)
-    return np.asarray(out)
 
 
 def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, differs: Single, rim: Bool) -> FoundSpot | None:
@@ -164,8 +140,7 @@ def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, 
     along = float(rim[box][region.mask].mean())
     if along > RIM and not rim[face.judged].mean() > 0.5:
         return None
-    # What is weak has to have an edge: unevenness has none.
-    if region.drop_mean < LEAST_DIFFERENCE or (differs[box][region.mask].mean() < 1.0 and degrees["gradual"] > 0.5):
+    if region.drop_mean < LEAST_DIFFERENCE:
         return None
     told = sorted((name for name in _TOLD if degrees[name] > 0.5), key=lambda name: -degrees[name])
     seen = int(np.bitwise_or.reduce(face.scans[box][region.mask]))
