@@ -243,3 +243,14 @@ def test_all_scans_say_where_a_material_ends_and_whether_it_does() -> None:
     few = np.where(np.arange(150)[:, None] < 55, stain[0], np.nan)  # sees nothing but what the stain ends on
     assert part_by_material([few], 0.01).any()
     assert not part_by_material([few, stain[1], stain[2]], 0.01).any()
+
+
+def test_rust_that_hides_much_of_the_line_between_two_materials_does_not_keep_them_together() -> None:
+    row, column = np.mgrid[:150, :200]
+    value = np.random.default_rng(6).normal(0, 0.4, row.shape) + 3.0 * (column >= 120)
+    value -= 2.8 * ((column >= 120) & (np.hypot(row - 75, (column - 120) * 1.5) < 45))
+    parts = part_by_material([value], 0.01)
+    assert np.unique(parts[:, :120]).size == np.unique(parts[:, 120:]).size == 1
+    assert parts[0, 119] != parts[0, 120]
+    alone = value - 3.0 * (column >= 120)  # the rust by itself, straight on one side: half of a disc
+    assert not part_by_material([alone], 0.01).any()

@@ -1,22 +1,26 @@
 """Faces of two materials that lie in one plane: parted where the level steps along a straight line from rim to rim.
 
 Geometry alone cannot tell a brick wall from the concrete beside it, and the paper's histogram of both has two heads. A stain or
-rust does not end on a straight line over the whole of a wide face; a wall of another material does. The step is looked for
+rust does not end on a straight line over the whole of a wide face; a wall of another material does, and so does most of what is
+beyond the line where rust covers the line itself. The step is looked for
 between places that lie close to each other, so that neither incidence nor range has a part in it, and over the whole of a
 plane: what stands before a wall parts it into faces, of which each shows but a piece of the line.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from tunneldb.arrays import Float, Int32, Int64
+from tunneldb.arrays import Bool, Float, Int32, Int64
+from tunneldb.radiometry.robust_statistics import robust_statistics
 from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.structures.contrast import Observed, curve_of
 from tunneldb.structures.face_raster import Layout
+from tunneldb.structures.level import SHORTH
 from tunneldb.structures.models import to_space, unroll
 
 LEAST_WIDTH = 0.4
@@ -32,7 +36,10 @@ USUAL_STEPS = 4.0
 """And it is so many times as large as the steps over other lines are: where a surface is uneven these are large, too."""
 
 EVEN = 0.85
-"""Share of the blocks along the line where it steps so, by half of the whole step and more."""
+"""Share of the blocks along the line where it steps so, by half of the whole step and more …"""
+
+PARTLY = 1.0 / 3.0
+"""… or this much, if most of one whole side lies that much off most of the other: rust beside the line hides the step."""
 
 ALONG, ACROSS = 8, 3
 """Pixels of a block along the line and across it."""
@@ -157,7 +164,7 @@ def part_by_material(images: list[Float], pixel: float) -> Int32:
 
 def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
     """Axis and place of the line over which the level steps most surely, as all scans see it; None where it steps over none."""
-    best: tuple[float, int, int] | None = None
+    best: tuple[float, int, int, Bool] | None = None
     for axis in (0, 1):
         turned = [np.moveaxis(image, axis, 0) for image in images]
         place = np.flatnonzero(np.any([np.isfinite(lines).any(axis=1) for lines in turned], axis=0))
@@ -173,22 +180,38 @@ def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
         found = []
         for k in range(edge, len(blocks[0]) - edge):
             steps = medians[:, k] - medians[:, k - BLOCKS]
-            seen = np.isfinite(steps)
-            length = int(seen.any(axis=0).sum())
+            length = int(np.isfinite(steps).any(axis=0).sum())
             if length >= FEWEST and length * ALONG * pixel >= LEAST_WIDTH:
-                found.append((k, steps[seen], float(np.median(steps[seen]))))
+                found.append((k, steps, float(np.nanmedian(steps))))
         usual = MAD_TO_SIGMA * float(np.median([abs(step) for _, _, step in found])) if len(found) >= MANY else 0.0
         least = max(LEAST_STEP * sigma, LEAST_STEP_DB, USUAL_STEPS * usual)
-        for k, steps, step in found:
-            sure = abs(step) / sigma * float(np.sqrt(len(steps)))
-            if abs(step) < least or (best is not None and sure <= best[0]):
+        for k, steps, local in found:
+            seen = int(np.isfinite(steps).sum())
+            if max((steps > 0.5 * least).sum(), (steps < -0.5 * least).sum()) < PARTLY * seen:
                 continue
-            if (steps * np.sign(step) > 0.5 * abs(step)).mean() >= EVEN:
-                best = (sure, axis, first + ACROSS * k)
+            for step, share in ((local, EVEN), (_apart(blocks, k), PARTLY)):
+                there = steps * np.sign(step) > 0.5 * abs(step)
+                sure = abs(step) / sigma * float(np.sqrt(there.sum()))
+                if abs(step) >= least and there.sum() >= share * seen and (best is None or sure > best[0]):
+                    best = (sure, axis, first + ACROSS * k, there)
     if best is None:
         return None
-    _, axis, about = best
-    return axis, _sharpest([np.moveaxis(image, axis, 0) for image in images], about)
+    _, axis, about, there = best
+    turned = [np.moveaxis(image, axis, 0) for image in images]
+    clear = np.repeat(there, ALONG, axis=1)[:, : turned[0].shape[1]]
+    return axis, _sharpest([np.where(here, lines, np.nan) for here, lines in zip(clear, turned, strict=True)], about)
+
+
+def _apart(blocks: Sequence[Float], k: int) -> float:
+    """By how much most of what lies beyond a line is off most of what lies before it, dB, the mean of all scans."""
+    steps, weights = [0.0], [0.0]
+    for scan in blocks:
+        sides = [side[np.isfinite(side)] for side in (scan[:k], scan[k:])]
+        if min(len(side) for side in sides) >= FEWEST:
+            before, beyond = (robust_statistics(side, SHORTH, two_sided=True).mean for side in sides)
+            steps.append(beyond - before)
+            weights.append(float(sum(len(side) for side in sides)))
+    return float(np.dot(steps, weights)) / max(sum(weights), 1.0)
 
 
 def _blocks(lines: Float) -> tuple[Float, float]:
@@ -224,7 +247,7 @@ def _nan_median(values: Float) -> Float:
 def _sharpest(images: list[Float], about: int) -> int:
     """First line behind a step near a place: of the pixels before it most lie below its middle, and behind it above.
 
-    All scans vote: where something hides the step from one, another sees it.
+    All scans vote: where something hides the step from one, another sees it. NaN is where none is seen.
     """
     reach = (BLOCKS + 1) * ACROSS
     first = max(about - 2 * reach, 0)
