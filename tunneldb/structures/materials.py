@@ -36,7 +36,7 @@ USUAL_STEPS = 4.0
 """And it is so many times as large as the steps over other lines are: where a surface is uneven these are large, too."""
 
 EVEN = 0.85
-"""Share of the blocks along the line where it steps so, by half of the whole step and more …"""
+"""Share of the blocks along the line where it steps so, by half of the whole step to one and a half of it …"""
 
 PARTLY = 1.0 / 3.0
 """… or this much, if most of one whole side lies that much off most of the other: rust beside the line hides the step."""
@@ -190,7 +190,7 @@ def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
             if max((steps > 0.5 * least).sum(), (steps < -0.5 * least).sum()) < PARTLY * seen:
                 continue
             for step, share in ((local, EVEN), (_apart(blocks, k), PARTLY)):
-                there = steps * np.sign(step) > 0.5 * abs(step)
+                there = np.abs(steps - step) < 0.5 * abs(step)
                 sure = abs(step) / sigma * float(np.sqrt(there.sum()))
                 if abs(step) >= least and there.sum() >= share * seen and (best is None or sure > best[0]):
                     best = (sure, axis, first + ACROSS * k, there)

@@ -33,9 +33,6 @@ LEAST_JUDGED = 150
 RIM = 0.75
 """A region of which more lies along the face's own edge is what the beam loses there."""
 
-LEAST_DIFFERENCE = 1.0
-"""What differs from its surface by less, dB, is not told from unevenness."""
-
 BIMODAL = 0.5
 """Share of what was judged that differs, from which it is not known which of both is the surface itself."""
 
@@ -139,8 +136,6 @@ def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, 
     degrees = degrees_of(region, shape)
     along = float(rim[box][region.mask].mean())
     if along > RIM and not rim[face.judged].mean() > 0.5:
-        return None
-    if region.drop_mean < LEAST_DIFFERENCE:
         return None
     told = sorted((name for name in _TOLD if degrees[name] > 0.5), key=lambda name: -degrees[name])
     seen = int(np.bitwise_or.reduce(face.scans[box][region.mask]))
