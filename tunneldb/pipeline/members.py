@@ -45,6 +45,9 @@ UNKNOWN = 0.01
 
 _WITHOUT = "on each flat face the level goes by incidence, which tells the range there, on each pipe by both"
 
+AT_ONCE = 250_000
+"""Points that are read and written at a time: voxels and faces need the memory."""
+
 _SAMPLES = 400_000
 _SAMPLE_OF_VALUES = 100_000
 
@@ -261,7 +264,7 @@ def read_all(
 ) -> Iterator[tuple[Points, Int32, Int64]]:
     """All points, the place of their scan among the stations, and which of them have one."""
     ids = inputs.poses.scan_id
-    files = chain.from_iterable(read_chunks(path, inputs.dimension, colours=colours) for path in inputs.paths)
+    files = chain.from_iterable(read_chunks(path, inputs.dimension, AT_ONCE, colours=colours) for path in inputs.paths)
     with closing(prefetch(files)) as chunks:
         for points in chunks:
             scan = np.minimum(np.searchsorted(ids, points.scan_id), len(ids) - 1).astype(np.int32)

@@ -9,7 +9,7 @@ from tunneldb.errors import UserError
 from tunneldb.export.exchange.members import Geometry, write_members
 from tunneldb.export.pointcloud.survey import same_file
 from tunneldb.files import replacing
-from tunneldb.pipeline.members import FileMembers, Inputs, numbers_of_points
+from tunneldb.pipeline.members import AT_ONCE, FileMembers, Inputs, numbers_of_points
 from tunneldb.pipeline.spot_colours import find_coloured_members
 from tunneldb.pointcloud.reader import read_header
 from tunneldb.pointcloud.rewrite import rewrite_with_numbers
@@ -58,6 +58,6 @@ def export_members(inputs: Inputs, target: Path | None, begin: Begin, geometry: 
             write_members(temporary, members.found.structures, header.crs, geometry)
         else:
             rewrite_with_numbers(
-                inputs.paths[0], temporary, numbers_of_points(inputs, members), DIMENSIONS, begin("writing", header.points)
+                inputs.paths[0], temporary, numbers_of_points(inputs, members), DIMENSIONS, begin("writing", header.points), AT_ONCE
             )
     return members
