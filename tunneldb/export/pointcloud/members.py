@@ -57,7 +57,6 @@ def export_members(inputs: Inputs, target: Path | None, begin: Begin, geometry: 
         if target.suffix.lower() == ".gpkg":
             write_members(temporary, members.found.structures, header.crs, geometry)
         else:
-            rewrite_with_numbers(
-                inputs.paths[0], temporary, numbers_of_points(inputs, members), DIMENSIONS, begin("writing", header.points), AT_ONCE
-            )
+            numbers, progress = numbers_of_points(inputs, members), begin("writing", header.points)
+            rewrite_with_numbers(inputs.paths[0], temporary, numbers, DIMENSIONS, progress, AT_ONCE)
     return members
