@@ -129,6 +129,7 @@ def find_members(inputs: Inputs, begin: Begin) -> FileMembers:
     for points, scan in _read(inputs, values, begin("points", total)):
         moments.add(points.xyz, scan)
     values.require()
+    moments.complete()
     if not len(moments):
         raise UserError(
             f"{inputs.name}: all points lie more than {REACH:g} m from the middle of the scanner positions, which is"

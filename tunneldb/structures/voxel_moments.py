@@ -71,6 +71,8 @@ class VoxelMoments:
 
     def add(self, xyz: Float, scan: Int32) -> None:
         """Add points (n, 3), m, of scans (n,) from 0 to `SCANS` - 1."""
+        if not len(self._table):
+            raise ValueError("points were complete")
         xyz = np.ascontiguousarray(xyz, np.float64)
         scan = np.ascontiguousarray(scan, np.int32)
         self.points += len(xyz)
@@ -83,6 +85,12 @@ class VoxelMoments:
             if done == len(xyz):
                 return
             self._make_room()
+
+    def complete(self) -> None:
+        """Give back the memory that further points would take; none can be added afterwards."""
+        self._table = np.empty(0, np.int32)
+        self._keys.resize(self._size, refcheck=False)
+        self._sums.resize((self._size, self._sums.shape[1]), refcheck=False)
 
     def grid(self, level: int) -> VoxelGrid:
         """Voxels with an edge of 2^-level m, no finer than those kept, in the order of scans and places."""
