@@ -192,6 +192,7 @@ def test_intensity_and_its_kind_belong_together(tunnel: Path) -> None:
         ("time,x,y,z\n1,500001,4640190,101\n2,500001,4640010,101\n", ["180 m down the axis", "reverse", "--backwards"]),
         ("time,x,y,z\n1,500090,4640010,101\n2,500090,4640020,101\n", ["never within 50 m", "another SRID", "90 m"]),
         ("time,x,y,z\n1,1,1,1\n2,1,2,1\n", ["never within 50 m"]),
+        ("time,x,y,z\n1,500001,4639990,101\n2,500001,4639999,101\n", ["no pose lies between the ends"]),
     ],
 )
 def test_a_wrong_trajectory_is_refused(tunnel: Path, conn: psycopg.Connection, text: str, parts: list[str]) -> None:
@@ -218,11 +219,18 @@ def test_a_trajectory_may_run_down_the_axis_when_that_is_said(tunnel: Path) -> N
         ("scan_id,x,y,z\n2147483648,500001,4640010,101\n", ["line 2", "2147483647"]),
         ("scan_id,x,y,z\n1,500001,4640010,101\n2,500001,4640020,101\n1,500001,4640030,101\n", ["line 4", "scan_id 1"]),
         ("scan_id,x,y,z\n1,600001,4640010,101\n", ["never within 50 m"]),
+        ("scan_id,x,y,z\n1,500000,4639940,101\n", ["never within 50 m", "60 m at the nearest, beyond its ends"]),
     ],
 )
 def test_wrong_stations_are_refused(tunnel: Path, text: str, parts: list[str]) -> None:
     (tunnel / "stations.csv").write_text(text)
     refused(run(*ADD, "--stations", "stations.csv"), "stations.csv", *parts)
+
+
+def test_a_scanner_may_stand_before_the_portal(tunnel: Path, conn: psycopg.Connection) -> None:
+    (tunnel / "stations.csv").write_text("scan_id,x,y,z\n1,500001,4639997,101\n")
+    assert run(*ADD, "--stations", "stations.csv").exit_code == 0
+    assert conn.execute("SELECT ST_Y(geom) FROM tunnel.station").fetchone() == (4639997,)
 
 
 @pytest.mark.parametrize(

@@ -178,6 +178,7 @@ def test_what_is_no_tunnel_is_doubted_first(tmp_path: Path, size: tuple[float, f
     said = inspected(tmp_path / "a.las")
     assert says in said["doubts"][0]
     assert "--axis AXIS.csv" in said["commands"][1]
+    assert said["commands"][2].endswith("--no-poses --intensity-kind none")  # without intensity nobody needs to know
     text = CliRunner().invoke(main, ["inspect", str(tmp_path / "a.las")]).stdout
     assert text.index("Doubtful:") < text.index("Missing:") < text.index("Next:")
 

@@ -21,6 +21,7 @@ from tunneldb.store.scanner import FARTHEST_SCANNER
 FAR_APART = 0.1
 """Profiles farther apart than this leave room for leaks that are worth a report, m."""
 
+_NO_INTENSITY = "--intensity-kind none"
 _MOST_FILES = 5  # named one by one
 _PREFERRED = ("reflectance", "amplitude", "linear")
 _INTENSITY = re.compile("intens|ampl|reflect|refl")
@@ -99,8 +100,18 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         given = "AXIS.csv"
         missing.append("the given axis, x,y,z in place of AXIS.csv: it can't be found from these points")
     survey, date = _survey(looks, name, missing)
-    poses = _poses(looks, missing, doubts)
-    intensity = _intensity(looks, missing, doubts)
+    unknown: list[str] = []
+    lacking: list[str] = []
+    poses, intensity = _poses(looks, unknown, doubts), _intensity(looks, lacking, doubts)
+    if unknown and intensity == _NO_INTENSITY:  # it alone needs them
+        poses, unknown = "--no-poses", []
+    missing += unknown + lacking
+    if axis_fault is not None and intensity != _NO_INTENSITY:
+        stations = poses if poses.startswith("--stations") else "--stations STATIONS.csv"
+        doubts.append(
+            "what stands without an axis (a hall, a bridge, a plant) is looked at by: tunneldb members"
+            f" {_quoted(looks[0].path)} {stations} {intensity} -o {shlex.quote(f'{name}-members.gpkg')}"
+        )
     tunnel = f"tunneldb tunnel add {name} --srid {srid} --axis {given}"
     return FirstSteps(
         missing,
@@ -190,7 +201,8 @@ def _poses(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> 
     if times and len(scans) < 3:
         missing.append(
             "where the scanner was: its trajectory as TRAJECTORY.csv with time,x,y,z, time being the gps_time of the files, "
-            f"{min(times):.3f} to {max(times):.3f}; of a scanner that stood still its stations, see --stations"
+            f"{min(times):.3f} to {max(times):.3f}; of a scanner that stood still its stations, see --stations; "
+            "if nobody knows, --no-poses in place of it, with intensity of kind reflectance or none"
         )
         return "--trajectory TRAJECTORY.csv"
     listed = ", ".join(map(str, scans[:10])) + (f" and {len(scans) - 10} more" if len(scans) > 10 else "")
@@ -235,7 +247,7 @@ def _intensity(looks: Sequence[FileLook], missing: list[str], doubts: list[str])
     found = _common_intensity(looks)
     if found is None:
         missing.append("an intensity that leaks can be found in; without one the lining is shown, and no leaks are sought")
-        return "--intensity-kind none"
+        return _NO_INTENSITY
     name, guess, sure = found
     if not sure:
         doubts.append(f"{name} is taken for {guess.what} by its values ({guess.reason}): ask who scanned it, and say so")

@@ -182,12 +182,15 @@ def _read_trajectory(path: Path) -> CsvTable:
 def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunnel: str) -> None:
     """The scanner must have been near the axis at least once."""
     distance = alignment.distance(xyz)
-    if np.isnan(distance).all() or np.nanmin(distance) > FARTHEST_SCANNER:
-        nearest = "beyond its ends" if np.isnan(distance).all() else f"{np.nanmin(distance):.0f} m at the nearest"
+    beyond = np.isnan(distance)
+    distance[beyond] = np.linalg.norm(xyz[beyond, None] - alignment.vertices[[0, -1]], axis=2).min(axis=1)
+    nearest = int(np.argmin(distance))
+    if distance[nearest] > FARTHEST_SCANNER:
         guess = explain_misplacement(xyz, alignment.vertices, FARTHEST_SCANNER)
         raise UserError(
             f"{', '.join(map(str, paths))}: the scanner was never within {FARTHEST_SCANNER:g} m of the axis of {tunnel!r} "
-            f"({nearest}); {guess or 'is it of another tunnel or in another SRID?'}"
+            f"({distance[nearest]:.0f} m at the nearest{', beyond its ends' if beyond[nearest] else ''}); "
+            f"{guess or 'is it of another tunnel or in another SRID?'}"
         )
 
 
@@ -195,6 +198,8 @@ def _require_direction(path: Path, xyz: Float, alignment: Alignment, *, backward
     """The trajectory must run up the axis, or down it when that was said."""
     chainage = alignment.chainage(xyz)
     within = chainage[np.isfinite(chainage)]
+    if not len(within):
+        raise UserError(f"{path}: no pose lies between the ends of the axis; is it that of the tunnel that was driven through?")
     run = within[-1] - within[0]
     if run < 0 and not backwards:
         raise UserError(
