@@ -35,8 +35,6 @@ def test_a_room_with_a_pump_is_doubted_and_surveyed(dsn: str, tmp_path: Path) ->
     assert any("is it a tunnel?" in doubt for doubt in found["doubts"])
     assert any(UNPOSED in doubt for doubt in found["doubts"])
     assert any("tunneldb members" in doubt and "linear -o pump-members.gpkg" in doubt for doubt in found["doubts"])
-        "tunneldb members" in doubt and "--intensity-kind linear -o pump-members.gpkg" in doubt for doubt in found["doubts"]
-    )
     axis = tmp_path / "axis.csv"
     axis.write_text("x,y,z\n-0.6,-5.2,-0.5\n-0.6,-0.9,-0.5\n")
     for command in found["commands"]:

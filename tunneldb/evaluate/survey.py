@@ -87,7 +87,7 @@ def read_findings(conn: psycopg.Connection[Any], survey: Survey, km: str | None 
     rows = conn.execute(
         "SELECT id, public.ST_AsBinary(unrolled) FROM tunnel_api.leak"
         " WHERE survey_id = %s AND (detected OR review = 'confirmed') AND review <> 'rejected'"
-        " ORDER BY chainage_from, arc_from, id",
+        " ORDER BY chainage_from + chainage_to, arc_from, id",
         (survey.id,),
     ).fetchall()
     shapes = [shapely.from_wkb(bytes(row[1])) for row in rows]

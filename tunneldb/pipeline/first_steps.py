@@ -110,7 +110,7 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         stations = poses if poses.startswith("--stations") else "--stations STATIONS.csv"
         doubts.append(
             "what stands without an axis (a hall, a bridge, a plant) is looked at by: tunneldb members"
-            f" {_quoted(looks[0].path)} {stations} {intensity} -o {shlex.quote(f'{name}-members.gpkg')}"
+            f" {_quoted(looks[0].path)} {stations} {intensity.removesuffix(' --reference auto')} -o {shlex.quote(f'{name}-members.gpkg')}"
         )
     tunnel = f"tunneldb tunnel add {name} --srid {srid} --axis {given}"
     return FirstSteps(

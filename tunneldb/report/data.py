@@ -141,7 +141,7 @@ _LEAK = sql.SQL(
     "SELECT {columns}, tunnel_api.area_between(unrolled, area, %(low)s, %(high)s) AS inside,"
     " public.ST_AsBinary(unrolled) AS outline FROM tunnel_api.leak"
     " WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed') AND chainage_to > %(low)s"
-    " AND chainage_from < %(high)s ORDER BY chainage_from, arc_from, id"
+    " AND chainage_from < %(high)s ORDER BY chainage_from + chainage_to, arc_from, id"
 ).format(columns=sql.SQL(", ").join(sql.Identifier(f.name) for f in fields(Leak) if f.name not in ("inside", "outline")))
 
 

@@ -199,7 +199,7 @@ def read_leaks(
         "clock": None if chosen.clock is None else list(chosen.clock),
     }
     columns = sql.SQL(", ").join(map(sql.Identifier, COLUMNS))
-    query = sql.SQL("SELECT {}, public.ST_AsBinary({}) {} ORDER BY chainage_from, arc_from, id")
+    query = sql.SQL("SELECT {}, public.ST_AsBinary({}) {} ORDER BY chainage_from + chainage_to, arc_from, id")
     rows = conn.execute(query.format(columns, sql.Identifier(_COLUMN[geometry]), _CHOSEN), asked).fetchall()
     names = [*COLUMNS, "geometry"]
     sums = sql.SQL(
