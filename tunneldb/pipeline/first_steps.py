@@ -108,9 +108,10 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
     missing += unknown + lacking
     if axis_fault is not None and intensity != _NO_INTENSITY:
         stations = poses if poses.startswith("--stations") else "--stations STATIONS.csv"
+        levels = intensity.removesuffix(" --reference auto")  # that takes a lining
         doubts.append(
             "what stands without an axis (a hall, a bridge, a plant) is looked at by: tunneldb members"
-            f" {_quoted(looks[0].path)} {stations} {intensity.removesuffix(' --reference auto')} -o {shlex.quote(f'{name}-members.gpkg')}"
+            f" {_quoted(looks[0].path)} {stations} {levels} -o {shlex.quote(f'{name}-members.gpkg')}"
         )
     tunnel = f"tunneldb tunnel add {name} --srid {srid} --axis {given}"
     return FirstSteps(
