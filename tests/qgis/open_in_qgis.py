@@ -71,6 +71,7 @@ def describe(project: QgsProject, canvas: QgsMapCanvas) -> dict[str, Any]:
             seen |= {
                 "wkb": QgsWkbTypes.displayString(layer.wkbType()),
                 "features": len(features),
+                "counted": layer.featureCount(),
                 "z": [max((v.z() for v in f.geometry().vertices()), default=None) for f in features],
                 "widget": {f.name(): layer.editorWidgetSetup(layer.fields().indexOf(f.name())).type() for f in layer.fields()},
                 "aliases": [f.name() for f in layer.fields() if layer.attributeAlias(layer.fields().indexOf(f.name()))],

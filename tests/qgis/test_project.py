@@ -126,6 +126,8 @@ def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str
         assert (layer["wkb"], layer["features"]) == (kind, count), name
         assert layer["crs"] == ("EPSG:25830" if name in ON_MAP else ""), name
         assert layer["error"] == "", name
+    (remarks,) = rows.execute("SELECT count(*) FROM tunnel_api.remark WHERE survey = 'demo-2024'").fetchone()  # type: ignore[misc]
+    assert layers["remark"]["counted"] == remarks, "what stands beside its name is no estimate"
     for kind in IMAGES:
         assert layers[f"demo-2024-km012-{kind}"]["crs"] == ""
 

@@ -285,6 +285,7 @@ def test_without_intensity_the_offset_is_shown(
         page.emulate_media(media=media)
         shown = page.locator("body").inner_text()
         assert shown.count("Leaks were not sought") == 1
+        assert "gaps up to 0.6 m filled with the nearest value" in shown
         for word in ("0 leaks", "class", "0.0 %", "seen", "wet or dark"):
             assert word not in shown, (media, word)
     assert troubles == []

@@ -126,8 +126,8 @@ def _of_file(
         found = export_members(inputs, output, step(progress), cast("Geometry", geometry or "3d"))
     _tell(found, output)
     _print(found)
-    if output is not None:
-        click.echo(f"written to {output}", err=True)
+    said = "nothing was written: -o out.gpkg or out.laz does" if output is None else f"written to {output}"
+    click.echo(said, err=True)
 
 
 def _reference(given: str | None) -> ReferenceCurve | str | None:

@@ -16,6 +16,7 @@ from tunneldb import __version__
 from tunneldb.database import snapshot
 from tunneldb.errors import UserError
 from tunneldb.export.tables.leaks import clock_label
+from tunneldb.raster.gap_fill import TOLD
 from tunneldb.report import data, text
 from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, without_detection
 from tunneldb.report.lining import Form
@@ -192,6 +193,7 @@ class _Report:
             "kilometres": self._kilometres(),
             "files": data.read_files(conn, survey, low, high),
             "remarks": read_remarks(conn, survey, low, high),
+            "filled": TOLD,
             "stale": text.stale(data.read_stale(conn, survey, low, high)),
             "runs": runs,
             "versions": text.versions(runs),
