@@ -45,7 +45,9 @@ def add(folder: Path, *kind: object) -> None:
 
 def test_files_of_a_site_are_recorded(plate: Path, conn: psycopg.Connection) -> None:
     add(plate)
-    command("load", "hall-1", plate / "plate.laz")
+    said = command("load", "hall-1", plate / "plate.laz").output
+    assert "the points stay in the files: tunneldb members hall-1" in said
+    assert "kept" not in said
     row = conn.execute("SELECT points, kept, chainage_from, extent, unposed FROM tunnel_api.file").fetchone()
     assert row is not None
     points, kept, chainage, extent, unposed = row

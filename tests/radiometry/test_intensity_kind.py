@@ -58,6 +58,10 @@ def test_decibels_that_are_declared_counts_are_doubted() -> None:
     assert "--intensity-kind amplitude?" in str(doubt("linear", AMPLITUDE))
 
 
+def test_lining_brighter_than_white_is_doubted() -> None:
+    assert "--intensity-kind amplitude?" in str(doubt("reflectance", AMPLITUDE))
+
+
 @pytest.mark.parametrize("kind", ["amplitude", "reflectance"])
 def test_counts_are_no_decibels(kind: str) -> None:
     assert "16-bit counts" in str(contradiction(kind, COUNTS))

@@ -125,17 +125,16 @@ def density_of(text: str) -> float | None:
 
 
 def _summary(connection: psycopg.Connection[Any], survey: Survey, done: list[Loaded]) -> None:
-    header = ["file", "", "points", "points/s", "noise", "outside", "left out", "thinned", "kept"]
-    rows = [
-        [
-            file.name,
-            file.state,
-            *map(_number, (file.points, file.points / file.seconds if file.seconds else None)),
-            *map(_number, (file.noise, file.outside, file.invalid + file.unposed, file.thinned, file.kept)),
-        ]
-        for file in done
-    ]
-    print_table(header, rows, right=range(2, 9))
+    said = ["left out"] if survey.site else ["noise", "outside", "left out", "thinned", "kept"]
+    rows = []
+    for file in done:
+        left_out = file.invalid + file.unposed
+        counts = [left_out] if survey.site else [file.noise, file.outside, left_out, file.thinned, file.kept]
+        speed = file.points / file.seconds if file.seconds else None
+        rows.append([file.name, file.state, *map(_number, (file.points, speed, *counts))])
+    print_table(["file", "", "points", "points/s", *said], rows, right=range(2, 4 + len(said)))
+    if survey.site:
+        click.echo(f"looked through; the points stay in the files: tunneldb members {survey.name}", err=True)
     loaded = {file.name for file in done}
     for remark in read_remarks(connection, survey):
         if remark.file in loaded:

@@ -190,6 +190,11 @@ def doubt(kind: str, values: NDArray[Any]) -> str | None:
             f"the intensities, declared linear, look like {likeliest.what} ({likeliest.reason}): is it"
             f" --intensity-kind {likeliest.kind}?"
         )
+    if kind == "reflectance" and found.low > 0.0:
+        said.append(
+            f"the intensities, declared reflectance, lie at {found.low:.4g} to {found.high:.4g} dB (1 to 99 %), and lining lies"
+            " below 0, which is a white target's: is it --intensity-kind amplitude?"
+        )
     return "; ".join(said) or None
 
 
