@@ -25,7 +25,8 @@ SELECT 16 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, forma
  WHERE w.points > w.share * (f.points - f.outside)
  UNION ALL
 SELECT 16 * f.id::bigint + b.k, f.survey_id, s.name, NULL, 'load', f.name,
-       format('%s points (%s %%) lie %s of the given axis, up to %s m: they are not loaded, and nothing is looked for there',
+       format('%s points (%s %%) lie %s of the given axis, up to %s m: they are not loaded, and nothing is looked for there; '
+              'an axis that reaches as far takes them in',
               b.points, round(100 * b.points / b.near::numeric, 1), b.side, b.reach)
   FROM tunnel.scan_file f
   JOIN tunnel.survey s ON s.id = f.survey_id

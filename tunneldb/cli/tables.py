@@ -21,10 +21,7 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[Any]], right: Seq
         table.add_column(name, justify="right" if index in right else "left", no_wrap=True)
     for row in rows:
         table.add_row(*("" if cell is None else cell if isinstance(cell, Text) else str(cell) for cell in row))
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=1000)  # a pipe has no width: let nothing be cut there
-    console.print(table, soft_wrap=True)
+    Console(width=1000).print(table, soft_wrap=True)  # nothing is cut: a terminal folds what is too wide
 
 
 def print_classes(counts: Int64) -> None:
