@@ -55,6 +55,7 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
         ("1", "1", ""),
         ("2", "1", "more than half differs"),
     ]
+    assert "further member" not in text
     assert "spot 2</td>" in text, "the record of edits knows it by its number"
 
     # Pictures are to scale: the disc of 0.3 m on a wall of 3.4 m × 2 m, drawn where it lies.

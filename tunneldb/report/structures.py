@@ -17,7 +17,10 @@ WIDTH = 1000.0
 """Width of a picture, in its own unit."""
 
 HIDDEN = 0.5
-"""A member of which less than this share could be judged is listed, whether it has spots or not."""
+"""A face or member of which less than this share could be judged is marked."""
+
+LARGEST = 25
+"""So many of the largest members are listed, whether they have spots or not."""
 
 _BARS = 4  # the bar of a picture is at least a fourth of its width
 
@@ -73,7 +76,7 @@ class StructuresChapter:
     spots : SpotList
         As `tunneldb spots` lists them.
     members : list of dict
-        Those with spots, those that are bimodal, and those hardly judged; columns of view ``member_statistics``.
+        The largest, those with spots, and those that are bimodal; columns of view ``member_statistics``.
     others, others_area, others_seen : int, float, float
         The rest: how many, their area, and what of it was judged, m².
     pictures : list of Picture
@@ -124,13 +127,13 @@ def read_structures(
     shown = {spot.member for spot in spots.rows if spot.member is not None}
     if stretch is not None:
         rows = [row for row in rows if row["number"] in shown or _between(row["chainage"], stretch)]
-    listed = [row for row in rows if row["number"] in shown or row["bimodal"] or row["seen_share"] < HIDDEN]
-    named = {row["number"] for row in listed}
+    shown |= {row["number"] for row in rows if row["bimodal"]}
+    named = shown | {row["number"] for row in sorted(rows, key=lambda row: -row["area"])[:LARGEST]}
+    listed = [row for row in rows if row["number"] in named]
     others = [row for row in rows if row["number"] not in named]
-    pictured = shown | {row["number"] for row in listed if row["bimodal"]}
     return StructuresChapter(
         spots, listed, len(others), sum(row["area"] for row in others), sum(row["area"] * row["seen_share"] for row in others),
-        _pictures(conn, survey, sorted(pictured), {spot.number for spot in spots.rows}),
+        _pictures(conn, survey, sorted(shown), {spot.number for spot in spots.rows}),
         {review: sum(spot.review == review for spot in spots.rows) for review in ("open", "confirmed", "rejected")},
     )  # fmt: skip
 
