@@ -101,6 +101,7 @@ def test_figures_follow_what_is_changed(conn, survey, tmp_path):
     assert everything["area_precision"] == pytest.approx(shared / sum(f.area for f in there), abs=1e-4)
     assert found["true"][2]["area_error"] == pytest.approx(1 - there[2].area / truth[2].area, abs=1e-4)
     text = run("evaluate", survey, tmp_path / "truth.geojson").stdout
+    assert "of 0.1 m² and more (--min-area)" in text
     assert "3.00 false leaks for each 1000 m² of the 1000 m²" in text
     assert "missed" in text
 

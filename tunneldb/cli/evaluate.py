@@ -108,6 +108,7 @@ def evaluate(
         click.echo()
         print_table(report.subject.list_header, rows, right=range(1, len(report.subject.list_header)))
     click.echo(f"\n{reports.false_line(report)}")
+    click.echo(f"counted are those of {smallest:g} m² and more (--min-area), by their areas as unrolled")
     for line in said:
         click.echo(line)
 
