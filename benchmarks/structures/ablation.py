@@ -67,7 +67,15 @@ def _one_level(parts: list[list[Any]], model: Float, *, by_range: bool) -> dict[
 
 
 def _by_histogram(
-    angle: Float, range_m: Float, value: Float, points: Float, pairs: Int64, own: Bool | None = None, *, by_range: bool
+    angle: Float,
+    range_m: Float,
+    value: Float,
+    points: Float,
+    pairs: Int64,
+    own: Bool | None = None,
+    *,
+    by_range: bool,
+    one_surface: bool = True,
 ) -> LevelCurve:
     """A robust mode for each class of incidence by itself (Ono et al., 3.3, with a mode that bears rust), no shape over θ."""
     usable = angle <= np.radians(level.STEEPEST)
