@@ -84,12 +84,25 @@ def test_loading_twice_changes_nothing(survey: psycopg.Connection, tmp_path: Pat
     assert (survey.execute("SELECT * FROM tunnel.scan_file").fetchall(), rows(survey), runs(survey)) == before
 
 
-def test_the_same_content_under_another_name_is_told(survey: psycopg.Connection, tmp_path: Path) -> None:
+def test_the_same_content_under_another_name_is_refused(survey: psycopg.Connection, tmp_path: Path) -> None:
     path = write(tmp_path / "a.laz", tube(980, 1020, 200, seed=1))
-    load(survey, [path, write(tmp_path / "other.laz", tube(980, 1020, 200, seed=2))])
+    copy, third = tmp_path / "copy.laz", tmp_path / "third.laz"
+    copy.write_bytes(path.read_bytes())
+    with pytest.raises(UserError, match=r"copy\.laz has the same content as a\.laz: .*leave it out"):
+        load(survey, [path, copy])
+    assert survey.execute("SELECT count(*) FROM tunnel.scan_file").fetchone() == (0,)
+    load(survey, [path])
+    before = rows(survey)
+    write(third, tube(980, 1020, 200, seed=2))
+    with pytest.raises(UserError, match=r"copy\.laz has the same content as a\.laz, which survey s holds"):
+        load(survey, [third, copy])
+    assert rows(survey) == before
+
+
+def test_a_copy_that_was_loaded_is_told(survey: psycopg.Connection, tmp_path: Path) -> None:
+    load(survey, [write(tmp_path / name, tube(980, 1020, 200, seed=seed)) for seed, name in enumerate(("a.laz", "copy.laz"))])
     assert survey.execute("SELECT count(*) FROM tunnel_api.remark").fetchone() == (0,)
-    (tmp_path / "copy.laz").write_bytes(path.read_bytes())
-    load(survey, [tmp_path / "copy.laz"])
+    survey.execute("UPDATE tunnel.scan_file SET checksum = (SELECT checksum FROM tunnel.scan_file WHERE name = 'a.laz')")
     ((name, remark),) = survey.execute("SELECT file, remark FROM tunnel_api.remark").fetchall()
     assert name == "copy.laz"
     assert remark.startswith("has the same content as a.laz: ")

@@ -106,5 +106,10 @@ def test_points(tunnel: Path, matrix: np.ndarray, says: str) -> None:
 def test_scan_numbers(tunnel: Path) -> None:
     twice = np.concatenate([STATIONS, STATIONS[:1] + np.array([0, 20.0, 0, 0])])
     assert "line 4: scan_id 1 stands above already" in add(tunnel, "--stations", twice, code=2)
+    unnamed = table(tunnel / "names.csv", "name,x,y,z", STATIONS)
+    said = command(
+        "survey", "add", "s", "--tunnel", "t", "--date", "2024-05-04", "--stations", unnamed, "--intensity-kind", "none", code=2
+    )
+    assert "names.csv has no column scan_id: its header is 'name,x,y,z'; scan_id is the number" in said
     add(tunnel, "--stations", STATIONS)
     assert "no station for scan_id 7" in command("load", "s", scan(tunnel / "a.laz", scan_id=7), code=2)

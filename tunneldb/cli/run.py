@@ -124,3 +124,4 @@ def _say_result(conn: psycopg.Connection[Any], survey: Survey) -> None:
     leaks, area = sum_leaks(conn, survey)
     tell(leaks=leaks, wet_area=area)
     click.echo(f"{survey.name}: {number(leaks, 'leak')}, {area:.2f} m²: tunneldb leaks {survey.name}")
+    click.echo(f"to look at it: tunneldb qgis {survey.name} -o FILE.qgz; a report: tunneldb report {survey.name} -o FILE.html")

@@ -34,7 +34,16 @@ from tunneldb.store.partition import (
     swap_partition,
     write_partition,
 )
-from tunneldb.store.scan_files import COUNTED, Loaded, change_counts, outcome, record_loaded, recorded_files, unchanged
+from tunneldb.store.scan_files import (
+    COUNTED,
+    Loaded,
+    change_counts,
+    outcome,
+    record_loaded,
+    recorded_files,
+    require_no_copies,
+    unchanged,
+)
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
@@ -222,6 +231,8 @@ def load_files(
     headers = read_headers(paths)
     for header in headers:
         reading.check(header)
+    require_no_copies(conn, survey, [header.path for header in headers])
+    conn.rollback()
     place = outside_area(survey.srid, reading.alignment.vertices[:, :2])
     notes = {header.path.name: "; ".join(filter(None, (crs_note(header, survey.srid), place))) for header in headers}
     for batch in _batches(headers, reading.alignment, settings.max_distance):

@@ -22,7 +22,17 @@ from tunneldb.pointcloud.reader import CHUNK, ScanHeader, check_header, crs_note
 from tunneldb.pointcloud.selection import SAMPLED, FilterCounts
 from tunneldb.radiometry.intensity_kind import doubt
 from tunneldb.store.ledger import stage_run
-from tunneldb.store.scan_files import COUNTED, Content, Loaded, checksum, outcome, record_file, recorded_files, unchanged
+from tunneldb.store.scan_files import (
+    COUNTED,
+    Content,
+    Loaded,
+    checksum,
+    outcome,
+    record_file,
+    recorded_files,
+    require_no_copies,
+    unchanged,
+)
 from tunneldb.store.sources import load_poses
 from tunneldb.store.survey import Survey
 
@@ -66,6 +76,7 @@ def register_files(
     headers = read_headers(paths)
     for header in headers:
         check_header(header, survey.intensity_dimension, survey.srid, needs_time=poses.mobile)
+    require_no_copies(conn, survey, [header.path for header in headers])
     for header in headers:
         corners = np.array([header.low[:2], header.high[:2]])
         recorded = recorded_files(conn, survey).get(header.path.name)

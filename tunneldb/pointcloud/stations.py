@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.arrays import Float, Int32
-from tunneldb.csvfile import read_csv
+from tunneldb.csvfile import read_csv, read_header
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.table import has_scans, posed_scans
 
@@ -90,6 +90,12 @@ def _of_scans(path: Path) -> Iterator[_Station]:
 
 
 def _of_csv(path: Path) -> Iterator[_Station]:
+    header = read_header(path)
+    if "scan_id" not in header:
+        raise UserError(
+            f"{path} has no column scan_id: its header is {','.join(header)!r}; scan_id is the number by which points name"
+            " their scan, their point_source_id: tunneldb inspect lists the numbers of a file"
+        )
     table = read_csv(path, ("scan_id", "x", "y", "z"))
     if not len(table):
         raise UserError(f"{path} holds no station")

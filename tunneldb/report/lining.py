@@ -18,6 +18,7 @@ from tunneldb.anomalies.windows import on_lining
 from tunneldb.arrays import Bool, Intp, Single, UInt8
 from tunneldb.raster.gap_fill import FILL, fill_gaps
 from tunneldb.raster.geotiff import Raster, decode
+from tunneldb.raster.grey import grey_range
 from tunneldb.raster.grid import BLOCK
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.store.survey import Survey
@@ -34,8 +35,8 @@ NO_STATE = 255
 FILLED = 0.14
 """Pixels without points take the mean of those about them, in a square so wide, m: about what the median filter looks at."""
 
-LEAST = {"corrected": 0.1, "offset": 0.005}
-"""From black to white are at least so many dB or m."""
+LEAST = 0.005
+"""From black to white are at least so many m of offset."""
 
 QUALITY = {"WEBP": 55, "JPEG": 70}
 """Of the pictures, 0 to 100."""
@@ -218,17 +219,17 @@ class Lining:
         return self._unseen[number]
 
     def _kilometre(self, km: int) -> _Kilometre:
-        """Values are drawn from the 1st to the 98th percentile of the lining in up to three of the kilometre's blocks."""
+        """What is drawn black and white is found from up to three of the kilometre's blocks."""
         if km not in self._known:
             numbers = sorted(number for number, where in self._km.items() if where == km)
             blocks = [self._block(numbers[n]) for n in sorted({0, len(numbers) // 2, len(numbers) - 1})]
             values = np.concatenate([block.lining() for block in blocks])
-            low, high = (float(v) for v in np.percentile(values, [1, 98])) if len(values) else (0.0, 1.0)
+            low, high = grey_range(values) if self._kind == "corrected" else _offset_range(values)
             pixel = blocks[0].shown.transform.a
             empty = sum(int(np.count_nonzero(block.state == PixelState.EMPTY)) for block in blocks)
             filled = sum(int(np.count_nonzero(on_lining(block.state))) for block in blocks)
             size = filter_size(max(filled, 1) / max(filled + empty, 1))
-            self._known[km] = _Kilometre(pixel, size, low, max(high, low + LEAST[self._kind]))
+            self._known[km] = _Kilometre(pixel, size, low, high)
         return self._known[km]
 
 
@@ -274,6 +275,12 @@ class _Place:
 def _inside(place: Intp, count: int) -> slice:
     """Those of growing places that lie from 0 to ``count`` - 1."""
     return slice(int(np.searchsorted(place, 0)), int(np.searchsorted(place, count)))
+
+
+def _offset_range(values: Single) -> tuple[float, float]:
+    """Offsets, m, drawn black and white: the 1st and the 98th percentile."""
+    low, high = (float(v) for v in np.percentile(values, [1, 98])) if len(values) else (0.0, 1.0)
+    return low, max(high, low + LEAST)
 
 
 def _grey(values: Single, kilometre: _Kilometre) -> UInt8:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -111,6 +112,30 @@ def unchanged(conn: psycopg.Connection[Any], path: Path, recorded: Recorded | No
     if state == "moved":
         conn.execute("UPDATE tunnel.scan_file SET path = %s WHERE id = %s", [place, recorded.id])
     return outcome(conn, recorded.id, state)
+
+
+def require_no_copies(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path]) -> None:
+    """Refuse a file that has the content of another one given, or of one that the survey holds under another name.
+
+    Only files of the same size are read for it.
+
+    Raises
+    ------
+    UserError
+        For the first such file.
+    """
+    given = {path.name: path for path in paths}
+    held = {name: file for name, file in recorded_files(conn, survey).items() if name not in given}
+    sizes = Counter(path.stat().st_size for path in given.values()) + Counter(file.bytes for file in held.values())
+    known = {file.checksum: f"{name}, which survey {survey.name} holds" for name, file in held.items()}
+    for name, path in given.items():
+        if sizes[path.stat().st_size] > 1:
+            digest = checksum(path)
+            if digest in known:
+                raise UserError(
+                    f"{path} has the same content as {known[digest]}: all its points would count twice; leave it out"
+                )
+            known[digest] = name
 
 
 def outcome(conn: psycopg.Connection[Any], file_id: int, state: str, seconds: float = 0.0) -> Loaded:

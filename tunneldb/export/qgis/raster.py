@@ -12,6 +12,7 @@ import rasterio
 from tunneldb.arrays import Float
 from tunneldb.export.images.palette import PALETTES, hexadecimal
 from tunneldb.raster.gap_fill import TOLD
+from tunneldb.raster.grey import grey_range
 
 FILLED = "-filled"
 """End of the kinds of image with gaps filled: each lies under the image of its kind as it was measured."""
@@ -38,19 +39,6 @@ _SAMPLE = 1000
 def image_kind(path: Path) -> str | None:
     """Return the kind of an image by its file name, None if it is no image of the lining."""
     return next((kind for kind in KINDS if path.stem.endswith(kind)), None)
-
-
-def grey_range(paths: Sequence[Path]) -> tuple[float, float]:
-    """Return the intensities, dB, that are drawn black and white, the same for all images of a kind.
-
-    The lining, which is most of an image, becomes a light grey, and a leak, darker by some decibels, stands out from its
-    noise: black is the 2 % quantile or lower, at least 4 dB below the median; white 98 %, at least 1.6 dB above it.
-    """
-    values = _sample(paths)
-    if not len(values):
-        return 0.0, 1.0
-    low, middle, high = np.quantile(values, [0.02, 0.5, 0.98])
-    return float(min(low, middle - 4.0)), float(max(high, middle + 1.6))
 
 
 def offset_range(paths: Sequence[Path]) -> float:
@@ -99,7 +87,7 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
             value = share * limit
             ET.SubElement(shader, "item", value=f"{value:g}", label=f"{value * 1000:+.0f} mm", color=colour, alpha="255")
     else:
-        limits = grey_range(paths)
+        limits = grey_range(_sample(paths))
         renderer = ET.SubElement(element, "rasterrenderer", type="singlebandgray", grayBand="1", gradient="BlackToWhite")
         _origin(renderer)
         enhancement = ET.SubElement(renderer, "contrastEnhancement")
