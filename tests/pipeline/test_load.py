@@ -84,19 +84,21 @@ def test_loading_twice_changes_nothing(survey: psycopg.Connection, tmp_path: Pat
     assert (survey.execute("SELECT * FROM tunnel.scan_file").fetchall(), rows(survey), runs(survey)) == before
 
 
-def test_the_same_content_under_another_name_is_refused(survey: psycopg.Connection, tmp_path: Path) -> None:
+def test_the_same_content_under_another_name_is_left_out(survey: psycopg.Connection, tmp_path: Path) -> None:
     path = write(tmp_path / "a.laz", tube(980, 1020, 200, seed=1))
-    copy, third = tmp_path / "copy.laz", tmp_path / "third.laz"
+    copy, other = tmp_path / "copy.laz", write(tmp_path / "other.laz", tube(980, 1020, 200, seed=2))
     copy.write_bytes(path.read_bytes())
-    with pytest.raises(UserError, match=r"copy\.laz has the same content as a\.laz: .*leave it out"):
-        load(survey, [path, copy])
-    assert survey.execute("SELECT count(*) FROM tunnel.scan_file").fetchone() == (0,)
-    load(survey, [path])
+    said, first = load(survey, [path, copy])
+    assert (said.name, said.state, said.kept) == ("copy.laz", "a copy", 0)
+    assert said.note == "has the same content as a.laz: left out, for all its points would count twice"
+    assert first.kept > 0
     before = rows(survey)
-    write(third, tube(980, 1020, 200, seed=2))
-    with pytest.raises(UserError, match=r"copy\.laz has the same content as a\.laz, which survey s holds"):
-        load(survey, [third, copy])
+    (said,) = load(survey, [copy])
+    assert said.note is not None
+    assert said.note.startswith("has the same content as a.laz, which the survey holds: left out")
     assert rows(survey) == before
+    load(survey, [copy, other])
+    assert survey.execute("SELECT name FROM tunnel.scan_file ORDER BY 1").fetchall() == [("a.laz",), ("other.laz",)]
 
 
 def test_a_copy_that_was_loaded_is_told(survey: psycopg.Connection, tmp_path: Path) -> None:

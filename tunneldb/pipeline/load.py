@@ -38,10 +38,10 @@ from tunneldb.store.scan_files import (
     COUNTED,
     Loaded,
     change_counts,
+    copies_of,
     outcome,
     record_loaded,
     recorded_files,
-    require_no_copies,
     unchanged,
 )
 from tunneldb.store.surface import load_alignment
@@ -207,7 +207,7 @@ def load_files(
     survey : Survey
     paths : sequence of Path
         Scan files. A file is known by its name without the folder; one of the same name and other content that was
-        loaded before is replaced, one of the same content is left as it is.
+        loaded before is replaced, one of the same content is left as it is; a copy of another file is left out.
     settings : FilterSettings
     begin : callable
         Told of each step that begins; returns what is told of its progress.
@@ -231,8 +231,10 @@ def load_files(
     headers = read_headers(paths)
     for header in headers:
         reading.check(header)
-    require_no_copies(conn, survey, [header.path for header in headers])
+    copies = copies_of(conn, survey, [header.path for header in headers])
     conn.rollback()
+    yield from copies.values()
+    headers = [header for header in headers if header.path not in copies]
     place = outside_area(survey.srid, reading.alignment.vertices[:, :2])
     notes = {header.path.name: "; ".join(filter(None, (crs_note(header, survey.srid), place))) for header in headers}
     for batch in _batches(headers, reading.alignment, settings.max_distance):

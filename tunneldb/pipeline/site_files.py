@@ -27,10 +27,10 @@ from tunneldb.store.scan_files import (
     Content,
     Loaded,
     checksum,
+    copies_of,
     outcome,
     record_file,
     recorded_files,
-    require_no_copies,
     unchanged,
 )
 from tunneldb.store.sources import load_poses
@@ -76,7 +76,10 @@ def register_files(
     headers = read_headers(paths)
     for header in headers:
         check_header(header, survey.intensity_dimension, survey.srid, needs_time=poses.mobile)
-    require_no_copies(conn, survey, [header.path for header in headers])
+    copies = copies_of(conn, survey, [header.path for header in headers])
+    conn.rollback()
+    yield from copies.values()
+    headers = [header for header in headers if header.path not in copies]
     for header in headers:
         corners = np.array([header.low[:2], header.high[:2]])
         recorded = recorded_files(conn, survey).get(header.path.name)

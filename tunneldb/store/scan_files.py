@@ -30,7 +30,8 @@ class Loaded:
     name : str
     state : str
         ``loaded``, ``replaced`` (there was a file of this name with other content), ``reread`` (because of a file that
-        was replaced), ``unchanged`` or ``moved`` (unchanged, but it lies elsewhere now, which was noted).
+        was replaced), ``unchanged``, ``moved`` (unchanged, but it lies elsewhere now, which was noted) or ``a copy`` (of
+        another file, left out).
     points, noise, outside, invalid, unposed, thinned, kept : int
         Its points, and what they came to, see `tunneldb.pointcloud.selection.FilterCounts`; points is the sum of the others
         once all its kilometres are loaded.
@@ -114,28 +115,23 @@ def unchanged(conn: psycopg.Connection[Any], path: Path, recorded: Recorded | No
     return outcome(conn, recorded.id, state)
 
 
-def require_no_copies(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path]) -> None:
-    """Refuse a file that has the content of another one given, or of one that the survey holds under another name.
+def copies_of(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path]) -> dict[Path, Loaded]:
+    """Files that have the content of one given before them, or of one that the survey holds under another name.
 
-    Only files of the same size are read for it.
-
-    Raises
-    ------
-    UserError
-        For the first such file.
+    Their points would count twice. Only files of the same size are read for it.
     """
     given = {path.name: path for path in paths}
     held = {name: file for name, file in recorded_files(conn, survey).items() if name not in given}
     sizes = Counter(path.stat().st_size for path in given.values()) + Counter(file.bytes for file in held.values())
-    known = {file.checksum: f"{name}, which survey {survey.name} holds" for name, file in held.items()}
+    known = {file.checksum: f"{name}, which the survey holds" for name, file in held.items()}
+    copies = {}
     for name, path in given.items():
-        if sizes[path.stat().st_size] > 1:
-            digest = checksum(path)
-            if digest in known:
-                raise UserError(
-                    f"{path} has the same content as {known[digest]}: all its points would count twice; leave it out"
-                )
+        if sizes[path.stat().st_size] > 1 and (digest := checksum(path)) in known:
+            note = f"has the same content as {known[digest]}: left out, for all its points would count twice"
+            copies[path] = Loaded(name, "a copy", 0, 0, 0, 0, 0, 0, 0, note=note)
+        elif sizes[path.stat().st_size] > 1:
             known[digest] = name
+    return copies
 
 
 def outcome(conn: psycopg.Connection[Any], file_id: int, state: str, seconds: float = 0.0) -> Loaded:

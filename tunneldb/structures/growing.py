@@ -46,6 +46,9 @@ LEAST_POINTS, LEAST_VOXELS = 60, 8
 PATCH = 150
 """Voxels in which it is looked whether normals turn about an axis."""
 
+VAIN = 3
+"""No cylinder is tried from a voxel that lay so many times in such a patch from which none was found."""
+
 TIMES = 6
 """How many times a plane is grown again from its seed, by the better plane that the time before gave, at most."""
 
@@ -196,8 +199,11 @@ def _spread_over(
 def _turning(
     seed: int, moments: Float, centroid: Float, normals: Float, starts: Int64, neighbours: Int32,
     owner: Int32, mark: Int32, stamp: int, queue: Int32, model: Float,
-) -> bool:  # pragma: no cover - compiled  # fmt: skip
-    """Whether normals about a seed turn about an axis; a first cylinder into ``model`` then."""
+) -> int:  # pragma: no cover - compiled  # fmt: skip
+    """Number of voxels about a seed, into ``queue``, whose normals turn about an axis; 0 if they don't.
+
+    A first cylinder into ``model`` then.
+    """
     queue[0], mark[seed] = seed, stamp
     count, at = 1, 0
     while at < count and count < PATCH:
@@ -216,7 +222,7 @@ def _turning(
             queue[count] = j
             count += 1
     if count < LEAST_VOXELS:
-        return False
+        return 0
     nn, weight = np.zeros(6), 0.0
     mean, middle = np.zeros(3), np.zeros(3)
     for m in range(count):
@@ -237,10 +243,10 @@ def _turning(
     middle /= weight
     least, between, _ = eigenvalues(nn[0], nn[1], nn[2], nn[3], nn[4], nn[5])
     if between < 0.003 or between < 4.0 * least:  # spread of 3° and more, across the axis
-        return False
+        return 0
     ax, ay, az = normal(nn[0], nn[1], nn[2], nn[3], nn[4], nn[5], least)
     if ax == 0.0 and ay == 0.0 and az == 0.0:
-        return False
+        return 0
     # Radius and axis by least squares from centroid = axis point + radius × normal, across the axis.
     product, square = 0.0, 0.0
     for m in range(count):
@@ -253,15 +259,15 @@ def _turning(
             product += w * d * (centroid[i, k] - middle[k])
             square += w * d * d
     if square <= 0.0:
-        return False
+        return 0
     radius = product / square
     if not 0.003 < abs(radius) < LARGEST:
-        return False
+        return 0
     for k in range(3):
         model[k] = middle[k] - radius * mean[k]
     model[3], model[4], model[5] = ax, ay, az
     model[6], model[7] = abs(radius), 1.0 if radius > 0.0 else -1.0
-    return True
+    return count
 
 
 @kernel
@@ -270,8 +276,8 @@ def _grow_all(
     noise: float, edge: float, owner: Int32, models: Float, rms: Float,
 ) -> int:  # pragma: no cover - compiled  # fmt: skip
     n = centroid.shape[0]
-    mark, tried = np.full(n, -1, np.int32), np.zeros(n, np.bool_)
-    queue, other = np.empty(n + 1, np.int32), np.empty(n + 1, np.int32)
+    mark, tried, vain = np.full(n, -1, np.int32), np.zeros(n, np.bool_), np.zeros(n, np.uint8)
+    queue, other, near = np.empty(n + 1, np.int32), np.empty(n + 1, np.int32), np.empty(PATCH, np.int32)
     plane, round_, total, sums = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(10), np.zeros(10)
     cosine = math.cos(math.radians(TURN))
     stamp, faces = 0, 0
@@ -298,7 +304,10 @@ def _grow_all(
         points = total[0]
         stamp += 1
         kind = 0
-        if _turning(seed, moments, centroid, normals, starts, neighbours, owner, mark, stamp, other, round_):
+        patch = 0
+        if vain[seed] < VAIN:
+            patch = _turning(seed, moments, centroid, normals, starts, neighbours, owner, mark, stamp, near, round_)
+        if patch > 0:
             held, rest = 0, np.inf
             for turn in range(3):
                 stamp += 1
@@ -324,6 +333,9 @@ def _grow_all(
                 and seen_angle(round_, centroid, other, held) >= math.radians(LEAST_ANGLE)
             ):
                 kind, count, points, deviation = 1, held, sums[0], rest
+            else:
+                for m in range(patch):
+                    vain[near[m]] = min(vain[near[m]] + 1, VAIN)
         if (kind == 0 and (count < LEAST_VOXELS or points < LEAST_POINTS)) or points < LEAST_POINTS:
             tried[seed] = True
             continue
