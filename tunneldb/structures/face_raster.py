@@ -13,6 +13,7 @@ from tunneldb.structures.merging import Faces
 from tunneldb.structures.models import RADIUS, distance, gradient, unroll
 from tunneldb.structures.voxel_grid import VoxelGrid
 from tunneldb.structures.voxel_moments import find_slot, key_table, voxel_key
+from tunneldb.threads import in_blocks
 
 CANDIDATES = 4
 """Faces that a point in a voxel may be on."""
@@ -34,6 +35,9 @@ FINEST, COARSEST = 0.003, 0.05
 
 MOST_PIXELS = 40_000_000
 """Pixels of all faces and scans; beyond that they are made larger."""
+
+BLOCK = 1 << 15
+"""Points that a thread takes at a time."""
 
 STEP = 0.01
 """Step in which levels are summed, dB."""
@@ -113,10 +117,16 @@ class PointFinder:
         """
         face, pixel = np.empty(len(xyz), np.int32), np.empty(len(xyz), np.int32)
         layout = self.layout
-        _find(
-            np.ascontiguousarray(xyz), np.ascontiguousarray(scan, np.int32), self.origin, self.edge, self.keys, self.table,
-            self.candidates, layout.models, self.rms, layout.pixel, layout.shape, self.stations, self.noise, face, pixel,
-        )  # fmt: skip
+        xyz, scan = np.ascontiguousarray(xyz), np.ascontiguousarray(scan, np.int32)
+
+        def some(begin: int, end: int) -> None:
+            of = slice(begin, end)
+            _find(
+                xyz[of], scan[of], self.origin, self.edge, self.keys, self.table, self.candidates, layout.models, self.rms,
+                layout.pixel, layout.shape, self.stations, self.noise, face[of], pixel[of],
+            )  # fmt: skip
+
+        in_blocks(some, len(xyz), BLOCK)
         return face, pixel
 
     def add(self, xyz: Float, scan: Int32, level: Single, sums: Sums) -> None:

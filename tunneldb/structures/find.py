@@ -203,7 +203,10 @@ def _extent(layout: Layout, face: int, held: Int64, scans: tuple[int, ...]) -> E
     if not occupied.any():
         return None
     side = float(layout.pixel[face])
-    outline = outline_of(closed(occupied, 2), int(layout.shape[face, 0]), int(layout.shape[face, 1]), side)
+    mask = closed(occupied, 2)
+    if mask.sum() * side**2 < 0.5 * LEAST_AREA:  # drawing outlines takes longest; straightened ones hardly have another area
+        return None
+    outline = outline_of(mask, int(layout.shape[face, 0]), int(layout.shape[face, 1]), side)
     area = outline.area
     if area < LEAST_AREA or occupied.sum() * side**2 < LEAST_FILLED * area:
         return None

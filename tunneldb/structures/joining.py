@@ -228,15 +228,16 @@ def _common_rims(mine: Float, yours: Float, pixel: float) -> list[Float]:
     """Lines (middle, direction, length) that are rims of both (3.2.2), each once."""
     found: list[Float] = []
     least = math.cos(math.radians(COMMON_ANGLE))
-    for i, j in np.argwhere(np.abs(mine[:, 2:4] @ yours[:, 2:4].T) >= least).tolist():
-        longer, shorter = (mine[i], yours[j]) if mine[i, 4] >= yours[j, 4] else (yours[j], mine[i])
-        across = np.array([-longer[3], longer[2]])
-        half = 0.5 * shorter[4] * shorter[2:4]
-        ends = np.array([shorter[:2] - half, shorter[:2] + half])
-        if np.abs((ends - longer[:2]) @ across).mean() > COMMON_APART * pixel:
-            continue
-        if all(abs(line[2:4] @ longer[2:4]) < least or _apart(line, longer) > COMMON_APART * pixel for line in found):
-            found.append(longer)
+    i, j = np.nonzero(np.abs(mine[:, 2:4] @ yours[:, 2:4].T) >= least)
+    first = (mine[i, 4] >= yours[j, 4])[:, None]
+    longer, shorter = np.where(first, mine[i], yours[j]), np.where(first, yours[j], mine[i])
+    across = np.column_stack([-longer[:, 3], longer[:, 2]])
+    middle = np.einsum("ni,ni->n", shorter[:, :2] - longer[:, :2], across)
+    half = 0.5 * shorter[:, 4] * np.einsum("ni,ni->n", shorter[:, 2:4], across)
+    off = 0.5 * (np.abs(middle - half) + np.abs(middle + half))
+    for line in longer[off <= COMMON_APART * pixel]:
+        if all(abs(known[2:4] @ line[2:4]) < least or _apart(known, line) > COMMON_APART * pixel for known in found):
+            found.append(line)
     return found
 
 

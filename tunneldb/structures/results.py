@@ -185,9 +185,8 @@ def outline_of(mask: Bool, left: int, bottom: int, pixel: float) -> MultiPolygon
     image = mask.astype(np.uint8)
     moved = Affine(pixel, 0.0, left * pixel, 0.0, pixel, bottom * pixel)
     found = [shapely.geometry.shape(shape) for shape, _ in rasterio.features.shapes(image, mask=mask, transform=moved)]
-    simple = [shapely.make_valid(shapely.simplify(shape, SIMPLIFY * pixel)) for shape in found]
-    parts = [part for shape in simple for part in shapely.get_parts(shape) if isinstance(part, Polygon)]
-    return MultiPolygon(parts)
+    parts = shapely.get_parts(shapely.make_valid(shapely.simplify(np.array(found, object), SIMPLIFY * pixel)))
+    return MultiPolygon([part for part in parts if isinstance(part, Polygon)])
 
 
 def kind_of(model: Float) -> Kind:
