@@ -6,6 +6,7 @@
     python -m benchmarks.structures --pairs               # the same surface from two viewpoints, by day and by night
     python -m benchmarks.structures --limits              # detection limits by size, contrast and incidence
     python -m benchmarks.structures --ablation            # the detector without one of its steps at a time
+    python -m benchmarks.structures --segmenters          # faces beside those of PCL, Open3D and CGAL
     python -m benchmarks.structures --points 100000000    # time and memory of one scene of so many points
 
 --peer needs apt's libpcl-dev and g++. --folder keeps the scenes, and takes those that it has. Figures of record count true
@@ -26,14 +27,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import print_table, progress, save
-from benchmarks.structures import ablation, judge, limits
+from benchmarks.structures import ablation, judge, limits, segmenters
 from benchmarks.structures.detector import Found, attempt
 from benchmarks.structures.literal import Literal, literal, program
 from benchmarks.structures.scenes import JUDGE, OWN, Scene, make, one_scan, parameters
 
 PAIR_SEEDS = {False: tuple(range(31, 37)), True: tuple(range(2031, 2037))}
 LIMIT_SEEDS = {False: tuple(range(51, 55)), True: tuple(range(2051, 2055))}
-ABLATION_SEEDS = (2, 3, 5)
+FEW_SEEDS = (2, 3, 5)
 AREAS = (0.0, 0.003, 0.01, 0.03, 0.1, np.inf)
 CONTRASTS = (0.0, 1.0, 2.0, 4.0, np.inf)
 
@@ -78,6 +79,7 @@ def main() -> None:
     parser.add_argument("--pairs", action="store_true", help="two viewpoints, day and night")
     parser.add_argument("--limits", action="store_true", help="detection limits")
     parser.add_argument("--ablation", action="store_true", help="what each step is good for")
+    parser.add_argument("--segmenters", action="store_true", help="faces beside those of PCL, Open3D and CGAL")
     parser.add_argument("--points", type=int, help="time and memory of a scene of about so many points")
     parser.add_argument("--reference", action="store_true", help="give the detector the reference curve")
     parser.add_argument("--list", action="store_true", help="list what was missed, and what is false")
@@ -96,7 +98,9 @@ def main() -> None:
         elif a.limits:
             limits.main(LIMIT_SEEDS[a.judge], Path(folder), a.reference)
         elif a.ablation:
-            ablation.main(a.seeds or ABLATION_SEEDS, Path(folder))
+            ablation.main(a.seeds or FEW_SEEDS, Path(folder))
+        elif a.segmenters:
+            segmenters.main(a.seeds or FEW_SEEDS, Path(folder))
         else:
             seeds = a.seeds or (JUDGE if a.judge else OWN)
             compare(seeds, Path(folder), a.peer, a.reference, a.list)

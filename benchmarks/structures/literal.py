@@ -78,7 +78,7 @@ def literal(scene: Scene, folder: Path) -> Literal:
         rows = np.flatnonzero(scene.scan == scan)
         start = time.perf_counter()
         xyz = scene.xyz[rows] - scene.stations[scan - 1]
-        label, normal, took = _grow(xyz, folder)
+        label, normal, took = grow(xyz, folder)
         joined = _group(xyz, normal, label)
         one, other = _decide(xyz, normal, joined, scene.level[rows])
         seconds += time.perf_counter() - start
@@ -89,7 +89,7 @@ def literal(scene: Scene, folder: Path) -> Literal:
     return Literal(cluster, group, fit, moments, pcl, seconds)
 
 
-def _grow(xyz: Float, folder: Path) -> tuple[Int64, Float, float]:
+def grow(xyz: Float, folder: Path) -> tuple[Int64, Float, float]:
     """Section 3.1: cluster of each point, its normal, seconds."""
     points, result = folder / "pcl.points", folder / "pcl.result"
     xyz.astype(np.float32).tofile(points)
