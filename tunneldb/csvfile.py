@@ -101,11 +101,13 @@ def read_texts(path: Path, name: str) -> list[str]:
     with _opened(path) as file:
         rows, _ = _rows(file)
         header = [cell.strip() for cell in next(rows, [])]
-        index = _indices(path, header, [name], {})[name]
+        index = _indices(path, header, [name], {}, {})[name]
         return [row[index].strip() for row in rows if any(cell.strip() for cell in row)]
 
 
-def read_csv(path: Path, names: Sequence[str], default: Mapping[str, float] | None = None) -> CsvTable:
+def read_csv(
+    path: Path, names: Sequence[str], default: Mapping[str, float] | None = None, hint: Mapping[str, str] | None = None
+) -> CsvTable:
     """Read numeric columns of a CSV file with a header; other columns are left out.
 
     Parameters
@@ -114,6 +116,8 @@ def read_csv(path: Path, names: Sequence[str], default: Mapping[str, float] | No
         The file, and the columns.
     default
         Columns that may be missing, with the value that all rows have then.
+    hint
+        What is said of columns that are missing, where their names do not say it.
 
     Raises
     ------
@@ -122,7 +126,7 @@ def read_csv(path: Path, names: Sequence[str], default: Mapping[str, float] | No
         value.
     """
     with _opened(path) as file:
-        rows, lines = _read_rows(path, *_rows(file), names, default or {})
+        rows, lines = _read_rows(path, *_rows(file), names, default or {}, hint or {})
     values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
     return CsvTable(path, tuple(names), values, np.array(lines, dtype=np.int64))
 
@@ -153,12 +157,17 @@ def _rows(file: Iterable[str]) -> tuple[_csv.Reader, bool]:
 
 
 def _read_rows(
-    path: Path, reader: _csv.Reader, decimal_comma: bool, names: Sequence[str], default: Mapping[str, float]
+    path: Path,
+    reader: _csv.Reader,
+    decimal_comma: bool,
+    names: Sequence[str],
+    default: Mapping[str, float],
+    hint: Mapping[str, str],
 ) -> tuple[list[list[float]], list[int]]:
     header = next(reader, None)
     if header is None:
         raise UserError(f"{path} is empty; it needs the header {','.join(names)}")
-    indices = _indices(path, [cell.strip() for cell in header], names, default)
+    indices = _indices(path, [cell.strip() for cell in header], names, default, hint)
     rows: list[list[float]] = []
     lines: list[int] = []
     for row in reader:
@@ -172,11 +181,14 @@ def _read_rows(
     return rows, lines
 
 
-def _indices(path: Path, header: list[str], names: Sequence[str], default: Mapping[str, float]) -> dict[str, int]:
+def _indices(
+    path: Path, header: list[str], names: Sequence[str], default: Mapping[str, float], hint: Mapping[str, str]
+) -> dict[str, int]:
     missing = [name for name in names if name not in header and name not in default]
     if missing:
-        hint = "; separate columns by commas, semicolons, tabs or spaces" if len(header) == 1 else ""
-        raise UserError(f"{path} has no column {', '.join(missing)}: its header is {','.join(header)!r}{hint}")
+        said = ["separate columns by commas, semicolons, tabs or spaces"] if len(header) == 1 else []
+        said += [hint[name] for name in missing if name in hint]
+        raise UserError("; ".join([f"{path} has no column {', '.join(missing)}: its header is {','.join(header)!r}", *said]))
     repeated = [name for name in names if header.count(name) > 1]
     if repeated:
         raise UserError(f"{path} has the column {repeated[0]} twice")

@@ -205,10 +205,10 @@ def face_rows(method: Method) -> list[tuple[str, float]]:
     good = np.abs(pipes[:, 1]) <= np.maximum(0.001, 0.01 * pipes[:, 0])
     many = len(pipes) + f.pipes_missed
     return [
-        ("purity", f.pure / f.assigned if f.assigned else nan),
-        ("purity of points on true faces", f.pure_on_faces / f.assigned_on_faces if f.assigned_on_faces else nan),
-        ("share of true faces' points on a face", f.assigned_on_faces / f.on_faces if f.on_faces else nan),
-        ("pieces per true face", float(np.mean(f.pieces)) if f.pieces else nan),
+        ("purity", f.purity),
+        ("purity of points on true faces", f.purity_on_faces),
+        ("share of true faces' points on a face", f.share_on_faces),
+        ("pieces per true face", f.mean_pieces),
         ("true faces found", len(f.pieces)),
         ("true faces missed", f.missed),
         ("true faces too small to be asked for", f.left_out),

@@ -19,7 +19,7 @@ from benchmarks.common import print_table, progress, save
 from benchmarks.structures import judge
 from benchmarks.structures.detector import Found
 from benchmarks.structures.scenes import Scene, make, parameters
-from tunneldb.arrays import Bool, Float, Int64, Single
+from tunneldb.arrays import Bool, Float, Single
 from tunneldb.pipeline import members as stage
 from tunneldb.radiometry.robust_statistics import robust_statistics
 from tunneldb.structures import contrast, find, level, significance, spots
@@ -66,18 +66,11 @@ def _one_level(parts: list[list[Any]], model: Float, *, by_range: bool) -> dict[
     return {one.scan: curve for one in seen}
 
 
-def _by_histogram(
-    angle: Float,
-    range_m: Float,
-    value: Float,
-    points: Float,
-    pairs: Int64,
-    own: Bool | None = None,
-    *,
-    by_range: bool,
-    one_surface: bool = True,
-) -> LevelCurve:
-    """A robust mode for each class of incidence by itself (Ono et al., 3.3, with a mode that bears rust), no shape over θ."""
+def _by_histogram(angle: Float, range_m: Float, value: Float, points: Float, *_: Any, **__: Any) -> LevelCurve:
+    """A robust mode for each class of incidence by itself (Ono et al., 3.3, with a mode that bears rust), no shape over θ.
+
+    In place of `level_curve`, whose further arguments say nothing to it.
+    """
     usable = angle <= np.radians(level.STEEPEST)
     which = (angle[usable] / CLASS).astype(np.int64)
     held = [k for k in np.unique(which).tolist() if points[usable][which == k].sum() >= level.FEWEST]
@@ -124,8 +117,8 @@ class Sums:
             "IoU": self.points.counted.iou,
             "found": sum(counted) / max(len(counted), 1),
             "false per 100 m²": 100.0 * self.false / area,
-            "purity": self.faces.pure / max(self.faces.assigned, 1.0),
-            "pieces": float(np.mean(self.faces.pieces)) if self.faces.pieces else float("nan"),
+            "purity": self.faces.purity,
+            "pieces": self.faces.mean_pieces,
         }
 
 

@@ -200,6 +200,26 @@ class Faces:
     pipes_missed: int = 0
     incidence: list[Float] = field(default_factory=list)
 
+    @property
+    def purity(self) -> float:
+        """Share of the points on a face that are of the true face with most of them."""
+        return self.pure / self.assigned if self.assigned else float("nan")
+
+    @property
+    def purity_on_faces(self) -> float:
+        """The same of points that are on a true face."""
+        return self.pure_on_faces / self.assigned_on_faces if self.assigned_on_faces else float("nan")
+
+    @property
+    def share_on_faces(self) -> float:
+        """Share of the points of true faces that are on a face."""
+        return self.assigned_on_faces / self.on_faces if self.on_faces else float("nan")
+
+    @property
+    def mean_pieces(self) -> float:
+        """Faces a true face is found in, on average."""
+        return float(np.mean(self.pieces)) if self.pieces else float("nan")
+
 
 def faces(scene: Scene, found: Found, into: Faces) -> None:
     """Add a scene's faces and members."""

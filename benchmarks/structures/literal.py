@@ -15,7 +15,6 @@ itself, as in the paper. Where the paper says nothing, what is simplest was take
 
 from __future__ import annotations
 
-import subprocess
 import time
 import warnings
 from dataclasses import dataclass
@@ -28,6 +27,7 @@ import shapely
 from scipy.optimize import OptimizeWarning, curve_fit
 from scipy.spatial import cKDTree
 
+from benchmarks.structures import compiled
 from benchmarks.structures.scenes import Scene
 from tunneldb.arrays import Bool, Float, Int64
 
@@ -36,23 +36,16 @@ GROUP_ANGLE, GROUP_DISTANCE, PROJECTED = 10.0, 0.005, 0.05
 DIVISION, BIN, SIGMAS = 0.05, 0.25, 3.0
 NEIGHBOURS, LEAST = 30, 50
 PARALLEL = np.cos(np.radians(GROUP_ANGLE))
-BUILD = Path(__file__).parent.parent / "results" / "region_growing"
 
 
 @cache
 def program() -> Path | None:
     """The compiled region growing; None where there is no PCL."""
-    source = Path(__file__).with_name("region_growing.cpp")
-    if BUILD.exists() and BUILD.stat().st_mtime > source.stat().st_mtime:
-        return BUILD
     roots = list(Path("/usr/include").glob("pcl-*"))
     if not roots:
         return None
-    BUILD.parent.mkdir(exist_ok=True)
     libraries = ["-lpcl_common", "-lpcl_kdtree", "-lpcl_search", "-lpcl_features", "-lpcl_segmentation"]
-    include = [f"-I{roots[0]}", "-I/usr/include/eigen3"]
-    subprocess.run(["g++", "-O2", "-w", *include, str(source), "-o", str(BUILD), *libraries], check=True)
-    return BUILD
+    return compiled.build("region_growing", [f"-I{roots[0]}", "-I/usr/include/eigen3"], libraries)
 
 
 @dataclass(frozen=True)
@@ -91,14 +84,11 @@ def literal(scene: Scene, folder: Path) -> Literal:
 
 def grow(xyz: Float, folder: Path) -> tuple[Int64, Float, float]:
     """Section 3.1: cluster of each point, its normal, seconds."""
-    points, result = folder / "pcl.points", folder / "pcl.result"
-    xyz.astype(np.float32).tofile(points)
-    arguments = [points, RADIUS, CURVATURE, ANGLE, NEIGHBOURS, LEAST, result]
-    done = subprocess.run([str(program()), *map(str, arguments)], check=True, capture_output=True, text=True)
-    rows = np.fromfile(result, dtype=[("label", np.int32), ("normal", np.float32, 3)])
-    points.unlink()
-    result.unlink()
-    return rows["label"].astype(np.int64), rows["normal"].astype(np.float64), sum(map(float, done.stdout.split()))
+    found = program()
+    assert found is not None
+    arguments = [RADIUS, CURVATURE, ANGLE, NEIGHBOURS, LEAST]
+    rows, seconds = compiled.run(found, xyz, arguments, [("label", np.int32), ("normal", np.float32, 3)], folder)
+    return rows["label"].astype(np.int64), rows["normal"].astype(np.float64), seconds
 
 
 @dataclass(frozen=True)

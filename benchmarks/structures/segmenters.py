@@ -10,7 +10,6 @@ segmentation with its normals; that of tunneldb is all of its run, with reading,
 from __future__ import annotations
 
 import importlib.util
-import subprocess
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.common import print_table, progress, save
-from benchmarks.structures import judge, literal
+from benchmarks.structures import compiled, judge, literal
 from benchmarks.structures.detector import Found, attempt
 from benchmarks.structures.scenes import Scene, make, parameters
 from tunneldb.arrays import Float, Int64
@@ -29,7 +28,6 @@ NEIGHBOURS = 30
 NEAR = 0.006  # m
 CLUSTER = 0.05  # m: as the paper's gap
 COSINE, LEAST = 0.9, 100
-BUILD = literal.BUILD.with_name("efficient_ransac")
 
 Labels = tuple[Int64, float]
 
@@ -45,10 +43,10 @@ class Sums:
         """Figures, by name."""
         f = self.faces
         return {
-            "purity": f.pure / max(f.assigned, 1.0),
-            "of points on true faces": f.pure_on_faces / max(f.assigned_on_faces, 1.0),
-            "points of true faces held": f.assigned_on_faces / max(f.on_faces, 1.0),
-            "pieces per true face": float(np.mean(f.pieces)) if f.pieces else float("nan"),
+            "purity": f.purity,
+            "of points on true faces": f.purity_on_faces,
+            "points of true faces held": f.share_on_faces,
+            "pieces per true face": f.mean_pieces,
             "true faces missed": f.missed / max(f.missed + len(f.pieces), 1),
             "points a second": points / self.seconds if self.seconds else float("nan"),
         }
@@ -57,14 +55,9 @@ class Sums:
 @cache
 def ransac() -> Path | None:
     """The compiled efficient RANSAC; None where there is no CGAL."""
-    source = Path(__file__).with_name("efficient_ransac.cpp")
-    if BUILD.exists() and BUILD.stat().st_mtime > source.stat().st_mtime:
-        return BUILD
     if not Path("/usr/include/CGAL").exists():
         return None
-    BUILD.parent.mkdir(exist_ok=True)
-    subprocess.run(["g++", "-O2", "-w", "-DNDEBUG", str(source), "-o", str(BUILD), "-lgmp", "-lmpfr"], check=True)
-    return BUILD
+    return compiled.build("efficient_ransac", ["-DNDEBUG"], ["-lgmp", "-lmpfr"])
 
 
 def by_pcl(xyz: Float, folder: Path) -> Labels:
@@ -75,14 +68,10 @@ def by_pcl(xyz: Float, folder: Path) -> Labels:
 
 def by_cgal(xyz: Float, folder: Path) -> Labels:
     """Planes and cylinders of CGAL's efficient RANSAC."""
-    points, result = folder / "cgal.points", folder / "cgal.result"
-    xyz.astype(np.float32).tofile(points)
-    arguments = [points, NEIGHBOURS, NEAR, CLUSTER, COSINE, LEAST, result]
-    done = subprocess.run([str(ransac()), *map(str, arguments)], check=True, capture_output=True, text=True)
-    label = np.fromfile(result, dtype=np.int32).astype(np.int64)
-    points.unlink()
-    result.unlink()
-    return label, sum(map(float, done.stdout.split()))
+    found = ransac()
+    assert found is not None
+    label, seconds = compiled.run(found, xyz, [NEIGHBOURS, NEAR, CLUSTER, COSINE, LEAST], np.int32, folder)
+    return label.astype(np.int64), seconds
 
 
 def by_open3d(xyz: Float, folder: Path) -> Labels:

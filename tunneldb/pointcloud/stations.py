@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.arrays import Float, Int32
-from tunneldb.csvfile import read_csv, read_header
+from tunneldb.csvfile import read_csv
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.table import has_scans, posed_scans
 
 SCAN_ID_LIMIT = 1 << 31  # point_source_id of LAS has 16 bits, the numbers of E57 scans have 31
+SCAN_ID = "scan_id is the number by which points name their scan, their point_source_id: tunneldb inspect lists those of a file"
 SAME_PLACE = 0.001  # m; one station that comes from two files
 
 
@@ -90,13 +91,7 @@ def _of_scans(path: Path) -> Iterator[_Station]:
 
 
 def _of_csv(path: Path) -> Iterator[_Station]:
-    header = read_header(path)
-    if "scan_id" not in header:
-        raise UserError(
-            f"{path} has no column scan_id: its header is {','.join(header)!r}; scan_id is the number by which points name"
-            " their scan, their point_source_id: tunneldb inspect lists the numbers of a file"
-        )
-    table = read_csv(path, ("scan_id", "x", "y", "z"))
+    table = read_csv(path, ("scan_id", "x", "y", "z"), hint={"scan_id": SCAN_ID})
     if not len(table):
         raise UserError(f"{path} holds no station")
     ids = table["scan_id"]

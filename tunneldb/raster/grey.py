@@ -1,4 +1,4 @@
-"""Grey in which corrected intensity is drawn."""
+"""Grey in which intensity is drawn."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tunneldb.arrays import Float, Single
 
 
 def grey_range(values: Float | Single) -> tuple[float, float]:
-    """Return the intensities, dB, that are drawn black and white, for a sample of corrected intensity, dB.
+    """Return the intensities, dB, that are drawn black and white, for a sample of all, dB.
 
     The lining, which is most of an image, becomes a light grey, and a leak, darker by some decibels, stands out from its
     noise and from soot: black is the 2 % quantile or lower, at least 4 dB below the median; white 98 %, at least 1.6 dB

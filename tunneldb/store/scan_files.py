@@ -126,10 +126,13 @@ def copies_of(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Pat
     known = {file.checksum: f"{name}, which the survey holds" for name, file in held.items()}
     copies = {}
     for name, path in given.items():
-        if sizes[path.stat().st_size] > 1 and (digest := checksum(path)) in known:
+        if sizes[path.stat().st_size] == 1:
+            continue
+        digest = checksum(path)
+        if digest in known:
             note = f"has the same content as {known[digest]}: left out, for all its points would count twice"
             copies[path] = Loaded(name, "a copy", 0, 0, 0, 0, 0, 0, 0, note=note)
-        elif sizes[path.stat().st_size] > 1:
+        else:
             known[digest] = name
     return copies
 
