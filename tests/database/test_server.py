@@ -179,6 +179,14 @@ def test_a_socket_folder_that_stands_open_is_closed(other_home: Path) -> None:
 
 
 @as_root
+def test_a_start_that_was_killed_before_it_gave_a_folder_away_is_made_good(other_home: Path) -> None:
+    (other_home / "run").mkdir(mode=0o700)
+    home = prepare_home(other_home)
+    assert home.user is not None
+    assert (other_home / "run").stat().st_uid == home.user.pw_uid
+
+
+@as_root
 def test_root_drops_to_another_user(home: Path) -> None:
     Server(home, SETTINGS).start()
     assert Path(f"/proc/{postmaster(home)}").stat().st_uid == pwd.getpwnam("postgres").pw_uid

@@ -7,6 +7,7 @@ import os
 import pwd
 import stat
 import subprocess
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -83,14 +84,22 @@ def prepare_home(folder: Path) -> Home:
         run = _socket_dir(state, user)
         for private in (state / "cluster", run):
             _make_private(private, user)
-        if state != folder and not (folder / "cluster").is_symlink():
-            (folder / "cluster").symlink_to(state / "cluster")
+        if state != folder:
+            _link(folder / "cluster", state / "cluster")
     except OSError as error:
         raise UserError(
             f"cannot make the embedded server's folder {error.filename or folder}: {error.strerror}; "
             "set TUNNELDB_HOME to another"
         ) from None
     return Home(folder=folder, state=state, run=run, user=user)
+
+
+def _link(link: Path, target: Path) -> None:
+    try:
+        link.symlink_to(target)
+    except FileExistsError:
+        if not link.is_symlink():
+            raise
 
 
 def _server_user(folder: Path) -> pwd.struct_passwd | None:
@@ -153,13 +162,13 @@ def _make_private(folder: Path, user: pwd.struct_passwd | None) -> None:
     The socket trusts whoever reaches it, so the folder is the lock on the door.
     """
     owner = os.geteuid() if user is None else user.pw_uid
-    try:
+    with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
-        if user is not None:
-            os.chown(folder, user.pw_uid, user.pw_gid)
-    except FileExistsError:
-        found = folder.lstat()
-        if not stat.S_ISDIR(found.st_mode) or found.st_uid != owner:
-            raise UserError(f"{folder} is not a folder of the server's user; remove it or set TUNNELDB_HOME") from None
-        if stat.S_IMODE(found.st_mode) & 0o077:
-            folder.chmod(0o700)
+    found = folder.lstat()
+    # Root's own is one that another start, still under way or killed, has made and not yet given away.
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid not in {owner, os.geteuid()}:
+        raise UserError(f"{folder} is not a folder of the server's user; remove it or set TUNNELDB_HOME")
+    if user is not None and found.st_uid != owner:
+        os.chown(folder, user.pw_uid, user.pw_gid, follow_symlinks=False)
+    if stat.S_IMODE(found.st_mode) & 0o077:
+        folder.chmod(0o700)
