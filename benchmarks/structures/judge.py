@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ LEAST_CONTRAST = 1.0  # dB, as seen: rust at a slant can be as bright as paint
 HALF = 0.5
 FRAGMENT = 100  # points of a fragment of a face
 PIECE = 0.02  # share of a true face's points that makes a piece
+BEAMS = ("I profile", "U profile", "L profile", "box")
 JUDGED_FACE, JUDGED_SIDE = 300, 0.03  # points, m: lesser true faces are not asked for in one piece
 
 
@@ -196,6 +198,9 @@ class Faces:
     made_joins: int = 0
     wanted_joins: int = 0
     kept_joins: int = 0
+    right_sides: int = 0
+    made_sides: int = 0
+    wanted_sides: int = 0
     pipes: list[tuple[float, float, float]] = field(default_factory=list)
     pipes_missed: int = 0
     incidence: list[Float] = field(default_factory=list)
@@ -226,6 +231,7 @@ def faces(scene: Scene, found: Found, into: Faces) -> None:
     _purity(scene, found.face, into)
     _pieces(scene, found.member, into)
     _joins(scene, found.member, into)
+    _sides(scene, found.member, into)
     if found.faces:
         _pipes(scene, found, into)
         error = np.abs(incidence(scene, found) - scene.incidence)
@@ -311,6 +317,22 @@ def _joins(scene: Scene, member: Int64, into: Faces) -> None:
             into.made_joins += 1
             into.right_joins += first_of_member[called] == true_member
         first_of_member.setdefault(called, true_member)
+
+
+def _sides(scene: Scene, member: Int64, into: Faces) -> None:
+    """Pairs of true flat faces found: how many are of one beam (wanted), in one member (made), and both (right)."""
+    parts = []
+    for truth, rows in _asked(scene):
+        numbers, many = np.unique(member[rows], return_counts=True)
+        top = int(np.argmax(many))
+        if truth["kind"] == "plane" and numbers[top] and many[top] > HALF * len(rows):
+            parts.append((truth["member"], int(numbers[top])))
+    beams = {m["id"] for m in scene.truth["members"] if m["kind"] in BEAMS}
+    for (true_one, one), (true_other, other) in combinations(parts, 2):
+        same = true_one == true_other and true_one in beams
+        into.wanted_sides += same
+        into.made_sides += one == other
+        into.right_sides += same and one == other
 
 
 def _pipes(scene: Scene, found: Found, into: Faces) -> None:

@@ -6,18 +6,18 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import shapely
 from scipy import ndimage, sparse
 
 from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.structures import profiles
 from tunneldb.structures.contrast import FaceContrast, contrast_of, face_level, member_levels, observe_face, some_pixels
 from tunneldb.structures.face_raster import Layout, Sums
 from tunneldb.structures.joining import Extent, RangeImages, coplanar, join
 from tunneldb.structures.level import UNKNOWN
 from tunneldb.structures.materials import parts_of_plane
-from tunneldb.structures.models import AXIS, RADIUS, to_space, unroll
-from tunneldb.structures.results import Face, Member, Spot, Structures, kind_of, outline_of
+from tunneldb.structures.models import AXIS, POINT, RADIUS, unroll
+from tunneldb.structures.results import Face, Member, MemberKind, Spot, Structures, kind_of, outline_of
 from tunneldb.structures.segmentation import Segmentation
 from tunneldb.structures.significance import Scatter
 from tunneldb.structures.solidity import closed, ray_densities, solid_faces
@@ -95,22 +95,21 @@ def find_structures(
     """
     layout = found.layout
     parts = _parts(found, sums, images, reference)
-    member_of = np.unique([part.member for part in parts], axis=0, return_inverse=True)[1] if parts else np.empty(0, np.int64)
+    surfaces = _surfaces(parts)
+    extents = [[part.extent for part in surface] for surface in surfaces]
+    member_of = _numbers(profiles.group(extents, found.noise), extents)
+    side_of = [int((member_of[:k] == number).sum()) + 1 for k, number in enumerate(member_of.tolist())]
     count = len(layout.models)
     places: list[Int32 | None] = [None] * count
     anomaly: list[Int32 | None] = [None] * count
     faces: list[Face] = []
     spots: list[Spot] = []
-    members: list[Member] = []
     face_number, member_number = np.zeros(count + 1, np.int32), np.zeros(count + 1, np.int32)
     pixels, scatter = int(np.count_nonzero(sums.count)), Scatter()
-    sizes = np.bincount(member_of, [part.extent.outline.area for part in parts])
-    for number, member in enumerate(np.argsort(-sizes, kind="stable").tolist(), start=1):
-        of = [parts[k] for k in np.flatnonzero(member_of == member).tolist()]
-        first = len(faces)
-        judged = _judge(found, sums, of, reference, pixels, scatter, by_range=by_range)
-        for part, (contrast, here) in zip(of, judged, strict=True):
-            faces.append(_face(found, part, len(faces) + 1, number, contrast, here))
+    for number, side, surface in zip(member_of.tolist(), side_of, surfaces, strict=True):
+        judged = _judge(found, sums, surface, reference, pixels, scatter, by_range=by_range)
+        for part, (contrast, here) in zip(surface, judged, strict=True):
+            faces.append(_face(found, part, len(faces) + 1, number, side, contrast, here))
             face_number[part.face], member_number[part.face] = len(faces), number
             if part.inside is not None:
                 rows_columns = part.inside.shape
@@ -129,7 +128,7 @@ def find_structures(
                 )
                 for place, spot in enumerate(here.spots, start=1)
             ]  # fmt: skip
-        members.append(_member(number, faces[first:], [part.extent for part in of], found.origin))
+    members = _members(faces, member_of, extents, found.origin)
     return Found(Structures(members, faces, spots), face_number, member_number, places, anomaly)
 
 
@@ -143,14 +142,14 @@ class _Part:
     inside : (rows, columns) bool array or None
         Its pixels; None for all.
     extent : Extent
-    member : (int, int)
+    surface : (int, int)
         Number of what the whole face is joined to, and of the material.
     """
 
     face: int
     inside: Bool | None
     extent: Extent
-    member: tuple[int, int]
+    surface: tuple[int, int]
 
 
 def _parts(found: Segmentation, sums: Sums, images: RangeImages, reference: ReferenceCurve | None) -> list[_Part]:
@@ -186,6 +185,22 @@ def _parts(found: Segmentation, sums: Sums, images: RangeImages, reference: Refe
                 if own is not None:
                     parts[face].append(_Part(face, inside, own, (joined[face], which)))
     return sorted((part for of in parts.values() for part in of), key=lambda part: -part.extent.points)
+
+
+def _surfaces(parts: list[_Part]) -> list[list[_Part]]:
+    """Parts by the surface that they are of, the largest surface first."""
+    of: dict[tuple[int, int], list[_Part]] = {}
+    for part in parts:
+        of.setdefault(part.surface, []).append(part)
+    return sorted(of.values(), key=lambda surface: -sum(part.extent.outline.area for part in surface))
+
+
+def _numbers(member: Int64, surfaces: list[list[Extent]]) -> Int64:
+    """Members (n,) of surfaces, numbered anew: from 1, the largest first."""
+    sizes = np.bincount(member, [sum(extent.outline.area for extent in surface) for surface in surfaces])
+    number = np.empty(len(sizes), np.int64)
+    number[np.argsort(-sizes, kind="stable")] = np.arange(1, len(sizes) + 1)
+    return number[member]
 
 
 def _planes(extents: dict[int, Extent], noise: float) -> list[list[int]]:
@@ -268,12 +283,15 @@ def _about(spots: Bool) -> Bool:
     return np.asarray(ndimage.binary_dilation(spots, iterations=2)) if spots.any() else spots
 
 
-def _face(found: Segmentation, part: _Part, number: int, member: int, contrast: FaceContrast, spots: FaceSpots) -> Face:
+def _face(
+    found: Segmentation, part: _Part, number: int, member: int, side: int, contrast: FaceContrast, spots: FaceSpots
+) -> Face:
     model, extent = found.layout.models[part.face], part.extent
     whole = int(contrast.face.sum())
     return Face(
         number,
         member,
+        side,
         kind_of(model),
         model,
         found.origin,
@@ -290,30 +308,34 @@ def _face(found: Segmentation, part: _Part, number: int, member: int, contrast: 
     )
 
 
-def _member(number: int, faces: list[Face], extents: list[Extent], origin: Float) -> Member:
-    """A member, its line along the axis of a pipe, else along its longest side."""
-    model = extents[0].model
-    places = []
-    for extent in extents:
-        at = shapely.get_coordinates(extent.outline)
-        places.append(to_space(extent.model, at[:, 0], at[:, 1]))
-    u, v, _ = unroll(model, np.concatenate(places))
-    area = sum(face.area for face in faces)
-    if model[RADIUS] > 0.0:
-        ends = np.array([u.min(), u.max()])
-        line = origin + model[:3] + np.multiply.outer(ends, model[AXIS])
-        length = float(ends[1] - ends[0])
+def _members(faces: list[Face], member_of: Int64, surfaces: list[list[Extent]], origin: Float) -> list[Member]:
+    """Members of faces, and of surfaces, whose members (n,) are said."""
+    on: dict[int, list[Face]] = {}
+    sides: dict[int, list[list[Extent]]] = {}
+    for face in faces:
+        on.setdefault(face.member, []).append(face)
+    for number, surface in zip(member_of.tolist(), surfaces, strict=True):
+        sides.setdefault(number, []).append(surface)
+    return [_member(number, on[number], sides[number], origin) for number in sorted(on)]
+
+
+def _member(number: int, faces: list[Face], sides: list[list[Extent]], origin: Float) -> Member:
+    """A member, its line along the axis of a pipe, else along the middle of its longest side."""
+    kind: MemberKind = "profile" if len(sides) > 1 else faces[0].kind
+    if kind == "pipe":
+        model = sides[0][0].model
+        along, _, _ = unroll(model, profiles.places_of(sides[0]))
+        line = model[POINT] + np.multiply.outer(np.array([along.min(), along.max()]), model[AXIS])
     else:
-        box = shapely.get_coordinates(shapely.minimum_rotated_rectangle(shapely.MultiPoint(np.column_stack([u, v]))))
-        if len(box) < 5:
-            box = np.array([[u.min(), v.min()], [u.max(), v.min()], [u.max(), v.max()], [u.min(), v.max()]])
-        first, second = np.linalg.norm(box[1] - box[0]), np.linalg.norm(box[2] - box[1])
-        pairs = ((0, 3), (1, 2)) if first >= second else ((0, 1), (2, 3))
-        ends = np.array([0.5 * (box[a] + box[b]) for a, b in pairs])
-        line = origin + to_space(model, ends[:, 0], ends[:, 1])
-        length = float(max(first, second))
+        line = profiles.middle_line([profiles.box_of(side) for side in sides])
     judged = sum(face.seen_share * face.area for face in faces)
     differs = sum(face.seen_share * face.area for face in faces if face.bimodal)
     return Member(
-        number, faces[0].kind, tuple(face.number for face in faces), area, length, line, bool(judged and differs > 0.5 * judged)
+        number,
+        kind,
+        tuple(face.number for face in faces),
+        sum(face.area for face in faces),
+        float(np.linalg.norm(line[1] - line[0])),
+        origin + line,
+        bool(judged and differs > 0.5 * judged),
     )

@@ -23,17 +23,18 @@ UPRIGHT = 0.02
 _CHORD = 0.005  # m by which an edge of a polygon may cut the corner of a curved face
 
 Kind = Literal["flat", "pipe"]
+MemberKind = Literal["flat", "pipe", "profile"]
 
 
 @dataclass(frozen=True)
 class Member:
-    """Faces of one surface, joined over what stands before it.
+    """Faces of one surface, joined over what stands before it, or of the sides of one beam or column.
 
     Attributes
     ----------
     number : int
         From 1, the largest first.
-    kind : {'flat', 'pipe'}
+    kind : {'flat', 'pipe', 'profile'}
     faces : tuple of int
         Numbers of its faces.
     area : float
@@ -47,7 +48,7 @@ class Member:
     """
 
     number: int
-    kind: Kind
+    kind: MemberKind
     faces: tuple[int, ...]
     area: float
     length: float
@@ -63,6 +64,8 @@ class Face:
     ----------
     number, member : int
         From 1, and that of its member.
+    side : int
+        Of its member, from 1, the largest first: faces of one plane or pipe are of one side.
     kind : {'flat', 'pipe'}
     model : (11,) float array
         See `models`; lengths are m from ``origin``.
@@ -90,6 +93,7 @@ class Face:
 
     number: int
     member: int
+    side: int
     kind: Kind
     model: Float
     origin: Float
