@@ -23,19 +23,19 @@ SELECT m.id, m.survey_id, s.name AS survey, m.number, m.kind, m.length, m.area, 
   JOIN tunnel.survey s ON s.id = m.survey_id;
 COMMENT ON VIEW tunnel_api.member IS 'Members of structures: faces that belong together, joined where others hide them';
 COMMENT ON COLUMN tunnel_api.member.number IS 'Its number in the survey; dimension member of files written';
-COMMENT ON COLUMN tunnel_api.member.kind IS 'flat (planes that lie in one) or pipe (cylinders about one axis)';
+COMMENT ON COLUMN tunnel_api.member.kind IS 'flat (planes that lie in one), pipe (cylinders about one axis) or profile (sides of one beam)';
 COMMENT ON COLUMN tunnel_api.member.length IS 'Length along its line, gaps counted, m';
 COMMENT ON COLUMN tunnel_api.member.area IS 'Area of its faces, m²';
 COMMENT ON COLUMN tunnel_api.member.bimodal IS 'Whether so much of it differs from the rest that neither is known to be its own surface';
 COMMENT ON COLUMN tunnel_api.member.chainage IS 'Chainage of its middle, m; NULL of a site or beyond the sections';
 COMMENT ON COLUMN tunnel_api.member.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.member.geom IS 'Its middle line, in the tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.member.geom IS 'Its middle line; of a flat one along its longest side; in the tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.face AS
 SELECT f.id, f.survey_id, s.name AS survey, m.number AS member, f.number, f.kind, f.radius, f.rms, f.points, f.area,
        f.seen_share, f.incidence_from, f.incidence_to, f.level, f.sigma, f.bimodal, f.chainage,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, f.chainage) l) AS label,
-       f.origin, f.axis, f.across, f.inside,
+       f.origin, f.axis, f.across, f.inside, f.side,
        f.outline::public.geometry(MultiPolygon, 0) AS outline, f.surface::public.geometry AS geom
   FROM tunnel.face f
   JOIN tunnel.member m ON m.id = f.member_id
@@ -60,6 +60,7 @@ COMMENT ON COLUMN tunnel_api.face.origin IS 'Where its unrolled coordinates are 
 COMMENT ON COLUMN tunnel_api.face.axis IS 'Axis of a pipe; of a plane its normal, towards the scanners';
 COMMENT ON COLUMN tunnel_api.face.across IS 'Direction at right angles to it from which unrolled coordinates count: u of a plane, v = 0 of a pipe';
 COMMENT ON COLUMN tunnel_api.face.inside IS 'Whether a pipe is seen from inside';
+COMMENT ON COLUMN tunnel_api.face.side IS 'Side of its member, from 1: faces of one plane or pipe are of one side';
 COMMENT ON COLUMN tunnel_api.face.outline IS 'Its outline in its own plane, of a pipe unrolled (along the axis, around it), m; SRID 0';
 COMMENT ON COLUMN tunnel_api.face.geom IS 'Its outline in space, in the tunnel''s SRID';
 
@@ -92,7 +93,7 @@ SELECT m.id, m.survey_id, s.name AS survey, m.number, m.kind, m.length, m.chaina
                       WHERE f.member_id = m.id AND q.detected AND q.review <> 'rejected') p;
 COMMENT ON VIEW tunnel_api.member_statistics IS 'Members with what of them could be judged, and what of that differs from its own surface';
 COMMENT ON COLUMN tunnel_api.member_statistics.number IS 'Its number in the survey';
-COMMENT ON COLUMN tunnel_api.member_statistics.kind IS 'flat or pipe';
+COMMENT ON COLUMN tunnel_api.member_statistics.kind IS 'flat, pipe or profile';
 COMMENT ON COLUMN tunnel_api.member_statistics.length IS 'Length along its line, gaps counted, m';
 COMMENT ON COLUMN tunnel_api.member_statistics.faces IS 'Its faces';
 COMMENT ON COLUMN tunnel_api.member_statistics.area IS 'Area of its faces, m²';
@@ -143,19 +144,22 @@ COMMENT ON COLUMN tunnel_api.face_3d.bimodal IS 'Whether more than half of it di
 COMMENT ON COLUMN tunnel_api.face_3d.geom IS 'Its outline in space, in the tunnel''s SRID, behind where it is';
 
 -- How the faces of a survey are laid out on one plane to be drawn (SRID 0, m), member below member, so that no two lie on each
--- other. The faces of a member lie there as they do in its plane or, of a pipe, about its axis: in the frame of its largest
--- face, which goes over into the drawing by a rotation, a shift and, of a pipe seen from outside, a reflection, for u, v and
--- the direction to the scanner are a right-handed frame in planes and in pipes seen from inside only. Each member has a cell of
--- the proportions of the strip on its page (277 mm by 110 mm) with a margin of a twentieth. A window function is counted by
--- survey and its name, so that a condition on either reaches the tables.
+-- other. The faces of a side of a member lie there as they do in its plane or, of a pipe, about its axis: in the frame of its
+-- largest face, which goes over into the drawing by a rotation, a shift and, of a pipe seen from outside, a reflection, for u, v
+-- and the direction to the scanner are a right-handed frame in planes and in pipes seen from inside only. Of a profile the sides
+-- lie below each other, 5 cm apart, turned so that its line runs to the right. Each member has a cell of the proportions of the
+-- strip on its page (277 mm by 110 mm) with a margin of a twentieth. A window function is counted by survey and its name, so that
+-- a condition on either reaches the tables.
 CREATE OR REPLACE VIEW tunnel_api.face_placement AS
 WITH placed AS NOT MATERIALIZED (
-    SELECT f.id, f.survey_id, s.name AS survey, f.member_id, m.number, f.outline, t.*
+    SELECT f.id, f.survey_id, s.name AS survey, f.member_id, m.number, f.side, f.outline,
+           r.c * t.xx + r.s * t.yx AS xx, r.c * t.xy + r.s * t.yy AS xy, r.c * t.yx - r.s * t.xx AS yx,
+           r.c * t.yy - r.s * t.xy AS yy, r.c * t.x + r.s * t.y + r.x AS x, r.c * t.y - r.s * t.x AS y
       FROM tunnel.face f
       JOIN tunnel.member m ON m.id = f.member_id
       JOIN tunnel.survey s ON s.id = f.survey_id
      CROSS JOIN LATERAL (SELECT g.origin, g.axis, g.across, tunnel_api.cross_product(g.axis, g.across) AS other, g.radius, g.inside
-                           FROM tunnel.face g WHERE g.member_id = m.id ORDER BY g.area DESC, g.id LIMIT 1) b
+                           FROM tunnel.face g WHERE g.member_id = m.id AND g.side = f.side ORDER BY g.area DESC, g.id LIMIT 1) b
      CROSS JOIN LATERAL (SELECT ARRAY[f.origin[1] - b.origin[1], f.origin[2] - b.origin[2], f.origin[3] - b.origin[3]] AS shift,
                                 tunnel_api.cross_product(f.axis, f.across) AS other,
                                 CASE WHEN tunnel_api.dot(f.axis, b.axis) < 0 THEN -1.0 ELSE 1.0 END AS way,
@@ -164,28 +168,48 @@ WITH placed AS NOT MATERIALIZED (
             SELECT tunnel_api.dot(f.across, b.across) AS xx, tunnel_api.dot(o.other, b.across) AS xy,
                    tunnel_api.dot(f.across, b.other) AS yx, tunnel_api.dot(o.other, b.other) AS yy,
                    tunnel_api.dot(o.shift, b.across) AS x, tunnel_api.dot(o.shift, b.other) AS y
-             WHERE m.kind = 'flat'
+             WHERE m.kind <> 'pipe'
              UNION ALL
             SELECT o.way, 0.0, 0.0, o.side * o.way, tunnel_api.dot(o.shift, b.axis),
                    o.side * b.radius * atan2(tunnel_api.dot(f.across, b.other), tunnel_api.dot(f.across, b.across))
              WHERE m.kind = 'pipe') t
-), boxed AS (
-    SELECT p.member_id, p.survey_id, p.survey, p.number,
+     CROSS JOIN LATERAL (SELECT public.st_startpoint(m.line) AS begin, public.st_endpoint(m.line) AS finish) e
+     CROSS JOIN LATERAL (SELECT ARRAY[public.st_x(e.finish) - public.st_x(e.begin), public.st_y(e.finish) - public.st_y(e.begin),
+                                      public.st_z(e.finish) - public.st_z(e.begin)] AS line) d
+     CROSS JOIN LATERAL (SELECT atan2(tunnel_api.dot(d.line, b.other), tunnel_api.dot(d.line, b.across)) AS angle) a
+     CROSS JOIN LATERAL (
+            SELECT 1.0::float8 AS c, 0.0::float8 AS s, 0.0::float8 AS x WHERE m.kind <> 'profile'
+             UNION ALL
+            SELECT cos(a.angle), sin(a.angle),
+                   tunnel_api.dot(ARRAY[b.origin[1] - public.st_x(e.begin), b.origin[2] - public.st_y(e.begin),
+                                        b.origin[3] - public.st_z(e.begin)], d.line) / sqrt(tunnel_api.dot(d.line, d.line))
+             WHERE m.kind = 'profile') r
+), sided AS (
+    SELECT p.member_id, p.survey_id, p.survey, p.number, p.side,
            public.st_extent(public.st_affine(p.outline, p.xx, p.xy, p.yx, p.yy, p.x, p.y)) AS box
       FROM placed p
-     GROUP BY p.member_id, p.survey_id, p.survey, p.number
+     GROUP BY p.member_id, p.survey_id, p.survey, p.number, p.side
+), stacked AS (
+    SELECT i.*, -public.st_ymin(i.box) - sum(public.st_ymax(i.box) - public.st_ymin(i.box) + 0.05)
+                                         OVER (PARTITION BY i.survey_id, i.survey, i.member_id ORDER BY i.side) AS y
+      FROM sided i
+), boxed AS (
+    SELECT k.member_id, k.survey_id, k.survey, k.number, min(public.st_xmin(k.box)) AS left, max(public.st_xmax(k.box)) AS right,
+           min(public.st_ymin(k.box) + k.y) AS bottom, max(public.st_ymax(k.box) + k.y) AS top
+      FROM stacked k
+     GROUP BY k.member_id, k.survey_id, k.survey, k.number
 ), sized AS (
-    SELECT b.*, (public.st_xmin(b.box) + public.st_xmax(b.box)) / 2 AS x, (public.st_ymin(b.box) + public.st_ymax(b.box)) / 2 AS y,
-           1.1 * greatest(public.st_xmax(b.box) - public.st_xmin(b.box),
-                          (public.st_ymax(b.box) - public.st_ymin(b.box)) * 277 / 110) AS width
+    SELECT b.*, (b.left + b.right) / 2 AS x, (b.bottom + b.top) / 2 AS y,
+           1.1 * greatest(b.right - b.left, (b.top - b.bottom) * 277 / 110) AS width
       FROM boxed b
 ), cell AS (
     SELECT z.*, sum(z.width) OVER (PARTITION BY z.survey_id, z.survey ORDER BY z.number) * 110 / 277 AS depth FROM sized z
 )
 SELECT p.id, p.survey_id, p.survey, p.member_id, p.xx, p.xy, p.yx, p.yy,
-       p.x - c.x + c.width / 2 AS x, p.y - c.y - c.depth + c.width * 55 / 277 AS y,
+       p.x - c.x + c.width / 2 AS x, p.y + k.y - c.y - c.depth + c.width * 55 / 277 AS y,
        public.st_makeenvelope(0, -c.depth, c.width, c.width * 110 / 277 - c.depth, 0) AS cell
   FROM placed p
+  JOIN stacked k ON k.member_id = p.member_id AND k.side = p.side AND k.survey_id = p.survey_id AND k.survey = p.survey
   JOIN cell c ON c.member_id = p.member_id AND c.survey_id = p.survey_id AND c.survey = p.survey;
 COMMENT ON VIEW tunnel_api.face_placement IS
     'How faces are laid out on one plane to be drawn, member below member: drawn x = xx u + xy v + x, y = yx u + yy v + y';
@@ -210,7 +234,7 @@ SELECT m.id, m.survey_id, m.survey, m.number, m.kind, m.length, m.chainage,
     ON c.member_id = m.id AND c.survey_id = m.survey_id AND c.survey = m.survey;
 COMMENT ON VIEW tunnel_api.member_sheet IS 'Pages of members: where each is drawn, its faces unrolled, with what could be judged of it';
 COMMENT ON COLUMN tunnel_api.member_sheet.number IS 'Its number in the survey';
-COMMENT ON COLUMN tunnel_api.member_sheet.kind IS 'flat or pipe';
+COMMENT ON COLUMN tunnel_api.member_sheet.kind IS 'flat, pipe or profile';
 COMMENT ON COLUMN tunnel_api.member_sheet.length IS 'Length along its line, gaps counted, m';
 COMMENT ON COLUMN tunnel_api.member_sheet.chainage IS 'Chainage of its middle, m; NULL of a site or beyond the sections';
 COMMENT ON COLUMN tunnel_api.member_sheet.label IS 'Station of its middle, as 12+345.678';
@@ -273,7 +297,7 @@ BEGIN
     FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
         ('number', 'Its number in the tunnel or site: the same in the next survey'),
         ('member', 'Number of the member that it is on; NULL where the last run found it no more'),
-        ('member_kind', 'flat or pipe'),
+        ('member_kind', 'flat, pipe or profile'),
         ('face', 'Number of its face'),
         ('kind', 'dark or bright, against its own surface; what caused it, the inspector says'),
         ('chainage', 'Chainage of its middle, m; NULL of a site or beyond the sections'),

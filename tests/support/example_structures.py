@@ -51,7 +51,7 @@ def example_structures() -> Structures:
     seen = [1.0, 0.9, 0.8, 0.0]
     faces = [
         Face(
-            k + 1, 1 if k < 2 else 2, "flat" if k < 2 else "pipe", models[k], ORIGIN, 1000, outlines[k].area,
+            k + 1, 1 if k < 2 else 2, 1, "flat" if k < 2 else "pipe", models[k], ORIGIN, 1000, outlines[k].area,
             0.0 if k < 2 else RADIUS, 0.002, seen[k], (5.0, 40.0) if seen[k] else (np.nan, np.nan),
             20.0 if seen[k] else np.nan, 0.3 if seen[k] else np.nan, False, MultiPolygon([outlines[k]]),
         )

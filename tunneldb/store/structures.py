@@ -167,15 +167,17 @@ def _insert_face(conn: psycopg.Connection[Any], survey: Survey, face: Face, memb
     solid = face.in_space(face.outline)
     row = conn.execute(
         """
-        INSERT INTO tunnel.face (survey_id, member_id, number, kind, origin, axis, across, radius, inside, rms, points, area,
-                                 seen_share, incidence_from, incidence_to, level, sigma, bimodal, chainage, outline, surface)
-        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, public.ST_GeomFromWKB(%s, 0),
+        INSERT INTO tunnel.face (survey_id, member_id, number, side, kind, origin, axis, across, radius, inside, rms, points,
+                                 area, seen_share, incidence_from, incidence_to, level, sigma, bimodal, chainage, outline,
+                                 surface)
+        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, public.ST_GeomFromWKB(%s, 0),
                 public.ST_GeomFromWKB(%s, %s::int)) RETURNING id
         """,
         [
-            survey.id, member, face.number, face.kind, (face.origin + face.model[POINT]).tolist(), face.model[AXIS].tolist(),
-            face.model[ACROSS].tolist(), face.radius or None, bool(face.model[SIDE] < 0.0), face.rms, face.points, face.area,
-            face.seen_share, *map(_number, face.incidence), _number(face.level), _number(face.sigma), face.bimodal,
+            survey.id, member, face.number, face.side, face.kind, (face.origin + face.model[POINT]).tolist(),
+            face.model[AXIS].tolist(), face.model[ACROSS].tolist(), face.radius or None, bool(face.model[SIDE] < 0.0), face.rms,
+            face.points, face.area, face.seen_share, *map(_number, face.incidence), _number(face.level), _number(face.sigma),
+            face.bimodal,
             _chainage(shapely.get_coordinates(solid, include_z=True).mean(axis=0), surface),
             shapely.to_wkb(face.outline), shapely.to_wkb(solid), survey.srid,
         ],

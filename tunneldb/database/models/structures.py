@@ -15,7 +15,7 @@ class Member(Base):
 
     __tablename__ = "member"
     __table_args__ = (
-        one_of("kind", "flat", "pipe"),
+        one_of("kind", "flat", "pipe", "profile"),
         UniqueConstraint("survey_id", "number"),
         {"comment": "Members of structures: faces that belong together, joined where others hide them"},
     )
@@ -23,14 +23,18 @@ class Member(Base):
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     number: Mapped[int] = mapped_column(comment="Its number in the survey, from 1; dimension member of files written")
-    kind: Mapped[str] = mapped_column(comment="flat (planes that lie in one) or pipe (cylinders about one axis)")
+    kind: Mapped[str] = mapped_column(
+        comment="flat (planes that lie in one), pipe (cylinders about one axis) or profile (sides of one beam)"
+    )
     length: Mapped[float] = mapped_column(comment="Length along its line, gaps counted, m")
     area: Mapped[float] = mapped_column(comment="Area of its faces, m²")
     bimodal: Mapped[bool] = mapped_column(
         comment="Whether so much of it differs from the rest that neither is known to be its own surface"
     )
     chainage: Mapped[float | None] = mapped_column(comment="Chainage of its middle, m; NULL of a site or beyond the sections")
-    line: Mapped[WKBElement] = mapped_column(geometry("LINESTRINGZ"), comment="Its middle line, tunnel's SRID, m")
+    line: Mapped[WKBElement] = mapped_column(
+        geometry("LINESTRINGZ"), comment="Its middle line; of a flat one along its longest side; tunnel's SRID, m"
+    )
 
 
 class Face(Base):
@@ -49,6 +53,7 @@ class Face(Base):
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     member_id: Mapped[int] = mapped_column(parent("member"), comment="Member that it belongs to")
     number: Mapped[int] = mapped_column(comment="Its number in the survey, from 1; dimension face of files written")
+    side: Mapped[int] = mapped_column(comment="Side of its member, from 1: faces of one plane or pipe are of one side")
     kind: Mapped[str] = mapped_column(comment="flat (a plane) or pipe (a part of a cylinder)")
     origin: Mapped[Floats] = mapped_column(comment="Where its unrolled coordinates are (0, 0) or on its axis: x, y, z, m")
     axis: Mapped[Floats] = mapped_column(comment="Axis of a pipe; of a plane its normal, towards the scanners")

@@ -75,6 +75,7 @@ def face_row(face: Face) -> dict[str, Any]:
     return {
         "face": face.number,
         "member": face.member,
+        "side": face.side,
         "kind": face.kind,
         "points": face.points,
         "area": face.area,
