@@ -1,4 +1,4 @@
-"""Members: faces of one surface that something before it parts (Ono et al., 3.2.1 to 3.2.4).
+"""Surfaces: faces of one plane or pipe that something before it parts (Ono et al., 3.2.1 to 3.2.4).
 
 Two faces are joined if they lie on one plane or cylinder (3.2.1), have two rims in common, or one and a short gap along it
 (3.2.2 and 3.2.3), and if what was sent through the gap between them came back from nearer (3.2.4).
@@ -113,7 +113,7 @@ class Extent:
 
 
 def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
-    """Member of each face (n,), numbered from 0 in the order of their first faces.
+    """Surface of each face (n,), numbered from 0 in the order of their first faces.
 
     Parameters
     ----------
@@ -128,10 +128,15 @@ def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
     for a, b in coplanar(faces, noise):
         if not found.connected(a, b) and _joined(faces[a], faces[b], rims[a], rims[b], images):
             found.merge(a, b)
-    member = np.empty(len(faces), np.int64)
-    for number, of in enumerate(sorted(min(subset) for subset in found.subsets())):
-        member[list(found.subset(of))] = number
-    return member
+    return numbered(found)
+
+
+def numbered(found: DisjointSet) -> Int64:
+    """Number of the subset of each element (n,), from 0 in the order of their first elements."""
+    number = np.empty(len(found), np.int64)
+    for place, subset in enumerate(sorted(found.subsets(), key=min)):
+        number[list(subset)] = place
+    return number
 
 
 def coplanar(faces: list[Extent], noise: float) -> list[tuple[int, int]]:

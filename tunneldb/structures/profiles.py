@@ -14,7 +14,7 @@ import shapely
 from scipy.cluster.hierarchy import DisjointSet
 
 from tunneldb.arrays import Float, Int64
-from tunneldb.structures.joining import COMMON_ANGLE, Extent
+from tunneldb.structures.joining import COMMON_ANGLE, Extent, numbered
 from tunneldb.structures.merging import ANGLE, APART
 from tunneldb.structures.models import AXIS, RADIUS, to_space, unroll
 
@@ -103,10 +103,7 @@ def group(surfaces: list[list[Extent]], noise: float) -> Int64:
         together = found.subset(a) | found.subset(b)
         if not found.connected(a, b) and _slender([boxes[number] for number in together]):
             found.merge(a, b)
-    member = np.empty(len(surfaces), np.int64)
-    for number, of in enumerate(sorted(min(subset) for subset in found.subsets())):
-        member[list(found.subset(of))] = number
-    return member
+    return numbered(found)
 
 
 def middle_line(boxes: list[Box]) -> Float:
