@@ -11,6 +11,7 @@ from tunneldb.structures.face_raster import Layout, PointFinder, candidates_of, 
 from tunneldb.structures.growing import UNKNOWN_NOISE, grow, noise_of
 from tunneldb.structures.merging import Faces, merge, refine
 from tunneldb.structures.models import RADIUS, with_directions
+from tunneldb.structures.thin_pipes import with_thin_pipes
 from tunneldb.structures.voxel_grid import VoxelGrid, voxel_planes
 from tunneldb.structures.voxel_moments import COARSEST, VoxelMoments
 
@@ -68,6 +69,7 @@ def find_faces(moments: VoxelMoments, stations: Float) -> Segmentation:
     planes = voxel_planes(grid, starts, neighbours, at, noise)
     grown = grow(grid, starts, neighbours, planes, towards, noise)
     faces = merge(grid, starts, neighbours, towards, grown, noise)
+    faces = with_thin_pipes(moments, level, grid, faces, at, noise)
     round_ = np.append(faces.models[:, RADIUS] > 0.0, False)[faces.owner]
     if round_.any():
         fine, place = moments.finest(grid, level, round_)
