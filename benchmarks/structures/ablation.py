@@ -22,7 +22,7 @@ from benchmarks.structures.scenes import Scene, make, parameters
 from tunneldb.arrays import Bool, Float, Single
 from tunneldb.pipeline import members as stage
 from tunneldb.radiometry.robust_statistics import robust_statistics
-from tunneldb.structures import contrast, find, level, significance, spots
+from tunneldb.structures import contrast, find, level, profiles, significance, spots
 from tunneldb.structures.level import CLASS, LevelCurve
 
 SIGMAS = 3.0  # Ono et al., 3.4
@@ -87,6 +87,7 @@ STEPS = (
     Step("materials not parted", [(find, "parts_of_plane", lambda *_: None)]),
     Step("gratings and fences kept", [(find, "solid_faces", lambda densities: np.ones(len(densities), bool))]),
     Step("faces not joined", [(find, "join", lambda extents, *_: np.arange(len(extents)))]),
+    Step("sides of a beam not put together", [(profiles, "group", lambda surfaces, noise: np.arange(len(surfaces)))]),
     Step("a mode for each class of incidence", [(contrast, "level_curve", _by_histogram)]),
     Step("one level for all scans", [(find, "member_levels", _one_level)]),
     Step("a face takes its member's level as it is", [(find, "face_level", lambda curve, one: curve)]),

@@ -139,6 +139,27 @@ def test_pipes_have_their_radius_and_axis(result: Result) -> None:
         assert np.degrees(np.arccos(min(abs(axis @ face.model[3:6]), 1.0))) < 0.2
 
 
+def test_pipes_thinner_than_the_voxels_are_pipes() -> None:
+    """Most points are on a wall far behind, by which voxels are wider than these pipes' radii."""
+    radii = {1: 0.03, 2: 0.05, 3: 0.02}
+    pipes = [
+        Pipe((-1, 4, 1), (1, 4, 1), 0.03),
+        Pipe((-0.5, 5, 0), (-0.5, 5, 3), 0.05),
+        Pipe((0.6, 3, 0.6), (0.6, 3.4, 2.5), 0.02),
+    ]
+    seen = scan([Plate((-6, 8, -3), (12, 0, 0), (0, 0, 10)), *pipes], STATIONS, step=0.0025, noise=0.0015, window=WINDOW)
+    result = find(seen, np.zeros(len(seen.xyz)), np.zeros(len(seen.xyz), bool))
+    assert result.segmentation.edge > max(radii.values())
+    faces = {face.number: face for face in result.found.structures.faces}
+    for surface, radius in radii.items():
+        mine = seen.surface == surface
+        for number in np.unique(result.face[mine & (result.face > 0)]).tolist():
+            assert faces[number].radius == pytest.approx(radius, abs=0.001)
+        member = result.member[mine]
+        assert (member == np.bincount(member[member > 0]).argmax()).mean() > 0.75
+    assert (result.face[seen.surface == 0] == 1).mean() > 0.99
+
+
 def test_incidence_is_that_of_the_surface(result: Result) -> None:
     errors = []
     for face in result.found.structures.faces:

@@ -37,6 +37,9 @@ TURN = 18.0
 LARGEST = 3.0
 """Greatest radius of a cylinder, m: vessels and ducts. What is larger is flat over the reach of a beam or pipe."""
 
+LEAST_RADIUS = 4.0
+"""Least radius of a cylinder, in standard deviations of the noise."""
+
 LEAST_ANGLE = 50.0
 """Angle over which a cylinder must be seen, degrees: less tells no radius."""
 
@@ -329,7 +332,7 @@ def _grow_all(
                 held >= LEAST_VOXELS
                 and sums[0] > 1.15 * points
                 and rest < 1.5 * noise + 0.0005
-                and round_[6] > 4.0 * noise
+                and round_[6] > LEAST_RADIUS * noise
                 and seen_angle(round_, centroid, other, held) >= math.radians(LEAST_ANGLE)
             ):
                 kind, count, points, deviation = 1, held, sums[0], rest

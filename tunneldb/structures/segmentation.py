@@ -72,7 +72,7 @@ def find_faces(moments: VoxelMoments, stations: Float) -> Segmentation:
     faces = with_thin_pipes(moments, level, grid, faces, at, noise)
     round_ = np.append(faces.models[:, RADIUS] > 0.0, False)[faces.owner]
     if round_.any():
-        fine, place = moments.finest(grid, level, round_)
+        fine, place = moments.within(grid, level, round_, moments.level)
         refine(fine, faces.owner[place], faces, noise)
     faces = replace(faces, models=with_directions(faces.models, _middles(grid, faces)))
     layout = lay_out(grid, faces, len(stations))

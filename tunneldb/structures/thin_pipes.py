@@ -1,7 +1,8 @@
-"""Pipes thinner than the voxels tell, from voxels half as wide.
+"""Pipes thinner than the voxels tell, from finer ones.
 
 Faces are grown in voxels of one width, by the density of most points. A pipe whose radius is a few of them at most shows as
-narrow strips, or as nothing. What is no face, and what may be such a strip, is looked at once more.
+narrow strips, or as nothing. What is no face, and what may be such a strip, is looked at again in voxels half as wide, and in
+others half as wide as these.
 """
 
 from __future__ import annotations
@@ -9,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int64
-from tunneldb.structures.growing import Grown, grow
+from tunneldb.structures.growing import LEAST_RADIUS, Grown, grow
 from tunneldb.structures.merging import Faces, merge
 from tunneldb.structures.models import RADIUS, WIDTH
 from tunneldb.structures.voxel_grid import VoxelGrid, voxel_planes
-from tunneldb.structures.voxel_moments import VoxelMoments, parents
+from tunneldb.structures.voxel_moments import VoxelMoments
 
 THIN = 4.0
-"""Radius, in edges of the usual voxels, up to which a pipe is thin: such voxels have no normal to speak of (see `growing`)."""
+"""Radius, in edges of voxels, up to which a pipe is thin: such voxels have no normal to speak of (see `growing`)."""
 
 TAKEN = 0.5
 """Share of its points by which a voxel, or a strip, is a thin pipe's."""
@@ -39,24 +40,29 @@ def with_thin_pipes(moments: VoxelMoments, level: int, grid: VoxelGrid, faces: F
     noise : float
         Of ranges, m.
     """
-    if level >= moments.level:
-        return faces
-    fine, place = _some(moments.grid(level + 1), grid, _open(grid, faces))
-    if not len(fine):
-        return faces
+    for finer in range(level + 1, moments.level + 1):
+        widest = THIN * 2.0 ** (1 - finer)
+        if widest < LEAST_RADIUS * noise:
+            break
+        fine, place = moments.within(grid, level, _open(grid, faces, widest), finer)
+        if len(fine):
+            faces = _together(grid, faces, fine, place, _pipes(fine, stations, noise, widest))
+    return faces
+
+
+def _pipes(fine: VoxelGrid, stations: Float, noise: float, widest: float) -> Faces:
+    """Pipes of radii up to ``widest``, m, in voxels."""
     starts, neighbours = fine.neighbours()
     towards = stations[fine.scan] - fine.centroids
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     grown = grow(fine, starts, neighbours, voxel_planes(fine, starts, neighbours, stations, noise), towards, noise)
-    thin = (grown.models[:, RADIUS] > 0.0) & (grown.models[:, RADIUS] <= THIN * grid.edge)
-    pipes = merge(fine, starts, neighbours, towards, _chosen(grown, thin), noise)
-    return _together(grid, faces, fine, place, pipes)
+    thin = (grown.models[:, RADIUS] > 0.0) & (grown.models[:, RADIUS] <= widest)
+    return merge(fine, starts, neighbours, towards, _chosen(grown, thin), noise)
 
 
-def _open(grid: VoxelGrid, faces: Faces) -> Bool:
-    """Voxels (n,) on no face, on a narrow plane, or on a thin pipe."""
+def _open(grid: VoxelGrid, faces: Faces, widest: float) -> Bool:
+    """Voxels (n,) on no face, on a plane as narrow as ``widest``, m, or on a pipe of no greater radius."""
     count = len(faces.models)
-    narrow = np.ones(count + 1, np.bool_)
     held = faces.owner >= 0
     owner, at = faces.owner[held], grid.centroids[held]
     many = np.bincount(owner, minlength=count)
@@ -68,16 +74,8 @@ def _open(grid: VoxelGrid, faces: Faces) -> Bool:
             spread[:, a, b] = np.bincount(owner, off[:, a] * off[:, b], count) / np.maximum(many, 1)
     # Evenly covered, a strip's standard deviation across is its width over √12.
     width = np.sqrt(12.0 * np.maximum(np.linalg.eigvalsh(spread)[:, 1], 0.0))
-    round_ = faces.models[:, RADIUS] > 0.0
-    narrow[:count] = np.where(round_, faces.models[:, RADIUS] <= THIN * grid.edge, width <= THIN * grid.edge)
-    return narrow[faces.owner]
-
-
-def _some(fine: VoxelGrid, grid: VoxelGrid, wanted: Bool) -> tuple[VoxelGrid, Int64]:
-    """Voxels half as wide as a grid's that lie in some of these, and in which."""
-    place = np.searchsorted(grid.keys, parents(fine.keys))
-    chosen = wanted[place]
-    return VoxelGrid(fine.edge, fine.origin, fine.keys[chosen], fine.moments[chosen]), place[chosen]
+    narrow = np.where(faces.models[:, RADIUS] > 0.0, faces.models[:, RADIUS], width) <= widest
+    return np.asarray(np.append(narrow, True)[faces.owner])
 
 
 def _chosen(grown: Grown, wanted: Bool) -> Grown:
@@ -106,4 +104,4 @@ def _together(grid: VoxelGrid, faces: Faces, fine: VoxelGrid, place: Int64, pipe
     order = order[size[order] > 0.0]
     renumbered = np.full(len(models) + 1, -1, np.int32)
     renumbered[order] = np.arange(len(order))
-    return Faces(renumbered[owner], models[order], size[order], rms[order])
+    return Faces(renumbered[owner], models[order], size[order].astype(np.float64), rms[order])

@@ -95,15 +95,11 @@ class VoxelMoments:
     def grid(self, level: int) -> VoxelGrid:
         """Voxels with an edge of 2^-level m, no finer than those kept, in the order of scans and places."""
         keys, sums = self._keys[: self._size], self._sums[: self._size]
-        if level == self.level:
-            order = np.argsort(keys)
-            keys, sums = keys[order], sums[order]
-        for finer in range(self.level, level, -1):
-            keys, sums = _coarser(keys, sums, finer)
+        keys, sums = _coarser_by(keys, sums, self.level, level)
         return VoxelGrid(2.0**-level, self.origin, keys, _metres(keys, sums, level))
 
-    def finest(self, grid: VoxelGrid, level: int, wanted: Bool) -> tuple[VoxelGrid, Int64]:
-        """The finest voxels that lie in some of the voxels of a grid, and in which of these.
+    def within(self, grid: VoxelGrid, level: int, wanted: Bool, finer: int) -> tuple[VoxelGrid, Int64]:
+        """Finer voxels that lie in some of the voxels of a grid, and in which of these.
 
         Parameters
         ----------
@@ -112,15 +108,14 @@ class VoxelMoments:
             Its voxels have an edge of 2^-level m.
         wanted : (n,) bool array
             Which of them.
+        finer : int
+            The finer ones have an edge of 2^-finer m, no finer than those kept.
         """
-        above = self._keys[: self._size]
-        for _ in range(level, self.level):
-            above = parents(above)
-        place = np.searchsorted(grid.keys, above)
+        place = np.searchsorted(grid.keys, _above(self._keys[: self._size], self.level - level))
         chosen = np.flatnonzero(wanted[place])
-        chosen = chosen[np.argsort(self._keys[chosen])]
-        keys = self._keys[chosen]
-        return VoxelGrid(2.0**-self.level, self.origin, keys, _metres(keys, self._sums[chosen], self.level)), place[chosen]
+        keys, sums = _coarser_by(self._keys[chosen], self._sums[chosen], self.level, finer)
+        found = VoxelGrid(2.0**-finer, self.origin, keys, _metres(keys, sums, finer))
+        return found, np.searchsorted(grid.keys, _above(keys, finer - level))
 
     def counts(self, level: int) -> Int64:
         """Points in each voxel with an edge of 2^-level m."""
@@ -163,10 +158,27 @@ def parents(keys: Int64) -> Int64:
     return np.asarray((((scan << AXIS_BITS | x) << AXIS_BITS | y) << AXIS_BITS) | z)
 
 
+def _above(keys: Int64, times: int) -> Int64:
+    """Keys of the voxels in which voxels lie, twice as large so many times."""
+    for _ in range(times):
+        keys = parents(keys)
+    return keys
+
+
 def split_keys(keys: Int64) -> tuple[Int64, Int64]:
     """Scan (n,) and place (n, 3), in edges from the origin, of voxels."""
     places = [((keys >> (AXIS_BITS * k)) & _MASK) - _HALF for k in (2, 1, 0)]
     return keys >> (3 * AXIS_BITS), np.column_stack(places)
+
+
+def _coarser_by(keys: Int64, sums: Int64, level: int, wanted: int) -> tuple[Int64, Int64]:
+    """Moments of voxels with an edge of 2^-wanted m, in the order of their keys, of those of 2^-level m in any order."""
+    if level == wanted:
+        order = np.argsort(keys)
+        return keys[order], sums[order]
+    for finer in range(level, wanted, -1):
+        keys, sums = _coarser(keys, sums, finer)
+    return keys, sums
 
 
 def _coarser(keys: Int64, sums: Int64, level: int) -> tuple[Int64, Int64]:
