@@ -55,3 +55,15 @@ def test_rings_of_single_points_are_refused_at_once(separator: str, tmp_path: Pa
     assert found["commands"] == []
     assert found["files"][0]["only_noise"] is True
     assert any("all points would be left out as noise" in doubt for doubt in found["doubts"])
+
+
+def test_rocks_of_unknown_stations_are_no_structure(tmp_path: Path) -> None:
+    scan, found = str(real_scan("lone-star.laz")), tmp_path / "found.gpkg"
+    words = ["members", scan, "--intensity", "intensity", "--intensity-kind", "linear", "-o", str(found)]
+    refused = CliRunner().invoke(main, words)
+    assert refused.exit_code == 2
+    assert "where the scanner stood isn't in the file" in refused.stderr
+    assert not found.exists()
+    stations = tmp_path / "stations.csv"
+    stations.write_text("scan_id,x,y,z\n0,515385,4918325,2330\n")
+    assert "0 members of 0 faces" in run(*words, "--stations", str(stations))
