@@ -1,0 +1,5 @@
+"""Sonar scans from below the water, registered to the laser's points above it."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
