@@ -1,0 +1,252 @@
+"""Joint robust adjustment of all sonar scans: poses, scales, ladders and the walls' batter below the water.
+
+Gauss-Newton with weights by Geman and McClure; rows of one group (a stretch of wall, a rung) err together, which the
+covariance takes into account (Liang and Zeger, 1986, the sandwich of groups).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from tunneldb.arrays import Float, Int64
+from tunneldb.registration.underwater.ladder_shape import PlacedLadder
+from tunneldb.registration.underwater.laser_ladders import LaserLadder
+from tunneldb.registration.underwater.observations import (
+    POSE,
+    Patches,
+    Pose,
+    Rows,
+    ladder_rows,
+    overlap_rows,
+    wall_rows,
+)
+from tunneldb.registration.underwater.walls import Walls
+
+SCALE_SIGMA = 0.01  # of the range scale before anything is known: 15 m/s of 1480
+BATTER_SIGMA = 0.03  # of the change of batter at the water
+LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
+CUT = 3.0  # standard deviations at which a row has a quarter of its weight
+REACHES = (0.3, 0.2, 0.15, 0.12, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1)  # within which rows are sought, round by round, m
+SETTLED = 1e-5
+SURROUNDINGS = 0.6  # m about a ladder: farther than a first pose may be off
+SINGULAR = 1e-12  # share of the largest eigenvalue up to which a direction is not known
+UNKNOWN = 1e4  # variance of such a direction
+
+
+@dataclass(frozen=True)
+class Scan:
+    """A scan to be adjusted.
+
+    Attributes
+    ----------
+    patches : Patches
+    pose : Pose
+    ladders : mapping of int to (n, 3) float64 array
+        Points about each of the ladders that it sees, file's axes.
+    """
+
+    patches: Patches
+    pose: Pose
+    ladders: Mapping[int, Float]
+
+
+def scan_of(points: Float, patches: Patches, pose: Pose, ladders: Iterable[int], found: Sequence[LaserLadder]) -> Scan:
+    """Keep of a scan's points (n, 3) those about some of the ladders found."""
+    space = pose.apply(points)
+    near = {}
+    for k in ladders:
+        placed = found[k].placed
+        own = placed.to_ladder(space)
+        half = placed.gap / 2.0 + SURROUNDINGS
+        near[k] = points[(np.abs(own[:, 0]) < half) & (np.abs(own[:, 2]) < SURROUNDINGS)]
+    return Scan(patches, pose, near)
+
+
+@dataclass(frozen=True)
+class Adjusted:
+    """Outcome.
+
+    Attributes
+    ----------
+    poses : tuple of Pose
+    covariance : (s, 7, 7) float64 array
+        Of each pose's changes.
+    information : (s, 7, 7) float64 array
+        What the rows alone say of each pose, without what was assumed beforehand, other poses held.
+    rows : tuple of Rows
+        As last compared.
+    ladders : tuple of PlacedLadder
+        The laser's, as last adjusted.
+    batter : tuple of float
+        Change of each side's batter below the water.
+    """
+
+    poses: tuple[Pose, ...]
+    covariance: Float
+    information: Float
+    rows: tuple[Rows, ...]
+    ladders: tuple[PlacedLadder, ...]
+    batter: tuple[float, float]
+
+
+def adjust(
+    scans: Sequence[Scan],
+    walls: Walls,
+    ladders: Sequence[LaserLadder],
+    pairs: Sequence[tuple[int, int]],
+    reaches: Sequence[float] = REACHES,
+) -> Adjusted:
+    """Adjust scans to walls and ladders, and to each other where ``pairs`` says that they overlap."""
+    poses = [scan.pose for scan in scans]
+    placed = [ladder.placed for ladder in ladders]
+    count = POSE * len(scans) + 2 + 6 * len(ladders)
+    batter = np.zeros(2)
+    precision = _prior(len(scans), ladders)
+    normal, rows = np.eye(count), []
+    for reach in reaches:
+        leaning = replace(walls, batter=walls.batter + batter[walls.side])
+        rows = _all_rows(scans, poses, leaning, placed, pairs, reach)
+        normal, right = _normal_equations(rows, len(scans), count)
+        offset = _prior_offset(poses, placed, ladders, batter)
+        change = -_inverse(normal + precision, 0.0) @ (right + precision @ offset)
+        for i, pose in enumerate(poses):
+            poses[i] = _moved(pose, change[POSE * i : POSE * (i + 1)])
+        batter += change[POSE * len(scans) : POSE * len(scans) + 2]
+        for k in range(len(placed)):
+            first = POSE * len(scans) + 2 + 6 * k
+            placed[k] = placed[k].moved(change[first : first + 3], change[first + 3 : first + 6])
+        if reach == reaches[-1] and np.abs(change).max() < SETTLED:
+            break
+    covariance = _sandwich(rows, normal, precision, len(scans), count)
+    blocks = [slice(POSE * i, POSE * (i + 1)) for i in range(len(scans))]
+    return Adjusted(
+        tuple(poses),
+        np.array([covariance[b, b] for b in blocks]).reshape(-1, POSE, POSE),
+        np.array([normal[b, b] for b in blocks]).reshape(-1, POSE, POSE),
+        tuple(rows),
+        tuple(placed),
+        (float(batter[0]), float(batter[1])),
+    )
+
+
+def _all_rows(
+    scans: Sequence[Scan],
+    poses: Sequence[Pose],
+    walls: Walls,
+    placed: Sequence[PlacedLadder],
+    pairs: Sequence[tuple[int, int]],
+    reach: float,
+) -> list[Rows]:
+    rows: list[Rows] = []
+    batter = POSE * len(scans)
+    for i, scan in enumerate(scans):
+        rows += wall_rows(scan.patches, poses[i], walls, i, batter, reach)
+        for k, points in scan.ladders.items():
+            found = ladder_rows(points, poses[i], placed[k], i, batter + 2 + 6 * k, reach)
+            rows += [found] if found is not None else []
+    for i, j in pairs:
+        found = overlap_rows(scans[i].patches, scans[j].patches, (poses[i], poses[j]), (i, j), reach)
+        rows += [found] if found is not None else []
+    return rows
+
+
+def _design(rows: Rows, scans: int) -> tuple[Float, Int64]:
+    """Design matrix of rows over those columns (c,) that they have."""
+    parts = [rows.poses]
+    columns = [POSE * rows.scan + np.arange(POSE)]
+    if rows.other is not None and rows.other_poses is not None:
+        parts.append(rows.other_poses)
+        columns.append(POSE * rows.other + np.arange(POSE))
+    parts.append(rows.common)
+    columns.append(rows.columns)
+    return np.hstack(parts), np.concatenate(columns)
+
+
+def weights_of(rows: Rows) -> Float:
+    """Weights (n,) of rows, 1/m²: by Geman and McClure."""
+    return np.asarray(1.0 / (1.0 + (_deviation(rows) / CUT) ** 2) ** 2 / rows.sigma**2)
+
+
+def gain(rows: Rows) -> float:
+    """By how much rows speak for what they are compared with: log likelihood over that of all of them being astray."""
+    each = CUT**2 / (1.0 + (_deviation(rows) / CUT) ** 2)
+    return float(each.sum()) / 2.0
+
+
+def _deviation(rows: Rows) -> Float:
+    """Residuals (n,) in standard deviations; those of a point across and along the beam together."""
+    z = np.abs(rows.residual / rows.sigma)
+    if rows.kind == "ladder":
+        half = len(z) // 2
+        z = np.tile(np.hypot(z[:half], z[half:]), 2) / np.sqrt(2.0)
+    return z
+
+
+def _normal_equations(rows: Sequence[Rows], scans: int, count: int) -> tuple[Float, Float]:
+    normal, right = np.zeros((count, count)), np.zeros(count)
+    for one in rows:
+        design, columns = _design(one, scans)
+        weighted = design * weights_of(one)[:, None]
+        normal[np.ix_(columns, columns)] += weighted.T @ design
+        right[columns] += weighted.T @ one.residual
+    return normal, right
+
+
+def _prior(scans: int, ladders: Sequence[LaserLadder]) -> Float:
+    """Precision of what is known beforehand: scales, batters, ladders."""
+    sigma = np.full(POSE * scans + 2 + 6 * len(ladders), np.inf)
+    sigma[POSE - 1 : POSE * scans : POSE] = SCALE_SIGMA
+    sigma[POSE * scans : POSE * scans + 2] = BATTER_SIGMA
+    for k, ladder in enumerate(ladders):
+        first = POSE * scans + 2 + 6 * k
+        own = np.sqrt(np.diag(ladder.covariance)[:6])
+        sigma[first : first + 6] = np.hypot(own, [LADDER_TURN] * 3 + [LADDER_SHIFT] * 3)
+    return np.diag(1.0 / sigma**2)
+
+
+def _prior_offset(
+    poses: Sequence[Pose], placed: Sequence[PlacedLadder], ladders: Sequence[LaserLadder], batter: Float
+) -> Float:
+    """How far scales, batters and ladders have come from what was known of them beforehand."""
+    out = np.zeros(POSE * len(poses) + 2 + 6 * len(placed))
+    for i, pose in enumerate(poses):
+        out[POSE * (i + 1) - 1] = pose.scale - 1.0
+    out[POSE * len(poses) : POSE * len(poses) + 2] = batter
+    for k, (now, before) in enumerate(zip(placed, ladders, strict=True)):
+        first = POSE * len(poses) + 2 + 6 * k
+        out[first : first + 3] = Rotation.from_matrix(now.axes.T @ before.placed.axes).as_rotvec()
+        out[first + 3 : first + 6] = now.origin - before.placed.origin
+    return out
+
+
+def _moved(pose: Pose, change: Float) -> Pose:
+    turn = Rotation.from_rotvec(change[:3]).as_matrix()
+    return Pose(np.asarray(turn @ pose.rotation), pose.translation + change[3:6], pose.scale + float(change[6]))
+
+
+def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float, scans: int, count: int) -> Float:
+    """Covariance of all parameters, by the spread of the groups' sums."""
+    middle = precision.copy()
+    for one in rows:
+        design, columns = _design(one, scans)
+        score = design * (weights_of(one) * one.residual)[:, None]
+        _, number = np.unique(one.group, return_inverse=True)
+        sums = np.column_stack([np.bincount(number, score[:, k]) for k in range(score.shape[1])])
+        groups = len(sums)
+        block = sums.T @ sums * (groups / max(groups - 1, 1))
+        middle[np.ix_(columns, columns)] += block
+    inverse = _inverse(normal + precision, 0.0)
+    unknown = _inverse(normal + precision, UNKNOWN) - inverse
+    return np.asarray(inverse @ middle @ inverse + unknown)
+
+
+def _inverse(matrix: Float, unknown: float) -> Float:
+    """Inverse of a symmetric matrix, in which directions that nothing is known of get a variance of ``unknown``."""
+    value, vector = np.linalg.eigh(matrix)
+    known = value > SINGULAR * value[-1]
+    inverse = np.where(known, 1.0 / np.where(known, value, 1.0), unknown)
+    return np.asarray((vector * inverse) @ vector.T)

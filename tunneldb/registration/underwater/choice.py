@@ -1,0 +1,62 @@
+"""Which of two poses a scan speaks for: by how well walls and ladders explain each of its points under either.
+
+The points are the same under both, so their differences are compared in pairs, cell by cell: neighbouring points err
+together (Vuong, 1989, for models that are not nested; cells as its independent observations).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tunneldb.arrays import Float
+from tunneldb.registration.underwater.ladder_shape import PlacedLadder, nearest_element
+from tunneldb.registration.underwater.observations import BEAM_SIGMA, FARTHEST, RANGE_NOISE, RELIEF, Pose, cell_keys
+from tunneldb.registration.underwater.walls import Walls
+
+CUT = 3.0  # standard deviations at which a point is half explained
+CELL = 0.25  # m
+REACH = 0.15  # of a ladder's surroundings, m
+DECIDED = 3.0  # standard deviations
+
+
+def explained(points: Float, pose: Pose, walls: Walls, ladders: Sequence[PlacedLadder]) -> Float:
+    """How well walls or ladders explain each point (n, 3), file's axes: log likelihood over that of being astray, (n,)."""
+    space = pose.apply(points)
+    reach = np.linalg.norm(space - pose.translation, axis=1)
+    best = np.full(len(points), np.inf)
+    usable = reach < FARTHEST
+    away, piece = walls.tree.query(space[:, :2], distance_upper_bound=1.0)
+    known = np.isfinite(away)
+    best[known] = (walls.distance(space[known], piece[known]) / np.hypot(RANGE_NOISE, RELIEF)) ** 2
+    for placed in ladders:
+        own = placed.to_ladder(space)
+        low, high = placed.ladder.height[0] - REACH, placed.ladder.height[-1] + REACH
+        near = (np.abs(own[:, 0]) < placed.gap / 2.0 + REACH) & (np.abs(own[:, 2]) < REACH)
+        near &= (own[:, 1] > low) & (own[:, 1] < high)
+        if near.any():
+            best[near] = np.minimum(best[near], _ladder_deviation(own[near], placed, pose))
+    return np.where(usable, CUT**2 / (2.0 * (1.0 + best / CUT**2)), 0.0)
+
+
+def _ladder_deviation(own: Float, placed: PlacedLadder, pose: Pose) -> Float:
+    """Squared distances (n,) of points in the ladder's axes from it, in standard deviations along and across the beam."""
+    which, away = nearest_element(own, placed)
+    ray = own - placed.to_ladder(pose.translation[None])
+    reach = np.linalg.norm(ray, axis=1)
+    axis = np.where(which < 2, 1, 0)
+    ray[np.arange(len(ray)), axis] = 0.0
+    ray /= np.linalg.norm(ray, axis=1)[:, None]
+    vector = away + placed.ladder.diameter / 2.0 * ray
+    along = (vector * ray).sum(axis=1)
+    across = np.maximum((vector**2).sum(axis=1) - along**2, 0.0)
+    return np.asarray((along / RANGE_NOISE) ** 2 + across / (BEAM_SIGMA * reach) ** 2)
+
+
+def margin(points: Float, one: Float, other: Float) -> float:
+    """By how many standard deviations points (n, 3) are better explained (n,) by one pose than by another."""
+    _, number = np.unique(cell_keys(points, CELL), return_inverse=True)
+    difference = np.bincount(number, one - other)
+    spread = float(np.sqrt((difference**2).sum()))
+    return float(difference.sum()) / spread if spread > 0.0 else 0.0

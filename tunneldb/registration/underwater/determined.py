@@ -1,0 +1,49 @@
+"""Which directions of a pose are known well, which badly, and which not at all."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tunneldb.arrays import Float
+
+WEAK, OPEN = 0.05, 0.5  # standard deviations of a place from which it is weak, and not known, m
+WEAK_TURN, OPEN_TURN = np.radians(0.2), np.radians(3.0)
+WEAK_SCALE = 0.005
+
+
+def judge(covariance: Float, along: Float) -> tuple[str, tuple[str, ...]]:
+    """State of a pose, and its badly known directions in words.
+
+    Parameters
+    ----------
+    covariance : (7, 7) float64 array
+        See `results.PARAMETERS`.
+    along : (2,) float64 array
+        Direction of the canal in plan.
+
+    Returns
+    -------
+    state : str
+        See `results.SonarPose`.
+    directions : tuple of str
+    """
+    ahead = np.array([along[0], along[1], 0.0])
+    across = np.array([-along[1], along[0], 0.0])
+    up = np.array([0.0, 0.0, 1.0])
+    turn, place = covariance[:3, :3], covariance[3:6, 3:6]
+    checks = [
+        ("along the tunnel", ahead @ place @ ahead, WEAK, OPEN),
+        ("across the tunnel", across @ place @ across, WEAK, OPEN),
+        ("height", up @ place @ up, WEAK, OPEN),
+        ("roll", ahead @ turn @ ahead, WEAK_TURN, OPEN_TURN),
+        ("pitch", across @ turn @ across, WEAK_TURN, OPEN_TURN),
+        ("yaw", up @ turn @ up, WEAK_TURN, OPEN_TURN),
+        ("range scale", covariance[6, 6], WEAK_SCALE, np.inf),
+    ]
+    named, state = [], "determined"
+    for name, variance, weak, unknown in checks:
+        sigma = np.sqrt(max(variance, 0.0))
+        if not sigma < weak:
+            named.append(name)
+            state = "undetermined" if not sigma < unknown else ("weak" if state == "determined" else state)
+    return state, tuple(named)

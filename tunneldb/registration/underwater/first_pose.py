@@ -1,0 +1,313 @@
+"""Where a sonar scan may lie, before anything is fitted: levelled by walls and bed, turned along the canal, set to a ladder.
+
+The walls leave half a turn, the place along the canal and the height. These are sought as the place in the scan, seen from
+across the canal, that looks most like what a ladder must look like below the water (Lewis, 1995, normalised
+cross-correlation), for each ladder of the laser's and either half turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+from scipy.signal import fftconvolve
+
+from tunneldb.arrays import Bool, Float
+from tunneldb.errors import UserError
+from tunneldb.registration.underwater.ladder_shape import PlacedLadder
+from tunneldb.registration.underwater.walls import Walls
+from tunneldb.robust import MAD_TO_SIGMA
+
+NEAR = 12.0  # m from the scanner
+BIN = 0.05  # m, across
+ANGLES = np.radians(np.arange(0.0, 180.0, 1.0))
+WIDTH_TOLERANCE = 0.15  # share, before the scan is level
+PIXEL = 0.03  # m
+BLUR = 0.045  # m: half a degree at 5 m
+WALL_MARGIN = 0.07  # m: four standard deviations of a sonar's range
+SLAB = 0.15  # before and behind the ladder's plane, m
+STEEPEST_TILT = np.radians(15.0)
+PEAKS = 4  # of each ladder and half turn
+LEVEL_ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class LevelScan:
+    """A scan turned level and along the canal.
+
+    Attributes
+    ----------
+    rotation : (3, 3) float64 array
+        From the file's axes to: x along the canal, y across, z up.
+    walls : tuple of float
+        Places y of the walls, at the scanner's height, m.
+    slopes : tuple of float
+        Of the walls: y grows by this much per metre of height.
+    points : (n, 3) float64 array
+        Turned.
+    bed : float
+        Median height of the bed, m.
+    top : float
+        Height up to which walls are seen, about the water's, m.
+    """
+
+    rotation: Float
+    walls: tuple[float, float]
+    slopes: tuple[float, float]
+    points: Float
+    bed: float
+    top: float
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A pose that may be: ``rotation @ point + translation``, what it rests on and how alike that looks (0 to 1)."""
+
+    rotation: Float
+    translation: Float
+    score: float
+    ladder: str
+
+
+def level(points: Float, up: int, width: float) -> LevelScan:
+    """Level a scan (n, 3), file's axes, between walls about ``width`` m apart.
+
+    Raises
+    ------
+    UserError
+        Two walls at about that distance are not seen.
+    """
+    rotation = np.diag([1.0, float(up), float(up)])  # half a turn about x where z points down
+    turned = points @ rotation.T
+    near = np.linalg.norm(turned[:, :2], axis=1) < NEAR
+    angle, low, high = _parallel_walls(turned[near], width)
+    rotation = _about_z(-angle) @ rotation
+    slopes = (0.0, 0.0)
+    bed = 0.0
+    for _ in range(LEVEL_ROUNDS):
+        turned = points @ rotation.T
+        near = np.linalg.norm(turned[:, :2], axis=1) < NEAR
+        first = _wall_plane(turned[near], low)
+        second = _wall_plane(turned[near], high)
+        pitch, bed = _bed_slope(turned[near], low, high)
+        # Walls that lean alike are a scan that is not level; those that lean apart are battered.
+        roll = (first[2] + second[2]) / 2.0
+        yaw = (first[1] + second[1]) / 2.0
+        low, high = first[0], second[0]
+        slopes = (first[2] - roll, second[2] - roll)
+        turn = np.array([[1.0, yaw, pitch], [-yaw, 1.0, -roll], [-pitch, roll, 1.0]])
+        left, _, right = np.linalg.svd(turn)
+        rotation = left @ right @ rotation
+    turned = points @ rotation.T
+    if np.degrees(np.arccos(np.clip(rotation[2, 2] * up, -1.0, 1.0))) > np.degrees(STEEPEST_TILT):
+        raise UserError("the scan lies more than 15° from level: is --up right?")
+    return LevelScan(rotation, (low, high), slopes, turned, bed, _wall_top(turned, (low, high), slopes))
+
+
+def _about_z(angle: float) -> Float:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _parallel_walls(points: Float, width: float) -> tuple[float, float, float]:
+    """Direction in plan in which two walls about ``width`` apart run, rad, and their places square to it, m."""
+    weight = np.minimum(np.linalg.norm(points[:, :2], axis=1) ** 2, 50.0)  # rays fan out
+    best = (-1.0, 0.0, 0.0, 0.0)
+    lags = np.arange(int(width * (1.0 - WIDTH_TOLERANCE) / BIN), int(width * (1.0 + WIDTH_TOLERANCE) / BIN) + 1)
+    for angle in ANGLES:
+        across = -np.sin(angle) * points[:, 0] + np.cos(angle) * points[:, 1]
+        k = np.floor((across + NEAR) / BIN).astype(np.int64)
+        histogram = np.bincount(np.clip(k, 0, int(2 * NEAR / BIN)), weights=weight, minlength=int(2 * NEAR / BIN) + 1)
+        smooth = np.convolve(histogram, np.ones(3), mode="same")
+        for lag in lags:
+            both = np.minimum(smooth[:-lag], smooth[lag:])
+            i = int(np.argmax(both))
+            if both[i] > best[0]:
+                best = (float(both[i]), float(angle), (i + 0.5) * BIN - NEAR, (i + lag + 0.5) * BIN - NEAR)
+    score, angle, low, high = best
+    if score <= 0.0 or not low < 0.0 < high:
+        raise UserError(f"no two walls {width:.1f} m apart, as the laser's are, stand about the scanner")
+    return angle, low, high
+
+
+def _wall_plane(points: Float, place: float) -> tuple[float, float, float]:
+    """Robust y = a + b x + c z of the points within some decimetres of a wall."""
+    mine = points[np.abs(points[:, 1] - place) < 0.4]
+    design = np.column_stack([np.ones(len(mine)), mine[:, 0], mine[:, 2]])
+    answer = np.array([place, 0.0, 0.0])
+    for _ in range(15):
+        residual = mine[:, 1] - design @ answer
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(residual))), 0.01)
+        weight = 1.0 / (1.0 + (residual / scale) ** 2) ** 2  # Geman-McClure
+        answer = np.linalg.lstsq(design * np.sqrt(weight)[:, None], mine[:, 1] * np.sqrt(weight), rcond=None)[0]
+    return float(answer[0]), float(answer[1]), float(answer[2])
+
+
+def _bed_slope(points: Float, low: float, high: float) -> tuple[float, float]:
+    """Slope along the canal of the lowest surface between the walls, and its median height, m."""
+    margin = 0.25 * (high - low)
+    mine = points[(points[:, 1] > low + margin) & (points[:, 1] < high - margin)]
+    cell = np.floor(mine[:, :2] / 0.5).astype(np.int64)
+    _, number = np.unique(cell, axis=0, return_inverse=True)
+    order = np.lexsort([mine[:, 2], number])
+    begin = np.searchsorted(number[order], np.arange(number.max() + 2))
+    count = np.diff(begin)
+    # The lower quartile of a cell is its bed; rays to the water's underside and their images lie above.
+    low_of = mine[order[begin[:-1] + count // 4], 2][count >= 5]
+    centre = np.array([mine[order[b], 0] for b in begin[:-1]])[count >= 5]
+    if len(low_of) < 10:
+        return 0.0, float(np.percentile(points[:, 2], 2))
+    slope, middle = 0.0, float(np.median(low_of))
+    for _ in range(10):
+        residual = low_of - middle - slope * centre
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(residual))), 0.02)
+        weight = 1.0 / (1.0 + (residual / scale) ** 2) ** 2
+        design = np.column_stack([np.ones(len(centre)), centre])
+        middle, slope = np.linalg.lstsq(design * np.sqrt(weight)[:, None], low_of * np.sqrt(weight), rcond=None)[0]
+    return float(slope), float(middle)
+
+
+def _on_walls(points: Float, places: tuple[float, float], slopes: tuple[float, float], within: float) -> Bool:
+    out = np.zeros(len(points), np.bool_)
+    for place, slope in zip(places, slopes, strict=True):
+        out |= np.abs(points[:, 1] - place - slope * points[:, 2]) < within
+    return out
+
+
+def _wall_top(points: Float, places: tuple[float, float], slopes: tuple[float, float]) -> float:
+    """Height at which points on the walls become few: what lies above the water's level are false echoes."""
+    wall = points[_on_walls(points, places, slopes, 0.1)]
+    along = np.abs(wall[:, 0])
+    wall = wall[(along > 3.0) & (along < 10.0)]
+    if len(wall) < 100:
+        return float(np.percentile(points[:, 2], 95))
+    # Each half metre along gives an edge of its own; a beam's width and the fan's end blur a single one.
+    height = np.arange(-4.0, 4.0, 0.05)
+    histogram = np.histogram(wall[:, 2], bins=height, weights=wall[:, 0] ** 2)[0]
+    smooth = np.convolve(histogram, np.ones(4) / 4.0, mode="same")
+    level_of = np.median(smooth[smooth > 0.2 * smooth.max()])
+    above = np.flatnonzero(smooth > 0.5 * level_of)
+    return float(height[above[-1]] + 0.05)
+
+
+def candidates(scan: LevelScan, walls: Walls, ladders: Sequence[PlacedLadder], uncertain: float) -> list[Candidate]:
+    """Poses at which the scan looks as if it saw one of the ladders, the likeliest first.
+
+    Parameters
+    ----------
+    scan : LevelScan
+    walls, ladders
+        By the laser, local frame with the water at zero.
+    uncertain : float
+        How far the water may be from the top of the scan's walls, m.
+    """
+    found: list[Candidate] = []
+    for placed in ladders:
+        foot = placed.origin - placed.axes[1] * (placed.origin[2] / placed.axes[1, 2])  # where it meets the water's level
+        _, piece = walls.tree.query(foot[:2])
+        normal = walls.normal[piece]
+        along = np.array([normal[1], -normal[0]])  # (along, normal, up) is right-handed
+        basis = np.column_stack([[*along, 0.0], [*normal, 0.0], [0.0, 0.0, 1.0]])
+        base = walls.foot[piece]
+        for flip in (0, 1):
+            turn = np.diag([-1.0, -1.0, 1.0]) if flip else np.eye(3)
+            turned = scan.points @ turn
+            place = -scan.walls[1] if flip else scan.walls[0]
+            slope = -scan.slopes[1] if flip else scan.slopes[0]
+            for x, h, score in _correlate(turned, place, slope, scan, placed, basis, base, uncertain):
+                rotation = basis @ turn @ scan.rotation
+                # at the water's level the scan's wall and the laser's are one
+                shift = basis @ np.array([x, -(place - slope * h), h]) + base
+                found.append(Candidate(rotation, shift, score, placed.ladder.name))
+    return sorted(found, key=lambda one: -one.score)
+
+
+def _correlate(
+    points: Float, place: float, slope: float, scan: LevelScan, placed: PlacedLadder, basis: Float, base: Float, uncertain: float
+) -> list[tuple[float, float, float]]:
+    """Shifts along and up (m) at which points before a wall look like the ladder, and how alike (-1 to 1)."""
+    begin, end = (((placed.to_space(ends) - base) @ basis) for ends in placed.elements())
+    share = np.linspace(0.0, 1.0, 80)
+    dots = (begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3)
+    step = np.repeat(np.linalg.norm(end - begin, axis=1) / len(share), len(share))
+    depth = scan.top - scan.bed
+    wet = (dots[:, 2] < -0.03) & (dots[:, 2] > -depth - 0.1)
+    dots, step = dots[wet], step[wet]
+    if len(dots) < 50:
+        return []
+    off = points[:, 1] - place - slope * points[:, 2]
+    # Before the wall by as much as the ladder, which may lean: its plane at a height is known when the water's height is.
+    height = points[:, 2] - scan.top
+    lean = np.polyfit(dots[:, 2], dots[:, 1], 1)
+    expected = np.polyval(lean, height)
+    mine = (np.abs(off - expected) < SLAB) & (off > WALL_MARGIN) & (height < uncertain) & (height > -depth - uncertain)
+    mine &= np.abs(points[:, 0]) < NEAR
+    own = points[mine]
+    if len(own) < 50:
+        return []
+    low = np.array([-NEAR - 1.0, own[:, 2].min() - 1.0])
+    shape = np.ceil((np.array([2.0 * NEAR + 2.0, np.ptp(own[:, 2]) + 2.0])) / PIXEL).astype(int)
+    k = np.floor((own[:, [0, 2]] - low) / PIXEL).astype(np.int64)
+    weight = (own**2).sum(axis=1)
+    image = np.bincount(k[:, 0] * shape[1] + k[:, 1], weights=weight, minlength=shape[0] * shape[1]).reshape(shape)
+    image = np.sqrt(gaussian_filter(image, 1.0))
+    corner = np.array([dots[:, 0].min() - 0.2, dots[:, 2].min() - 0.2])
+    size = np.ceil((np.array([dots[:, 0].max(), dots[:, 2].max()]) + 0.2 - corner) / PIXEL).astype(int)
+    if (size > shape).any():
+        return []
+    t = np.floor((dots[:, [0, 2]] - corner) / PIXEL).astype(np.int64)
+    template = np.bincount(t[:, 0] * size[1] + t[:, 1], weights=step, minlength=size[0] * size[1]).reshape(size)
+    template = np.sqrt(gaussian_filter(template, BLUR / PIXEL))
+    template -= template.mean()
+    template /= np.linalg.norm(template)
+    ones = np.ones_like(template)
+    total = fftconvolve(image, ones, mode="valid")
+    square = fftconvolve(image**2, ones, mode="valid")
+    spread = np.sqrt(np.maximum(square - total**2 / template.size, 1e-6 * float(image.max()) ** 2 * template.size))
+    alike = fftconvolve(image, template[::-1, ::-1], mode="valid") / spread
+    # a template at pixel (i, j) puts its corner at low + (i, j) * PIXEL: shift = where it is expected less where it is seen
+    along = corner[0] - (low[0] + np.arange(alike.shape[0]) * PIXEL)
+    up = corner[1] - (low[1] + np.arange(alike.shape[1]) * PIXEL)
+    alike[:, np.abs(up + scan.top) > uncertain] = -1.0
+    out = []
+    for _ in range(PEAKS):
+        i, j = np.unravel_index(int(np.argmax(alike)), alike.shape)
+        if alike[i, j] <= 0.1:
+            break
+        out.append((float(along[i]), float(up[j]), float(alike[i, j])))
+        alike[max(i - 5, 0) : i + 6, max(j - 4, 0) : j + 5] = -1.0
+    return out
+
+
+def likeness(points: Float, scanner: Float, placed: PlacedLadder) -> float:
+    """How much points (n, 3) about a ladder look like it below the water, seen square to its plane (-1 to 1).
+
+    Parameters
+    ----------
+    points, scanner, placed
+        In the local frame, the water at zero.
+    """
+    own = placed.to_ladder(points)
+    begin, end = placed.elements()
+    share = np.linspace(0.0, 1.0, 80)
+    dots = (begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3)
+    step = np.repeat(np.linalg.norm(end - begin, axis=1) / len(share), len(share))
+    wet = placed.to_space(dots)[:, 2] < -0.03
+    low, high = dots[wet, :2].min(axis=0) - 0.2, dots[wet, :2].max(axis=0) + [0.2, 0.0]
+    mine = (np.abs(own[:, 2]) < 0.07) & (own[:, :2] > low).all(axis=1) & (own[:, :2] < high).all(axis=1)
+    if mine.sum() < 50:
+        return -1.0
+    size = np.ceil((high - low) / PIXEL).astype(int)
+    weight = ((points[mine] - scanner) ** 2).sum(axis=1)
+    seen = _image(own[mine, :2], weight, low, size, 1.0)
+    expected = _image(dots[wet, :2], step[wet], low, size, BLUR / PIXEL)
+    return float(np.corrcoef(seen.ravel(), expected.ravel())[0, 1])
+
+
+def _image(places: Float, weight: Float, low: Float, size: Float, blur: float) -> Float:
+    """Root of the density of weighted places (n, 2) in pixels from ``low`` on, blurred."""
+    k = np.minimum(np.floor((places - low) / PIXEL).astype(np.int64), np.asarray(size) - 1)
+    image = np.bincount(k[:, 0] * size[1] + k[:, 1], weights=weight, minlength=size[0] * size[1]).reshape(tuple(size))
+    return np.asarray(np.sqrt(gaussian_filter(image, blur)))

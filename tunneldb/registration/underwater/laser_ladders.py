@@ -1,0 +1,221 @@
+"""Ladders in the laser's points above the water: found before the walls, numbered by their rungs' gaps, fitted.
+
+Moisan et al. (2015), section 5.3, fit a plane, then stiles and rungs by Parzen windows, then lines. Here the peaks only start
+a fit of the whole ladder, whose rungs' heights are known, by its six parameters and its width.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+from scipy.optimize import least_squares, linear_sum_assignment
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from tunneldb.arrays import Float, Int64
+from tunneldb.registration.underwater.ladder_shape import PlacedLadder, nearest_element
+from tunneldb.registration.underwater.observations import cell_keys
+from tunneldb.registration.underwater.results import Ladder
+from tunneldb.registration.underwater.walls import Walls
+
+OFF_WALL = (0.05, 1.2)  # where a ladder stands before its wall, m
+HIGHEST = 2.5  # above the water, m
+DRY = 0.03  # above the water, below which waves and mirror images mix in, m
+LINK = 0.06  # between neighbouring points of a ladder, m
+LEAST_HEIGHT = 0.3  # of a ladder above the water, m
+MOST_POINTS = 4000
+TRIED_POINTS = 600  # of a first fit
+LEANING = np.radians(np.arange(-15.0, 15.1, 0.5))  # sideways
+BIN = 0.005  # m
+NOISE = 0.004  # of laser points from a cylinder, m: what the fit takes for usual
+STARTS = 8
+TIE = 1.1  # ratio of two ways' costs up to which they are not told apart
+
+
+@dataclass(frozen=True)
+class LaserLadder:
+    """A ladder fitted to the laser's points.
+
+    Attributes
+    ----------
+    placed : PlacedLadder
+    rms : float
+        Of the points from its surface, robust, m.
+    rungs : tuple of int
+        Numbers of the rungs that were seen.
+    points : int
+    covariance : (7, 7) float64 array
+        Of turn (3) rad, shift (3) m and gap m.
+    ties : tuple of float
+        Heights along the ladder by which it may be shifted instead, for its gaps fit as well, m.
+    """
+
+    placed: PlacedLadder
+    rms: float
+    rungs: tuple[int, ...]
+    points: int
+    covariance: Float
+    ties: tuple[float, ...]
+
+
+def find_laser_ladders(points: Float, walls: Walls, ladders: Sequence[Ladder]) -> list[LaserLadder]:
+    """Find and fit ladders in laser points (n, 3), local frame with the water at zero; those not found are left out."""
+    clusters = _clusters(points, walls)
+    fits = [[_fit_cluster(cluster, out, ladder) for ladder in ladders] for cluster, out in clusters]
+    if not fits:
+        return []
+    cost = np.array([[fit.rms if fit is not None else 1.0 for fit in row] for row in fits])
+    # A tall cluster with all its rungs says more than a short one with as good a fit.
+    seen = np.array([[len(fit.rungs) if fit is not None else 0 for fit in row] for row in fits])
+    rows, columns = linear_sum_assignment(cost - 1e-3 * seen)
+    found = [fits[row][column] for row, column in zip(rows, columns, strict=True)]
+    return [fit for fit in found if fit is not None]
+
+
+def _clusters(points: Float, walls: Walls) -> list[tuple[Float, Float]]:
+    """Clusters before the walls that may be ladders: points (n, 3), and the direction (3,) to the water."""
+    near = points[(points[:, 2] > DRY) & (points[:, 2] < HIGHEST)]
+    away, piece = walls.tree.query(near[:, :2], distance_upper_bound=OFF_WALL[1] + 0.5)
+    known = np.isfinite(away)
+    near, piece = near[known], piece[known]
+    off = walls.distance(near, piece)
+    before = (off > OFF_WALL[0]) & (off < OFF_WALL[1])
+    near, piece = near[before], piece[before]
+    if len(near) == 0:
+        return []
+    near, piece = _thin(near, piece, LINK / 3.0)
+    pairs = cKDTree(near).query_pairs(LINK, output_type="ndarray")
+    count = len(near)
+    _, label = connected_components(coo_array((np.ones(len(pairs)), pairs.T), (count, count)), directed=False)
+    out = []
+    for number in np.flatnonzero(np.bincount(label) >= 30):
+        mine = label == number
+        if np.ptp(near[mine, 2]) >= LEAST_HEIGHT:
+            normal = walls.normal[piece[mine]].mean(axis=0)
+            out.append((near[mine], np.array([*normal, 0.0]) / np.linalg.norm(normal)))
+    return out
+
+
+def _thin(points: Float, piece: Int64, edge: float) -> tuple[Float, Int64]:
+    """One point of each voxel."""
+    _, first = np.unique(cell_keys(points, edge), return_index=True)
+    return points[first], piece[first]
+
+
+def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | None:
+    """Fit a ladder to a cluster; None if it is none."""
+    start = _stiles(cluster, out, ladder)
+    if start is None:
+        return None
+    order = np.random.default_rng(0).permutation(len(cluster))
+    few, cluster = cluster[order[:TRIED_POINTS]], cluster[order[:MOST_POINTS]]
+    tried: list[tuple[float, PlacedLadder]] = []
+    for shift in _shifts(start.to_ladder(cluster), ladder, start.gap):
+        cost, fitted, _ = _refine(few, start.moved(np.zeros(3), start.axes[1] * shift), 10)
+        tried.append((cost, fitted))
+    if not tried:
+        return None
+    tried.sort(key=lambda one: one[0])
+    _, placed, covariance = _refine(cluster, tried[0][1], 40)
+    own = placed.to_ladder(cluster)
+    which, away = nearest_element(own, placed)
+    residual = np.linalg.norm(away, axis=1) - ladder.diameter / 2.0
+    close = np.abs(residual) < 5.0 * NOISE
+    if close.mean() < 0.5:
+        return None
+    counts = np.bincount(which[close & (np.abs(own[:, 0]) < placed.gap / 2.0 - ladder.diameter)], minlength=len(ladder.height) + 2)
+    seen = np.flatnonzero(counts[2:] >= 5)
+    if len(seen) < 2:
+        return None
+    ties = tuple(
+        float((other.origin - placed.origin) @ placed.axes[1])
+        for cost, other in tried[1:]
+        if cost < TIE * tried[0][0] and np.linalg.norm(other.origin - placed.origin) > 0.1
+    )
+    rms = float(np.sqrt(np.mean(residual[close] ** 2)))
+    return LaserLadder(placed, rms, tuple(ladder.number[i] for i in seen), int(close.sum()), covariance, ties)
+
+
+def _stiles(cluster: Float, out: Float, ladder: Ladder) -> PlacedLadder | None:
+    """Plane and stiles: the lean sideways, and the place across, at which two peaks stand a ladder's width apart."""
+    middle = np.median(cluster, axis=0)
+    keep = np.ones(len(cluster), np.bool_)
+    normal = out
+    for _ in range(8):  # the plane that most of the cluster lies in, upright or leaning towards the wall
+        _, _, axes = np.linalg.svd(cluster[keep] - cluster[keep].mean(axis=0), full_matrices=False)
+        normal = axes[2] * np.sign(axes[2] @ out)
+        off = (cluster - cluster[keep].mean(axis=0)) @ normal
+        limit = max(3.0 * float(np.median(np.abs(off[keep]))), 0.02)
+        keep = np.abs(off - np.median(off[keep])) < limit
+        if keep.sum() < 30:
+            return None
+    if normal @ out < 0.7:
+        return None
+    middle = cluster[keep].mean(axis=0)
+    across = np.cross(np.array([0.0, 0.0, 1.0]), normal)
+    across /= np.linalg.norm(across)
+    up = np.cross(normal, across)
+    plane = (cluster[keep] - middle) @ np.column_stack([across, up])
+    best: tuple[float, float, float, float] | None = None
+    for lean in LEANING:
+        place = plane[:, 0] * np.cos(lean) + plane[:, 1] * np.sin(lean)
+        first = place.min() - 0.05
+        histogram = np.bincount(((place - first) / BIN).astype(np.int64))
+        smooth = gaussian_filter1d(histogram.astype(np.float64), 1.5, mode="constant")
+        for gap in np.arange(ladder.stile_gap - 0.03, ladder.stile_gap + 0.031, BIN):
+            step = round(gap / BIN)
+            if step >= len(smooth):
+                continue
+            both = np.minimum(smooth[:-step], smooth[step:])
+            k = int(np.argmax(both))
+            if best is None or both[k] > best[0]:
+                best = (float(both[k]), float(lean), first + (k + 0.5) * BIN, step * BIN)
+    if best is None or best[0] <= 0.0:
+        return None
+    _, lean, left, gap = best
+    turned_across = across * np.cos(lean) + up * np.sin(lean)
+    turned_up = -across * np.sin(lean) + up * np.cos(lean)
+    origin = middle + turned_across * (left + gap / 2.0) - normal * ladder.diameter / 2.0
+    return PlacedLadder(ladder, origin, np.vstack([turned_across, turned_up, normal]), gap)
+
+
+def _shifts(own: Float, ladder: Ladder, gap: float) -> list[float]:
+    """Heights at which the ladder's zero may lie so that its rungs meet the points between the stiles, likeliest first."""
+    inside = np.abs(own[:, 0]) < gap / 2.0 - ladder.diameter
+    if inside.sum() < 10:
+        return []
+    low, high = own[:, 1].min(), own[:, 1].max()
+    histogram = np.bincount(((own[inside, 1] - low) / BIN).astype(np.int64), minlength=int((high - low) / BIN) + 1)
+    smooth = gaussian_filter1d(histogram.astype(np.float64), 2.0, mode="constant")
+    smooth = np.minimum(smooth, np.percentile(smooth[smooth > 0.0], 95) if (smooth > 0.0).any() else 0.0)
+    zero = np.arange(low - ladder.height[-1], high - ladder.height[0], BIN)
+    at = zero[:, None] + ladder.height[None]
+    k = np.round((at - low) / BIN).astype(np.int64)
+    visible = (k >= 0) & (k < len(smooth))
+    score = np.where(visible, smooth[np.clip(k, 0, len(smooth) - 1)] - smooth.mean(), 0.0).sum(axis=1)
+    chosen: list[float] = []
+    for i in np.argsort(-score):
+        if score[i] <= 0.0 or len(chosen) == STARTS:
+            break
+        if all(abs(zero[i] - other) > 0.05 for other in chosen):
+            chosen.append(float(zero[i]))
+    return chosen
+
+
+def _refine(cluster: Float, start: PlacedLadder, most: int) -> tuple[float, PlacedLadder, Float]:
+    """Fit turn, shift and gap by robust least squares; the cost, the ladder and the covariance."""
+    radius = start.ladder.diameter / 2.0
+
+    def residual(change: Float) -> Float:
+        placed = start.moved(change[:3], change[3:6], float(change[6]))
+        _, away = nearest_element(placed.to_ladder(cluster), placed)
+        return np.asarray((np.linalg.norm(away, axis=1) - radius) / NOISE)
+
+    found = least_squares(residual, np.zeros(7), loss="cauchy", x_scale=np.array([0.01] * 6 + [0.005]), max_nfev=most)
+    information = found.jac.T @ found.jac
+    covariance = np.linalg.pinv(information, rcond=1e-12)
+    return float(found.cost), start.moved(found.x[:3], found.x[3:6], float(found.x[6])), np.asarray(covariance)

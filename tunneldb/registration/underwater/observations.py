@@ -1,0 +1,230 @@
+"""What ties a sonar scan to the laser's model and to other scans, as linear equations of small changes of the poses.
+
+A pose's changes are those of `results.PARAMETERS`: a turn about the tunnel's axes through the scanner, a shift of the
+scanner, and a change of scale.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tunneldb.arrays import Float, Int64
+from tunneldb.registration.underwater.ladder_shape import PlacedLadder, nearest_element
+from tunneldb.registration.underwater.walls import Walls
+
+POSE = 7  # parameters of a pose
+RANGE_NOISE = 0.015  # m, of a BV5000 (Moisan et al., 2015, section 3)
+BEAM = np.radians(1.0)  # width of a beam there
+BEAM_SIGMA = BEAM / np.sqrt(12.0)  # an echo comes from anywhere in it
+FACING = 0.9  # least cosine between the normals of what is compared
+WALL_DEPTH = 3.0  # m below the water
+WALL_TOP = 0.05  # below the water, m: nearer to it, echoes by way of the surface mix in
+RELIEF = 0.012  # m: how far a patch of stones may lie from its wall's plane
+GRAZING = 0.35  # least cosine of incidence of what is compared
+FARTHEST = 12.0  # m
+PATCH = 0.3  # m
+PATCH_POINTS = 8
+FLAT = 0.035  # m: spread of a patch across its plane
+
+
+@dataclass(frozen=True)
+class Pose:
+    """``rotation @ (scale * point) + translation``."""
+
+    rotation: Float
+    translation: Float
+    scale: float
+
+    def apply(self, points: Float) -> Float:
+        """Points (n, 3) of the file in the tunnel's axes."""
+        return np.asarray(self.scale * points @ self.rotation.T + self.translation)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Equations: ``residual + design @ change ≈ 0``.
+
+    Attributes
+    ----------
+    residual : (n,) float64 array
+        m.
+    sigma : (n,) float64 array
+        Standard deviations, m.
+    poses : (n, 7) float64 array
+        Derivatives by the changes of the pose of scan ``scan``.
+    scan : int
+    other : int or None
+        A second scan, whose derivatives are ``other_poses``.
+    common : (n, c) float64 array
+        Derivatives by the parameters ``columns`` that are common to all scans.
+    columns : (c,) int64 array
+    group : (n,) int64 array
+        Rows of one group err together.
+    kind, name : str
+    """
+
+    residual: Float
+    sigma: Float
+    poses: Float
+    scan: int
+    other: int | None
+    other_poses: Float | None
+    common: Float
+    columns: Int64
+    group: Int64
+    kind: str
+    name: str
+
+
+def cell_keys(points: Float, edge: float) -> Int64:
+    """Numbers (n,) of the cubic cells that points (n, 3) within some kilometres lie in."""
+    cell = np.floor(points / edge).astype(np.int64) + (1 << 20)
+    return np.asarray((cell[:, 0] << 42) | (cell[:, 1] << 21) | cell[:, 2])
+
+
+def pose_derivatives(points: Float, pose: Pose, normal: Float) -> Float:
+    """Derivatives (n, 7) of points (n, 3), in the tunnel's axes, along normals (n, 3)."""
+    arm = points - pose.translation
+    scale = (arm * normal).sum(axis=1)[:, None] / pose.scale
+    return np.hstack([np.cross(arm, normal), normal, scale])
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Flat patches of a scan in its file's axes: centroid and normal (k, 3), points (k,), spread across (k,) m."""
+
+    centre: Float
+    normal: Float
+    count: Int64
+    spread: Float
+
+
+def find_patches(points: Float) -> Patches:
+    """Cells of a scan whose points lie on a plane that is not seen at a grazing angle."""
+    near = points[np.linalg.norm(points, axis=1) < FARTHEST]
+    _, number, count = np.unique(cell_keys(near, PATCH), return_inverse=True, return_counts=True)
+    centre = np.column_stack([np.bincount(number, near[:, k]) for k in range(3)]) / count[:, None]
+    away = near - centre[number]
+    moments = np.empty((len(count), 3, 3))
+    for a in range(3):
+        for b in range(a, 3):
+            moments[:, a, b] = moments[:, b, a] = np.bincount(number, away[:, a] * away[:, b]) / count
+    value, vector = np.linalg.eigh(moments)
+    normal = vector[:, :, 0]
+    normal *= -np.sign((normal * centre).sum(axis=1))[:, None]
+    spread = np.sqrt(np.maximum(value[:, 0], 0.0))
+    reach = np.linalg.norm(centre, axis=1)
+    cosine = -(normal * centre).sum(axis=1) / np.maximum(reach, 1e-9)
+    keep = (count >= PATCH_POINTS) & (spread < FLAT) & (value[:, 1] > (PATCH / 8.0) ** 2) & (cosine > GRAZING)
+    return Patches(centre[keep], normal[keep], count[keep], spread[keep])
+
+
+def wall_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, first_column: int, within: float) -> list[Rows]:
+    """Compare a scan's patches with the walls, at most ``within`` m off.
+
+    Common parameters from ``first_column`` on: the change of batter below the water of each side.
+    """
+    centre = pose.apply(patches.centre)
+    away, piece = walls.tree.query(centre[:, :2], distance_upper_bound=1.0)
+    wet = (centre[:, 2] < -WALL_TOP) & (centre[:, 2] > -WALL_DEPTH) & np.isfinite(away)
+    piece = np.where(wet, piece, 0)
+    normal = walls.normals(piece)
+    off = walls.distance(centre, piece)
+    facing = ((patches.normal @ pose.rotation.T) * normal).sum(axis=1) > FACING
+    keep = wet & facing & (np.abs(off) < within)
+    centre, piece, normal, off = centre[keep], piece[keep], normal[keep], off[keep]
+    sigma = np.sqrt(
+        patches.spread[keep] ** 2 / patches.count[keep]
+        + RELIEF**2
+        + walls.sigma[piece] ** 2
+        + (walls.sigma_batter[piece] * centre[:, 2]) ** 2
+    )
+    batter = centre[:, 2] / np.sqrt(1.0 + walls.batter[piece] ** 2)
+    out = []
+    for side in (0, 1):
+        rows = walls.side[piece] == side
+        if rows.any():
+            out.append(
+                Rows(off[rows], sigma[rows], pose_derivatives(centre[rows], pose, normal[rows]), scan, None, None,
+                     batter[rows, None], np.array([first_column + side]), piece[rows] // 4, "wall", "left" if side else "right")
+            )  # fmt: skip
+    return out
+
+
+def ladder_rows(
+    points: Float, pose: Pose, placed: PlacedLadder, scan: int, first_column: int, within: float
+) -> Rows | None:
+    """Distances of a scan's points (n, 3), file's axes, from a ladder's axes below the water, across and along the beam.
+
+    Common parameters from ``first_column`` on: the ladder's turn and shift.
+    """
+    space = pose.apply(points)
+    own = placed.to_ladder(space)
+    ladder = placed.ladder
+    box = (np.abs(own[:, 0]) < placed.gap / 2.0 + within) & (np.abs(own[:, 2]) < within) & (space[:, 2] < -0.02)
+    box &= (own[:, 1] > ladder.height[0] - 0.3) & (own[:, 1] < ladder.height[-1] + 0.3)
+    space, own = space[box], own[box]
+    if len(own) < 30:
+        return None
+    which, away = nearest_element(own, placed)
+    axis = np.where(which[:, None] < 2, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]]) @ placed.axes
+    ray = space - pose.translation
+    reach = np.linalg.norm(ray, axis=1)
+    ray = ray - (ray * axis).sum(axis=1)[:, None] * axis
+    ray /= np.linalg.norm(ray, axis=1)[:, None]
+    side = np.cross(axis, ray)
+    # A sonar sees the near surface; a beam between two rungs or beside a stile takes its echo from the nearest of them.
+    vector = away @ placed.axes + ladder.diameter / 2.0 * ray
+    along, across = (vector * ray).sum(axis=1), (vector * side).sum(axis=1)
+    sigma_along = np.full(len(own), np.hypot(RANGE_NOISE, 0.005))
+    sigma_across = np.hypot(BEAM_SIGMA * reach, 0.005)
+    near = np.hypot(along / sigma_along, across / sigma_across) < max(within / RANGE_NOISE / 4.0, 3.0)
+    near &= np.hypot(along, across) < within
+    if near.sum() < 30:
+        return None
+    arm = space[near] - placed.origin
+    rows = []
+    for direction in (ray[near], side[near]):
+        poses = pose_derivatives(space[near], pose, direction)
+        rows.append((poses, -np.hstack([np.cross(arm, direction), direction])))
+    return Rows(
+        np.concatenate([along[near], across[near]]),
+        np.concatenate([sigma_along[near], sigma_across[near]]),
+        np.vstack([rows[0][0], rows[1][0]]),
+        scan, None, None,
+        np.vstack([rows[0][1], rows[1][1]]),
+        first_column + np.arange(6),
+        np.tile(which[near], 2),
+        "ladder", ladder.name,
+    )  # fmt: skip
+
+
+def overlap_rows(one: Patches, other: Patches, poses: tuple[Pose, Pose], scans: tuple[int, int], within: float) -> Rows | None:
+    """Distances between patches of two scans that lie beside each other and face the same way."""
+    first, second = poses
+    place, beside = first.apply(one.centre), second.apply(other.centre)
+    normal, beside_normal = one.normal @ first.rotation.T, other.normal @ second.rotation.T
+    reach, k = cKDTree(beside).query(place, distance_upper_bound=max(PATCH, within))
+    found = np.isfinite(reach)
+    i, k = np.flatnonzero(found), k[found]
+    same = (normal[i] * beside_normal[k]).sum(axis=1) > FACING
+    low = place[i, 2] < -WALL_TOP  # images above the water move with the scanner
+    i, k = i[same & low], k[same & low]
+    if len(i) < 20:
+        return None
+    mean = normal[i] + beside_normal[k]
+    mean /= np.linalg.norm(mean, axis=1)[:, None]
+    residual = ((place[i] - beside[k]) * mean).sum(axis=1)
+    close = np.abs(residual) < within
+    i, k, mean, residual = i[close], k[close], mean[close], residual[close]
+    if len(i) < 20:
+        return None
+    sigma = np.sqrt(one.spread[i] ** 2 / one.count[i] + other.spread[k] ** 2 / other.count[k] + RELIEF**2)
+    return Rows(
+        residual, sigma, pose_derivatives(place[i], first, mean), scans[0], scans[1],
+        -pose_derivatives(beside[k], second, mean), np.zeros((len(i), 0)), np.zeros(0, np.int64),
+        np.floor(place[i, 0] / 2.0).astype(np.int64) * 1000 + np.floor(place[i, 1] / 2.0).astype(np.int64), "scan", "",
+    )  # fmt: skip

@@ -1,0 +1,180 @@
+"""Walls at the waterline, from the laser's points above it, extrapolated below it.
+
+Frame: local, m, z up and zero at the water's level.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.errors import UserError
+from tunneldb.robust import MAD_TO_SIGMA
+
+SPACING = 0.5  # of anchors along a wall, m
+REACH = 0.8  # half of the length of wall that an anchor is fitted to, m
+FOOT, HEAD = 0.02, 1.5  # heights between which a wall is fitted, m
+LEAST_HEIGHT = 0.25  # of what is fitted, m
+STEEPEST = 0.3  # batter, tangent
+ROUGHEST = 0.04  # m
+LEAST_POINTS = 20
+NARROWEST, WIDEST = 2.0, 40.0  # canal, m
+TUKEY = 4.685
+
+
+@dataclass(frozen=True)
+class Walls:
+    """Pieces of wall: lines at the waterline with a batter.
+
+    Attributes
+    ----------
+    foot : (k, 3) float64 array
+        Points of the walls at the water's level, m.
+    normal : (k, 2) float64 array
+        Horizontal unit normals, towards the water.
+    batter : (k,) float64 array
+        How far the wall leans back per metre of height: it lies at ``-batter * z`` along the normal.
+    sigma, sigma_batter : (k,) float64 arrays
+        Standard deviations of the foot along the normal, m, and of the batter.
+    side : (k,) int64 array
+        Which wall a piece belongs to.
+    """
+
+    foot: Float
+    normal: Float
+    batter: Float
+    sigma: Float
+    sigma_batter: Float
+    side: Int64
+
+    @property
+    def tree(self) -> cKDTree:
+        """Of the feet in plan."""
+        return cKDTree(self.foot[:, :2])
+
+    def some(self, keep: Bool) -> Walls:
+        """Those of a mask (k,)."""
+        return Walls(
+            self.foot[keep], self.normal[keep], self.batter[keep], self.sigma[keep], self.sigma_batter[keep], self.side[keep]
+        )
+
+    def distance(self, points: Float, piece: Int64) -> Float:
+        """Distance (n,) m of points (n, 3) in front of the pieces (n,), square to the wall."""
+        away = ((points[:, :2] - self.foot[piece, :2]) * self.normal[piece]).sum(axis=1) + self.batter[piece] * points[:, 2]
+        return np.asarray(away / np.sqrt(1.0 + self.batter[piece] ** 2))
+
+    def normals(self, piece: Int64) -> Float:
+        """Unit normals (n, 3) of pieces (n,), towards the water."""
+        out = np.column_stack([self.normal[piece], self.batter[piece]])
+        return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
+
+    def width(self) -> float:
+        """Median distance between the two sides at the waterline, m."""
+        return float(np.median(_opposite(self.foot, self.normal)[0]))
+
+
+def find_walls(points: Float) -> Walls:
+    """Fit the walls at the waterline to the laser's points (n, 3).
+
+    Raises
+    ------
+    UserError
+        There is no wall down to the water, or only on one side.
+    """
+    near = points[(points[:, 2] > FOOT) & (points[:, 2] < HEAD)]
+    low = near[near[:, 2] < LEAST_HEIGHT]
+    cells = np.unique(np.floor(low[:, :2] / SPACING), axis=0)
+    found = []
+    if len(cells):
+        tree, low_tree = cKDTree(near[:, :2]), cKDTree(low[:, :2])
+        for centre in (cells + 0.5) * SPACING:
+            piece = _fit(near, low, tree, low_tree, centre)
+            if piece is not None:
+                found.append(piece)
+    if not found:
+        raise UserError(
+            "no wall reaches down to the water in the laser's points: is --water-level right, and in the tunnel's heights?"
+        )
+    table = np.array(found)
+    foot, normal = table[:, :3], table[:, 3:5]
+    walls = Walls(foot, normal, table[:, 5], table[:, 6], table[:, 7], np.zeros(len(foot), np.int64))
+    return _orient(walls)
+
+
+def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Float) -> list[float] | None:
+    """Line and batter about a place in plan: foot (3), normal (2), batter and their standard deviations; None if no wall."""
+    around = low[low_tree.query_ball_point(centre, REACH)]
+    if len(around) < LEAST_POINTS:
+        return None
+    middle = around[:, :2].mean(axis=0)
+    _, _, axes = np.linalg.svd(around[:, :2] - middle, full_matrices=False)
+    mine = near[tree.query_ball_point(middle, REACH)]
+    along = (mine[:, :2] - middle) @ axes[0]
+    across = (mine[:, :2] - middle) @ axes[1]
+    design = np.column_stack([np.ones(len(mine)), along, mine[:, 2]])
+    weight = (mine[:, 2] < LEAST_HEIGHT).astype(np.float64)  # what begins higher, as behind a towpath, is no start
+    answer, scale = np.zeros(3), np.inf
+    for _ in range(12):
+        normal_matrix = design.T @ (design * weight[:, None])
+        if np.linalg.cond(normal_matrix) > 1e12:
+            return None
+        answer = np.linalg.solve(normal_matrix, design.T @ (weight * across))
+        residual = across - design @ answer
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(residual[weight > 0.1]))), 1e-3)
+        weight = np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2
+    used = mine[weight > 0.1]
+    if len(used) < LEAST_POINTS or np.ptp(used[:, 2]) < LEAST_HEIGHT or np.ptp(along[weight > 0.1]) < SPACING:
+        return None
+    if scale > ROUGHEST or abs(answer[2]) > STEEPEST:
+        return None
+    # Stones are some decimetres: their relief is not averaged by points, but by as many stones as there are.
+    stones = max(np.ptp(used[:, 2]) * np.ptp(along[weight > 0.1]) / 0.3**2, 1.0)
+    covariance = np.linalg.inv(design.T @ (design * weight[:, None])) * len(used) * scale**2 / stones
+    line = np.array([1.0, answer[1]]) / np.hypot(1.0, answer[1])
+    direction = line[0] * axes[0] + line[1] * axes[1]
+    normal = np.array([-direction[1], direction[0]])
+    foot = middle + answer[0] * axes[1]
+    sign = np.sign(normal @ axes[1])
+    return [*foot, 0.0, *normal, -answer[2] * sign * line[0], float(np.sqrt(covariance[0, 0])), float(np.sqrt(covariance[2, 2]))]
+
+
+def _opposite(foot: Float, normal: Float) -> tuple[Float, Bool]:
+    """Distance to the wall opposite, m (median over those seen), of each piece along its normal, and whether there is one."""
+    away = foot[None, :, :2] - foot[:, None, :2]
+    ahead = (away * normal[:, None]).sum(axis=2)
+    beside = np.abs(away[..., 0] * -normal[:, None, 1] + away[..., 1] * normal[:, None, 0])
+    facing = (ahead > NARROWEST) & (ahead < WIDEST) & (beside < 2.0 * SPACING)
+    distance = np.where(facing, ahead, np.inf).min(axis=1)
+    return distance, np.isfinite(distance)
+
+
+def _orient(walls: Walls) -> Walls:
+    """Turn normals to the water, keep the pieces that face each other, and name the sides."""
+    ahead, some_ahead = _opposite(walls.foot, walls.normal)
+    behind, some_behind = _opposite(walls.foot, -walls.normal)
+    turn = np.where(behind < ahead, -1.0, 1.0)
+    keep = some_ahead | some_behind
+    if not keep.any():
+        raise UserError("the laser's points show the wall of one side only at the water: both are needed")
+    turned = Walls(
+        walls.foot, walls.normal * turn[:, None], walls.batter * turn, walls.sigma, walls.sigma_batter, walls.side
+    ).some(keep)
+    pairs = turned.tree.query_pairs(3.0 * SPACING, output_type="ndarray")
+    same = (turned.normal[pairs[:, 0]] * turned.normal[pairs[:, 1]]).sum(axis=1) > 0.5
+    links = pairs[same]
+    count = len(turned.foot)
+    _, label = connected_components(coo_array((np.ones(len(links)), links.T), (count, count)), directed=False)
+    # Pieces parted by a gap are of one side if they face the same way along the canal.
+    main = np.linalg.svd(turned.foot[:, :2] - turned.foot[:, :2].mean(axis=0), full_matrices=False)[2][0]
+    left = turned.normal @ np.array([-main[1], main[0]]) > 0.0
+    sizes = np.bincount(label)
+    keep = sizes[label] >= 3
+    if not (keep & left).any() or not (keep & ~left).any():
+        raise UserError("the laser's points show the wall of one side only at the water: both are needed")
+    named = Walls(turned.foot, turned.normal, turned.batter, turned.sigma, turned.sigma_batter, left.astype(np.int64))
+    return named.some(keep)
