@@ -32,6 +32,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "tunnel": ("tunneldb.cli.tunnel:tunnel", "Add, list or remove tunnels, and give them a stationing."),
     "survey": ("tunneldb.cli.survey:survey", "Add, list or remove the scanning campaigns of a tunnel."),
     "load": ("tunneldb.cli.load:load", "Load scan files into a survey."),
+    "register": ("tunneldb.cli.register:register", "Register sonar scans below the water to the laser's above it."),
     "run": ("tunneldb.cli.run:run", "Run the stages: axis, segments, sections, ground, detect."),
     "batch": ("tunneldb.cli.batch:batch", "Bring files to leaks, kilometre by kilometre, on all cores; go on after a stop."),
     "worker": ("tunneldb.cli.worker:worker", "Do what batches ask for, also of other machines."),

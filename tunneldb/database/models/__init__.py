@@ -10,6 +10,7 @@ from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
 from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
 from tunneldb.database.models.ground import Cluster, Ground, Lining, TargetSphere
 from tunneldb.database.models.leak import Anomaly, AnomalyPart, Coverage, Image, Radiometry, RangeCurve, Region, Waterproof
+from tunneldb.database.models.sonar import Ladder, RegistrationResidual, SonarScan
 from tunneldb.database.models.structures import Face, Member, Spot
 from tunneldb.database.models.work import Audit, Goal, Run, Stage, Worker
 
@@ -30,6 +31,7 @@ __all__ = [
     "Ground",
     "Image",
     "Incoming",
+    "Ladder",
     "Lining",
     "Member",
     "Point",
@@ -38,11 +40,13 @@ __all__ = [
     "RangeCurve",
     "Reference",
     "Region",
+    "RegistrationResidual",
     "Run",
     "ScanFile",
     "Section",
     "SectionClass",
     "Segment",
+    "SonarScan",
     "Spot",
     "Stage",
     "Station",

@@ -225,7 +225,14 @@ def candidates(scan: LevelScan, walls: Walls, ladders: Sequence[PlacedLadder], u
 
 
 def _correlate(
-    points: Float, place: float, slope: float, scan: LevelScan, placed: PlacedLadder, basis: Float, base: Float, uncertain: float
+    points: Float,
+    place: float,
+    slope: float,
+    scan: LevelScan,
+    placed: PlacedLadder,
+    basis: Float,
+    base: Float,
+    uncertain: float,
 ) -> list[tuple[float, float, float]]:
     """Shifts along and up (m) at which points before a wall look like the ladder, and how alike (-1 to 1)."""
     begin, end = (((placed.to_space(ends) - base) @ basis) for ends in placed.elements())
@@ -295,7 +302,7 @@ def likeness(points: Float, scanner: Float, placed: PlacedLadder) -> float:
     dots = (begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3)
     step = np.repeat(np.linalg.norm(end - begin, axis=1) / len(share), len(share))
     wet = placed.to_space(dots)[:, 2] < -0.03
-    low, high = dots[wet, :2].min(axis=0) - 0.2, dots[wet, :2].max(axis=0) + [0.2, 0.0]
+    low, high = dots[wet, :2].min(axis=0) - 0.2, dots[wet, :2].max(axis=0) + np.array([0.2, 0.0])
     mine = (np.abs(own[:, 2]) < 0.07) & (own[:, :2] > low).all(axis=1) & (own[:, :2] < high).all(axis=1)
     if mine.sum() < 50:
         return -1.0

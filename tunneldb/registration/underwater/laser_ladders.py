@@ -127,7 +127,8 @@ def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | No
     close = np.abs(residual) < 5.0 * NOISE
     if close.mean() < 0.5:
         return None
-    counts = np.bincount(which[close & (np.abs(own[:, 0]) < placed.gap / 2.0 - ladder.diameter)], minlength=len(ladder.height) + 2)
+    between = close & (np.abs(own[:, 0]) < placed.gap / 2.0 - ladder.diameter)
+    counts = np.bincount(which[between], minlength=len(ladder.height) + 2)
     seen = np.flatnonzero(counts[2:] >= 5)
     if len(seen) < 2:
         return None

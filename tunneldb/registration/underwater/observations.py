@@ -154,9 +154,7 @@ def wall_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, first_colum
     return out
 
 
-def ladder_rows(
-    points: Float, pose: Pose, placed: PlacedLadder, scan: int, first_column: int, within: float
-) -> Rows | None:
+def ladder_rows(points: Float, pose: Pose, placed: PlacedLadder, scan: int, first_column: int, within: float) -> Rows | None:
     """Distances of a scan's points (n, 3), file's axes, from a ladder's axes below the water, across and along the beam.
 
     Common parameters from ``first_column`` on: the ladder's turn and shift.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.arrays import Float, Int64
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.adjustment import Adjusted, adjust, scan_of
 from tunneldb.registration.underwater.choice import DECIDED, explained, margin
@@ -36,7 +36,7 @@ OVERLAP = 15.0  # m between scanners whose scans are compared
 
 @dataclass(frozen=True)
 class _Started:
-    """A scan's first pose, the ladders that it sees, how like ladders those look, and how well its points (n,) are explained."""
+    """A scan's first pose, the ladders that it sees, how like ladders they look, how well its points are explained (n,)."""
 
     pose: Pose
     ladders: tuple[int, ...]
@@ -44,9 +44,7 @@ class _Started:
     explained: Float
 
 
-def register(
-    laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladder], water_level: float
-) -> Registration:
+def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladder], water_level: float) -> Registration:
     """Register sonar scans to the laser's points.
 
     Parameters
@@ -69,7 +67,8 @@ def register(
     walls = find_walls(local[np.unique(cell_keys(local, WALL_VOXEL), return_index=True)[1]])
     found = find_laser_ladders(local, walls, ladders)
     starts = [_start(cloud, walls, found) for cloud in clouds]
-    notes = [f"ladder {one.name} is not seen by the laser" for one in ladders if all(one.name != f.placed.ladder.name for f in found)]
+    seen = {one.placed.ladder.name for one in found}
+    notes = [f"ladder {one.name} is not seen by the laser" for one in ladders if one.name not in seen]
     known = [i for i, start in enumerate(starts) if start is not None]
     adjusted = _adjust_all(clouds, starts, known, walls, found)
     scans = []
@@ -87,8 +86,8 @@ def register(
                 open_directions, residuals,
             )
         )  # fmt: skip
-    fits = [_fit(one, k, origin, clouds, known, starts) for k, one in enumerate(found)]
-    return Registration(tuple(scans), tuple(fits), water_level, 0.0, tuple(notes))
+    fits = [_fit(one, k, origin, clouds, starts) for k, one in enumerate(found)]
+    return Registration(tuple(scans), tuple(fits), water_level, tuple(notes))
 
 
 def _start(cloud: SonarCloud, walls: Walls, found: Sequence[LaserLadder]) -> _Started | None:
@@ -172,10 +171,7 @@ def _adjust_all(
         return None
     place = np.array([scan.pose.translation for scan in scans])
     pairs = [
-        (a, b)
-        for a in range(len(scans))
-        for b in range(a + 1, len(scans))
-        if np.linalg.norm(place[a] - place[b]) < OVERLAP
+        (a, b) for a in range(len(scans)) for b in range(a + 1, len(scans)) if np.linalg.norm(place[a] - place[b]) < OVERLAP
     ]
     return adjust(scans, walls, found, pairs)
 
@@ -208,10 +204,10 @@ def _residuals(rows: Sequence[Rows], scan: int, names: Sequence[str]) -> tuple[R
     return tuple(out)
 
 
-def _fit(
-    one: LaserLadder, k: int, origin: Float, clouds: Sequence[SonarCloud], known: Sequence[int], starts: Sequence[_Started | None]
-) -> LadderFit:
+def _fit(one: LaserLadder, k: int, origin: Float, clouds: Sequence[SonarCloud], starts: Sequence[_Started | None]) -> LadderFit:
     placed = one.placed
-    scans = tuple(clouds[i].path.name for i in known if (start := starts[i]) is not None and k in start.ladders)
+    scans = tuple(
+        cloud.path.name for cloud, start in zip(clouds, starts, strict=True) if start is not None and k in start.ladders
+    )
     across, up, out = placed.axes
     return LadderFit(placed.ladder.name, placed.origin + origin, up, across, out, one.rms, one.rungs, scans)

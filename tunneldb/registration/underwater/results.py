@@ -54,7 +54,7 @@ class Residual:
     Attributes
     ----------
     kind : str
-        ``wall``, ``ladder``, ``waterline`` or ``scan`` (the overlap with another sonar scan).
+        ``wall``, ``ladder`` or ``scan`` (the overlap with another sonar scan).
     name : str
         Which one: the ladder's name, the other scan's file, or the side of the wall.
     count : int
@@ -129,10 +129,9 @@ class LadderFit:
 
 @dataclass(frozen=True)
 class Registration:
-    """Outcome for all scans at once; water_level is the height of the water, m, and how well it is known."""
+    """Outcome for all scans at once; water_level is the height of the water, m."""
 
     scans: tuple[SonarPose, ...]
     ladders: tuple[LadderFit, ...]
     water_level: float
-    water_level_sigma: float
     notes: tuple[str, ...] = ()

@@ -140,7 +140,8 @@ def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Floa
     normal = np.array([-direction[1], direction[0]])
     foot = middle + answer[0] * axes[1]
     sign = np.sign(normal @ axes[1])
-    return [*foot, 0.0, *normal, -answer[2] * sign * line[0], float(np.sqrt(covariance[0, 0])), float(np.sqrt(covariance[2, 2]))]
+    sigma, sigma_batter = np.sqrt(covariance[[0, 2], [0, 2]])
+    return [*foot, 0.0, *normal, -answer[2] * sign * line[0], sigma, sigma_batter]
 
 
 def _opposite(foot: Float, normal: Float) -> tuple[Float, Bool]:

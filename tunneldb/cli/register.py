@@ -1,0 +1,100 @@
+"""The verb ``register``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.progress import bar, step
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect
+from tunneldb.errors import UserError
+from tunneldb.store.survey import get_survey
+
+if TYPE_CHECKING:
+    from tunneldb.registration.underwater import Registration, SonarPose
+
+UP = {"+z": 1, "-z": -1}
+
+
+@verb(
+    examples=[
+        "tunneldb register canal-26 mss-1.xyz mss-2.xyz --ladders ladders.csv --up +z --water-level 265.0",
+        "tunneldb register canal-26 mss-*.xyz --ladders ladders.csv --up -z --water-level 265.0 --report registration.md",
+    ],
+    wrong="some scan's pose is weak or undetermined: the table and --json name the directions",
+)
+@click.argument("survey")
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILES...")
+@click.option(
+    "--ladders",
+    type=click.Path(dir_okay=False, path_type=Path),
+    required=True,
+    metavar="CSV",
+    help="Ladders that stand in the water: ladder,rung,height,stile_gap,diameter, m; a row for each rung.",
+)
+@click.option("--up", type=click.Choice(list(UP)), required=True, help="Whether z of the sonar's files points up or down.")
+@click.option("--water-level", type=float, required=True, metavar="M", help="Height of the water in the tunnel's system, m.")
+@click.option("--report", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE", help="Report to write, as Markdown.")
+@click.pass_context
+def register(
+    ctx: click.Context, survey: str, files: tuple[Path, ...], ladders: Path, up: str, water_level: float, report: Path | None
+) -> None:
+    """Register sonar scans from below the water (FILES) to the laser scans of SURVEY above it.
+
+    FILES are static scans of a mechanical sonar in axes of its own, m: .xyz, .txt, .csv, .off, LAS, LAZ, E57, PLY. Where
+    the sonar stood and which way it looked need not be known. All scans are adjusted together: to the laser's walls,
+    continued below the water, to ladders that stand in the water and are seen by both, and to each other. The poses are
+    stored (tunnel_api.sonar_scan), with their covariance, in the place of those that these files had.
+
+    A point of a file lies in the tunnel at rotation · (scale · point) + translation.
+    """
+    from tunneldb.export.tables.registration import HEADER, as_report, scan_rows
+    from tunneldb.files import replacing
+    from tunneldb.pipeline.register import register_survey
+
+    settings: Settings = ctx.obj
+    if report is not None and not report.parent.is_dir():
+        raise UserError(f"{report}: there is no folder {report.parent}")
+    with connect(settings.dsn) as conn:
+        chosen = get_survey(conn, survey)
+        conn.rollback()
+        with bar("points") as progress:
+            found = register_survey(conn, chosen, files, ladders, UP[up], water_level, step(progress))
+    _tell(survey, found)
+    print_table(HEADER, scan_rows(found), right=range(2, 7))
+    for note in found.notes:
+        click.echo(note, err=True)
+    if report is not None:
+        with replacing(report) as temporary:
+            temporary.write_text(as_report(survey, found), encoding="utf-8")
+        click.echo(f"report to {report}", err=True)
+    if any(scan.state != "determined" for scan in found.scans):
+        ctx.exit(1)
+
+
+def _tell(survey: str, found: Registration) -> None:
+    tell(
+        survey=survey,
+        scans=[_scan(scan) for scan in found.scans],
+        ladders=found.ladders,
+        water_level=found.water_level,
+        notes=found.notes,
+    )
+
+
+def _scan(scan: SonarPose) -> dict[str, object]:
+    return {
+        "file": scan.path,
+        "rotation": scan.rotation,
+        "translation": scan.translation,
+        "scale": scan.scale,
+        "covariance": scan.covariance,
+        "state": scan.state,
+        "undetermined": scan.undetermined,
+        "residuals": scan.residuals,
+    }

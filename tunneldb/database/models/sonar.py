@@ -1,0 +1,80 @@
+"""Sonar scans below the water, registered to the laser's points above it (Moisan et al.)."""
+
+from __future__ import annotations
+
+import datetime as dt
+
+from sqlalchemy import BigInteger, Identity, Index, Text, UniqueConstraint
+from sqlalchemy.dialects.postgresql import ARRAY
+from sqlalchemy.orm import Mapped, mapped_column
+
+from tunneldb.database.models.base import NOW, SURVEY, Base, Floats, one_of, parent
+
+
+class SonarScan(Base):
+    """A sonar scan and its pose."""
+
+    __tablename__ = "sonar_scan"
+    __table_args__ = (
+        one_of("state", "determined", "weak", "undetermined"),
+        UniqueConstraint("survey_id", "name"),
+        {"comment": "Sonar scans below the water, with their poses in the tunnel"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    name: Mapped[str] = mapped_column(comment="Name of the file")
+    path: Mapped[str] = mapped_column(comment="Where the file lay when it was registered")
+    checksum: Mapped[str] = mapped_column(comment="SHA-256 of the file, hexadecimal")
+    bytes: Mapped[int] = mapped_column(BigInteger, comment="Size of the file")
+    up: Mapped[int] = mapped_column(comment="Whether the file's z axis points up (1) or down (-1), as was said")
+    water_level: Mapped[float] = mapped_column(comment="Height of the water, as was said, m")
+    state: Mapped[str] = mapped_column(comment="determined, weak (known worse than it should be) or undetermined")
+    undetermined: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Directions that are known badly or not at all")
+    rotation: Mapped[Floats | None] = mapped_column(comment="3 × 3, row by row; NULL where no pose was found")
+    translation: Mapped[Floats | None] = mapped_column(comment="Place of the sonar in the tunnel's SRID, m")
+    scale: Mapped[float | None] = mapped_column(
+        comment="By which its coordinates are multiplied: speed of sound over that assumed"
+    )
+    covariance: Mapped[Floats | None] = mapped_column(
+        comment="7 × 7, row by row: turns about x, y, z through the sonar, rad, shifts along them, m, and scale"
+    )
+    registered_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was registered")
+
+
+class RegistrationResidual(Base):
+    """What is left between a sonar scan and what it was fitted to."""
+
+    __tablename__ = "registration_residual"
+    __table_args__ = (
+        one_of("kind", "wall", "ladder", "scan"),
+        Index(None, "scan_id"),
+        {"comment": "What is left between sonar scans and what they were fitted to"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    scan_id: Mapped[int] = mapped_column(parent("sonar_scan"), comment="Sonar scan")
+    kind: Mapped[str] = mapped_column(comment="wall, ladder or scan (where two sonar scans overlap)")
+    name: Mapped[str] = mapped_column(comment="Side of the wall, name of the ladder or of the other scan's file")
+    count: Mapped[int] = mapped_column(comment="Patches or points that were compared")
+    median: Mapped[float] = mapped_column(comment="Median of the absolute distances, m")
+    p95: Mapped[float] = mapped_column(comment="Of which 95 % are no more, m")
+
+
+class Ladder(Base):
+    """A ladder in the water, as the laser sees it."""
+
+    __tablename__ = "ladder"
+    __table_args__ = (
+        UniqueConstraint("survey_id", "name"),
+        {"comment": "Ladders that stand in the water, as the laser sees them above it"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    name: Mapped[str] = mapped_column(comment="Its name in the file of ladders")
+    origin: Mapped[Floats] = mapped_column(comment="Middle between its stiles at its height zero, tunnel's SRID, m")
+    axes: Mapped[Floats] = mapped_column(comment="3 × 3, row by row: unit vectors across, up and out to the water")
+    rms: Mapped[float] = mapped_column(comment="Of the laser's points from it, m")
+    rungs: Mapped[list[int]] = mapped_column(ARRAY(BigInteger), comment="Numbers of the rungs that the laser saw")
+    scans: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Names of the sonar scans that saw it")

@@ -1,0 +1,61 @@
+"""Ladders as they were measured before they were put into the water, from a CSV file."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from tunneldb.csvfile import CsvTable, read_csv, read_texts
+from tunneldb.errors import UserError
+from tunneldb.registration.underwater import Ladder
+
+COLUMNS = ("rung", "height", "stile_gap", "diameter")
+LEAST_RUNGS = 3
+GAPS = (0.1, 0.6)  # between rungs, m
+WIDTHS = (0.1, 1.5)  # between stiles, m
+DIAMETERS = (0.005, 0.15)  # m
+SAME = 0.0005  # m
+
+
+def read_ladders(path: Path) -> list[Ladder]:
+    """Read ladders: a row ``ladder,rung,height,stile_gap,diameter`` for each rung, m.
+
+    Raises
+    ------
+    UserError
+        If a ladder has too few rungs, or figures that no ladder has; names file, line and value.
+    """
+    table = read_csv(path, COLUMNS)
+    if len(table) == 0:
+        raise UserError(f"{path} holds no ladder; it needs rows ladder,{','.join(COLUMNS)}")
+    names = read_texts(path, "ladder")
+    return [_ladder(table, name, [k for k, other in enumerate(names) if other == name]) for name in dict.fromkeys(names)]
+
+
+def _ladder(table: CsvTable, name: str, rows: list[int]) -> Ladder:
+    if not name:
+        raise table.error(rows[0], "ladder is empty")
+    if len(rows) < LEAST_RUNGS:
+        raise table.error(rows[0], f"ladder {name} has {len(rows)} rungs; {LEAST_RUNGS} are the least")
+    for before, row in pairwise(rows):
+        gap = table["height"][row] - table["height"][before]
+        if not GAPS[0] <= gap <= GAPS[1]:
+            raise table.error(
+                row,
+                f"rung {table['rung'][row]:g} of ladder {name} is {gap:g} m above the one before;"
+                f" heights are in metres, growing, {GAPS[0]:g} to {GAPS[1]:g} m apart",
+            )
+    for column, (low, high) in {"stile_gap": WIDTHS, "diameter": DIAMETERS}.items():
+        for row in rows:
+            value = table[column][row]
+            if not low <= value <= high:
+                raise table.error(row, f"{column} of ladder {name} is {value:g} m; {low:g} to {high:g} m is what ladders have")
+            if abs(value - table[column][rows[0]]) > SAME:
+                raise table.error(row, f"{column} of ladder {name} is {value:g} m, and {table[column][rows[0]]:g} m above")
+    number = tuple(round(float(table["rung"][row])) for row in rows)
+    if len(set(number)) < len(number):
+        raise table.error(rows[0], f"ladder {name} has a rung twice")
+    gap, diameter = (float(table[column][rows[0]]) for column in ("stile_gap", "diameter"))
+    return Ladder(name, number, np.asarray(table["height"][rows]), gap, diameter)
