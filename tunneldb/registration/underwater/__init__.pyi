@@ -1,4 +1,4 @@
-from .register import register as register
+from .block import register as register
 from .results import Ladder as Ladder
 from .results import LadderFit as LadderFit
 from .results import Registration as Registration

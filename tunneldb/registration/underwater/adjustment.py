@@ -1,7 +1,8 @@
 """Joint robust adjustment of all sonar scans: poses, scales, ladders and the walls' batter below the water.
 
 Gauss-Newton with weights by Geman and McClure; rows of one group (a stretch of wall, a rung) err together, which the
-covariance takes into account (Liang and Zeger, 1986, the sandwich of groups).
+covariance takes into account (Liang and Zeger, 1986, the sandwich of groups; Bell and
+McCaffrey, 2002, for few of them).
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ SCALE_SIGMA = 0.01  # of the range scale before anything is known: 15 m/s of 148
 BATTER_SIGMA = 0.03  # of the change of batter at the water
 LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
 CUT = 3.0  # standard deviations at which a row has a quarter of its weight
-REACHES = (0.3, 0.2, 0.15, 0.12, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1)  # within which rows are sought, round by round, m
+REACHES = (0.3, 0.2, 0.15, 0.12, *[0.1] * 30)  # within which rows are sought, round by round, m
 SETTLED = 1e-5
 SURROUNDINGS = 0.6  # m about a ladder: farther than a first pose may be off
 SINGULAR = 1e-12  # share of the largest eigenvalue up to which a direction is not known
@@ -110,7 +111,7 @@ def adjust(
     for reach in reaches:
         leaning = replace(walls, batter=walls.batter + batter[walls.side])
         rows = _all_rows(scans, poses, leaning, placed, pairs, reach)
-        normal, right = _normal_equations(rows, len(scans), count)
+        normal, right = _normal_equations(rows, count)
         offset = _prior_offset(poses, placed, ladders, batter)
         change = -_inverse(normal + precision, 0.0) @ (right + precision @ offset)
         for i, pose in enumerate(poses):
@@ -121,7 +122,7 @@ def adjust(
             placed[k] = placed[k].moved(change[first : first + 3], change[first + 3 : first + 6])
         if reach == reaches[-1] and np.abs(change).max() < SETTLED:
             break
-    covariance = _sandwich(rows, normal, precision, len(scans), count)
+    covariance = _sandwich(rows, normal, precision)
     blocks = [slice(POSE * i, POSE * (i + 1)) for i in range(len(scans))]
     return Adjusted(
         tuple(poses),
@@ -154,7 +155,7 @@ def _all_rows(
     return rows
 
 
-def _design(rows: Rows, scans: int) -> tuple[Float, Int64]:
+def _design(rows: Rows) -> tuple[Float, Int64]:
     """Design matrix of rows over those columns (c,) that they have."""
     parts = [rows.poses]
     columns = [POSE * rows.scan + np.arange(POSE)]
@@ -171,12 +172,6 @@ def weights_of(rows: Rows) -> Float:
     return np.asarray(1.0 / (1.0 + (_deviation(rows) / CUT) ** 2) ** 2 / rows.sigma**2)
 
 
-def gain(rows: Rows) -> float:
-    """By how much rows speak for what they are compared with: log likelihood over that of all of them being astray."""
-    each = CUT**2 / (1.0 + (_deviation(rows) / CUT) ** 2)
-    return float(each.sum()) / 2.0
-
-
 def _deviation(rows: Rows) -> Float:
     """Residuals (n,) in standard deviations; those of a point across and along the beam together."""
     z = np.abs(rows.residual / rows.sigma)
@@ -186,10 +181,10 @@ def _deviation(rows: Rows) -> Float:
     return z
 
 
-def _normal_equations(rows: Sequence[Rows], scans: int, count: int) -> tuple[Float, Float]:
+def _normal_equations(rows: Sequence[Rows], count: int) -> tuple[Float, Float]:
     normal, right = np.zeros((count, count)), np.zeros(count)
     for one in rows:
-        design, columns = _design(one, scans)
+        design, columns = _design(one)
         weighted = design * weights_of(one)[:, None]
         normal[np.ix_(columns, columns)] += weighted.T @ design
         right[columns] += weighted.T @ one.residual
@@ -228,18 +223,22 @@ def _moved(pose: Pose, change: Float) -> Pose:
     return Pose(np.asarray(turn @ pose.rotation), pose.translation + change[3:6], pose.scale + float(change[6]))
 
 
-def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float, scans: int, count: int) -> Float:
-    """Covariance of all parameters, by the spread of the groups' sums."""
+def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float) -> Float:
+    """Covariance of all parameters, by the spread of the groups' sums, each as if it had not been adjusted to."""
+    inverse = _inverse(normal + precision, 0.0)
     middle = precision.copy()
     for one in rows:
-        design, columns = _design(one, scans)
-        score = design * (weights_of(one) * one.residual)[:, None]
+        design, columns = _design(one)
+        weighted = design * weights_of(one)[:, None]
+        score = weighted * one.residual[:, None]
+        own = inverse[np.ix_(columns, columns)]
         _, number = np.unique(one.group, return_inverse=True)
         sums = np.column_stack([np.bincount(number, score[:, k]) for k in range(score.shape[1])])
-        groups = len(sums)
-        block = sums.T @ sums * (groups / max(groups - 1, 1))
-        middle[np.ix_(columns, columns)] += block
-    inverse = _inverse(normal + precision, 0.0)
+        for group in range(len(sums)):
+            mine = number == group
+            leverage = weighted[mine].T @ design[mine] @ own
+            sums[group] = np.linalg.solve(np.eye(len(columns)) - leverage, sums[group])
+        middle[np.ix_(columns, columns)] += sums.T @ sums
     unknown = _inverse(normal + precision, UNKNOWN) - inverse
     return np.asarray(inverse @ middle @ inverse + unknown)
 

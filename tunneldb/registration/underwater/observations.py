@@ -25,6 +25,7 @@ WALL_TOP = 0.05  # below the water, m: nearer to it, echoes by way of the surfac
 RELIEF = 0.012  # m: how far a patch of stones may lie from its wall's plane
 GRAZING = 0.35  # least cosine of incidence of what is compared
 FARTHEST = 12.0  # m
+FURTHEST_OFF = 4.0  # standard deviations of an echo from the ladder that it comes from
 PATCH = 0.3  # m
 PATCH_POINTS = 8
 FLAT = 0.035  # m: spread of a patch across its plane
@@ -162,15 +163,16 @@ def ladder_rows(points: Float, pose: Pose, placed: PlacedLadder, scan: int, firs
     space = pose.apply(points)
     own = placed.to_ladder(space)
     ladder = placed.ladder
-    box = (np.abs(own[:, 0]) < placed.gap / 2.0 + within) & (np.abs(own[:, 2]) < within) & (space[:, 2] < -0.02)
+    reach = np.linalg.norm(space - pose.translation, axis=1)
+    room = np.maximum(within, FURTHEST_OFF * BEAM_SIGMA * reach)
+    box = (np.abs(own[:, 0]) < placed.gap / 2.0 + room) & (np.abs(own[:, 2]) < room)
     box &= (own[:, 1] > ladder.height[0] - 0.3) & (own[:, 1] < ladder.height[-1] + 0.3)
-    space, own = space[box], own[box]
+    space, own, reach = space[box], own[box], reach[box]
     if len(own) < 30:
         return None
     which, away = nearest_element(own, placed)
     axis = np.where(which[:, None] < 2, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]]) @ placed.axes
     ray = space - pose.translation
-    reach = np.linalg.norm(ray, axis=1)
     ray = ray - (ray * axis).sum(axis=1)[:, None] * axis
     ray /= np.linalg.norm(ray, axis=1)[:, None]
     side = np.cross(axis, ray)
@@ -179,8 +181,7 @@ def ladder_rows(points: Float, pose: Pose, placed: PlacedLadder, scan: int, firs
     along, across = (vector * ray).sum(axis=1), (vector * side).sum(axis=1)
     sigma_along = np.full(len(own), np.hypot(RANGE_NOISE, 0.005))
     sigma_across = np.hypot(BEAM_SIGMA * reach, 0.005)
-    near = np.hypot(along / sigma_along, across / sigma_across) < max(within / RANGE_NOISE / 4.0, 3.0)
-    near &= np.hypot(along, across) < within
+    near = np.hypot(along / sigma_along, across / sigma_across) < max(within / RANGE_NOISE / 4.0, FURTHEST_OFF)
     if near.sum() < 30:
         return None
     arm = space[near] - placed.origin

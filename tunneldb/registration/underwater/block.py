@@ -30,6 +30,7 @@ FIRST_REACHES = (0.35, 0.25, 0.2, 0.15, 0.12)
 LEAST_LIKENESS = 0.35  # of a ladder that is taken for one
 TIE = 0.92  # of the best likeness, from which rungs are not told apart
 SAME_PLACE, SAME_TURN = 0.15, np.radians(3.0)  # of two candidates that came to the same pose
+AIR, MOST_IN_AIR = 0.2, 0.25  # above the water, m: share of a scan that echoes by way of the surface may put there
 FARTHEST_LADDER = 12.0  # m from the scanner
 OVERLAP = 15.0  # m between scanners whose scans are compared
 
@@ -105,6 +106,9 @@ def _start(cloud: SonarCloud, walls: Walls, found: Sequence[LaserLadder]) -> _St
     if not fitted:
         return None
     best = _best(thin, fitted)
+    high = float((best.pose.apply(thin)[:, 2] > AIR).mean())
+    if high > MOST_IN_AIR:
+        raise UserError(f"{cloud.path}: {100.0 * high:.0f} % of its points would lie above the water: is --up right?")
     for other in fitted:
         if _same(best.pose, other.pose):
             continue

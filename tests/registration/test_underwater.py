@@ -1,0 +1,160 @@
+"""Sonar scans below the water, registered to the laser's points above it, against a canal made independently."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.support.canal_scene import LEVEL, ORIGIN, WIDTH, Canal, Sonar
+from tunneldb.arrays import Float
+from tunneldb.errors import UserError
+from tunneldb.registration.underwater import Registration, SonarCloud, SonarPose, register
+from tunneldb.registration.underwater.laser_ladders import find_laser_ladders
+from tunneldb.registration.underwater.observations import Pose, pose_derivatives
+from tunneldb.registration.underwater.walls import find_walls
+
+pytestmark = pytest.mark.xdist_group("canal")
+
+
+@dataclass(frozen=True)
+class Scene:
+    canal: Canal
+    laser: Float
+    scans: tuple[Sonar, ...]
+
+    def clouds(self, up: int = 1) -> list[SonarCloud]:
+        return [SonarCloud(Path(f"s{k}.xyz"), scan.points, up) for k, scan in enumerate(self.scans)]
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    canal = Canal(31)
+    laser = canal.laser()
+    return Scene(canal, laser, (canal.sonar(-3.0), canal.sonar(1.0)))
+
+
+@pytest.fixture(scope="module")
+def found(scene: Scene) -> Registration:
+    return register(scene.laser, scene.clouds(), [one.measured() for one in scene.canal.ladders], LEVEL)
+
+
+def check_points(scan: Sonar) -> Float:
+    """Points of the scan within 10 m of the sonar, file's axes, without those of false echoes."""
+    reach = np.linalg.norm(scan.points, axis=1)
+    return scan.points[(reach > 1.0) & (reach < 10.0)][::50]
+
+
+def turn_between(pose: SonarPose, scan: Sonar) -> float:
+    return float(np.degrees(Rotation.from_matrix(pose.rotation @ scan.rotation.T).magnitude()))
+
+
+def test_points_of_all_scans_come_to_where_they_were_measured(scene: Scene, found: Registration) -> None:
+    for pose, scan in zip(found.scans, scene.scans, strict=True):
+        points = check_points(scan)
+        mine = pose.scale * points @ pose.rotation.T + pose.translation
+        off = np.linalg.norm(mine - scan.to_tunnel(points), axis=1)
+        assert np.median(off) < 0.015
+        assert np.percentile(off, 95) < 0.035
+        assert turn_between(pose, scan) < 0.3
+        assert abs(pose.scale / scan.scale - 1.0) < 0.001
+        assert pose.state == "determined", pose.undetermined
+        assert {one.kind for one in pose.residuals} == {"wall", "ladder", "scan"}
+
+
+def test_stated_deviations_are_of_the_size_of_the_errors(scene: Scene, found: Registration) -> None:
+    chi = []
+    for pose, scan in zip(found.scans, scene.scans, strict=True):
+        turn = Rotation.from_matrix(scan.rotation @ pose.rotation.T).as_rotvec()
+        error = np.concatenate([turn, scan.translation - pose.translation, [scan.scale - pose.scale]])
+        chi.append(float(error @ np.linalg.solve(pose.covariance, error)) / len(error))
+    assert 0.05 < np.mean(chi) < 9.0
+
+
+def test_ladders_stand_where_the_laser_saw_them(scene: Scene, found: Registration) -> None:
+    assert {one.name for one in found.ladders} == {"L0", "L1"}
+    for one in found.ladders:
+        true = scene.canal.ladders[int(one.name[1:])]
+        assert np.linalg.norm(one.origin - scene.canal.to_tunnel(true.origin)) < 0.006
+        assert one.up @ (scene.canal.turn @ true.axes[1]) > np.cos(np.radians(0.15))
+        assert one.scans == ("s0.xyz", "s1.xyz")
+        heights = true.origin[2] + true.height * true.axes[1, 2]
+        assert set(one.rungs) <= {k + 1 for k in np.flatnonzero(heights > 0.0)}
+
+
+def test_walls_at_the_water_are_those_of_the_canal(scene: Scene) -> None:
+    walls = find_walls((scene.laser - ORIGIN)[::3])
+    assert walls.width() == pytest.approx(WIDTH, abs=0.01)
+    measured = sorted(float(np.median(walls.batter[walls.side == side])) for side in (0, 1))
+    assert measured == pytest.approx(sorted(scene.canal.batter), abs=0.02)
+
+
+def test_a_scan_whose_axes_point_down_comes_to_the_same_place(scene: Scene) -> None:
+    flip = np.diag([1.0, -1.0, -1.0])
+    scan = scene.scans[0]
+    turned = [SonarCloud(Path("s.xyz"), scan.points @ flip, -1)]
+    ladders = [one.measured() for one in scene.canal.ladders]
+    down = register(scene.laser, turned, ladders, LEVEL).scans[0]
+    up = register(scene.laser, scene.clouds()[:1], ladders, LEVEL).scans[0]
+    assert np.allclose(down.rotation @ flip, up.rotation, atol=1e-4)
+    assert np.allclose(down.translation, up.translation, atol=1e-3)
+
+
+def test_a_scan_said_to_point_the_other_way_is_refused(scene: Scene) -> None:
+    ladders = [one.measured() for one in scene.canal.ladders]
+    with pytest.raises(UserError, match="--up"):
+        register(scene.laser, scene.clouds(-1)[:1], ladders, LEVEL)
+
+
+def test_without_a_ladder_nothing_is_claimed_along_the_tunnel_or_of_the_height(scene: Scene) -> None:
+    none = replace(scene.canal.ladders[0].measured(), name="elsewhere")
+    bare = scene.laser[~near_ladders(scene)]
+    result = register(bare, scene.clouds()[:1], [none], LEVEL)
+    assert result.ladders == ()
+    assert result.scans[0].state == "undetermined"
+    assert {"along the tunnel", "height"} <= set(result.scans[0].undetermined)
+    assert result.notes == ("ladder elsewhere is not seen by the laser",)
+
+
+def near_ladders(scene: Scene) -> np.ndarray:
+    local = (scene.laser - ORIGIN) @ scene.canal.turn
+    near = np.zeros(len(local), np.bool_)
+    for ladder in scene.canal.ladders:
+        own = (local - ladder.origin) @ ladder.axes.T
+        near |= (np.abs(own[:, 0]) < 0.25) & (np.abs(own[:, 2]) < 0.1)
+    return near
+
+
+def test_no_wall_at_the_water_is_said_so(scene: Scene) -> None:
+    with pytest.raises(UserError, match="water-level"):
+        register(scene.laser, scene.clouds(), [scene.canal.ladders[0].measured()], LEVEL + 5.0)
+
+
+def test_a_ladder_with_other_gaps_is_fitted_to_its_own(scene: Scene) -> None:
+    """Of two ladders that differ in their gaps alone, each is found where its own rungs are."""
+    local = scene.laser - ORIGIN
+    walls = find_walls(local[::3])
+    ladders = [one.measured() for one in scene.canal.ladders]
+    for order in (ladders, ladders[::-1]):
+        fits = {fit.placed.ladder.name: fit.placed.origin for fit in find_laser_ladders(local, walls, order)}
+        for true in scene.canal.ladders:
+            assert np.linalg.norm(fits[true.name] + ORIGIN - scene.canal.to_tunnel(true.origin)) < 0.006
+
+
+def test_derivatives_of_a_pose_are_those_of_differences() -> None:
+    rng = np.random.default_rng(5)
+    pose = Pose(Rotation.from_rotvec([0.3, -0.2, 1.0]).as_matrix(), np.array([3.0, -2.0, -1.0]), 1.004)
+    own = rng.normal(0.0, 4.0, (20, 3))
+    normal = rng.normal(size=(20, 3))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    analytic = pose_derivatives(pose.apply(own), pose, normal)
+    for k in range(7):
+        change = np.zeros(7)
+        change[k] = 1e-6
+        turn = Rotation.from_rotvec(change[:3]).as_matrix()
+        moved = Pose(turn @ pose.rotation, pose.translation + change[3:6], pose.scale + change[6])
+        difference = ((moved.apply(own) - pose.apply(own)) * normal).sum(axis=1) / 1e-6
+        assert np.allclose(difference, analytic[:, k], atol=1e-4)
