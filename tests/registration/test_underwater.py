@@ -8,16 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.canal_scene import LEVEL, ORIGIN, WIDTH, Canal, Sonar
 
-from tests.support.canal_scene import LEVEL, ORIGIN, WIDTH, Canal, Sonar
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater import Registration, SonarCloud, SonarPose, register
 from tunneldb.registration.underwater.laser_ladders import find_laser_ladders
 from tunneldb.registration.underwater.observations import Pose, pose_derivatives
 from tunneldb.registration.underwater.walls import find_walls
-
-pytestmark = pytest.mark.xdist_group("canal")
 
 
 @dataclass(frozen=True)

@@ -124,9 +124,7 @@ class Canal:
         tilt = np.radians(rng.normal(0.0, 1.5, 2))
         rotation = Rotation.from_euler("zyx", [rng.uniform(0.0, 2.0 * np.pi), *tilt]).as_matrix() @ np.diag([1.0, up, up])
         scale = 1.0 + rng.uniform(-0.01, 0.01)
-        azimuth, elevation = np.meshgrid(
-            np.arange(0.0, 2.0 * np.pi, np.radians(0.3)), np.radians(np.arange(-22.5, 22.5, 0.3))
-        )
+        azimuth, elevation = np.meshgrid(np.arange(0.0, 2.0 * np.pi, np.radians(0.3)), np.radians(np.arange(-22.5, 22.5, 0.3)))
         beams = _rays(azimuth, elevation)
         reach = self._strongest(station, beams, rotation)
         seen = np.isfinite(reach) & (reach < 25.0)

@@ -28,7 +28,8 @@ TRIED = 8  # candidates of a scan that are fitted
 TRIED_POINTS = 60_000
 FIRST_REACHES = (0.35, 0.25, 0.2, 0.15, 0.12)
 LEAST_LIKENESS = 0.35  # of a ladder that is taken for one
-TIE = 0.92  # of the best likeness, from which rungs are not told apart
+TIE = 0.92  # of the best likelihood, from which rungs are not told apart
+WATERLINE_SIGMA = 0.15  # of the top of a scan's walls, m
 SAME_PLACE, SAME_TURN = 0.15, np.radians(3.0)  # of two candidates that came to the same pose
 AIR, MOST_IN_AIR = 0.2, 0.25  # above the water, m: share of a scan that echoes by way of the surface may put there
 FARTHEST_LADDER = 12.0  # m from the scanner
@@ -43,6 +44,10 @@ class _Started:
     ladders: tuple[int, ...]
     likeness: float
     explained: Float
+
+    def likelihood(self, top: float) -> float:
+        """Likeness, the less the farther the water is from the top ``top`` of the scan's walls above the sonar, m."""
+        return self.likeness * float(np.exp(-0.5 * ((self.pose.translation[2] + top) / WATERLINE_SIGMA) ** 2))
 
 
 def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladder], water_level: float) -> Registration:
@@ -113,7 +118,7 @@ def _start(cloud: SonarCloud, walls: Walls, found: Sequence[LaserLadder]) -> _St
         if _same(best.pose, other.pose):
             continue
         if _same_place(best.pose, other.pose):
-            told = other.likeness < TIE * best.likeness
+            told = other.likelihood(flat.top) < TIE * best.likelihood(flat.top)
         else:
             told = margin(thin, best.explained, other.explained) > DECIDED
         if not told:

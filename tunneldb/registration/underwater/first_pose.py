@@ -17,6 +17,7 @@ from scipy.signal import fftconvolve
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.ladder_shape import PlacedLadder
+from tunneldb.registration.underwater.observations import BEAM
 from tunneldb.registration.underwater.walls import Walls
 from tunneldb.robust import MAD_TO_SIGMA
 
@@ -189,7 +190,9 @@ def _wall_top(points: Float, places: tuple[float, float], slopes: tuple[float, f
     smooth = np.convolve(histogram, np.ones(4) / 4.0, mode="same")
     level_of = np.median(smooth[smooth > 0.2 * smooth.max()])
     above = np.flatnonzero(smooth > 0.5 * level_of)
-    return float(height[above[-1]] + 0.05)
+    # A beam whose axis passes half its width above the edge still meets the wall below it.
+    spill = 0.5 * BEAM * float(np.median(np.linalg.norm(wall, axis=1)))
+    return float(height[above[-1]] + 0.05) - spill
 
 
 def candidates(scan: LevelScan, walls: Walls, ladders: Sequence[PlacedLadder], uncertain: float) -> list[Candidate]:

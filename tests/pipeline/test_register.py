@@ -1,0 +1,110 @@
+"""`tunneldb register`: sonar scans of a canal tunnel from files to poses in the database."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import psycopg
+import pytest
+from click.testing import CliRunner, Result
+from support.canal_scene import LEVEL, Canal, Sonar
+
+from tunneldb.cli.main import main
+
+NAME = "canal"
+
+
+@pytest.fixture(scope="module")
+def canal(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Sonar]]:
+    folder = tmp_path_factory.mktemp(NAME)
+    scene = Canal(77)
+    scene.write_laser(folder / "laser.laz", scene.laser())
+    scene.write_ladders(folder / "ladders.csv")
+    scene.write_axis(folder / "axis.csv")
+    scans = [scene.sonar(-2.0), scene.sonar(2.0)]
+    for k, scan in enumerate(scans):
+        np.savetxt(folder / f"s{k}.xyz", np.column_stack([scan.points, np.full(len(scan.points), 50)]), "%.4f")
+    return folder, scans
+
+
+def command(*arguments: object, code: int = 0) -> Result:
+    result = CliRunner().invoke(main, [str(a) for a in arguments])
+    assert result.exit_code == code, result.output
+    return result
+
+
+def load(folder: Path) -> None:
+    command("tunnel", "add", NAME, "--srid", 25832, "--axis", folder / "axis.csv")
+    command("survey", "add", NAME, "--tunnel", NAME, "--date", "2026-05-04", "--no-poses", "--intensity-kind", "none")
+    command("load", NAME, folder / "laser.laz", "--noise-points", 1)
+
+
+def register(folder: Path, *more: object, code: int = 0, up: str = "+z", level: float = LEVEL) -> Result:
+    files = [folder / "s0.xyz", folder / "s1.xyz"]
+    ladders = ["--ladders", folder / "ladders.csv", "--up", up, "--water-level", level]
+    return command("register", NAME, *files, *ladders, *more, code=code)
+
+
+def test_poses_are_told_stored_and_shown(canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path) -> None:
+    folder, scans = canal
+    load(folder)
+    before = conn.execute("SELECT count(*), sum(ST_Z(geom)) FROM tunnel.point").fetchone()
+    conn.rollback()
+    told = json.loads(register(folder, "--json", "--report", tmp_path / "report.md").stdout)
+    assert [Path(scan["file"]).name for scan in told["scans"]] == ["s0.xyz", "s1.xyz"]
+    for scan, true in zip(told["scans"], scans, strict=True):
+        points = true.points[np.linalg.norm(true.points, axis=1) < 10.0][::50]
+        mine = scan["scale"] * points @ np.array(scan["rotation"]).T + np.array(scan["translation"])
+        assert np.percentile(np.linalg.norm(mine - true.to_tunnel(points), axis=1), 95) < 0.035
+        assert np.array(scan["covariance"]).shape == (7, 7)
+        assert (scan["state"], scan["undetermined"]) == ("determined", [])
+    rows = conn.execute(
+        "SELECT name, state, rotation, translation, scale, ST_X(geom), sigma_z, water_level"
+        "  FROM tunnel_api.sonar_scan ORDER BY name"
+    ).fetchall()
+    for row, scan in zip(rows, told["scans"], strict=True):
+        assert (row[0], row[1]) == (Path(scan["file"]).name, "determined")
+        assert np.array_equal(row[2], np.ravel(scan["rotation"]))
+        assert (row[3], row[4], row[5]) == (scan["translation"], scan["scale"], scan["translation"][0])
+        assert row[6] == pytest.approx(np.sqrt(scan["covariance"][5][5]))
+        assert row[7] == LEVEL
+    residuals = conn.execute("SELECT DISTINCT scan, kind FROM tunnel_api.registration_residual").fetchall()
+    assert set(residuals) == {(name, kind) for name in ("s0.xyz", "s1.xyz") for kind in ("wall", "ladder", "scan")}
+    assert conn.execute("SELECT array_agg(name ORDER BY name) FROM tunnel_api.ladder").fetchone() == (["L0", "L1"],)
+    assert conn.execute("SELECT count(*), sum(ST_Z(geom)) FROM tunnel.point").fetchone() == before
+    conn.rollback()
+    report = (tmp_path / "report.md").read_text("utf-8")
+    assert "| s0.xyz | determined |" in report
+    assert "| L1 |" in report
+    again = json.loads(register(folder, "--json").stdout)
+    assert again["scans"] == told["scans"]
+    assert conn.execute("SELECT count(*) FROM tunnel.sonar_scan").fetchone() == (2,)
+    conn.rollback()
+    command("survey", "remove", NAME, "--yes")
+    assert conn.execute("SELECT count(*) FROM tunnel.sonar_scan").fetchone() == (0,)
+
+
+def test_what_cannot_be_registered_is_refused_and_nothing_stored(
+    canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    folder, _ = canal
+    load(folder)
+    assert "is --up right?" in register(folder, code=2, up="-z").stderr
+    assert "no laser point lies within" in register(folder, code=2, level=LEVEL + 20.0).stderr
+    ladders = tmp_path / "ladders.csv"
+    cases = {
+        "ladder,rung,height,stile_gap,diameter\nA,1,0.0,0.32,0.035\nA,2,0.28,0.32,0.035\n": "2 rungs; 3 are the least",
+        "ladder,rung,height,stile_gap,diameter\nA,1,0,320,35\nA,2,280,320,35\nA,3,560,320,35\n": "line 3: rung 2",
+        "ladder,rung,height,stile_gap,diameter\nA,1,0,0.3,0.03\nA,2,0.28,0.4,0.03\nA,3,0.56,0.3,0.03\n": "line 3: stile_gap",
+        "ladder,rung,height,stile_gap\nA,1,0,0.3\n": "no column diameter",
+        "ladder,rung,height,stile_gap,diameter\n": "holds no ladder",
+    }
+    for text, said in cases.items():
+        ladders.write_text(text)
+        files = [folder / "s0.xyz", "--ladders", ladders, "--up", "+z", "--water-level", LEVEL]
+        assert said in command("register", NAME, *files, code=2).stderr
+    twice = [folder / "s0.xyz", folder / "s0.xyz", "--ladders", folder / "ladders.csv", "--up", "+z", "--water-level", LEVEL]
+    assert "known by its name" in command("register", NAME, *twice, code=2).stderr
+    assert conn.execute("SELECT count(*) FROM tunnel.sonar_scan").fetchone() == (0,)
