@@ -179,6 +179,13 @@ def test_a_program_reads_it_from_the_pipe(example: str) -> None:
     assert json.loads(done.stdout)["listed"] == 7
 
 
+def test_scans_that_cannot_be_registered_are_told(example: str, tmp_path: Path) -> None:
+    ladders = tmp_path / "ladders.csv"
+    ladders.write_text("ladder,rung,height,stile_gap,diameter\n")
+    said = told(2, "register", example, tmp_path / "a.xyz", "--ladders", ladders, "--up", "+z", "--water-level", 1.0)
+    assert "holds no ladder" in said["error"]
+
+
 def test_no_verb_was_left_out() -> None:
     text = Path(__file__).read_text("utf-8")
     assert [name for name in COMMANDS if name != "psql" and f'"{name}"' not in text] == []

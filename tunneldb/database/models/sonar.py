@@ -33,9 +33,7 @@ class SonarScan(Base):
     undetermined: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Directions that are known badly or not at all")
     rotation: Mapped[Floats | None] = mapped_column(comment="3 × 3, row by row; NULL where no pose was found")
     translation: Mapped[Floats | None] = mapped_column(comment="Place of the sonar in the tunnel's SRID, m")
-    scale: Mapped[float | None] = mapped_column(
-        comment="By which its coordinates are multiplied: speed of sound over that assumed"
-    )
+    scale: Mapped[float | None] = mapped_column(comment="Factor of its coordinates: speed of sound over that assumed")
     covariance: Mapped[Floats | None] = mapped_column(
         comment="7 × 7, row by row: turns about x, y, z through the sonar, rad, shifts along them, m, and scale"
     )

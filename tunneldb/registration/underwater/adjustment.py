@@ -29,6 +29,8 @@ from tunneldb.registration.underwater.walls import Walls
 
 SCALE_SIGMA = 0.01  # of the range scale before anything is known: 15 m/s of 1480
 BATTER_SIGMA = 0.03  # of the change of batter at the water
+DEPTH_SHARE = 0.25  # of a bar's radius by which its echo may come from behind its near surface
+COMMON = 3  # parameters common to all scans but for the ladders: two batters and that depth
 LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
 CUT = 3.0  # standard deviations at which a row has a quarter of its weight
 REACHES = (0.3, 0.2, 0.15, 0.12, *[0.1] * 30)  # within which rows are sought, round by round, m
@@ -104,21 +106,22 @@ def adjust(
     """Adjust scans to walls and ladders, and to each other where ``pairs`` says that they overlap."""
     poses = [scan.pose for scan in scans]
     placed = [ladder.placed for ladder in ladders]
-    count = POSE * len(scans) + 2 + 6 * len(ladders)
-    batter = np.zeros(2)
-    precision = _prior(len(scans), ladders)
+    count = POSE * len(scans) + COMMON + 6 * len(ladders)
+    common = np.zeros(COMMON)  # changes of batter of either side, and depth behind a bar's near surface
+    radius = max((ladder.placed.ladder.diameter / 2.0 for ladder in ladders), default=0.0)
+    precision = _prior(len(scans), ladders, radius)
     normal, rows = np.eye(count), []
     for reach in reaches:
-        leaning = replace(walls, batter=walls.batter + batter[walls.side])
-        rows = _all_rows(scans, poses, leaning, placed, pairs, reach)
+        leaning = replace(walls, batter=walls.batter + common[walls.side])
+        rows = _all_rows(scans, poses, leaning, placed, float(common[2]), pairs, reach)
         normal, right = _normal_equations(rows, count)
-        offset = _prior_offset(poses, placed, ladders, batter)
+        offset = _prior_offset(poses, placed, ladders, common)
         change = -_inverse(normal + precision, 0.0) @ (right + precision @ offset)
         for i, pose in enumerate(poses):
             poses[i] = _moved(pose, change[POSE * i : POSE * (i + 1)])
-        batter += change[POSE * len(scans) : POSE * len(scans) + 2]
+        common += change[POSE * len(scans) : POSE * len(scans) + COMMON]
         for k in range(len(placed)):
-            first = POSE * len(scans) + 2 + 6 * k
+            first = POSE * len(scans) + COMMON + 6 * k
             placed[k] = placed[k].moved(change[first : first + 3], change[first + 3 : first + 6])
         if reach == reaches[-1] and np.abs(change).max() < SETTLED:
             break
@@ -130,7 +133,7 @@ def adjust(
         np.array([normal[b, b] for b in blocks]).reshape(-1, POSE, POSE),
         tuple(rows),
         tuple(placed),
-        (float(batter[0]), float(batter[1])),
+        (float(common[0]), float(common[1])),
     )
 
 
@@ -139,15 +142,16 @@ def _all_rows(
     poses: Sequence[Pose],
     walls: Walls,
     placed: Sequence[PlacedLadder],
+    depth: float,
     pairs: Sequence[tuple[int, int]],
     reach: float,
 ) -> list[Rows]:
     rows: list[Rows] = []
-    batter = POSE * len(scans)
+    first = POSE * len(scans)
     for i, scan in enumerate(scans):
-        rows += wall_rows(scan.patches, poses[i], walls, i, batter, reach)
+        rows += wall_rows(scan.patches, poses[i], walls, i, first, reach)
         for k, points in scan.ladders.items():
-            found = ladder_rows(points, poses[i], placed[k], i, batter + 2 + 6 * k, reach)
+            found = ladder_rows(points, poses[i], placed[k], depth, i, (first + 2, first + COMMON + 6 * k), reach)
             rows += [found] if found is not None else []
     for i, j in pairs:
         found = overlap_rows(scans[i].patches, scans[j].patches, (poses[i], poses[j]), (i, j), reach)
@@ -191,28 +195,28 @@ def _normal_equations(rows: Sequence[Rows], count: int) -> tuple[Float, Float]:
     return normal, right
 
 
-def _prior(scans: int, ladders: Sequence[LaserLadder]) -> Float:
+def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
     """Precision of what is known beforehand: scales, batters, ladders."""
-    sigma = np.full(POSE * scans + 2 + 6 * len(ladders), np.inf)
+    sigma = np.full(POSE * scans + COMMON + 6 * len(ladders), np.inf)
     sigma[POSE - 1 : POSE * scans : POSE] = SCALE_SIGMA
-    sigma[POSE * scans : POSE * scans + 2] = BATTER_SIGMA
+    sigma[POSE * scans : POSE * scans + COMMON] = BATTER_SIGMA, BATTER_SIGMA, max(DEPTH_SHARE * radius, 1e-4)
     for k, ladder in enumerate(ladders):
-        first = POSE * scans + 2 + 6 * k
+        first = POSE * scans + COMMON + 6 * k
         own = np.sqrt(np.diag(ladder.covariance)[:6])
         sigma[first : first + 6] = np.hypot(own, [LADDER_TURN] * 3 + [LADDER_SHIFT] * 3)
     return np.diag(1.0 / sigma**2)
 
 
 def _prior_offset(
-    poses: Sequence[Pose], placed: Sequence[PlacedLadder], ladders: Sequence[LaserLadder], batter: Float
+    poses: Sequence[Pose], placed: Sequence[PlacedLadder], ladders: Sequence[LaserLadder], common: Float
 ) -> Float:
     """How far scales, batters and ladders have come from what was known of them beforehand."""
-    out = np.zeros(POSE * len(poses) + 2 + 6 * len(placed))
+    out = np.zeros(POSE * len(poses) + COMMON + 6 * len(placed))
     for i, pose in enumerate(poses):
         out[POSE * (i + 1) - 1] = pose.scale - 1.0
-    out[POSE * len(poses) : POSE * len(poses) + 2] = batter
+    out[POSE * len(poses) : POSE * len(poses) + COMMON] = common
     for k, (now, before) in enumerate(zip(placed, ladders, strict=True)):
-        first = POSE * len(poses) + 2 + 6 * k
+        first = POSE * len(poses) + COMMON + 6 * k
         out[first : first + 3] = Rotation.from_matrix(now.axes.T @ before.placed.axes).as_rotvec()
         out[first + 3 : first + 6] = now.origin - before.placed.origin
     return out
@@ -234,11 +238,12 @@ def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float) -> Float:
         own = inverse[np.ix_(columns, columns)]
         _, number = np.unique(one.group, return_inverse=True)
         sums = np.column_stack([np.bincount(number, score[:, k]) for k in range(score.shape[1])])
+        together = np.column_stack([np.bincount(number, (weighted[:, k] * one.shared)) for k in range(score.shape[1])])
         for group in range(len(sums)):
             mine = number == group
             leverage = weighted[mine].T @ design[mine] @ own
             sums[group] = np.linalg.solve(np.eye(len(columns)) - leverage, sums[group])
-        middle[np.ix_(columns, columns)] += sums.T @ sums
+        middle[np.ix_(columns, columns)] += sums.T @ sums + together.T @ together
     unknown = _inverse(normal + precision, UNKNOWN) - inverse
     return np.asarray(inverse @ middle @ inverse + unknown)
 

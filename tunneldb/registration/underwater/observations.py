@@ -19,6 +19,8 @@ POSE = 7  # parameters of a pose
 RANGE_NOISE = 0.015  # m, of a BV5000 (Moisan et al., 2015, section 3)
 BEAM = np.radians(1.0)  # width of a beam there
 BEAM_SIGMA = BEAM / np.sqrt(12.0)  # an echo comes from anywhere in it
+SHARED = 0.002  # m: of a stretch of wall or bed, by relief and slanting beams
+BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: those that hear it overlap
 FACING = 0.9  # least cosine between the normals of what is compared
 WALL_DEPTH = 3.0  # m below the water
 WALL_TOP = 0.05  # below the water, m: nearer to it, echoes by way of the surface mix in
@@ -64,6 +66,8 @@ class Rows:
     columns : (c,) int64 array
     group : (n,) int64 array
         Rows of one group err together.
+    shared : (n,) float64 array
+        Standard deviation of what they have in common, m.
     kind, name : str
     """
 
@@ -76,6 +80,7 @@ class Rows:
     common: Float
     columns: Int64
     group: Int64
+    shared: Float
     kind: str
     name: str
 
@@ -150,16 +155,27 @@ def wall_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, first_colum
         if rows.any():
             out.append(
                 Rows(off[rows], sigma[rows], pose_derivatives(centre[rows], pose, normal[rows]), scan, None, None,
-                     batter[rows, None], np.array([first_column + side]), piece[rows] // 4, "wall", "left" if side else "right")
+                     batter[rows, None], np.array([first_column + side]), piece[rows] // 4,
+                     np.full(int(rows.sum()), SHARED), "wall", "left" if side else "right")
             )  # fmt: skip
     return out
 
 
-def ladder_rows(points: Float, pose: Pose, placed: PlacedLadder, scan: int, first_column: int, within: float) -> Rows | None:
+def ladder_rows(
+    points: Float,
+    pose: Pose,
+    placed: PlacedLadder,
+    depth: float,
+    scan: int,
+    columns: tuple[int, int],
+    within: float,
+) -> Rows | None:
     """Distances of a scan's points (n, 3), file's axes, from a ladder's axes below the water, across and along the beam.
 
-    Common parameters from ``first_column`` on: the ladder's turn and shift.
+    A sonar hears the near surface of a bar, or a little behind it, ``depth`` m. ``columns`` are the places among the common
+    parameters of that depth, and of the first of the ladder's turn and shift.
     """
+    depth_column, first_column = columns
     space = pose.apply(points)
     own = placed.to_ladder(space)
     ladder = placed.ladder
@@ -176,8 +192,7 @@ def ladder_rows(points: Float, pose: Pose, placed: PlacedLadder, scan: int, firs
     ray = ray - (ray * axis).sum(axis=1)[:, None] * axis
     ray /= np.linalg.norm(ray, axis=1)[:, None]
     side = np.cross(axis, ray)
-    # A sonar sees the near surface; a beam between two rungs or beside a stile takes its echo from the nearest of them.
-    vector = away @ placed.axes + ladder.diameter / 2.0 * ray
+    vector = away @ placed.axes + (ladder.diameter / 2.0 - depth) * ray
     along, across = (vector * ray).sum(axis=1), (vector * side).sum(axis=1)
     sigma_along = np.full(len(own), np.hypot(RANGE_NOISE, 0.005))
     sigma_across = np.hypot(BEAM_SIGMA * reach, 0.005)
@@ -185,18 +200,18 @@ def ladder_rows(points: Float, pose: Pose, placed: PlacedLadder, scan: int, firs
     if near.sum() < 30:
         return None
     arm = space[near] - placed.origin
-    rows = []
-    for direction in (ray[near], side[near]):
-        poses = pose_derivatives(space[near], pose, direction)
-        rows.append((poses, -np.hstack([np.cross(arm, direction), direction])))
+    poses, common = [], []
+    for direction, behind in ((ray[near], -1.0), (side[near], 0.0)):
+        poses.append(pose_derivatives(space[near], pose, direction))
+        common.append(np.hstack([np.full((len(arm), 1), behind), -np.cross(arm, direction), -direction]))
+    bar = which[near]
     return Rows(
         np.concatenate([along[near], across[near]]),
         np.concatenate([sigma_along[near], sigma_across[near]]),
-        np.vstack([rows[0][0], rows[1][0]]),
-        scan, None, None,
-        np.vstack([rows[0][1], rows[1][1]]),
-        first_column + np.arange(6),
-        np.tile(which[near], 2),
+        np.vstack(poses), scan, None, None, np.vstack(common),
+        np.concatenate([[depth_column], first_column + np.arange(6)]),
+        np.concatenate([bar, bar + 1000]),
+        np.concatenate([np.full(len(bar), SHARED), sigma_across[near] / np.sqrt(BARS_BEAMS)]),
         "ladder", ladder.name,
     )  # fmt: skip
 
@@ -225,5 +240,6 @@ def overlap_rows(one: Patches, other: Patches, poses: tuple[Pose, Pose], scans: 
     return Rows(
         residual, sigma, pose_derivatives(place[i], first, mean), scans[0], scans[1],
         -pose_derivatives(beside[k], second, mean), np.zeros((len(i), 0)), np.zeros(0, np.int64),
-        np.floor(place[i, 0] / 2.0).astype(np.int64) * 1000 + np.floor(place[i, 1] / 2.0).astype(np.int64), "scan", "",
+        np.floor(place[i, 0] / 2.0).astype(np.int64) * 1000 + np.floor(place[i, 1] / 2.0).astype(np.int64),
+        np.full(len(i), SHARED), "scan", "",
     )  # fmt: skip
