@@ -11,6 +11,7 @@ import psycopg
 import pytest
 import shapely
 from psycopg import sql
+from support.example_sonar import save_example_registration
 from support.example_structures import save_example_structures
 from support.queue_rows import add_file, add_goal, add_job, add_worker
 from support.system import missing
@@ -100,6 +101,7 @@ def test_every_view_begins_with_a_stable_integer_key(
 ) -> None:
     conn.execute("UPDATE tunnel.scan_file SET unposed = 3")  # a remark
     save_example_structures(conn, "demo-2024")
+    save_example_registration(conn, "demo-2024")
     for view in views(conn):
         with conn.cursor() as cursor:
             cursor.execute(sql.SQL("SELECT * FROM tunnel_api.{}").format(sql.Identifier(view)))

@@ -28,7 +28,7 @@ from tunneldb.registration.underwater.observations import (
 from tunneldb.registration.underwater.walls import Walls
 
 SCALE_SIGMA = 0.01  # of the range scale before anything is known: 15 m/s of 1480
-BATTER_SIGMA = 0.03  # of the change of batter at the water
+BATTER_SIGMA = 0.01  # of the change of batter at the water
 DEPTH_SHARE = 0.25  # of a bar's radius by which its echo may come from behind its near surface
 COMMON = 3  # parameters common to all scans but for the ladders: two batters and that depth
 LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
@@ -230,20 +230,26 @@ def _moved(pose: Pose, change: Float) -> Pose:
 def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float) -> Float:
     """Covariance of all parameters, by the spread of the groups' sums, each as if it had not been adjusted to."""
     inverse = _inverse(normal + precision, 0.0)
-    middle = precision.copy()
-    for one in rows:
+    keys, sums = [], []
+    for place, one in enumerate(rows):
         design, columns = _design(one)
         weighted = design * weights_of(one)[:, None]
         score = weighted * one.residual[:, None]
         own = inverse[np.ix_(columns, columns)]
-        _, number = np.unique(one.group, return_inverse=True)
-        sums = np.column_stack([np.bincount(number, score[:, k]) for k in range(score.shape[1])])
-        together = np.column_stack([np.bincount(number, (weighted[:, k] * one.shared)) for k in range(score.shape[1])])
-        for group in range(len(sums)):
+        names, number = np.unique(one.group, return_inverse=True)
+        for group, name in enumerate(names):
             mine = number == group
             leverage = weighted[mine].T @ design[mine] @ own
-            sums[group] = np.linalg.solve(np.eye(len(columns)) - leverage, sums[group])
-        middle[np.ix_(columns, columns)] += sums.T @ sums + together.T @ together
+            scores = np.zeros((2, len(normal)))
+            scores[0, columns] = np.linalg.solve(np.eye(len(columns)) - leverage, score[mine].sum(axis=0))
+            scores[1, columns] = weighted[mine].T @ one.shared[mine]
+            keys.append((0 if one.kind == "wall" else place + 1, int(name)))
+            sums.append(scores)
+    order = {key: k for k, key in enumerate(dict.fromkeys(keys))}
+    total = np.zeros((len(order), 2, len(normal)))
+    np.add.at(total, [order[key] for key in keys], np.array(sums).reshape(-1, 2, len(normal)))
+    flat = total.reshape(-1, len(normal))
+    middle = precision + flat.T @ flat
     unknown = _inverse(normal + precision, UNKNOWN) - inverse
     return np.asarray(inverse @ middle @ inverse + unknown)
 

@@ -19,6 +19,7 @@ POSE = 7  # parameters of a pose
 RANGE_NOISE = 0.015  # m, of a BV5000 (Moisan et al., 2015, section 3)
 BEAM = np.radians(1.0)  # width of a beam there
 BEAM_SIGMA = BEAM / np.sqrt(12.0)  # an echo comes from anywhere in it
+STRETCH = 2.0  # m of wall: its relief is the same for all scans
 SHARED = 0.002  # m: of a stretch of wall or bed, by relief and slanting beams
 BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: those that hear it overlap
 FACING = 0.9  # least cosine between the normals of what is compared
@@ -65,7 +66,7 @@ class Rows:
         Derivatives by the parameters ``columns`` that are common to all scans.
     columns : (c,) int64 array
     group : (n,) int64 array
-        Rows of one group err together.
+        Rows of one group err together; those of walls also with the rows of other scans.
     shared : (n,) float64 array
         Standard deviation of what they have in common, m.
     kind, name : str
@@ -149,13 +150,14 @@ def wall_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, first_colum
         + (walls.sigma_batter[piece] * centre[:, 2]) ** 2
     )
     batter = centre[:, 2] / np.sqrt(1.0 + walls.batter[piece] ** 2)
+    stretch = cell_keys(np.where([True, True, False], walls.foot[piece], 0.0), STRETCH)
     out = []
     for side in (0, 1):
         rows = walls.side[piece] == side
         if rows.any():
             out.append(
                 Rows(off[rows], sigma[rows], pose_derivatives(centre[rows], pose, normal[rows]), scan, None, None,
-                     batter[rows, None], np.array([first_column + side]), piece[rows] // 4,
+                     batter[rows, None], np.array([first_column + side]), stretch[rows],
                      np.full(int(rows.sum()), SHARED), "wall", "left" if side else "right")
             )  # fmt: skip
     return out

@@ -1,0 +1,163 @@
+"""Pose of a sonar scan by itself: from the ladders that it sees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunneldb.arrays import Float
+from tunneldb.errors import UserError
+from tunneldb.registration.underwater.adjustment import adjust, scan_of
+from tunneldb.registration.underwater.choice import DECIDED, explained, margin
+from tunneldb.registration.underwater.first_pose import Candidate, LevelScan, candidates, level, likeness
+from tunneldb.registration.underwater.laser_ladders import LaserLadder
+from tunneldb.registration.underwater.observations import Patches, Pose, find_patches
+from tunneldb.registration.underwater.results import SonarCloud
+from tunneldb.registration.underwater.walls import Walls
+
+HEIGHT_TOLERANCE = 0.45  # between the top of a scan's walls and the water, m
+TRIED = 8  # candidates of a scan that are fitted
+TRIED_POINTS = 60_000
+FIRST_REACHES = (0.35, 0.25, 0.2, 0.15, 0.12)
+LEAST_LIKENESS = 0.35  # of a ladder that is taken for one
+TIE = 0.92  # of the best likelihood, from which rungs are not told apart
+WATERLINE_SIGMA = 0.15  # of the top of a scan's walls, m
+SAME_PLACE, SAME_TURN = 0.15, np.radians(3.0)  # of two candidates that came to the same pose
+AIR, MOST_IN_AIR = 0.2, 0.25  # above the water, m: share of a scan that echoes by way of the surface may put there
+FARTHEST_LADDER = 12.0  # m from the scanner
+
+
+@dataclass(frozen=True)
+class PreparedScan:
+    """A scan, level and thinned.
+
+    Attributes
+    ----------
+    cloud : SonarCloud
+    flat : LevelScan
+    thin : (n, 3) float64 array
+        Some of its points, evenly, file's axes.
+    patches : Patches
+        Of all of its points.
+    """
+
+    cloud: SonarCloud
+    flat: LevelScan
+    thin: Float
+    patches: Patches
+
+
+@dataclass(frozen=True)
+class StartedScan:
+    """A scan's first pose, and the ladders that it sees, by their places in the list of those found."""
+
+    pose: Pose
+    ladders: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """A fitted candidate: the ladders that it sees, how like ladders they look, how well its points are explained (n,)."""
+
+    pose: Pose
+    ladders: tuple[int, ...]
+    likeness: float
+    explained: Float
+
+    def likelihood(self, top: float) -> float:
+        """Likeness, the less the farther the water is from the top ``top`` of the scan's walls above the sonar, m."""
+        return self.likeness * float(np.exp(-0.5 * ((self.pose.translation[2] + top) / WATERLINE_SIGMA) ** 2))
+
+
+def prepare(cloud: SonarCloud, walls: Walls) -> PreparedScan:
+    """Level a scan and find its patches.
+
+    Raises
+    ------
+    UserError
+        It shows no two walls as far apart as the laser's.
+    """
+    every = max(1, len(cloud.points) // TRIED_POINTS)
+    return PreparedScan(cloud, level(cloud.points, cloud.up, walls.width()), cloud.points[::every], find_patches(cloud.points))
+
+
+def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> StartedScan | None:
+    """Most likely pose of a scan by itself; None if no ladder is seen, or more than one pose fits as well.
+
+    Raises
+    ------
+    UserError
+        It is upside down.
+    """
+    cloud, flat, thin = scan.cloud, scan.flat, scan.thin
+    placed = [one.placed for one in found]
+    tried = candidates(flat, walls, placed, HEIGHT_TOLERANCE)[:TRIED]
+    patches = find_patches(thin)
+    fitted = [one for one in (_try(thin, patches, one, walls, found) for one in tried) if one.ladders]
+    if not fitted:
+        return None
+    best = _best(thin, fitted)
+    high = float((best.pose.apply(thin)[:, 2] > AIR).mean())
+    if high > MOST_IN_AIR:
+        raise UserError(f"{cloud.path}: {100.0 * high:.0f} % of its points would lie above the water: is --up right?")
+    for other in fitted:
+        if _same(best.pose, other.pose):
+            continue
+        if _same_place(best.pose, other.pose):
+            told = other.likelihood(flat.top) < TIE * best.likelihood(flat.top)
+        else:
+            told = margin(thin, best.explained, other.explained) > DECIDED
+        if not told:
+            return None
+    return StartedScan(best.pose, best.ladders)
+
+
+def _best(points: Float, fitted: Sequence[_Fitted]) -> _Fitted:
+    """Likeliest pose: of those a rung apart the one under which the ladders look most like ladders.
+
+    Of those at other places or turned the other way it is the one that explains more of the points; that says nothing of
+    rungs, for a wall is as good a wall a rung lower.
+    """
+    leaders: list[_Fitted] = []
+    for one in sorted(fitted, key=lambda one: -one.likeness):
+        if not any(_same_place(one.pose, other.pose) for other in leaders):
+            leaders.append(one)
+    return max(leaders, key=lambda one: float(one.explained.sum()))
+
+
+def _try(points: Float, patches: Patches, candidate: Candidate, walls: Walls, found: Sequence[LaserLadder]) -> _Fitted:
+    """Fit a candidate, and tell how like the ladders look then."""
+    pose = Pose(candidate.rotation, candidate.translation, 1.0)
+    first = tuple(k for k, one in enumerate(found) if one.placed.ladder.name == candidate.ladder)
+    pose = adjust([scan_of(points, patches, pose, first, found)], walls, found, [], FIRST_REACHES).poses[0]
+    near = _near(pose, found)
+    pose = adjust([scan_of(points, patches, pose, near, found)], walls, found, [], FIRST_REACHES[-3:]).poses[0]
+    likenesses = [(likeness(pose.apply(points), pose.translation, found[k].placed), k) for k in near]
+    seen = tuple(k for value, k in likenesses if value > LEAST_LIKENESS)
+    alike = sum(value for value, k in likenesses if value > LEAST_LIKENESS or k in first)
+    return _Fitted(pose, seen, alike, explained(points, pose, walls, [found[k].placed for k in near]))
+
+
+def _same(one: Pose, other: Pose) -> bool:
+    turn = np.arccos(np.clip((np.trace(one.rotation @ other.rotation.T) - 1.0) / 2.0, -1.0, 1.0))
+    return bool(np.linalg.norm(one.translation - other.translation) < SAME_PLACE and turn < SAME_TURN)
+
+
+def _same_place(one: Pose, other: Pose) -> bool:
+    """Whether two poses are the same but for the height."""
+    return _same(one, Pose(other.rotation, np.array([*other.translation[:2], one.translation[2]]), other.scale))
+
+
+def sees(scan: PreparedScan, pose: Pose, found: Sequence[LaserLadder]) -> tuple[int, ...]:
+    """Which ladders a scan with this pose sees."""
+    near = _near(pose, found)
+    placed = pose.apply(scan.thin)
+    return tuple(k for k in near if likeness(placed, pose.translation, found[k].placed) > LEAST_LIKENESS)
+
+
+def _near(pose: Pose, found: Sequence[LaserLadder]) -> tuple[int, ...]:
+    return tuple(
+        k for k, one in enumerate(found) if np.linalg.norm(one.placed.origin[:2] - pose.translation[:2]) < FARTHEST_LADDER
+    )
