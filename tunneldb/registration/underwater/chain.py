@@ -21,11 +21,12 @@ OVERLAP = 15.0  # m between scanners whose scans are compared
 PIXEL = 0.1  # m
 REACH = 10.0  # m along, from a scanner
 MARGIN = 0.3  # m from the walls
-FINE = 1.0  # m: relief that is wider says nothing of the place
+FINE = 2.5  # m: relief that is wider says nothing of the place
 STEPS = 0.6  # m: farther from the bed's height are objects and false echoes
-LEAST_CELLS = 300  # that both scans must see
-LEAST_ALIKE = 0.4
-TIE = 0.9
+LEAST_CELLS = 500  # that both scans must see
+PATCH_AREA = 1.0  # m²: of bed whose relief is one observation
+SURE = 2.2  # standard deviations by which beds are alike, and more alike than elsewhere
+AHEAD = 1.0
 REACHES = (0.3, 0.25, 0.2, 0.15, *[0.1] * 8)
 AGREEING = 0.02  # m: median distance of patches that show the same
 LEAST_SHARED = 60  # patches
@@ -56,11 +57,11 @@ def place_beside(
             if pose is not None:
                 tried.append((alike, k, pose))
     tried.sort(key=lambda one: -one[0])
-    if not tried or tried[0][0] < LEAST_ALIKE:
+    if not tried or tried[0][0] < SURE:
         return None
     alike, k, pose = tried[0]
     own = [value for value, _, other in tried[1:] if np.linalg.norm(other.translation - pose.translation) > 1.0]
-    if own and own[0] > TIE * alike:
+    if own and own[0] > alike - AHEAD:
         return None
     both = [
         scan_of(scans[k].thin, scans[k].patches, started[k].pose, started[k].ladders, found),
@@ -79,7 +80,7 @@ def _agree(rows: Sequence[Rows]) -> bool:
 
 
 def _candidate(flat: LevelScan, beside: PreparedScan, known: Pose, walls: Walls, flip: bool) -> tuple[Pose | None, float]:
-    """Pose of a level scan at which its bed looks most like that of a known one, and how alike (-1 to 1)."""
+    """Pose of a level scan at which its bed looks most like that of a known one, and how alike, in standard deviations."""
     _, piece = walls.tree.query(known.translation[:2])
     normal = walls.normal[piece]
     basis = np.column_stack([[normal[1], -normal[0], 0.0], [*normal, 0.0], [0.0, 0.0, 1.0]])
@@ -126,7 +127,11 @@ def _relief(points: Float, middle: float, width: float) -> _Relief | None:
 
 
 def _correlate(mine: _Relief, theirs: _Relief) -> tuple[float, int]:
-    """Best normalised correlation over shifts along, by masks (Padfield, 2012), and the shift in pixels."""
+    """Significance of the best correlation over shifts along, and the shift in pixels.
+
+    Correlation of masked images (Padfield, 2012), in standard deviations by Fisher's transform: much bed that is somewhat alike
+    says more than little that is very alike.
+    """
 
     def over(one: Float, other: Float) -> Float:
         # shifts along only: the walls have settled those across
@@ -135,7 +140,9 @@ def _correlate(mine: _Relief, theirs: _Relief) -> tuple[float, int]:
     shared = over(theirs.seen, mine.seen)
     product = over(theirs.fine, mine.fine)
     theirs_square, mine_square = over(theirs.fine**2, mine.seen), over(theirs.seen, mine.fine**2)
-    alike = np.where(shared > LEAST_CELLS, product / np.sqrt(np.maximum(theirs_square * mine_square, 1e-12)), -1.0)
+    correlation = np.clip(product / np.sqrt(np.maximum(theirs_square * mine_square, 1e-12)), -0.99, 0.99)
+    observations = np.maximum(shared * PIXEL**2 / PATCH_AREA - 3.0, 0.0)
+    alike = np.where(shared > LEAST_CELLS, np.arctanh(correlation) * np.sqrt(observations), -1.0)
     k = int(np.argmax(alike))
     return float(alike[k]), k - (mine.seen.shape[0] - 1)
 
