@@ -72,14 +72,14 @@ def upgrade() -> None:
         "registration_residual",
         sa.Column("id", sa.BigInteger(), sa.Identity(always=True), nullable=False, comment="Key"),
         sa.Column("scan_id", sa.BigInteger(), nullable=False, comment="Sonar scan"),
-        sa.Column("kind", sa.Text(), nullable=False, comment="wall, ladder or scan (where two sonar scans overlap)"),
+        sa.Column("kind", sa.Text(), nullable=False, comment="wall, ladder, waterline or scan (where two sonar scans overlap)"),
         sa.Column(
             "name", sa.Text(), nullable=False, comment="Side of the wall, name of the ladder or of the other scan's file"
         ),
         sa.Column("count", sa.Integer(), nullable=False, comment="Patches or points that were compared"),
         sa.Column("median", sa.Double(), nullable=False, comment="Median of the absolute distances, m"),
         sa.Column("p95", sa.Double(), nullable=False, comment="Of which 95 % are no more, m"),
-        sa.CheckConstraint("kind IN ('wall', 'ladder', 'scan')", name=op.f("registration_residual_kind_check")),
+        sa.CheckConstraint("kind IN ('wall', 'ladder', 'waterline', 'scan')", name=op.f("registration_residual_kind_check")),
         sa.ForeignKeyConstraint(
             ["scan_id"], ["tunnel.sonar_scan.id"], name=op.f("registration_residual_scan_id_fkey"), ondelete="CASCADE"
         ),

@@ -71,7 +71,7 @@ def test_poses_are_told_stored_and_shown(canal: tuple[Path, list[Sonar]], conn: 
         assert row[6] == pytest.approx(np.sqrt(scan["covariance"][5][5]))
         assert row[7] == LEVEL
     residuals = conn.execute("SELECT DISTINCT scan, kind FROM tunnel_api.registration_residual").fetchall()
-    assert set(residuals) == {(name, kind) for name in ("s0.xyz", "s1.xyz") for kind in ("wall", "ladder", "scan")}
+    assert set(residuals) == {(name, kind) for name in ("s0.xyz", "s1.xyz") for kind in ("wall", "ladder", "waterline", "scan")}
     assert conn.execute("SELECT array_agg(name ORDER BY name) FROM tunnel_api.ladder").fetchone() == (["L0", "L1"],)
     assert conn.execute("SELECT count(*), sum(ST_Z(geom)) FROM tunnel.point").fetchone() == before
     conn.rollback()

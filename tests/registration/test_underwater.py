@@ -60,7 +60,7 @@ def test_points_of_all_scans_come_to_where_they_were_measured(scene: Scene, foun
         assert turn_between(pose, scan) < 0.3
         assert abs(pose.scale / scan.scale - 1.0) < 0.001
         assert pose.state == "determined", pose.undetermined
-        assert {one.kind for one in pose.residuals} == {"wall", "ladder", "scan"}
+        assert {one.kind for one in pose.residuals} == {"wall", "ladder", "waterline", "scan"}
 
 
 def test_stated_deviations_are_of_the_size_of_the_errors(scene: Scene, found: Registration) -> None:

@@ -45,14 +45,14 @@ class RegistrationResidual(Base):
 
     __tablename__ = "registration_residual"
     __table_args__ = (
-        one_of("kind", "wall", "ladder", "scan"),
+        one_of("kind", "wall", "ladder", "waterline", "scan"),
         Index(None, "scan_id"),
         {"comment": "What is left between sonar scans and what they were fitted to"},
     )
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     scan_id: Mapped[int] = mapped_column(parent("sonar_scan"), comment="Sonar scan")
-    kind: Mapped[str] = mapped_column(comment="wall, ladder or scan (where two sonar scans overlap)")
+    kind: Mapped[str] = mapped_column(comment="wall, ladder, waterline or scan (where two sonar scans overlap)")
     name: Mapped[str] = mapped_column(comment="Side of the wall, name of the ladder or of the other scan's file")
     count: Mapped[int] = mapped_column(comment="Patches or points that were compared")
     median: Mapped[float] = mapped_column(comment="Median of the absolute distances, m")

@@ -24,13 +24,15 @@ from tunneldb.registration.underwater.observations import (
     ladder_rows,
     overlap_rows,
     wall_rows,
+    waterline_rows,
 )
 from tunneldb.registration.underwater.walls import Walls
 
 SCALE_SIGMA = 0.01  # of the range scale before anything is known: 15 m/s of 1480
 BATTER_SIGMA = 0.01  # of the change of batter at the water
 DEPTH_SHARE = 0.25  # of a bar's radius by which its echo may come from behind its near surface
-COMMON = 3  # parameters common to all scans but for the ladders: two batters and that depth
+WATERLINE_SIGMA = 0.03  # m: of what edges of walls have in common, by which they lie above or below the water
+COMMON = 4  # parameters common to all scans but for the ladders: two batters, that depth, and that of the waterline
 LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
 CUT = 3.0  # standard deviations at which a row has a quarter of its weight
 REACHES = (0.3, 0.2, 0.15, 0.12, *[0.1] * 30)  # within which rows are sought, round by round, m
@@ -47,17 +49,22 @@ class Scan:
     Attributes
     ----------
     patches : Patches
+    edges : (k, 3) float64 array
+        Where its walls end, at the water's level, file's axes.
     pose : Pose
     ladders : mapping of int to (n, 3) float64 array
         Points about each of the ladders that it sees, file's axes.
     """
 
     patches: Patches
+    edges: Float
     pose: Pose
     ladders: Mapping[int, Float]
 
 
-def scan_of(points: Float, patches: Patches, pose: Pose, ladders: Iterable[int], found: Sequence[LaserLadder]) -> Scan:
+def scan_of(
+    points: Float, patches: Patches, edges: Float, pose: Pose, ladders: Iterable[int], found: Sequence[LaserLadder]
+) -> Scan:
     """Keep of a scan's points (n, 3) those about some of the ladders found."""
     space = pose.apply(points)
     near = {}
@@ -66,7 +73,7 @@ def scan_of(points: Float, patches: Patches, pose: Pose, ladders: Iterable[int],
         own = placed.to_ladder(space)
         half = placed.gap / 2.0 + SURROUNDINGS
         near[k] = points[(np.abs(own[:, 0]) < half) & (np.abs(own[:, 2]) < SURROUNDINGS)]
-    return Scan(patches, pose, near)
+    return Scan(patches, edges, pose, near)
 
 
 @dataclass(frozen=True)
@@ -107,13 +114,13 @@ def adjust(
     poses = [scan.pose for scan in scans]
     placed = [ladder.placed for ladder in ladders]
     count = POSE * len(scans) + COMMON + 6 * len(ladders)
-    common = np.zeros(COMMON)  # changes of batter of either side, and depth behind a bar's near surface
+    common = np.zeros(COMMON)  # changes of batter of either side, depth behind a bar's near surface, height of the waterline
     radius = max((ladder.placed.ladder.diameter / 2.0 for ladder in ladders), default=0.0)
     precision = _prior(len(scans), ladders, radius)
     normal, rows = np.eye(count), []
     for reach in reaches:
         leaning = replace(walls, batter=walls.batter + common[walls.side])
-        rows = _all_rows(scans, poses, leaning, placed, float(common[2]), pairs, reach)
+        rows = _all_rows(scans, poses, leaning, placed, common, pairs, reach)
         normal, right = _normal_equations(rows, count)
         offset = _prior_offset(poses, placed, ladders, common)
         change = -_inverse(normal + precision, 0.0) @ (right + precision @ offset)
@@ -142,7 +149,7 @@ def _all_rows(
     poses: Sequence[Pose],
     walls: Walls,
     placed: Sequence[PlacedLadder],
-    depth: float,
+    common: Float,
     pairs: Sequence[tuple[int, int]],
     reach: float,
 ) -> list[Rows]:
@@ -151,8 +158,10 @@ def _all_rows(
     for i, scan in enumerate(scans):
         rows += wall_rows(scan.patches, poses[i], walls, i, first, reach)
         for k, points in scan.ladders.items():
-            found = ladder_rows(points, poses[i], placed[k], depth, i, (first + 2, first + COMMON + 6 * k), reach)
+            found = ladder_rows(points, poses[i], placed[k], float(common[2]), i, (first + 2, first + COMMON + 6 * k), reach)
             rows += [found] if found is not None else []
+        found = waterline_rows(scan.edges, poses[i], float(common[3]), i, first + 3)
+        rows += [found] if found is not None else []
     for i, j in pairs:
         found = overlap_rows(scans[i].patches, scans[j].patches, (poses[i], poses[j]), (i, j), reach)
         rows += [found] if found is not None else []
@@ -199,7 +208,12 @@ def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
     """Precision of what is known beforehand: scales, batters, ladders."""
     sigma = np.full(POSE * scans + COMMON + 6 * len(ladders), np.inf)
     sigma[POSE - 1 : POSE * scans : POSE] = SCALE_SIGMA
-    sigma[POSE * scans : POSE * scans + COMMON] = BATTER_SIGMA, BATTER_SIGMA, max(DEPTH_SHARE * radius, 1e-4)
+    sigma[POSE * scans : POSE * scans + COMMON] = (
+        BATTER_SIGMA,
+        BATTER_SIGMA,
+        max(DEPTH_SHARE * radius, 1e-4),
+        WATERLINE_SIGMA,
+    )
     for k, ladder in enumerate(ladders):
         first = POSE * scans + COMMON + 6 * k
         own = np.sqrt(np.diag(ladder.covariance)[:6])

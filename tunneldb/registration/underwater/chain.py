@@ -64,8 +64,8 @@ def place_beside(
     if own and own[0] > alike - AHEAD:
         return None
     both = [
-        scan_of(scans[k].thin, scans[k].patches, started[k].pose, started[k].ladders, found),
-        scan_of(scans[i].thin, scans[i].patches, pose, (), found),
+        scan_of(scans[k].thin, scans[k].patches, scans[k].edges, started[k].pose, started[k].ladders, found),
+        scan_of(scans[i].thin, scans[i].patches, scans[i].edges, pose, (), found),
     ]
     adjusted = adjust(both, walls, found, [(0, 1)], REACHES)
     if not _agree(adjusted.rows):

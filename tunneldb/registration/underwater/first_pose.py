@@ -14,11 +14,11 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 from scipy.signal import fftconvolve
 
-from tunneldb.arrays import Bool, Float
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.ladder_shape import PlacedLadder
-from tunneldb.registration.underwater.observations import BEAM
 from tunneldb.registration.underwater.walls import Walls
+from tunneldb.registration.underwater.waterline import find_waterline
 from tunneldb.robust import MAD_TO_SIGMA
 
 NEAR = 12.0  # m from the scanner
@@ -32,6 +32,7 @@ SLAB = 0.15  # before and behind the ladder's plane, m
 STEEPEST_TILT = np.radians(15.0)
 PEAKS = 4  # of each ladder and half turn
 LEVEL_ROUNDS = 3
+HIGHEST = 95.0  # percentile of heights
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,10 @@ class LevelScan:
         Turned.
     bed : float
         Median height of the bed, m.
+    edges : (k, 3) float64 array
+        Where its walls end, at the water's level; see `find_waterline`.
     top : float
-        Height up to which walls are seen, about the water's, m.
+        Their height, m, or that of its highest points where there are none.
     """
 
     rotation: Float
@@ -59,6 +62,7 @@ class LevelScan:
     slopes: tuple[float, float]
     points: Float
     bed: float
+    edges: Float
     top: float
 
 
@@ -104,7 +108,9 @@ def level(points: Float, up: int, width: float) -> LevelScan:
     turned = points @ rotation.T
     if np.degrees(np.arccos(np.clip(rotation[2, 2] * up, -1.0, 1.0))) > np.degrees(STEEPEST_TILT):
         raise UserError("the scan lies more than 15° from level: is --up right?")
-    return LevelScan(rotation, (low, high), slopes, turned, bed, _wall_top(turned, (low, high), slopes))
+    edges = find_waterline(turned, (low, high), slopes)
+    top = float(np.median(edges[:, 2])) if len(edges) else float(np.percentile(turned[:, 2], HIGHEST))
+    return LevelScan(rotation, (low, high), slopes, turned, bed, edges, top)
 
 
 def _about_z(angle: float) -> Float:
@@ -168,31 +174,6 @@ def _bed_slope(points: Float, low: float, high: float) -> tuple[float, float]:
         design = np.column_stack([np.ones(len(centre)), centre])
         middle, slope = np.linalg.lstsq(design * np.sqrt(weight)[:, None], low_of * np.sqrt(weight), rcond=None)[0]
     return float(slope), float(middle)
-
-
-def _on_walls(points: Float, places: tuple[float, float], slopes: tuple[float, float], within: float) -> Bool:
-    out = np.zeros(len(points), np.bool_)
-    for place, slope in zip(places, slopes, strict=True):
-        out |= np.abs(points[:, 1] - place - slope * points[:, 2]) < within
-    return out
-
-
-def _wall_top(points: Float, places: tuple[float, float], slopes: tuple[float, float]) -> float:
-    """Height at which points on the walls become few: what lies above the water's level are false echoes."""
-    wall = points[_on_walls(points, places, slopes, 0.1)]
-    along = np.abs(wall[:, 0])
-    wall = wall[(along > 3.0) & (along < 10.0)]
-    if len(wall) < 100:
-        return float(np.percentile(points[:, 2], 95))
-    # Each half metre along gives an edge of its own; a beam's width and the fan's end blur a single one.
-    height = np.arange(-4.0, 4.0, 0.05)
-    histogram = np.histogram(wall[:, 2], bins=height, weights=wall[:, 0] ** 2)[0]
-    smooth = np.convolve(histogram, np.ones(4) / 4.0, mode="same")
-    level_of = np.median(smooth[smooth > 0.2 * smooth.max()])
-    above = np.flatnonzero(smooth > 0.5 * level_of)
-    # A beam whose axis passes half its width above the edge still meets the wall below it.
-    spill = 0.5 * BEAM * float(np.median(np.linalg.norm(wall, axis=1)))
-    return float(height[above[-1]] + 0.05) - spill
 
 
 def candidates(scan: LevelScan, walls: Walls, ladders: Sequence[PlacedLadder], uncertain: float) -> list[Candidate]:

@@ -22,6 +22,8 @@ BEAM_SIGMA = BEAM / np.sqrt(12.0)  # an echo comes from anywhere in it
 STRETCH = 2.0  # m of wall: its relief is the same for all scans
 SHARED = 0.002  # m: of a stretch of wall or bed, by relief and slanting beams
 BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: those that hear it overlap
+WATERLINE_NOISE = 0.025  # m: half a bin, and half of what is left of half a beam
+WATERLINE_SHARED = 0.01  # m
 FACING = 0.9  # least cosine between the normals of what is compared
 WALL_DEPTH = 3.0  # m below the water
 WALL_TOP = 0.05  # below the water, m: nearer to it, echoes by way of the surface mix in
@@ -161,6 +163,19 @@ def wall_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, first_colum
                      np.full(int(rows.sum()), SHARED), "wall", "left" if side else "right")
             )  # fmt: skip
     return out
+
+
+def waterline_rows(edges: Float, pose: Pose, bias: float, scan: int, column: int) -> Rows | None:
+    """Heights of the edges (k, 3) of a scan's walls, file's axes, over the water; ``bias`` m is common to all scans."""
+    if len(edges) == 0:
+        return None
+    place = pose.apply(edges)
+    up = np.tile([0.0, 0.0, 1.0], (len(edges), 1))
+    return Rows(
+        place[:, 2] - bias, np.full(len(edges), WATERLINE_NOISE), pose_derivatives(place, pose, up), scan, None, None,
+        np.full((len(edges), 1), -1.0), np.array([column]), np.arange(len(edges)),
+        np.full(len(edges), WATERLINE_SHARED / np.sqrt(len(edges))), "waterline", "",
+    )  # fmt: skip
 
 
 def ladder_rows(

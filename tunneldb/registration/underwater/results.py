@@ -54,7 +54,7 @@ class Residual:
     Attributes
     ----------
     kind : str
-        ``wall``, ``ladder`` or ``scan`` (the overlap with another sonar scan).
+        ``wall``, ``ladder``, ``waterline`` or ``scan`` (the overlap with another sonar scan).
     name : str
         Which one: the ladder's name, the other scan's file, or the side of the wall.
     count : int

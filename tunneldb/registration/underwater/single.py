@@ -41,12 +41,15 @@ class PreparedScan:
         Some of its points, evenly, file's axes.
     patches : Patches
         Of all of its points.
+    edges : (k, 3) float64 array
+        Where its walls end, at the water's level, file's axes.
     """
 
     cloud: SonarCloud
     flat: LevelScan
     thin: Float
     patches: Patches
+    edges: Float
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,8 @@ def prepare(cloud: SonarCloud, walls: Walls) -> PreparedScan:
         It shows no two walls as far apart as the laser's.
     """
     every = max(1, len(cloud.points) // TRIED_POINTS)
-    return PreparedScan(cloud, level(cloud.points, cloud.up, walls.width()), cloud.points[::every], find_patches(cloud.points))
+    flat = level(cloud.points, cloud.up, walls.width())
+    return PreparedScan(cloud, flat, cloud.points[::every], find_patches(cloud.points), flat.edges @ flat.rotation)
 
 
 def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> StartedScan | None:
@@ -131,9 +135,10 @@ def _try(points: Float, patches: Patches, candidate: Candidate, walls: Walls, fo
     """Fit a candidate, and tell how like the ladders look then."""
     pose = Pose(candidate.rotation, candidate.translation, 1.0)
     first = tuple(k for k, one in enumerate(found) if one.placed.ladder.name == candidate.ladder)
-    pose = adjust([scan_of(points, patches, pose, first, found)], walls, found, [], FIRST_REACHES).poses[0]
+    no_edges = np.zeros((0, 3))  # the height is to come from the ladder alone, to be compared with the water's
+    pose = adjust([scan_of(points, patches, no_edges, pose, first, found)], walls, found, [], FIRST_REACHES).poses[0]
     near = _near(pose, found)
-    pose = adjust([scan_of(points, patches, pose, near, found)], walls, found, [], FIRST_REACHES[-3:]).poses[0]
+    pose = adjust([scan_of(points, patches, no_edges, pose, near, found)], walls, found, [], FIRST_REACHES[-3:]).poses[0]
     likenesses = [(likeness(pose.apply(points), pose.translation, found[k].placed), k) for k in near]
     seen = tuple(k for value, k in likenesses if value > LEAST_LIKENESS)
     alike = sum(value for value, k in likenesses if value > LEAST_LIKENESS or k in first)

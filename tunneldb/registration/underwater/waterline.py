@@ -1,0 +1,62 @@
+"""Where the walls of a sonar scan end: the water's level, seen from below.
+
+Above it a scan shows only echoes by way of the water's surface, which are fewer. Each metre of either wall gives an edge; a
+beam whose axis passes less than half its width above the edge still meets the wall, which is taken off.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tunneldb.arrays import Float
+
+STRIP = 1.0  # m along a wall
+NEAREST, FARTHEST = 2.0, 9.0  # m along, from the sonar
+THICK = 0.1  # of a wall, m
+BIN = 0.05  # m of height
+LEAST_POINTS = 60  # of a strip
+SMOOTH = 3  # bins
+FAN_MARGIN = np.radians(2.0)  # below the fan's upper end, nearer to which an edge may be that of the fan
+BEAM = np.radians(1.0)
+
+
+def find_waterline(points: Float, walls: tuple[float, float], slopes: tuple[float, float]) -> Float:
+    """Edges (k, 3) of the walls of a level scan (n, 3), in its axes: x along the canal, y across, z up.
+
+    Parameters
+    ----------
+    walls, slopes
+        Places y of the two walls at z = 0, and by how much y grows per metre of height.
+    """
+    reach = np.linalg.norm(points, axis=1)
+    elevation = points[:, 2] / np.maximum(reach, 1e-6)
+    fan = float(np.percentile(elevation[reach > 1.0], 99.8)) if (reach > 1.0).any() else 0.0
+    edges = []
+    for place, slope in zip(walls, slopes, strict=True):
+        wall = points[np.abs(points[:, 1] - place - slope * points[:, 2]) < THICK]
+        strip = np.floor(wall[:, 0] / STRIP).astype(np.int64)
+        for k in np.unique(strip):
+            middle = (k + 0.5) * STRIP
+            if not NEAREST < abs(middle) < FARTHEST:
+                continue
+            height = _edge(wall[strip == k, 2])
+            if height is None:
+                continue
+            y = place + slope * height
+            distance = float(np.linalg.norm([middle, y, height]))
+            if height / distance < np.sin(np.arcsin(np.clip(fan, -1.0, 1.0)) - FAN_MARGIN):
+                edges.append([middle, y, height - 0.5 * BEAM * distance])
+    return np.array(edges).reshape(-1, 3)
+
+
+def _edge(height: Float) -> float | None:
+    """Height above which a strip of wall has less than half as many points as below; None if it has no such edge."""
+    if len(height) < LEAST_POINTS:
+        return None
+    low = float(height.min())
+    histogram = np.bincount(((height - low) / BIN).astype(np.int64)).astype(np.float64)
+    smooth = np.convolve(histogram, np.ones(SMOOTH) / SMOOTH, mode="same")
+    usual = float(np.median(smooth[smooth > 0.2 * smooth.max()]))
+    above = np.flatnonzero(smooth > 0.5 * usual)
+    # between the last bin that has half of it and the next
+    return low + (float(above[-1]) + 1.0) * BIN
