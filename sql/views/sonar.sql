@@ -33,3 +33,52 @@ SELECT l.id, l.survey_id, s.name AS survey, l.name, l.origin, l.axes, l.rms, l.r
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id;
 COMMENT ON VIEW tunnel_api.ladder IS 'Ladders that stand in the water, as the laser sees them above it';
 COMMENT ON COLUMN tunnel_api.ladder.geom IS 'Its origin, in the tunnel''s SRID';
+
+CREATE OR REPLACE VIEW tunnel_api.sonar_point AS
+SELECT p.id, p.survey_id, p.km, p.scan_id, c.name AS scan, p.chainage, p.across, p.classification,
+       public.ST_Z(p.geom) - c.water_level AS over_water, p.geom::public.geometry(PointZ) AS geom
+  FROM tunnel.sonar_point p
+  JOIN tunnel.sonar_scan c ON c.id = p.scan_id;
+COMMENT ON VIEW tunnel_api.sonar_point IS 'Points of sonar scans in the tunnel, thinned and without false echoes';
+COMMENT ON COLUMN tunnel_api.sonar_point.scan IS 'Name of the sonar scan';
+COMMENT ON COLUMN tunnel_api.sonar_point.over_water IS 'Height above the water, m; below it less than 0';
+
+CREATE OR REPLACE VIEW tunnel_api.bed AS
+SELECT b.id, b.survey_id, s.name AS survey, b.km, b.n + 0.5::float8 AS chainage, (b.across_n + 0.5::float8) / 10 AS across, b.height, b.depth,
+       b.sigma, b.points
+  FROM tunnel.bed b
+  JOIN tunnel.survey s ON s.id = b.survey_id;
+COMMENT ON VIEW tunnel_api.bed IS
+    'The bed below the water in cells of 1 m along and 0.1 m across; cells that no sonar saw are not there. Of silt it is the top';
+COMMENT ON COLUMN tunnel_api.bed.chainage IS 'Chainage of the cell''s middle, m';
+COMMENT ON COLUMN tunnel_api.bed.across IS 'Place of the cell''s middle right of the given axis, m';
+
+CREATE OR REPLACE FUNCTION tunnel_api.depth(survey text, chainage float8, across float8, OUT depth float8, OUT sigma float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    SELECT b.depth, b.sigma
+      FROM tunnel.bed b
+      JOIN tunnel.survey s ON s.id = b.survey_id
+     WHERE s.name = $1 AND b.n = floor($2) AND b.across_n = floor($3 * 10)
+$$;
+COMMENT ON FUNCTION tunnel_api.depth(text, float8, float8) IS
+    'Depth of the water, m, over the cell of the bed at a chainage and a place right of the given axis, m, and its standard deviation; NULL where no sonar saw the bed';
+
+CREATE OR REPLACE FUNCTION tunnel_api.bed_volume(
+    survey text, chainage_from float8, chainage_to float8, height float8,
+    OUT above float8, OUT below float8, OUT sigma float8, OUT seen_area float8, OUT unseen_area float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    WITH cell AS (
+        SELECT b.n, b.across_n, b.height, b.sigma,
+               0.1 * (least($3, b.n + 1) - greatest($2, b.n)) AS area
+          FROM tunnel.bed b
+          JOIN tunnel.survey s ON s.id = b.survey_id
+         WHERE s.name = $1 AND b.n >= floor($2) AND b.n < $3),
+    width AS (
+        SELECT percentile_cont(0.95) WITHIN GROUP (ORDER BY span) AS span
+          FROM (SELECT 0.1 * (max(across_n) - min(across_n) + 1) AS span FROM cell GROUP BY n) metre)
+    SELECT sum(area * greatest(cell.height - $4, 0)), sum(area * greatest($4 - cell.height, 0)),
+           sum(area * cell.sigma), sum(area), greatest(max(width.span) * ($3 - $2) - sum(area), 0)
+      FROM cell, width
+$$;
+COMMENT ON FUNCTION tunnel_api.bed_volume(text, float8, float8, float8) IS
+    'Volume of the bed above a height (tunnel''s system, m) between two chainages, as silt above a design bed, and of the room below it, m³; its standard deviation if all cells err alike, as a pose does; the area seen, and that which no sonar saw, taken as wide as the bed mostly is, m²: nothing is said of the latter';

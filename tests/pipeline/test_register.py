@@ -9,7 +9,7 @@ import numpy as np
 import psycopg
 import pytest
 from click.testing import CliRunner, Result
-from support.canal_scene import LEVEL, Canal, Sonar
+from support.canal_scene import DEPTH, LEVEL, Canal, Sonar
 
 from tunneldb.cli.main import main
 
@@ -84,6 +84,59 @@ def test_poses_are_told_stored_and_shown(canal: tuple[Path, list[Sonar]], conn: 
     conn.rollback()
     command("survey", "remove", NAME, "--yes")
     assert conn.execute("SELECT count(*) FROM tunnel.sonar_scan").fetchone() == (0,)
+
+
+def test_points_are_loaded_with_their_poses_and_the_bed_is_where_it_is(
+    canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    folder, _ = canal
+    load(folder)
+    files = [folder / "s0.xyz", folder / "s1.xyz"]
+    before = conn.execute("SELECT count(*), sum(ST_Z(geom)), sum(chainage) FROM tunnel.point").fetchone()
+    conn.rollback()
+    register(folder)
+    told = json.loads(command("load", NAME, *files, "--json").stdout)["files"]
+    assert [(one["name"], one["state"]) for one in told] == [("s0.xyz", "loaded"), ("s1.xyz", "loaded")]
+    for one in told:
+        assert one["points"] == one["noise"] + one["outside"] + one["thinned"] + one["kept"]
+        assert 0.02 < one["noise"] / one["points"] < 0.06  # 3 % are false
+    assert conn.execute("SELECT count(*), sum(ST_Z(geom)), sum(chainage) FROM tunnel.point").fetchone() == before
+    scene = Canal(77)
+    rows = conn.execute("SELECT chainage, across, height, depth, sigma FROM tunnel_api.bed").fetchall()
+    chainage, across, height, depth, sigma = np.array(rows).T
+    # the axis begins at x = -30 of the scene; right of it is -y
+    x, y = chainage - 30.0, -across
+    near = (np.abs(x) < 6.0) & (np.abs(y) < 2.5)
+    error = height[near] - (LEVEL - DEPTH + scene.bed.at(x[near], y[near]))
+    assert np.median(np.abs(error)) < 0.02
+    assert np.percentile(np.abs(error), 95) < 0.06  # a metre along, over which the bed waves by that much
+    assert np.allclose(depth, LEVEL - height)
+    assert (sigma > 0.0).all()
+    assert near.sum() > 0.9 * 12 * 50
+    k = int(np.flatnonzero(near)[0])
+    found = conn.execute("SELECT depth FROM tunnel_api.depth(%s, %s, %s)", [NAME, chainage[k], across[k]]).fetchone()
+    assert found == (depth[k],)
+    assert conn.execute("SELECT depth FROM tunnel_api.depth(%s, 30, 50)", [NAME]).fetchone() in {(None,), None}
+    volume = conn.execute("SELECT * FROM tunnel_api.bed_volume(%s, 26, 34, %s)", [NAME, LEVEL - DEPTH - 0.5]).fetchone()
+    assert volume is not None
+    above, below, _, seen, unseen = volume
+    assert above == pytest.approx(0.5 * seen, rel=0.06)
+    assert below < 0.01
+    assert seen > 0.9 * 8 * 6.0
+    assert unseen < 0.1 * seen
+    conn.rollback()
+    again = json.loads(command("load", NAME, *files, "--json").stdout)["files"]
+    assert [one["state"] for one in again] == ["unchanged", "unchanged"]
+    assert [one["kept"] for one in again] == [one["kept"] for one in told]
+    register(folder)  # points of the poses before go, and the bed with them
+    assert conn.execute("SELECT (SELECT count(*) FROM tunnel.sonar_point), (SELECT count(*) FROM tunnel.bed)").fetchone() == (
+        0,
+        0,
+    )
+    conn.rollback()
+    changed = tmp_path / "s0.xyz"
+    changed.write_text("1.0 2.0 3.0 4\n")
+    assert "changed since it was registered" in command("load", NAME, changed, code=2).stderr
 
 
 def test_what_cannot_be_registered_is_refused_and_nothing_stored(

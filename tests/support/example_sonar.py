@@ -8,7 +8,7 @@ import numpy as np
 import psycopg
 
 from tunneldb.registration.underwater import LadderFit, Registration, Residual, SonarPose
-from tunneldb.store.sonar import save_registration
+from tunneldb.store.sonar import SonarRows, save_bed, save_points, save_registration, stored_scans
 from tunneldb.store.survey import get_survey
 
 PLACE = np.array([400010.0, 5700020.0, 98.5])
@@ -23,5 +23,10 @@ def save_example_registration(conn: psycopg.Connection, name: str) -> Registrati
     across, up, out = np.eye(3)[[0, 2, 1]]
     ladder = LadderFit("left", PLACE + 1.0, up, across, out, 0.0015, (8, 9), (Path(__file__).name,))
     found = Registration((scan,), (ladder,), 100.0)
-    save_registration(conn, get_survey(conn, name), found, 1)
+    survey = get_survey(conn, name)
+    save_registration(conn, survey, found, 1)
+    (stored,) = stored_scans(conn, survey).values()
+    xyz = PLACE + np.array([[0.0, 0.0, -1.0], [0.01, 0.0, -1.02], [0.0, 0.01, -1.01]])
+    rows = SonarRows(np.full(3, 12345.5), np.full(3, 0.25), xyz, np.full(3, 40), 4, 0, 0)
+    save_bed(conn, survey, save_points(conn, survey, stored, rows, 1))
     return found

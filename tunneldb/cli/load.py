@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,8 +88,12 @@ def load(
     loaded already is left alone; a file of the same name with other content takes its place.
 
     Files of a site are looked through and recorded; their points stay where they are.
+
+    Files that were registered as sonar scans come into the tunnel by their poses: their points are classed, false echoes
+    left out (as noise), and the bed is worked out. What was loaded of the laser's files stays as it is.
     """
     from tunneldb.pipeline.load import load_files
+    from tunneldb.pipeline.load_sonar import load_sonar, sonar_among
     from tunneldb.pipeline.site_files import register_files
     from tunneldb.pointcloud.selection import FilterSettings
 
@@ -99,11 +104,15 @@ def load(
         found = get_survey(connection, survey, site=True)
         try:
             with bar("points") as progress:
-                loaded = (
-                    register_files(connection, found, files, chosen.max_left_out, step(progress))
-                    if found.site
-                    else load_files(connection, found, files, chosen, step(progress))
-                )
+                if found.site:
+                    loaded = register_files(connection, found, files, chosen.max_left_out, step(progress))
+                else:
+                    sonar = sonar_among(connection, found, files)
+                    laser = [path for path in files if path not in sonar]
+                    loaded = chain(
+                        load_files(connection, found, laser, chosen, step(progress)) if laser else (),
+                        load_sonar(connection, found, sonar, step(progress)) if sonar else (),
+                    )
                 for file in loaded:
                     done.append(file)  # noqa: PERF402 - those before a failure are in the summary too
         finally:

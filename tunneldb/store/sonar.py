@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import psycopg
+from psycopg import sql
 
-from tunneldb.arrays import Float
+from tunneldb.arrays import Float, Int64
+from tunneldb.database.copy import Column, PointZ, copy_binary, pack
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.registration.underwater import LadderFit, Registration, SonarPose
+from tunneldb.registration.underwater.observations import RANGE_NOISE
 from tunneldb.store.scan_files import checksum
 from tunneldb.store.survey import Survey
 
 
 def save_registration(conn: psycopg.Connection[Any], survey: Survey, found: Registration, up: int) -> None:
     """Store the poses of scans in the place of those that scans of these names had, and the survey's ladders.
+
+    Points that were loaded with an earlier pose go with it.
 
     Parameters
     ----------
@@ -23,8 +31,15 @@ def save_registration(conn: psycopg.Connection[Any], survey: Survey, found: Regi
     up : int
         As the scans were taken: 1 or -1.
     """
+    names = [scan.path.name for scan in found.scans]
+    rows = conn.execute(
+        "SELECT DISTINCT p.km FROM tunnel.sonar_point p JOIN tunnel.sonar_scan c ON c.id = p.scan_id"
+        " WHERE c.survey_id = %s AND c.name = ANY (%s)",
+        [survey.id, names],
+    ).fetchall()
     for scan in found.scans:
         _save_scan(conn, survey, scan, found.water_level, up)
+    save_bed(conn, survey, [row[0] for row in rows])  # their points went with their poses
     conn.execute("DELETE FROM tunnel.ladder WHERE survey_id = %s", [survey.id])
     for ladder in found.ladders:
         _save_ladder(conn, survey, ladder)
@@ -75,3 +90,113 @@ def _save_ladder(conn: psycopg.Connection[Any], survey: Survey, ladder: LadderFi
 
 def _list(values: Float) -> list[float]:
     return [float(value) for value in np.ravel(values)]
+
+
+@dataclass(frozen=True)
+class StoredScan:
+    """A registered scan: its pose, and what became of its points; counts as those of `tunneldb.store.scan_files.Loaded`."""
+
+    id: int
+    checksum: str
+    state: str
+    undetermined: tuple[str, ...]
+    rotation: Float
+    translation: Float
+    scale: float
+    water_level: float
+    loaded: bool
+    counts: tuple[int, int, int, int, int, int, int]
+
+
+@dataclass(frozen=True)
+class SonarRows:
+    """Points of a scan in the tunnel.
+
+    Attributes
+    ----------
+    chainage, across : (n,) float64 arrays
+        m.
+    xyz : (n, 3) float64 array
+        Tunnel's SRID, m.
+    classes : (n,) int array
+        See `tunneldb.classification.underwater.WaterClass`.
+    points, outside, thinned : int
+        Of the file; of these, beyond the axis' ends or too far from the sonar, and left out for others beside them.
+    """
+
+    chainage: Float
+    across: Float
+    xyz: Float
+    classes: Int64
+    points: int
+    outside: int
+    thinned: int
+
+
+def stored_scans(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, StoredScan]:
+    """Registered scans of a survey, by name; poses of those that have none are NaN."""
+    rows = conn.execute(
+        "SELECT name, id, checksum, state, undetermined, rotation, translation, scale, water_level, loaded_at IS NOT NULL,"
+        "       coalesce(points, 0), coalesce(false_echoes, 0), coalesce(outside, 0), coalesce(kept, 0)"
+        "  FROM tunnel.sonar_scan WHERE survey_id = %s",
+        [survey.id],
+    ).fetchall()
+    found = {}
+    for name, key, digest, state, directions, rotation, translation, scale, level, loaded, *counts in rows:
+        points, false, outside, kept = counts
+        found[name] = StoredScan(
+            key,
+            digest,
+            state,
+            tuple(directions),
+            np.reshape(rotation or [np.nan] * 9, (3, 3)),
+            np.array(translation or [np.nan] * 3),
+            np.nan if scale is None else scale,
+            level,
+            loaded,
+            (points, false, outside, 0, 0, points - false - outside - kept, kept),
+        )
+    return found
+
+
+def save_points(conn: psycopg.Connection[Any], survey: Survey, scan: StoredScan, rows: SonarRows, false: int) -> list[int]:
+    """Store the points of a scan in the place of those that it had; returns the kilometres that they touch."""
+    conn.execute("DELETE FROM tunnel.sonar_point WHERE scan_id = %s", [scan.id])
+    km = np.floor(rows.chainage / KILOMETRE).astype(np.int32)
+    count = len(km)
+    columns: dict[str, Column] = {
+        "survey_id": np.full(count, survey.id, np.int32),
+        "km": km,
+        "scan_id": np.full(count, scan.id, np.int64),
+        "chainage": rows.chainage,
+        "across": rows.across,
+        "classification": rows.classes.astype(np.int16),
+        "geom": PointZ(rows.xyz, survey.srid),
+    }
+    copy_binary(conn, sql.Identifier("tunnel", "sonar_point"), list(columns), [pack(list(columns.values()))])
+    conn.execute(
+        "UPDATE tunnel.sonar_scan SET points = %s, false_echoes = %s, outside = %s, kept = %s, loaded_at = clock_timestamp()"
+        " WHERE id = %s",
+        [rows.points, false, rows.outside, count, scan.id],
+    )
+    return sorted({int(one) for one in np.unique(km)})
+
+
+def save_bed(conn: psycopg.Connection[Any], survey: Survey, kilometres: Sequence[int]) -> None:
+    """Make the bed of kilometres anew from the points that they have."""
+    conn.execute("DELETE FROM tunnel.bed WHERE survey_id = %s AND km = ANY (%s)", [survey.id, list(kilometres)])
+    conn.execute(
+        """
+        INSERT INTO tunnel.bed (survey_id, km, n, across_n, height, depth, sigma, points)
+        SELECT cell.survey_id, km, n, across_n, height, water_level - height, sqrt(variance / points + pose_variance), points
+          FROM (SELECT p.survey_id, p.km, floor(p.chainage)::int AS n, floor(p.across * 10)::int AS across_n,
+                       percentile_cont(0.5) WITHIN GROUP (ORDER BY ST_Z(p.geom)) AS height, max(c.water_level) AS water_level,
+                       coalesce(var_samp(ST_Z(p.geom)), %(noise)s ^ 2) AS variance, max(c.covariance[41]) AS pose_variance,
+                       count(*) AS points
+                  FROM tunnel.sonar_point p
+                  JOIN tunnel.sonar_scan c ON c.id = p.scan_id
+                 WHERE p.survey_id = %(survey)s AND p.km = ANY (%(km)s) AND p.classification = 40
+                 GROUP BY 1, 2, 3, 4) cell
+        """,
+        {"survey": survey.id, "km": list(kilometres), "noise": RANGE_NOISE},
+    )

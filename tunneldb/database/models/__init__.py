@@ -10,7 +10,7 @@ from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
 from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
 from tunneldb.database.models.ground import Cluster, Ground, Lining, TargetSphere
 from tunneldb.database.models.leak import Anomaly, AnomalyPart, Coverage, Image, Radiometry, RangeCurve, Region, Waterproof
-from tunneldb.database.models.sonar import Ladder, RegistrationResidual, SonarScan
+from tunneldb.database.models.sonar import Bed, Ladder, RegistrationResidual, SonarPoint, SonarScan
 from tunneldb.database.models.structures import Face, Member, Spot
 from tunneldb.database.models.work import Audit, Goal, Run, Stage, Worker
 
@@ -23,6 +23,7 @@ __all__ = [
     "Audit",
     "AxisVertex",
     "Base",
+    "Bed",
     "Cluster",
     "Coverage",
     "Face",
@@ -46,6 +47,7 @@ __all__ = [
     "Section",
     "SectionClass",
     "Segment",
+    "SonarPoint",
     "SonarScan",
     "Spot",
     "Stage",

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import datetime as dt
 
-from sqlalchemy import BigInteger, Identity, Index, Text, UniqueConstraint
+from geoalchemy2 import WKBElement
+from sqlalchemy import BigInteger, Identity, Index, SmallInteger, Text, UniqueConstraint
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
-from tunneldb.database.models.base import NOW, SURVEY, Base, Floats, one_of, parent
+from tunneldb.database.models.base import KM, NOW, SURVEY, Base, Floats, geometry, one_of, parent
 
 
 class SonarScan(Base):
@@ -38,6 +39,11 @@ class SonarScan(Base):
         comment="7 × 7, row by row: turns about x, y, z through the sonar, rad, shifts along them, m, and scale"
     )
     registered_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was registered")
+    points: Mapped[int | None] = mapped_column(BigInteger, comment="Points of the file; NULL before it is loaded")
+    false_echoes: Mapped[int | None] = mapped_column(BigInteger, comment="Of these, false echoes, which are left out")
+    outside: Mapped[int | None] = mapped_column(BigInteger, comment="Of these, beyond the axis or too far from the sonar")
+    kept: Mapped[int | None] = mapped_column(BigInteger, comment="Rows of it in tunnel.sonar_point")
+    loaded_at: Mapped[dt.datetime | None] = mapped_column(comment="When its points were loaded with this pose")
 
 
 class RegistrationResidual(Base):
@@ -76,3 +82,46 @@ class Ladder(Base):
     rms: Mapped[float] = mapped_column(comment="Of the laser's points from it, m")
     rungs: Mapped[list[int]] = mapped_column(ARRAY(BigInteger), comment="Numbers of the rungs that the laser saw")
     scans: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Names of the sonar scans that saw it")
+
+
+class SonarPoint(Base):
+    """A point of a sonar scan, thinned."""
+
+    __tablename__ = "sonar_point"
+    __table_args__ = (
+        Index(None, "survey_id", "km"),
+        Index(None, "scan_id"),
+        {"comment": "Points of sonar scans in the tunnel, thinned and without false echoes"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    km: Mapped[int] = mapped_column(comment=KM)
+    scan_id: Mapped[int] = mapped_column(parent("sonar_scan"), comment="Sonar scan")
+    chainage: Mapped[float] = mapped_column(comment="Chainage by the given axis, m")
+    across: Mapped[float] = mapped_column(comment="Place right of the given axis, m")
+    classification: Mapped[int] = mapped_column(
+        SmallInteger, comment="40 bed, 41 surface of the water, 42 submerged lining, 43 submerged object"
+    )
+    geom: Mapped[WKBElement] = mapped_column(geometry("POINTZ"), comment="Place in the tunnel's SRID, m")
+
+
+class Bed(Base):
+    """A cell of the bed, 1 m along and 0.1 m across."""
+
+    __tablename__ = "bed"
+    __table_args__ = (
+        UniqueConstraint("survey_id", "n", "across_n"),
+        Index(None, "survey_id", "km"),
+        {"comment": "The bed below the water in cells of 1 m along and 0.1 m across; cells that no sonar saw are not there"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    km: Mapped[int] = mapped_column(comment=KM)
+    n: Mapped[int] = mapped_column(comment="Metre of chainage at which it begins")
+    across_n: Mapped[int] = mapped_column(comment="Tenth of a metre right of the axis at which it begins")
+    height: Mapped[float] = mapped_column(comment="Median height of the bed, m")
+    depth: Mapped[float] = mapped_column(comment="Of the bed below the water, m")
+    sigma: Mapped[float] = mapped_column(comment="Standard deviation of its height, that of the scans' poses included, m")
+    points: Mapped[int] = mapped_column(comment="Points of the bed in it")

@@ -1,0 +1,144 @@
+"""Class of each point of a registered sonar scan: bed, water's surface, submerged lining, object, or false echo.
+
+Places are along the axis, across it and in height above the water, m. Walls and bed are the farthest that many points of a
+cell show: the few that a sonar hears by way of the surface or of a second wall lie behind them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt, median_filter
+from scipy.spatial import cKDTree
+
+from tunneldb.arrays import Bool, Float, Int64
+
+SURFACE = 0.1  # about the water's level, m
+ALONE = 0.15  # m: radius in which a point must have
+SPREADING = 0.03  # times the range, beyond which rays lie farther apart than that
+LEAST_NEIGHBOURS = 4  # others
+STRIP, BAND = 1.0, 0.25  # cells of wall, m along and in height
+SQUARE = 0.5  # cells of bed, m
+BIN = 0.05  # m
+THICK = 0.15  # m: four standard deviations of range, and a wall's relief
+FARTHEST_FILL = 3.0  # cells
+LARGEST_STEP = 0.5  # m between places of a wall at one chainage
+MANY = 0.4  # of the most that a bin has, from which one is many
+LEAST_CELL = 10  # points of a cell that says where a wall or the bed is
+
+
+class WaterClass(IntEnum):
+    """What a point below the water lies on; ASPRS LAS 1.4 has 40, 41 and 43 for bathymetry so, 42 is the submerged lining."""
+
+    FALSE = 7  # noise
+    BED = 40
+    SURFACE = 41
+    LINING = 42
+    OBJECT = 43
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """A figure for each cell of a grid, NaN where none is known, and the place of its first cell."""
+
+    value: Float
+    low: Int64
+
+    def at(self, keys: Int64) -> Float:
+        """Figures (n,) of cells (n, 2)."""
+        place = np.clip(keys - self.low, 0, np.array(self.value.shape) - 1)
+        return np.asarray(self.value[place[:, 0], place[:, 1]])
+
+
+def classify(points: Float, reach: Float) -> Int64:
+    """Classes (n,) of points, see `WaterClass`.
+
+    Parameters
+    ----------
+    points : (n, 3) float64 array
+        Chainage, place right of the axis, and height above the water, m.
+    reach : (n,) float64 array
+        Distance from the sonar, m.
+    """
+    out = np.full(len(points), WaterClass.FALSE, np.int64)
+    if len(points) == 0:
+        return out
+    height = points[:, 2]
+    sound = (height < SURFACE) & _has_neighbours(points, reach)
+    middle = _middle(points[sound])
+    below = sound & (height < -SURFACE)
+    side = np.where(points[:, 1] > middle, 1.0, -1.0)
+    away = np.abs(points[:, 1] - middle)
+    wall = np.full(len(points), np.nan)
+    for sign in (-1.0, 1.0):
+        mine = side == sign
+        keys = np.floor(points[:, [0, 2]] / [STRIP, BAND]).astype(np.int64)
+        cells = _rear_of_cells(keys[mine & below], away[mine & below])
+        if cells is not None:
+            wall[mine] = _on_line(cells).at(keys[mine])
+    on_wall = sound & (height < 0.0) & (np.abs(away - wall) < THICK)
+    inside = ~(away > wall + THICK)  # also where no wall is known
+    keys = np.floor(points[:, :2] / SQUARE).astype(np.int64)
+    floor = _rear_of_cells(keys[below & inside & ~on_wall], -height[below & inside & ~on_wall])
+    depth = -floor.at(keys) if floor is not None else np.full(len(points), np.nan)
+    on_bed = below & inside & (np.abs(height - depth) < THICK)
+    out[below & inside & (height > depth)] = WaterClass.OBJECT
+    out[sound & inside & (np.abs(height) <= SURFACE) & (away < wall - THICK)] = WaterClass.SURFACE
+    out[on_wall & ~(height < depth - THICK)] = WaterClass.LINING
+    out[on_bed & ~on_wall] = WaterClass.BED
+    return out
+
+
+def _has_neighbours(points: Float, reach: Float) -> Bool:
+    distance, _ = cKDTree(points).query(points, k=[LEAST_NEIGHBOURS + 1])
+    return np.asarray(distance[:, 0] < np.maximum(ALONE, SPREADING * reach))
+
+
+def _middle(points: Float) -> float:
+    """Middle between the walls, m across."""
+    return float(np.mean(np.percentile(points[:, 1], [2.0, 98.0]))) if len(points) else 0.0
+
+
+def _rear_of_cells(keys: Int64, values: Float) -> _Cells | None:
+    """Farthest place at which many values (n,) of each cell (n, 2) lie, smoothed over its neighbours; None if no cell has any.
+
+    What stands before a wall or on the bed has as many points as it has, or more; false echoes behind it have few.
+    """
+    if len(values) == 0:
+        return None
+    low = keys.min(axis=0)
+    shape = keys.max(axis=0) - low + 1
+    cell = (keys[:, 0] - low[0]) * shape[1] + keys[:, 1] - low[1]
+    least = float(values.min())
+    level = np.floor((values - least) / BIN).astype(np.int64)
+    levels = int(level.max()) + 1
+    places, count = np.unique(cell * levels + level, return_counts=True)
+    cells, level = places // levels, places % levels
+    most = np.zeros(int(shape.prod()), np.int64)
+    np.maximum.at(most, cells, count)
+    total = np.bincount(cell, minlength=len(most))
+    many = (count >= MANY * most[cells]) & (total[cells] >= LEAST_CELL)
+    if not many.any():
+        return None
+    rear = np.full(len(most), -1, np.int64)
+    np.maximum.at(rear, cells[many], level[many])
+    grid = np.where(rear >= 0, least + (rear + 0.5) * BIN, np.nan)
+    return _Cells(_filled(grid.reshape(shape)), low)
+
+
+def _filled(grid: Float) -> Float:
+    """Median of the 3 × 3 cells about each, those unknown taken from the nearest that is known if that is near enough."""
+    away: Float
+    nearest: Int64
+    away, nearest = distance_transform_edt(~np.isfinite(grid), return_indices=True)
+    smooth = median_filter(grid[tuple(nearest)], size=3, mode="nearest")
+    return np.where(away <= FARTHEST_FILL, smooth, np.nan)
+
+
+def _on_line(cells: _Cells) -> _Cells:
+    """Cells of a wall, those of a strip that lie far from the others of it put among them: most points there are the bed's."""
+    known = np.isfinite(cells.value).any(axis=1, keepdims=True)
+    usual = np.nanmedian(np.where(known, cells.value, 0.0), axis=1, keepdims=True)
+    return _Cells(np.where(np.abs(cells.value - usual) > LARGEST_STEP, usual, cells.value), cells.low)
