@@ -121,7 +121,7 @@ def parts(dsn: str, path: Path, count: int) -> dict[str, float]:
         survey = get_survey(conn, NAME)
         surface = load_surface(conn, survey, km * 1000.0, (km + 1) * 1000.0)
         radiometer = Radiometer("amplitude", load_poses(conn, survey), load_reference(conn, survey), 75.0, 40.0, 0.05)
-        floor = load_floor(conn, survey, km, 0.0)
+        floor = load_floor(conn, survey, surface, km, 0.0)
     observer = Observer.of(surface, km, (0.5, 1.2), radiometer, floor)
     grid = Grid.covering(km, 0.02, float(surface.arcs.min()), float(surface.arcs.max()))
     projector = Projector.of(observer, grid, 12.0)

@@ -19,27 +19,39 @@ COMMENT ON FUNCTION tunnel_api.section_plane(int, int) IS
 'Planes of the cross-sections of one kilometre, at 25 % and 75 % of each segment, within what was scanned: chainage (m) and frame (origin, tangent, right, up; 12 numbers). Source: Gonçalves et al. (2012), stage 4.';
 
 
--- The points of a slab: those at most half_width (in chainage, m) from a plane, in the plane's own frame, right and up, m.
+-- The points of a slab: those at most half_width (in chainage, m) from a plane, in the plane's own frame, right and up, m. Where
+-- sonar scans were loaded, those on the bed and on the submerged lining belong to it; what the laser has below 0.1 m above
+-- the water there are images mirrored by it, or the water itself.
 CREATE OR REPLACE FUNCTION tunnel_api.section_slab(survey_id int, chainage float8, frame float8[], half_width float8)
 RETURNS TABLE (u float8, w float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 1000
 AS $$
 #variable_conflict use_variable
+DECLARE
+    -- near the ends of a kilometre a point may lie in the partition next door
+    km_from constant int := floor((section_slab.chainage - half_width - 1) / 1000);
+    km_to constant int := floor((section_slab.chainage + half_width + 1) / 1000);
+    water constant float8 := (SELECT max(l.height) FROM tunnel.water_level l
+                              WHERE l.survey_id = section_slab.survey_id AND l.km BETWEEN km_from AND km_to);
 BEGIN
     RETURN QUERY EXECUTE format($query$
         SELECT d.x * $1[7] + d.y * $1[8], d.x * $1[10] + d.y * $1[11] + d.z * $1[12]
         FROM %s p
         CROSS JOIN LATERAL (SELECT ST_X(p.geom) - $1[1] AS x, ST_Y(p.geom) - $1[2] AS y, ST_Z(p.geom) - $1[3] AS z) d
-        WHERE p.chainage BETWEEN $2 AND $3
-    $query$, tunnel_api.partition_source(section_slab.survey_id,
-        -- near the ends of a kilometre a point may lie in the partition next door
-        floor((section_slab.chainage - half_width - 1) / 1000)::int, floor((section_slab.chainage + half_width + 1) / 1000)::int))
-    USING frame, section_slab.chainage - half_width, section_slab.chainage + half_width;
+        WHERE p.chainage BETWEEN $2 AND $3%s
+    $query$, tunnel_api.partition_source(section_slab.survey_id, km_from, km_to), CASE WHEN water IS NOT NULL THEN
+        ' AND ST_Z(p.geom) >= $4 + 0.1'
+        ' UNION ALL '
+        'SELECT d.x * $1[7] + d.y * $1[8], d.x * $1[10] + d.y * $1[11] + d.z * $1[12]'
+        ' FROM tunnel.sonar_point p'
+        ' CROSS JOIN LATERAL (SELECT ST_X(p.geom) - $1[1] AS x, ST_Y(p.geom) - $1[2] AS y, ST_Z(p.geom) - $1[3] AS z) d'
+        ' WHERE p.survey_id = $5 AND p.classification IN (40, 42) AND p.chainage BETWEEN $2 AND $3' END)
+    USING frame, section_slab.chainage - half_width, section_slab.chainage + half_width, water, section_slab.survey_id;
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.section_slab(int, float8, float8[], float8) IS
-'Points at most half_width (m of chainage) from the plane of a section, in its frame: right and up of the axis, m. Source: Gonçalves et al. (2012), stage 4.';
+'Points at most half_width (m of chainage) from the plane of a section, those of sonar scans on the bed and the submerged lining included, in its frame: right and up of the axis, m. Source: Gonçalves et al. (2012), stage 4.';
 
 
 -- Angular classes of the sections of a kilometre.

@@ -107,7 +107,8 @@ COMMENT ON FUNCTION tunnel_api.section_open(int, int, float8, float8, int) IS
 -- class by class. A class that stands in from their median
 -- by more than protrusion, and by more than the lining differs there from section to section, holds something hung on the
 -- wall that the section by itself did not tell from it: it is rejected, and the curve drawn again. Where more than a quarter
--- of the classes stand in, it is the tunnel that is narrower, and nothing is rejected.
+-- of the classes stand in, it is the tunnel that is narrower, and nothing is rejected. Below the water nothing is, either: what
+-- stands there before the wall or on the bed was left out by the class of its points, and a bed has its own shape anywhere.
 CREATE OR REPLACE FUNCTION tunnel_api.section_curves(
     survey_id int, km int, angle_step float8, half_width float8, max_half_width float8, min_points int, protrusion float8)
 RETURNS TABLE (
@@ -132,7 +133,7 @@ AS $$
         SELECT a.i, k.class, k.radius
         FROM alone a CROSS JOIN LATERAL unnest(a.class_radius) WITH ORDINALITY AS k (radius, class)
     ), beside AS (
-        SELECT c.i, c.class, c.radius - percentile_cont(0.5) WITHIN GROUP (ORDER BY o.radius) AS apart
+        SELECT c.i, c.class, c.radius, c.radius - percentile_cont(0.5) WITHIN GROUP (ORDER BY o.radius) AS apart
         FROM (SELECT c.*, greatest(least(c.i - 2, n.sections - 4), 1) + d AS other
               FROM class c CROSS JOIN (SELECT count(*) AS sections FROM gathered) n CROSS JOIN generate_series(0, 4) AS d) c
         JOIN class o ON o.i = c.other AND o.i <> c.i AND o.class = c.class
@@ -146,7 +147,12 @@ AS $$
     ), hung AS (
         SELECT b.i, array_agg(b.class::int) AS classes
         FROM beside b JOIN usual u ON u.i = b.i
-        WHERE b.apart < -u.tolerance
+        JOIN gathered g ON g.i = b.i
+        JOIN tunnel_api.section_plane(section_curves.survey_id, section_curves.km) p ON p.segment = g.segment AND p.half = g.half
+        WHERE b.apart < -u.tolerance AND NOT EXISTS (
+            SELECT FROM tunnel.water_level w
+            WHERE w.survey_id = section_curves.survey_id AND w.km = section_curves.km
+                AND p.frame[3] - p.frame[12] * b.radius * cosd((b.class - 0.5) * section_curves.angle_step) < w.height)
         GROUP BY b.i
         HAVING count(*) * 4 <= round(360 / section_curves.angle_step)
     ), again AS (

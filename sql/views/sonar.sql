@@ -16,6 +16,28 @@ COMMENT ON COLUMN tunnel_api.sonar_scan.sigma_y IS 'Standard deviation of its pl
 COMMENT ON COLUMN tunnel_api.sonar_scan.sigma_z IS 'Standard deviation of its height, m';
 COMMENT ON COLUMN tunnel_api.sonar_scan.geom IS 'Place of the sonar, in the tunnel''s SRID; NULL where no pose was found';
 
+-- The ellipse in which a scan's place in plan lies with a probability of 95 % is that of covariance × 5.991 (chi², two degrees of
+-- freedom); its half axes are the roots of the eigenvalues.
+CREATE OR REPLACE VIEW tunnel_api.sonar_ellipse AS
+SELECT c.id, c.survey_id, c.survey, c.name, c.state, 100 AS exaggeration, e.half_major, e.half_minor,
+       public.ST_SetSRID(public.ST_Translate(public.ST_Rotate(public.ST_Scale(
+           public.ST_Buffer(public.ST_MakePoint(0, 0), 1, 16), 100 * e.half_major, 100 * e.half_minor), e.turn),
+           c.translation[1], c.translation[2]), public.ST_SRID(c.geom))::public.geometry(Polygon) AS geom
+  FROM tunnel_api.sonar_scan c
+ CROSS JOIN LATERAL (
+    SELECT (c.covariance[25] + c.covariance[33]) / 2 AS mean, c.covariance[26] AS xy,
+           sqrt(((c.covariance[25] - c.covariance[33]) / 2) ^ 2 + c.covariance[26] ^ 2) AS half) v
+ CROSS JOIN LATERAL (
+    SELECT sqrt(5.991 * (v.mean + v.half)) AS half_major, sqrt(5.991 * greatest(v.mean - v.half, 0)) AS half_minor,
+           atan2(2 * v.xy, c.covariance[25] - c.covariance[33]) / 2 AS turn) e
+ WHERE c.geom IS NOT NULL;
+COMMENT ON VIEW tunnel_api.sonar_ellipse IS
+    'Ellipses in which the places of sonar scans in plan lie with a probability of 95 %, drawn 100 times as large';
+COMMENT ON COLUMN tunnel_api.sonar_ellipse.exaggeration IS 'So many times as large as it is';
+COMMENT ON COLUMN tunnel_api.sonar_ellipse.half_major IS 'Greater half axis, m';
+COMMENT ON COLUMN tunnel_api.sonar_ellipse.half_minor IS 'Lesser half axis, m';
+COMMENT ON COLUMN tunnel_api.sonar_ellipse.geom IS 'Ellipse, drawn 100 times as large, in plan, tunnel''s SRID';
+
 CREATE OR REPLACE VIEW tunnel_api.registration_residual AS
 SELECT r.id, c.survey_id, s.name AS survey, r.scan_id, c.name AS scan, r.kind, r.name, r.count, r.median, r.p95
   FROM tunnel.registration_residual r
@@ -82,3 +104,10 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
 $$;
 COMMENT ON FUNCTION tunnel_api.bed_volume(text, float8, float8, float8) IS
     'Volume of the bed above a height (tunnel''s system, m) between two chainages, as silt above a design bed, and of the room below it, m³; its standard deviation if all cells err alike, as a pose does; the area seen, and that which no sonar saw, taken as wide as the bed mostly is, m²: nothing is said of the latter';
+
+CREATE OR REPLACE VIEW tunnel_api.water_level AS
+SELECT w.id, w.survey_id, s.name AS survey, w.km, w.height, w.changed_at
+  FROM tunnel.water_level w
+  JOIN tunnel.survey s ON s.id = w.survey_id
+ WHERE w.height IS NOT NULL;
+COMMENT ON VIEW tunnel_api.water_level IS 'The water in kilometres into which sonar scans were loaded';

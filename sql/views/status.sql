@@ -26,7 +26,8 @@ COMMENT ON COLUMN tunnel_api.run.job_id IS 'Job of the queue that it was (tunnel
 
 -- Last run of each stage on each kilometre of a survey that was ever loaded or worked on, waits to be loaded or is wanted,
 -- and whether its result is out of date. Load rests on the files that touch the kilometre; what the others rest on, here and on
--- both neighbours, is in tunnel.stage; what reads the survey rests on its positions, reference and intensity.
+-- both neighbours, is in tunnel.stage; what reads the survey rests on its positions, reference and intensity, what reads sonar on
+-- the points below the water.
 -- A result is stale when one of these came to be since its run began, is stale itself, or is of a stage that never ran here, as
 -- ground in a database that was made before there was that stage. Runs are put in order by their times:
 -- a result commits under a lock that each run takes just before it begins (see queue_lock), so that none which it did not
@@ -44,7 +45,7 @@ SET enable_nestloop = off  -- how few or many rows there are is not known when i
 AS $$
     WITH RECURSIVE stage AS MATERIALIZED (  -- the stages that each rests on, by their numbers: here, and on both neighbours
         SELECT s.step, s.name, s.name = 'segments' AS of_segments, 'axis' = ANY (s.reads) AS of_axis,
-               'survey' = ANY (s.reads) AS of_survey,
+               'survey' = ANY (s.reads) AS of_survey, 'sonar' = ANY (s.reads) AS of_sonar,
                ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads) ORDER BY 1) AS here,
                ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads_beside) ORDER BY 1) AS beside
           FROM tunnel.stage s
@@ -105,7 +106,8 @@ AS $$
     ), direct AS MATERIALIZED (
         SELECT c.km, c.step, c.started_at IS NOT NULL AS done,
                CASE c.step WHEN 1 THEN p.read_at ELSE greatest(i.finished_at, CASE WHEN s.of_axis THEN e.edited_at END,
-                                                             CASE WHEN s.of_survey THEN v.settings_at END) END AS input_at,
+                                                             CASE WHEN s.of_survey THEN v.settings_at END,
+                                                             CASE WHEN s.of_sonar THEN w.changed_at END) END AS input_at,
                CASE
                    WHEN c.started_at IS NULL THEN NULL
                    WHEN c.step = 1 THEN p.name || ' read since'
@@ -116,6 +118,7 @@ AS $$
                            ELSE format('%s of kilometre %s ran since', l.name, c.km + i.late / 1000 - 3)
                        END
                    WHEN s.of_survey AND v.settings_at > c.started_at THEN 'positions, reference or intensity set since'
+                   WHEN s.of_sonar AND w.changed_at > c.started_at THEN 'sonar scans loaded or registered since'
                    WHEN s.of_segments AND m.km IS NOT NULL THEN 'axis edited since'
                END AS reason
           FROM cell c
@@ -125,6 +128,7 @@ AS $$
           LEFT JOIN pending p ON p.km = c.km
           LEFT JOIN edit e ON e.km = c.km
           LEFT JOIN moved m ON m.km = c.km
+          LEFT JOIN tunnel.water_level w ON w.survey_id = $1 AND w.km = c.km
          CROSS JOIN (SELECT s.settings_at FROM tunnel.survey s WHERE s.id = $1) v
     ), ripple AS (  -- what is stale, and what rests on it
         SELECT d.km, d.step FROM direct d WHERE d.reason IS NOT NULL

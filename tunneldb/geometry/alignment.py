@@ -113,6 +113,27 @@ class Alignment:
         distance[beyond] = np.nan
         return chainage, distance
 
+    def places(self, points: Float) -> tuple[Float, Float]:
+        """Chainage of points (n, 3), and their place right of the axis in plan, both (n,), m; NaN beyond the ends."""
+        chainage = self.chainage(points)
+        on_axis, along = self._plan(chainage)
+        away = points[:, :2] - on_axis
+        return chainage, away[:, 0] * along[:, 1] - away[:, 1] * along[:, 0]
+
+    def plan_points(self, chainage: Float, across: Float) -> Float:
+        """Points in plan (n, 2), m, at chainages and places right of the axis (n,), m: the inverse of `places`."""
+        on_axis, along = self._plan(chainage)
+        return on_axis + across[:, None] * np.column_stack([along[:, 1], -along[:, 0]])
+
+    def _plan(self, chainage: Float) -> tuple[Float, Float]:
+        """Points on the axis in plan, and unit vectors along it, both (n, 2), at chainages (n,), m."""
+        stations = self.number * self.spacing
+        slope = np.gradient(self.vertices[:, :2], stations, axis=0)
+        on_axis, along = (
+            np.column_stack([np.interp(chainage, stations, of[:, k]) for k in range(2)]) for of in (self.vertices, slope)
+        )
+        return on_axis, along / np.linalg.norm(along, axis=1)[:, None]
+
 
 def _curve(xyz: Float, chord: Float) -> tuple[Float, Float, CubicSpline]:
     """Spline over the chord length, with a table of its parameter against its length in plan."""

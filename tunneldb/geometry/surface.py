@@ -126,6 +126,32 @@ class Surface:
         low, high = ((1.0 - g) * self.arcs[a, end] + g * self.arcs[b, end] for end in (0, -1))
         return np.where(a >= 0, low, np.nan), np.where(a >= 0, high, np.nan)
 
+    def waterline(self, chainage: Float, level: float) -> tuple[Float, Float]:
+        """Arcs at which the surface meets the water on the left and on the right, at places along the axis (n,), m.
+
+        NaN where there is no section, or where it does not reach down to the water.
+
+        Parameters
+        ----------
+        chainage : (n,) float array
+            m.
+        level : float
+            Height of the water in the tunnel's SRID, m.
+        """
+        chainage = np.asarray(chainage, dtype=np.float64)
+        a, b, g = sections_about(self.chainages, chainage, self.reach)
+        blend = g[:, None]
+        radius, arcs = ((1.0 - blend) * of[a] + blend * of[b] for of in (self.radius, self.arcs))
+        frames = self.frames(chainage)
+        angle = np.radians(np.arange(NODES) - (NODES // 2))
+        height = frames[:, 0, 2, None] + radius * (
+            np.sin(angle) * frames[:, 2, 2, None] + np.cos(angle) * frames[:, 3, 2, None]
+        )
+        above = np.where((a >= 0)[:, None], height - level, np.nan)
+        crown = NODES // 2
+        left, right = above[:, crown::-1], above[:, crown:]
+        return _crossing(left, arcs[:, crown::-1]), _crossing(right, arcs[:, crown:])
+
     def section_outliers(self) -> Float:
         """How far each section stands apart from those beside it, (k, 361), m; 0 where it is on the lining.
 
@@ -141,3 +167,14 @@ class Surface:
         apart = self.radius - np.median(self.radius[beside], axis=1)
         usual = 3.0 * MAD_TO_SIGMA * np.median(np.abs(apart), axis=1)
         return np.where(np.abs(apart) > np.maximum(usual, APART)[:, None], apart, 0.0)
+
+
+def _crossing(above: Float, arcs: Float) -> Float:
+    """Arc (n,) at which the heights above the water (n, k) of nodes first fall below zero; NaN where they never do."""
+    under = above < 0.0
+    after = np.maximum(under.argmax(axis=1), 1)[:, None]
+    high, low = (np.take_along_axis(above, at, axis=1)[:, 0] for at in (after - 1, after))
+    before, behind = (np.take_along_axis(arcs, at, axis=1)[:, 0] for at in (after - 1, after))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing = before + (behind - before) * high / (high - low)
+    return np.where(under.any(axis=1), crossing, np.nan)

@@ -46,6 +46,7 @@ from tunneldb.store.images import (
     save_range_curve,
 )
 from tunneldb.store.scene import load_arcs
+from tunneldb.store.sonar import water_level
 from tunneldb.store.sources import load_poses, sample, sources
 from tunneldb.store.surface import load_surface, survey_ends
 from tunneldb.store.survey import Survey
@@ -168,7 +169,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
     beyond = grid.halo * grid.pixel
     depth = values["lining.tolerance"], values["lining.recess"]
     ends = survey_ends(conn, survey) or (-np.inf, np.inf)
-    observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, km, beyond), beyond, ends)
+    observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, surface, km, beyond), beyond, ends)
     return DetectionInputs(
         survey.name,
         observer,
@@ -292,8 +293,11 @@ def load_radiometer(conn: psycopg.Connection[Any], survey: Survey, values: Mappi
     return Radiometer(kind, load_poses(conn, survey), reference, *limits)
 
 
-def load_floor(conn: psycopg.Connection[Any], survey: Survey, km: int, halo: float) -> Floor:
-    """Where the floor of a kilometre begins, and of so many metres beyond its ends: where stage ``ground`` has found it."""
+def load_floor(conn: psycopg.Connection[Any], survey: Survey, surface: Surface, km: int, halo: float) -> Floor:
+    """Where the floor of a kilometre begins, and of so many metres beyond its ends: where stage ``ground`` has found it.
+
+    In a canal it begins where the surface meets the water, if sonar scans were loaded.
+    """
     done = conn.execute(
         "SELECT FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage = 'ground' AND outcome = 'done' LIMIT 1",
         (survey.id, km),
@@ -302,8 +306,10 @@ def load_floor(conn: psycopg.Connection[Any], survey: Survey, km: int, halo: flo
         raise UserError(f"the ground of kilometre {km} is not known yet: tunneldb run {survey.name} --km {km} --from ground")
     # Far enough for both kilometres to see the ground on both sides of a gap at their border.
     beyond = int(np.ceil(halo)) + HIDDEN
-    first = int(km * KILOMETRE) - beyond
-    return Floor.of(first, *load_arcs(conn, survey, first, int((km + 1) * KILOMETRE) + beyond))
+    first, last = int(km * KILOMETRE) - beyond, int((km + 1) * KILOMETRE) + beyond
+    level = water_level(conn, survey, km)
+    water = None if level is None else surface.waterline(np.arange(first, last + 1, dtype=np.float64), level)
+    return Floor.of(first, *load_arcs(conn, survey, first, last), water)
 
 
 def _gather(

@@ -111,7 +111,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
     # Without a curve the lining itself is asked, whether or not detection is to go by it.
     radiometer = load_radiometer(conn, survey if measured else replace(survey, reference="auto"), values)
     depth = values["lining.tolerance"], values["lining.recess"]
-    observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, km, 0.0))
+    observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, surface, km, 0.0))
     view = observe_sample(sample(conn, survey, km), observer)
     return DiagnosisInputs(f"kilometre {km}", kind, measured, observer, view, load_regions(conn, survey, km, "homogeneous"))
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from tunneldb.arrays import Float
 from tunneldb.classification.underwater import WaterClass, classify
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
@@ -89,7 +88,7 @@ def _rows(path: Path, scan: StoredScan, alignment: Alignment) -> tuple[SonarRows
     """Points of a scan that are no false echoes, in the tunnel, and how many are false."""
     file_points, _ = read_sonar(path)
     points = scan.scale * file_points @ scan.rotation.T + scan.translation
-    chainage, across = places(alignment, points)
+    chainage, across = alignment.places(points)
     inside = np.isfinite(chainage) & (np.linalg.norm(points - scan.translation, axis=1) < FARTHEST)
     chainage, across, points = chainage[inside], across[inside], points[inside]
     reach = np.linalg.norm(points - scan.translation, axis=1)
@@ -105,15 +104,3 @@ def _rows(path: Path, scan: StoredScan, alignment: Alignment) -> tuple[SonarRows
         len(file_points) - int(inside.sum()), len(points) - len(first),
     )  # fmt: skip
     return rows, false
-
-
-def places(alignment: Alignment, points: Float) -> tuple[Float, Float]:
-    """Chainage, and place right of the axis in plan, both (n,) m, of points (n, 3); NaN beyond the axis' ends."""
-    chainage = alignment.chainage(points)
-    stations = alignment.number * alignment.spacing
-    on_axis = np.column_stack([np.interp(chainage, stations, alignment.vertices[:, k]) for k in range(2)])
-    slope = np.gradient(alignment.vertices[:, :2], stations, axis=0)
-    along = np.column_stack([np.interp(chainage, stations, slope[:, k]) for k in range(2)])
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    away = points[:, :2] - on_axis
-    return chainage, away[:, 0] * along[:, 1] - away[:, 1] * along[:, 0]

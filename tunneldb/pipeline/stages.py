@@ -33,7 +33,7 @@ class Stage:
         come out. Empty for ``load``, which goes by the files (`tunneldb.pipeline.load`).
     reads : tuple of str
         Stages whose results in the kilometre itself it rests on, directly or through another; ``survey`` where it rests on the
-        scanner's positions, the reference curve or the kind of intensity.
+        scanner's positions, the reference curve or the kind of intensity, ``sonar`` on what sonar scans saw below the water.
     reads_beside : tuple of str
         Stages whose results in the kilometres before and after it rests on.
     parameters : tuple of str
@@ -64,7 +64,9 @@ STAGES: tuple[Stage, ...] = (
     Stage("load", "", (), (), ()),
     Stage("axis", "tunneldb.pipeline.geometry:axis", ("load",), ("load",), ("axis",)),
     Stage("segments", "tunneldb.pipeline.geometry:segments", ("load", "axis"), ("axis",), ()),
-    Stage("sections", "tunneldb.pipeline.geometry:sections", ("load", "axis", "segments"), ("segments",), ("section",)),
+    Stage(
+        "sections", "tunneldb.pipeline.geometry:sections", ("load", "axis", "segments", "sonar"), ("segments",), ("section",)
+    ),
     Stage(
         "ground",
         "tunneldb.pipeline.ground:ground",
@@ -75,7 +77,7 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "detect",
         "tunneldb.pipeline.detect:detect",
-        ("load", "axis", "segments", "sections", "ground", "survey"),
+        ("load", "axis", "segments", "sections", "ground", "survey", "sonar"),
         ("ground",),
         ("lining", "image", "intensity", "appendage", "leak"),
     ),

@@ -1,4 +1,4 @@
-"""Where the floor begins in the unrolled plane, along the tunnel."""
+"""Where the floor begins in the unrolled plane, along the tunnel, and where the water does."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from scipy import ndimage
 
-from tunneldb.arrays import Bool, Float
+from tunneldb.arrays import Bool, Float, Int64
 
 HIDDEN = 25
 """So many metres of ground may be hidden by what stands on it, and the floor goes on beneath."""
@@ -19,9 +19,10 @@ FLOOR_EDGE = 0.02
 
 @dataclass(frozen=True)
 class Floor:
-    """Where the floor begins, on both sides, each metre along the tunnel: at the foot of the walls.
+    """Where the floor begins, on both sides, each metre along the tunnel: at the foot of the walls, or at the water.
 
-    All that lies beyond, rails or whatever stands there, belongs to it. Where the tunnel has no ground nothing does.
+    All that lies beyond, rails or whatever stands there, belongs to it. Where the tunnel has no ground and no water that is
+    known nothing does.
 
     Attributes
     ----------
@@ -29,25 +30,51 @@ class Floor:
         Chainage of the first place, m.
     left, right : (k,) float arrays
         Arc at which the floor begins at each metre from there on, m; infinite where it doesn't.
+    water_left, water_right : (k,) float arrays
+        The same of the water, under which the laser sees nothing.
     """
 
     start: int
     left: Float
     right: Float
+    water_left: Float
+    water_right: Float
 
     @classmethod
-    def of(cls, start: int, left: Float, right: Float) -> Floor:
-        """Make a floor of the arcs of the walls' feet (k,), m, NaN for none, at each metre from ``start`` on."""
+    def of(cls, start: int, left: Float, right: Float, water: tuple[Float, Float] | None = None) -> Floor:
+        """Make a floor.
+
+        Parameters
+        ----------
+        start : int
+            Chainage of the first place, m.
+        left, right : (k,) float arrays
+            Arcs of the walls' feet at each metre from there on, m, NaN for none.
+        water : two (k,) float arrays, optional
+            Arcs at which the water begins, left and right, NaN for none.
+        """
         left, right = _bridged(left), _bridged(right)
         none = np.isnan(left), np.isnan(right)
         left, right = np.where(none[0], -np.inf, left + FLOOR_EDGE), np.where(none[1], np.inf, right - FLOOR_EDGE)
-        return cls(start, -_steady(-left), _steady(right))
+        left, right = -_steady(-left), _steady(right)
+        if water is None:
+            return cls(start, left, right, np.full_like(left, -np.inf), np.full_like(right, np.inf))
+        water_left, water_right = np.nan_to_num(water[0], nan=-np.inf), np.nan_to_num(water[1], nan=np.inf)
+        return cls(start, np.maximum(left, water_left), np.minimum(right, water_right), water_left, water_right)
 
     def bounds(self, chainage: Float) -> tuple[Float, Float]:
         """Arc at which the floor begins on the left and on the right, m."""
-        place = np.where(np.isfinite(chainage), chainage, self.start)
-        row = np.clip(np.rint(place - self.start).astype(np.intp), 0, len(self.left) - 1)
+        row = self._row(chainage)
         return self.left[row], self.right[row]
+
+    def waterline(self, chainage: Float) -> tuple[Float, Float]:
+        """Arc at which the water begins on the left and on the right, m; infinite where there is none that is known."""
+        row = self._row(chainage)
+        return self.water_left[row], self.water_right[row]
+
+    def _row(self, chainage: Float) -> Int64:
+        place = np.where(np.isfinite(chainage), chainage, self.start)
+        return np.clip(np.rint(place - self.start).astype(np.int64), 0, len(self.left) - 1)
 
     def covers(self, chainage: Float, arc: Float, above: float = 0.0) -> Bool:
         """Tell which places in the unrolled plane are floor, or wall so far ``above`` it; arrays that broadcast, m."""

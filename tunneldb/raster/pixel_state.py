@@ -1,4 +1,4 @@
-"""What each pixel of the unrolled image shows: lining, lining set back in a recess, what hangs on it, floor."""
+"""What each pixel of the unrolled image shows: lining, lining set back in a recess, what hangs on it, floor, water."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ class PixelState(IntEnum):
     OFF = 3  # an appendage, or the mixed pixels of an edge
     FLOOR = 4
     DARK = 5  # in the stored image of states only: lining that is dark
+    SUBMERGED = 6  # below the water
 
 
 def reach(pixel: float) -> int:
@@ -43,7 +44,7 @@ def pixel_states(window: Window, columns: slice, grid: Grid, floor: Floor, outli
     grid : Grid
         The pixels.
     floor : Floor
-        Where the floor begins.
+        Where floor and water begin.
     outliers : SectionOutliers
         Where the surface leaves the wall.
     delta : float
@@ -82,4 +83,6 @@ def pixel_states(window: Window, columns: slice, grid: Grid, floor: Floor, outli
     state = np.where(off, PixelState.OFF, np.where(held, PixelState.LINING, PixelState.EMPTY)).astype(np.uint8)
     state[recess & held] = PixelState.RECESS
     state[(rows <= left[inner]) | (rows >= right[inner])] = PixelState.FLOOR
+    left, right = floor.waterline(chainage[inner])
+    state[(rows <= left) | (rows >= right)] = PixelState.SUBMERGED
     return state

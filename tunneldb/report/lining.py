@@ -314,9 +314,9 @@ def _accumulate(values: Single, state: UInt8, hidden: Bool, row: Intp, column: I
     """Sum up the pixels that fall into each coarser one.
 
     How many hold points, their intensities added up, how many are lining, lining that was not seen, what hangs before it,
-    floor. (6, rows, columns).
+    floor or water. (6, rows, columns).
     """
-    floor = (state == PixelState.FLOOR) | (state == NO_STATE)
+    floor = (state == PixelState.FLOOR) | (state == PixelState.SUBMERGED) | (state == NO_STATE)
     off = state == PixelState.OFF
     held = np.isfinite(values)
     layers = (held, np.where(held, values, 0.0), ~(floor | off), hidden, off, floor)

@@ -133,6 +133,12 @@ class SonarRows:
     thinned: int
 
 
+def has_sonar(conn: psycopg.Connection[Any], survey: Survey) -> bool:
+    """Whether sonar scans were registered for a survey."""
+    row = conn.execute("SELECT EXISTS (SELECT FROM tunnel.sonar_scan WHERE survey_id = %s)", [survey.id]).fetchone()
+    return row is not None and bool(row[0])
+
+
 def stored_scans(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, StoredScan]:
     """Registered scans of a survey, by name; poses of those that have none are NaN."""
     rows = conn.execute(
@@ -159,6 +165,12 @@ def stored_scans(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, Sto
     return found
 
 
+def water_level(conn: psycopg.Connection[Any], survey: Survey, km: int) -> float | None:
+    """Height of the water in a kilometre, m; None where no sonar scan was loaded."""
+    row = conn.execute("SELECT height FROM tunnel.water_level WHERE survey_id = %s AND km = %s", [survey.id, km]).fetchone()
+    return None if row is None else row[0]
+
+
 def save_points(conn: psycopg.Connection[Any], survey: Survey, scan: StoredScan, rows: SonarRows, false: int) -> list[int]:
     """Store the points of a scan in the place of those that it had; returns the kilometres that they touch."""
     conn.execute("DELETE FROM tunnel.sonar_point WHERE scan_id = %s", [scan.id])
@@ -183,7 +195,19 @@ def save_points(conn: psycopg.Connection[Any], survey: Survey, scan: StoredScan,
 
 
 def save_bed(conn: psycopg.Connection[Any], survey: Survey, kilometres: Sequence[int]) -> None:
-    """Make the bed of kilometres anew from the points that they have."""
+    """Make the bed and the water's level of kilometres anew from the points that they have; what rests on them is stale."""
+    conn.execute(
+        """
+        INSERT INTO tunnel.water_level (survey_id, km, height, changed_at)
+        SELECT %(survey)s, k.km,
+               (SELECT max(c.water_level) FROM tunnel.sonar_scan c
+                 WHERE c.survey_id = %(survey)s
+                   AND EXISTS (SELECT FROM tunnel.sonar_point p WHERE p.scan_id = c.id AND p.km = k.km)), clock_timestamp()
+          FROM unnest(%(km)s::int[]) AS k (km)
+        ON CONFLICT (survey_id, km) DO UPDATE SET height = excluded.height, changed_at = excluded.changed_at
+        """,
+        {"survey": survey.id, "km": list(kilometres)},
+    )
     conn.execute("DELETE FROM tunnel.bed WHERE survey_id = %s AND km = ANY (%s)", [survey.id, list(kilometres)])
     conn.execute(
         """
@@ -200,3 +224,55 @@ def save_bed(conn: psycopg.Connection[Any], survey: Survey, kilometres: Sequence
         """,
         {"survey": survey.id, "km": list(kilometres), "noise": RANGE_NOISE},
     )
+
+
+@dataclass(frozen=True)
+class BedCells:
+    """The bed of a kilometre; all arrays over its cells.
+
+    Attributes
+    ----------
+    chainage, across : (n,) float64 arrays
+        Of the cells' middles, m.
+    values : (n, 3) float64 array
+        Height, depth below the water and standard deviation, m.
+    """
+
+    chainage: Float
+    across: Float
+    values: Float
+
+    def at(self, chainage: Float, across: Float) -> Float:
+        """Values (k, 3) of the cells that hold places (k,), m; NaN where there is none."""
+        key, wanted = self._keys(self.chainage, self.across), self._keys(chainage, across)
+        order = np.argsort(key)
+        place = order[np.minimum(np.searchsorted(key, wanted, sorter=order), len(order) - 1)]
+        return np.where((key[place] == wanted)[:, None], self.values[place], np.nan)
+
+    @staticmethod
+    def _keys(chainage: Float, across: Float) -> Int64:
+        """A whole number for each cell, -1 beyond the axis."""
+        with np.errstate(invalid="ignore"):
+            key = np.floor(chainage) * 10_000 + np.floor(across * 10.0) + 5_000  # a canal is not 500 m wide
+        return np.where(np.isfinite(key), key, -1).astype(np.int64)
+
+
+def load_bed(conn: psycopg.Connection[Any], survey: Survey, km: int) -> BedCells:
+    """Read the bed of a kilometre."""
+    rows = conn.execute(
+        "SELECT n + 0.5::float8, (across_n + 0.5::float8) / 10, height, depth, sigma FROM tunnel.bed"
+        " WHERE survey_id = %s AND km = %s ORDER BY n, across_n",
+        [survey.id, km],
+    ).fetchall()
+    cells = np.reshape(np.array(rows, np.float64), (-1, 5))
+    return BedCells(cells[:, 0], cells[:, 1], cells[:, 2:])
+
+
+def load_sonar_points(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Float:
+    """Points (n, 3) of sonar scans on the submerged lining and the bed of a kilometre, tunnel's SRID, m."""
+    rows = conn.execute(
+        "SELECT ST_X(geom), ST_Y(geom), ST_Z(geom) FROM tunnel.sonar_point"
+        " WHERE survey_id = %s AND km = %s AND classification IN (40, 42) ORDER BY id",
+        [survey.id, km],
+    ).fetchall()
+    return np.reshape(np.array(rows, np.float64), (-1, 3))

@@ -90,6 +90,7 @@ class SonarPoint(Base):
     __tablename__ = "sonar_point"
     __table_args__ = (
         Index(None, "survey_id", "km"),
+        Index(None, "survey_id", "chainage"),
         Index(None, "scan_id"),
         {"comment": "Points of sonar scans in the tunnel, thinned and without false echoes"},
     )
@@ -125,3 +126,21 @@ class Bed(Base):
     depth: Mapped[float] = mapped_column(comment="Of the bed below the water, m")
     sigma: Mapped[float] = mapped_column(comment="Standard deviation of its height, that of the scans' poses included, m")
     points: Mapped[int] = mapped_column(comment="Points of the bed in it")
+
+
+class WaterLevel(Base):
+    """The water in a kilometre, and since when what sonar scans saw of it is as it is."""
+
+    __tablename__ = "water_level"
+    __table_args__ = (
+        UniqueConstraint("survey_id", "km"),
+        {"comment": "The water in kilometres into which sonar scans were loaded"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    km: Mapped[int] = mapped_column(comment=KM)
+    height: Mapped[float | None] = mapped_column(comment="Of the water, m; NULL where sonar scans were loaded and none is left")
+    changed_at: Mapped[dt.datetime] = mapped_column(
+        comment="When points of sonar scans were last loaded into the kilometre, or taken out of it"
+    )

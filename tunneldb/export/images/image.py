@@ -19,6 +19,7 @@ from tunneldb.export.images import preview
 from tunneldb.export.images.class_raster import ClassPainter
 from tunneldb.export.images.cog import Extent, write_cog
 from tunneldb.export.images.palette import PALETTES
+from tunneldb.export.images.underwater import export_bed, export_submerged
 from tunneldb.files import replacing
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.raster.gap_fill import FILL, TOLD, fill_blocks
@@ -41,7 +42,8 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
 
     The GeoTIFFs hold dB or m as single-precision numbers, NaN where no point fell, the state of a pixel, or the code of a
     class, 0 where no point fell; x is the chainage and y the arc, m. Each file appears whole. Classes are there when stage
-    ground has run: they are computed from the offset image and what that stage has stored.
+    ground has run: they are computed from the offset image and what that stage has stored. Where sonar scans were loaded, the
+    bed and what they saw, unrolled, are written beside them.
 
     Returns
     -------
@@ -49,7 +51,9 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
         Files written.
     """
     with snapshot(conn):
-        return [path for kind in (*KINDS, *PALETTES) for path in _export_kind(conn, survey, km, kind, folder)]
+        written = [path for kind in (*KINDS, *PALETTES) for path in _export_kind(conn, survey, km, kind, folder)]
+        below = (export(conn, survey, km, folder) for export in (export_submerged, export_bed))
+        return [*written, *(path for path in below if path is not None)]
 
 
 def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> Path | None:

@@ -48,6 +48,7 @@ PALETTES = {
             int(PixelState.OFF): ("appendage", COLOURS[PointClass.APPENDAGE]),
             int(PixelState.FLOOR): ("floor", COLOURS[PointClass.GROUND]),
             int(PixelState.DARK): ("dark", (24, 24, 34)),
+            int(PixelState.SUBMERGED): ("submerged", (120, 190, 220)),
         },
         nodata=255,
     ),

@@ -14,6 +14,9 @@ SHEETS = "Inspection sheets"
 STRUCTURES, FACES = "Structures", "Faces"
 """Group of the layers of structures, and within it that of faces unrolled, with a map theme of its name."""
 
+UNDERWATER = "Under water"
+"""Group of the layers of sonar scans, with the raster of the bed."""
+
 MEMBERS = "Members"
 """The print layout with a page for each member."""
 
@@ -122,3 +125,18 @@ STRUCTURE_LAYERS = (
     VectorLayer("face_sheet", "Faces, unrolled", "face_sheet", "MultiPolygon", "face_sheet", FACES, (FACES,)),
 )
 """The same of structures: of a site, and of a survey of a tunnel in which members were found."""
+
+UNDERWATER_LAYERS = (
+    VectorLayer("sonar_scan", "Sonar stations", "sonar_scan", "PointZ", "sonar_scan", UNDERWATER, (MAP, SPACE)),
+    VectorLayer(
+        "sonar_ellipse", "Error ellipses, 95 %, 100 times as large", "sonar_ellipse", "Polygon", "sonar_ellipse", UNDERWATER,
+        (MAP,),
+    ),
+    VectorLayer("ladder", "Ladders", "ladder", "PointZ", "ladder", UNDERWATER, (MAP,)),
+    VectorLayer("waterline", "Waterlines", "waterline", "LineStringZ", "waterline", UNDERWATER, (MAP, SPACE)),
+    VectorLayer(
+        "section_part", "Sections below the water", "section_part", "LineStringZ", "section_part", UNDERWATER, (MAP, SPACE),
+        where="\"part\" <> 'lining'",
+    ),
+)  # fmt: skip
+"""The same of a survey of a canal tunnel for which sonar scans were registered."""

@@ -26,9 +26,21 @@ from tunneldb.export.qgis.extent import (
     sheet_extent,
     unrolled_extents,
 )
-from tunneldb.export.qgis.layer import FACES, LAYERS, MAP, SHEETS, SPACE, STRUCTURE_LAYERS, STRUCTURES, UNROLLED, VectorLayer
+from tunneldb.export.qgis.layer import (
+    FACES,
+    LAYERS,
+    MAP,
+    SHEETS,
+    SPACE,
+    STRUCTURE_LAYERS,
+    STRUCTURES,
+    UNDERWATER,
+    UNDERWATER_LAYERS,
+    UNROLLED,
+    VectorLayer,
+)
 from tunneldb.export.qgis.member_sheet import member_layout
-from tunneldb.export.qgis.raster import FILLED, KINDS, image_kind, pipe
+from tunneldb.export.qgis.raster import BED, FILLED, KINDS, SUBMERGED, image_kind, pipe
 from tunneldb.export.qgis.sheet import sheet_layout
 from tunneldb.export.qgis.source import RECOMPUTED_FROM, Source, recompute
 from tunneldb.export.qgis.space import docks, filled_layers, scene, site_viewpoint, viewpoint
@@ -37,6 +49,7 @@ from tunneldb.export.tables.spots import read_spots
 from tunneldb.files import replacing
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
+from tunneldb.store.sonar import has_sonar
 from tunneldb.store.survey import Survey
 
 QGIS_VERSION = "3.22.0-Białowieża"
@@ -140,13 +153,17 @@ def _project(
     source = Source.of_connection(conn) if service is None else Source.of_service(service)
     cells = first_members(conn, survey.name)
     structures = survey.site or cells is not None
-    layers = (*(() if survey.site else LAYERS), *(STRUCTURE_LAYERS if structures else ()))
+    layers = (
+        *(() if survey.site else LAYERS),
+        *(STRUCTURE_LAYERS if structures else ()),
+        *(UNDERWATER_LAYERS if has_sonar(conn, survey) else ()),
+    )
     filled = filled_layers(conn, survey.name, layers)
     entries = [_table(source, survey, "remark", "What is to be known (table)", counted=True)]
     if structures:
         entries.append(_table(source, survey, "member_statistics", "Members (table)"))
     entries += [_vector(layer, source, survey, crs, in_space=layer.id in filled) for layer in layers]
-    entries += _rasters(images, folder)
+    entries += _rasters(images, folder, crs)
     views = _views(conn, survey, cells)
     root = ET.Element("qgis", version=QGIS_VERSION, projectname=survey.name, saveUser="", saveUserFull="")
     ET.SubElement(root, "homePath", path="")
@@ -237,14 +254,14 @@ def _table(source: Source, survey: Survey, view: str, title: str, *, counted: bo
     return _Entry(layer_id(view), title, (), (), element, counted)
 
 
-def _rasters(images: Sequence[Path], folder: Path | None) -> list[_Entry]:
-    """Layers of the images, a group for each kind; the first kind that there is is shown.
+def _rasters(images: Sequence[Path], folder: Path | None, crs: ET.Element) -> list[_Entry]:
+    """Layers of the images, a group for each kind; the first kind that there is is shown, and what lies below the water.
 
     It lies over the same with gaps filled.
     """
     entries = []
     of_kind = {kind: sorted(path for path in images if image_kind(path) == kind) for kind in KINDS}
-    shown = next((kind for kind, paths in of_kind.items() if paths), None)
+    shown = {next((kind for kind, paths in of_kind.items() if paths), ""), SUBMERGED}
     for kind, title in KINDS.items():
         paths = of_kind[kind]
         drawn = pipe(kind, of_kind[kind.removesuffix(FILLED)])
@@ -253,11 +270,14 @@ def _rasters(images: Sequence[Path], folder: Path | None) -> list[_Entry]:
             ET.SubElement(element, "id").text = layer_id(path.stem)
             ET.SubElement(element, "datasource").text = _path(path, folder)
             ET.SubElement(element, "layername").text = path.stem
-            ET.SubElement(element, "srs").append(no_crs())
+            ET.SubElement(element, "srs").append(deepcopy(crs) if kind == BED else no_crs())
             ET.SubElement(element, "provider").text = "gdal"
             element.append(deepcopy(drawn))
             ET.SubElement(element, "blendMode").text = "0"
-            themes = (UNROLLED, SHEETS) if kind.removesuffix(FILLED) == shown else ()
+            if kind == BED:
+                entries.append(_Entry(layer_id(path.stem), path.stem, (UNDERWATER, title), (MAP,), element))
+                continue
+            themes = (UNROLLED, SHEETS) if kind.removesuffix(FILLED) in shown else ()
             entries.append(_Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))
     return entries
 
@@ -282,7 +302,7 @@ def _tree(entries: Iterable[_Entry]) -> ET.Element:
 
 def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
     element = ET.Element(
-        "layer-tree-group", name=name, expanded=str(int(name in ("", MAP, UNROLLED, STRUCTURES))),
+        "layer-tree-group", name=name, expanded=str(int(name in ("", MAP, UNROLLED, STRUCTURES, UNDERWATER))),
         checked="Qt::Checked" if checked else "Qt::Unchecked",
     )  # fmt: skip
     for entry in group.entries:
@@ -294,7 +314,7 @@ def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
             shown = ET.SubElement(ET.SubElement(leaf, "customproperties"), "Option", type="Map")
             ET.SubElement(shown, "Option", type="int", name="showFeatureCount", value="1")
     for title, part in group.groups.items():
-        element.append(_group_element(part, title, title in (MAP, STRUCTURES)))
+        element.append(_group_element(part, title, title in (MAP, STRUCTURES, UNDERWATER)))
     return element
 
 

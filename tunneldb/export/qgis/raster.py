@@ -17,6 +17,9 @@ from tunneldb.raster.grey import grey_range
 FILLED = "-filled"
 """End of the kinds of image with gaps filled: each lies under the image of its kind as it was measured."""
 
+BED, SUBMERGED = "bed", "submerged"
+"""Kinds of image of what sonar scans saw: the bed, on the map, and submerged lining and bed, unrolled."""
+
 KINDS = {
     "corrected": "Intensity, corrected",
     f"corrected{FILLED}": f"Intensity, corrected, {TOLD}",
@@ -25,6 +28,8 @@ KINDS = {
     f"offset{FILLED}": f"Offset, {TOLD}",
     "state": "States: seen, unseen, dark",
     "class": "Classes",
+    SUBMERGED: "Offset below the water",
+    BED: "Depth of the water",
 }
 """Kinds of image, the one shown at first in front, with the names of their groups."""
 
@@ -33,6 +38,9 @@ OFFSET_RANGES = (0.1, 0.2, 0.5)
 
 # Inwards red, outwards blue (ColorBrewer RdBu), the surface itself grey, to be told from paper.
 _OFFSET_COLOURS = ((-1.0, "#2166ac"), (-0.4, "#92c5de"), (0.0, "#e6e6e6"), (0.4, "#f4a582"), (1.0, "#b2182b"))
+# The deeper the darker (ColorBrewer Blues).
+_DEPTH_COLOURS = ("#eff3ff", "#bdd7e7", "#6baed6", "#3182bd", "#08519c")
+_DEPTH = 2  # band of the depth in a raster of the bed
 _SAMPLE = 1000
 
 
@@ -48,13 +56,13 @@ def offset_range(paths: Sequence[Path]) -> float:
     return next((limit for limit in OFFSET_RANGES if limit >= usual), OFFSET_RANGES[-1])
 
 
-def _sample(paths: Sequence[Path]) -> Float:
-    """Values of images, some from all over each."""
+def _sample(paths: Sequence[Path], band_number: int = 1) -> Float:
+    """Values of a band of images, some from all over each."""
     samples = [np.empty(0)]
     for path in paths:
         with rasterio.open(path) as image:
             rows, columns = min(image.height, _SAMPLE), min(image.width, _SAMPLE)
-            band = image.read(1, out_shape=(rows, columns), masked=True)
+            band = image.read(band_number, out_shape=(rows, columns), masked=True)
         values = np.asarray(band.compressed(), dtype=np.float64)
         samples.append(values[np.isfinite(values)])
     return np.concatenate(samples)
@@ -63,7 +71,7 @@ def _sample(paths: Sequence[Path]) -> Float:
 def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
     """Return the element that says how an image is drawn, and all of its kind alike.
 
-    Intensity is drawn in grey, offset in diverging colours, each state or class in its own.
+    Intensity is drawn in grey, offset in diverging colours, each state or class in its own, depth the darker the deeper.
     """
     element = ET.Element("pipe")
     if kind in PALETTES:
@@ -71,21 +79,15 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
         entries = ET.SubElement(renderer, "colorPalette")
         for code, (name, rgb) in PALETTES[kind].entries.items():
             ET.SubElement(entries, "paletteEntry", value=str(code), color=hexadecimal(rgb), label=name, alpha="255")
-    elif kind.removesuffix(FILLED) == "offset":
+    elif kind.removesuffix(FILLED) in ("offset", SUBMERGED):
         limit = offset_range(paths)
-        renderer = ET.SubElement(
-            element, "rasterrenderer", type="singlebandpseudocolor", band="1",
-            classificationMin=str(-limit), classificationMax=str(limit),
-        )  # fmt: skip
-        _origin(renderer)
-        shader = ET.SubElement(
-            ET.SubElement(renderer, "rastershader"), "colorrampshader", colorRampType="INTERPOLATED",
-            classificationMode="1", clip="0",
-            minimumValue=str(-limit), maximumValue=str(limit),
-        )  # fmt: skip
-        for share, colour in _OFFSET_COLOURS:
-            value = share * limit
-            ET.SubElement(shader, "item", value=f"{value:g}", label=f"{value * 1000:+.0f} mm", color=colour, alpha="255")
+        renderer = _ramp(
+            element, 1, [(share * limit, f"{share * limit * 1000:+.0f} mm", colour) for share, colour in _OFFSET_COLOURS]
+        )
+    elif kind == BED:
+        shallow, deep = np.quantile(_sample(paths, _DEPTH), [0.02, 0.98]) if paths else (0.0, 1.0)
+        named = zip(np.linspace(shallow, deep, len(_DEPTH_COLOURS)).tolist(), _DEPTH_COLOURS, strict=True)
+        renderer = _ramp(element, _DEPTH, [(depth, f"{depth:.2f} m", colour) for depth, colour in named])
     else:
         limits = grey_range(_sample(paths))
         renderer = ET.SubElement(element, "rasterrenderer", type="singlebandgray", grayBand="1", gradient="BlackToWhite")
@@ -101,6 +103,22 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
     if kind not in PALETTES:
         resampler.set("zoomedOutResampler", "bilinear")
     return element
+
+
+def _ramp(element: ET.Element, band: int, items: Sequence[tuple[float, str, str]]) -> ET.Element:
+    """Draw a band in colours between values, each with its label; returns the renderer."""
+    low, high = str(items[0][0]), str(items[-1][0])
+    renderer = ET.SubElement(
+        element, "rasterrenderer", type="singlebandpseudocolor", band=str(band), classificationMin=low, classificationMax=high
+    )
+    _origin(renderer)
+    shader = ET.SubElement(
+        ET.SubElement(renderer, "rastershader"), "colorrampshader", colorRampType="INTERPOLATED", classificationMode="1",
+        clip="0", minimumValue=low, maximumValue=high,
+    )  # fmt: skip
+    for value, label, colour in items:
+        ET.SubElement(shader, "item", value=f"{value:g}", label=label, color=colour, alpha="255")
+    return renderer
 
 
 def _origin(renderer: ET.Element) -> None:

@@ -8,7 +8,7 @@ from importlib import resources
 import psycopg
 
 from tunneldb.errors import UserError
-from tunneldb.export.qgis.layer import LAYERS, STRUCTURE_LAYERS
+from tunneldb.export.qgis.layer import LAYERS, STRUCTURE_LAYERS, UNDERWATER_LAYERS
 
 STYLE_NAME = "tunneldb"
 
@@ -78,7 +78,9 @@ def styled_columns() -> list[tuple[str, str, str, str]]:
     Of a view that is in a project twice, the layer of its own name has the style.
     """
     return [
-        (layer.view, layer.column, layer.style, layer.title) for layer in (*LAYERS, *STRUCTURE_LAYERS) if layer.id == layer.view
+        (layer.view, layer.column, layer.style, layer.title)
+        for layer in (*LAYERS, *STRUCTURE_LAYERS, *UNDERWATER_LAYERS)
+        if layer.id == layer.view
     ] + [
         ("anomaly", "unrolled", "anomaly", "Leaks, joints and dark spots, unrolled"),
         ("anomaly", "map", "anomaly", "Leaks, joints and dark spots beside the axis"),

@@ -1,0 +1,90 @@
+-- Sections of canal tunnels, closed below the water by what sonar scans saw there.
+
+-- The pieces of each section in kilometres with water, from node to node (one per degree, from straight below the axis round to
+-- the left): what it rests on, its length, and how deep it lies below the water.
+CREATE OR REPLACE VIEW tunnel_api.section_piece AS
+SELECT c.id * 1000 + n.n AS id, c.id AS section_id, c.survey_id, c.km, n.n,
+       CASE WHEN k.state = 'interpolated' THEN 'unseen'
+            WHEN w.height > (public.ST_Z(n.here) + public.ST_Z(n.next)) / 2 THEN 'submerged'
+            ELSE 'lining' END AS part,
+       w.height > (public.ST_Z(n.here) + public.ST_Z(n.next)) / 2 AS below,
+       public.ST_3DDistance(n.here, n.next) AS length, n.here, n.next,
+       (c.radius[n.n] * sind(n.n - 181) - c.radius[n.n + 1] * sind(n.n - 180))
+           * (greatest(w.height - public.ST_Z(n.here), 0) + greatest(w.height - public.ST_Z(n.next), 0)) / 2 AS wet_area,
+       w.height - least(public.ST_Z(n.here), public.ST_Z(n.next)) AS depth
+  FROM tunnel.section c
+  JOIN tunnel.water_level w ON w.survey_id = c.survey_id AND w.km = c.km AND w.height IS NOT NULL
+ CROSS JOIN LATERAL (
+    SELECT i AS n, public.ST_PointN(c.geom, i) AS here, public.ST_PointN(c.geom, i + 1) AS next
+      FROM generate_series(1, 360) AS i) n
+  JOIN tunnel.section_class k ON k.section_id = c.id AND k.class = floor((n.n - 0.5::float8) / c.angle_step);
+COMMENT ON VIEW tunnel_api.section_piece IS
+    'Pieces of sections in kilometres into which sonar scans were loaded, one per degree from straight below the axis to the left; closed_section and section_part are made of them';
+COMMENT ON COLUMN tunnel_api.section_piece.n IS 'Number in its section, from 1';
+COMMENT ON COLUMN tunnel_api.section_piece.part IS 'lining (above the water), submerged (seen by a sonar) or unseen (bridged between what was seen)';
+COMMENT ON COLUMN tunnel_api.section_piece.below IS 'Whether it lies below the water';
+COMMENT ON COLUMN tunnel_api.section_piece.length IS 'm';
+COMMENT ON COLUMN tunnel_api.section_piece.here IS 'Where it begins, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel_api.section_piece.next IS 'Where it ends, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel_api.section_piece.wet_area IS 'Area of the water above it, m²';
+COMMENT ON COLUMN tunnel_api.section_piece.depth IS 'Of its lower end below the water, m';
+
+CREATE OR REPLACE VIEW tunnel_api.closed_section AS
+SELECT c.id, c.survey_id, s.name AS survey, c.km, c.chainage,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, c.chainage) l) AS label, w.height AS water_level,
+       p.unseen, CASE WHEN p.unseen <= 0.2 THEN p.wet_area END AS wet_area,
+       CASE WHEN p.unseen <= 0.2 THEN p.depth END AS depth, c.geom::public.geometry AS geom
+  FROM tunnel.section c
+  JOIN tunnel.survey s ON s.id = c.survey_id
+  JOIN tunnel.water_level w ON w.survey_id = c.survey_id AND w.km = c.km
+  JOIN LATERAL (
+    SELECT coalesce(sum(q.length) FILTER (WHERE q.below AND q.part = 'unseen'), 0) / sum(q.length) FILTER (WHERE q.below) AS unseen,
+           sum(q.wet_area) AS wet_area, max(q.depth) FILTER (WHERE q.part = 'submerged') AS depth
+      FROM tunnel_api.section_piece q
+     WHERE q.section_id = c.id
+    HAVING bool_or(q.part = 'submerged')) p ON true
+ WHERE w.height IS NOT NULL;
+COMMENT ON VIEW tunnel_api.closed_section IS
+    'Cross-sections of canal tunnels, closed through the bed: those of which a sonar saw anything below the water';
+COMMENT ON COLUMN tunnel_api.closed_section.unseen IS 'Share of its line below the water that no sonar saw, 0 to 1; there it is bridged';
+COMMENT ON COLUMN tunnel_api.closed_section.wet_area IS 'Area of the water, m²; NULL where more than a fifth of the line below it was not seen';
+COMMENT ON COLUMN tunnel_api.closed_section.depth IS 'Greatest depth that was seen, m; NULL where more than a fifth of the line below the water was not seen';
+COMMENT ON COLUMN tunnel_api.closed_section.geom IS 'Closed line in space, tunnel''s SRID, m';
+
+CREATE OR REPLACE VIEW tunnel_api.section_part AS
+SELECT min(r.id) AS id, r.survey_id, s.name AS survey, r.km, r.section_id, c.chainage, r.part, sum(r.length) AS length,
+       public.ST_MakeLine(array_agg(r.here ORDER BY r.n) || (array_agg(r.next ORDER BY r.n DESC))[1])
+           ::public.geometry(LineStringZ) AS geom
+  FROM (SELECT q.*, q.n - row_number() OVER (PARTITION BY q.section_id, q.part ORDER BY q.n) AS run
+          FROM tunnel_api.section_piece q) r
+  JOIN tunnel.section c ON c.id = r.section_id
+  JOIN tunnel.survey s ON s.id = r.survey_id
+ GROUP BY r.survey_id, s.name, r.km, r.section_id, c.chainage, r.part, r.run;
+COMMENT ON VIEW tunnel_api.section_part IS
+    'Parts of closed sections that rest on the same: lining above the water, submerged, or unseen';
+COMMENT ON COLUMN tunnel_api.section_part.id IS 'Key';
+COMMENT ON COLUMN tunnel_api.section_part.part IS 'lining (above the water), submerged (seen by a sonar) or unseen (bridged between what was seen)';
+COMMENT ON COLUMN tunnel_api.section_part.length IS 'm';
+COMMENT ON COLUMN tunnel_api.section_part.geom IS 'Line in space, tunnel''s SRID, m';
+
+-- Where sections meet the water, joined from section to section; a line ends where a segment has no section.
+CREATE OR REPLACE VIEW tunnel_api.waterline AS
+SELECT min(p.id) AS id, p.survey_id, s.name AS survey, p.side, min(p.chainage) AS chainage_from, max(p.chainage) AS chainage_to,
+       p.height, public.ST_MakeLine(p.geom ORDER BY p.chainage)::public.geometry(LineStringZ) AS geom
+  FROM (SELECT c.id * 2 + (q.n > 180)::int AS id, c.survey_id, c.chainage, w.height,
+               CASE WHEN q.n > 180 THEN 'right' ELSE 'left' END AS side,
+               c.segment - dense_rank() OVER (PARTITION BY c.survey_id ORDER BY c.segment) AS piece,
+               public.ST_3DLineInterpolatePoint(public.ST_MakeLine(q.here, q.next),
+                   (public.ST_Z(q.here) - w.height) / (public.ST_Z(q.here) - public.ST_Z(q.next))) AS geom
+          FROM tunnel.section c
+          JOIN tunnel.water_level w ON w.survey_id = c.survey_id AND w.km = c.km
+          JOIN tunnel_api.section_piece q ON q.section_id = c.id
+         WHERE (public.ST_Z(q.here) > w.height) <> (public.ST_Z(q.next) > w.height)) p
+  JOIN tunnel.survey s ON s.id = p.survey_id
+ GROUP BY p.survey_id, s.name, p.side, p.piece, p.height
+HAVING count(*) > 1;
+COMMENT ON VIEW tunnel_api.waterline IS 'Where the walls meet the water, in kilometres into which sonar scans were loaded';
+COMMENT ON COLUMN tunnel_api.waterline.id IS 'Key';
+COMMENT ON COLUMN tunnel_api.waterline.side IS 'left or right, looking up-chainage';
+COMMENT ON COLUMN tunnel_api.waterline.height IS 'Of the water, m';
+COMMENT ON COLUMN tunnel_api.waterline.geom IS 'Line in space, tunnel''s SRID, m';
