@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt, median_filter
+from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float, Int64
@@ -81,7 +81,8 @@ def classify(points: Float, reach: Float) -> Int64:
     on_wall = sound & (height < 0.0) & (np.abs(away - wall) < THICK)
     inside = ~(away > wall + THICK)  # also where no wall is known
     keys = np.floor(points[:, :2] / SQUARE).astype(np.int64)
-    floor = _rear_of_cells(keys[below & inside & ~on_wall], -height[below & inside & ~on_wall])
+    # with the foot of the walls: squares beside it hold little else than what stands before it
+    floor = _rear_of_cells(keys[below & inside], -height[below & inside])
     depth = -floor.at(keys) if floor is not None else np.full(len(points), np.nan)
     on_bed = below & inside & (np.abs(height - depth) < THICK)
     out[below & inside & (height > depth)] = WaterClass.OBJECT
@@ -129,12 +130,16 @@ def _rear_of_cells(keys: Int64, values: Float) -> _Cells | None:
 
 
 def _filled(grid: Float) -> Float:
-    """Median of the 3 × 3 cells about each, those unknown taken from the nearest that is known if that is near enough."""
+    """Median of those of the 3 × 3 cells about each that are known; else that of the nearest, if that is near enough."""
+    padded = np.pad(grid, 1, constant_values=np.nan)
+    about = np.stack([padded[i : i + grid.shape[0], j : j + grid.shape[1]] for i in range(3) for j in range(3)])
+    known = np.isfinite(grid)
+    smooth = np.full(grid.shape, np.nan)
+    smooth[known] = np.nanmedian(about[:, known], axis=0)
     away: Float
     nearest: Int64
-    away, nearest = distance_transform_edt(~np.isfinite(grid), return_indices=True)
-    smooth = median_filter(grid[tuple(nearest)], size=3, mode="nearest")
-    return np.where(away <= FARTHEST_FILL, smooth, np.nan)
+    away, nearest = distance_transform_edt(~known, return_indices=True)
+    return np.where(away <= FARTHEST_FILL, smooth[tuple(nearest)], np.nan)
 
 
 def _on_line(cells: _Cells) -> _Cells:

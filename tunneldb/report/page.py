@@ -22,6 +22,7 @@ from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, witho
 from tunneldb.report.lining import Form
 from tunneldb.report.strip import LETTERS, Progress, Strips
 from tunneldb.report.structures import StructuresChapter, read_structures
+from tunneldb.report.underwater import read_underwater
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.coverage import Coverage, read_coverage
 from tunneldb.store.remarks import read_remarks
@@ -200,6 +201,7 @@ class _Report:
             "radiometry": data.read_radiometry(conn, survey, low, high),
             "people": text.reviewers(self.leaks),
             "structures": self.structures,
+            "underwater": read_underwater(conn, survey, low, high),
             "edits": [text.edit(edit, numbers) for edit in edits],
             "edits_in_all": edits_in_all,
             "part": self.part,

@@ -38,7 +38,8 @@ _BESIDE = 50.0  # m of the surface beyond a kilometre's ends
 def export_bed(conn: psycopg.Connection[Any], survey: Survey, km: int, folder: Path) -> Path | None:
     """Write the bed of a kilometre as it lies on the map, ``SURVEY-kmNNN-bed.tif``; its path, or None if no sonar saw any.
 
-    A Cloud Optimized GeoTIFF in the tunnel's SRID of three bands, BANDS, m; NaN where no sonar saw the bed."""
+    A Cloud Optimized GeoTIFF in the tunnel's SRID of three bands, BANDS, m; NaN where no sonar saw the bed.
+    """
     cells = load_bed(conn, survey, km)
     if len(cells.chainage) == 0:
         return None
@@ -96,7 +97,8 @@ def export_submerged(conn: psycopg.Connection[Any], survey: Survey, km: int, fol
     """Write what sonar scans saw of a kilometre, unrolled, ``SURVEY-kmNNN-submerged.tif``; its path, or None if there is none.
 
     A Cloud Optimized GeoTIFF of the distance of the submerged lining and of the bed from the section surface, m, positive
-    into the tunnel: x is the chainage, y the arc, m, as in all images; NaN where no sonar saw anything."""
+    into the tunnel: x is the chainage, y the arc, m, as in all images; NaN where no sonar saw anything.
+    """
     points = load_sonar_points(conn, survey, km)
     if len(points) == 0:
         return None
