@@ -16,7 +16,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from tunneldb.arrays import Float, Int64
+from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.registration.underwater.ladder_shape import PlacedLadder, nearest_element
 from tunneldb.registration.underwater.observations import cell_keys
 from tunneldb.registration.underwater.results import Ladder
@@ -26,6 +26,8 @@ OFF_WALL = (0.05, 1.2)  # where a ladder stands before its wall, m
 HIGHEST = 2.5  # above the water, m
 DRY = 0.03  # above the water, below which waves and mirror images mix in, m
 LINK = 0.06  # between neighbouring points of a ladder, m
+AROUND, LEAST_AROUND = 0.08, 6  # m: two diameters of a bar; points in it
+FLATTEST = 0.5  # ratio of variances on a bar, also where two meet: on a surface they are alike
 LEAST_HEIGHT = 0.3  # of a ladder above the water, m
 MOST_POINTS = 4000
 TRIED_POINTS = 600  # of a first fit
@@ -81,13 +83,15 @@ def _clusters(points: Float, walls: Walls) -> list[tuple[Float, Float]]:
     near = points[(points[:, 2] > DRY) & (points[:, 2] < HIGHEST)]
     away, piece = walls.tree.query(near[:, :2], distance_upper_bound=OFF_WALL[1] + 0.5)
     known = np.isfinite(away)
-    near, piece = near[known], piece[known]
+    near, piece = _thin(near[known], piece[known], LINK / 3.0)
     off = walls.distance(near, piece)
-    before = (off > OFF_WALL[0]) & (off < OFF_WALL[1])
-    near, piece = near[before], piece[before]
+    beside = (off > -AROUND) & (off < OFF_WALL[1] + AROUND)
+    near, piece, off = near[beside], piece[beside], off[beside]
+    bars = (off > OFF_WALL[0]) & (off < OFF_WALL[1])
+    bars[bars] = _elongated(near, bars)
+    near, piece = near[bars], piece[bars]
     if len(near) == 0:
         return []
-    near, piece = _thin(near, piece, LINK / 3.0)
     pairs = cKDTree(near).query_pairs(LINK, output_type="ndarray")
     count = len(near)
     _, label = connected_components(coo_array((np.ones(len(pairs)), pairs.T), (count, count)), directed=False)
@@ -98,6 +102,24 @@ def _clusters(points: Float, walls: Walls) -> list[tuple[Float, Float]]:
             normal = walls.normal[piece[mine]].mean(axis=0)
             out.append((near[mine], np.array([*normal, 0.0]) / np.linalg.norm(normal)))
     return out
+
+
+def _elongated(points: Float, which: Bool) -> Bool:
+    """Whether some of the points (n, 3) lie on bars and not on surfaces: by the principal axes of what is about each.
+
+    A vault or a boat before the wall would else be one cluster with the ladder that leans on it.
+    """
+    tree = cKDTree(points)
+    pairs = cKDTree(points[which]).sparse_distance_matrix(tree, AROUND, output_type="coo_matrix")
+    count = int(which.sum())
+    about = coo_array((np.ones(pairs.nnz), (pairs.row, pairs.col)), (count, len(points))).tocsr()
+    number = np.asarray(about.sum(axis=1))
+    centred = points - points.mean(axis=0)
+    mean = about @ centred / number[:, None]
+    square = (centred[:, :, None] * centred[:, None]).reshape(-1, 9)
+    spread = (about @ square / number[:, None]).reshape(-1, 3, 3) - mean[:, :, None] * mean[:, None]
+    size = np.linalg.eigvalsh(spread)
+    return np.asarray((number >= LEAST_AROUND) & (size[:, 1] < FLATTEST * size[:, 2]))
 
 
 def _thin(points: Float, piece: Int64, edge: float) -> tuple[Float, Int64]:

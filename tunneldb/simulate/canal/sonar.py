@@ -1,0 +1,197 @@
+"""A mechanical profiling sonar's scans below the water of a synthetic canal tunnel.
+
+A fan of narrow beams turns about the tripod's axis. Of each beam the strongest echo is taken, of all that its cone meets in
+one length of the pulse: on a wall that it meets slantingly not the middle, before an edge the nearer or the stronger side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunneldb.arrays import Bool, Float, Int32
+from tunneldb.simulate.canal.cast import NOTHING, Hits, Scene, cast
+from tunneldb.simulate.canal.laser import directions
+from tunneldb.simulate.canal.layout import Layout, Tripod
+from tunneldb.simulate.canal.parameters import CanalParameters
+from tunneldb.simulate.canal.section import BED, BOAT, LADDER, OBJECT, PIER, TOWPATH, VAULT, WALL, WATER
+
+FALSE = -2
+"""Kind of a false echo."""
+
+# Strength of the echo at right angles, relative to masonry; mud swallows some of it, a bar's round face returns much.
+_STRENGTH = {BED: 0.6, WALL: 1.0, VAULT: 1.0, TOWPATH: 1.0, LADDER: 1.5, PIER: 1.0, OBJECT: 1.2, BOAT: 1.5}
+_LAMBERT = 1.0  # power of the cosine, besides that by which a beam covers more of a slanting surface
+_RINGS = {1: ((1, 0.0),), 7: ((1, 0.0), (6, 0.4)), 13: ((1, 0.0), (6, 0.35), (6, 0.7)), 19: ((1, 0.0), (6, 0.3), (12, 0.65))}
+_BLOCK = 20_000  # beams
+# Shares of the false echoes: by way of the water's surface, by a second wall, by side lobes; the others are noise.
+_BY_SURFACE, _BY_WALL, _BY_LOBES = 0.4, 0.2, 0.2
+_NEAREST = 0.4  # m
+
+
+@dataclass(frozen=True)
+class SonarScan:
+    """A scan, as its file has it, with its truth.
+
+    Attributes
+    ----------
+    points : (n, 3) float array
+        File's axes, m.
+    intensity : (n,) float array
+        dB above the weakest.
+    kind : (n,) int array
+        Of the surface (tunneldb.simulate.canal.section), WATER or FALSE.
+    rotation, translation, scale
+        A point of the tunnel = rotation @ (scale * point of the file) + translation: (3, 3), (3,) m, and a number.
+    tilt : float
+        Elevation of the middle of the fan, degrees.
+    """
+
+    name: str
+    points: Float
+    intensity: Float
+    kind: Int32
+    rotation: Float
+    translation: Float
+    scale: float
+    tilt: float
+
+
+@dataclass(frozen=True)
+class _Echoes:
+    """Of each beam the range, m, and strength of the strongest echo, and what returned it."""
+
+    range: Float
+    strength: Float
+    kind: Int32
+
+
+def scan_by_sonar(
+    parameters: CanalParameters, layout: Layout, tripod: Tripod, number: int, tilt: float, to_tunnel: Float, origin: Float
+) -> SonarScan:
+    """One rotation from a tripod.
+
+    Parameters
+    ----------
+    number : int
+        Of the scan, from 1; it decides its noise.
+    tilt : float
+        Elevation of the middle of the fan, degrees.
+    to_tunnel, origin : (3, 3), (3,) float arrays
+        Rotation and place of the local frame in the tunnel's.
+    """
+    p = parameters
+    rng = np.random.default_rng([p.seed, 3, number])
+    session = np.random.default_rng([p.seed, 4]).uniform(-p.sound_speed_spread, p.sound_speed_spread)
+    error = session if p.sound_speed_error is None else p.sound_speed_error
+    scale = 1.0 + error + rng.uniform(-p.sound_speed_scan_spread, p.sound_speed_scan_spread)
+    azimuth = np.radians(np.arange(0.0, 360.0, p.sonar_step))
+    elevation = np.radians(tilt + np.linspace(-0.5, 0.5, p.sonar_beams) * p.sonar_swath)
+    turn, rise = (grid.ravel() for grid in np.meshgrid(azimuth, elevation, indexing="ij"))
+    beams = directions(turn, rise)
+    place = np.broadcast_to(tripod.place, beams.shape).copy()
+    place[turn > np.pi] += p.sonar_settling * np.append(directions(rng.uniform(0.0, 2.0 * np.pi, 1), np.zeros(1))[0, :2], 0.0)
+    echoes = _echoes(p, layout.scene, place, beams, tripod.rotation)
+    seen = (echoes.kind != NOTHING) & (echoes.range > _NEAREST) & (echoes.range < p.sonar_maximum_range)
+    seen &= (echoes.kind != WATER) | (rng.random(len(beams)) < p.water_surface_share)
+    reach, kind, strength = echoes.range.copy(), echoes.kind.copy(), echoes.strength.copy()
+    false = _false_echoes(p, layout.scene, place, beams @ tripod.rotation.T, echoes, seen, rng)
+    for beam, wrong in false:
+        reach[beam], kind[beam], seen[beam] = wrong, FALSE, True
+        strength[beam] *= 0.3
+    reach = reach[seen] + rng.normal(0.0, p.sonar_noise, int(seen.sum()))
+    flip = np.diag([1.0, -1.0, -1.0]) if p.sonar_z_down else np.eye(3)
+    points = (reach / scale)[:, None] * beams[seen] @ flip
+    level = 10.0 * np.log10(np.maximum(strength[seen], 1e-12))
+    return SonarScan(
+        f"sonar-{number}", points, level - level.min(), kind[seen], to_tunnel @ tripod.rotation @ flip,
+        to_tunnel @ tripod.place + origin, scale, tilt,
+    )  # fmt: skip
+
+
+def _cone(parameters: CanalParameters) -> tuple[Float, Float]:
+    """Angles (k, 2) of a beam's rays off its middle, rad, and their weights (k,), two-way."""
+    angles = []
+    for count, radius in _RINGS[parameters.sub_rays]:
+        around = 2.0 * np.pi * (np.arange(count) + 0.5 * (radius > 0.5)) / count
+        angles.append(radius * parameters.sonar_beam_width * np.column_stack([np.cos(around), np.sin(around)]))
+    off = np.concatenate(angles)
+    weight = np.exp(-4.0 * np.log(2.0) * (off**2).sum(axis=1) / parameters.sonar_beam_width**2)
+    return np.radians(off), weight
+
+
+def _echoes(parameters: CanalParameters, scene: Scene, place: Float, beams: Float, rotation: Float) -> _Echoes:
+    """Strongest echo of beams (n, 3), file's axes but upright, from places (n, 3), local frame."""
+    off, weight = _cone(parameters)
+    table = np.zeros(max(_STRENGTH) + 2)
+    table[list(_STRENGTH)] = list(_STRENGTH.values())
+    out = _Echoes(np.full(len(beams), np.inf), np.zeros(len(beams)), np.full(len(beams), NOTHING, np.int32))
+    for begin in range(0, len(beams), _BLOCK):
+        part = slice(begin, begin + _BLOCK)
+        middle = beams[part]
+        side = np.cross(middle, [0.0, 0.0, 1.0])
+        side /= np.linalg.norm(side, axis=1)[:, None]
+        over = np.cross(side, middle)
+        rays = middle[:, None] + off[:, :1] * side[:, None] + off[:, 1:] * over[:, None]
+        rays /= np.linalg.norm(rays, axis=2)[..., None]
+        start = np.repeat(place[part], len(off), axis=0)
+        hits = cast(scene, start, rays.reshape(-1, 3) @ rotation.T, parameters.sonar_maximum_range + 1.0)
+        _strongest(parameters, hits, table, weight, out, part)
+    return out
+
+
+def _strongest(parameters: CanalParameters, hits: Hits, table: Float, weight: Float, out: _Echoes, part: slice) -> None:
+    """Take of each beam the range cell with the most energy; its echo is the mean of what lies in it."""
+    shape = (-1, len(weight))
+    reach, kind, cosine = (column.reshape(shape) for column in (hits.range, hits.kind, hits.cosine))
+    solid = (kind != NOTHING) & (kind != WATER)
+    power = np.where(solid, table[np.where(solid, kind, 0)] * weight * cosine**_LAMBERT, 0.0)
+    within = (reach[:, None, :] >= reach[:, :, None]) & (reach[:, None, :] < reach[:, :, None] + parameters.sonar_resolution)
+    energy = (within * power[:, None, :]).sum(axis=2)
+    best = energy.argmax(axis=1)
+    row = np.arange(len(best))
+    chosen = within[row, best] * power
+    total = chosen.sum(axis=1)
+    met = total > 1e-4
+    mean = (chosen * np.where(np.isfinite(reach), reach, 0.0)).sum(axis=1) / np.where(met, total, 1.0)
+    water = (kind == WATER).all(axis=1)
+    strongest = kind[row, chosen.argmax(axis=1)]
+    out.range[part] = np.where(met, mean, np.where(water, reach[:, 0], np.inf))
+    out.strength[part] = np.where(met, total, 0.05)
+    out.kind[part] = np.where(met, strongest, np.where(water, WATER, NOTHING))
+
+
+def _false_echoes(
+    parameters: CanalParameters, scene: Scene, place: Float, ways: Float, echoes: _Echoes, seen: Bool, rng: np.random.Generator
+) -> list[tuple[Int32, Float]]:
+    """Beams whose echo is false, and their ranges, m; ``ways`` (n, 3) are the beams in the local frame."""
+    count = round(parameters.false_share * int(seen.sum()))
+    by_surface, by_wall, by_lobes = (round(share * count) for share in (_BY_SURFACE, _BY_WALL, _BY_LOBES))
+    out = []
+    up = np.flatnonzero(echoes.kind == WATER)
+    beam = rng.choice(up, min(by_surface, len(up)), replace=False)
+    start = place[beam] + echoes.range[beam, None] * ways[beam]
+    start[:, 2] = -1e-6
+    out.append(_bounced(scene, start, ways[beam] * [1.0, 1.0, -1.0], echoes.range[beam], beam))
+    walls = np.flatnonzero(seen & (echoes.kind == WALL))
+    beam = rng.choice(walls, min(by_wall, len(walls)), replace=False)
+    # off a wall and back from the other one: the walls are taken for mirrors that are upright and along the axis
+    start = place[beam] + 0.98 * echoes.range[beam, None] * ways[beam]
+    out.append(_bounced(scene, start, ways[beam] * [1.0, -1.0, 1.0], echoes.range[beam], beam))
+    held = np.flatnonzero(seen)
+    beam = rng.choice(held, min(by_lobes, len(held)), replace=False)
+    lobe = np.clip(beam + rng.integers(-12, 13, len(beam)), 0, len(ways) - 1)  # some degrees above or below
+    known = np.isfinite(echoes.range[lobe])
+    out.append((beam[known].astype(np.int32), echoes.range[lobe][known]))
+    beam = rng.choice(held, min(max(count - sum(len(b) for b, _ in out), 0), len(held)), replace=False)
+    out.append((beam.astype(np.int32), rng.uniform(_NEAREST, min(15.0, parameters.sonar_maximum_range), len(beam))))
+    return out
+
+
+def _bounced(scene: Scene, start: Float, ways: Float, before: Float, beam: Float) -> tuple[Int32, Float]:
+    """Beams (n,) that went on from places (n, 3) after so many metres (n,) and met something, and their ranges."""
+    hits = cast(scene, start, ways, 15.0)
+    met = (hits.kind != NOTHING) & (hits.kind != WATER) & (hits.range > 0.3)
+    return beam[met].astype(np.int32), before[met] + hits.range[met]
+
