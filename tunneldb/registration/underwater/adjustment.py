@@ -30,9 +30,12 @@ from tunneldb.registration.underwater.walls import Walls
 
 SCALE_SIGMA = 0.01  # of the range scale before anything is known: 15 m/s of 1480
 BATTER_SIGMA = 0.01  # of the change of batter at the water
-DEPTH_SHARE = 0.25  # of a bar's radius by which its echo may come from behind its near surface
+# Share of a bar's radius by which its echo comes from behind its near surface: where Lambert's law has its mean over a round bar,
+# 1 - (4/3) / (pi/2); and by how much another law may shift it.
+DEPTH_SHARE, DEPTH_SPREAD = 1.0 - (4.0 / 3.0) / (np.pi / 2.0), 0.2
 WATERLINE_SIGMA = 0.03  # m: of what edges of walls have in common, by which they lie above or below the water
-COMMON = 4  # parameters common to all scans but for the ladders: two batters, that depth, and that of the waterline
+ZERO_SIGMA = 0.0015  # m: of the sonar's zero on masonry, and of what its beam hears there of stones and joints: some of RELIEF
+COMMON = 5  # parameters common to all scans but for the ladders: two batters, that depth, that of the waterline, that zero
 LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
 CUT = 3.0  # standard deviations at which a row has a quarter of its weight
 REACHES = (0.3, 0.2, 0.15, 0.12, *[0.1] * 30)  # within which rows are sought, round by round, m
@@ -114,15 +117,17 @@ def adjust(
     poses = [scan.pose for scan in scans]
     placed = [ladder.placed for ladder in ladders]
     count = POSE * len(scans) + COMMON + 6 * len(ladders)
-    common = np.zeros(COMMON)  # changes of batter of either side, depth behind a bar's near surface, height of the waterline
     radius = max((ladder.placed.ladder.diameter / 2.0 for ladder in ladders), default=0.0)
+    # changes of batter of either side, depth behind a bar's near surface, height of the waterline, zero on masonry
+    usual = np.array([0.0, 0.0, DEPTH_SHARE * radius, 0.0, 0.0])
+    common = usual.copy()
     precision = _prior(len(scans), ladders, radius)
     normal, rows = np.eye(count), []
     for reach in reaches:
         leaning = replace(walls, batter=walls.batter + common[walls.side])
         rows = _all_rows(scans, poses, leaning, placed, common, pairs, reach)
         normal, right = _normal_equations(rows, count)
-        offset = _prior_offset(poses, placed, ladders, common)
+        offset = _prior_offset(poses, placed, ladders, common - usual)
         change = -_inverse(normal + precision, 0.0) @ (right + precision @ offset)
         for i, pose in enumerate(poses):
             poses[i] = _moved(pose, change[POSE * i : POSE * (i + 1)])
@@ -156,7 +161,7 @@ def _all_rows(
     rows: list[Rows] = []
     first = POSE * len(scans)
     for i, scan in enumerate(scans):
-        rows += wall_rows(scan.patches, poses[i], walls, i, first, reach)
+        rows += wall_rows(scan.patches, poses[i], walls, float(common[4]), i, (first, first + 4), reach)
         for k, points in scan.ladders.items():
             found = ladder_rows(points, poses[i], placed[k], float(common[2]), i, (first + 2, first + COMMON + 6 * k), reach)
             rows += [found] if found is not None else []
@@ -211,8 +216,9 @@ def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
     sigma[POSE * scans : POSE * scans + COMMON] = (
         BATTER_SIGMA,
         BATTER_SIGMA,
-        max(DEPTH_SHARE * radius, 1e-4),
+        max(DEPTH_SPREAD * radius, 1e-4),
         WATERLINE_SIGMA,
+        ZERO_SIGMA,
     )
     for k, ladder in enumerate(ladders):
         first = POSE * scans + COMMON + 6 * k

@@ -131,10 +131,13 @@ def find_patches(points: Float) -> Patches:
     return Patches(centre[keep], normal[keep], count[keep], spread[keep])
 
 
-def wall_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, first_column: int, within: float) -> list[Rows]:
+def wall_rows(
+    patches: Patches, pose: Pose, walls: Walls, zero: float, scan: int, columns: tuple[int, int], within: float
+) -> list[Rows]:
     """Compare a scan's patches with the walls, at most ``within`` m off.
 
-    Common parameters from ``first_column`` on: the change of batter below the water of each side.
+    A sonar hears masonry ``zero`` m in front of where the laser sees it. ``columns`` are the places among the common parameters
+    of the first of the changes of batter of each side, and of that zero.
     """
     centre = pose.apply(patches.centre)
     away, piece = walls.tree.query(centre[:, :2], distance_upper_bound=1.0)
@@ -158,8 +161,9 @@ def wall_rows(patches: Patches, pose: Pose, walls: Walls, scan: int, first_colum
         rows = walls.side[piece] == side
         if rows.any():
             out.append(
-                Rows(off[rows], sigma[rows], pose_derivatives(centre[rows], pose, normal[rows]), scan, None, None,
-                     batter[rows, None], np.array([first_column + side]), stretch[rows],
+                Rows(off[rows] - zero, sigma[rows], pose_derivatives(centre[rows], pose, normal[rows]), scan, None, None,
+                     np.column_stack([batter[rows], np.full(int(rows.sum()), -1.0)]),
+                     np.array([columns[0] + side, columns[1]]), stretch[rows],
                      np.full(int(rows.sum()), SHARED), "wall", "left" if side else "right")
             )  # fmt: skip
     return out

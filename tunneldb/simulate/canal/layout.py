@@ -96,7 +96,9 @@ def lay_out(parameters: CanalParameters, line: Centreline) -> Layout:
     tripods = tuple(_tripod(parameters, line, station, rng) for station in stations)
     along = _stations(parameters.laser_stations, parameters.laser_spacing)
     offsets = rng.uniform(-0.4, 0.4, len(along))
-    lasers = line.local(np.column_stack([along, offsets, rng.uniform(1.1, 1.4, len(along))])) if len(along) else np.empty((0, 3))
+    lasers = (
+        line.local(np.column_stack([along, offsets, rng.uniform(1.1, 1.4, len(along))])) if len(along) else np.empty((0, 3))
+    )
     return Layout(scene, tuple(ladders), tripods, lasers)
 
 
@@ -136,14 +138,27 @@ def _ladder(
     origin = water - submerged * rise
     hidden = tuple(sorted(rng.choice(RUNGS, min(p.hidden_rungs, RUNGS - 4), replace=False).tolist()))
     low, high = -OVERHANG, heights[-1] + OVERHANG
-    rows = [[*(origin + x * across + low * rise), *rise, high - low, 0.5 * DIAMETER, 100.0 * k] for x in (-0.5 * STILE_GAP, 0.5 * STILE_GAP)]
+    rows = [
+        [*(origin + x * across + low * rise), *rise, high - low, 0.5 * DIAMETER, 100.0 * k]
+        for x in (-0.5 * STILE_GAP, 0.5 * STILE_GAP)
+    ]
     for number, height in enumerate(heights):
         if number not in hidden:
             start = origin - 0.5 * STILE_GAP * across + height * rise
             rows.append([*start, *across, STILE_GAP, 0.5 * DIAMETER, 100.0 * k + number + 1])
     middle = origin + 0.5 * (low + high) * rise
     margin = DIAMETER
-    frame = [*middle, *across, *rise, *out, 0.5 * STILE_GAP + margin, 0.5 * (high - low) + margin, margin, first, first + len(rows)]
+    frame = [
+        *middle,
+        *across,
+        *rise,
+        *out,
+        0.5 * STILE_GAP + margin,
+        0.5 * (high - low) + margin,
+        margin,
+        first,
+        first + len(rows),
+    ]
     turn = line.rotation()
     truth = TrueLadder(f"L{k + 1}", line.to_tunnel(origin), np.array([across, rise, out]) @ turn.T, heights, hidden)
     return truth, np.array(rows), np.array(frame)
@@ -159,7 +174,20 @@ def _solids(parameters: CanalParameters, cut: Section, stations: list[float], rn
             s = -reach + 2.0 * reach * (k + rng.uniform(0.2, 0.8)) / count
             side = rng.choice([-1.0, 1.0])
             if kind == BOX:
-                rows.append([BOX, PIER, s, side * half, -0.5 * p.depth + 0.5, rng.uniform(0.2, 0.5), rng.uniform(0.1, 0.3), 0.5 * p.depth + 1.5, 1.0, 0.0])
+                rows.append(
+                    [
+                        BOX,
+                        PIER,
+                        s,
+                        side * half,
+                        -0.5 * p.depth + 0.5,
+                        rng.uniform(0.2, 0.5),
+                        rng.uniform(0.1, 0.3),
+                        0.5 * p.depth + 1.5,
+                        1.0,
+                        0.0,
+                    ]
+                )
             else:
                 size = rng.uniform(0.3, 0.5), rng.uniform(0.2, 0.4), rng.uniform(0.4, 0.9)
                 rows.append([RECESS, PIER, s, side * (half + 0.1), rng.uniform(-1.0, 0.2), *size, 1.0, 0.0])

@@ -194,4 +194,3 @@ def _bounced(scene: Scene, start: Float, ways: Float, before: Float, beam: Float
     hits = cast(scene, start, ways, 15.0)
     met = (hits.kind != NOTHING) & (hits.kind != WATER) & (hits.range > 0.3)
     return beam[met].astype(np.int32), before[met] + hits.range[met]
-

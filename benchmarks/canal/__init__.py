@@ -1,0 +1,1 @@
+"""Registration of sonar scans in canal tunnels: against truth, on scenes of `tunneldb.simulate.canal`, beside peers."""
