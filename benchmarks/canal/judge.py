@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmarks.canal.scenes import Case, check_points, true_places
+from benchmarks.canal.scenes import CHECK_REACH, Case, check_points, true_places
 from tunneldb.arrays import Float
 from tunneldb.classification.underwater import WaterClass, classify
 from tunneldb.errors import UserError
@@ -20,6 +20,7 @@ from tunneldb.simulate.canal.section import BED, WALL, WATER
 
 HARMLESS = 0.15  # m from a surface within which a false echo says nothing wrong
 CELL = 0.1  # m of wall, and across the bed
+LEAST = 5  # points of a cell of the bed
 RUNG = 0.279  # m
 
 
@@ -31,12 +32,20 @@ def judge(case: Case) -> dict[str, Any]:
     except UserError as error:
         return {"seed": case.scene.parameters.seed, "refused": str(error), "scans": [], "ladders": []}
     seconds = time.perf_counter() - start
+    scans = [_scan(case, pose, true) for pose, true in zip(found.scans, case.scene.sonar, strict=True)]
+    points = [np.empty((0, 7))]
+    for one, pose, true in zip(scans, found.scans, case.scene.sonar, strict=True):
+        if "shift" in one:
+            counted, placed = _classes(case, pose, true)
+            one |= counted
+            points.append(placed)
     return {
         "seed": case.scene.parameters.seed,
         "seconds": seconds,
         "points": int(sum(len(cloud.points) for cloud in case.clouds)),
         "ladders": _ladders(case, found),
-        "scans": [_scan(case, pose, true) for pose, true in zip(found.scans, case.scene.sonar, strict=True)],
+        "scans": scans,
+        "surfaces": _surfaces(case, np.concatenate(points)) if len(points) > 1 else None,
     }
 
 
@@ -73,7 +82,7 @@ def _scan(case: Case, pose: SonarPose, true: SonarScan) -> dict[str, Any]:
     points = check_points(true)[::20]
     error = pose.scale * points @ pose.rotation.T + pose.translation - true_places(true, points)
     out["inside"] = _share_inside(pose, points, error)
-    return out | _classes(case, pose, true)
+    return out
 
 
 def _share_inside(pose: SonarPose, points: Float, error: Float) -> float:
@@ -89,8 +98,8 @@ def _share_inside(pose: SonarPose, points: Float, error: Float) -> float:
     return float(np.mean(inside))
 
 
-def _classes(case: Case, pose: SonarPose, true: SonarScan) -> dict[str, Any]:
-    """False echoes removed, good points lost, and how far bed and wall lie from the truth."""
+def _classes(case: Case, pose: SonarPose, true: SonarScan) -> tuple[dict[str, Any], Float]:
+    """False echoes removed and good points lost; chainage, place across, place (3), class and true kind of points of surfaces."""
     scene = case.scene
     space = pose.scale * true.points @ pose.rotation.T + pose.translation
     reach = np.linalg.norm(space - pose.translation, axis=1)
@@ -102,27 +111,36 @@ def _classes(case: Case, pose: SonarPose, true: SonarScan) -> dict[str, Any]:
     off = np.abs(scene.distance(space))
     phantom, good = (kind == FALSE) & (off > HARMLESS), (kind >= 0) & (kind != WATER)
     gone = classes == WaterClass.FALSE
-    wall = (classes == WaterClass.LINING) & (kind == WALL) & (reach < 10.0)
-    out = {
-        "phantoms": int(phantom.sum()), "removed": int((phantom & gone).sum()), "good": int(good.sum()),
-        "lost": int((good & gone).sum()), "wall": _cell_errors(space[wall], scene.distance(space[wall])),
-    }  # fmt: skip
-    bed = (classes == WaterClass.BED) & (reach < 10.0)
-    cell = np.floor(np.column_stack([along[bed], across[bed] / CELL])).astype(np.int64)
+    counted = {
+        "phantoms": int(phantom.sum()),
+        "removed": int((phantom & gone).sum()),
+        "good": int(good.sum()),
+        "lost": int((good & gone).sum()),
+    }
+    kept = (reach < CHECK_REACH) & ((classes == WaterClass.BED) | (classes == WaterClass.LINING))
+    return counted, np.column_stack([along, across, space, classes, kind])[kept]
+
+
+def _surfaces(case: Case, points: Float) -> dict[str, Any]:
+    """How far bed and wall lie from the truth, by cells over the points of all scans."""
+    scene = case.scene
+    klass, kind, space = points[:, 5], points[:, 6], points[:, 2:5]
+    wall = (klass == WaterClass.LINING) & (kind == WALL)
+    bed = klass == WaterClass.BED
+    cell = np.floor(np.column_stack([points[bed, 0], points[bed, 1] / CELL])).astype(np.int64)
     names, number, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     order = np.lexsort([space[bed, 2], number.ravel()])
-    begin = np.concatenate([[0], np.cumsum(count)[:-1]])
-    height = space[bed, 2][order][begin + count // 2]
-    fine = np.linspace(0.05, 0.95, 10)
-    truth = np.mean(
-        [scene.bed_height(names[:, 0] + share, (names[:, 1] + 0.5) * CELL) for share in fine], axis=0
-    )  # a cell is 1 m long
-    held = (count >= 5) & (kind[bed][order][begin] == BED)
-    error = height[held] - truth[held]
+    middle = np.concatenate([[0], np.cumsum(count)[:-1]]) + count // 2
+    height = space[bed, 2][order][middle]
+    along = np.linspace(0.05, 0.95, 10)  # a cell is 1 m long
+    truth = np.mean([scene.bed_height(names[:, 0] + share, (names[:, 1] + 0.5) * CELL) for share in along], axis=0)
+    held = (count >= LEAST) & (kind[bed][order][middle] == BED)
     floor = scene.parameters.water_level - scene.parameters.depth - 0.5
-    out["bed"] = np.abs(error).round(5).tolist()[::3]
-    out["volume"] = [float((height[held] - floor).sum() * CELL), float((truth[held] - floor).sum() * CELL)]
-    return out
+    return {
+        "wall": _cell_errors(space[wall], scene.distance(space[wall])),
+        "bed": np.abs(height[held] - truth[held]).round(5).tolist(),
+        "volume": [float((height[held] - floor).sum() * CELL), float((truth[held] - floor).sum() * CELL)],
+    }
 
 
 def _cell_errors(points: Float, distance: Float) -> list[float]:

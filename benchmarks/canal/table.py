@@ -21,8 +21,9 @@ def table(rows: list[dict[str, Any]]) -> str:
     scale = 100.0 * np.abs([scan["scale"] for scan in right])
     z = np.array([[*scan["turn"], *scan["shift"], scan["scale"]] for scan in right]) / [scan["sigma"] for scan in right]
     height = 1e3 * np.array([one["off"][1] for one in ladders if one["off"]])
-    bed, wall = (1e3 * np.concatenate([scan[kind] for scan in right]) for kind in ("bed", "wall"))
-    volume = np.array([scan["volume"] for scan in right])
+    surfaces = [row["surfaces"] for row in rows if row.get("surfaces")]
+    bed, wall = (1e3 * np.concatenate([one[kind] for one in surfaces]) for kind in ("bed", "wall"))
+    volume = np.array([one["volume"] for one in surfaces])
     off = 100.0 * np.abs(volume[:, 0] / volume[:, 1] - 1.0)
     total = {name: sum(scan[name] for scan in right) for name in ("phantoms", "removed", "good", "lost")}
     seconds = np.array([row["seconds"] for row in rows if "seconds" in row])

@@ -11,17 +11,21 @@ from enum import IntEnum
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float, Int64
 
 SURFACE = 0.1  # about the water's level, m
+WAVES = 0.05  # m above it, up to which noise puts points of a wall; farther up are its images
 ALONE = 0.15  # m: radius in which a point must have
 SPREADING = 0.03  # times the range, beyond which rays lie farther apart than that
 LEAST_NEIGHBOURS = 4  # others
 STRIP, BAND = 1.0, 0.25  # cells of wall, m along and in height
 SQUARE = 0.5  # cells of bed, m
 BIN = 0.05  # m
+STEEPEST = 0.84  # slope of a bed, 40°: silt and rubble do not stand steeper
 THICK = 0.15  # m: four standard deviations of range, and a wall's relief
 FARTHEST_FILL = 3.0  # cells
 LARGEST_STEP = 0.5  # m between places of a wall at one chainage
@@ -71,25 +75,34 @@ def classify(points: Float, reach: Float) -> Int64:
     below = sound & (height < -SURFACE)
     side = np.where(points[:, 1] > middle, 1.0, -1.0)
     away = np.abs(points[:, 1] - middle)
-    wall = np.full(len(points), np.nan)
+    wall, niche = np.full(len(points), np.nan), np.full(len(points), np.nan)
+    keys = np.floor(points[:, [0, 2]] / [STRIP, BAND]).astype(np.int64)
     for sign in (-1.0, 1.0):
         mine = side == sign
-        keys = np.floor(points[:, [0, 2]] / [STRIP, BAND]).astype(np.int64)
         cells = _rear_of_cells(keys[mine & below], away[mine & below])
         if cells is not None:
-            wall[mine] = _on_line(cells).at(keys[mine])
-    on_wall = sound & (height < 0.0) & (np.abs(away - wall) < THICK)
+            wall[mine] = _on_line(_smoothed(cells)).at(keys[mine])
+            niche[mine] = cells.at(keys[mine])
+    in_niche = (niche > wall) & (np.abs(away - niche) < THICK)
+    on_wall = sound & (height < WAVES) & ((np.abs(away - wall) < THICK) | in_niche)
     inside = ~(away > wall + THICK)  # also where no wall is known
     keys = np.floor(points[:, :2] / SQUARE).astype(np.int64)
     # with the foot of the walls: squares beside it hold little else than what stands before it
     floor = _rear_of_cells(keys[below & inside], -height[below & inside])
-    depth = -floor.at(keys) if floor is not None else np.full(len(points), np.nan)
+    depth = -_connected(_smoothed(floor)).at(keys) if floor is not None else np.full(len(points), np.nan)
     on_bed = below & inside & (np.abs(height - depth) < THICK)
-    out[below & inside & (height > depth)] = WaterClass.OBJECT
+    # where the bed is hidden, what hides it
+    out[below & inside & (height > np.where(np.isnan(depth), _deepest(depth), depth))] = WaterClass.OBJECT
     out[sound & inside & (np.abs(height) <= SURFACE) & (away < wall - THICK)] = WaterClass.SURFACE
     out[on_wall & ~(height < depth - THICK)] = WaterClass.LINING
     out[on_bed & ~on_wall] = WaterClass.BED
     return out
+
+
+def _deepest(depth: Float) -> float:
+    """Lowest height of the bed, m; the water's surface if none is known."""
+    known = depth[np.isfinite(depth)]
+    return float(known.min()) if len(known) else 0.0
 
 
 def _has_neighbours(points: Float, reach: Float) -> Bool:
@@ -126,11 +139,12 @@ def _rear_of_cells(keys: Int64, values: Float) -> _Cells | None:
     rear = np.full(len(most), -1, np.int64)
     np.maximum.at(rear, cells[many], level[many])
     grid = np.where(rear >= 0, least + (rear + 0.5) * BIN, np.nan)
-    return _Cells(_filled(grid.reshape(shape)), low)
+    return _Cells(grid.reshape(shape), low)
 
 
-def _filled(grid: Float) -> Float:
+def _smoothed(cells: _Cells) -> _Cells:
     """Median of those of the 3 × 3 cells about each that are known; else that of the nearest, if that is near enough."""
+    grid = cells.value
     padded = np.pad(grid, 1, constant_values=np.nan)
     about = np.stack([padded[i : i + grid.shape[0], j : j + grid.shape[1]] for i in range(3) for j in range(3)])
     known = np.isfinite(grid)
@@ -139,7 +153,25 @@ def _filled(grid: Float) -> Float:
     away: Float
     nearest: Int64
     away, nearest = distance_transform_edt(~known, return_indices=True)
-    return np.where(away <= FARTHEST_FILL, smooth[tuple(nearest)], np.nan)
+    return _Cells(np.where(away <= FARTHEST_FILL, smooth[tuple(nearest)], np.nan), cells.low)
+
+
+def _connected(cells: _Cells) -> _Cells:
+    """The largest surface of cells that go on into each other at no more than STEEPEST: a hull over the bed is not the bed."""
+    value = cells.value
+    number = np.arange(value.size).reshape(value.shape)
+    pairs = []
+    for one, other in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
+        joined = np.abs(value[one] - value[other]) < STEEPEST * SQUARE
+        pairs.append((number[one][joined], number[other][joined]))
+    rows, columns = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    links = coo_array((np.ones(len(rows)), (rows, columns)), (value.size, value.size))
+    _, label = connected_components(links, directed=False)
+    known = np.isfinite(value).ravel()
+    if not known.any():
+        return cells
+    largest = np.bincount(label[known]).argmax()
+    return _Cells(np.where((label == largest).reshape(value.shape), value, np.nan), cells.low)
 
 
 def _on_line(cells: _Cells) -> _Cells:

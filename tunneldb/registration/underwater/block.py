@@ -13,7 +13,7 @@ import numpy as np
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.adjustment import Adjusted, adjust, scan_of
-from tunneldb.registration.underwater.chain import OVERLAP, place_beside
+from tunneldb.registration.underwater.chain import OVERLAP, agreement, place_beside
 from tunneldb.registration.underwater.determined import judge
 from tunneldb.registration.underwater.laser_ladders import LaserLadder, find_laser_ladders
 from tunneldb.registration.underwater.observations import Pose, Rows, cell_keys
@@ -47,8 +47,8 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
     walls = find_walls(local[np.unique(cell_keys(local, WALL_VOXEL), return_index=True)[1]])
     found = find_laser_ladders(local, walls, ladders)
     scans, faults = _prepare(clouds, walls)
-    started = _start(scans, walls, found)
     seen = {one.placed.ladder.name for one in found}
+    started = _start(scans, walls, found, unseen=len(seen) < len(ladders))
     notes = [f"ladder {one.name} is not seen by the laser" for one in ladders if one.name not in seen]
     known = sorted(started)
     adjusted = _adjust_all(scans, started, known, walls, found)
@@ -84,9 +84,28 @@ def _prepare(clouds: Sequence[SonarCloud], walls: Walls) -> tuple[dict[int, Prep
     return scans, faults
 
 
-def _start(scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[LaserLadder]) -> dict[int, StartedScan]:
-    """First poses: by the ladders that a scan sees, then beside scans that have one, as far as that leads."""
-    started = {i: one for i, scan in scans.items() if (one := start(scan, walls, found)) is not None}
+def _start(
+    scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[LaserLadder], *, unseen: bool
+) -> dict[int, StartedScan]:
+    """First poses: by the ladders that a scan sees, then beside scans that have one, as far as that leads.
+
+    Raises
+    ------
+    UserError
+        Those that see a ladder are upside down.
+    """
+    started, upside_down = {}, []
+    for i, scan in scans.items():
+        try:
+            one = start(scan, walls, found)
+        except UserError as error:
+            upside_down.append(error)
+            continue
+        if one is not None:
+            started[i] = one
+    if upside_down and not started:
+        raise upside_down[0]
+    started = _agreeing(scans, started, walls, unseen=unseen)
     left = [i for i in scans if i not in started]
     while started and left:
         placed = {i: one for i in left if (one := place_beside(i, scans, started, walls, found)) is not None}
@@ -95,6 +114,38 @@ def _start(scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[Lase
         started |= placed
         left = [i for i in left if i not in placed]
     return started
+
+
+def _agreeing(
+    scans: Mapping[int, PreparedScan], started: Mapping[int, StartedScan], walls: Walls, *, unseen: bool
+) -> dict[int, StartedScan]:
+    """Those of the scans that do not contradict each other where they see the same bed: one ladder looks like another.
+
+    Where there are ladders that the laser does not see (``unseen``), a scan that sees one ladder alone may have taken such a one
+    for it: it needs another scan's word.
+    """
+    kept = dict(started)
+    said = {
+        (a, b): agreement(scans[a], scans[b], (started[a].pose, started[b].pose), walls)
+        for a in started
+        for b in started
+        if a < b and np.linalg.norm(started[a].pose.translation - started[b].pose.translation) < OVERLAP
+    }
+
+    def votes(i: int) -> tuple[int, int]:
+        of = [value for (a, b), value in said.items() if i in (a, b) and a in kept and b in kept]
+        return of.count(1), of.count(-1)
+
+    while kept:
+        against = {i: votes(i) for i in kept if votes(i)[1]}
+        if not against:
+            break
+        worst = min(for_it - no for for_it, no in against.values())
+        for i in [i for i, (for_it, no) in against.items() if for_it - no == worst]:
+            del kept[i]
+    if unseen:
+        kept = {i: one for i, one in kept.items() if len(one.ladders) > 1 or votes(i)[0]}
+    return kept
 
 
 def _adjust_all(

@@ -27,6 +27,8 @@ LEAST_CELLS = 500  # that both scans must see
 PATCH_AREA = 1.0  # m²: of bed whose relief is one observation
 SURE = 2.2  # standard deviations by which beds are alike, and more alike than elsewhere
 AHEAD = 1.0
+LOOSE = 4  # pixels by which first poses may be off along
+BED_NOISE = 0.02  # m: of the bed's height in a pixel, seen slantingly
 REACHES = (0.3, 0.25, 0.2, 0.15, *[0.1] * 8)
 AGREEING = 0.02  # m: median distance of patches that show the same
 LEAST_SHARED = 60  # patches
@@ -94,7 +96,9 @@ def _candidate(flat: LevelScan, beside: PreparedScan, known: Pose, walls: Walls,
     mine, theirs = _relief(own, 0.0, width), _relief(other, there, width)
     if mine is None or theirs is None:
         return None, -1.0
-    alike, shift = _correlate(mine, theirs)
+    by_shift, _ = _correlate(mine, theirs)
+    best = int(np.argmax(by_shift))
+    alike, shift = float(by_shift[best]), best - (mine.seen.shape[0] - 1)
     if alike <= 0.0:
         return None, -1.0
     along = shift * PIXEL + theirs.low[0] - mine.low[0]
@@ -126,8 +130,8 @@ def _relief(points: Float, middle: float, width: float) -> _Relief | None:
     return _Relief(grid, (grid - wide) * seen, seen, low)
 
 
-def _correlate(mine: _Relief, theirs: _Relief) -> tuple[float, int]:
-    """Significance of the best correlation over shifts along, and the shift in pixels.
+def _correlate(mine: _Relief, theirs: _Relief) -> tuple[Float, Float]:
+    """Significance of the correlation at each shift along, by pixels, from that at which they only touch on; and observations.
 
     Correlation of masked images (Padfield, 2012), in standard deviations by Fisher's transform: much bed that is somewhat alike
     says more than little that is very alike.
@@ -142,9 +146,39 @@ def _correlate(mine: _Relief, theirs: _Relief) -> tuple[float, int]:
     theirs_square, mine_square = over(theirs.fine**2, mine.seen), over(theirs.seen, mine.fine**2)
     correlation = np.clip(product / np.sqrt(np.maximum(theirs_square * mine_square, 1e-12)), -0.99, 0.99)
     observations = np.maximum(shared * PIXEL**2 / PATCH_AREA - 3.0, 0.0)
-    alike = np.where(shared > LEAST_CELLS, np.arctanh(correlation) * np.sqrt(observations), -1.0)
-    k = int(np.argmax(alike))
-    return float(alike[k]), k - (mine.seen.shape[0] - 1)
+    return np.where(shared > LEAST_CELLS, np.arctanh(correlation) * np.sqrt(observations), -1.0), observations
+
+
+def agreement(one: PreparedScan, other: PreparedScan, poses: tuple[Pose, Pose], walls: Walls) -> int:
+    """Whether two scans show the same bed where their poses say that they see the same: 1 yes, -1 no, 0 it can't be told.
+
+    It is yes if the reliefs are alike, and no if their correlation is less than half of what their noise leaves, both by SURE
+    standard deviations.
+    """
+    first, second = poses
+    _, piece = walls.tree.query(first.translation[:2])
+    normal = walls.normal[piece]
+    basis = np.column_stack([[normal[1], -normal[0], 0.0], [*normal, 0.0], [0.0, 0.0, 1.0]])
+    base = walls.foot[piece]
+    width = walls.width()
+    reliefs = []
+    for scan, pose in ((one, first), (other, second)):
+        place = (pose.apply(scan.cloud.points) - base) @ basis
+        reliefs.append(_relief(place, float((pose.translation - base) @ basis[:, 0]), width))
+    mine, theirs = reliefs
+    if mine is None or theirs is None:
+        return 0
+    by_shift, observations = _correlate(mine, theirs)
+    together = round((mine.low[0] - theirs.low[0]) / PIXEL) + mine.seen.shape[0] - 1
+    near = slice(max(together - LOOSE, 0), together + LOOSE + 1)
+    if together < 0 or len(by_shift[near]) == 0 or observations[near].max() <= 0.0:
+        return 0
+    alike = float(by_shift[near].max())
+    clear = [max(1.0 - BED_NOISE**2 / float((of.fine[of.seen > 0.0] ** 2).mean()), 0.0) for of in (mine, theirs)]
+    expected = np.arctanh(min(0.5 * np.sqrt(clear[0] * clear[1]), 0.9)) * np.sqrt(observations[near].max())
+    if alike > SURE:
+        return 1
+    return -1 if alike < expected - SURE else 0
 
 
 def _height_difference(mine: _Relief, theirs: _Relief, shift: int) -> float:

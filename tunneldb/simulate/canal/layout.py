@@ -87,9 +87,10 @@ def lay_out(parameters: CanalParameters, line: Centreline) -> Layout:
         ladders.append(ladder)
         cylinders.append(bars)
         frames.append(frame)
+    feet = [float(line.stationed(line.to_local(one.origin))[0, 0]) for one in ladders]
     scene = Scene(
         cut,
-        _solids(parameters, cut, [*stations], rng),
+        _solids(parameters, cut, [*stations], feet, rng),
         np.concatenate([*cylinders, np.empty((0, CYLINDER_COLUMNS))]),
         np.reshape(np.array(frames, float), (-1, FRAME_COLUMNS)),
     )
@@ -164,8 +165,10 @@ def _ladder(
     return truth, np.array(rows), np.array(frame)
 
 
-def _solids(parameters: CanalParameters, cut: Section, stations: list[float], rng: np.random.Generator) -> Float:
-    """Piers and niches along both walls, objects on the bed, and a boat at a wall."""
+def _solids(
+    parameters: CanalParameters, cut: Section, stations: list[float], ladders: list[float], rng: np.random.Generator
+) -> Float:
+    """Piers and niches along both walls, where no ladder stands, objects on the bed, and a boat at a wall."""
     p, half = parameters, 0.5 * parameters.width
     reach = 0.5 * p.length - 1.5
     rows = []
@@ -173,6 +176,8 @@ def _solids(parameters: CanalParameters, cut: Section, stations: list[float], rn
         for k in range(count):
             s = -reach + 2.0 * reach * (k + rng.uniform(0.2, 0.8)) / count
             side = rng.choice([-1.0, 1.0])
+            if any(abs(s - at) < 1.5 for at in ladders):
+                continue
             if kind == BOX:
                 rows.append(
                     [
