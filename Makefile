@@ -1,5 +1,6 @@
 # make demo   a simulated tunnel from its scan to leaks in QGIS, in ./demo
 # make demo-structure   the same for a simulated steel structure and its spots: 40 s, and half a minute more on first use
+# make demo-canal       the same for a simulated canal tunnel, above and below the water: a minute and a half
 # make quick  those of the tests that need no server and are over soon
 # make test   lint, types and all tests, against the wheel as a user would install it
 # make faults 100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
@@ -12,7 +13,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find tunneldb sql migrations -type f -not -name '*.py[co]' -not -name '*.nb[ic]') pyproject.toml README.md LICENSE
 
-.PHONY: install demo demo-structure quick test tests faults docs bench lint clean
+.PHONY: install demo demo-structure demo-canal quick test tests faults docs bench lint clean
 .DELETE_ON_ERROR:
 
 install: $(VENV)/wheel
@@ -50,6 +51,9 @@ demo: install
 
 demo-structure: install
 	scripts/demo-structure.sh $(abspath $(BIN))/tunneldb
+
+demo-canal: install
+	scripts/demo-canal.sh $(abspath $(BIN))/tunneldb
 
 lint: install
 	$(BIN)/ruff check

@@ -99,7 +99,7 @@ def _share_inside(pose: SonarPose, points: Float, error: Float) -> float:
 
 
 def _classes(case: Case, pose: SonarPose, true: SonarScan) -> tuple[dict[str, Any], Float]:
-    """False echoes removed and good points lost; chainage, place across, place (3), class and true kind of points of surfaces."""
+    """False echoes removed and good points lost; of points of surfaces chainage, place across, place (3), class, true kind."""
     scene = case.scene
     space = pose.scale * true.points @ pose.rotation.T + pose.translation
     reach = np.linalg.norm(space - pose.translation, axis=1)

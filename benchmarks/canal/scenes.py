@@ -30,7 +30,7 @@ class Case:
 
 
 def usual(seed: int) -> CanalParameters:
-    """Two ladders, three stations 5 or 10 m apart, all else as chance has it: batter, towpath, piers, objects, a boat, a curve."""
+    """Two ladders, three stations 5 or 10 m apart, all else by chance: batter, towpath, piers, objects, a boat, a curve."""
     rng = np.random.default_rng([seed, 99])
     return CanalParameters(
         seed=seed,

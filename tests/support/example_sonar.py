@@ -27,6 +27,14 @@ def save_example_registration(conn: psycopg.Connection, name: str) -> Registrati
     save_registration(conn, survey, found, 1)
     (stored,) = stored_scans(conn, survey).values()
     xyz = PLACE + np.array([[0.0, 0.0, -1.0], [0.01, 0.0, -1.02], [0.0, 0.01, -1.01]])
+    # the sections of the example are as good as any to be closed: a metre of water
+    conn.execute(
+        "INSERT INTO tunnel.section_class (section_id, class, angle, radius, points, state)"
+        " SELECT c.id, k, -180 + (k + 0.5) * c.angle_step, 1, 9, 'measured'"
+        "   FROM tunnel.section c CROSS JOIN generate_series(0, 71) AS k WHERE c.survey_id = %s",
+        [survey.id],
+    )
     rows = SonarRows(np.full(3, 12345.5), np.full(3, 0.25), xyz, np.full(3, 40), 4, 0, 0)
     save_bed(conn, survey, save_points(conn, survey, stored, rows, 1))
+    conn.execute("UPDATE tunnel.water_level SET height = (SELECT avg(ST_ZMin(geom) + 1) FROM tunnel.section)")
     return found

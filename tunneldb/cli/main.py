@@ -62,6 +62,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "tunneldb.cli.simulate_structure:simulate_structure",
         "Make a simulated scan of a structure, with its truth.",
     ),
+    "simulate-canal": (
+        "tunneldb.cli.simulate_canal:simulate_canal",
+        "Make simulated scans of a canal tunnel, above and below the water, with their truth.",
+    ),
 }
 
 MANUAL: dict[str, list[tuple[str, str]]] = {

@@ -169,7 +169,9 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
     beyond = grid.halo * grid.pixel
     depth = values["lining.tolerance"], values["lining.recess"]
     ends = survey_ends(conn, survey) or (-np.inf, np.inf)
-    observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, surface, km, beyond), beyond, ends)
+    level = water_level(conn, survey, km)
+    floor = load_floor(conn, survey, surface, km, beyond)
+    observer = Observer.of(surface, km, depth, radiometer, floor, beyond, ends, -np.inf if level is None else level)
     return DetectionInputs(
         survey.name,
         observer,

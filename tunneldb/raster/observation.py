@@ -113,11 +113,13 @@ class Observer:
         floor: Floor,
         halo: float = 0.0,
         ends: tuple[float, float] = (-math.inf, math.inf),
+        water: float = -math.inf,
     ) -> Observer:
         """Make the eye for a kilometre that the surface covers at least in part, and so many metres beyond its ends.
 
         ``depth`` is how far in front of the surface and behind it lining is looked for, m: tolerance and recess; ``ends`` is
-        where the survey begins and ends.
+        where the survey begins and ends; ``water`` the height of the water, m: what a laser shows below it are images that it
+        mirrors.
         """
         start, stop = km * KILOMETRE, (km + 1) * KILOMETRE
         touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)
@@ -128,6 +130,8 @@ class Observer:
         touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)
         vertices = surface.segments[touching, :6].reshape(-1, 3)
         margin = float(surface.radius.max()) + max(depth)
+        low = vertices.min(0) - margin
+        low[2] = max(low[2], water)
         return cls(
             surface,
             km,
@@ -135,7 +139,7 @@ class Observer:
             radiometer,
             floor,
             Edges.of(surface, start, stop),
-            np.array([vertices.min(0) - margin, vertices.max(0) + margin]),
+            np.array([low, vertices.max(0) + margin]),
             ends,
         )
 

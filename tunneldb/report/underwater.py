@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, LiteralString
 
 import numpy as np
 import psycopg
@@ -89,8 +89,8 @@ def read_underwater(conn: psycopg.Connection[Any], survey: Survey, low: float, h
     """Read what is stated of a stretch below the water, m; None where no sonar scan was registered."""
     scans = _rows(
         conn,
-        "SELECT v.name, v.state, v.undetermined, v.sigma_x, v.sigma_y, v.sigma_z, v.scale, sqrt(v.covariance[49]) AS sigma_scale,"
-        " c.points, c.false_echoes, c.kept, v.registered_at"
+        "SELECT v.name, v.state, v.undetermined, v.sigma_x, v.sigma_y, v.sigma_z, v.scale,"
+        " sqrt(v.covariance[49]) AS sigma_scale, c.points, c.false_echoes, c.kept, v.registered_at"
         "  FROM tunnel_api.sonar_scan v JOIN tunnel.sonar_scan c ON c.id = v.id WHERE v.survey_id = %s ORDER BY v.name",
         [survey.id],
     )
@@ -119,7 +119,7 @@ def read_underwater(conn: psycopg.Connection[Any], survey: Survey, low: float, h
         [survey.id, low, high],
     )
     bed, profile = _bed(conn, survey, low, high)
-    chosen = np.unique(np.linspace(0, len(sections) - 1, min(SECTIONS, len(sections))).round().astype(int)) if sections else []
+    chosen = sorted({round(place) for place in np.linspace(0, len(sections) - 1, min(SECTIONS, len(sections))).tolist()})
     drawn = [_draw(conn, sections[k]) for k in chosen]
     return UnderwaterChapter(scans, ladders, residuals, [level for (level,) in levels], bed, profile, sections, drawn)
 
@@ -191,6 +191,6 @@ def _draw(conn: psycopg.Connection[Any], row: dict[str, Any]) -> ClosedSection:
     )
 
 
-def _rows(conn: psycopg.Connection[Any], query: str, values: list[Any]) -> list[dict[str, Any]]:
+def _rows(conn: psycopg.Connection[Any], query: LiteralString, values: list[Any]) -> list[dict[str, Any]]:
     with conn.cursor(row_factory=dict_row) as cursor:
-        return cursor.execute(query, values).fetchall()  # type: ignore[call-overload,no-any-return]
+        return cursor.execute(query, values).fetchall()

@@ -18,6 +18,8 @@ from tunneldb.registration.underwater.observations import RANGE_NOISE
 from tunneldb.store.scan_files import checksum
 from tunneldb.store.survey import Survey
 
+LEAST_OF_CELL = 3  # points, of which the median bears one false echo
+
 
 def save_registration(conn: psycopg.Connection[Any], survey: Survey, found: Registration, up: int) -> None:
     """Store the poses of scans in the place of those that scans of these names had, and the survey's ladders.
@@ -220,9 +222,10 @@ def save_bed(conn: psycopg.Connection[Any], survey: Survey, kilometres: Sequence
                   FROM tunnel.sonar_point p
                   JOIN tunnel.sonar_scan c ON c.id = p.scan_id
                  WHERE p.survey_id = %(survey)s AND p.km = ANY (%(km)s) AND p.classification = 40
-                 GROUP BY 1, 2, 3, 4) cell
+                 GROUP BY 1, 2, 3, 4
+                HAVING count(*) >= %(least)s) cell
         """,
-        {"survey": survey.id, "km": list(kilometres), "noise": RANGE_NOISE},
+        {"survey": survey.id, "km": list(kilometres), "noise": RANGE_NOISE, "least": LEAST_OF_CELL},
     )
 
 

@@ -30,7 +30,7 @@ from tunneldb.registration.underwater.walls import Walls
 
 SCALE_SIGMA = 0.01  # of the range scale before anything is known: 15 m/s of 1480
 BATTER_SIGMA = 0.01  # of the change of batter at the water
-# Share of a bar's radius by which its echo comes from behind its near surface: where Lambert's law has its mean over a round bar,
+# Share of a bar's radius by which its echo comes from behind its near surface: the mean of Lambert's law over a round bar,
 # 1 - (4/3) / (pi/2); and by how much another law may shift it.
 DEPTH_SHARE, DEPTH_SPREAD = 1.0 - (4.0 / 3.0) / (np.pi / 2.0), 0.2
 WATERLINE_SIGMA = 0.03  # m: of what edges of walls have in common, by which they lie above or below the water

@@ -117,11 +117,15 @@ def _start(
 
 
 def _agreeing(
-    scans: Mapping[int, PreparedScan], started: Mapping[int, StartedScan], walls: Walls, *, unseen: bool
+    scans: Mapping[int, PreparedScan],
+    started: Mapping[int, StartedScan],
+    walls: Walls,
+    *,
+    unseen: bool,
 ) -> dict[int, StartedScan]:
     """Those of the scans that do not contradict each other where they see the same bed: one ladder looks like another.
 
-    Where there are ladders that the laser does not see (``unseen``), a scan that sees one ladder alone may have taken such a one
+    Where there are ladders that the laser does not see (``unseen``), a scan that sees one ladder alone may have taken such
     for it: it needs another scan's word.
     """
     kept = dict(started)

@@ -149,7 +149,7 @@ def _cast(
 
 
 class Hits(NamedTuple):
-    """Where rays ended, arrays of n: range m, kind (-1: nowhere), part of a ladder (100 x ladder + rung), cosine of incidence."""
+    """Where rays ended, arrays of n: range m, kind (-1: nowhere), part of a ladder (100 x ladder + rung), cosine."""
 
     range: Float
     kind: Int32

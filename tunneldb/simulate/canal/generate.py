@@ -64,7 +64,7 @@ class CanalScene:
         return self.parameters.water_level + bed_heights(self.section, stations, -np.asarray(across, float))
 
     def bed_volume(self, start: float, stop: float, height: float, half_width: float) -> float:
-        """Volume of the bed above a height between two chainages, half_width m to both sides of the axis, m³; by cells of 5 cm."""
+        """Volume of the bed above a height between two chainages, half_width m to both sides, m³; by cells of 5 cm."""
         step = 0.05
         x, y = np.meshgrid(np.arange(start + step / 2, stop, step), np.arange(-half_width + step / 2, half_width, step))
         above = self.bed_height(x.ravel(), y.ravel()) - height
@@ -78,13 +78,13 @@ def simulate(parameters: CanalParameters, progress: Callable[[str], None] = lamb
     layout = lay_out(parameters, line)
     points, number = scan_by_laser(parameters, layout)
     progress("laser")
-    scans = []
+    scans: list[SonarScan] = []
     for tripod in layout.tripods:
         for tilt in parameters.sonar_tilts:
             turn, origin = line.rotation(), np.array(line.origin)
             scans.append(scan_by_sonar(parameters, layout, tripod, len(scans) + 1, tilt, turn, origin))
             progress(scans[-1].name)
-    axis = line.vertices(VERTEX_SPACING) + [0.0, 0.0, AXIS_HEIGHT]
+    axis = line.vertices(VERTEX_SPACING) + np.array([0.0, 0.0, AXIS_HEIGHT])
     return CanalScene(
         parameters, line, layout, line.to_tunnel(points), number, line.to_tunnel(layout.lasers), tuple(scans), axis
     )

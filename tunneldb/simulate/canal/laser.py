@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from tunneldb.arrays import Float, Int32
@@ -42,8 +44,7 @@ def _about_ladders(parameters: CanalParameters, layout: Layout, place: Float) ->
     for frame in layout.scene.frames:
         corners = [
             frame[:3] + sum(sign * (frame[12 + a] + _BESIDE) * frame[3 + 3 * a : 6 + 3 * a] for a, sign in enumerate(signs))
-            for signs in np.ndindex(2, 2, 2)
-            for signs in [np.array(signs) * 2 - 1]
+            for signs in product((-1.0, 1.0), repeat=3)
         ]
         away = np.array(corners) - place
         distance = float(np.linalg.norm(frame[:3] - place))

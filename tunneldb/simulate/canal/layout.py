@@ -80,7 +80,9 @@ def lay_out(parameters: CanalParameters, line: Centreline) -> Layout:
     rng = np.random.default_rng([parameters.seed, 1])
     cut = section(parameters)
     stations = _stations(parameters.sonar_stations, parameters.sonar_spacing)
-    ladders, cylinders, frames = [], [], []
+    ladders: list[TrueLadder] = []
+    cylinders: list[Float] = []
+    frames: list[Float] = []
     for k, station in enumerate(_ladder_stations(parameters, stations, rng)):
         side = (-1.0) ** (k + int(parameters.seed) % 2)
         ladder, bars, frame = _ladder(parameters, line, k, station, side, sum(len(c) for c in cylinders), rng)
@@ -104,7 +106,7 @@ def lay_out(parameters: CanalParameters, line: Centreline) -> Layout:
 
 
 def _stations(count: int, spacing: float) -> Float:
-    return (np.arange(count) - 0.5 * (count - 1)) * spacing
+    return np.asarray((np.arange(count) - 0.5 * (count - 1)) * spacing)
 
 
 def _ladder_stations(parameters: CanalParameters, stations: Float, rng: np.random.Generator) -> Float:
@@ -202,9 +204,9 @@ def _solids(
             continue  # a tripod stands there
         bed = float(bed_heights(cut, np.array([s]), np.array([o]))[0])
         turn = rng.uniform(0.0, math.pi)
-        size = rng.uniform(0.1, 0.35, 3)
+        sizes = rng.uniform(0.1, 0.35, 3)
         kind = BALL if rng.random() < 0.4 else BOX
-        rows.append([kind, OBJECT, s, o, bed + 0.4 * size[2 if kind == BOX else 0], *size, math.cos(turn), math.sin(turn)])
+        rows.append([kind, OBJECT, s, o, bed + 0.4 * sizes[2 if kind == BOX else 0], *sizes, math.cos(turn), math.sin(turn)])
     if p.boat:
         side = rng.choice([-1.0, 1.0])
         rows.append([HULL, BOAT, rng.uniform(-0.3, 0.3) * reach, side * (half - 0.9), 0.1, 2.5, 0.6, 0.5, 1.0, 0.0])
