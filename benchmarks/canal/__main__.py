@@ -10,6 +10,7 @@ import json
 from pathlib import Path
 
 from benchmarks.canal.judge import judge
+from benchmarks.canal.literal import gap_errors
 from benchmarks.canal.peers import compare
 from benchmarks.canal.scenes import case_of, usual
 from benchmarks.canal.table import peers_table, table
@@ -33,6 +34,8 @@ def main() -> None:
         done[seed] = judge(case)
         if asked.peers:
             done[seed]["peers"] = compare(case)
+            pairs = zip(case.clouds, case.scene.sonar, strict=True)
+            done[seed]["gaps"] = [error for cloud, true in pairs for error in gap_errors(case, cloud, true)]
         with asked.results.open("a") as file:
             file.write(json.dumps(done[seed]) + "\n")
     rows = [done[seed] for seed in range(first, first + count)]

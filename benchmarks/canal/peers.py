@@ -111,7 +111,7 @@ def _matrix(rotation: Float, translation: Float) -> Float:
 
 
 def _open3d(target: Float, source: Float, rotation: Float, translation: Float, *, generalized: bool) -> tuple[Float, Float]:
-    import open3d  # noqa: PLC0415 - may be missing
+    import open3d
 
     clouds = []
     for points in (source, target):
@@ -128,7 +128,7 @@ def _open3d(target: Float, source: Float, rotation: Float, translation: Float, *
 
 
 def _small_gicp(target: Float, source: Float, rotation: Float, translation: Float) -> tuple[Float, Float]:
-    import small_gicp  # noqa: PLC0415 - may be missing
+    import small_gicp
 
     found = small_gicp.align(
         target, source, _matrix(rotation, translation), downsampling_resolution=VOXEL, max_correspondence_distance=REACH
@@ -146,7 +146,7 @@ def _least_squares(cloud: SonarCloud, walls: Walls, rotation: Float, translation
 
     first = moved(np.zeros(7)).apply(patches.centre)
     away, piece = walls.tree.query(first[:, :2])
-    facing = ((patches.normal @ rotation.T) * walls.normals(piece)).sum(axis=1) > 0.8  # noqa: PLR2004 - some 35 degrees
+    facing = ((patches.normal @ rotation.T) * walls.normals(piece)).sum(axis=1) > 0.8
     keep = facing & (away < 1.0) & (np.abs(walls.distance(first, piece)) < REACH + SHIFT)
     centre, piece = patches.centre[keep], piece[keep]
     found = least_squares(lambda change: walls.distance(moved(change).apply(centre), piece), np.zeros(7))

@@ -80,4 +80,10 @@ def peers_table(rows: list[dict[str, Any]]) -> str:
             f"| {name} | {len(done)} of {len(mine)} | {np.median(check):.1f}, {np.quantile(check, 0.95):.1f} |"
             f" {np.median(turn):.3f}, {np.quantile(turn, 0.95):.3f} | {seconds:.1f} |"
         )
+    gaps = 1e3 * np.abs([error for row in rows for error in row.get("gaps", [])])
+    if len(gaps):
+        lines.append(
+            f"\nRung gaps by the paper's appendix B, {len(gaps)}: mean {gaps.mean():.0f}, median {np.median(gaps):.0f},"
+            f" greatest {gaps.max():.0f} mm (its Table 2: 10, 5, 28)"
+        )
     return "\n".join(lines)
