@@ -76,7 +76,7 @@ def gap_errors(case: Case, cloud: SonarCloud, true: SonarScan) -> list[float]:
 
 
 class _Fit:
-    """A ladder in a sonar's cloud: origin at its height zero, unit vectors, and heights of rungs by their places in the list."""
+    """A ladder in a sonar's cloud: origin at its height zero, unit vectors, heights of rungs by their places in the list."""
 
     def __init__(self, origin: Float, across: Float, up: Float, rungs: dict[int, float]) -> None:
         self.origin, self.across, self.up, self.rungs = origin, across, up, rungs

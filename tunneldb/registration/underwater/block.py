@@ -92,7 +92,7 @@ def _start(
     Raises
     ------
     UserError
-        Those that see a ladder are upside down.
+        At least as many of those that see a ladder are upside down as are not.
     """
     started, upside_down = {}, []
     for i, scan in scans.items():
@@ -103,7 +103,7 @@ def _start(
             continue
         if one is not None:
             started[i] = one
-    if upside_down and not started:
+    if upside_down and len(upside_down) >= len(started):  # one alone may have taken one ladder for another
         raise upside_down[0]
     started = _agreeing(scans, started, walls, unseen=unseen)
     left = [i for i in scans if i not in started]

@@ -22,7 +22,10 @@ DECIDED = 3.0  # standard deviations
 
 
 def explained(points: Float, pose: Pose, walls: Walls, ladders: Sequence[PlacedLadder]) -> Float:
-    """How well walls or ladders explain each point (n, 3), file's axes: log likelihood over that of being astray, (n,)."""
+    """How well walls or ladders explain each point (n, 3), file's axes: log likelihood over that of being astray, (n,).
+
+    NaN where it can't be said: too far, or where the laser shows no wall.
+    """
     space = pose.apply(points)
     reach = np.linalg.norm(space - pose.translation, axis=1)
     best = np.full(len(points), np.inf)
@@ -37,7 +40,7 @@ def explained(points: Float, pose: Pose, walls: Walls, ladders: Sequence[PlacedL
         near &= (own[:, 1] > low) & (own[:, 1] < high)
         if near.any():
             best[near] = np.minimum(best[near], _ladder_deviation(own[near], placed, pose))
-    return np.where(usable, CUT**2 / (2.0 * (1.0 + best / CUT**2)), 0.0)
+    return np.where(usable & np.isfinite(best), CUT**2 / (2.0 * (1.0 + best / CUT**2)), np.nan)
 
 
 def _ladder_deviation(own: Float, placed: PlacedLadder, pose: Pose) -> Float:
@@ -55,8 +58,12 @@ def _ladder_deviation(own: Float, placed: PlacedLadder, pose: Pose) -> Float:
 
 
 def margin(points: Float, one: Float, other: Float) -> float:
-    """By how many standard deviations points (n, 3) are better explained (n,) by one pose than by another."""
-    _, number = np.unique(cell_keys(points, CELL), return_inverse=True)
-    difference = np.bincount(number, one - other)
+    """By how many standard deviations points (n, 3) are better explained (n,) by one pose than by another.
+
+    Only those count of which both say something: walls that are known farther one way are no evidence.
+    """
+    both = np.isfinite(one) & np.isfinite(other)
+    _, number = np.unique(cell_keys(points[both], CELL), return_inverse=True)
+    difference = np.bincount(number, (one - other)[both])
     spread = float(np.sqrt((difference**2).sum()))
     return float(difference.sum()) / spread if spread > 0.0 else 0.0

@@ -23,10 +23,13 @@ TRIED_POINTS = 60_000
 FIRST_REACHES = (0.35, 0.25, 0.2, 0.15, 0.12)
 LEAST_LIKENESS = 0.35  # of a ladder that is taken for one
 TIE = 0.92  # of the best likelihood, from which rungs are not told apart
+MOST_SCALE = 0.03  # by which sound may be faster or slower than the sonar took it to be: 45 m/s
+OTHER_PLACE = 0.6  # of the best likelihood, under which another place is none: of two ladders it sees one
 WATERLINE_SIGMA = 0.15  # of the top of a scan's walls, m
 SAME_PLACE, SAME_TURN = 0.15, np.radians(3.0)  # of two candidates that came to the same pose
 AIR, MOST_IN_AIR = 0.2, 0.25  # above the water, m: share of a scan that echoes by way of the surface may put there
 FARTHEST_LADDER = 12.0  # m from the scanner
+IN_SIGHT = 7.0  # m: a ladder nearer than that is seen, or the pose is wrong: each of its bars is two beams off the next
 
 
 @dataclass(frozen=True)
@@ -62,10 +65,11 @@ class StartedScan:
 
 @dataclass(frozen=True)
 class _Fitted:
-    """A fitted candidate: the ladders that it sees, how like ladders they look, how well its points are explained (n,)."""
+    """A fitted candidate: the ladders that it sees, how many in sight it does not, how like ladders they look, explanations."""
 
     pose: Pose
     ladders: tuple[int, ...]
+    missed: int
     likeness: float
     explained: Float
 
@@ -102,33 +106,26 @@ def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> Sta
     fitted = [one for one in (_try(thin, patches, one, walls, found) for one in tried) if one.ladders]
     if not fitted:
         return None
-    best = _best(thin, fitted)
-    high = float((best.pose.apply(thin)[:, 2] > AIR).mean())
+    most = max(fitted, key=lambda one: float(np.nansum(one.explained)))
+    high = float((most.pose.apply(thin)[:, 2] > AIR).mean())
     if high > MOST_IN_AIR:
         raise UserError(f"{cloud.path}: {100.0 * high:.0f} % of its points would lie above the water: is --up right?")
+    fitted = [one for one in fitted if abs(one.pose.scale - 1.0) < MOST_SCALE]
+    best = max(fitted, key=lambda one: one.likelihood(flat.top), default=None)
+    if best is None or best.missed:
+        return None
     for other in fitted:
-        if _same(best.pose, other.pose):
+        if other.missed or _same(best.pose, other.pose):
             continue
+        less = other.likelihood(flat.top) / best.likelihood(flat.top)
+        # a wall is as good a wall a rung lower; elsewhere, or turned the other way, it is another
         if _same_place(best.pose, other.pose):
-            told = other.likelihood(flat.top) < TIE * best.likelihood(flat.top)
+            told = less < TIE
         else:
-            told = margin(thin, best.explained, other.explained) > DECIDED
+            told = less < OTHER_PLACE or margin(thin, best.explained, other.explained) > DECIDED
         if not told:
             return None
     return StartedScan(best.pose, best.ladders)
-
-
-def _best(points: Float, fitted: Sequence[_Fitted]) -> _Fitted:
-    """Likeliest pose: of those a rung apart the one under which the ladders look most like ladders.
-
-    Of those at other places or turned the other way it is the one that explains more of the points; that says nothing of
-    rungs, for a wall is as good a wall a rung lower.
-    """
-    leaders: list[_Fitted] = []
-    for one in sorted(fitted, key=lambda one: -one.likeness):
-        if not any(_same_place(one.pose, other.pose) for other in leaders):
-            leaders.append(one)
-    return max(leaders, key=lambda one: float(one.explained.sum()))
 
 
 def _try(points: Float, patches: Patches, candidate: Candidate, walls: Walls, found: Sequence[LaserLadder]) -> _Fitted:
@@ -142,7 +139,8 @@ def _try(points: Float, patches: Patches, candidate: Candidate, walls: Walls, fo
     likenesses = [(likeness(pose.apply(points), pose.translation, found[k].placed), k) for k in near]
     seen = tuple(k for value, k in likenesses if value > LEAST_LIKENESS)
     alike = sum(value for value, k in likenesses if value > LEAST_LIKENESS or k in first)
-    return _Fitted(pose, seen, alike, explained(points, pose, walls, [found[k].placed for k in near]))
+    missed = sum(k not in seen and _away(pose, found[k]) < IN_SIGHT for k in near)
+    return _Fitted(pose, seen, missed, alike, explained(points, pose, walls, [found[k].placed for k in near]))
 
 
 def _same(one: Pose, other: Pose) -> bool:
@@ -163,6 +161,9 @@ def sees(scan: PreparedScan, pose: Pose, found: Sequence[LaserLadder]) -> tuple[
 
 
 def _near(pose: Pose, found: Sequence[LaserLadder]) -> tuple[int, ...]:
-    return tuple(
-        k for k, one in enumerate(found) if np.linalg.norm(one.placed.origin[:2] - pose.translation[:2]) < FARTHEST_LADDER
-    )
+    return tuple(k for k, one in enumerate(found) if _away(pose, one) < FARTHEST_LADDER)
+
+
+def _away(pose: Pose, ladder: LaserLadder) -> float:
+    """Distance in plan between a scanner and a ladder, m."""
+    return float(np.linalg.norm(ladder.placed.origin[:2] - pose.translation[:2]))
