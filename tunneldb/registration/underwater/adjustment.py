@@ -34,7 +34,9 @@ BATTER_SIGMA = 0.01  # of the change of batter at the water
 # 1 - (4/3) / (pi/2); and by how much another law may shift it.
 DEPTH_SHARE, DEPTH_SPREAD = 1.0 - (4.0 / 3.0) / (np.pi / 2.0), 0.2
 WATERLINE_SIGMA = 0.03  # m: of what edges of walls have in common, by which they lie above or below the water
-ZERO_SIGMA = 0.0015  # m: of the sonar's zero on masonry, and of what its beam hears there of stones and joints: some of RELIEF
+# Of the sonar's zero on masonry, and of what its beam hears there of stones and joints, m: some of RELIEF. Walls tell it apart
+# from scale as little as ladders do, so it is held, and what it may be goes into the covariance alone.
+ZERO_SIGMA, ZERO_HELD = 0.0015, 0.0003
 COMMON = 5  # parameters common to all scans but for the ladders: two batters, that depth, that of the waterline, that zero
 LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
 CUT = 3.0  # standard deviations at which a row has a quarter of its weight
@@ -137,7 +139,10 @@ def adjust(
             placed[k] = placed[k].moved(change[first : first + 3], change[first + 3 : first + 6])
         if reach == reaches[-1] and np.abs(change).max() < SETTLED:
             break
-    covariance = _sandwich(rows, normal, precision)
+    spread = precision.copy()  # of what was known beforehand, by what it is worth
+    zero = POSE * len(scans) + COMMON - 1
+    spread[zero, zero] *= (ZERO_SIGMA / ZERO_HELD) ** 2
+    covariance = _sandwich(rows, normal, precision, spread)
     blocks = [slice(POSE * i, POSE * (i + 1)) for i in range(len(scans))]
     return Adjusted(
         tuple(poses),
@@ -218,7 +223,7 @@ def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
         BATTER_SIGMA,
         max(DEPTH_SPREAD * radius, 1e-4),
         WATERLINE_SIGMA,
-        ZERO_SIGMA,
+        ZERO_HELD,
     )
     for k, ladder in enumerate(ladders):
         first = POSE * scans + COMMON + 6 * k
@@ -247,7 +252,7 @@ def _moved(pose: Pose, change: Float) -> Pose:
     return Pose(np.asarray(turn @ pose.rotation), pose.translation + change[3:6], pose.scale + float(change[6]))
 
 
-def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float) -> Float:
+def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float, spread: Float) -> Float:
     """Covariance of all parameters, by the spread of the groups' sums, each as if it had not been adjusted to."""
     inverse = _inverse(normal + precision, 0.0)
     keys, sums = [], []
@@ -269,7 +274,7 @@ def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float) -> Float:
     total = np.zeros((len(order), 2, len(normal)))
     np.add.at(total, [order[key] for key in keys], np.array(sums).reshape(-1, 2, len(normal)))
     flat = total.reshape(-1, len(normal))
-    middle = precision + flat.T @ flat
+    middle = spread + flat.T @ flat
     unknown = _inverse(normal + precision, UNKNOWN) - inverse
     return np.asarray(inverse @ middle @ inverse + unknown)
 

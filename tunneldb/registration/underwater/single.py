@@ -27,7 +27,7 @@ MOST_SCALE = 0.03  # by which sound may be faster or slower than the sonar took 
 OTHER_PLACE = 0.6  # of the best likelihood, under which another place is none: of two ladders it sees one
 WATERLINE_SIGMA = 0.15  # of the top of a scan's walls, m
 SAME_PLACE, SAME_TURN = 0.15, np.radians(3.0)  # of two candidates that came to the same pose
-AIR, MOST_IN_AIR = 0.2, 0.25  # above the water, m: share of a scan that echoes by way of the surface may put there
+AIR, MOST_IN_AIR = 0.2, 0.15  # above the water, m: share of a scan that echoes by way of the surface may put there
 FARTHEST_LADDER = 12.0  # m from the scanner
 IN_SIGHT = 7.0  # m: a ladder nearer than that is seen, or the pose is wrong: each of its bars is two beams off the next
 
@@ -106,8 +106,7 @@ def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> Sta
     fitted = [one for one in (_try(thin, patches, one, walls, found) for one in tried) if one.ladders]
     if not fitted:
         return None
-    most = max(fitted, key=lambda one: float(np.nansum(one.explained)))
-    high = float((most.pose.apply(thin)[:, 2] > AIR).mean())
+    high = float(np.median([(one.pose.apply(thin)[:, 2] > AIR).mean() for one in fitted]))
     if high > MOST_IN_AIR:
         raise UserError(f"{cloud.path}: {100.0 * high:.0f} % of its points would lie above the water: is --up right?")
     fitted = [one for one in fitted if abs(one.pose.scale - 1.0) < MOST_SCALE]
