@@ -20,6 +20,7 @@ SELECT c.id * 1000 + n.n AS id, c.id AS section_id, c.survey_id, c.km, n.n,
   JOIN tunnel.section_class k ON k.section_id = c.id AND k.class = floor((n.n - 0.5::float8) / c.angle_step);
 COMMENT ON VIEW tunnel_api.section_piece IS
     'Pieces of sections in kilometres into which sonar scans were loaded, one per degree from straight below the axis to the left; closed_section and section_part are made of them';
+COMMENT ON COLUMN tunnel_api.section_piece.section_id IS 'Key of the section';
 COMMENT ON COLUMN tunnel_api.section_piece.n IS 'Number in its section, from 1';
 COMMENT ON COLUMN tunnel_api.section_piece.part IS 'lining (above the water), submerged (seen by a sonar) or unseen (bridged between what was seen)';
 COMMENT ON COLUMN tunnel_api.section_piece.below IS 'Whether it lies below the water';
@@ -46,6 +47,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km, c.chainage,
  WHERE w.height IS NOT NULL;
 COMMENT ON VIEW tunnel_api.closed_section IS
     'Cross-sections of canal tunnels, closed through the bed: those of which a sonar saw anything below the water';
+COMMENT ON COLUMN tunnel_api.closed_section.water_level IS 'Height of the water, m';
 COMMENT ON COLUMN tunnel_api.closed_section.unseen IS 'Share of its line below the water that no sonar saw, 0 to 1; there it is bridged';
 COMMENT ON COLUMN tunnel_api.closed_section.wet_area IS 'Area of the water, m²; NULL where more than a fifth of the line below it was not seen';
 COMMENT ON COLUMN tunnel_api.closed_section.depth IS 'Greatest depth that was seen, m; NULL where more than a fifth of the line below the water was not seen';
@@ -63,6 +65,7 @@ SELECT min(r.id) AS id, r.survey_id, s.name AS survey, r.km, r.section_id, c.cha
 COMMENT ON VIEW tunnel_api.section_part IS
     'Parts of closed sections that rest on the same: lining above the water, submerged, or unseen';
 COMMENT ON COLUMN tunnel_api.section_part.id IS 'Key';
+COMMENT ON COLUMN tunnel_api.section_part.section_id IS 'Key of the section';
 COMMENT ON COLUMN tunnel_api.section_part.part IS 'lining (above the water), submerged (seen by a sonar) or unseen (bridged between what was seen)';
 COMMENT ON COLUMN tunnel_api.section_part.length IS 'm';
 COMMENT ON COLUMN tunnel_api.section_part.geom IS 'Line in space, tunnel''s SRID, m';
@@ -88,3 +91,5 @@ COMMENT ON COLUMN tunnel_api.waterline.id IS 'Key';
 COMMENT ON COLUMN tunnel_api.waterline.side IS 'left or right, looking up-chainage';
 COMMENT ON COLUMN tunnel_api.waterline.height IS 'Of the water, m';
 COMMENT ON COLUMN tunnel_api.waterline.geom IS 'Line in space, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel_api.waterline.chainage_from IS 'Of its first section, m';
+COMMENT ON COLUMN tunnel_api.waterline.chainage_to IS 'Of its last section, m';

@@ -33,6 +33,8 @@ SELECT c.id, c.survey_id, c.survey, c.name, c.state, 100 AS exaggeration, e.half
  WHERE c.geom IS NOT NULL;
 COMMENT ON VIEW tunnel_api.sonar_ellipse IS
     'Ellipses in which the places of sonar scans in plan lie with a probability of 95 %, drawn 100 times as large';
+COMMENT ON COLUMN tunnel_api.sonar_ellipse.name IS 'Name of the scan''s file';
+COMMENT ON COLUMN tunnel_api.sonar_ellipse.state IS 'determined, weak (known worse than it should be) or undetermined';
 COMMENT ON COLUMN tunnel_api.sonar_ellipse.exaggeration IS 'So many times as large as it is';
 COMMENT ON COLUMN tunnel_api.sonar_ellipse.half_major IS 'Greater half axis, m';
 COMMENT ON COLUMN tunnel_api.sonar_ellipse.half_minor IS 'Lesser half axis, m';
@@ -111,3 +113,4 @@ SELECT w.id, w.survey_id, s.name AS survey, w.km, w.height, w.changed_at
   JOIN tunnel.survey s ON s.id = w.survey_id
  WHERE w.height IS NOT NULL;
 COMMENT ON VIEW tunnel_api.water_level IS 'The water in kilometres into which sonar scans were loaded';
+COMMENT ON COLUMN tunnel_api.water_level.height IS 'Of the water, m';

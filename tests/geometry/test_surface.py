@@ -221,3 +221,22 @@ def test_tangents_are_exact_on_a_circle() -> None:
     np.testing.assert_allclose(tangents(helix.position(s)), helix.frame(s)[0], atol=2e-5)
     np.testing.assert_allclose(tangents(helix.position(s[:2])), np.tile(helix.frame(np.array([5.0]))[0], (2, 1)), atol=1e-9)
     np.testing.assert_allclose(plan_lengths(helix.position(s), tangents(helix.position(s))), 10.0, atol=1e-5)
+
+
+@given(low=st.floats(-3.9, 3.9))
+@settings(max_examples=20, deadline=None)
+def test_the_waterline_is_where_a_circle_meets_the_water(low: float) -> None:
+    """In a level straight tunnel the water a metres over the axis meets a circle at the angle whose cosine is a / radius."""
+    surface = circular_surface(Helix(1e7, 0.0), 60.0)
+    left, right = surface.waterline(np.array([12.0, 31.7, 200.0]), ORIGIN[2] + low)
+    arc = TUNNEL_RADIUS * np.arccos(low / TUNNEL_RADIUS)
+    assert right[:2] == pytest.approx([arc, arc], abs=2e-3)
+    assert left[:2] == pytest.approx([-arc, -arc], abs=2e-3)
+    assert np.isnan([left[2], right[2]]).all()
+
+
+def test_a_tunnel_above_the_water_has_no_waterline() -> None:
+    surface = circular_surface(Helix(1e7, 0.0), 60.0)
+    left, right = surface.waterline(np.array([12.0]), ORIGIN[2] - 4.1)
+    assert np.isnan(left).all()
+    assert np.isnan(right).all()

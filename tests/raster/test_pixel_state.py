@@ -175,6 +175,19 @@ def test_beyond_the_ends_of_the_section_nothing_is_left_to_be_seen():
     assert (state[:, chainage > LENGTH + 5.0] == PixelState.OFF).all()
 
 
+def test_below_the_water_lining_is_submerged_not_unseen():
+    grid = Grid.covering(0, 0.05, -15.0, 15.0)
+    none = np.full(61, np.nan)
+    floor = Floor.of(0, none, np.full(61, 7.0), (np.full(61, -6.0), np.full(61, 8.0)))
+    with Accumulator(grid) as image:
+        state = pixel_states(image.window(0, 1400), slice(200, 1400), grid, floor, SectionOutliers.of(ROUND, MOST), 0.03)
+    arc, chainage = grid.arcs(), grid.chainages(slice(200, 1400)) < LENGTH
+    assert (state[arc < -6.05] == PixelState.SUBMERGED).all()
+    assert (state[arc > 8.05] == PixelState.SUBMERGED).all()
+    assert (state[(arc > 7.05) & (arc < 7.95)] == PixelState.FLOOR).all()
+    assert (state[(arc > -5.95) & (arc < 6.95)][:, chainage] == PixelState.EMPTY).all()
+
+
 def ring(rng, pixel, filled=0.9):
     """Offset image of a lining 0.1 m wider from column 400 on, its sections 2.5 m before and behind; a tray and a box."""
     rows, columns = round(20.0 / pixel), 800

@@ -13,8 +13,10 @@ from support.canal_scene import LEVEL, ORIGIN, WIDTH, Canal, Sonar
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater import Registration, SonarCloud, SonarPose, register
+from tunneldb.registration.underwater.chain import agreement
 from tunneldb.registration.underwater.laser_ladders import find_laser_ladders
 from tunneldb.registration.underwater.observations import Pose, pose_derivatives
+from tunneldb.registration.underwater.single import prepare
 from tunneldb.registration.underwater.walls import find_walls
 
 
@@ -158,3 +160,26 @@ def test_derivatives_of_a_pose_are_those_of_differences() -> None:
         moved = Pose(turn @ pose.rotation, pose.translation + change[3:6], pose.scale + change[6])
         difference = ((moved.apply(own) - pose.apply(own)) * normal).sum(axis=1) / 1e-6
         assert np.allclose(difference, analytic[:, k], atol=1e-4)
+
+
+def test_scans_at_wrong_places_contradict_each_other(scene: Scene) -> None:
+    local = scene.laser - ORIGIN
+    walls = find_walls(local)
+    scans = [prepare(cloud, walls) for cloud in scene.clouds()]
+    along = scene.canal.turn @ [1.0, 0.0, 0.0]
+    first, second = (Pose(scan.rotation, scan.translation - ORIGIN, scan.scale) for scan in scene.scans)
+    assert agreement(scans[0], scans[1], (first, second), walls) == 1
+    moved = replace(second, translation=second.translation + 3.0 * along)
+    assert agreement(scans[0], scans[1], (first, moved), walls) == -1
+
+
+def test_a_ladder_that_the_laser_does_not_see_is_not_taken_for_another(scene: Scene) -> None:
+    hidden = scene.canal.ladders[1]
+    own = (scene.laser - scene.canal.to_tunnel(hidden.origin[None])) @ scene.canal.turn @ hidden.axes.T
+    seen = scene.laser[(np.abs(own[:, 0]) > 0.3) | (np.abs(own[:, 2]) > 0.1)]
+    found = register(seen, scene.clouds(), [one.measured() for one in scene.canal.ladders], LEVEL)
+    assert any(hidden.name in note for note in found.notes)
+    for pose, scan in zip(found.scans, scene.scans, strict=True):
+        if pose.state != "undetermined":
+            assert np.linalg.norm(pose.translation - scan.translation) < 0.05
+            assert turn_between(pose, scan) < 0.5
