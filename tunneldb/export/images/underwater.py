@@ -19,6 +19,7 @@ from tunneldb.arrays import Float, Single
 from tunneldb.export.images.cog import Extent, write_cog
 from tunneldb.files import replacing
 from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.crs import LOCAL_NAME
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.sonar import BedCells, load_bed, load_sonar_points
@@ -59,7 +60,7 @@ def _write_bed(path: Path, cells: BedCells, alignment: Alignment, crs: str) -> N
     plain = path.with_name(f"plain-{path.name}")
     with rasterio.open(
         plain, "w", driver="GTiff", height=rows, width=columns, count=len(BANDS), transform=transform, dtype="float32",
-        nodata=np.nan, crs=CRS.from_user_input(crs) if crs.startswith("EPSG") else None, tiled=True, blockxsize=_TILE,
+        nodata=np.nan, crs=None if crs == LOCAL_NAME else CRS.from_user_input(crs), tiled=True, blockxsize=_TILE,
         blockysize=_TILE, sparse_ok=True, bigtiff="if_safer",
     ) as image:  # fmt: skip
         for k, name in enumerate(BANDS, start=1):
