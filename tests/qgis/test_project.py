@@ -28,7 +28,7 @@ from support.system import missing
 from tunneldb.classification.classes import PointClass
 from tunneldb.cli.main import main
 from tunneldb.export.images.palette import COLOURS, PALETTES, hexadecimal
-from tunneldb.export.qgis.layer import STRUCTURE_LAYERS
+from tunneldb.export.qgis.layer import STRUCTURE_LAYERS, UNDERWATER_LAYERS
 from tunneldb.export.tables.leaks import clock_label
 
 ON_MAP = {
@@ -213,7 +213,7 @@ def test_states_are_named_and_drawn_in_their_colours(shared: Path, seen: dict[st
     entries = PALETTES["state"].entries
     legend = [[code, name, hexadecimal(colour)] for code, (name, colour) in entries.items()]
     assert seen["layers"]["demo-2024-km012-state"]["legend"] == legend
-    assert [name for _, name, _ in legend] == ["unseen", "lining", "recess", "appendage", "floor", "dark"]
+    assert [name for _, name, _ in legend] == ["unseen", "lining", "recess", "appendage", "floor", "dark", "submerged"]
     picture = tmp_path / "state.png"
     # 160 m along the tunnel by 64 m across in 1600 × 640 pixels: one of the image is one of the picture
     assert act(shared, "draw_layer", "demo-2024-km012-state", "12300,-32,12460,32", str(picture))["saved"]
@@ -543,7 +543,7 @@ def test_styles_have_one_default_a_layer_and_are_replaced(conn: psycopg.Connecti
     assert {(row[0], row[1]) for row in first} == {
         *((name, "geom") for name in STYLED), ("leak", "unrolled"), ("leak", "map"), ("leak", "surface"),
         ("anomaly", "unrolled"), ("anomaly", "map"), ("spot", "map"), ("spot", "surface"),
-        *((layer.view, "geom") for layer in STRUCTURE_LAYERS), ("spot_face", "geom"),
+        *((layer.view, "geom") for layer in (*STRUCTURE_LAYERS, *UNDERWATER_LAYERS)), ("spot_face", "geom"),
     }  # fmt: skip
     assert all(row[2:] == (1, 1, True) for row in first)
     conn.execute(
