@@ -10,6 +10,7 @@ import psycopg
 import pytest
 from click.testing import CliRunner, Result
 from psycopg import sql
+from support.example_sonar import save_example_registration
 from support.example_structures import save_example_structures
 
 from tests.qgis.test_project import act
@@ -189,6 +190,7 @@ def labelled_views(conn: psycopg.Connection) -> list[tuple[str, str, str]]:
 
 def test_labels_of_every_view_are_stations(conn: psycopg.Connection, example: str) -> None:
     save_example_structures(conn, example)
+    save_example_registration(conn, example)
     for table in ("member", "face", "spot"):
         conn.execute(sql.SQL("UPDATE tunnel.{} SET chainage = 12345.678 + id").format(sql.Identifier(table)))
     views = labelled_views(conn)
