@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.canal.scenes import CHECK_REACH, Case, check_points, true_places
 from tunneldb.arrays import Float
-from tunneldb.classification.underwater import WaterClass, classify
+from tunneldb.classification.underwater import WaterClass, classify, spacing_of_rays
 from tunneldb.errors import UserError
 from tunneldb.pipeline.load_sonar import FARTHEST
 from tunneldb.registration.underwater import Registration, SonarPose
@@ -107,7 +107,7 @@ def _classes(case: Case, pose: SonarPose, true: SonarScan) -> tuple[dict[str, An
     space, reach, kind = space[near], reach[near], true.kind[near]
     stationed = scene.line.stationed(scene.line.to_local(space))
     along, across = stationed[:, 0] + 0.5 * scene.parameters.length, -stationed[:, 1]
-    classes = classify(np.column_stack([along, across, stationed[:, 2]]), reach)
+    classes = classify(np.column_stack([along, across, stationed[:, 2]]), spacing_of_rays(reach))
     off = np.abs(scene.distance(space))
     phantom, good = (kind == FALSE) & (off > HARMLESS), (kind >= 0) & (kind != WATER)
     gone = classes == WaterClass.FALSE

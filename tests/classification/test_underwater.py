@@ -7,7 +7,7 @@ import pytest
 from support.canal_scene import DEPTH, WIDTH, Canal
 
 from tunneldb.arrays import Float
-from tunneldb.classification.underwater import WaterClass, classify
+from tunneldb.classification.underwater import WaterClass, classify, spacing_of_rays
 
 
 def surfaces(canal: Canal, points: Float) -> tuple[Float, Float]:
@@ -25,7 +25,7 @@ def test_points_get_the_class_of_what_they_were_measured_on() -> None:
     points = (scan.to_tunnel(scan.points) - canal.to_tunnel(np.zeros((1, 3)))) @ canal.turn
     points = points[np.abs(points[:, 0]) < 12.0]
     place = (scan.translation - canal.to_tunnel(np.zeros((1, 3)))) @ canal.turn
-    found = classify(points, np.linalg.norm(points - place, axis=1))
+    found = classify(points, spacing_of_rays(np.linalg.norm(points - place, axis=1)))
     wall, bed = surfaces(canal, points)
     wet = points[:, 2] < -0.2
     on_bed = wet & (np.abs(bed) < 0.05) & (wall < -0.3)

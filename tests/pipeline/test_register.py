@@ -161,3 +161,36 @@ def test_what_cannot_be_registered_is_refused_and_nothing_stored(
     twice = [folder / "s0.xyz", folder / "s0.xyz", "--ladders", folder / "ladders.csv", "--up", "+z", "--water-level", LEVEL]
     assert "known by its name" in command("register", NAME, *twice, code=2).stderr
     assert conn.execute("SELECT count(*) FROM tunnel.sonar_scan").fetchone() == (0,)
+
+
+def test_soundings_in_the_tunnels_system_need_no_pose(
+    canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    folder, scans = canal
+    load(folder)
+    soundings = tmp_path / "soundings.xyz"
+    points = np.vstack([scan.to_tunnel(scan.points[np.linalg.norm(scan.points, axis=1) < 10.0]) for scan in scans])
+    np.savetxt(soundings, points, "%.4f")
+    how = ["--medium", "water", "--water-level", LEVEL]
+    assert "belong together" in command("load", NAME, soundings, *how[:2], code=2).stderr
+    (told,) = json.loads(command("load", NAME, soundings, *how, "--json").stdout)["files"]
+    assert (told["state"], told["points"]) == ("loaded", len(points))
+    assert told["points"] == told["noise"] + told["outside"] + told["thinned"] + told["kept"]
+    assert 0.02 < told["noise"] / told["points"] < 0.06  # 3 % are false
+    chainage, across, height = np.array(conn.execute("SELECT chainage, across, height FROM tunnel_api.bed").fetchall()).T
+    x, y = chainage - 30.0, -across
+    near = (np.abs(x) < 6.0) & (np.abs(y) < 2.5)
+    error = height[near] - (LEVEL - DEPTH + Canal(77).bed.at(x[near], y[near]))
+    assert np.median(np.abs(error)) < 0.02
+    row = "SELECT state, geom, translation, (SELECT min(sigma) > 0 FROM tunnel_api.bed) FROM tunnel_api.sonar_scan"
+    assert conn.execute(row).fetchone() == ("given", None, None, True)
+    conn.rollback()
+    again = json.loads(command("load", NAME, soundings, *how, "--json").stdout)["files"]
+    assert again[0]["state"] == "unchanged"
+    np.savetxt(soundings, points[:, :2], "%.4f")
+    assert "2 values where x, y and z are expected" in command("load", NAME, soundings, *how, code=2).stderr
+    np.savetxt(soundings, points + [5000.0, 0.0, 0.0], "%.4f")
+    assert "lies along the axis" in command("load", NAME, soundings, *how, code=2).stderr
+    register(folder)
+    named = command("load", NAME, folder / "s0.xyz", *how, code=2).stderr
+    assert "has been registered" in named

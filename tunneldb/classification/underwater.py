@@ -19,8 +19,8 @@ from tunneldb.arrays import Bool, Float, Int64
 
 SURFACE = 0.1  # about the water's level, m
 WAVES = 0.05  # m above it, up to which noise puts points of a wall; farther up are its images
-ALONE = 0.15  # m: radius in which a point must have
-SPREADING = 0.03  # times the range, beyond which rays lie farther apart than that
+ALONE = 0.15  # m, or as far as rays lie apart: radius in which a point must have
+SPREADING = 0.03  # of a sonar's range, by which its rays lie apart
 LEAST_NEIGHBOURS = 4  # others
 STRIP, BAND = 1.0, 0.25  # cells of wall, m along and in height
 SQUARE = 0.5  # cells of bed, m
@@ -56,21 +56,21 @@ class _Cells:
         return np.asarray(self.value[place[:, 0], place[:, 1]])
 
 
-def classify(points: Float, reach: Float) -> Int64:
+def classify(points: Float, spacing: Float) -> Int64:
     """Classes (n,) of points, see `WaterClass`.
 
     Parameters
     ----------
     points : (n, 3) float64 array
         Chainage, place right of the axis, and height above the water, m.
-    reach : (n,) float64 array
-        Distance from the sonar, m.
+    spacing : (n,) float64 array
+        Distance within which points of one surface lie, m; see `spacing_of_rays`, `spacing_of_soundings`.
     """
     out = np.full(len(points), WaterClass.FALSE, np.int64)
     if len(points) == 0:
         return out
     height = points[:, 2]
-    sound = (height < SURFACE) & _has_neighbours(points, reach)
+    sound = (height < SURFACE) & _has_neighbours(points, spacing)
     middle = _middle(points[sound])
     below = sound & (height < -SURFACE)
     side = np.where(points[:, 1] > middle, 1.0, -1.0)
@@ -105,9 +105,20 @@ def _deepest(depth: Float) -> float:
     return float(known.min()) if len(known) else 0.0
 
 
-def _has_neighbours(points: Float, reach: Float) -> Bool:
+def spacing_of_rays(reach: Float) -> Float:
+    """Distances (n,) within which points of one surface lie, m, by those from the sonar, m."""
+    return SPREADING * reach
+
+
+def spacing_of_soundings(points: Float) -> Float:
+    """The same of soundings (n, 3) whose sonar's places are not known: twice as far as these usually lie."""
     distance, _ = cKDTree(points).query(points, k=[LEAST_NEIGHBOURS + 1])
-    return np.asarray(distance[:, 0] < np.maximum(ALONE, SPREADING * reach))
+    return np.full(len(points), 2.0 * float(np.median(distance)))
+
+
+def _has_neighbours(points: Float, spacing: Float) -> Bool:
+    distance, _ = cKDTree(points).query(points, k=[LEAST_NEIGHBOURS + 1])
+    return np.asarray(distance[:, 0] < np.maximum(ALONE, spacing))
 
 
 def _middle(points: Float) -> float:

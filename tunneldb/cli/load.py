@@ -30,6 +30,7 @@ MOST_NAMED = 5  # files of which the same is said
     examples=[
         "tunneldb load ringo-2024 scans/km-511.laz scans/km-512.laz",
         "tunneldb load ringo-2024 scans/*.e57 --density all",
+        "tunneldb load canal-26 soundings.laz --medium water --water-level 265.0",
     ]
 )
 @click.argument("survey")
@@ -71,6 +72,14 @@ MOST_NAMED = 5  # files of which the same is said
     metavar="PERCENT",
     help="Points of unknown scanner position, or whose time or intensity is NaN, are left out; a file with more is refused.",
 )
+@click.option(
+    "--medium",
+    type=click.Choice(["air", "water"]),
+    default="air",
+    show_default=True,
+    help="water: FILES are soundings that lie in the tunnel's system already. Registered sonar scans need no word.",
+)
+@click.option("--water-level", type=float, metavar="M", help="Height of the water, of soundings, m.")
 @click.pass_obj
 def load(
     settings: Settings,
@@ -81,6 +90,8 @@ def load(
     noise_diameter: float,
     max_distance: float,
     max_left_out: float,
+    medium: str,
+    water_level: float | None,
 ) -> None:
     """Load FILES (LAS, LAZ, E57, PTX, PTS, PLY, tables of points) into SURVEY.
 
@@ -90,13 +101,16 @@ def load(
     Files of a site are looked through and recorded; their points stay where they are.
 
     Files that were registered as sonar scans come into the tunnel by their poses: their points are classed, false echoes
-    left out (as noise), and the bed is worked out. What was loaded of the laser's files stays as it is.
+    left out (as noise), and the bed is worked out. What was loaded of the laser's files stays as it is. So do soundings
+    (--medium water), as a boat's multibeam sonar makes them, without a pose.
     """
     from tunneldb.pipeline.load import load_files
-    from tunneldb.pipeline.load_sonar import load_sonar, sonar_among
+    from tunneldb.pipeline.load_sonar import load_sonar, record_soundings, sonar_among
     from tunneldb.pipeline.site_files import register_files
     from tunneldb.pointcloud.selection import FilterSettings
 
+    if (medium == "water") != (water_level is not None):
+        raise UserError("--medium water and --water-level M belong together: give both or none")
     chosen = FilterSettings(density_of(density), noise_points, noise_diameter, max_distance, max_left_out / 100.0)
     done: list[Loaded] = []
     tell(survey=survey, files=done)
@@ -104,6 +118,10 @@ def load(
         found = get_survey(connection, survey, site=True)
         try:
             with bar("points") as progress:
+                if water_level is not None:
+                    if found.site:
+                        raise UserError(f"survey {survey} is of a site, which has no axis: soundings are of tunnels")
+                    record_soundings(connection, found, files, water_level)
                 if found.site:
                     loaded = register_files(connection, found, files, chosen.max_left_out, step(progress))
                 else:

@@ -10,14 +10,16 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from tunneldb.classification.underwater import WaterClass, classify
+from tunneldb.arrays import Bool, Float
+from tunneldb.classification.underwater import WaterClass, classify, spacing_of_rays, spacing_of_soundings
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.pipeline.read import Begin, silent
-from tunneldb.pointcloud.sonar import read_sonar
+from tunneldb.pointcloud.sonar import read_sonar, read_soundings
+from tunneldb.registration.underwater import GIVEN, SonarPose
 from tunneldb.store.ledger import stage_run
 from tunneldb.store.scan_files import Loaded, checksum
-from tunneldb.store.sonar import SonarRows, StoredScan, save_bed, save_points, stored_scans
+from tunneldb.store.sonar import SonarRows, StoredScan, save_bed, save_points, save_scans, stored_scans
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
@@ -29,6 +31,35 @@ def sonar_among(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[P
     """Those of some files that were registered as sonar scans of the survey, by their names."""
     known = stored_scans(conn, survey)
     return [path for path in paths if path.name in known]
+
+
+def record_soundings(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path], water_level: float) -> None:
+    """Record files of soundings that lie in the tunnel's system, for `load_sonar`; those that are recorded so stay.
+
+    Parameters
+    ----------
+    conn : Connection
+        Idle.
+    water_level : float
+        m, in the tunnel's system.
+
+    Raises
+    ------
+    UserError
+        If there is no such file, or a scan of its name was registered.
+    """
+    with conn.transaction():
+        known = stored_scans(conn, survey)
+        for path in paths:
+            if not path.is_file():
+                raise UserError(f"{path}: there is no such file")
+            before = known.get(path.name)
+            if before is not None and before.state != GIVEN:
+                raise UserError(f"{path}: a sonar scan {path.name} has been registered: load it without --medium, or rename it")
+            if before is None or (before.checksum, before.water_level) != (checksum(path), water_level):
+                nothing = np.full((7, 7), np.nan)
+                scan = SonarPose(path, np.full((3, 3), np.nan), np.full(3, np.nan), np.nan, nothing, GIVEN, (), ())
+                save_scans(conn, survey, [scan], water_level, 1)
 
 
 def load_sonar(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path], begin: Begin = silent) -> Iterator[Loaded]:
@@ -86,21 +117,33 @@ def _require_pose(path: Path, scan: StoredScan) -> None:
 
 def _rows(path: Path, scan: StoredScan, alignment: Alignment) -> tuple[SonarRows, int]:
     """Points of a scan that are no false echoes, in the tunnel, and how many are false."""
-    file_points, _ = read_sonar(path)
-    points = scan.scale * file_points @ scan.rotation.T + scan.translation
+    points, read, in_reach, reach = _placed(path, scan)
     chainage, across = alignment.places(points)
-    inside = np.isfinite(chainage) & (np.linalg.norm(points - scan.translation, axis=1) < FARTHEST)
+    inside = np.isfinite(chainage) & in_reach
     chainage, across, points = chainage[inside], across[inside], points[inside]
-    reach = np.linalg.norm(points - scan.translation, axis=1)
-    classes = classify(np.column_stack([chainage, across, points[:, 2] - scan.water_level]), reach)
+    if len(points) == 0:
+        raise UserError(f"{path}: none of its {read} points lies along the axis of the tunnel")
+    spacing = spacing_of_soundings(points) if reach is None else spacing_of_rays(reach[inside])
+    classes = classify(np.column_stack([chainage, across, points[:, 2] - scan.water_level]), spacing)
     true = classes != WaterClass.FALSE
     false = int((~true).sum())
     chainage, across, points, classes = chainage[true], across[true], points[true], classes[true]
-    voxel = np.floor((points - scan.translation) / VOXEL).astype(np.int64)
+    voxel = np.floor((points - points[:1]) / VOXEL).astype(np.int64)
     _, first = np.unique(voxel, axis=0, return_index=True)
     first.sort()
     rows = SonarRows(
-        chainage[first], across[first], points[first], classes[first], len(file_points),
-        len(file_points) - int(inside.sum()), len(points) - len(first),
+        chainage[first], across[first], points[first], classes[first], read, read - int(inside.sum()),
+        len(points) - len(first),
     )  # fmt: skip
     return rows, false
+
+
+def _placed(path: Path, scan: StoredScan) -> tuple[Float, int, Bool, Float | None]:
+    """Points (n, 3) of a file in the tunnel, of how many, which are near enough to the sonar, and how far from it, if known."""
+    if scan.state == GIVEN:
+        points, invalid = read_soundings(path)
+        return points, len(points) + invalid, np.ones(len(points), bool), None
+    points, invalid = read_sonar(path)
+    arm = scan.scale * points @ scan.rotation.T
+    reach = np.linalg.norm(arm, axis=1)
+    return arm + scan.translation, len(points) + invalid, reach < FARTHEST, reach

@@ -28,6 +28,18 @@ def read_sonar(path: Path) -> tuple[Float, int]:
     UserError
         If it is no such file, or its coordinates are not those of a scanner's own axes in metres.
     """
+    points, invalid = read_soundings(path)
+    far = float(np.percentile(np.linalg.norm(points, axis=1), 50))
+    if far > FARTHEST:
+        raise UserError(
+            f"{path}: its points lie {far:.0f} m from the origin, which is the sonar's place in a scan of its own:"
+            " is it a scan in the tunnel's system (load it with --medium water), or in feet or millimetres?"
+        )
+    return points, invalid
+
+
+def read_soundings(path: Path) -> tuple[Float, int]:
+    """Points of a sonar in whatever axes its file has, see `read_sonar`."""
     suffix = path.suffix.lower()
     if suffix in RAW:
         raise UserError(f"{path}: {suffix} is raw data, which needs the maker's software: export it as .xyz, .las or .off")
@@ -47,12 +59,6 @@ def read_sonar(path: Path) -> tuple[Float, int]:
     points = points[finite]
     if len(points) == 0:
         raise UserError(f"{path}: the file holds no points")
-    far = float(np.percentile(np.linalg.norm(points, axis=1), 50))
-    if far > FARTHEST:
-        raise UserError(
-            f"{path}: its points lie {far:.0f} m from the origin, which is the sonar's place in a scan of its own:"
-            " is it a scan in the tunnel's system, or in feet or millimetres?"
-        )
     return points, invalid
 
 

@@ -33,18 +33,23 @@ def save_registration(conn: psycopg.Connection[Any], survey: Survey, found: Regi
     up : int
         As the scans were taken: 1 or -1.
     """
-    names = [scan.path.name for scan in found.scans]
+    save_scans(conn, survey, found.scans, found.water_level, up)
+    conn.execute("DELETE FROM tunnel.ladder WHERE survey_id = %s", [survey.id])
+    for ladder in found.ladders:
+        _save_ladder(conn, survey, ladder)
+
+
+def save_scans(conn: psycopg.Connection[Any], survey: Survey, scans: Sequence[SonarPose], water_level: float, up: int) -> None:
+    """Store scans and their poses in the place of those of their names, whose points go; see `save_registration`."""
+    names = [scan.path.name for scan in scans]
     rows = conn.execute(
         "SELECT DISTINCT p.km FROM tunnel.sonar_point p JOIN tunnel.sonar_scan c ON c.id = p.scan_id"
         " WHERE c.survey_id = %s AND c.name = ANY (%s)",
         [survey.id, names],
     ).fetchall()
-    for scan in found.scans:
-        _save_scan(conn, survey, scan, found.water_level, up)
+    for scan in scans:
+        _save_scan(conn, survey, scan, water_level, up)
     save_bed(conn, survey, [row[0] for row in rows])  # their points went with their poses
-    conn.execute("DELETE FROM tunnel.ladder WHERE survey_id = %s", [survey.id])
-    for ladder in found.ladders:
-        _save_ladder(conn, survey, ladder)
 
 
 def _save_scan(conn: psycopg.Connection[Any], survey: Survey, scan: SonarPose, water_level: float, up: int) -> None:
@@ -217,8 +222,8 @@ def save_bed(conn: psycopg.Connection[Any], survey: Survey, kilometres: Sequence
         SELECT cell.survey_id, km, n, across_n, height, water_level - height, sqrt(variance / points + pose_variance), points
           FROM (SELECT p.survey_id, p.km, floor(p.chainage)::int AS n, floor(p.across * 10)::int AS across_n,
                        percentile_cont(0.5) WITHIN GROUP (ORDER BY ST_Z(p.geom)) AS height, max(c.water_level) AS water_level,
-                       coalesce(var_samp(ST_Z(p.geom)), %(noise)s ^ 2) AS variance, max(c.covariance[41]) AS pose_variance,
-                       count(*) AS points
+                       coalesce(var_samp(ST_Z(p.geom)), %(noise)s ^ 2) AS variance,
+                       coalesce(max(c.covariance[41]), 0) AS pose_variance, count(*) AS points
                   FROM tunnel.sonar_point p
                   JOIN tunnel.sonar_scan c ON c.id = p.scan_id
                  WHERE p.survey_id = %(survey)s AND p.km = ANY (%(km)s) AND p.classification = 40

@@ -17,7 +17,7 @@ class SonarScan(Base):
 
     __tablename__ = "sonar_scan"
     __table_args__ = (
-        one_of("state", "determined", "weak", "undetermined"),
+        one_of("state", "determined", "weak", "undetermined", "given"),
         UniqueConstraint("survey_id", "name"),
         {"comment": "Sonar scans below the water, with their poses in the tunnel"},
     )
@@ -30,9 +30,13 @@ class SonarScan(Base):
     bytes: Mapped[int] = mapped_column(BigInteger, comment="Size of the file")
     up: Mapped[int] = mapped_column(comment="Whether the file's z axis points up (1) or down (-1), as was said")
     water_level: Mapped[float] = mapped_column(comment="Height of the water, as was said, m")
-    state: Mapped[str] = mapped_column(comment="determined, weak (known worse than it should be) or undetermined")
+    state: Mapped[str] = mapped_column(
+        comment="determined, weak (known worse than it should be), undetermined, or given (the file is in the tunnel's system)"
+    )
     undetermined: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Directions that are known badly or not at all")
-    rotation: Mapped[Floats | None] = mapped_column(comment="3 × 3, row by row; NULL where no pose was found")
+    rotation: Mapped[Floats | None] = mapped_column(
+        comment="3 × 3, row by row; NULL where no pose was found, or none is needed"
+    )
     translation: Mapped[Floats | None] = mapped_column(comment="Place of the sonar in the tunnel's SRID, m")
     scale: Mapped[float | None] = mapped_column(comment="Factor of its coordinates: speed of sound over that assumed")
     covariance: Mapped[Floats | None] = mapped_column(

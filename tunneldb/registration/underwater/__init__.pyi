@@ -1,4 +1,5 @@
 from .block import register as register
+from .results import GIVEN as GIVEN
 from .results import Ladder as Ladder
 from .results import LadderFit as LadderFit
 from .results import Registration as Registration

@@ -11,6 +11,9 @@ from pathlib import Path
 
 from tunneldb.arrays import Float
 
+GIVEN = "given"
+"""State of a scan whose file is in the tunnel's system already."""
+
 PARAMETERS = ("turn x", "turn y", "turn z", "shift x", "shift y", "shift z", "scale")
 
 
