@@ -189,7 +189,7 @@ def test_soundings_in_the_tunnels_system_need_no_pose(
     assert again[0]["state"] == "unchanged"
     np.savetxt(soundings, points[:, :2], "%.4f")
     assert "2 values where x, y and z are expected" in command("load", NAME, soundings, *how, code=2).stderr
-    np.savetxt(soundings, points + [5000.0, 0.0, 0.0], "%.4f")
+    np.savetxt(soundings, points + np.array([5000.0, 0.0, 0.0]), "%.4f")
     assert "lies along the axis" in command("load", NAME, soundings, *how, code=2).stderr
     register(folder)
     named = command("load", NAME, folder / "s0.xyz", *how, code=2).stderr

@@ -13,7 +13,7 @@ from support.canal_scene import LEVEL, ORIGIN, WIDTH, Canal, Sonar
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater import Registration, SonarCloud, SonarPose, register
-from tunneldb.registration.underwater.chain import agreement
+from tunneldb.registration.underwater.chain import Reliefs, agreement
 from tunneldb.registration.underwater.laser_ladders import find_laser_ladders
 from tunneldb.registration.underwater.observations import Pose, pose_derivatives
 from tunneldb.registration.underwater.single import prepare
@@ -165,13 +165,13 @@ def test_derivatives_of_a_pose_are_those_of_differences() -> None:
 def test_scans_at_wrong_places_contradict_each_other(scene: Scene) -> None:
     local = scene.laser - ORIGIN
     walls = find_walls(local)
-    scans = [prepare(cloud, walls) for cloud in scene.clouds()]
+    reliefs = Reliefs({i: prepare(cloud, walls) for i, cloud in enumerate(scene.clouds())})
     along = scene.canal.turn @ [1.0, 0.0, 0.0]
     first, second = (Pose(scan.rotation, scan.translation - ORIGIN, scan.scale) for scan in scene.scans)
-    assert agreement(scans[0], scans[1], (first, second), walls) != -1
-    assert agreement(scans[0], scans[0], (first, first), walls) == 1
+    assert agreement(0, 1, (first, second), reliefs) != -1
+    assert agreement(0, 0, (first, first), reliefs) == 1
     moved = replace(first, translation=first.translation + 3.0 * along)
-    assert agreement(scans[0], scans[0], (first, moved), walls) == -1
+    assert agreement(0, 0, (first, moved), reliefs) == -1
 
 
 def test_a_ladder_that_the_laser_does_not_see_is_not_taken_for_another(scene: Scene) -> None:

@@ -116,6 +116,7 @@ def load(
     tell(survey=survey, files=done)
     with connect(settings.dsn) as connection:
         found = get_survey(connection, survey, site=True)
+        connection.rollback()
         try:
             with bar("points") as progress:
                 if water_level is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.adjustment import Adjusted, adjust, scan_of
-from tunneldb.registration.underwater.chain import OVERLAP, agreement, place_beside
+from tunneldb.registration.underwater.chain import OVERLAP, Reliefs, agreement, place_beside
 from tunneldb.registration.underwater.determined import judge
 from tunneldb.registration.underwater.laser_ladders import LaserLadder, find_laser_ladders
 from tunneldb.registration.underwater.observations import Pose, Rows, cell_keys
@@ -105,21 +105,21 @@ def _start(
             started[i] = one
     if upside_down and len(upside_down) >= len(started):  # one alone may have taken one ladder for another
         raise upside_down[0]
-    started = _agreeing(scans, started, walls, unseen=unseen)
+    reliefs = Reliefs(scans)
+    started = _agreeing(reliefs, started, unseen=unseen)
     left = [i for i in scans if i not in started]
     while started and left:
-        placed = {i: one for i in left if (one := place_beside(i, scans, started, walls, found)) is not None}
+        placed = {i: one for i in left if (one := place_beside(i, reliefs, started, walls, found)) is not None}
         if not placed:
             break
         started |= placed
         left = [i for i in left if i not in placed]
-    return started
+    return _agreeing(reliefs, started, unseen=unseen)
 
 
 def _agreeing(
-    scans: Mapping[int, PreparedScan],
+    reliefs: Reliefs,
     started: Mapping[int, StartedScan],
-    walls: Walls,
     *,
     unseen: bool,
 ) -> dict[int, StartedScan]:
@@ -130,7 +130,7 @@ def _agreeing(
     """
     kept = dict(started)
     said = {
-        (a, b): agreement(scans[a], scans[b], (started[a].pose, started[b].pose), walls)
+        (a, b): agreement(a, b, (started[a].pose, started[b].pose), reliefs)
         for a in started
         for b in started
         if a < b and np.linalg.norm(started[a].pose.translation - started[b].pose.translation) < OVERLAP

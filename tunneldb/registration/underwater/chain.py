@@ -1,190 +1,181 @@
-"""Pose of a sonar scan that sees no ladder, beside one whose pose is known: by the relief of the bed that both see."""
+"""Poses of sonar scans that see no ladder, beside others whose poses are known: by the relief of the bed that they see."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
-from scipy.signal import fftconvolve
+from scipy.signal import find_peaks
 
 from tunneldb.arrays import Float
 from tunneldb.registration.underwater.adjustment import adjust, scan_of
 from tunneldb.registration.underwater.first_pose import LevelScan
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
 from tunneldb.registration.underwater.observations import Pose, Rows
-from tunneldb.registration.underwater.single import PreparedScan, StartedScan, sees
+from tunneldb.registration.underwater.relief import NOWHERE, PIXEL, Relief, height_difference, likelihood, relief_of
+from tunneldb.registration.underwater.single import PreparedScan, StartedScan, misses, sees
 from tunneldb.registration.underwater.walls import Walls
 
 OVERLAP = 15.0  # m between scanners whose scans are compared
-PIXEL = 0.1  # m
-REACH = 10.0  # m along, from a scanner
-MARGIN = 0.3  # m from the walls
-FINE = 2.5  # m: relief that is wider says nothing of the place
-STEPS = 0.6  # m: farther from the bed's height are objects and false echoes
-LEAST_CELLS = 500  # that both scans must see
-PATCH_AREA = 1.0  # m²: of bed whose relief is one observation
-SURE = 2.2  # standard deviations by which beds are alike, and more alike than elsewhere
-AHEAD = 1.0
-LOOSE = 4  # pixels by which first poses may be off along
-BED_NOISE = 0.02  # m: of the bed's height in a pixel, seen slantingly
+LOOSE = 4  # pixels along by which poses may be off
+PEAKS = 5  # of a pair's likelihood that are followed
+SURE = float(np.log(100.0))  # likelihood of a place over that of none, and of the next best, from which it is taken
+SAID = float(np.log(10.0))  # likelihood from which two scans agree, or contradict each other
+ELSEWHERE = 10  # pixels along from which a place is another
 REACHES = (0.3, 0.25, 0.2, 0.15, *[0.1] * 8)
+BESIDE = 3  # known scans that it is adjusted with
+MOST_MOVED = 0.5  # m along by which that may move it: farther, it has slid to another place
 AGREEING = 0.02  # m: median distance of patches that show the same
 LEAST_SHARED = 60  # patches
 
 
-@dataclass(frozen=True)
-class _Relief:
-    """Heights of the bed (x, y) in pixels from ``low`` on, without what is wide, and which pixels there are."""
+@dataclass
+class Reliefs:
+    """Reliefs of scans, by their places in the list, and how well pairs of them agree, worked out when they are asked for."""
 
-    height: Float
-    fine: Float
-    seen: Float
-    low: Float
+    scans: Mapping[int, PreparedScan]
+    _reliefs: dict[int, Relief | None] = field(default_factory=dict)
+    _pairs: dict[tuple[int, int, bool], Float] = field(default_factory=dict)
+
+    def of(self, i: int) -> Relief | None:
+        """Relief of a scan."""
+        if i not in self._reliefs:
+            self._reliefs[i] = relief_of(self.scans[i].flat)
+        return self._reliefs[i]
+
+    def likelihood(self, known: int, i: int, *, turned: bool) -> Float:
+        """That of each shift along of scan ``i``, or of it ``turned`` by half a turn, in the level frame of scan ``known``."""
+        if (known, i, turned) not in self._pairs:
+            one, other = self.of(known), self.of(i)
+            if one is None or other is None:
+                self._pairs[known, i, turned] = np.full(1, NOWHERE)
+            else:
+                self._pairs[known, i, turned] = likelihood(one, other.turned() if turned else other)
+        return self._pairs[known, i, turned]
+
+    def near(self, known: int, i: int, shift: float, *, turned: bool) -> Float:
+        """Likelihoods at shifts LOOSE pixels either way about one, m; 0 where nothing can be said."""
+        values = self.likelihood(known, i, turned=turned)
+        at = round(shift / PIXEL) + len(values) // 2 + np.arange(-LOOSE, LOOSE + 1)
+        inside = (at >= 0) & (at < len(values))
+        found = np.where(inside, values[np.clip(at, 0, len(values) - 1)], NOWHERE)
+        return np.where(found > NOWHERE, found, 0.0)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a scan may stand: beside scan ``known``, ``shift`` m along, ``turned`` or not; and the likelihood of that."""
+
+    known: int
+    shift: float
+    turned: bool
+    point: Float
+    direction: Float
+    likelihood: float
+
+    def elsewhere(self, other: _Place) -> bool:
+        """Whether it is another place, or another way round."""
+        apart = abs(float((self.point - other.point) @ self.direction))
+        return apart > ELSEWHERE * PIXEL or float(self.direction @ other.direction) < 0.0
 
 
 def place_beside(
     i: int,
-    scans: Mapping[int, PreparedScan],
+    reliefs: Reliefs,
     started: Mapping[int, StartedScan],
     walls: Walls,
     found: Sequence[LaserLadder],
 ) -> StartedScan | None:
-    """Pose of scan ``i`` beside the one of those started that it shares most of the bed with; None if it isn't sure."""
-    tried = []
-    for k, known in started.items():
-        for flip in (False, True):
-            pose, alike = _candidate(scans[i].flat, scans[k], known.pose, walls, flip)
-            if pose is not None:
-                tried.append((alike, k, pose))
-    tried.sort(key=lambda one: -one[0])
-    if not tried or tried[0][0] < SURE:
+    """Pose of scan ``i`` beside those started that it shares the bed with; None if it isn't sure."""
+    scans = reliefs.scans
+    places = sorted(_places(i, reliefs, started), key=lambda one: -one.likelihood)
+    if not places or places[0].likelihood < SURE:
         return None
-    alike, k, pose = tried[0]
-    own = [value for value, _, other in tried[1:] if np.linalg.norm(other.translation - pose.translation) > 1.0]
-    if own and own[0] > alike - AHEAD:
+    best = places[0]
+    second = next((one for one in places if one.elsewhere(best)), None)
+    if second is not None and second.likelihood > best.likelihood - SURE:
         return None
-    both = [
-        scan_of(scans[k].thin, scans[k].patches, scans[k].edges, started[k].pose, started[k].ladders, found),
-        scan_of(scans[i].thin, scans[i].patches, scans[i].edges, pose, (), found),
+    pose = _pose(i, best, reliefs, started, walls)
+    if pose is None:
+        return None
+    beside = sorted(started, key=lambda k: float(np.linalg.norm(started[k].pose.translation - pose.translation)))[:BESIDE]
+    together = [
+        scan_of(scans[k].thin, scans[k].patches, scans[k].edges, started[k].pose, started[k].ladders, found) for k in beside
     ]
-    adjusted = adjust(both, walls, found, [(0, 1)], REACHES)
-    if not _agree(adjusted.rows):
+    together.append(scan_of(scans[i].thin, scans[i].patches, scans[i].edges, pose, (), found))
+    pairs = [(a, b) for a in range(len(together)) for b in range(a + 1, len(together))]
+    adjusted = adjust(together, walls, found, pairs, REACHES)
+    settled = adjusted.poses[-1]
+    moved = abs(float((settled.translation - pose.translation)[:2] @ best.direction))
+    if moved > MOST_MOVED or not _agree(adjusted.rows, len(beside)):
         return None
-    return StartedScan(adjusted.poses[1], sees(scans[i], adjusted.poses[1], found))
+    seen = sees(scans[i], settled, found)
+    return None if misses(settled, seen, found) else StartedScan(settled, seen)
 
 
-def _agree(rows: Sequence[Rows]) -> bool:
-    """Whether two scans show the same where they overlap."""
-    shared = next((one for one in rows if one.kind == "scan"), None)
-    return shared is not None and len(shared.residual) > LEAST_SHARED and float(np.median(np.abs(shared.residual))) < AGREEING
+def _direction(scan: PreparedScan, pose: Pose) -> Float:
+    """Way (2,) in which the x axis of a scan's level frame points in the tunnel."""
+    along = (pose.rotation @ scan.flat.rotation.T)[:2, 0]
+    return np.asarray(along / np.linalg.norm(along))
 
 
-def _candidate(flat: LevelScan, beside: PreparedScan, known: Pose, walls: Walls, flip: bool) -> tuple[Pose | None, float]:
-    """Pose of a level scan at which its bed looks most like that of a known one, and how alike, in standard deviations."""
-    _, piece = walls.tree.query(known.translation[:2])
+def _places(i: int, reliefs: Reliefs, started: Mapping[int, StartedScan]) -> list[_Place]:
+    """Places where scan ``i`` may stand, by each pair of it, with what all scans about them say."""
+    stand = {k: one.pose.translation[:2] for k, one in started.items()}
+    look = {k: _direction(reliefs.scans[k], one.pose) for k, one in started.items()}
+    out = []
+    for k in started:
+        for turned in (False, True):
+            values = reliefs.likelihood(k, i, turned=turned)
+            peaks, _ = find_peaks(values, height=0.0)
+            for peak in peaks[np.argsort(-values[peaks])][:PEAKS]:
+                shift = (int(peak) - len(values) // 2) * PIXEL
+                point, direction = stand[k] + shift * look[k], look[k] * (-1.0 if turned else 1.0)
+                total = np.zeros(2 * LOOSE + 1)
+                for other in started:
+                    if np.linalg.norm(point - stand[other]) < OVERLAP:
+                        along = float((point - stand[other]) @ look[other])
+                        same = float(direction @ look[other]) > 0.0
+                        near = reliefs.near(other, i, along, turned=not same)
+                        total += near if float(look[k] @ look[other]) > 0.0 else near[::-1]
+                out.append(_Place(k, shift, turned, point, direction, float(total.max())))
+    return out
+
+
+def _pose(i: int, place: _Place, reliefs: Reliefs, started: Mapping[int, StartedScan], walls: Walls) -> Pose | None:
+    """Pose of a level scan at a place: as far from its wall as it sees it to be, as high as the bed says."""
+    flat: LevelScan = reliefs.scans[i].flat
+    across = np.array([-place.direction[1], place.direction[0]])
+    facing = np.flatnonzero(walls.normal @ across > 0.0)  # those behind the scanner, where y is least
+    if len(facing) == 0:
+        return None
+    piece = facing[np.argmin(np.linalg.norm(walls.foot[facing, :2] - place.point, axis=1))]
     normal = walls.normal[piece]
-    basis = np.column_stack([[normal[1], -normal[0], 0.0], [*normal, 0.0], [0.0, 0.0, 1.0]])
-    base = walls.foot[piece]
-    turn = np.diag([-1.0, -1.0, 1.0]) if flip else np.eye(3)
-    place = -flat.walls[1] if flip else flat.walls[0]
-    own = flat.points @ turn - [0.0, place, 0.0]
-    other = (known.apply(beside.cloud.points) - base) @ basis
-    there = float((known.translation - base) @ basis[:, 0])
-    width = flat.walls[1] - flat.walls[0]
-    mine, theirs = _relief(own, 0.0, width), _relief(other, there, width)
-    if mine is None or theirs is None:
-        return None, -1.0
-    by_shift, _ = _correlate(mine, theirs)
-    best = int(np.argmax(by_shift))
-    alike, shift = float(by_shift[best]), best - (mine.seen.shape[0] - 1)
-    if alike <= 0.0:
-        return None, -1.0
-    along = shift * PIXEL + theirs.low[0] - mine.low[0]
-    up = _height_difference(mine, theirs, shift)
-    rotation = basis @ turn @ flat.rotation
-    translation = basis @ np.array([along, -place, up]) + base
-    return Pose(rotation, translation, 1.0), alike
+    along = np.array([normal[1], -normal[0]])
+    basis = np.column_stack([[*along, 0.0], [*normal, 0.0], [0.0, 0.0, 1.0]])
+    one, other = reliefs.of(place.known), reliefs.of(i)
+    assert one is not None
+    assert other is not None
+    over = height_difference(one, other.turned() if place.turned else other, round(place.shift / PIXEL))
+    height = started[place.known].pose.translation[2] + over
+    foot = walls.foot[piece, :2]
+    plan = foot + ((place.point - foot) @ along) * along - flat.walls[0] * normal
+    return Pose(basis @ flat.rotation, np.array([*plan, height]), 1.0)
 
 
-def _relief(points: Float, middle: float, width: float) -> _Relief | None:
-    """Bed about a place along the canal, from points in a frame whose y is 0 at one wall."""
-    near = points[(np.abs(points[:, 0] - middle) < REACH) & (points[:, 1] > MARGIN) & (points[:, 1] < width - MARGIN)]
-    if len(near) < LEAST_CELLS:
-        return None
-    low = np.array([middle - REACH, 0.0])
-    shape = (round(2.0 * REACH / PIXEL), int(width / PIXEL) + 1)
-    cell = np.floor((near[:, :2] - low) / PIXEL).astype(np.int64)
-    key = cell[:, 0] * shape[1] + cell[:, 1]
-    bed = float(np.percentile(near[:, 2], 20))
-    on_bed = np.abs(near[:, 2] - bed) < STEPS
-    key, height = key[on_bed], near[on_bed, 2]
-    order = np.lexsort([height, key])
-    places, begin, count = np.unique(key[order], return_index=True, return_counts=True)
-    grid, seen = np.zeros(shape), np.zeros(shape)
-    grid.ravel()[places] = height[order][begin + count // 2]
-    seen.ravel()[places] = 1.0
-    sigma = FINE / PIXEL
-    wide = gaussian_filter(grid * seen, sigma) / np.maximum(gaussian_filter(seen, sigma), 1e-6)
-    return _Relief(grid, (grid - wide) * seen, seen, low)
+def _agree(rows: Sequence[Rows], i: int) -> bool:
+    """Whether scan ``i`` shows the same as those before it where they overlap."""
+    shared = [one.residual for one in rows if one.kind == "scan" and one.other == i]
+    residual = np.abs(np.concatenate([*shared, np.zeros(0)]))
+    return len(residual) > LEAST_SHARED and float(np.median(residual)) < AGREEING
 
 
-def _correlate(mine: _Relief, theirs: _Relief) -> tuple[Float, Float]:
-    """Significance of the correlation at each shift along, by pixels, from that at which they only touch on; and observations.
-
-    Correlation of masked images (Padfield, 2012), in standard deviations by Fisher's transform: much bed that is somewhat alike
-    says more than little that is very alike.
-    """
-
-    def over(one: Float, other: Float) -> Float:
-        # shifts along only: the walls have settled those across
-        return np.asarray(fftconvolve(one, other[::-1, ::-1], mode="full")[:, one.shape[1] - 1])
-
-    shared = over(theirs.seen, mine.seen)
-    product = over(theirs.fine, mine.fine)
-    theirs_square, mine_square = over(theirs.fine**2, mine.seen), over(theirs.seen, mine.fine**2)
-    correlation = np.clip(product / np.sqrt(np.maximum(theirs_square * mine_square, 1e-12)), -0.99, 0.99)
-    observations = np.maximum(shared * PIXEL**2 / PATCH_AREA - 3.0, 0.0)
-    return np.where(shared > LEAST_CELLS, np.arctanh(correlation) * np.sqrt(observations), -1.0), observations
-
-
-def agreement(one: PreparedScan, other: PreparedScan, poses: tuple[Pose, Pose], walls: Walls) -> int:
-    """Whether two scans show the same bed where their poses say that they see the same: 1 yes, -1 no, 0 it can't be told.
-
-    It is yes if the reliefs are alike, and no if their correlation is less than half of what their noise leaves, both by SURE
-    standard deviations.
-    """
+def agreement(one: int, other: int, poses: tuple[Pose, Pose], reliefs: Reliefs) -> int:
+    """Whether two scans show the same bed where their poses say that they see the same: 1 yes, -1 no, 0 it can't be told."""
     first, second = poses
-    _, piece = walls.tree.query(first.translation[:2])
-    normal = walls.normal[piece]
-    basis = np.column_stack([[normal[1], -normal[0], 0.0], [*normal, 0.0], [0.0, 0.0, 1.0]])
-    base = walls.foot[piece]
-    width = walls.width()
-    reliefs = []
-    for scan, pose in ((one, first), (other, second)):
-        place = (pose.apply(scan.cloud.points) - base) @ basis
-        reliefs.append(_relief(place, float((pose.translation - base) @ basis[:, 0]), width))
-    mine, theirs = reliefs
-    if mine is None or theirs is None:
-        return 0
-    by_shift, observations = _correlate(mine, theirs)
-    together = round((mine.low[0] - theirs.low[0]) / PIXEL) + mine.seen.shape[0] - 1
-    near = slice(max(together - LOOSE, 0), together + LOOSE + 1)
-    if together < 0 or len(by_shift[near]) == 0 or observations[near].max() <= 0.0:
-        return 0
-    alike = float(by_shift[near].max())
-    clear = [max(1.0 - BED_NOISE**2 / float((of.fine[of.seen > 0.0] ** 2).mean()), 0.0) for of in (mine, theirs)]
-    expected = np.arctanh(min(0.5 * np.sqrt(clear[0] * clear[1]), 0.9)) * np.sqrt(observations[near].max())
-    if alike > SURE:
-        return 1
-    return -1 if alike < expected - SURE else 0
-
-
-def _height_difference(mine: _Relief, theirs: _Relief, shift: int) -> float:
-    """Median of their heights over mine where both are seen at a shift."""
-    size = mine.seen.shape[0]
-    one = slice(max(shift, 0), min(size + shift, size))
-    other = slice(max(-shift, 0), min(size - shift, size))
-    both = (theirs.seen[one] > 0.0) & (mine.seen[other] > 0.0)
-    return float(np.median((theirs.height[one] - mine.height[other])[both]))
+    look = _direction(reliefs.scans[one], first)
+    same = float(look @ _direction(reliefs.scans[other], second)) > 0.0
+    along = float((second.translation - first.translation)[:2] @ look)
+    said = float(reliefs.near(one, other, along, turned=not same).max())
+    return int(np.sign(said)) if abs(said) > SAID else 0

@@ -148,7 +148,8 @@ def _wall_plane(points: Float, place: float) -> tuple[float, float, float]:
         residual = mine[:, 1] - design @ answer
         scale = max(MAD_TO_SIGMA * float(np.median(np.abs(residual))), 0.01)
         weight = 1.0 / (1.0 + (residual / scale) ** 2) ** 2  # Geman-McClure
-        answer = np.linalg.lstsq(design * np.sqrt(weight)[:, None], mine[:, 1] * np.sqrt(weight), rcond=None)[0]
+        weighted = design * weight[:, None]
+        answer = np.linalg.lstsq(weighted.T @ design, weighted.T @ mine[:, 1], rcond=None)[0]
     return float(answer[0]), float(answer[1]), float(answer[2])
 
 

@@ -64,10 +64,13 @@ def nearest_element(own: Float, placed: PlacedLadder) -> tuple[Int64, Float]:
 
     Elements are numbered as in `PlacedLadder.elements`.
     """
-    begin, end = placed.elements()
-    span = end - begin
-    share = np.einsum("nej,ej->ne", own[:, None] - begin[None], span) / (span**2).sum(axis=1)
-    foot = begin + np.clip(share, 0.0, 1.0)[..., None] * span
-    away = own[:, None] - foot
-    which = np.argmin((away**2).sum(axis=2), axis=1)
-    return which.astype(np.int64), np.asarray(away[np.arange(len(own)), which])
+    height, half = placed.ladder.height, placed.gap / 2.0
+    x, y, z = own.T
+    side = np.where(x < 0.0, -half, half)
+    rung = np.searchsorted(0.5 * (height[1:] + height[:-1]), y)  # of all rungs that at the nearest height
+    along_stile = y - np.clip(y, height[0] - BEYOND, height[-1] + BEYOND)
+    to_stile = np.column_stack([x - side, along_stile, z])
+    to_rung = np.column_stack([x - np.clip(x, -half, half), y - height[rung], z])
+    stile = (to_stile[:, :2] ** 2).sum(axis=1) <= (to_rung[:, :2] ** 2).sum(axis=1)
+    which = np.where(stile, np.where(x < 0.0, 0, 1), rung + 2)
+    return which.astype(np.int64), np.where(stile[:, None], to_stile, to_rung)

@@ -20,6 +20,7 @@ from tunneldb.registration.underwater.walls import Walls
 HEIGHT_TOLERANCE = 0.45  # between the top of a scan's walls and the water, m
 TRIED = 8  # candidates of a scan that are fitted
 TRIED_POINTS = 60_000
+LEVEL_POINTS = 120_000  # of a scan that are levelled, and compared with ladders and with other scans'
 FIRST_REACHES = (0.35, 0.25, 0.2, 0.15, 0.12)
 LEAST_LIKENESS = 0.35  # of a ladder that is taken for one
 TIE = 0.92  # of the best likelihood, from which rungs are not told apart
@@ -87,7 +88,7 @@ def prepare(cloud: SonarCloud, walls: Walls) -> PreparedScan:
         It shows no two walls as far apart as the laser's.
     """
     every = max(1, len(cloud.points) // TRIED_POINTS)
-    flat = level(cloud.points, cloud.up, walls.width())
+    flat = level(cloud.points[:: max(1, len(cloud.points) // LEVEL_POINTS)], cloud.up, walls.width())
     return PreparedScan(cloud, flat, cloud.points[::every], find_patches(cloud.points), flat.edges @ flat.rotation)
 
 
@@ -135,11 +136,17 @@ def _try(points: Float, patches: Patches, candidate: Candidate, walls: Walls, fo
     pose = adjust([scan_of(points, patches, no_edges, pose, first, found)], walls, found, [], FIRST_REACHES).poses[0]
     near = _near(pose, found)
     pose = adjust([scan_of(points, patches, no_edges, pose, near, found)], walls, found, [], FIRST_REACHES[-3:]).poses[0]
-    likenesses = [(likeness(pose.apply(points), pose.translation, found[k].placed), k) for k in near]
+    space = pose.apply(points)
+    likenesses = [(likeness(space, pose.translation, found[k].placed), k) for k in near]
     seen = tuple(k for value, k in likenesses if value > LEAST_LIKENESS)
     alike = sum(value for value, k in likenesses if value > LEAST_LIKENESS or k in first)
-    missed = sum(k not in seen and _away(pose, found[k]) < IN_SIGHT for k in near)
+    missed = misses(pose, seen, found)
     return _Fitted(pose, seen, missed, alike, explained(points, pose, walls, [found[k].placed for k in near]))
+
+
+def misses(pose: Pose, seen: Sequence[int], found: Sequence[LaserLadder]) -> int:
+    """How many ladders that are in sight of a pose are not among those seen."""
+    return sum(k not in seen and _away(pose, found[k]) < IN_SIGHT for k in _near(pose, found))
 
 
 def _same(one: Pose, other: Pose) -> bool:

@@ -110,11 +110,13 @@ def _stations(count: int, spacing: float) -> Float:
 
 
 def _ladder_stations(parameters: CanalParameters, stations: Float, rng: np.random.Generator) -> Float:
-    """Near the middle of the sonars' stretch first, then on to both its ends, half a spacing off the stations."""
+    """Evenly over the sonars' stretch, from its middle on, at least a spacing of theirs apart."""
     step = max(parameters.sonar_spacing, 3.0)
     order = np.array([0.5 * (-1.0) ** k * (k + (k + 1) % 2) for k in range(parameters.ladders)])
     middle = float(stations.mean()) if len(stations) else 0.0
     reach = 0.5 * parameters.length - 1.0
+    if parameters.ladders > 1 and len(stations):
+        step = max(step, float(np.ptp(stations)) / parameters.ladders)
     return np.clip(middle + step * order + rng.uniform(-0.6, 0.6, parameters.ladders), -reach, reach)
 
 

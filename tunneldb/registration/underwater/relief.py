@@ -1,0 +1,157 @@
+"""The bed's relief as a sonar scan sees it, and how much two scans speak for seeing the same of it at a shift along the canal.
+
+Each scan's relief is an image in its own level frame, without what is the same all along the canal. Two images are compared
+at all shifts at once by masked correlation (Padfield, 2012); what a correlation is worth is told by how many independent
+places the images hold (Dutilleul, 1993): relief that is wide has few.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.ndimage import gaussian_filter
+from scipy.signal import fftconvolve
+
+from tunneldb.arrays import Float
+from tunneldb.registration.underwater.first_pose import LevelScan
+
+PIXEL = 0.1  # m
+REACH = 10.0  # m along, from the scanner
+MARGIN = 0.3  # m from the walls
+FINE = 2.5  # m: relief that is wider says nothing of the place
+STEPS = 0.6  # m: farther from the bed's height are objects and false echoes
+LEAST_CELLS = 500  # that both scans must see
+ALIKE = 0.5  # correlation that two scans of one bed have at least, mostly
+CORRELATED = 30  # pixels within which relief may be correlated
+FEWEST = 3.0  # independent places, of which a correlation says nothing
+CERTAIN = 0.99  # highest correlation that is believed
+NOWHERE = -1e3  # instead of a likelihood where nothing is shared
+
+
+@dataclass(frozen=True)
+class Relief:
+    """The bed about a scanner.
+
+    Attributes
+    ----------
+    height : (2 n, m) float64 array
+        Of the bed in pixels along (x from -REACH on) and across (symmetric about the canal's middle), m, level frame.
+    fine : (2 n, m) float64 array
+        Without what is wide, and what is the same all along; 0 where nothing is seen.
+    seen : (2 n, m) float64 array
+        1 where the bed is seen.
+    likeness : (c, d) float64 array
+        Correlation of ``fine`` with itself at shifts of up to CORRELATED pixels either way.
+    """
+
+    height: Float
+    fine: Float
+    seen: Float
+    likeness: Float
+
+    def turned(self) -> Relief:
+        """The same for half a turn of the scanner."""
+        return Relief(self.height[::-1, ::-1], self.fine[::-1, ::-1], self.seen[::-1, ::-1], self.likeness)
+
+
+def relief_of(scan: LevelScan) -> Relief | None:
+    """Relief that a level scan sees; None if it is too little."""
+    low, high = scan.walls
+    width = high - low
+    across = scan.points[:, 1] - 0.5 * (low + high)
+    near = (np.abs(scan.points[:, 0]) < REACH) & (np.abs(across) < 0.5 * width - MARGIN)
+    if near.sum() < LEAST_CELLS:
+        return None
+    half = int(np.ceil(0.5 * width / PIXEL))
+    shape = (round(2.0 * REACH / PIXEL), 2 * half)
+    place = np.column_stack([scan.points[near, 0] + REACH, across[near] + half * PIXEL])
+    cell = np.floor(place / PIXEL).astype(np.int64)
+    key = cell[:, 0] * shape[1] + cell[:, 1]
+    height = scan.points[near, 2]
+    on_bed = np.abs(height - float(np.percentile(height, 20))) < STEPS
+    key, height = key[on_bed], height[on_bed]
+    order = np.lexsort([height, key])
+    places, begin, count = np.unique(key[order], return_index=True, return_counts=True)
+    grid, seen = np.zeros(shape), np.zeros(shape)
+    grid.ravel()[places] = height[order][begin + count // 2]
+    seen.ravel()[places] = 1.0
+    if seen.sum() < LEAST_CELLS:
+        return None
+    wide = _smooth(grid * seen) / np.maximum(_smooth(seen), 1e-6)
+    fine = (grid - wide) * seen
+    usual = fine.sum(axis=0) / np.maximum(seen.sum(axis=0), 1.0)  # as the silt's rise to the foot of the walls
+    fine = (fine - usual) * seen
+    return Relief(grid, fine, seen, _autocorrelation(fine, seen))
+
+
+def _smooth(grid: Float) -> Float:
+    return np.asarray(gaussian_filter(grid, FINE / PIXEL))
+
+
+def _autocorrelation(fine: Float, seen: Float) -> Float:
+    product = fftconvolve(fine, fine[::-1, ::-1])
+    shared = fftconvolve(seen, seen[::-1, ::-1])
+    variance = float((fine**2).sum() / seen.sum())
+    alike = np.where(shared > LEAST_CELLS, product / np.maximum(shared, 1.0) / variance, 0.0)
+    middle = np.array(fine.shape) - 1
+    reach = np.minimum(CORRELATED, middle)
+    return np.asarray(alike[middle[0] - reach[0] : middle[0] + reach[0] + 1, middle[1] - reach[1] : middle[1] + reach[1] + 1])
+
+
+def likelihood(one: Relief, other: Relief) -> Float:
+    """How much two scans speak for seeing the same bed, at each shift along of ``other`` against ``one``.
+
+    Returns
+    -------
+    (4 n - 1,) float64 array
+        Logarithm of the likelihood that they do over that of not, at shifts from -(2 n - 1) pixels on: x in ``one`` is x in
+        ``other`` plus the shift. Where they share too little NOWHERE.
+    """
+    columns = min(one.fine.shape[1], other.fine.shape[1])
+    a, b = _middle(one, columns), _middle(other, columns)
+    shared = _over(a.seen, b.seen)
+    product = _over(a.fine, b.fine)
+    squares = _over(a.fine**2, b.seen) * _over(a.seen, b.fine**2)
+    correlation = np.clip(product / np.sqrt(np.maximum(squares, 1e-12)), -CERTAIN, CERTAIN)
+    patch = max(float((_middle_of(one.likeness, other.likeness)).sum()), 1.0)  # pixels of an independent place
+    weight = np.sqrt(np.maximum(shared / patch - FEWEST, 0.0))
+    score, expected = np.arctanh(correlation) * weight, np.arctanh(ALIKE) * weight
+    return np.where((shared > LEAST_CELLS) & (weight > 0.0), score * expected - 0.5 * expected**2, NOWHERE)
+
+
+def _middle(relief: Relief, columns: int) -> Relief:
+    """Its middle columns: widths of scans may differ by a pixel or two."""
+    first = (relief.fine.shape[1] - columns) // 2
+    part = slice(first, first + columns)
+    return Relief(relief.height[:, part], relief.fine[:, part], relief.seen[:, part], relief.likeness)
+
+
+def _middle_of(one: Float, other: Float) -> Float:
+    """Product of two autocorrelations where both are known."""
+    rows, columns = np.minimum(one.shape, other.shape)
+
+    def part(of: Float) -> Float:
+        first = (np.array(of.shape) - (rows, columns)) // 2
+        return of[first[0] : first[0] + rows, first[1] : first[1] + columns]
+
+    return np.asarray(part(one) * part(other))
+
+
+def _over(one: Float, other: Float) -> Float:
+    """Sums of products of two images at all shifts along, none across: the walls have settled that."""
+    size = next_fast_len(one.shape[0] + other.shape[0] - 1, real=True)
+    spectrum = (rfft(one, size, axis=0) * rfft(other[::-1], size, axis=0)).sum(axis=1)
+    return np.asarray(irfft(spectrum, size)[: one.shape[0] + other.shape[0] - 1])
+
+
+def height_difference(one: Relief, other: Relief, shift: int) -> float:
+    """Median of heights of ``one`` over those of ``other`` where both see the bed at a shift, pixels."""
+    columns = min(one.fine.shape[1], other.fine.shape[1])
+    a, b = _middle(one, columns), _middle(other, columns)
+    size = len(a.seen)
+    mine = slice(max(shift, 0), min(size + shift, size))
+    theirs = slice(max(-shift, 0), min(size - shift, size))
+    both = (a.seen[mine] > 0.0) & (b.seen[theirs] > 0.0)
+    return float(np.median((a.height[mine] - b.height[theirs])[both]))
