@@ -1,4 +1,4 @@
-"""Run the benchmark: ``python -m benchmarks.canal --seeds FIRST COUNT --results FILE``.
+"""Run the benchmark: ``python -m benchmarks.canal [--scenes KIND] --seeds FIRST COUNT --results FILE``.
 
 Each seed's figures are a line of FILE; seeds that it has are not made again. The table is printed at the end.
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 from benchmarks.canal.judge import judge
 from benchmarks.canal.literal import gap_errors
 from benchmarks.canal.peers import compare
-from benchmarks.canal.scenes import case_of, usual
+from benchmarks.canal.scenes import SCENES, case_of
 from benchmarks.canal.table import peers_table, table
 
 
@@ -20,6 +20,7 @@ def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.canal", description=__doc__)
     parser.add_argument("--seeds", nargs=2, type=int, default=[1, 100], metavar=("FIRST", "COUNT"))
+    parser.add_argument("--scenes", choices=list(SCENES), default="usual", help="kind of scenes")
     parser.add_argument("--results", type=Path, default=Path("canal.jsonl"))
     parser.add_argument("--peers", action="store_true", help="beside Open3D, small_gicp, least squares and the paper's steps")
     asked = parser.parse_args()
@@ -30,7 +31,7 @@ def main() -> None:
     for seed in range(first, first + count):
         if seed in done:
             continue
-        case = case_of(usual(seed))
+        case = case_of(SCENES[asked.scenes](seed))
         done[seed] = judge(case)
         if asked.peers:
             done[seed]["peers"] = compare(case)

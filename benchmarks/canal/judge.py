@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import time
 from typing import Any
 
@@ -42,6 +43,7 @@ def judge(case: Case) -> dict[str, Any]:
     return {
         "seed": case.scene.parameters.seed,
         "seconds": seconds,
+        "gigabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
         "points": int(sum(len(cloud.points) for cloud in case.clouds)),
         "ladders": _ladders(case, found),
         "scans": scans,
@@ -132,12 +134,15 @@ def _surfaces(case: Case, points: Float) -> dict[str, Any]:
     order = np.lexsort([space[bed, 2], number.ravel()])
     middle = np.concatenate([[0], np.cumsum(count)[:-1]]) + count // 2
     height = space[bed, 2][order][middle]
+    place = scene.bed_height(points[bed, 0], points[bed, 1])  # of the bed where each point lies
+    there = place[np.lexsort([place, number.ravel()])][middle]
     along = np.linspace(0.05, 0.95, 10)  # a cell is 1 m long
     truth = np.mean([scene.bed_height(names[:, 0] + share, (names[:, 1] + 0.5) * CELL) for share in along], axis=0)
     held = (count >= LEAST) & (kind[bed][order][middle] == BED)
     floor = scene.parameters.water_level - scene.parameters.depth - 0.5
     return {
         "wall": _cell_errors(space[wall], scene.distance(space[wall])),
+        "seen": np.abs(height[held] - there[held]).round(5).tolist(),
         "bed": np.abs(height[held] - truth[held]).round(5).tolist(),
         "volume": [float((height[held] - floor).sum() * CELL), float((truth[held] - floor).sum() * CELL)],
     }

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,53 @@ def usual(seed: int) -> CanalParameters:
         roughness=float(rng.uniform(0.004, 0.015)),
         bed_relief=float(rng.uniform(0.03, 0.12)),
     )
+
+
+def block(seed: int) -> CanalParameters:
+    """Twenty stations 5 m apart, four ladders among them."""
+    return replace(
+        usual(seed), length=110.0, ladders=4, sonar_stations=20, sonar_spacing=5.0, laser_stations=6, laser_spacing=20.0
+    )
+
+
+def dense(seed: int) -> CanalParameters:
+    """As many points as the instrument gives in its finest step."""
+    return replace(usual(seed), sonar_step=0.09)
+
+
+def long(seed: int) -> CanalParameters:
+    """The tunnel of Moisan et al. (2015), 475 m, with stations 5 m apart and a ladder each 60 m; straight, as that one is."""
+    return replace(
+        usual(seed),
+        length=490.0,
+        radius=0.0,
+        ladders=8,
+        sonar_stations=95,
+        sonar_spacing=5.0,
+        laser_stations=30,
+        laser_spacing=16.0,
+    )
+
+
+def one_ladder(seed: int) -> CanalParameters:
+    """One ladder: whatever it is taken for, nothing else along the tunnel contradicts."""
+    return replace(usual(seed), ladders=1, sonar_spacing=5.0)
+
+
+def no_ladder(seed: int) -> CanalParameters:
+    """Two walls and nothing else: they say nothing of the place along, of the height, or which way round."""
+    return replace(usual(seed), ladders=0, piers=0, niches=0, boat=False)
+
+
+SCENES: Mapping[str, Callable[[int], CanalParameters]] = {
+    "usual": usual,
+    "block": block,
+    "dense": dense,
+    "long": long,
+    "one-ladder": one_ladder,
+    "no-ladder": no_ladder,
+}
+"""Kinds of scenes by name."""
 
 
 def case_of(parameters: CanalParameters) -> Case:

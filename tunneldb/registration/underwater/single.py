@@ -66,13 +66,12 @@ class StartedScan:
 
 @dataclass(frozen=True)
 class _Fitted:
-    """A fitted candidate: the ladders that it sees, how many in sight it does not, how like ladders they look, explanations."""
+    """A fitted candidate: the ladders that it sees, how many in sight it does not, how like ladders they look."""
 
     pose: Pose
     ladders: tuple[int, ...]
     missed: int
     likeness: float
-    explained: Float
 
     def likelihood(self, top: float) -> float:
         """Likeness, the less the farther the water is from the top ``top`` of the scan's walls above the sonar, m."""
@@ -122,7 +121,10 @@ def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> Sta
         if _same_place(best.pose, other.pose):
             told = less < TIE
         else:
-            told = less < OTHER_PLACE or margin(thin, best.explained, other.explained) > DECIDED
+            told = (
+                less < OTHER_PLACE
+                or margin(thin, *(_explained(thin, one.pose, walls, found) for one in (best, other))) > DECIDED
+            )
         if not told:
             return None
     return StartedScan(best.pose, best.ladders)
@@ -141,7 +143,11 @@ def _try(points: Float, patches: Patches, candidate: Candidate, walls: Walls, fo
     seen = tuple(k for value, k in likenesses if value > LEAST_LIKENESS)
     alike = sum(value for value, k in likenesses if value > LEAST_LIKENESS or k in first)
     missed = misses(pose, seen, found)
-    return _Fitted(pose, seen, missed, alike, explained(points, pose, walls, [found[k].placed for k in near]))
+    return _Fitted(pose, seen, missed, alike)
+
+
+def _explained(points: Float, pose: Pose, walls: Walls, found: Sequence[LaserLadder]) -> Float:
+    return explained(points, pose, walls, [found[k].placed for k in _near(pose, found)])
 
 
 def misses(pose: Pose, seen: Sequence[int], found: Sequence[LaserLadder]) -> int:
