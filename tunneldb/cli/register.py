@@ -25,6 +25,7 @@ UP = {"+z": 1, "-z": -1}
     examples=[
         "tunneldb register canal-26 mss-1.xyz mss-2.xyz --ladders ladders.csv --up +z --water-level 265.0",
         "tunneldb register canal-26 mss-*.xyz --ladders ladders.csv --up -z --water-level 265.0 --report registration.md",
+        "tunneldb register canal-26 mss-*.xyz --ladders ladders.csv --up +z --water-level 265.0 --sound-speed 1500=1447",
     ],
     wrong="some scan's pose is weak or undetermined: the table and --json name the directions",
 )
@@ -39,10 +40,29 @@ UP = {"+z": 1, "-z": -1}
 )
 @click.option("--up", type=click.Choice(list(UP)), required=True, help="Whether z of the sonar's files points up or down.")
 @click.option("--water-level", type=float, required=True, metavar="M", help="Height of the water in the tunnel's system, m.")
+@click.option(
+    "--start",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="CSV",
+    help="Where sonars stood, roughly: file,x,y,within, m. A scan is then sought no farther from x, y; others anywhere.",
+)
+@click.option(
+    "--sound-speed",
+    metavar="ASSUMED=MEASURED",
+    help="Speed of sound that the sonar was set to, and that of the water, m/s; needed where they differ by more than 3 %.",
+)
 @click.option("--report", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE", help="Report to write, as Markdown.")
 @click.pass_context
 def register(
-    ctx: click.Context, survey: str, files: tuple[Path, ...], ladders: Path, up: str, water_level: float, report: Path | None
+    ctx: click.Context,
+    survey: str,
+    files: tuple[Path, ...],
+    ladders: Path,
+    up: str,
+    water_level: float,
+    start: Path | None,
+    sound_speed: str | None,
+    report: Path | None,
 ) -> None:
     """Register sonar scans from below the water (FILES) to the laser scans of SURVEY above it.
 
@@ -55,16 +75,17 @@ def register(
     """
     from tunneldb.export.tables.registration import HEADER, as_report, scan_rows
     from tunneldb.files import replacing
-    from tunneldb.pipeline.register import register_survey
+    from tunneldb.pipeline.register import SonarInput, register_survey
 
     settings: Settings = ctx.obj
     if report is not None and not report.parent.is_dir():
         raise UserError(f"{report}: there is no folder {report.parent}")
+    given = SonarInput(files, ladders, UP[up], water_level, start, _speeds(sound_speed))
     with connect(settings.dsn) as conn:
         chosen = get_survey(conn, survey)
         conn.rollback()
         with bar("points") as progress:
-            found = register_survey(conn, chosen, files, ladders, UP[up], water_level, step(progress))
+            found = register_survey(conn, chosen, given, step(progress))
     _tell(survey, found)
     print_table(HEADER, scan_rows(found), right=range(2, 7))
     for note in found.notes:
@@ -75,6 +96,17 @@ def register(
         click.echo(f"report to {report}", err=True)
     if any(scan.state != "determined" for scan in found.scans):
         ctx.exit(1)
+
+
+def _speeds(text: str | None) -> tuple[float, float] | None:
+    """Speeds that a text ``ASSUMED=MEASURED`` states, m/s."""
+    if text is None:
+        return None
+    assumed, _, measured = text.partition("=")
+    try:
+        return float(assumed), float(measured)
+    except ValueError:
+        raise UserError(f"--sound-speed takes ASSUMED=MEASURED in m/s, as 1500=1447, not {text!r}") from None
 
 
 def _tell(survey: str, found: Registration) -> None:

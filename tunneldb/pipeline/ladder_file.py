@@ -1,4 +1,4 @@
-"""Ladders as they were measured before they were put into the water, from a CSV file."""
+"""Ladders as they were measured before they were put into the water, and where sonars stood, from CSV files."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from tunneldb.csvfile import CsvTable, read_csv, read_texts
 from tunneldb.errors import UserError
-from tunneldb.registration.underwater import Ladder
+from tunneldb.registration.underwater import Ladder, Near
 
 COLUMNS = ("rung", "height", "stile_gap", "diameter")
 LEAST_RUNGS = 3
@@ -59,3 +59,23 @@ def _ladder(table: CsvTable, name: str, rows: list[int]) -> Ladder:
         raise table.error(rows[0], f"ladder {name} has a rung twice")
     gap, diameter = (float(table[column][rows[0]]) for column in ("stile_gap", "diameter"))
     return Ladder(name, number, np.asarray(table["height"][rows]), gap, diameter)
+
+
+def read_start(path: Path) -> dict[str, Near]:
+    """Read where sonars stood, roughly: a row ``file,x,y,within`` for each scan of which that is known, by the file's name.
+
+    Raises
+    ------
+    UserError
+        Names file, line and value.
+    """
+    table = read_csv(path, ("x", "y", "within"))
+    out: dict[str, Near] = {}
+    for row, name in enumerate(read_texts(path, "file")):
+        within = float(table["within"][row])
+        if not within > 0.0:
+            raise table.error(row, f"within is {within:g}; it is how far the sonar may have stood from x, y, in metres")
+        if name in out:
+            raise table.error(row, f"file {name} stands twice")
+        out[name] = Near(np.array([table["x"][row], table["y"][row]]), within)
+    return out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,43 +11,71 @@ import psycopg
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.pipeline.ladder_file import read_ladders
+from tunneldb.pipeline.ladder_file import read_ladders, read_start
 from tunneldb.pipeline.read import Begin
 from tunneldb.pointcloud.reader import read_chunks, read_header
 from tunneldb.pointcloud.sonar import read_sonar
 from tunneldb.pointcloud.voxels import Voxels
-from tunneldb.registration.underwater import Registration, SonarCloud, register
+from tunneldb.registration.underwater import Registration, SonarCloud, SonarPose, register
 from tunneldb.store.sonar import save_registration
 from tunneldb.store.sources import unchanged_file
 from tunneldb.store.survey import Survey
 
+SPEEDS = (1300.0, 1700.0)  # of sound in water, m/s
 BELOW, ABOVE = 0.3, 3.0  # what of the laser's points is looked at, about the water's level, m
 VOXEL = 0.01  # of which one point each is kept, m
 
 
-def register_survey(
-    conn: psycopg.Connection[Any],
-    survey: Survey,
-    paths: Sequence[Path],
-    ladder_file: Path,
-    up: int,
-    water_level: float,
-    begin: Begin,
-) -> Registration:
+@dataclass(frozen=True)
+class SonarInput:
+    """What is said of sonar scans.
+
+    Attributes
+    ----------
+    paths : tuple of Path
+    ladders : Path
+        See `tunneldb.pipeline.ladder_file.read_ladders`.
+    up : int
+        1 if the scans' z axis points up, -1 if down.
+    water_level : float
+        m, in the tunnel's system.
+    start : Path or None
+        See `tunneldb.pipeline.ladder_file.read_start`.
+    sound_speed : (float, float) or None
+        That which the sonar assumed, and that which was measured, m/s.
+    """
+
+    paths: tuple[Path, ...]
+    ladders: Path
+    up: int
+    water_level: float
+    start: Path | None = None
+    sound_speed: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        names = [path.name for path in self.paths]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise UserError(f"two of the files are named {twice}: a scan is known by its name")
+        for speed in self.sound_speed or ():
+            if not SPEEDS[0] <= speed <= SPEEDS[1]:
+                raise UserError(
+                    f"--sound-speed {speed:g}: sound in water goes {SPEEDS[0]:g} to {SPEEDS[1]:g} m/s; give ASSUMED=MEASURED"
+                )
+
+    @property
+    def factor(self) -> float:
+        """By which ranges are to be multiplied, as far as is known beforehand."""
+        return 1.0 if self.sound_speed is None else self.sound_speed[1] / self.sound_speed[0]
+
+
+def register_survey(conn: psycopg.Connection[Any], survey: Survey, given: SonarInput, begin: Begin) -> Registration:
     """Register sonar scans and store their poses, in the place of those that files of these names had.
 
     Parameters
     ----------
     conn : Connection
         Idle.
-    paths : sequence of Path
-        Sonar scans.
-    ladder_file : Path
-        See `tunneldb.pipeline.ladder_file.read_ladders`.
-    up : int
-        1 if the scans' z axis points up, -1 if down.
-    water_level : float
-        m, in the tunnel's system.
     begin : callable
         See `tunneldb.pipeline.read.Begin`.
 
@@ -55,23 +83,32 @@ def register_survey(
     ------
     UserError
     """
-    names = [path.name for path in paths]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise UserError(f"two of the files are named {twice}: a scan is known by its name")
-    ladders = read_ladders(ladder_file)
+    ladders = read_ladders(given.ladders)
+    places = {} if given.start is None else read_start(given.start)
+    unknown = next((name for name in places if name not in {path.name for path in given.paths}), None)
+    if unknown is not None:
+        raise UserError(f"{given.start}: {unknown} is none of the files")
     clouds, notes = [], []
-    for path in paths:
+    for path in given.paths:
         points, invalid = read_sonar(path)
-        clouds.append(SonarCloud(path, points, up))
+        clouds.append(SonarCloud(path, points * given.factor, given.up, places.get(path.name)))
         if invalid:
             notes.append(f"{path.name}: {invalid} points without coordinates are left out")
-    laser = _laser_points(conn, survey, water_level, begin)
+    laser = _laser_points(conn, survey, given.water_level, begin)
     begin("registration", len(clouds))
-    found = register(laser, clouds, ladders, water_level)
+    found = register(laser, clouds, ladders, given.water_level)
+    poses = tuple(_of_file(scan, given.factor) for scan in found.scans)
+    found = replace(found, scans=poses, notes=(*notes, *found.notes))
     with conn.transaction():
-        save_registration(conn, survey, found, up)
-    return Registration(found.scans, found.ladders, found.water_level, (*notes, *found.notes))
+        save_registration(conn, survey, found, given.up)
+    return found
+
+
+def _of_file(scan: SonarPose, factor: float) -> SonarPose:
+    """The pose of a file's points, by that of these times ``factor``."""
+    unit = np.ones(7)
+    unit[6] = factor
+    return replace(scan, scale=scan.scale * factor, covariance=scan.covariance * unit * unit[:, None])
 
 
 def _laser_points(conn: psycopg.Connection[Any], survey: Survey, water_level: float, begin: Begin) -> Float:

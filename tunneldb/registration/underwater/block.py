@@ -7,21 +7,24 @@ geometry leaves open is named.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.adjustment import Adjusted, adjust, scan_of
-from tunneldb.registration.underwater.chain import OVERLAP, Reliefs, agreement, place_beside
+from tunneldb.registration.underwater.chain import OVERLAP
 from tunneldb.registration.underwater.determined import judge
 from tunneldb.registration.underwater.laser_ladders import LaserLadder, find_laser_ladders
 from tunneldb.registration.underwater.observations import Pose, Rows, cell_keys
 from tunneldb.registration.underwater.results import Ladder, LadderFit, Registration, Residual, SonarCloud, SonarPose
-from tunneldb.registration.underwater.single import PreparedScan, StartedScan, prepare, start
-from tunneldb.registration.underwater.walls import Walls, find_walls
+from tunneldb.registration.underwater.single import PreparedScan, StartedScan, prepare
+from tunneldb.registration.underwater.starting import start_all
+from tunneldb.registration.underwater.walls import Walls, find_walls, lower_edge
 
 WALL_VOXEL = 0.03  # m
+DRY_WALL = 0.1  # m: walls that the laser sees so far below the water's level, as it was said, are not under water
 
 
 def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladder], water_level: float) -> Registration:
@@ -44,12 +47,19 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
     """
     origin = np.array([*np.floor(np.median(laser[:, :2], axis=0)), water_level])
     local = laser - origin
-    walls = find_walls(local[np.unique(cell_keys(local, WALL_VOXEL), return_index=True)[1]])
+    thin = local[np.unique(cell_keys(local, WALL_VOXEL), return_index=True)[1]]
+    walls = find_walls(thin)
+    edge = lower_edge(thin, walls)
+    if edge < -DRY_WALL:
+        raise UserError(f"the laser sees the walls {-edge:.2f} m below the water's level and more: is --water-level right?")
     found = find_laser_ladders(local, walls, ladders)
-    scans, faults = _prepare(clouds, walls)
+    scans, faults = _prepare([_local(cloud, origin) for cloud in clouds], walls)
     seen = {one.placed.ladder.name for one in found}
-    started = _start(scans, walls, found, unseen=len(seen) < len(ladders))
-    notes = [f"ladder {one.name} is not seen by the laser" for one in ladders if one.name not in seen]
+    started, reasons = start_all(scans, walls, found, unseen=len(seen) < len(ladders))
+    notes = []
+    if edge > DRY_WALL:
+        notes.append(f"the laser sees the walls from {edge:.2f} m above the water on: is --water-level right?")
+    notes += [f"ladder {one.name} is not seen by the laser" for one in ladders if one.name not in seen]
     known = sorted(started)
     adjusted = _adjust_all(scans, started, known, walls, found)
     poses = []
@@ -67,8 +77,16 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
                 open_directions, residuals,
             )
         )  # fmt: skip
+    why = [f"{clouds[i].path.name} has no pose: {reason}" for i, reason in reasons.items()]
     fits = [_fit(one, k, origin, clouds, started) for k, one in enumerate(found)]
-    return Registration(tuple(poses), tuple(fits), water_level, (*notes, *faults))
+    return Registration(tuple(poses), tuple(fits), water_level, (*notes, *faults, *why))
+
+
+def _local(cloud: SonarCloud, origin: Float) -> SonarCloud:
+    """The cloud with its rough place in the local frame."""
+    if cloud.near is None:
+        return cloud
+    return replace(cloud, near=replace(cloud.near, place=cloud.near.place - origin[:2]))
 
 
 def _prepare(clouds: Sequence[SonarCloud], walls: Walls) -> tuple[dict[int, PreparedScan], list[str]]:
@@ -82,74 +100,6 @@ def _prepare(clouds: Sequence[SonarCloud], walls: Walls) -> tuple[dict[int, Prep
     if not scans:
         raise UserError(faults[0])
     return scans, faults
-
-
-def _start(
-    scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[LaserLadder], *, unseen: bool
-) -> dict[int, StartedScan]:
-    """First poses: by the ladders that a scan sees, then beside scans that have one, as far as that leads.
-
-    Raises
-    ------
-    UserError
-        At least as many of those that see a ladder are upside down as are not.
-    """
-    started, upside_down = {}, []
-    for i, scan in scans.items():
-        try:
-            one = start(scan, walls, found)
-        except UserError as error:
-            upside_down.append(error)
-            continue
-        if one is not None:
-            started[i] = one
-    if upside_down and len(upside_down) >= len(started):  # one alone may have taken one ladder for another
-        raise upside_down[0]
-    reliefs = Reliefs(scans)
-    started = _agreeing(reliefs, started, unseen=unseen)
-    left = [i for i in scans if i not in started]
-    while started and left:
-        placed = {i: one for i in left if (one := place_beside(i, reliefs, started, walls, found)) is not None}
-        if not placed:
-            break
-        started |= placed
-        left = [i for i in left if i not in placed]
-    return _agreeing(reliefs, started, unseen=unseen)
-
-
-def _agreeing(
-    reliefs: Reliefs,
-    started: Mapping[int, StartedScan],
-    *,
-    unseen: bool,
-) -> dict[int, StartedScan]:
-    """Those of the scans that do not contradict each other where they see the same bed: one ladder looks like another.
-
-    Where there are ladders that the laser does not see (``unseen``), a scan that sees one ladder alone may have taken such
-    for it: it needs another scan's word.
-    """
-    kept = dict(started)
-    said = {
-        (a, b): agreement(a, b, (started[a].pose, started[b].pose), reliefs)
-        for a in started
-        for b in started
-        if a < b and np.linalg.norm(started[a].pose.translation - started[b].pose.translation) < OVERLAP
-    }
-
-    def votes(i: int) -> tuple[int, int]:
-        of = [value for (a, b), value in said.items() if i in (a, b) and a in kept and b in kept]
-        return of.count(1), of.count(-1)
-
-    while kept:
-        against = {i: votes(i) for i in kept if votes(i)[1]}
-        if not against:
-            break
-        worst = min(for_it - no for for_it, no in against.values())
-        for i in [i for i, (for_it, no) in against.items() if for_it - no == worst]:
-            del kept[i]
-    if unseen:
-        kept = {i: one for i, one in kept.items() if len(one.ladders) > 1 or votes(i)[0]}
-    return kept
 
 
 def _adjust_all(

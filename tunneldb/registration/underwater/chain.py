@@ -132,6 +132,8 @@ def _places(i: int, reliefs: Reliefs, started: Mapping[int, StartedScan]) -> lis
             for peak in peaks[np.argsort(-values[peaks])][:PEAKS]:
                 shift = (int(peak) - len(values) // 2) * PIXEL
                 point, direction = stand[k] + shift * look[k], look[k] * (-1.0 if turned else 1.0)
+                if not reliefs.scans[i].cloud.may_stand(point):
+                    continue
                 total = np.zeros(2 * LOOSE + 1)
                 for other in started:
                     if np.linalg.norm(point - stand[other]) < OVERLAP:

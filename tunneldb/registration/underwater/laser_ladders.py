@@ -35,7 +35,9 @@ LEANING = np.radians(np.arange(-15.0, 15.1, 0.5))  # sideways
 BIN = 0.005  # m
 NOISE = 0.004  # of laser points from a cylinder, m: what the fit takes for usual
 STARTS = 8
-TIE = 1.1  # ratio of two ways' costs up to which they are not told apart
+TIE = float(np.log(100.0))  # likelihood of a way over that of another up to which they are not told apart
+STONES = 5.0  # points whose errors are independent, one of so many
+ASTRAY = 5.0  # standard deviations off, by which a point is no ladder's
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,8 @@ class LaserLadder:
     rungs : tuple of int
         Numbers of the rungs that were seen.
     points : int
+    cost : float
+        Of the points of its cluster, as if each of STONES were one: half of the robust sum of squares.
     covariance : (7, 7) float64 array
         Of turn (3) rad, shift (3) m and gap m.
     ties : tuple of float
@@ -60,6 +64,7 @@ class LaserLadder:
     rms: float
     rungs: tuple[int, ...]
     points: int
+    cost: float
     covariance: Float
     ties: tuple[float, ...]
 
@@ -70,12 +75,19 @@ def find_laser_ladders(points: Float, walls: Walls, ladders: Sequence[Ladder]) -
     fits = [[_fit_cluster(cluster, out, ladder) for ladder in ladders] for cluster, out in clusters]
     if not fits:
         return []
-    cost = np.array([[fit.rms if fit is not None else 1.0 for fit in row] for row in fits])
-    # A tall cluster with all its rungs says more than a short one with as good a fit.
-    seen = np.array([[len(fit.rungs) if fit is not None else 0 for fit in row] for row in fits])
-    rows, columns = linear_sum_assignment(cost - 1e-3 * seen)
+    # what is explained as a ladder, over its points' being astray
+    gain = [
+        [0.0 if fit is None else _astray(len(cluster)) - fit.cost for fit in row]
+        for (cluster, _), row in zip(clusters, fits, strict=True)
+    ]
+    rows, columns = linear_sum_assignment(-np.array(gain))
     found = [fits[row][column] for row, column in zip(rows, columns, strict=True)]
     return [fit for fit in found if fit is not None]
+
+
+def _astray(points: int) -> float:
+    """Cost of points of which none is a ladder's."""
+    return 0.5 * min(points, MOST_POINTS) * float(np.log1p(ASTRAY**2)) / STONES
 
 
 def _clusters(points: Float, walls: Walls) -> list[tuple[Float, Float]]:
@@ -142,7 +154,8 @@ def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | No
     if not tried:
         return None
     tried.sort(key=lambda one: one[0])
-    _, placed, covariance = _refine(cluster, tried[0][1], 40)
+    refined = sorted((_refine(cluster, start, 40) for _, start in tried), key=lambda one: one[0])
+    cost, placed, covariance = refined[0]
     own = placed.to_ladder(cluster)
     which, away = nearest_element(own, placed)
     residual = np.linalg.norm(away, axis=1) - ladder.diameter / 2.0
@@ -156,11 +169,11 @@ def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | No
         return None
     ties = tuple(
         float((other.origin - placed.origin) @ placed.axes[1])
-        for cost, other in tried[1:]
-        if cost < TIE * tried[0][0] and np.linalg.norm(other.origin - placed.origin) > 0.1
+        for other_cost, other, _ in refined[1:]
+        if other_cost < cost + TIE and np.linalg.norm(other.origin - placed.origin) > 0.1
     )
     rms = float(np.sqrt(np.mean(residual[close] ** 2)))
-    return LaserLadder(placed, rms, tuple(ladder.number[i] for i in seen), int(close.sum()), covariance, ties)
+    return LaserLadder(placed, rms, tuple(ladder.number[i] for i in seen), int(close.sum()), cost, covariance, ties)
 
 
 def _stiles(cluster: Float, out: Float, ladder: Ladder) -> PlacedLadder | None:
@@ -233,12 +246,26 @@ def _refine(cluster: Float, start: PlacedLadder, most: int) -> tuple[float, Plac
     """Fit turn, shift and gap by robust least squares; the cost, the ladder and the covariance."""
     radius = start.ladder.diameter / 2.0
 
-    def residual(change: Float) -> Float:
+    def compared(change: Float) -> tuple[PlacedLadder, Float, Int64, Float]:
         placed = start.moved(change[:3], change[3:6], float(change[6]))
-        _, away = nearest_element(placed.to_ladder(cluster), placed)
+        own = placed.to_ladder(cluster)
+        return placed, own, *nearest_element(own, placed)
+
+    def residual(change: Float) -> Float:
+        _, _, _, away = compared(change)
         return np.asarray((np.linalg.norm(away, axis=1) - radius) / NOISE)
 
-    found = least_squares(residual, np.zeros(7), loss="cauchy", x_scale=np.array([0.01] * 6 + [0.005]), max_nfev=most)
+    def derivatives(change: Float) -> Float:
+        """Of the residuals: what a bar's axis moves towards a point takes from the distance."""
+        placed, own, which, away = compared(change)
+        towards = away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
+        turn, shift = np.cross(own - away, towards) @ placed.axes, towards @ placed.axes
+        wider = 0.5 * towards[:, 0] * np.select([which == 0, which == 1], [-1.0, 1.0], 0.0)
+        return np.asarray(-np.column_stack([turn, shift, wider]) / NOISE)
+
+    found = least_squares(
+        residual, np.zeros(7), derivatives, loss="cauchy", x_scale=np.array([0.01] * 6 + [0.005]), max_nfev=most
+    )
     information = found.jac.T @ found.jac
     covariance = np.linalg.pinv(information, rcond=1e-12)
-    return float(found.cost), start.moved(found.x[:3], found.x[3:6], float(found.x[6])), np.asarray(covariance)
+    return float(found.cost) / STONES, start.moved(found.x[:3], found.x[3:6], float(found.x[6])), np.asarray(covariance)

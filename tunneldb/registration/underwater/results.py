@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from tunneldb.arrays import Float
 
 GIVEN = "given"
@@ -42,12 +44,29 @@ class Ladder:
 
 
 @dataclass(frozen=True)
+class Near:
+    """Where a sonar stood, roughly: a place (2,) in the tunnel's plan, and within how far of it, m."""
+
+    place: Float
+    within: float
+
+    def holds(self, place: Float) -> bool:
+        """Whether a place (2,) or (3,) lies there."""
+        return bool(np.linalg.norm(place[:2] - self.place) <= self.within)
+
+
+@dataclass(frozen=True)
 class SonarCloud:
-    """A sonar scan as its file has it: points (n, 3), m, and whether its z axis points up (1) or down (-1)."""
+    """A sonar scan as its file has it: points (n, 3), m, whether its z axis points up (1) or down (-1), and where it stood."""
 
     path: Path
     points: Float
     up: int
+    near: Near | None = None
+
+    def may_stand(self, place: Float) -> bool:
+        """Whether the sonar may have stood at a place (2,) or (3,)."""
+        return self.near is None or self.near.holds(place)
 
 
 @dataclass(frozen=True)

@@ -65,6 +65,13 @@ class StartedScan:
 
 
 @dataclass(frozen=True)
+class NotStarted:
+    """Why a scan has no first pose."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
 class _Fitted:
     """A fitted candidate: the ladders that it sees, how many in sight it does not, how like ladders they look."""
 
@@ -91,8 +98,8 @@ def prepare(cloud: SonarCloud, walls: Walls) -> PreparedScan:
     return PreparedScan(cloud, flat, cloud.points[::every], find_patches(cloud.points), flat.edges @ flat.rotation)
 
 
-def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> StartedScan | None:
-    """Most likely pose of a scan by itself; None if no ladder is seen, or more than one pose fits as well.
+def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> StartedScan | NotStarted:
+    """Most likely pose of a scan by itself; none if no ladder is seen, or more than one pose fits as well.
 
     Raises
     ------
@@ -101,32 +108,34 @@ def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> Sta
     """
     cloud, flat, thin = scan.cloud, scan.flat, scan.thin
     placed = [one.placed for one in found]
-    tried = candidates(flat, walls, placed, HEIGHT_TOLERANCE)[:TRIED]
+    may_be = candidates(flat, walls, placed, HEIGHT_TOLERANCE)
+    tried = [one for one in may_be if cloud.may_stand(one.translation)][:TRIED]
     patches = find_patches(thin)
     fitted = [one for one in (_try(thin, patches, one, walls, found) for one in tried) if one.ladders]
     if not fitted:
-        return None
+        return NotStarted("it shows no ladder that the laser sees")
     high = float(np.median([(one.pose.apply(thin)[:, 2] > AIR).mean() for one in fitted]))
     if high > MOST_IN_AIR:
         raise UserError(f"{cloud.path}: {100.0 * high:.0f} % of its points would lie above the water: is --up right?")
-    fitted = [one for one in fitted if abs(one.pose.scale - 1.0) < MOST_SCALE]
-    best = max(fitted, key=lambda one: one.likelihood(flat.top), default=None)
-    if best is None or best.missed:
-        return None
-    for other in fitted:
+    scaled = [one for one in fitted if abs(one.pose.scale - 1.0) < MOST_SCALE]
+    best = max(scaled, key=lambda one: one.likelihood(flat.top), default=None)
+    if best is None:
+        off = 100.0 * (float(np.median([one.pose.scale for one in fitted])) - 1.0)
+        return NotStarted(f"its ranges would be {-off:+.1f} % off: is the speed of sound right (--sound-speed)?")
+    if best.missed:
+        return NotStarted("where it seems to stand a ladder would be in sight that it does not show")
+    for other in scaled:
         if other.missed or _same(best.pose, other.pose):
             continue
         less = other.likelihood(flat.top) / best.likelihood(flat.top)
         # a wall is as good a wall a rung lower; elsewhere, or turned the other way, it is another
         if _same_place(best.pose, other.pose):
-            told = less < TIE
-        else:
-            told = (
-                less < OTHER_PLACE
-                or margin(thin, *(_explained(thin, one.pose, walls, found) for one in (best, other))) > DECIDED
-            )
-        if not told:
-            return None
+            if less > TIE:
+                return NotStarted("two of its ladder's rungs fit as well")
+        elif less > OTHER_PLACE:
+            explanations = (_explained(thin, one.pose, walls, found) for one in (best, other))
+            if margin(thin, *explanations) < DECIDED:
+                return NotStarted("two places, or two ways round, fit as well: --start may tell them apart")
     return StartedScan(best.pose, best.ladders)
 
 

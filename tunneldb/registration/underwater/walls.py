@@ -25,6 +25,9 @@ ROUGHEST = 0.04  # m
 LEAST_POINTS = 20
 NARROWEST, WIDEST = 2.0, 40.0  # canal, m
 TUKEY = 4.685
+ON_WALL = 0.05  # m
+EDGE_BIN = 0.02  # m of height, for the lower edge of the walls
+USUAL = (0.1, 0.6)  # heights between which walls are seen as they usually are, m
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,22 @@ def find_walls(points: Float) -> Walls:
     foot, normal = table[:, :3], table[:, 3:5]
     walls = Walls(foot, normal, table[:, 5], table[:, 6], table[:, 7], np.zeros(len(foot), np.int64))
     return _orient(walls)
+
+
+def lower_edge(points: Float, walls: Walls) -> float:
+    """Height down to which laser points (n, 3) show the walls, m: above it they are at least half as dense as higher up.
+
+    Nothing below ``points`` is looked at; images of the walls in the water are fewer.
+    """
+    low = points[points[:, 2] < USUAL[1]]
+    away, piece = walls.tree.query(low[:, :2], distance_upper_bound=2.0 * SPACING)
+    known = np.isfinite(away)
+    low, piece = low[known], piece[known]
+    height = low[np.abs(walls.distance(low, piece)) < ON_WALL, 2]
+    bins = np.arange(np.floor(height.min() / EDGE_BIN), USUAL[1] / EDGE_BIN + 0.5) * EDGE_BIN
+    count, _ = np.histogram(height, bins)
+    usual = float(np.median(count[bins[:-1] > USUAL[0]]))
+    return float(bins[int(np.argmax(count > 0.5 * usual))])
 
 
 def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Float) -> list[float] | None:

@@ -1,0 +1,97 @@
+"""First poses of all scans: by the ladders that each sees, and beside those that have one, without those that contradict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from tunneldb.errors import UserError
+from tunneldb.registration.underwater.chain import OVERLAP, Reliefs, agreement, place_beside
+from tunneldb.registration.underwater.laser_ladders import LaserLadder
+from tunneldb.registration.underwater.single import PreparedScan, StartedScan, start
+from tunneldb.registration.underwater.walls import Walls
+
+
+def start_all(
+    scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[LaserLadder], *, unseen: bool
+) -> tuple[dict[int, StartedScan], dict[int, str]]:
+    """First poses: by the ladders that a scan sees, then beside scans that have one, as far as that leads.
+
+    Returns
+    -------
+    dict of int to StartedScan
+    dict of int to str
+        Why each of the others has none.
+
+    Raises
+    ------
+    UserError
+        At least as many of those that see a ladder are upside down as are not.
+    """
+    started: dict[int, StartedScan] = {}
+    reasons, upside_down = {}, []
+    for i, scan in scans.items():
+        try:
+            one = start(scan, walls, found)
+        except UserError as error:
+            upside_down.append(error)
+            reasons[i] = "it seems to be upside down"
+            continue
+        if isinstance(one, StartedScan):
+            started[i] = one
+        else:
+            reasons[i] = one.reason
+    # one alone may have taken one ladder for another
+    if upside_down and len(upside_down) >= len(started):
+        raise upside_down[0]
+    reliefs = Reliefs(scans)
+    started = _agreeing(reliefs, started, reasons, unseen=unseen)
+    left = [i for i in scans if i not in started]
+    while started and left:
+        beside = {i: at for i in left if (at := place_beside(i, reliefs, started, walls, found)) is not None}
+        if not beside:
+            break
+        started |= beside
+        left = [i for i in left if i not in beside]
+    reasons = {i: reason for i, reason in reasons.items() if i not in started}
+    return _agreeing(reliefs, started, reasons, unseen=unseen), reasons
+
+
+def _agreeing(
+    reliefs: Reliefs,
+    started: Mapping[int, StartedScan],
+    reasons: dict[int, str],
+    *,
+    unseen: bool,
+) -> dict[int, StartedScan]:
+    """Those of the scans that do not contradict each other where they see the same bed: one ladder looks like another.
+
+    Of the others ``reasons`` is told why. Where there are ladders that the laser does not see (``unseen``), a scan that sees
+    one ladder alone may have taken such for it: it needs another scan's word.
+    """
+    kept = dict(started)
+    said = {
+        (a, b): agreement(a, b, (started[a].pose, started[b].pose), reliefs)
+        for a in started
+        for b in started
+        if a < b and np.linalg.norm(started[a].pose.translation - started[b].pose.translation) < OVERLAP
+    }
+
+    def votes(i: int) -> tuple[int, int]:
+        of = [value for (a, b), value in said.items() if i in (a, b) and a in kept and b in kept]
+        return of.count(1), of.count(-1)
+
+    while kept:
+        against = {i: votes(i) for i in kept if votes(i)[1]}
+        if not against:
+            break
+        worst = min(for_it - no for for_it, no in against.values())
+        for i in [i for i, (for_it, no) in against.items() if for_it - no == worst]:
+            del kept[i]
+            reasons[i] = "its bed is another than that which other scans show there"
+    if unseen:
+        for i in [i for i, one in kept.items() if len(one.ladders) < 2 and not votes(i)[0]]:
+            del kept[i]
+            reasons[i] = "it sees one ladder, which may be one that the laser does not see"
+    return kept
