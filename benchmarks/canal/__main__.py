@@ -31,7 +31,7 @@ def main() -> None:
     for seed in range(first, first + count):
         if seed in done:
             continue
-        case = case_of(SCENES[asked.scenes](seed))
+        case = case_of(asked.scenes, seed)
         done[seed] = judge(case)
         if asked.peers:
             done[seed]["peers"] = compare(case)

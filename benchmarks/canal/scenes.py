@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.arrays import Float
-from tunneldb.registration.underwater import Ladder, SonarCloud
+from tunneldb.registration.underwater import Ladder, Near, SonarCloud
 from tunneldb.simulate.canal import CanalParameters, CanalScene, SonarScan, simulate
 
 CHECK_REACH = 10.0  # m of the check points from the sonar
@@ -98,17 +98,30 @@ SCENES: Mapping[str, Callable[[int], CanalParameters]] = {
 }
 """Kinds of scenes by name."""
 
+PACED: Mapping[str, float] = {"long": 3.0}
+"""Kinds in which it is known where each sonar stood, within so many metres, as by a tape along the wall."""
 
-def case_of(parameters: CanalParameters) -> Case:
+
+def case_of(kind: str, seed: int) -> Case:
     """Simulate a scene."""
+    parameters = SCENES[kind](seed)
     scene = simulate(parameters)
     up = -1 if parameters.sonar_z_down else 1
-    clouds = tuple(SonarCloud(Path(f"{scan.name}.xyz"), scan.points, up) for scan in scene.sonar)
+    within, rng = PACED.get(kind), np.random.default_rng([seed, 98])
+    clouds = tuple(
+        SonarCloud(Path(f"{scan.name}.xyz"), scan.points, up, None if within is None else _near(scan, within, rng))
+        for scan in scene.sonar
+    )
     ladders = tuple(
         Ladder(one.name, tuple(range(1, len(one.heights) + 1)), one.heights, one.stile_gap, one.diameter)
         for one in scene.ladders
     )
     return Case(scene, clouds, ladders)
+
+
+def _near(scan: SonarScan, within: float, rng: np.random.Generator) -> Near:
+    off = rng.normal(0.0, within / 3.0, 2)
+    return Near(scan.translation[:2] + off, within)
 
 
 def check_points(scan: SonarScan) -> Float:

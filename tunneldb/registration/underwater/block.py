@@ -55,7 +55,7 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
     found = find_laser_ladders(local, walls, ladders)
     scans, faults = _prepare([_local(cloud, origin) for cloud in clouds], walls)
     seen = {one.placed.ladder.name for one in found}
-    started, reasons = start_all(scans, walls, found, unseen=len(seen) < len(ladders))
+    started, reasons = start_all(scans, walls, found, several=len(ladders) > 1)
     notes = []
     if edge > DRY_WALL:
         notes.append(f"the laser sees the walls from {edge:.2f} m above the water on: is --water-level right?")
@@ -77,6 +77,11 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
                 open_directions, residuals,
             )
         )  # fmt: skip
+    notes += [
+        f"ladder {one.placed.ladder.name}: by its gaps it may as well stand {_shifts(one)} m higher"
+        for one in found
+        if one.ties
+    ]
     why = [f"{clouds[i].path.name} has no pose: {reason}" for i, reason in reasons.items()]
     fits = [_fit(one, k, origin, clouds, started) for k, one in enumerate(found)]
     return Registration(tuple(poses), tuple(fits), water_level, (*notes, *faults, *why))
@@ -148,6 +153,10 @@ def _residuals(rows: Sequence[Rows], scan: int, names: Sequence[str]) -> tuple[R
         absolute = np.abs(one.residual)
         out.append(Residual(one.kind, name, len(absolute), float(np.median(absolute)), float(np.percentile(absolute, 95))))
     return tuple(out)
+
+
+def _shifts(one: LaserLadder) -> str:
+    return " or ".join(f"{shift:.2f}" for shift in one.ties)
 
 
 def _fit(

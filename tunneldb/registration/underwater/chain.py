@@ -20,12 +20,14 @@ from tunneldb.registration.underwater.walls import Walls
 OVERLAP = 15.0  # m between scanners whose scans are compared
 LOOSE = 4  # pixels along by which poses may be off
 PEAKS = 5  # of a pair's likelihood that are followed
-SURE = float(np.log(100.0))  # likelihood of a place over that of none, and of the next best, from which it is taken
+SURE = float(np.log(100.0))  # likelihood of a place over that of none, from which it is taken
+AHEAD = float(np.log(20.0))  # and over that of the next best
 SAID = float(np.log(10.0))  # likelihood from which two scans agree, or contradict each other
 ELSEWHERE = 10  # pixels along from which a place is another
 REACHES = (0.3, 0.25, 0.2, 0.15, *[0.1] * 8)
 BESIDE = 3  # known scans that it is adjusted with
 MOST_MOVED = 0.5  # m along by which that may move it: farther, it has slid to another place
+SAME_PLACE = 0.1  # m: of two poses that are one
 AGREEING = 0.02  # m: median distance of patches that show the same
 LEAST_SHARED = 60  # patches
 
@@ -76,8 +78,11 @@ class _Place:
 
     def elsewhere(self, other: _Place) -> bool:
         """Whether it is another place, or another way round."""
-        apart = abs(float((self.point - other.point) @ self.direction))
-        return apart > ELSEWHERE * PIXEL or float(self.direction @ other.direction) < 0.0
+        return self.along(other) > ELSEWHERE * PIXEL or float(self.direction @ other.direction) < 0.0
+
+    def along(self, other: _Place) -> float:
+        """Distance to another place along the canal, m."""
+        return abs(float((self.point - other.point) @ self.direction))
 
 
 def place_beside(
@@ -93,10 +98,40 @@ def place_beside(
     if not places or places[0].likelihood < SURE:
         return None
     best = places[0]
-    second = next((one for one in places if one.elsewhere(best)), None)
-    if second is not None and second.likelihood > best.likelihood - SURE:
+    rivals = [one for one in places if one.likelihood > best.likelihood - AHEAD]
+    if any(one.elsewhere(best) for one in rivals):
         return None
-    pose = _pose(i, best, reliefs, started, walls)
+    settled = [_settled(i, one, reliefs, started, walls, found) for one in _apart(rivals)]
+    first = settled[0]
+    # what is settled from beside it must be the same
+    if first is None or any(
+        one is not None and np.linalg.norm(one.translation - first.translation) > SAME_PLACE for one in settled[1:]
+    ):
+        return None
+    seen = sees(scans[i], first, found)
+    return None if misses(first, seen, found) else StartedScan(first, seen)
+
+
+def _apart(places: Sequence[_Place]) -> list[_Place]:
+    """Those of some places, the likeliest first, that are not the same but for what poses may be off."""
+    out: list[_Place] = []
+    for one in places:
+        if all(one.along(other) > LOOSE * PIXEL for other in out):
+            out.append(one)
+    return out
+
+
+def _settled(
+    i: int,
+    place: _Place,
+    reliefs: Reliefs,
+    started: Mapping[int, StartedScan],
+    walls: Walls,
+    found: Sequence[LaserLadder],
+) -> Pose | None:
+    """Pose of a scan adjusted from a place together with those beside it; None if it slides away or shows something else."""
+    scans = reliefs.scans
+    pose = _pose(i, place, reliefs, started, walls)
     if pose is None:
         return None
     beside = sorted(started, key=lambda k: float(np.linalg.norm(started[k].pose.translation - pose.translation)))[:BESIDE]
@@ -106,12 +141,8 @@ def place_beside(
     together.append(scan_of(scans[i].thin, scans[i].patches, scans[i].edges, pose, (), found))
     pairs = [(a, b) for a in range(len(together)) for b in range(a + 1, len(together))]
     adjusted = adjust(together, walls, found, pairs, REACHES)
-    settled = adjusted.poses[-1]
-    moved = abs(float((settled.translation - pose.translation)[:2] @ best.direction))
-    if moved > MOST_MOVED or not _agree(adjusted.rows, len(beside)):
-        return None
-    seen = sees(scans[i], settled, found)
-    return None if misses(settled, seen, found) else StartedScan(settled, seen)
+    moved = abs(float((adjusted.poses[-1].translation - pose.translation)[:2] @ place.direction))
+    return adjusted.poses[-1] if moved < MOST_MOVED and _agree(adjusted.rows, len(beside)) else None
 
 
 def _direction(scan: PreparedScan, pose: Pose) -> Float:

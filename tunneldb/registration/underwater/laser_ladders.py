@@ -37,6 +37,7 @@ NOISE = 0.004  # of laser points from a cylinder, m: what the fit takes for usua
 STARTS = 8
 TIE = float(np.log(100.0))  # likelihood of a way over that of another up to which they are not told apart
 STONES = 5.0  # points whose errors are independent, one of so many
+MOSTLY = 0.5  # share of what points that are astray cost, from which a first fit is of no ladder
 ASTRAY = 5.0  # standard deviations off, by which a point is no ladder's
 
 
@@ -151,7 +152,7 @@ def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | No
     for shift in _shifts(start.to_ladder(cluster), ladder, start.gap):
         cost, fitted, _ = _refine(few, start.moved(np.zeros(3), start.axes[1] * shift), 10)
         tried.append((cost, fitted))
-    if not tried:
+    if min((cost for cost, _ in tried), default=np.inf) > MOSTLY * _astray(len(few)):
         return None
     tried.sort(key=lambda one: one[0])
     refined = sorted((_refine(cluster, start, 40) for _, start in tried), key=lambda one: one[0])

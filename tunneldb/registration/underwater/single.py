@@ -94,7 +94,7 @@ def prepare(cloud: SonarCloud, walls: Walls) -> PreparedScan:
         It shows no two walls as far apart as the laser's.
     """
     every = max(1, len(cloud.points) // TRIED_POINTS)
-    flat = level(cloud.points[:: max(1, len(cloud.points) // LEVEL_POINTS)], cloud.up, walls.width())
+    flat = level(cloud.points[:: max(1, len(cloud.points) // LEVEL_POINTS)], cloud.up, walls.width)
     return PreparedScan(cloud, flat, cloud.points[::every], find_patches(cloud.points), flat.edges @ flat.rotation)
 
 
@@ -107,7 +107,7 @@ def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> Sta
         It is upside down.
     """
     cloud, flat, thin = scan.cloud, scan.flat, scan.thin
-    placed = [one.placed for one in found]
+    placed = [one.placed for one in found if _in_reach(cloud, one)]
     may_be = candidates(flat, walls, placed, HEIGHT_TOLERANCE)
     tried = [one for one in may_be if cloud.may_stand(one.translation)][:TRIED]
     patches = find_patches(thin)
@@ -183,6 +183,14 @@ def sees(scan: PreparedScan, pose: Pose, found: Sequence[LaserLadder]) -> tuple[
 
 def _near(pose: Pose, found: Sequence[LaserLadder]) -> tuple[int, ...]:
     return tuple(k for k, one in enumerate(found) if _away(pose, one) < FARTHEST_LADDER)
+
+
+def _in_reach(cloud: SonarCloud, ladder: LaserLadder) -> bool:
+    """Whether a ladder may be near enough to where the scanner stood."""
+    if cloud.near is None:
+        return True
+    away = float(np.linalg.norm(ladder.placed.origin[:2] - cloud.near.place))
+    return away < cloud.near.within + FARTHEST_LADDER
 
 
 def _away(pose: Pose, ladder: LaserLadder) -> float:

@@ -14,9 +14,14 @@ from tunneldb.registration.underwater.walls import Walls
 
 
 def start_all(
-    scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[LaserLadder], *, unseen: bool
+    scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[LaserLadder], *, several: bool
 ) -> tuple[dict[int, StartedScan], dict[int, str]]:
     """First poses: by the ladders that a scan sees, then beside scans that have one, as far as that leads.
+
+    Parameters
+    ----------
+    several : bool
+        Whether more than one ladder stands in the water, seen by the laser or not.
 
     Returns
     -------
@@ -46,7 +51,7 @@ def start_all(
     if upside_down and len(upside_down) >= len(started):
         raise upside_down[0]
     reliefs = Reliefs(scans)
-    started = _agreeing(reliefs, started, reasons, unseen=unseen)
+    started = _agreeing(reliefs, started, reasons, several=several)
     left = [i for i in scans if i not in started]
     while started and left:
         beside = {i: at for i in left if (at := place_beside(i, reliefs, started, walls, found)) is not None}
@@ -55,7 +60,7 @@ def start_all(
         started |= beside
         left = [i for i in left if i not in beside]
     reasons = {i: reason for i, reason in reasons.items() if i not in started}
-    return _agreeing(reliefs, started, reasons, unseen=unseen), reasons
+    return _agreeing(reliefs, started, reasons, several=several), reasons
 
 
 def _agreeing(
@@ -63,12 +68,12 @@ def _agreeing(
     started: Mapping[int, StartedScan],
     reasons: dict[int, str],
     *,
-    unseen: bool,
+    several: bool,
 ) -> dict[int, StartedScan]:
     """Those of the scans that do not contradict each other where they see the same bed: one ladder looks like another.
 
-    Of the others ``reasons`` is told why. Where there are ladders that the laser does not see (``unseen``), a scan that sees
-    one ladder alone may have taken such for it: it needs another scan's word.
+    Of the others ``reasons`` is told why. Where there are ``several`` ladders, a scan that sees one alone may have taken it
+    for another: it needs another scan's word, or the operator's of where it stood.
     """
     kept = dict(started)
     said = {
@@ -90,8 +95,9 @@ def _agreeing(
         for i in [i for i, (for_it, no) in against.items() if for_it - no == worst]:
             del kept[i]
             reasons[i] = "its bed is another than that which other scans show there"
-    if unseen:
-        for i in [i for i, one in kept.items() if len(one.ladders) < 2 and not votes(i)[0]]:
+    if several:
+        alone = [i for i, one in kept.items() if len(one.ladders) < 2 and reliefs.scans[i].cloud.near is None]
+        for i in [i for i in alone if not votes(i)[0]]:
             del kept[i]
-            reasons[i] = "it sees one ladder, which may be one that the laser does not see"
+            reasons[i] = "it sees one ladder, which may be another than it seems: --start may tell"
     return kept

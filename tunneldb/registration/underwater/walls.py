@@ -6,6 +6,7 @@ Frame: local, m, z up and zero at the water's level.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -55,7 +56,7 @@ class Walls:
     sigma_batter: Float
     side: Int64
 
-    @property
+    @cached_property
     def tree(self) -> cKDTree:
         """Of the feet in plan."""
         return cKDTree(self.foot[:, :2])
@@ -76,6 +77,7 @@ class Walls:
         out = np.column_stack([self.normal[piece], self.batter[piece]])
         return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
 
+    @cached_property
     def width(self) -> float:
         """Median distance between the two sides at the waterline, m."""
         return float(np.median(_opposite(self.foot, self.normal)[0]))
