@@ -14,7 +14,7 @@ COMMENT ON VIEW tunnel_api.sonar_scan IS
 COMMENT ON COLUMN tunnel_api.sonar_scan.sigma_x IS 'Standard deviation of its place along x, m';
 COMMENT ON COLUMN tunnel_api.sonar_scan.sigma_y IS 'Standard deviation of its place along y, m';
 COMMENT ON COLUMN tunnel_api.sonar_scan.sigma_z IS 'Standard deviation of its height, m';
-COMMENT ON COLUMN tunnel_api.sonar_scan.geom IS 'Place of the sonar, in the tunnel''s SRID; NULL where no pose was found';
+COMMENT ON COLUMN tunnel_api.sonar_scan.geom IS 'Place of the sonar, in the tunnel''s SRID; NULL where no pose was found, or none is needed';
 
 -- The ellipse in which a scan's place in plan lies with a probability of 95 % is that of covariance × 5.991 (chi², two degrees of
 -- freedom); its half axes are the roots of the eigenvalues.
@@ -34,7 +34,7 @@ SELECT c.id, c.survey_id, c.survey, c.name, c.state, 100 AS exaggeration, e.half
 COMMENT ON VIEW tunnel_api.sonar_ellipse IS
     'Ellipses in which the places of sonar scans in plan lie with a probability of 95 %, drawn 100 times as large';
 COMMENT ON COLUMN tunnel_api.sonar_ellipse.name IS 'Name of the scan''s file';
-COMMENT ON COLUMN tunnel_api.sonar_ellipse.state IS 'determined, weak (known worse than it should be) or undetermined';
+COMMENT ON COLUMN tunnel_api.sonar_ellipse.state IS 'determined, or weak (known worse than it should be)';
 COMMENT ON COLUMN tunnel_api.sonar_ellipse.exaggeration IS 'So many times as large as it is';
 COMMENT ON COLUMN tunnel_api.sonar_ellipse.half_major IS 'Greater half axis, m';
 COMMENT ON COLUMN tunnel_api.sonar_ellipse.half_minor IS 'Lesser half axis, m';
