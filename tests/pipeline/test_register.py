@@ -145,6 +145,7 @@ def test_what_cannot_be_registered_is_refused_and_nothing_stored(
     folder, _ = canal
     load(folder)
     assert "is --up right?" in register(folder, code=2, up="-z").stderr
+    assert "0.28 m below the water's level" in register(folder, code=2, level=LEVEL + 0.28).stderr
     assert "no laser point lies within" in register(folder, code=2, level=LEVEL + 20.0).stderr
     ladders = tmp_path / "ladders.csv"
     cases = {
@@ -161,6 +162,41 @@ def test_what_cannot_be_registered_is_refused_and_nothing_stored(
     twice = [folder / "s0.xyz", folder / "s0.xyz", "--ladders", folder / "ladders.csv", "--up", "+z", "--water-level", LEVEL]
     assert "known by its name" in command("register", NAME, *twice, code=2).stderr
     assert conn.execute("SELECT count(*) FROM tunnel.sonar_scan").fetchone() == (0,)
+
+
+def test_speed_of_sound_and_place_may_be_told(
+    canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    folder, scans = canal
+    load(folder)
+    slow = tmp_path / "slow.xyz"
+    np.savetxt(slow, scans[0].points / 1.05, "%.4f")
+    how = ["--ladders", folder / "ladders.csv", "--up", "+z", "--water-level", LEVEL]
+    untold = command("register", NAME, slow, *how, "--json", code=1)
+    assert "is the speed of sound right" in untold.stderr
+    assert json.loads(untold.stdout)["scans"][0]["state"] == "undetermined"
+    start = tmp_path / "start.csv"
+    x, y, _ = scans[0].translation
+    start.write_text(f"file,x,y,within\nslow.xyz,{x + 1.0:.2f},{y - 1.0:.2f},2.0\n")
+    told = command("register", NAME, slow, *how, "--sound-speed", "1400=1470", "--start", start, "--json")
+    (scan,) = json.loads(told.stdout)["scans"]
+    assert scan["scale"] == pytest.approx(1.05 * scans[0].scale, abs=0.002)
+    assert np.linalg.norm(np.array(scan["translation"]) - scans[0].translation) < 0.03
+    start.write_text(f"file,x,y,within\nslow.xyz,{x + 9.0:.2f},{y + 9.0:.2f},2.0\n")
+    assert "has no pose" in command("register", NAME, slow, *how, "--sound-speed", "1400=1470", "--start", start, code=1).stderr
+    for options, said in (
+        (["--sound-speed", "1500"], "takes ASSUMED=MEASURED"),
+        (["--sound-speed", "1.5=1447"], "1300 to 1700 m/s"),
+        (["--sound-speed", "1500=nan"], "1300 to 1700 m/s"),
+    ):
+        assert said in command("register", NAME, slow, *how, *options, code=2).stderr
+    for text, said in (
+        ("file,x,y,within\nother.xyz,1,2,3\n", "other.xyz is none of the files"),
+        ("file,x,y,within\nslow.xyz,1,2,0\n", "line 2: within is 0"),
+        ("file,x,y,within\nslow.xyz,1,2,1\nslow.xyz,1,2,1\n", "line 3: file slow.xyz stands twice"),
+    ):
+        start.write_text(text)
+        assert said in command("register", NAME, slow, *how, "--start", start, code=2).stderr
 
 
 def test_soundings_in_the_tunnels_system_need_no_pose(

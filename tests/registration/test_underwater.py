@@ -118,7 +118,28 @@ def test_without_a_ladder_nothing_is_claimed_along_the_tunnel_or_of_the_height(s
     assert result.ladders == ()
     assert result.scans[0].state == "undetermined"
     assert {"along the tunnel", "height"} <= set(result.scans[0].undetermined)
-    assert result.notes == ("ladder elsewhere is not seen by the laser",)
+    assert result.notes == (
+        "ladder elsewhere is not seen by the laser",
+        "s0.xyz has no pose: it shows no ladder that the laser sees",
+    )
+
+
+def test_a_scan_that_shows_no_ladder_is_placed_by_the_bed_beside_others(scene: Scene) -> None:
+    third = scene.canal.sonar(5.0)
+    place = third.to_tunnel(third.points)
+    local = (place - ORIGIN) @ scene.canal.turn
+    shows = np.zeros(len(local), np.bool_)
+    for ladder in scene.canal.ladders:
+        own = (local - ladder.origin) @ ladder.axes.T
+        shows |= (np.abs(own[:, 0]) < 0.4) & (np.abs(own[:, 2]) < 0.25)
+    cloud = SonarCloud(Path("s2.xyz"), third.points[~shows], 1)
+    ladders = [one.measured() for one in scene.canal.ladders]
+    result = register(scene.laser, [*scene.clouds(), cloud], ladders, LEVEL)
+    pose = result.scans[2]
+    assert all("s2.xyz" not in ladder.scans for ladder in result.ladders)
+    assert pose.state == "determined", result.notes
+    mine = pose.scale * check_points(third) @ pose.rotation.T + pose.translation
+    assert np.percentile(np.linalg.norm(mine - third.to_tunnel(check_points(third)), axis=1), 95) < 0.05
 
 
 def near_ladders(scene: Scene) -> np.ndarray:

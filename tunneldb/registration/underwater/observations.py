@@ -30,6 +30,9 @@ WALL_TOP = 0.05  # below the water, m: nearer to it, echoes by way of the surfac
 RELIEF = 0.012  # m: how far a patch of stones may lie from its wall's plane
 GRAZING = 0.35  # least cosine of incidence of what is compared
 FARTHEST = 12.0  # m
+STILES_SIDE = 0.05  # m from a stile's axis, nearer to which an echo is the stile's
+MIXTURE_ROUNDS = 10
+LEAST_TOLD = 0.02  # share of a rung's information that is left where rungs are hardly told from what is between them
 FURTHEST_OFF = 4.0  # standard deviations of an echo from the ladder that it comes from
 PATCH = 0.3  # m
 PATCH_POINTS = 8
@@ -226,15 +229,40 @@ def ladder_rows(
         poses.append(pose_derivatives(space[near], pose, direction))
         common.append(np.hstack([np.full((len(arm), 1), behind), -np.cross(arm, direction), -direction]))
     bar = which[near]
+    told = np.bincount(bar, _told(own[near], bar, away[near], sigma_across[near], placed))[bar]
     return Rows(
         np.concatenate([along[near], across[near]]),
         np.concatenate([sigma_along[near], sigma_across[near]]),
         np.vstack(poses), scan, None, None, np.vstack(common),
         np.concatenate([[depth_column], first_column + np.arange(6)]),
         np.concatenate([bar, bar + 1000]),
-        np.concatenate([np.full(len(bar), SHARED), sigma_across[near] / np.sqrt(BARS_BEAMS)]),
+        np.concatenate([np.full(len(bar), SHARED), sigma_across[near] / np.sqrt(np.minimum(told, BARS_BEAMS))]),
         "ladder", ladder.name,
     )  # fmt: skip
+
+
+def _told(own: Float, which: Int64, away: Float, sigma: Float, placed: PlacedLadder) -> Float:
+    """Share (n,) of its information across the beam that each point has; 1 for those of stiles.
+
+    Far off and at a slant the stiles' echoes drown the rungs', and what lies between the stiles says little of where rungs are: a
+    mixture of echoes of rungs and of others, evenly spread, by expectation and maximisation (McLachlan and Peel, 2000, section
+    2.8; the information in what is left open is that of Louis, 1982).
+    """
+    share = np.ones(len(own))
+    inside = (which >= 2) & (np.abs(own[:, 0]) < placed.gap / 2.0 - STILES_SIDE)
+    if not inside.any():
+        return np.where(which < 2, 1.0, LEAST_TOLD)
+    off = (away[inside, 1] / sigma[inside]) ** 2
+    echo = np.exp(-0.5 * off) / (np.sqrt(2.0 * np.pi) * sigma[inside])
+    even = 1.0 / float(np.mean(np.diff(placed.ladder.height)))
+    rungs = 0.5
+    for _ in range(MIXTURE_ROUNDS):
+        mine = rungs * echo / (rungs * echo + (1.0 - rungs) * even)
+        rungs = float(mine.mean())
+    told = float((mine - mine * (1.0 - mine) * off).sum() / mine.sum())
+    share[which >= 2] = 0.0
+    share[inside] = mine * max(told, 0.0)
+    return np.maximum(share, LEAST_TOLD)
 
 
 def overlap_rows(one: Patches, other: Patches, poses: tuple[Pose, Pose], scans: tuple[int, int], within: float) -> Rows | None:
