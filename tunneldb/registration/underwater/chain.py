@@ -20,9 +20,9 @@ from tunneldb.registration.underwater.walls import Walls
 OVERLAP = 15.0  # m between scanners whose scans are compared
 LOOSE = 4  # pixels along by which poses may be off
 PEAKS = 5  # of a pair's likelihood that are followed
-SURE = float(np.log(100.0))  # likelihood of a place over that of none, from which it is taken
+SURE = float(np.log(30.0))  # likelihood of a place over that of none, from which it is taken
 AHEAD = float(np.log(20.0))  # and over that of the next best
-SAID = float(np.log(10.0))  # likelihood from which two scans agree, or contradict each other
+SAID = float(np.log(5.0))  # likelihood from which two scans agree, or contradict each other
 ELSEWHERE = 10  # pixels along from which a place is another
 REACHES = (0.3, 0.25, 0.2, 0.15, *[0.1] * 8)
 BESIDE = 3  # known scans that it is adjusted with

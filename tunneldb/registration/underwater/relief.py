@@ -13,6 +13,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import gaussian_filter
 from scipy.signal import fftconvolve
+from scipy.special import log_ndtr
 
 from tunneldb.arrays import Float
 from tunneldb.registration.underwater.first_pose import LevelScan
@@ -23,7 +24,7 @@ MARGIN = 0.3  # m from the walls
 FINE = 2.5  # m: relief that is wider says nothing of the place
 STEPS = 0.6  # m: farther from the bed's height are objects and false echoes
 LEAST_CELLS = 500  # that both scans must see
-ALIKE = 0.5  # correlation that two scans of one bed have at least, mostly
+MOST_ALIKE = 0.9  # correlation that two scans of one bed have at most: they see it from either side, past other crests
 CORRELATED = 30  # pixels within which relief may be correlated
 FEWEST = 3.0  # independent places, of which a correlation says nothing
 CERTAIN = 0.99  # highest correlation that is believed
@@ -117,8 +118,19 @@ def likelihood(one: Relief, other: Relief) -> Float:
     correlation = np.clip(product / np.sqrt(np.maximum(squares, 1e-12)), -CERTAIN, CERTAIN)
     patch = max(float((_middle_of(one.likeness, other.likeness)).sum()), 1.0)  # pixels of an independent place
     weight = np.sqrt(np.maximum(shared / patch - FEWEST, 0.0))
-    score, expected = np.arctanh(correlation) * weight, np.arctanh(ALIKE) * weight
-    return np.where((shared > LEAST_CELLS) & (weight > 0.0), score * expected - 0.5 * expected**2, NOWHERE)
+    told = (shared > LEAST_CELLS) & (weight > 0.0)
+    return np.where(told, _log_ratio(np.arctanh(correlation) * weight, np.where(told, weight, 1.0)), NOWHERE)
+
+
+def _log_ratio(score: Float, weight: Float) -> Float:
+    """Logarithm of the likelihood of scores (n,), by a standard deviation of one each, if beds are one over that if they aren't.
+
+    How alike two scans of one bed are is not known beforehand: any correlation up to MOST_ALIKE is as likely, by Fisher's z.
+    """
+    most = np.arctanh(MOST_ALIKE) * weight
+    high, low = log_ndtr(score), log_ndtr(score - most)
+    mean = high + np.log1p(-np.exp(np.minimum(low - high, -1e-12))) - np.log(most)
+    return np.asarray(mean + 0.5 * score**2 + 0.5 * np.log(2.0 * np.pi))
 
 
 def _middle(relief: Relief, columns: int) -> Relief:
