@@ -101,6 +101,8 @@ def _methods() -> dict[str, Method]:
         found["Open3D, generalized ICP"] = lambda *given: _open3d(*given, generalized=True)
     if find_spec("small_gicp"):
         found["small_gicp, GICP"] = _small_gicp
+    if find_spec("kiss_matcher"):
+        found["KISS-Matcher, without a start"] = _kiss_matcher
     return found
 
 
@@ -134,6 +136,14 @@ def _small_gicp(target: Float, source: Float, rotation: Float, translation: Floa
         target, source, _matrix(rotation, translation), downsampling_resolution=VOXEL, max_correspondence_distance=REACH
     )
     return found.T_target_source[:3, :3], found.T_target_source[:3, 3]
+
+
+def _kiss_matcher(target: Float, source: Float, rotation: Float, translation: Float) -> tuple[Float, Float]:
+    import kiss_matcher
+
+    matcher = kiss_matcher.KISSMatcher(kiss_matcher.KISSMatcherConfig(VOXEL))
+    found = matcher.estimate(source, target)
+    return np.asarray(found.rotation), np.asarray(found.translation)
 
 
 def _least_squares(cloud: SonarCloud, walls: Walls, rotation: Float, translation: Float) -> Pose:

@@ -168,12 +168,13 @@ def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | No
     seen = np.flatnonzero(counts[2:] >= 5)
     if len(seen) < 2:
         return None
+    rms = float(np.sqrt(np.mean(residual[close] ** 2)))
+    tie = TIE * (rms / NOISE) ** 2  # the noise is that which there is
     ties = tuple(
         float((other.origin - placed.origin) @ placed.axes[1])
         for other_cost, other, _ in refined[1:]
-        if other_cost < cost + TIE and np.linalg.norm(other.origin - placed.origin) > 0.1
+        if other_cost < cost + tie and np.linalg.norm(other.origin - placed.origin) > 0.1
     )
-    rms = float(np.sqrt(np.mean(residual[close] ** 2)))
     return LaserLadder(placed, rms, tuple(ladder.number[i] for i in seen), int(close.sum()), cost, covariance, ties)
 
 
