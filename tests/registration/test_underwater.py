@@ -124,22 +124,23 @@ def test_without_a_ladder_nothing_is_claimed_along_the_tunnel_or_of_the_height(s
     )
 
 
-def test_a_scan_that_shows_no_ladder_is_placed_by_the_bed_beside_others(scene: Scene) -> None:
-    third = scene.canal.sonar(5.0)
-    place = third.to_tunnel(third.points)
-    local = (place - ORIGIN) @ scene.canal.turn
+def test_a_scan_that_shows_no_ladder_is_placed_by_the_bed_beside_others() -> None:
+    canal = Canal(33, waves=(0.1, 0.7))
+    scans = [canal.sonar(x) for x in (-3.0, 1.0, 5.5, 10.0)]
+    far = scans[3]
+    local = (far.to_tunnel(far.points) - ORIGIN) @ canal.turn
     shows = np.zeros(len(local), np.bool_)
-    for ladder in scene.canal.ladders:
+    for ladder in canal.ladders:
         own = (local - ladder.origin) @ ladder.axes.T
         shows |= (np.abs(own[:, 0]) < 0.4) & (np.abs(own[:, 2]) < 0.25)
-    cloud = SonarCloud(Path("s2.xyz"), third.points[~shows], 1)
-    ladders = [one.measured() for one in scene.canal.ladders]
-    result = register(scene.laser, [*scene.clouds(), cloud], ladders, LEVEL)
-    pose = result.scans[2]
-    assert all("s2.xyz" not in ladder.scans for ladder in result.ladders)
+    clouds = [SonarCloud(Path(f"s{k}.xyz"), scan.points, 1) for k, scan in enumerate(scans[:3])]
+    clouds.append(SonarCloud(Path("s3.xyz"), far.points[~shows], 1))
+    result = register(canal.laser(), clouds, [one.measured() for one in canal.ladders], LEVEL)
+    pose = result.scans[3]
+    assert all("s3.xyz" not in ladder.scans for ladder in result.ladders)
     assert pose.state == "determined", result.notes
-    mine = pose.scale * check_points(third) @ pose.rotation.T + pose.translation
-    assert np.percentile(np.linalg.norm(mine - third.to_tunnel(check_points(third)), axis=1), 95) < 0.05
+    mine = pose.scale * check_points(far) @ pose.rotation.T + pose.translation
+    assert np.percentile(np.linalg.norm(mine - far.to_tunnel(check_points(far)), axis=1), 95) < 0.05
 
 
 def near_ladders(scene: Scene) -> np.ndarray:

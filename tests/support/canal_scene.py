@@ -73,15 +73,16 @@ class Sonar:
 
 @dataclass
 class Canal:
-    """The scene; ``sides`` has -1 or 1 for the bank of each ladder."""
+    """The scene; ``sides`` has -1 or 1 for the bank of each ladder, ``waves`` the bed's standard deviation and correlation, m."""
 
     seed: int
     sides: tuple[int, ...] = (-1, 1)
+    waves: tuple[float, float] = (0.06, 1.5)
     ladders: list[TrueLadder] = field(init=False)
 
     def __post_init__(self) -> None:
         rng = self.rng = np.random.default_rng(self.seed)
-        self.bed, self.rough = Relief(rng, 0.06, 1.5), [Relief(rng, 0.01, 0.3) for _ in range(2)]
+        self.bed, self.rough = Relief(rng, *self.waves), [Relief(rng, 0.01, 0.3) for _ in range(2)]
         self.batter = rng.uniform(0.0, 0.08, 2)
         angle = rng.uniform(0.0, 2.0 * np.pi)
         self.turn = Rotation.from_euler("z", angle).as_matrix()

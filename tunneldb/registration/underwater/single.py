@@ -27,6 +27,7 @@ TIE = 0.92  # of the best likelihood, from which rungs are not told apart
 MOST_SCALE = 0.03  # by which sound may be faster or slower than the sonar took it to be: 45 m/s
 OTHER_PLACE = 0.6  # of the best likelihood, under which another place is none: of two ladders it sees one
 WATERLINE_SIGMA = 0.15  # of the top of a scan's walls, m
+SOME_EDGES, MOST_OFF_WATER = 6, 0.2  # edges of walls that tell where the water is, and by how much less than a rung, m
 SAME_PLACE, SAME_TURN = 0.15, np.radians(3.0)  # of two candidates that came to the same pose
 AIR, MOST_IN_AIR = 0.2, 0.15  # above the water, m: share of a scan that echoes by way of the surface may put there
 FARTHEST_LADDER = 12.0  # m from the scanner
@@ -122,6 +123,8 @@ def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> Sta
     if best is None:
         off = 100.0 * (float(np.median([one.pose.scale for one in fitted])) - 1.0)
         return NotStarted(f"its ranges would be {-off:+.1f} % off: is the speed of sound right (--sound-speed)?")
+    if len(flat.edges) >= SOME_EDGES and abs(best.pose.translation[2] + flat.top) > MOST_OFF_WATER:
+        return NotStarted("by its ladder the water is not where its walls end")
     if best.missed:
         return NotStarted("where it seems to stand a ladder would be in sight that it does not show")
     for other in scaled:
