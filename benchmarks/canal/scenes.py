@@ -91,6 +91,7 @@ def no_ladder(seed: int) -> CanalParameters:
 SCENES: Mapping[str, Callable[[int], CanalParameters]] = {
     "usual": usual,
     "block": block,
+    "paced-block": block,
     "dense": dense,
     "long": long,
     "one-ladder": one_ladder,
@@ -98,7 +99,7 @@ SCENES: Mapping[str, Callable[[int], CanalParameters]] = {
 }
 """Kinds of scenes by name."""
 
-PACED: Mapping[str, float] = {"long": 3.0}
+PACED: Mapping[str, float] = {"paced-block": 3.0, "long": 3.0}
 """Kinds in which it is known where each sonar stood, within so many metres, as by a tape along the wall."""
 
 

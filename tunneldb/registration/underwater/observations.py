@@ -19,7 +19,7 @@ POSE = 7  # parameters of a pose
 RANGE_NOISE = 0.015  # m, of a BV5000 (Moisan et al., 2015, section 3)
 BEAM = np.radians(1.0)  # width of a beam there
 BEAM_SIGMA = BEAM / np.sqrt(12.0)  # an echo comes from anywhere in it
-STRETCH = 2.0  # m of wall: its relief is the same for all scans
+STRETCH = 2.0  # m of wall or bed: its relief is the same for all scans
 SHARED = 0.002  # m: of a stretch of wall or bed, by relief and slanting beams
 BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: those that hear it overlap
 WATERLINE_NOISE = 0.025  # m: half a bin, and half of what is left of half a beam
@@ -71,7 +71,7 @@ class Rows:
         Derivatives by the parameters ``columns`` that are common to all scans.
     columns : (c,) int64 array
     group : (n,) int64 array
-        Rows of one group err together; those of walls also with the rows of other scans.
+        Rows of one group err together; those of walls and of overlaps, places in plan, also with the rows of other scans.
     shared : (n,) float64 array
         Standard deviation of what they have in common, m.
     kind, name : str
@@ -289,6 +289,6 @@ def overlap_rows(one: Patches, other: Patches, poses: tuple[Pose, Pose], scans: 
     return Rows(
         residual, sigma, pose_derivatives(place[i], first, mean), scans[0], scans[1],
         -pose_derivatives(beside[k], second, mean), np.zeros((len(i), 0)), np.zeros(0, np.int64),
-        np.floor(place[i, 0] / 2.0).astype(np.int64) * 1000 + np.floor(place[i, 1] / 2.0).astype(np.int64),
+        cell_keys(np.where([True, True, False], place[i], 0.0), STRETCH),
         np.full(len(i), SHARED), "scan", "",
     )  # fmt: skip
