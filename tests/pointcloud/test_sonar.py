@@ -20,6 +20,7 @@ POINTS = np.array([[1.25, -2.5, 0.75], [-3.0, 4.5, -1.5], [0.5, 0.25, -2.125]])
         ("a.xyz", "1.25 -2.5 0.75 55\n-3.0 4.5 -1.5 60\n0.5 0.25 -2.125 7\n"),
         ("a.txt", "x;y;z\n1.25;-2.5;0.75\n-3.0;4.5;-1.5\n\n0.5;0.25;-2.125\n"),
         ("a.csv", "# BV5000\nX,Y,Z,I\n1.25,-2.5,0.75,1\n-3.0,4.5,-1.5,2\n0.5,0.25,-2.125,3\n"),
+        ("b.xyz", "1.25 -2.5 0.75 12:31:07 ok\n-3.0 4.5 -1.5 12:31:07 ok\n0.5 0.25 -2.125 12:31:08 weak\n"),
         ("a.off", "OFF\n3 1 0\n1.25 -2.5 0.75\n-3.0 4.5 -1.5\n0.5 0.25 -2.125\n3 0 1 2\n"),
     ],
 )
@@ -55,7 +56,8 @@ def test_points_that_are_no_numbers_are_left_out_and_counted(tmp_path: Path) -> 
         ("a.xyz", "", "holds no points"),
         ("a.xyz", "1.0 2.0 3.0\n1.0 2.0\n", "line 2"),
         ("a.xyz", "1.0 2.0 3.0\n1.0 2.0 abc\n", "line 2"),
-        ("a.xyz", "1,0 2,0 3,0\n", "holds no points"),
+        ("a.xyz", "1,0 2,0 3,0\n", "decimals with a point"),
+        ("a.xyz", "version https://git-lfs.example/spec/v1\noid sha256:0\nsize 4453983\n", "git lfs pull"),
         ("a.xyz", "nan nan nan\n1.0 2.0 3.0\n", "no numbers"),
         ("a.xyz", "352000.0 5400000.0 264.0\n" * 5, "sonar's place"),
         ("a.off", "OFF\n3 0 0\n1 2 3\n", "truncated"),

@@ -73,7 +73,7 @@ class Sonar:
 
 @dataclass
 class Canal:
-    """The scene; ``sides`` has -1 or 1 for the bank of each ladder, ``waves`` the bed's standard deviation and correlation, m."""
+    """The scene; ``sides`` has -1 or 1 for each ladder's bank, ``waves`` the bed's standard deviation and correlation, m."""
 
     seed: int
     sides: tuple[int, ...] = (-1, 1)

@@ -8,12 +8,13 @@ import numpy as np
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.formats.text_lines import TextLines, are_numbers, divider_of, parse
+from tunneldb.pointcloud.formats.text_lines import TextLines, divider_of, parse
 from tunneldb.pointcloud.reader import read_chunks, read_header
 
 TEXT = (".xyz", ".txt", ".csv")
 RAW = (".all", ".kmall", ".xtf", ".gsf", ".s7k", ".son")
 FARTHEST = 100.0  # m: no echo comes from farther
+POINTER = "version https://git-lfs"
 MOST_INVALID = 0.01  # share
 _LINES = 1 << 20
 
@@ -64,11 +65,13 @@ def read_soundings(path: Path) -> tuple[Float, int]:
 
 def _read_text(path: Path) -> Float:
     with TextLines(path) as lines:
-        while (text := lines.text()) is not None and not (text and are_numbers(text)):
+        while (text := lines.text()) is not None and not _is_place(text):
+            if text.startswith(POINTER):
+                raise UserError(f"{path}: it is the pointer to a file in Git LFS, not the file: git lfs pull")
             if lines.line > 100:
                 raise UserError(f"{path}, line {lines.line - 1}: no line of numbers so far: it is no table of points")
         if text is None:
-            raise UserError(f"{path}: the file holds no points")
+            raise UserError(f"{path}: the file holds no points: no line begins with x, y and z, decimals with a point")
         lines.back()
         divider = divider_of(text)
         width = len(text.split(divider))
@@ -82,6 +85,15 @@ def _read_text(path: Path) -> Float:
             if not count:
                 return np.vstack(parts)
             parts.append(parse(path, block, first, divider, width, (0, 1, 2)))
+
+
+def _is_place(text: str) -> bool:
+    """Whether a line begins with x, y and z, or with as many numbers as it has; what follows may be text, as a time."""
+    fields = text.split(divider_of(text))[:3] if text else []
+    try:
+        return bool([float(field) for field in fields])
+    except ValueError:
+        return False
 
 
 def _read_off(path: Path) -> Float:

@@ -39,7 +39,8 @@ WATERLINE_SIGMA = 0.03  # m: of what edges of walls have in common, by which the
 ZERO_SIGMA, ZERO_HELD = 0.0015, 0.0003
 COMMON = 5  # parameters common to all scans but for the ladders: two batters, that depth, that of the waterline, that zero
 LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
-SLANT = 0.0004  # rad: what slanting beams on a rough wall hear in common, 0.8 mm over 2 m of its height; no scan shows that by itself
+# rad: what slanting beams on a rough wall hear in common, 0.6 mm over 2 m of its height; no scan shows that by itself
+SLANT = 0.0003
 CUT = 3.0  # standard deviations at which a row has a quarter of its weight
 REACHES = (0.3, 0.2, 0.15, 0.12, *[0.1] * 30)  # within which rows are sought, round by round, m
 SETTLED = 1e-5

@@ -13,7 +13,7 @@ import numpy as np
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.registration.underwater.adjustment import Adjusted, adjust, scan_of
+from tunneldb.registration.underwater.adjustment import LADDER_SHIFT, Adjusted, adjust, scan_of
 from tunneldb.registration.underwater.chain import OVERLAP
 from tunneldb.registration.underwater.determined import judge
 from tunneldb.registration.underwater.laser_ladders import LaserLadder, find_laser_ladders
@@ -24,6 +24,7 @@ from tunneldb.registration.underwater.starting import start_all
 from tunneldb.registration.underwater.walls import Walls, find_walls, lower_edge
 
 WALL_VOXEL = 0.03  # m
+MOVED = 2.5  # standard deviations by which a ladder stands elsewhere for the sonar
 DRY_WALL = 0.1  # m: walls that the laser sees so far below the water's level, as it was said, are not under water
 
 
@@ -59,9 +60,10 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
     notes = []
     if edge > DRY_WALL:
         notes.append(f"the laser sees the walls from {edge:.2f} m above the water on: is --water-level right?")
-    notes += [f"ladder {one.name} is not seen by the laser" for one in ladders if one.name not in seen]
+    notes += [f"ladder {one.name} is not seen by the laser, or has other gaps" for one in ladders if one.name not in seen]
     known = sorted(started)
     adjusted = _adjust_all(scans, started, known, walls, found)
+    moved = () if adjusted is None else _moved(found, adjusted)
     poses = []
     for i, cloud in enumerate(clouds):
         if adjusted is None or i not in started:
@@ -70,6 +72,8 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
         k = known.index(i)
         pose = adjusted.poses[k]
         state, open_directions = judge(adjusted.covariance[k], _along(walls, pose))
+        if state == "determined" and set(started[i].ladders) & set(moved):
+            state, open_directions = "weak", (*open_directions, "ladders disagree")
         residuals = _residuals(adjusted.rows, k, [clouds[j].path.name for j in known])
         poses.append(
             SonarPose(
@@ -81,6 +85,10 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
         f"ladder {one.placed.ladder.name}: by its gaps it may as well stand {_shifts(one)} m higher"
         for one in found
         if one.ties
+    ]
+    notes += [
+        f"ladder {found[k].placed.ladder.name} does not stand where the laser saw it: was it moved, or the tripod?"
+        for k in moved
     ]
     why = [f"{clouds[i].path.name} has no pose: {reason}" for i, reason in reasons.items()]
     fits = [_fit(one, k, origin, clouds, started) for k, one in enumerate(found)]
@@ -125,6 +133,17 @@ def _adjust_all(
         (a, b) for a in range(len(scans)) for b in range(a + 1, len(scans)) if np.linalg.norm(place[a] - place[b]) < OVERLAP
     ]
     return adjust(scans, walls, found, pairs)
+
+
+def _moved(found: Sequence[LaserLadder], adjusted: Adjusted) -> tuple[int, ...]:
+    """Ladders that the sonar sees aside of where the laser saw them, or higher or lower, by more than can be by chance."""
+    out = []
+    for k, (before, now) in enumerate(zip(found, adjusted.ladders, strict=True)):
+        axes = before.placed.axes[:2]
+        sigma = np.sqrt(np.diag(axes @ before.covariance[3:6, 3:6] @ axes.T) + LADDER_SHIFT**2)
+        if (np.abs(axes @ (now.origin - before.placed.origin)) > MOVED * sigma).any():
+            out.append(k)
+    return tuple(out)
 
 
 def _along(walls: Walls, pose: Pose) -> Float:

@@ -32,6 +32,7 @@ SLAB = 0.15  # before and behind the ladder's plane, m
 STEEPEST_TILT = np.radians(15.0)
 PEAKS = 4  # of each ladder and half turn
 LEVEL_ROUNDS = 3
+LEAST_BED = 10  # cells of 0.5 m
 HIGHEST = 95.0  # percentile of heights
 
 
@@ -82,7 +83,7 @@ def level(points: Float, up: int, width: float) -> LevelScan:
     Raises
     ------
     UserError
-        Two walls at about that distance are not seen.
+        Two walls at about that distance are not seen, or no bed between them.
     """
     rotation = np.diag([1.0, float(up), float(up)])  # half a turn about x where z points down
     turned = points @ rotation.T
@@ -135,7 +136,7 @@ def _parallel_walls(points: Float, width: float) -> tuple[float, float, float]:
                 best = (float(both[i]), float(angle), (i + 0.5) * BIN - NEAR, (i + lag + 0.5) * BIN - NEAR)
     score, angle, low, high = best
     if score <= 0.0 or not low < 0.0 < high:
-        raise UserError(f"no two walls {width:.1f} m apart, as the laser's are, stand about the scanner")
+        raise UserError(f"no two walls {width:.1f} m apart, as the laser's are, stand about the scanner: is it in metres?")
     return angle, low, high
 
 
@@ -158,15 +159,15 @@ def _bed_slope(points: Float, low: float, high: float) -> tuple[float, float]:
     margin = 0.25 * (high - low)
     mine = points[(points[:, 1] > low + margin) & (points[:, 1] < high - margin)]
     cell = np.floor(mine[:, :2] / 0.5).astype(np.int64)
-    _, number = np.unique(cell, axis=0, return_inverse=True)
+    cells, number = np.unique(cell, axis=0, return_inverse=True)
     order = np.lexsort([mine[:, 2], number])
-    begin = np.searchsorted(number[order], np.arange(number.max() + 2))
+    begin = np.searchsorted(number[order], np.arange(len(cells) + 1))
     count = np.diff(begin)
     # The lower quartile of a cell is its bed; rays to the water's underside and their images lie above.
     low_of = mine[order[begin[:-1] + count // 4], 2][count >= 5]
     centre = np.array([mine[order[b], 0] for b in begin[:-1]])[count >= 5]
-    if len(low_of) < 10:
-        return 0.0, float(np.percentile(points[:, 2], 2))
+    if len(low_of) < LEAST_BED:
+        raise UserError("no bed is seen between its walls: is it a scan of the sonar?")
     slope, middle = 0.0, float(np.median(low_of))
     for _ in range(10):
         residual = low_of - middle - slope * centre

@@ -38,6 +38,7 @@ STARTS = 8
 TIE = float(np.log(100.0))  # likelihood of a way over that of another up to which they are not told apart
 STONES = 5.0  # points whose errors are independent, one of so many
 MOSTLY = 0.5  # share of what points that are astray cost, from which a first fit is of no ladder
+RUNGS_OFF = 0.01  # m off where rungs should be, median of the points between the stiles, from which it has other gaps
 ASTRAY = 5.0  # standard deviations off, by which a point is no ladder's
 
 
@@ -163,7 +164,10 @@ def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | No
     close = np.abs(residual) < 5.0 * NOISE
     if close.mean() < 0.5:
         return None
-    between = close & (np.abs(own[:, 0]) < placed.gap / 2.0 - ladder.diameter)
+    inside = np.abs(own[:, 0]) < placed.gap / 2.0 - ladder.diameter
+    between = close & inside
+    if not inside.any() or float(np.median(np.abs(residual[inside]))) > RUNGS_OFF:  # its gaps are others
+        return None
     counts = np.bincount(which[between], minlength=len(ladder.height) + 2)
     seen = np.flatnonzero(counts[2:] >= 5)
     if len(seen) < 2:

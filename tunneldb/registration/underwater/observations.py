@@ -244,9 +244,9 @@ def ladder_rows(
 def _told(own: Float, which: Int64, away: Float, sigma: Float, placed: PlacedLadder) -> Float:
     """Share (n,) of its information across the beam that each point has; 1 for those of stiles.
 
-    Far off and at a slant the stiles' echoes drown the rungs', and what lies between the stiles says little of where rungs are: a
-    mixture of echoes of rungs and of others, evenly spread, by expectation and maximisation (McLachlan and Peel, 2000, section
-    2.8; the information in what is left open is that of Louis, 1982).
+    Far off and at a slant the stiles' echoes drown the rungs', and what lies between the stiles says little of where rungs
+    are: a mixture of echoes of rungs and of others, evenly spread, by expectation and maximisation (McLachlan and Peel, 2000,
+    section 2.8; the information in what is left open is that of Louis, 1982).
     """
     share = np.ones(len(own))
     inside = (which >= 2) & (np.abs(own[:, 0]) < placed.gap / 2.0 - STILES_SIDE)

@@ -123,7 +123,7 @@ def likelihood(one: Relief, other: Relief) -> Float:
 
 
 def _log_ratio(score: Float, weight: Float) -> Float:
-    """Logarithm of the likelihood of scores (n,), by a standard deviation of one each, if beds are one over that if they aren't.
+    """Logarithm of the likelihood of scores (n,), each with a standard deviation of 1, of one bed over that of two.
 
     How alike two scans of one bed are is not known beforehand: any correlation up to MOST_ALIKE is as likely, by Fisher's z.
     """

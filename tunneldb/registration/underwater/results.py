@@ -106,7 +106,7 @@ class SonarPose:
     state : str
         ``determined``, ``weak`` (some direction is known worse than it should be) or ``undetermined`` (one is not known).
     undetermined : tuple of str
-        Directions in words, as ``along the tunnel``, ``height``, ``yaw``; of weak ones too.
+        Directions in words, as ``along the tunnel``, ``height``, ``yaw``; of weak ones too; ``ladders disagree``.
     residuals : tuple of Residual
     """
 
