@@ -12,7 +12,7 @@ from support.canal_scene import LEVEL, ORIGIN, WIDTH, Canal, Sonar
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.registration.underwater import Registration, SonarCloud, SonarPose, register
+from tunneldb.registration.underwater import Ladder, Registration, SonarCloud, SonarPose, register
 from tunneldb.registration.underwater.chain import Reliefs, agreement
 from tunneldb.registration.underwater.laser_ladders import find_laser_ladders
 from tunneldb.registration.underwater.observations import Pose, pose_derivatives
@@ -126,7 +126,7 @@ def test_without_a_ladder_nothing_is_claimed_along_the_tunnel_or_of_the_height(s
 
 def test_a_scan_that_shows_no_ladder_is_placed_by_the_bed_beside_others() -> None:
     canal = Canal(33, waves=(0.1, 0.7))
-    scans = [canal.sonar(x) for x in (-3.0, 1.0, 5.5, 10.0)]
+    scans = [canal.sonar(x) for x in (1.0, 5.5, 8.0, 10.5)]
     far = scans[3]
     local = (far.to_tunnel(far.points) - ORIGIN) @ canal.turn
     shows = np.zeros(len(local), np.bool_)
@@ -206,3 +206,36 @@ def test_a_ladder_that_the_laser_does_not_see_is_not_taken_for_another(scene: Sc
         if pose.state != "undetermined":
             assert np.linalg.norm(pose.translation - scan.translation) < 0.05
             assert turn_between(pose, scan) < 0.5
+
+
+def test_ladders_whose_gaps_are_others_are_not_used(scene: Scene) -> None:
+    other = [replace(ladder, height=0.3 * np.arange(len(ladder.height))) for ladder in measured(scene)]
+    result = register(scene.laser, scene.clouds(), other, LEVEL)
+    assert result.ladders == ()
+    assert {pose.state for pose in result.scans} == {"undetermined"}
+    assert sum("has other gaps" in note for note in result.notes) == 2
+
+
+def test_a_ladder_that_was_moved_after_the_laser_is_told_and_scans_are_weak(scene: Scene) -> None:
+    moved = scene.laser.copy()
+    moved[near_ladder(scene, 1)] += np.array([0.0, 0.0, 0.05])
+    result = register(moved, scene.clouds(), measured(scene), LEVEL)
+    assert any("does not stand where the laser saw it" in note for note in result.notes)
+    for pose in result.scans:
+        assert (pose.state, pose.undetermined[-1]) == ("weak", "ladders disagree")
+
+
+def test_a_scan_of_the_laser_is_no_scan_of_the_sonar(scene: Scene) -> None:
+    own = (scene.laser - scene.laser.mean(axis=0))[::4]
+    with pytest.raises(UserError, match=r"laser\.xyz: no bed is seen between its walls"):
+        register(scene.laser, [SonarCloud(Path("laser.xyz"), own, 1)], measured(scene), LEVEL)
+
+
+def measured(scene: Scene) -> list[Ladder]:
+    return [one.measured() for one in scene.canal.ladders]
+
+
+def near_ladder(scene: Scene, k: int) -> np.ndarray:
+    ladder = scene.canal.ladders[k]
+    own = ((scene.laser - ORIGIN) @ scene.canal.turn - ladder.origin) @ ladder.axes.T
+    return (np.abs(own[:, 0]) < 0.3) & (np.abs(own[:, 2]) < 0.1)
