@@ -12,7 +12,7 @@ from support.canal_scene import LEVEL, ORIGIN, WIDTH, Canal, Sonar
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.registration.underwater import Ladder, Registration, SonarCloud, SonarPose, register
+from tunneldb.registration.underwater import Registration, SonarCloud, SonarPose, register
 from tunneldb.registration.underwater.chain import Reliefs, agreement
 from tunneldb.registration.underwater.laser_ladders import find_laser_ladders
 from tunneldb.registration.underwater.observations import Pose, pose_derivatives
@@ -39,7 +39,7 @@ def scene() -> Scene:
 
 @pytest.fixture(scope="module")
 def found(scene: Scene) -> Registration:
-    return register(scene.laser, scene.clouds(), [one.measured() for one in scene.canal.ladders], LEVEL)
+    return register(scene.laser, scene.clouds(), scene.canal.measured(), LEVEL)
 
 
 def check_points(scan: Sonar) -> Float:
@@ -98,7 +98,7 @@ def test_a_scan_whose_axes_point_down_comes_to_the_same_place(scene: Scene) -> N
     flip = np.diag([1.0, -1.0, -1.0])
     scan = scene.scans[0]
     turned = [SonarCloud(Path("s.xyz"), scan.points @ flip, -1)]
-    ladders = [one.measured() for one in scene.canal.ladders]
+    ladders = scene.canal.measured()
     down = register(scene.laser, turned, ladders, LEVEL).scans[0]
     up = register(scene.laser, scene.clouds()[:1], ladders, LEVEL).scans[0]
     assert np.allclose(down.rotation @ flip, up.rotation, atol=1e-4)
@@ -106,7 +106,7 @@ def test_a_scan_whose_axes_point_down_comes_to_the_same_place(scene: Scene) -> N
 
 
 def test_a_scan_said_to_point_the_other_way_is_refused(scene: Scene) -> None:
-    ladders = [one.measured() for one in scene.canal.ladders]
+    ladders = scene.canal.measured()
     with pytest.raises(UserError, match="--up"):
         register(scene.laser, scene.clouds(-1)[:1], ladders, LEVEL)
 
@@ -128,14 +128,11 @@ def test_a_scan_that_shows_no_ladder_is_placed_by_the_bed_beside_others() -> Non
     canal = Canal(33, waves=(0.1, 0.7))
     scans = [canal.sonar(x) for x in (1.0, 5.5, 8.0, 10.5)]
     far = scans[3]
-    local = (far.to_tunnel(far.points) - ORIGIN) @ canal.turn
-    shows = np.zeros(len(local), np.bool_)
-    for ladder in canal.ladders:
-        own = (local - ladder.origin) @ ladder.axes.T
-        shows |= (np.abs(own[:, 0]) < 0.4) & (np.abs(own[:, 2]) < 0.25)
+    place = far.to_tunnel(far.points)
+    shows = np.any([canal.near(ladder, place, 0.4, 0.25) for ladder in canal.ladders], axis=0)
     clouds = [SonarCloud(Path(f"s{k}.xyz"), scan.points, 1) for k, scan in enumerate(scans[:3])]
     clouds.append(SonarCloud(Path("s3.xyz"), far.points[~shows], 1))
-    result = register(canal.laser(), clouds, [one.measured() for one in canal.ladders], LEVEL)
+    result = register(canal.laser(), clouds, canal.measured(), LEVEL)
     pose = result.scans[3]
     assert all("s3.xyz" not in ladder.scans for ladder in result.ladders)
     assert pose.state == "determined", result.notes
@@ -144,12 +141,7 @@ def test_a_scan_that_shows_no_ladder_is_placed_by_the_bed_beside_others() -> Non
 
 
 def near_ladders(scene: Scene) -> np.ndarray:
-    local = (scene.laser - ORIGIN) @ scene.canal.turn
-    near = np.zeros(len(local), np.bool_)
-    for ladder in scene.canal.ladders:
-        own = (local - ladder.origin) @ ladder.axes.T
-        near |= (np.abs(own[:, 0]) < 0.25) & (np.abs(own[:, 2]) < 0.1)
-    return near
+    return np.any([scene.canal.near(ladder, scene.laser, 0.25, 0.1) for ladder in scene.canal.ladders], axis=0)
 
 
 def test_no_wall_at_the_water_is_said_so(scene: Scene) -> None:
@@ -161,7 +153,7 @@ def test_a_ladder_with_other_gaps_is_fitted_to_its_own(scene: Scene) -> None:
     """Of two ladders that differ in their gaps alone, each is found where its own rungs are."""
     local = scene.laser - ORIGIN
     walls = find_walls(local[::3])
-    ladders = [one.measured() for one in scene.canal.ladders]
+    ladders = scene.canal.measured()
     for order in (ladders, ladders[::-1]):
         fits = {fit.placed.ladder.name: fit.placed.origin for fit in find_laser_ladders(local, walls, order)}
         for true in scene.canal.ladders:
@@ -198,9 +190,8 @@ def test_scans_at_wrong_places_contradict_each_other(scene: Scene) -> None:
 
 def test_a_ladder_that_the_laser_does_not_see_is_not_taken_for_another(scene: Scene) -> None:
     hidden = scene.canal.ladders[1]
-    own = (scene.laser - scene.canal.to_tunnel(hidden.origin[None])) @ scene.canal.turn @ hidden.axes.T
-    seen = scene.laser[(np.abs(own[:, 0]) > 0.3) | (np.abs(own[:, 2]) > 0.1)]
-    found = register(seen, scene.clouds(), [one.measured() for one in scene.canal.ladders], LEVEL)
+    seen = scene.laser[~scene.canal.near(hidden, scene.laser, 0.3, 0.1)]
+    found = register(seen, scene.clouds(), scene.canal.measured(), LEVEL)
     assert any(hidden.name in note for note in found.notes)
     for pose, scan in zip(found.scans, scene.scans, strict=True):
         if pose.state != "undetermined":
@@ -209,7 +200,7 @@ def test_a_ladder_that_the_laser_does_not_see_is_not_taken_for_another(scene: Sc
 
 
 def test_ladders_whose_gaps_are_others_are_not_used(scene: Scene) -> None:
-    other = [replace(ladder, height=0.3 * np.arange(len(ladder.height))) for ladder in measured(scene)]
+    other = [replace(ladder, height=0.3 * np.arange(len(ladder.height))) for ladder in scene.canal.measured()]
     result = register(scene.laser, scene.clouds(), other, LEVEL)
     assert result.ladders == ()
     assert {pose.state for pose in result.scans} == {"undetermined"}
@@ -218,8 +209,8 @@ def test_ladders_whose_gaps_are_others_are_not_used(scene: Scene) -> None:
 
 def test_a_ladder_that_was_moved_after_the_laser_is_told_and_scans_are_weak(scene: Scene) -> None:
     moved = scene.laser.copy()
-    moved[near_ladder(scene, 1)] += np.array([0.0, 0.0, 0.05])
-    result = register(moved, scene.clouds(), measured(scene), LEVEL)
+    moved[scene.canal.near(scene.canal.ladders[1], moved, 0.3, 0.1)] += np.array([0.0, 0.0, 0.05])
+    result = register(moved, scene.clouds(), scene.canal.measured(), LEVEL)
     assert any("does not stand where the laser saw it" in note for note in result.notes)
     for pose in result.scans:
         assert (pose.state, pose.undetermined[-1]) == ("weak", "ladders disagree")
@@ -228,14 +219,4 @@ def test_a_ladder_that_was_moved_after_the_laser_is_told_and_scans_are_weak(scen
 def test_a_scan_of_the_laser_is_no_scan_of_the_sonar(scene: Scene) -> None:
     own = (scene.laser - scene.laser.mean(axis=0))[::4]
     with pytest.raises(UserError, match=r"laser\.xyz: no bed is seen between its walls"):
-        register(scene.laser, [SonarCloud(Path("laser.xyz"), own, 1)], measured(scene), LEVEL)
-
-
-def measured(scene: Scene) -> list[Ladder]:
-    return [one.measured() for one in scene.canal.ladders]
-
-
-def near_ladder(scene: Scene, k: int) -> np.ndarray:
-    ladder = scene.canal.ladders[k]
-    own = ((scene.laser - ORIGIN) @ scene.canal.turn - ladder.origin) @ ladder.axes.T
-    return (np.abs(own[:, 0]) < 0.3) & (np.abs(own[:, 2]) < 0.1)
+        register(scene.laser, [SonarCloud(Path("laser.xyz"), own, 1)], scene.canal.measured(), LEVEL)

@@ -16,7 +16,7 @@ import pyproj
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.spatial.transform import Rotation
 
-from tunneldb.arrays import Float, Int64
+from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.registration.underwater import Ladder
 
 WIDTH, DEPTH, LEVEL = 6.6, 2.5, 265.0
@@ -99,6 +99,14 @@ class Canal:
         out /= np.linalg.norm(out)
         foot = np.array([x + rng.uniform(-0.5, 0.5), side * (WIDTH / 2.0 - rng.uniform(0.2, 0.4)), 0.0])
         return TrueLadder(name, foot - rng.uniform(1.7, 2.0) * up, np.vstack([np.cross(up, out), up, out]), height)
+
+    def measured(self) -> list[Ladder]:
+        return [ladder.measured() for ladder in self.ladders]
+
+    def near(self, ladder: TrueLadder, points: Float, aside: float, before: float) -> Bool:
+        """Which points (n, 3), tunnel frame, lie about a ladder: ``aside`` m of its middle and ``before`` m of its plane."""
+        own = ((points - ORIGIN) @ self.turn - ladder.origin) @ ladder.axes.T
+        return np.asarray((np.abs(own[:, 0]) < aside) & (np.abs(own[:, 2]) < before))
 
     def to_tunnel(self, points: Float) -> Float:
         return np.asarray(points @ self.turn.T + ORIGIN)

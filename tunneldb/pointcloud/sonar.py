@@ -8,7 +8,7 @@ import numpy as np
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.formats.text_lines import TextLines, divider_of, parse
+from tunneldb.pointcloud.formats.text_lines import TextLines, are_numbers, divider_of, parse
 from tunneldb.pointcloud.reader import read_chunks, read_header
 
 TEXT = (".xyz", ".txt", ".csv")
@@ -89,11 +89,8 @@ def _read_text(path: Path) -> Float:
 
 def _is_place(text: str) -> bool:
     """Whether a line begins with x, y and z, or with as many numbers as it has; what follows may be text, as a time."""
-    fields = text.split(divider_of(text))[:3] if text else []
-    try:
-        return bool([float(field) for field in fields])
-    except ValueError:
-        return False
+    divider = divider_of(text)
+    return are_numbers((divider or " ").join(text.split(divider)[:3]))
 
 
 def _read_off(path: Path) -> Float:

@@ -97,6 +97,11 @@ def cell_keys(points: Float, edge: float) -> Int64:
     return np.asarray((cell[:, 0] << 42) | (cell[:, 1] << 21) | cell[:, 2])
 
 
+def _stretches(points: Float) -> Int64:
+    """Numbers (n,) of the stretches of wall or bed that points (n, 3) lie in, whatever their height."""
+    return cell_keys(np.where([True, True, False], points, 0.0), STRETCH)
+
+
 def pose_derivatives(points: Float, pose: Pose, normal: Float) -> Float:
     """Derivatives (n, 7) of points (n, 3), in the tunnel's axes, along normals (n, 3)."""
     arm = points - pose.translation
@@ -158,7 +163,7 @@ def wall_rows(
         + (walls.sigma_batter[piece] * centre[:, 2]) ** 2
     )
     batter = centre[:, 2] / np.sqrt(1.0 + walls.batter[piece] ** 2)
-    stretch = cell_keys(np.where([True, True, False], walls.foot[piece], 0.0), STRETCH)
+    stretch = _stretches(walls.foot[piece])
     out = []
     for side in (0, 1):
         rows = walls.side[piece] == side
@@ -248,10 +253,10 @@ def _told(own: Float, which: Int64, away: Float, sigma: Float, placed: PlacedLad
     are: a mixture of echoes of rungs and of others, evenly spread, by expectation and maximisation (McLachlan and Peel, 2000,
     section 2.8; the information in what is left open is that of Louis, 1982).
     """
-    share = np.ones(len(own))
+    share = np.where(which < 2, 1.0, LEAST_TOLD)
     inside = (which >= 2) & (np.abs(own[:, 0]) < placed.gap / 2.0 - STILES_SIDE)
     if not inside.any():
-        return np.where(which < 2, 1.0, LEAST_TOLD)
+        return share
     off = (away[inside, 1] / sigma[inside]) ** 2
     echo = np.exp(-0.5 * off) / (np.sqrt(2.0 * np.pi) * sigma[inside])
     even = 1.0 / float(np.mean(np.diff(placed.ladder.height)))
@@ -260,9 +265,8 @@ def _told(own: Float, which: Int64, away: Float, sigma: Float, placed: PlacedLad
         mine = rungs * echo / (rungs * echo + (1.0 - rungs) * even)
         rungs = float(mine.mean())
     told = float((mine - mine * (1.0 - mine) * off).sum() / mine.sum())
-    share[which >= 2] = 0.0
-    share[inside] = mine * max(told, 0.0)
-    return np.maximum(share, LEAST_TOLD)
+    share[inside] = np.maximum(mine * told, LEAST_TOLD)
+    return share
 
 
 def overlap_rows(one: Patches, other: Patches, poses: tuple[Pose, Pose], scans: tuple[int, int], within: float) -> Rows | None:
@@ -289,6 +293,6 @@ def overlap_rows(one: Patches, other: Patches, poses: tuple[Pose, Pose], scans: 
     return Rows(
         residual, sigma, pose_derivatives(place[i], first, mean), scans[0], scans[1],
         -pose_derivatives(beside[k], second, mean), np.zeros((len(i), 0)), np.zeros(0, np.int64),
-        cell_keys(np.where([True, True, False], place[i], 0.0), STRETCH),
+        _stretches(place[i]),
         np.full(len(i), SHARED), "scan", "",
     )  # fmt: skip
