@@ -37,7 +37,12 @@ WATERLINE_SIGMA = 0.03  # m: of what edges of walls have in common, by which the
 # Of the sonar's zero on masonry, and of what its beam hears there of stones and joints, m: some of RELIEF. Walls tell it apart
 # from scale as little as ladders do, so it is held, and what it may be goes into the covariance alone.
 ZERO_SIGMA, ZERO_HELD = 0.0015, 0.0003
-COMMON = 5  # parameters common to all scans but for the ladders: two batters, that depth, that of the waterline, that zero
+# Slant of walls and of the bed (nearer_by_slant), between none and that of the cell with the most power on what is smooth; and
+# the share by which the bed's relief seems nearer than it is, of which nothing is known but that it is small.
+SLANT_USUAL, SLANT_SIGMA, NEARER_SIGMA = 1.5, 1.0, (0.0005, 0.002)
+# Parameters common to all scans but for the ladders: two batters, that depth, that of the waterline, that zero, two slants, that
+# share.
+COMMON = 9
 LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
 # rad: what slanting beams on a rough wall hear in common, 0.6 mm over 2 m of its height; no scan shows that by itself
 SLANT = 0.0003
@@ -122,8 +127,9 @@ def adjust(
     placed = [ladder.placed for ladder in ladders]
     count = POSE * len(scans) + COMMON + 6 * len(ladders)
     radius = max((ladder.placed.ladder.diameter / 2.0 for ladder in ladders), default=0.0)
-    # changes of batter of either side, depth behind a bar's near surface, height of the waterline, zero on masonry
-    usual = np.array([0.0, 0.0, DEPTH_SHARE * radius, 0.0, 0.0])
+    # changes of batter of either side, depth behind a bar's near surface, height of the waterline, zero on masonry, slants of
+    # walls and bed, share by which the bed's relief seems nearer
+    usual = np.array([0.0, 0.0, DEPTH_SHARE * radius, 0.0, 0.0, SLANT_USUAL, SLANT_USUAL, 0.0, 0.0])
     common = usual.copy()
     precision = _prior(len(scans), ladders, radius)
     normal, rows = np.eye(count), []
@@ -142,7 +148,7 @@ def adjust(
         if reach == reaches[-1] and np.abs(change).max() < SETTLED:
             break
     spread = precision.copy()  # of what was known beforehand, by what it is worth
-    zero = POSE * len(scans) + COMMON - 1
+    zero = POSE * len(scans) + 4
     spread[zero, zero] *= (ZERO_SIGMA / ZERO_HELD) ** 2
     covariance = _sandwich(rows, normal, precision, spread)
     blocks = [slice(POSE * i, POSE * (i + 1)) for i in range(len(scans))]
@@ -171,14 +177,17 @@ def _all_rows(
     rows: list[Rows] = []
     first = POSE * len(scans)
     for i, scan in enumerate(scans):
-        rows += wall_rows(scan.patches, poses[i], walls, float(common[4]), i, (first, first + 4), reach)
+        zero, slant = float(common[4]), float(common[5])
+        rows += wall_rows(scan.patches, poses[i], walls, (zero, slant), i, (first, first + 4, first + 5), reach)
         for k, points in scan.ladders.items():
             found = ladder_rows(points, poses[i], placed[k], float(common[2]), i, (first + 2, first + COMMON + 6 * k), reach)
             rows += [found] if found is not None else []
         found = waterline_rows(scan.edges, poses[i], float(common[3]), i, first + 3)
         rows += [found] if found is not None else []
+    shared = (float(common[5]), float(common[6]), float(common[7]), float(common[8]))
+    columns = (first + 5, first + 6, first + 7, first + 8)
     for i, j in pairs:
-        found = overlap_rows(scans[i].patches, scans[j].patches, (poses[i], poses[j]), (i, j), reach)
+        found = overlap_rows(scans[i].patches, scans[j].patches, (poses[i], poses[j]), shared, (i, j), columns, reach)
         rows += [found] if found is not None else []
     return rows
 
@@ -220,7 +229,7 @@ def _normal_equations(rows: Sequence[Rows], count: int) -> tuple[Float, Float]:
 
 
 def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
-    """Precision of what is known beforehand: scales, batters, ladders."""
+    """Precision of what is known beforehand: scales, what is common, ladders."""
     sigma = np.full(POSE * scans + COMMON + 6 * len(ladders), np.inf)
     sigma[POSE - 1 : POSE * scans : POSE] = SCALE_SIGMA
     sigma[POSE * scans : POSE * scans + COMMON] = (
@@ -229,6 +238,9 @@ def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
         max(DEPTH_SPREAD * radius, 1e-4),
         WATERLINE_SIGMA,
         ZERO_HELD,
+        SLANT_SIGMA,
+        SLANT_SIGMA,
+        *NEARER_SIGMA,
     )
     for k, ladder in enumerate(ladders):
         first = POSE * scans + COMMON + 6 * k

@@ -19,6 +19,7 @@ POSE = 7  # parameters of a pose
 RANGE_NOISE = 0.015  # m, of a BV5000 (Moisan et al., 2015, section 3)
 BEAM = np.radians(1.0)  # width of a beam there
 BEAM_SIGMA = BEAM / np.sqrt(12.0)  # an echo comes from anywhere in it
+BEAM_SPREAD = BEAM / np.sqrt(8.0 * np.log(2.0))  # of its power, taken for a normal distribution
 STRETCH = 2.0  # m of wall or bed: its relief is the same for all scans
 SHARED = 0.002  # m: of a stretch of wall or bed, by relief and slanting beams
 BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: those that hear it overlap
@@ -29,7 +30,9 @@ WALL_DEPTH = 3.0  # m below the water
 WALL_TOP = 0.05  # below the water, m: nearer to it, echoes by way of the surface mix in
 RELIEF = 0.012  # m: how far a patch of stones may lie from its wall's plane
 GRAZING = 0.35  # least cosine of incidence of what is compared
+LEAST_AWAY = 0.5  # m from a surface, from which on slanting beams' echoes are taken to come nearer
 FARTHEST = 12.0  # m
+UPRIGHT = 0.6  # least cosine between the vertical and the normal of what is taken for bed
 STILES_SIDE = 0.05  # m from a stile's axis, nearer to which an echo is the stile's
 MIXTURE_ROUNDS = 10
 LEAST_TOLD = 0.02  # share of a rung's information that is left where rungs are hardly told from what is between them
@@ -139,14 +142,28 @@ def find_patches(points: Float) -> Patches:
     return Patches(centre[keep], normal[keep], count[keep], spread[keep])
 
 
+def nearer_by_slant(points: Float, scanner: Float, normal: Float) -> Float:
+    """How far (n,), m, in front of a surface of normals (n, 3) a beam's strongest echo seems to lie if its slant is 1.
+
+    A beam that meets a surface slantingly hears its nearer side more loudly, so that the echo comes from a direction off the
+    beam's middle by ``slant * spread² / tan(elevation over the surface)``: 1 for the power of Lambert's law alone, 3 if the
+    cell of range with the most of it is taken, less on what is rough, where a stone that faces the beam decides.
+    """
+    arm = scanner - points
+    over = np.maximum((arm * normal).sum(axis=1), LEAST_AWAY)
+    return np.asarray(BEAM_SPREAD**2 * np.maximum((arm**2).sum(axis=1) - over**2, 0.0) / over)
+
+
 def wall_rows(
-    patches: Patches, pose: Pose, walls: Walls, zero: float, scan: int, columns: tuple[int, int], within: float
+    patches: Patches, pose: Pose, walls: Walls, common: tuple[float, float], scan: int, columns: tuple[int, int, int], within: float
 ) -> list[Rows]:
     """Compare a scan's patches with the walls, at most ``within`` m off.
 
-    A sonar hears masonry ``zero`` m in front of where the laser sees it. ``columns`` are the places among the common parameters
-    of the first of the changes of batter of each side, and of that zero.
+    A sonar hears masonry ``zero`` m in front of where the laser sees it, and slantingly still nearer: ``common`` is that zero
+    and that slant. ``columns`` are the places among the common parameters of the first of the changes of batter of each side,
+    of the zero, and of the slant.
     """
+    zero, slant = common
     centre = pose.apply(patches.centre)
     away, piece = walls.tree.query(centre[:, :2], distance_upper_bound=1.0)
     wet = (centre[:, 2] < -WALL_TOP) & (centre[:, 2] > -WALL_DEPTH) & np.isfinite(away)
@@ -163,15 +180,16 @@ def wall_rows(
         + (walls.sigma_batter[piece] * centre[:, 2]) ** 2
     )
     batter = centre[:, 2] / np.sqrt(1.0 + walls.batter[piece] ** 2)
+    nearer = nearer_by_slant(centre, pose.translation, normal)
     stretch = _stretches(walls.foot[piece])
     out = []
     for side in (0, 1):
         rows = walls.side[piece] == side
         if rows.any():
             out.append(
-                Rows(off[rows] - zero, sigma[rows], pose_derivatives(centre[rows], pose, normal[rows]), scan, None, None,
-                     np.column_stack([batter[rows], np.full(int(rows.sum()), -1.0)]),
-                     np.array([columns[0] + side, columns[1]]), stretch[rows],
+                Rows(off[rows] - zero - slant * nearer[rows], sigma[rows], pose_derivatives(centre[rows], pose, normal[rows]),
+                     scan, None, None, np.column_stack([batter[rows], np.full(int(rows.sum()), -1.0), -nearer[rows]]),
+                     np.array([columns[0] + side, *columns[1:]]), stretch[rows],
                      np.full(int(rows.sum()), SHARED), "wall", "left" if side else "right")
             )  # fmt: skip
     return out
@@ -269,8 +287,20 @@ def _told(own: Float, which: Int64, away: Float, sigma: Float, placed: PlacedLad
     return share
 
 
-def overlap_rows(one: Patches, other: Patches, poses: tuple[Pose, Pose], scans: tuple[int, int], within: float) -> Rows | None:
-    """Distances between patches of two scans that lie beside each other and face the same way."""
+def overlap_rows(
+    one: Patches,
+    other: Patches,
+    poses: tuple[Pose, Pose],
+    common: tuple[float, float, float, float],
+    scans: tuple[int, int],
+    columns: tuple[int, int, int, int],
+    within: float,
+) -> Rows | None:
+    """Distances between patches of two scans that lie beside each other and face the same way.
+
+    ``common`` are the slants of walls and of the bed (`nearer_by_slant`), and the share by which the bed's relief seems nearer
+    to a scanner than it is, along: of a crest its near face is heard. ``columns`` are their places among the common parameters.
+    """
     first, second = poses
     place, beside = first.apply(one.centre), second.apply(other.centre)
     normal, beside_normal = one.normal @ first.rotation.T, other.normal @ second.rotation.T
@@ -284,15 +314,18 @@ def overlap_rows(one: Patches, other: Patches, poses: tuple[Pose, Pose], scans: 
         return None
     mean = normal[i] + beside_normal[k]
     mean /= np.linalg.norm(mean, axis=1)[:, None]
-    residual = ((place[i] - beside[k]) * mean).sum(axis=1)
+    nearer = nearer_by_slant(place[i], first.translation, mean) - nearer_by_slant(beside[k], second.translation, mean)
+    bed = mean[:, 2] > UPRIGHT
+    apart = (second.translation - first.translation) * [1.0, 1.0, 0.0]
+    design = np.column_stack([np.where(bed, 0.0, -nearer), np.where(bed, -nearer, 0.0), np.where(bed, 0.0, mean @ apart), np.where(bed, mean @ apart, 0.0)])
+    residual = ((place[i] - beside[k]) * mean).sum(axis=1) + design @ np.array(common)
     close = np.abs(residual) < within
-    i, k, mean, residual = i[close], k[close], mean[close], residual[close]
+    i, k, mean, residual, design = i[close], k[close], mean[close], residual[close], design[close]
     if len(i) < 20:
         return None
     sigma = np.sqrt(one.spread[i] ** 2 / one.count[i] + other.spread[k] ** 2 / other.count[k] + RELIEF**2)
     return Rows(
         residual, sigma, pose_derivatives(place[i], first, mean), scans[0], scans[1],
-        -pose_derivatives(beside[k], second, mean), np.zeros((len(i), 0)), np.zeros(0, np.int64),
-        _stretches(place[i]),
+        -pose_derivatives(beside[k], second, mean), design, np.array(columns), _stretches(place[i]),
         np.full(len(i), SHARED), "scan", "",
     )  # fmt: skip
