@@ -37,19 +37,21 @@ WATERLINE_SIGMA = 0.03  # m: of what edges of walls have in common, by which the
 # Of the sonar's zero on masonry, and of what its beam hears there of stones and joints, m: some of RELIEF. Walls tell it apart
 # from scale as little as ladders do, so it is held, and what it may be goes into the covariance alone.
 ZERO_SIGMA, ZERO_HELD = 0.0015, 0.0003
-# Slant of walls and of the bed (nearer_by_slant), between none and that of the cell with the most power on what is smooth; and
-# the share by which the bed's relief seems nearer than it is, of which nothing is known but that it is small.
-SLANT_USUAL, SLANT_SIGMA, NEARER_SIGMA = 1.5, 1.0, (0.0005, 0.002)
-# Parameters common to all scans but for the ladders: two batters, that depth, that of the waterline, that zero, two slants, that
-# share.
+# Slant of walls and of the bed (nearer_by_slant), between none and that of the cell with the most power on what is smooth.
+SLANT_USUAL, SLANT_SIGMA = 1.5, 1.0
+NEARER_SIGMA = (0.0005, 0.002)  # of the shares by which relief of walls and of the bed seems nearer along than it is
+# Parameters common to all scans but for the ladders: changes of batter of either side, depth behind a bar's near surface,
+# height of the waterline, zero on masonry, two slants, two of those shares
 COMMON = 9
-LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
+# Least standard deviations of a ladder by the laser: turns, rad, and shifts, m; it may sway or bend, but keeps its height.
+LADDER_TURN, LADDER_SHIFT, LADDER_HEIGHT = 0.0005, 0.002, 0.0005
 # rad: what slanting beams on a rough wall hear in common, 0.6 mm over 2 m of its height; no scan shows that by itself
 SLANT = 0.0003
 CUT = 3.0  # standard deviations at which a row has a quarter of its weight
 REACHES = (0.3, 0.2, 0.15, 0.12, *[0.1] * 30)  # within which rows are sought, round by round, m
 SETTLED = 1e-5
 SURROUNDINGS = 0.6  # m about a ladder: farther than a first pose may be off
+HELD = 1e8  # precision of what stays where it is
 SINGULAR = 1e-12  # share of the largest eigenvalue up to which a direction is not known
 UNKNOWN = 1e4  # variance of such a direction
 
@@ -60,7 +62,8 @@ class Scan:
 
     Attributes
     ----------
-    patches : Patches
+    patches, smooth : Patches
+        Compared with the walls, and with other scans.
     edges : (k, 3) float64 array
         Where its walls end, at the water's level, file's axes.
     pose : Pose
@@ -69,13 +72,20 @@ class Scan:
     """
 
     patches: Patches
+    smooth: Patches
     edges: Float
     pose: Pose
     ladders: Mapping[int, Float]
 
 
 def scan_of(
-    points: Float, patches: Patches, edges: Float, pose: Pose, ladders: Iterable[int], found: Sequence[LaserLadder]
+    points: Float,
+    patches: Patches,
+    smooth: Patches,
+    edges: Float,
+    pose: Pose,
+    ladders: Iterable[int],
+    found: Sequence[LaserLadder],
 ) -> Scan:
     """Keep of a scan's points (n, 3) those about some of the ladders found."""
     space = pose.apply(points)
@@ -85,7 +95,7 @@ def scan_of(
         own = placed.to_ladder(space)
         half = placed.gap / 2.0 + SURROUNDINGS
         near[k] = points[(np.abs(own[:, 0]) < half) & (np.abs(own[:, 2]) < SURROUNDINGS)]
-    return Scan(patches, edges, pose, near)
+    return Scan(patches, smooth, edges, pose, near)
 
 
 @dataclass(frozen=True)
@@ -115,30 +125,71 @@ class Adjusted:
     batter: tuple[float, float]
 
 
-def adjust(
+@dataclass(frozen=True)
+class Fitted:
+    """Scans fitted, as `Adjusted` but without covariance; common parameters, normal matrix, precision of what was assumed."""
+
+    poses: tuple[Pose, ...]
+    rows: tuple[Rows, ...]
+    ladders: tuple[PlacedLadder, ...]
+    common: Float
+    normal: Float
+    precision: Float
+
+
+def adjust(scans: Sequence[Scan], walls: Walls, ladders: Sequence[LaserLadder], pairs: Sequence[tuple[int, int]]) -> Adjusted:
+    """Adjust scans to walls and ladders, and to each other where ``pairs`` says that they overlap."""
+    fitted = fit(scans, walls, ladders, pairs, REACHES)
+    spread = fitted.precision.copy()  # of what was known beforehand, by what it is worth
+    zero = POSE * len(scans) + 4
+    spread[zero, zero] *= (ZERO_SIGMA / ZERO_HELD) ** 2
+    covariance = _sandwich(fitted.rows, fitted.normal, fitted.precision, spread)
+    blocks = [slice(POSE * i, POSE * (i + 1)) for i in range(len(scans))]
+    for block in blocks:
+        turns = range(block.start, block.start + 3)
+        covariance[turns, turns] += SLANT**2
+    return Adjusted(
+        fitted.poses,
+        np.array([covariance[b, b] for b in blocks]).reshape(-1, POSE, POSE),
+        np.array([fitted.normal[b, b] for b in blocks]).reshape(-1, POSE, POSE),
+        fitted.rows,
+        fitted.ladders,
+        (float(fitted.common[0]), float(fitted.common[1])),
+    )
+
+
+def fit(
     scans: Sequence[Scan],
     walls: Walls,
     ladders: Sequence[LaserLadder],
     pairs: Sequence[tuple[int, int]],
-    reaches: Sequence[float] = REACHES,
-) -> Adjusted:
-    """Adjust scans to walls and ladders, and to each other where ``pairs`` says that they overlap."""
+    reaches: Sequence[float],
+    held: int = 0,
+    *,
+    hold_height: bool = False,
+) -> Fitted:
+    """Fit scans to walls, ladders and each other, within some reaches, round by round.
+
+    The first ``held`` of them stay where they are; the next keeps its height if that is to be held.
+    """
     poses = [scan.pose for scan in scans]
     placed = [ladder.placed for ladder in ladders]
     count = POSE * len(scans) + COMMON + 6 * len(ladders)
     radius = max((ladder.placed.ladder.diameter / 2.0 for ladder in ladders), default=0.0)
-    # changes of batter of either side, depth behind a bar's near surface, height of the waterline, zero on masonry, slants of
-    # walls and bed, share by which the bed's relief seems nearer
     usual = np.array([0.0, 0.0, DEPTH_SHARE * radius, 0.0, 0.0, SLANT_USUAL, SLANT_USUAL, 0.0, 0.0])
     common = usual.copy()
     precision = _prior(len(scans), ladders, radius)
+    stay = np.append(np.arange(POSE * held), [POSE * held + 5] if hold_height else []).astype(np.int64)
     normal, rows = np.eye(count), []
     for reach in reaches:
         leaning = replace(walls, batter=walls.batter + common[walls.side])
-        rows = _all_rows(scans, poses, leaning, placed, common, pairs, reach)
+        rows = _all_rows(scans, poses, leaning, placed, common, pairs, reach, held)
         normal, right = _normal_equations(rows, count)
+        normal[stay, stay] += HELD
         offset = _prior_offset(poses, placed, ladders, common - usual)
+        offset[stay] = 0.0
         change = -_inverse(normal + precision, 0.0) @ (right + precision @ offset)
+        change[stay] = 0.0
         for i, pose in enumerate(poses):
             poses[i] = _moved(pose, change[POSE * i : POSE * (i + 1)])
         common += change[POSE * len(scans) : POSE * len(scans) + COMMON]
@@ -147,22 +198,7 @@ def adjust(
             placed[k] = placed[k].moved(change[first : first + 3], change[first + 3 : first + 6])
         if reach == reaches[-1] and np.abs(change).max() < SETTLED:
             break
-    spread = precision.copy()  # of what was known beforehand, by what it is worth
-    zero = POSE * len(scans) + 4
-    spread[zero, zero] *= (ZERO_SIGMA / ZERO_HELD) ** 2
-    covariance = _sandwich(rows, normal, precision, spread)
-    blocks = [slice(POSE * i, POSE * (i + 1)) for i in range(len(scans))]
-    for block in blocks:
-        turns = range(block.start, block.start + 3)
-        covariance[turns, turns] += SLANT**2
-    return Adjusted(
-        tuple(poses),
-        np.array([covariance[b, b] for b in blocks]).reshape(-1, POSE, POSE),
-        np.array([normal[b, b] for b in blocks]).reshape(-1, POSE, POSE),
-        tuple(rows),
-        tuple(placed),
-        (float(common[0]), float(common[1])),
-    )
+    return Fitted(tuple(poses), tuple(rows), tuple(placed), common, normal, precision)
 
 
 def _all_rows(
@@ -173,21 +209,21 @@ def _all_rows(
     common: Float,
     pairs: Sequence[tuple[int, int]],
     reach: float,
+    held: int,
 ) -> list[Rows]:
     rows: list[Rows] = []
     first = POSE * len(scans)
-    for i, scan in enumerate(scans):
-        zero, slant = float(common[4]), float(common[5])
-        rows += wall_rows(scan.patches, poses[i], walls, (zero, slant), i, (first, first + 4, first + 5), reach)
+    for i, scan in enumerate(scans[held:], held):
+        rows += wall_rows(scan.patches, poses[i], walls, common[4:6], i, first + np.array([0, 1, 4, 5]), reach)
         for k, points in scan.ladders.items():
             found = ladder_rows(points, poses[i], placed[k], float(common[2]), i, (first + 2, first + COMMON + 6 * k), reach)
             rows += [found] if found is not None else []
         found = waterline_rows(scan.edges, poses[i], float(common[3]), i, first + 3)
         rows += [found] if found is not None else []
-    shared = (float(common[5]), float(common[6]), float(common[7]), float(common[8]))
-    columns = (first + 5, first + 6, first + 7, first + 8)
     for i, j in pairs:
-        found = overlap_rows(scans[i].patches, scans[j].patches, (poses[i], poses[j]), shared, (i, j), columns, reach)
+        together = (poses[i], poses[j])
+        columns = first + np.arange(5, COMMON)
+        found = overlap_rows(scans[i].smooth, scans[j].smooth, together, common[5:], (i, j), columns, reach)
         rows += [found] if found is not None else []
     return rows
 
@@ -245,7 +281,7 @@ def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
     for k, ladder in enumerate(ladders):
         first = POSE * scans + COMMON + 6 * k
         own = np.sqrt(np.diag(ladder.covariance)[:6])
-        sigma[first : first + 6] = np.hypot(own, [LADDER_TURN] * 3 + [LADDER_SHIFT] * 3)
+        sigma[first : first + 6] = np.hypot(own, [LADDER_TURN] * 3 + [LADDER_SHIFT] * 2 + [LADDER_HEIGHT])
     return np.diag(1.0 / sigma**2)
 
 

@@ -127,7 +127,7 @@ def _adjust_all(
     scans = []
     for i in known:
         scan, one = prepared[i], started[i]
-        scans.append(scan_of(scan.cloud.points, scan.patches, scan.edges, one.pose, one.ladders, found))
+        scans.append(scan_of(scan.cloud.points, scan.patches, scan.smooth, scan.edges, one.pose, one.ladders, found))
     place = np.array([scan.pose.translation for scan in scans])
     pairs = [
         (a, b) for a in range(len(scans)) for b in range(a + 1, len(scans)) if np.linalg.norm(place[a] - place[b]) < OVERLAP

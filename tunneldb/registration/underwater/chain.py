@@ -3,33 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.signal import find_peaks
 
 from tunneldb.arrays import Float
-from tunneldb.registration.underwater.adjustment import adjust, scan_of
+from tunneldb.registration.underwater.adjustment import Scan, fit, scan_of
 from tunneldb.registration.underwater.first_pose import LevelScan
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
-from tunneldb.registration.underwater.observations import Pose, Rows
+from tunneldb.registration.underwater.observations import UPRIGHT, Patches, Pose, overlap_rows
 from tunneldb.registration.underwater.relief import NOWHERE, PIXEL, Relief, height_difference, likelihood, relief_of
-from tunneldb.registration.underwater.single import PreparedScan, StartedScan, misses, sees
+from tunneldb.registration.underwater.single import SOME_EDGES, PreparedScan, StartedScan, misses, sees
 from tunneldb.registration.underwater.walls import Walls
 
 OVERLAP = 15.0  # m between scanners whose scans are compared
 LOOSE = 4  # pixels along by which poses may be off
 PEAKS = 5  # of a pair's likelihood that are followed
+TRIED = 4  # places, the likeliest by the bed's relief, that are looked at closely
+LESS = float(np.log(100.0))  # and by how much a place may be less likely than the first of them
 SURE = float(np.log(30.0))  # likelihood of a place over that of none, from which it is taken
 AHEAD = float(np.log(20.0))  # and over that of the next best
 SAID = float(np.log(5.0))  # likelihood from which two scans agree, or contradict each other
-ELSEWHERE = 10  # pixels along from which a place is another
-REACHES = (0.3, 0.25, 0.2, 0.15, *[0.1] * 8)
+REACHES = (0.3, 0.25, 0.2, 0.15, 0.1, 0.1)
+WITHIN = 0.3  # m of each other: patches that are compared there
 BESIDE = 3  # known scans that it is adjusted with
-MOST_MOVED = 0.5  # m along by which that may move it: farther, it has slid to another place
+MOST_MOVED = 1.0  # m along by which that may move it: farther, it has slid to another place
+SLIDES = np.arange(-6, 7) * 0.1  # m along, at which a fitted scan is tried again
 SAME_PLACE = 0.1  # m: of two poses that are one
-AGREEING = 0.02  # m: median distance of patches that show the same
-LEAST_SHARED = 60  # patches
+ODD = 0.05  # share of a bed's patches that show something else than another scan: objects, false echoes
+PROFILE = 0.5  # m across, in which the bed is as high all along
 
 
 @dataclass
@@ -56,6 +59,10 @@ class Reliefs:
                 self._pairs[known, i, turned] = likelihood(one, other.turned() if turned else other)
         return self._pairs[known, i, turned]
 
+    def may_overlap(self, one: int, other: int) -> bool:
+        """Whether two scans speak for seeing the same bed at any shift."""
+        return any(bool((self.likelihood(one, other, turned=turned) > 0.0).any()) for turned in (False, True))
+
     def near(self, known: int, i: int, shift: float, *, turned: bool) -> Float:
         """Likelihoods at shifts LOOSE pixels either way about one, m; 0 where nothing can be said."""
         values = self.likelihood(known, i, turned=turned)
@@ -76,9 +83,9 @@ class _Place:
     direction: Float
     likelihood: float
 
-    def elsewhere(self, other: _Place) -> bool:
-        """Whether it is another place, or another way round."""
-        return self.along(other) > ELSEWHERE * PIXEL or float(self.direction @ other.direction) < 0.0
+    def is_at(self, other: _Place) -> bool:
+        """Whether it is the same place, but for what poses may be off, and the same way round."""
+        return self.along(other) <= LOOSE * PIXEL and float(self.direction @ other.direction) > 0.0
 
     def along(self, other: _Place) -> float:
         """Distance to another place along the canal, m."""
@@ -91,58 +98,100 @@ def place_beside(
     started: Mapping[int, StartedScan],
     walls: Walls,
     found: Sequence[LaserLadder],
-) -> StartedScan | None:
-    """Pose of scan ``i`` beside those started that it shares the bed with; None if it isn't sure."""
-    scans = reliefs.scans
-    places = sorted(_places(i, reliefs, started), key=lambda one: -one.likelihood)
-    if not places or places[0].likelihood < SURE:
+) -> tuple[StartedScan, float] | None:
+    """Pose of scan ``i`` beside those started that it shares the bed with, and its likelihood; None if it isn't sure."""
+    tried = (_settled(i, place, reliefs, started, walls) for place in _likeliest(_places(i, reliefs, started)))
+    settled = sorted((one for one in tried if one is not None), key=lambda one: -one[1])
+    if not settled or settled[0][1] < SURE:
         return None
-    best = places[0]
-    rivals = [one for one in places if one.likelihood > best.likelihood - AHEAD]
-    if any(one.elsewhere(best) for one in rivals):
-        return None
-    settled = [_settled(i, one, reliefs, started, walls, found) for one in _apart(rivals)]
-    first = settled[0]
-    # what is settled from beside it must be the same
-    if first is None or any(
-        one is not None and np.linalg.norm(one.translation - first.translation) > SAME_PLACE for one in settled[1:]
-    ):
-        return None
-    seen = sees(scans[i], first, found)
-    return None if misses(first, seen, found) else StartedScan(first, seen)
+    pose, likelihood = settled[0]
+    for other, less in settled[1:]:
+        if less > likelihood - AHEAD and np.linalg.norm(other.translation - pose.translation) > SAME_PLACE:
+            return None
+    seen = sees(reliefs.scans[i], pose, found)
+    return None if misses(pose, seen, found) else (StartedScan(pose, seen), likelihood)
 
 
-def _apart(places: Sequence[_Place]) -> list[_Place]:
-    """Those of some places, the likeliest first, that are not the same but for what poses may be off."""
+def _likeliest(places: Sequence[_Place]) -> list[_Place]:
+    """Those of some places that are worth a closer look, each once."""
     out: list[_Place] = []
-    for one in places:
-        if all(one.along(other) > LOOSE * PIXEL for other in out):
+    for one in sorted(places, key=lambda one: -one.likelihood):
+        if out and one.likelihood < out[0].likelihood - LESS:
+            break
+        if not any(one.is_at(other) for other in out):
             out.append(one)
-    return out
+    return out[:TRIED]
 
 
 def _settled(
-    i: int,
-    place: _Place,
-    reliefs: Reliefs,
-    started: Mapping[int, StartedScan],
-    walls: Walls,
-    found: Sequence[LaserLadder],
-) -> Pose | None:
-    """Pose of a scan adjusted from a place together with those beside it; None if it slides away or shows something else."""
+    i: int, place: _Place, reliefs: Reliefs, started: Mapping[int, StartedScan], walls: Walls
+) -> tuple[Pose, float] | None:
+    """Pose of a scan fitted from a place to those beside it, and its likelihood by the bed; None if it slides away."""
     scans = reliefs.scans
     pose = _pose(i, place, reliefs, started, walls)
     if pose is None:
         return None
     beside = sorted(started, key=lambda k: float(np.linalg.norm(started[k].pose.translation - pose.translation)))[:BESIDE]
-    together = [
-        scan_of(scans[k].thin, scans[k].patches, scans[k].edges, started[k].pose, started[k].ladders, found) for k in beside
-    ]
-    together.append(scan_of(scans[i].thin, scans[i].patches, scans[i].edges, pose, (), found))
-    pairs = [(a, b) for a in range(len(together)) for b in range(a + 1, len(together))]
-    adjusted = adjust(together, walls, found, pairs, REACHES)
-    moved = abs(float((adjusted.poses[-1].translation - pose.translation)[:2] @ place.direction))
-    return adjusted.poses[-1] if moved < MOST_MOVED and _agree(adjusted.rows, len(beside)) else None
+    together, own = [_levelled(scans[k], started[k].pose) for k in beside], _levelled(scans[i], pose)
+    pairs = [(k, len(beside)) for k in range(len(beside))]
+
+    def fitted(start: Pose, reaches: Sequence[float]) -> Pose:
+        free = replace(own, pose=start)
+        return fit([*together, free], walls, (), pairs, reaches, len(beside), hold_height=_tells_water(scans[i])).poses[-1]
+
+    def likelihood(one: Pose) -> float:
+        rough = _roughness(own.smooth, one, place.direction)
+        return sum(bed_likelihood((other.smooth, own.smooth), (other.pose, one), rough) for other in together)
+
+    found = fitted(own.pose, REACHES)
+    along = np.array([*place.direction, 0.0])
+    slid = [replace(found, translation=found.translation + slide * along) for slide in SLIDES]
+    best = max(slid, key=likelihood)
+    if best is not slid[len(slid) // 2]:
+        found = fitted(best, REACHES[1:])
+    moved = abs(float((found.translation - pose.translation) @ along))
+    return (found, likelihood(found)) if moved < MOST_MOVED else None
+
+
+def _tells_water(scan: PreparedScan) -> bool:
+    """Whether it shows where its walls end, at the water: it is level, while slopes that err add up from scan to scan."""
+    return len(scan.edges) >= SOME_EDGES
+
+
+def _levelled(scan: PreparedScan, pose: Pose) -> Scan:
+    """The scan without ladders, as high as the water says."""
+    if _tells_water(scan):
+        pose = replace(pose, translation=np.array([*pose.translation[:2], -scan.flat.top]))
+    return scan_of(scan.thin, scan.patches, scan.smooth, scan.edges, pose, (), ())
+
+
+def _roughness(patches: Patches, pose: Pose, direction: Float) -> float:
+    """Spread of the bed's height about what is the same all along the canal, m, as a scan's patches show it."""
+    place = pose.apply(patches.centre)[(patches.normal @ pose.rotation.T)[:, 2] > UPRIGHT]
+    across = np.floor((place[:, :2] @ [-direction[1], direction[0]]) / PROFILE).astype(np.int64)
+    order = np.lexsort([place[:, 2], across])
+    _, begin, number, count = np.unique(across[order], return_index=True, return_inverse=True, return_counts=True)
+    height = place[order, 2]
+    away = np.abs(height - height[begin + count // 2][number])
+    return float(1.4826 * np.median(away)) if len(away) else 0.0
+
+
+def bed_likelihood(patches: tuple[Patches, Patches], poses: tuple[Pose, Pose], roughness: float) -> float:
+    """Logarithm of the likelihood that the bed of two scans is the same where they overlap, over that of its being another.
+
+    Heights of one bed differ by what patches are off, those of two by the bed's own roughness too; the patches of a stretch say
+    the same, so that their mean counts.
+    """
+    rows = overlap_rows(*patches, poses, np.zeros(4), (0, 1), np.arange(4), WITHIN)
+    if rows is None:
+        return 0.0
+    bed = rows.poses[:, 5] > UPRIGHT
+    square, same = rows.residual[bed] ** 2, rows.sigma[bed] ** 2
+    other = same + 2.0 * roughness**2
+    ratio = 0.5 * (np.log(other / same) - square / same + square / other)
+    told = np.log((1.0 - ODD) * np.exp(ratio) + ODD)
+    _, stretch, count = np.unique(rows.group[bed], return_inverse=True, return_counts=True)
+    return float((np.bincount(stretch, told) / count).sum())
 
 
 def _direction(scan: PreparedScan, pose: Pose) -> Float:
@@ -195,13 +244,6 @@ def _pose(i: int, place: _Place, reliefs: Reliefs, started: Mapping[int, Started
     foot = walls.foot[piece, :2]
     plan = foot + ((place.point - foot) @ along) * along - flat.walls[0] * normal
     return Pose(basis @ flat.rotation, np.array([*plan, height]), 1.0)
-
-
-def _agree(rows: Sequence[Rows], i: int) -> bool:
-    """Whether scan ``i`` shows the same as those before it where they overlap."""
-    shared = [one.residual for one in rows if one.kind == "scan" and one.other == i]
-    residual = np.abs(np.concatenate([*shared, np.zeros(0)]))
-    return len(residual) > LEAST_SHARED and float(np.median(residual)) < AGREEING
 
 
 def agreement(one: int, other: int, poses: tuple[Pose, Pose], reliefs: Reliefs) -> int:

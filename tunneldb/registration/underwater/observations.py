@@ -7,6 +7,7 @@ scanner, and a change of scale.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -40,6 +41,12 @@ FURTHEST_OFF = 4.0  # standard deviations of an echo from the ladder that it com
 PATCH = 0.3  # m
 PATCH_POINTS = 8
 FLAT = 0.035  # m: spread of a patch across its plane
+SMOOTH_PATCH = 0.2  # m, of patches that are compared with another scan's
+SMOOTH_POINTS = 3
+ABOUT = 0.4  # m: their normals are those of planes through the patches so near
+MOST_ABOUT, FEWEST_ABOUT = 13, 6  # of them
+NEIGHBOUR = 0.3  # m between the middles of two scans' patches that are compared
+SMOOTH_GRAZING = 0.2  # least cosine of incidence by those normals
 
 
 @dataclass(frozen=True)
@@ -53,6 +60,10 @@ class Pose:
     def apply(self, points: Float) -> Float:
         """Points (n, 3) of the file in the tunnel's axes."""
         return np.asarray(self.scale * points @ self.rotation.T + self.translation)
+
+    def to_file(self, points: Float) -> Float:
+        """Points (n, 3) of the tunnel's axes in those of the file."""
+        return np.asarray((points - self.translation) @ self.rotation / self.scale)
 
 
 @dataclass(frozen=True)
@@ -121,11 +132,50 @@ class Patches:
     count: Int64
     spread: Float
 
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Of their middles."""
+        return cKDTree(self.centre)
+
 
 def find_patches(points: Float) -> Patches:
-    """Cells of a scan whose points lie on a plane that is not seen at a grazing angle."""
+    """Cells of a scan whose points lie on a plane that is not seen at a grazing angle, with that plane's normal."""
+    centre, count, value, vector = _cells(points, PATCH)
+    normal = _towards_scanner(vector[:, :, 0], centre)
+    spread = np.sqrt(np.maximum(value[:, 0], 0.0))
+    keep = (count >= PATCH_POINTS) & (spread < FLAT) & (value[:, 1] > (PATCH / 8.0) ** 2)
+    keep &= _cosine(normal, centre) > GRAZING
+    return Patches(centre[keep], normal[keep], count[keep], spread[keep])
+
+
+def find_smooth_patches(points: Float) -> Patches:
+    """Smaller cells, with the normals of planes through the middles of those about.
+
+    A beam's echoes lie on an arc about the scanner, so that the points of one patch lean towards it, the more the farther it
+    is; and they are few. Two scans whose patches are compared along such normals draw each other nearer.
+    """
+    centre, count, value, _ = _cells(points, SMOOTH_PATCH)
+    spread = np.sqrt(np.maximum(value[:, 0], 0.0))
+    keep = (count >= SMOOTH_POINTS) & (spread < FLAT) & (value[:, 1] > (SMOOTH_PATCH / 8.0) ** 2)
+    centre, count, spread = centre[keep], count[keep], spread[keep]
+    if len(centre) < MOST_ABOUT:
+        return Patches(centre[:0], centre[:0], count[:0], spread[:0])
+    reach, about = cKDTree(centre).query(centre, MOST_ABOUT, distance_upper_bound=ABOUT)
+    there = np.isfinite(reach)[..., None]
+    number = there.sum(axis=1)
+    away = np.where(there, centre[np.where(there[..., 0], about, 0)] - centre[:, None], 0.0)
+    away = np.where(there, away - (away.sum(axis=1) / number)[:, None], 0.0)
+    value, vector = np.linalg.eigh(np.swapaxes(away, 1, 2) @ away / number[..., None])
+    normal = _towards_scanner(vector[:, :, 0], centre)
+    keep = (number[:, 0] >= FEWEST_ABOUT) & (value[:, 0] < FLAT**2) & (value[:, 1] > (SMOOTH_PATCH / 3.0) ** 2)
+    keep &= _cosine(normal, centre) > SMOOTH_GRAZING
+    return Patches(centre[keep], normal[keep], count[keep], spread[keep])
+
+
+def _cells(points: Float, edge: float) -> tuple[Float, Int64, Float, Float]:
+    """Of cubic cells, middles of their points (k, 3), points (k,), and variances (k, 3) and axes (k, 3, 3) of their spread."""
     near = points[np.linalg.norm(points, axis=1) < FARTHEST]
-    _, number, count = np.unique(cell_keys(near, PATCH), return_inverse=True, return_counts=True)
+    _, number, count = np.unique(cell_keys(near, edge), return_inverse=True, return_counts=True)
     centre = np.column_stack([np.bincount(number, near[:, k]) for k in range(3)]) / count[:, None]
     away = near - centre[number]
     moments = np.empty((len(count), 3, 3))
@@ -133,13 +183,16 @@ def find_patches(points: Float) -> Patches:
         for b in range(a, 3):
             moments[:, a, b] = moments[:, b, a] = np.bincount(number, away[:, a] * away[:, b]) / count
     value, vector = np.linalg.eigh(moments)
-    normal = vector[:, :, 0]
-    normal *= -np.sign((normal * centre).sum(axis=1))[:, None]
-    spread = np.sqrt(np.maximum(value[:, 0], 0.0))
-    reach = np.linalg.norm(centre, axis=1)
-    cosine = -(normal * centre).sum(axis=1) / np.maximum(reach, 1e-9)
-    keep = (count >= PATCH_POINTS) & (spread < FLAT) & (value[:, 1] > (PATCH / 8.0) ** 2) & (cosine > GRAZING)
-    return Patches(centre[keep], normal[keep], count[keep], spread[keep])
+    return centre, count, value, vector
+
+
+def _towards_scanner(normal: Float, centre: Float) -> Float:
+    return -normal * np.sign((normal * centre).sum(axis=1))[:, None]
+
+
+def _cosine(normal: Float, centre: Float) -> Float:
+    """Cosines of incidence (k,) of beams on patches."""
+    return np.asarray(-(normal * centre).sum(axis=1) / np.maximum(np.linalg.norm(centre, axis=1), 1e-9))
 
 
 def nearer_by_slant(points: Float, scanner: Float, normal: Float) -> Float:
@@ -155,13 +208,12 @@ def nearer_by_slant(points: Float, scanner: Float, normal: Float) -> Float:
 
 
 def wall_rows(
-    patches: Patches, pose: Pose, walls: Walls, common: tuple[float, float], scan: int, columns: tuple[int, int, int], within: float
+    patches: Patches, pose: Pose, walls: Walls, common: Float, scan: int, columns: Int64, within: float
 ) -> list[Rows]:
     """Compare a scan's patches with the walls, at most ``within`` m off.
 
-    A sonar hears masonry ``zero`` m in front of where the laser sees it, and slantingly still nearer: ``common`` is that zero
-    and that slant. ``columns`` are the places among the common parameters of the first of the changes of batter of each side,
-    of the zero, and of the slant.
+    ``common`` are how far in front of where the laser sees it a sonar hears masonry, m, and the slant (`nearer_by_slant`).
+    ``columns`` are the places among the common parameters of the changes of batter of either side, and of these two.
     """
     zero, slant = common
     centre = pose.apply(patches.centre)
@@ -186,11 +238,11 @@ def wall_rows(
     for side in (0, 1):
         rows = walls.side[piece] == side
         if rows.any():
+            design = np.column_stack([batter[rows], np.full(int(rows.sum()), -1.0), -nearer[rows]])
             out.append(
                 Rows(off[rows] - zero - slant * nearer[rows], sigma[rows], pose_derivatives(centre[rows], pose, normal[rows]),
-                     scan, None, None, np.column_stack([batter[rows], np.full(int(rows.sum()), -1.0), -nearer[rows]]),
-                     np.array([columns[0] + side, *columns[1:]]), stretch[rows],
-                     np.full(int(rows.sum()), SHARED), "wall", "left" if side else "right")
+                     scan, None, None, design, columns[[side, 2, 3]], stretch[rows], np.full(int(rows.sum()), SHARED),
+                     "wall", "left" if side else "right")
             )  # fmt: skip
     return out
 
@@ -291,41 +343,50 @@ def overlap_rows(
     one: Patches,
     other: Patches,
     poses: tuple[Pose, Pose],
-    common: tuple[float, float, float, float],
+    common: Float,
     scans: tuple[int, int],
-    columns: tuple[int, int, int, int],
+    columns: Int64,
     within: float,
 ) -> Rows | None:
-    """Distances between patches of two scans that lie beside each other and face the same way.
+    """Distances between smooth patches of two scans that lie beside each other and face the same way.
 
-    ``common`` are the slants of walls and of the bed (`nearer_by_slant`), and the share by which the bed's relief seems nearer
-    to a scanner than it is, along: of a crest its near face is heard. ``columns`` are their places among the common parameters.
+    ``common`` are the slants of walls and of the bed (`nearer_by_slant`), and the shares by which the relief of either seems
+    nearer to a scanner than it is, along: of a crest or a stone the near face is heard. ``columns`` are their places among the
+    common parameters.
     """
     first, second = poses
-    place, beside = first.apply(one.centre), second.apply(other.centre)
-    normal, beside_normal = one.normal @ first.rotation.T, other.normal @ second.rotation.T
-    reach, k = cKDTree(beside).query(place, distance_upper_bound=max(PATCH, within))
-    found = np.isfinite(reach)
-    i, k = np.flatnonzero(found), k[found]
-    same = (normal[i] * beside_normal[k]).sum(axis=1) > FACING
-    low = place[i, 2] < -WALL_TOP  # images above the water move with the scanner
-    i, k = i[same & low], k[same & low]
+    place = first.apply(one.centre)
+    low = np.flatnonzero(place[:, 2] < -WALL_TOP)  # images above the water move with the scanner
+    reach, k = other.tree.query(second.to_file(place[low]), distance_upper_bound=max(NEIGHBOUR, within))
+    i, k = low[np.isfinite(reach)], k[np.isfinite(reach)]
+    normal, beside_normal = one.normal[i] @ first.rotation.T, other.normal[k] @ second.rotation.T
+    same = (normal * beside_normal).sum(axis=1) > FACING
+    i, k, normal, beside_normal = i[same], k[same], normal[same], beside_normal[same]
     if len(i) < 20:
         return None
-    mean = normal[i] + beside_normal[k]
+    place, beside = place[i], second.apply(other.centre[k])
+    mean = normal + beside_normal
     mean /= np.linalg.norm(mean, axis=1)[:, None]
-    nearer = nearer_by_slant(place[i], first.translation, mean) - nearer_by_slant(beside[k], second.translation, mean)
+    nearer = nearer_by_slant(place, first.translation, mean) - nearer_by_slant(beside, second.translation, mean)
     bed = mean[:, 2] > UPRIGHT
     apart = (second.translation - first.translation) * [1.0, 1.0, 0.0]
-    design = np.column_stack([np.where(bed, 0.0, -nearer), np.where(bed, -nearer, 0.0), np.where(bed, 0.0, mean @ apart), np.where(bed, mean @ apart, 0.0)])
-    residual = ((place[i] - beside[k]) * mean).sum(axis=1) + design @ np.array(common)
+    design = np.column_stack(
+        [
+            np.where(bed, 0.0, -nearer),
+            np.where(bed, -nearer, 0.0),
+            np.where(bed, 0.0, mean @ apart),
+            np.where(bed, mean @ apart, 0.0),
+        ]
+    )
+    residual = ((place - beside) * mean).sum(axis=1) + design @ np.array(common)
     close = np.abs(residual) < within
-    i, k, mean, residual, design = i[close], k[close], mean[close], residual[close], design[close]
+    i, k, place, beside = i[close], k[close], place[close], beside[close]
+    mean, residual, design = mean[close], residual[close], design[close]
     if len(i) < 20:
         return None
     sigma = np.sqrt(one.spread[i] ** 2 / one.count[i] + other.spread[k] ** 2 / other.count[k] + RELIEF**2)
     return Rows(
-        residual, sigma, pose_derivatives(place[i], first, mean), scans[0], scans[1],
-        -pose_derivatives(beside[k], second, mean), design, np.array(columns), _stretches(place[i]),
+        residual, sigma, pose_derivatives(place, first, mean), scans[0], scans[1],
+        -pose_derivatives(beside, second, mean), design, columns, _stretches(place),
         np.full(len(i), SHARED), "scan", "",
     )  # fmt: skip

@@ -9,11 +9,11 @@ import numpy as np
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.registration.underwater.adjustment import adjust, scan_of
+from tunneldb.registration.underwater.adjustment import fit, scan_of
 from tunneldb.registration.underwater.choice import DECIDED, explained, margin
 from tunneldb.registration.underwater.first_pose import Candidate, LevelScan, candidates, level, likeness
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
-from tunneldb.registration.underwater.observations import Patches, Pose, find_patches
+from tunneldb.registration.underwater.observations import Patches, Pose, find_patches, find_smooth_patches
 from tunneldb.registration.underwater.results import SonarCloud
 from tunneldb.registration.underwater.walls import Walls
 
@@ -44,7 +44,7 @@ class PreparedScan:
     flat : LevelScan
     thin : (n, 3) float64 array
         Some of its points, evenly, file's axes.
-    patches : Patches
+    patches, smooth : Patches
         Of all of its points.
     edges : (k, 3) float64 array
         Where its walls end, at the water's level, file's axes.
@@ -54,6 +54,7 @@ class PreparedScan:
     flat: LevelScan
     thin: Float
     patches: Patches
+    smooth: Patches
     edges: Float
 
 
@@ -96,7 +97,8 @@ def prepare(cloud: SonarCloud, walls: Walls) -> PreparedScan:
     """
     every = max(1, len(cloud.points) // TRIED_POINTS)
     flat = level(cloud.points[:: max(1, len(cloud.points) // LEVEL_POINTS)], cloud.up, walls.width)
-    return PreparedScan(cloud, flat, cloud.points[::every], find_patches(cloud.points), flat.edges @ flat.rotation)
+    patches, smooth = find_patches(cloud.points), find_smooth_patches(cloud.points)
+    return PreparedScan(cloud, flat, cloud.points[::every], patches, smooth, flat.edges @ flat.rotation)
 
 
 def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> StartedScan | NotStarted:
@@ -147,9 +149,9 @@ def _try(points: Float, patches: Patches, candidate: Candidate, walls: Walls, fo
     pose = Pose(candidate.rotation, candidate.translation, 1.0)
     first = tuple(k for k, one in enumerate(found) if one.placed.ladder.name == candidate.ladder)
     no_edges = np.zeros((0, 3))  # the height is to come from the ladder alone, to be compared with the water's
-    pose = adjust([scan_of(points, patches, no_edges, pose, first, found)], walls, found, [], FIRST_REACHES).poses[0]
+    pose = fit([scan_of(points, patches, patches, no_edges, pose, first, found)], walls, found, [], FIRST_REACHES).poses[0]
     near = _near(pose, found)
-    pose = adjust([scan_of(points, patches, no_edges, pose, near, found)], walls, found, [], FIRST_REACHES[-3:]).poses[0]
+    pose = fit([scan_of(points, patches, patches, no_edges, pose, near, found)], walls, found, [], FIRST_REACHES[-3:]).poses[0]
     space = pose.apply(points)
     likenesses = [(likeness(space, pose.translation, found[k].placed), k) for k in near]
     seen = tuple(k for value, k in likenesses if value > LEAST_LIKENESS)

@@ -12,6 +12,8 @@ from tunneldb.registration.underwater.laser_ladders import LaserLadder
 from tunneldb.registration.underwater.single import PreparedScan, StartedScan, start
 from tunneldb.registration.underwater.walls import Walls
 
+FIRST = 0.5  # of the likelihood (its logarithm) of the surest of a round: less sure ones wait for the next
+
 
 def start_all(
     scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[LaserLadder], *, several: bool
@@ -53,12 +55,18 @@ def start_all(
     reliefs = Reliefs(scans)
     started = _agreeing(reliefs, started, reasons, several=several)
     left = [i for i in scans if i not in started]
-    while started and left:
-        beside = {i: at for i in left if (at := place_beside(i, reliefs, started, walls, found)) is not None}
-        if not beside:
-            break
-        started |= beside
-        left = [i for i in left if i not in beside]
+    beside: dict[int, tuple[StartedScan, float]] = {}
+    new = list(started)
+    while new and left:
+        for i in left:
+            if any(reliefs.may_overlap(k, i) for k in new):
+                at = place_beside(i, reliefs, started, walls, found)
+                beside = {k: one for k, one in beside.items() if k != i} | ({} if at is None else {i: at})
+        # what is less sure, farther off, may become so beside those that come first
+        most = max((likelihood for _, likelihood in beside.values()), default=0.0)
+        new = [i for i, (_, likelihood) in beside.items() if likelihood >= FIRST * most]
+        started |= {i: beside.pop(i)[0] for i in new}
+        left = [i for i in left if i not in started]
     reasons = {i: reason for i, reason in reasons.items() if i not in started}
     return _agreeing(reliefs, started, reasons, several=several), reasons
 
