@@ -43,8 +43,7 @@ NEARER_SIGMA = (0.0005, 0.002)  # of the shares by which relief of walls and of 
 # Parameters common to all scans but for the ladders: changes of batter of either side, depth behind a bar's near surface,
 # height of the waterline, zero on masonry, two slants, two of those shares
 COMMON = 9
-# Least standard deviations of a ladder by the laser: turns, rad, and shifts, m; it may sway or bend, but keeps its height.
-LADDER_TURN, LADDER_SHIFT, LADDER_HEIGHT = 0.0005, 0.002, 0.0005
+LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
 # rad: what slanting beams on a rough wall hear in common, 0.6 mm over 2 m of its height; no scan shows that by itself
 SLANT = 0.0003
 CUT = 3.0  # standard deviations at which a row has a quarter of its weight
@@ -281,7 +280,7 @@ def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
     for k, ladder in enumerate(ladders):
         first = POSE * scans + COMMON + 6 * k
         own = np.sqrt(np.diag(ladder.covariance)[:6])
-        sigma[first : first + 6] = np.hypot(own, [LADDER_TURN] * 3 + [LADDER_SHIFT] * 2 + [LADDER_HEIGHT])
+        sigma[first : first + 6] = np.hypot(own, [LADDER_TURN] * 3 + [LADDER_SHIFT] * 3)
     return np.diag(1.0 / sigma**2)
 
 
