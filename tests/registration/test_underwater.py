@@ -182,10 +182,10 @@ def test_scans_at_wrong_places_contradict_each_other(scene: Scene) -> None:
     reliefs = Reliefs({i: prepare(cloud, walls) for i, cloud in enumerate(scene.clouds())})
     along = scene.canal.turn @ [1.0, 0.0, 0.0]
     first, second = (Pose(scan.rotation, scan.translation - ORIGIN, scan.scale) for scan in scene.scans)
-    assert agreement(0, 1, (first, second), reliefs) != -1
-    assert agreement(0, 0, (first, first), reliefs) == 1
+    assert agreement(0, 1, (first, second), reliefs, walls) != -1
+    assert agreement(0, 0, (first, first), reliefs, walls) == 1
     moved = replace(first, translation=first.translation + 3.0 * along)
-    assert agreement(0, 0, (first, moved), reliefs) == -1
+    assert agreement(0, 0, (first, moved), reliefs, walls) == -1
 
 
 def test_a_ladder_that_the_laser_does_not_see_is_not_taken_for_another(scene: Scene) -> None:

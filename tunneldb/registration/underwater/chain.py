@@ -132,25 +132,33 @@ def _settled(
     if pose is None:
         return None
     beside = sorted(started, key=lambda k: float(np.linalg.norm(started[k].pose.translation - pose.translation)))[:BESIDE]
-    together, own = [_levelled(scans[k], started[k].pose) for k in beside], _levelled(scans[i], pose)
-    pairs = [(k, len(beside)) for k in range(len(beside))]
+    own, others = _levelled(scans[i], pose), [_levelled(scans[k], started[k].pose) for k in beside]
+    found, likelihood = _fitted_beside(own, others, walls, place.direction, hold_height=_tells_water(scans[i]))
+    moved = abs(float((found.translation - pose.translation)[:2] @ place.direction))
+    return (found, likelihood) if moved < MOST_MOVED else None
+
+
+def _fitted_beside(
+    own: Scan, others: Sequence[Scan], walls: Walls, direction: Float, *, hold_height: bool
+) -> tuple[Pose, float]:
+    """Pose of a scan fitted to others that stay, tried again along the canal, and the likelihood of it by the bed."""
+    pairs = [(k, len(others)) for k in range(len(others))]
 
     def fitted(start: Pose, reaches: Sequence[float]) -> Pose:
         free = replace(own, pose=start)
-        return fit([*together, free], walls, (), pairs, reaches, len(beside), hold_height=_tells_water(scans[i])).poses[-1]
+        return fit([*others, free], walls, (), pairs, reaches, len(others), hold_height=hold_height).poses[-1]
 
     def likelihood(one: Pose) -> float:
-        rough = _roughness(own.smooth, one, place.direction)
-        return sum(bed_likelihood((other.smooth, own.smooth), (other.pose, one), rough) for other in together)
+        rough = _roughness(own.smooth, one, direction)
+        return sum(bed_likelihood((other.smooth, own.smooth), (other.pose, one), rough) for other in others)
 
     found = fitted(own.pose, REACHES)
-    along = np.array([*place.direction, 0.0])
+    along = np.array([*direction, 0.0])
     slid = [replace(found, translation=found.translation + slide * along) for slide in SLIDES]
     best = max(slid, key=likelihood)
     if best is not slid[len(slid) // 2]:
         found = fitted(best, REACHES[1:])
-    moved = abs(float((found.translation - pose.translation) @ along))
-    return (found, likelihood(found)) if moved < MOST_MOVED else None
+    return found, likelihood(found)
 
 
 def _tells_water(scan: PreparedScan) -> bool:
@@ -246,11 +254,19 @@ def _pose(i: int, place: _Place, reliefs: Reliefs, started: Mapping[int, Started
     return Pose(basis @ flat.rotation, np.array([*plan, height]), 1.0)
 
 
-def agreement(one: int, other: int, poses: tuple[Pose, Pose], reliefs: Reliefs) -> int:
-    """Whether two scans show the same bed where their poses say that they see the same: 1 yes, -1 no, 0 it can't be told."""
+def agreement(one: int, other: int, poses: tuple[Pose, Pose], reliefs: Reliefs, walls: Walls) -> int:
+    """Whether two scans show the same bed where their poses say that they see the same: 1 yes, -1 no, 0 it can't be told.
+
+    Where the relief at large does not tell, the second is fitted to the first from where it is said to stand.
+    """
     first, second = poses
     look = _direction(reliefs.scans[one], first)
     same = float(look @ _direction(reliefs.scans[other], second)) > 0.0
     along = float((second.translation - first.translation)[:2] @ look)
     said = float(reliefs.near(one, other, along, turned=not same).max())
-    return int(np.sign(said)) if abs(said) > SAID else 0
+    if abs(said) > SAID:
+        return int(np.sign(said))
+    scans = reliefs.scans
+    own, beside = _levelled(scans[other], second), _levelled(scans[one], first)
+    _, closely = _fitted_beside(own, [beside], walls, look, hold_height=_tells_water(scans[other]))
+    return int(np.sign(closely)) if abs(closely) > SURE else 0

@@ -53,7 +53,7 @@ def start_all(
     if upside_down and len(upside_down) >= len(started):
         raise upside_down[0]
     reliefs = Reliefs(scans)
-    started = _agreeing(reliefs, started, reasons, several=several)
+    started = _agreeing(reliefs, started, reasons, walls, several=several)
     left = [i for i in scans if i not in started]
     beside: dict[int, tuple[StartedScan, float]] = {}
     new = list(started)
@@ -68,13 +68,14 @@ def start_all(
         started |= {i: beside.pop(i)[0] for i in new}
         left = [i for i in left if i not in started]
     reasons = {i: reason for i, reason in reasons.items() if i not in started}
-    return _agreeing(reliefs, started, reasons, several=several), reasons
+    return _agreeing(reliefs, started, reasons, walls, several=several), reasons
 
 
 def _agreeing(
     reliefs: Reliefs,
     started: Mapping[int, StartedScan],
     reasons: dict[int, str],
+    walls: Walls,
     *,
     several: bool,
 ) -> dict[int, StartedScan]:
@@ -85,7 +86,7 @@ def _agreeing(
     """
     kept = dict(started)
     said = {
-        (a, b): agreement(a, b, (started[a].pose, started[b].pose), reliefs)
+        (a, b): agreement(a, b, (started[a].pose, started[b].pose), reliefs, walls)
         for a in started
         for b in started
         if a < b and np.linalg.norm(started[a].pose.translation - started[b].pose.translation) < OVERLAP
