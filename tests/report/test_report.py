@@ -19,7 +19,7 @@ import pytest
 import shapely
 from click.testing import CliRunner, Result
 from PIL import Image
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from support.example_survey import without_intensity
@@ -384,7 +384,7 @@ def test_table_sorts_and_filters(page: Page, leaks: list[dict[str, Any]]) -> Non
 def test_from_the_lining_to_the_leak_and_back(page: Page, leaks: list[dict[str, Any]]) -> None:
     page.locator('#strip-12400 a[href="#leak-3"] path').click()
     dialog = page.get_by_role("dialog")
-    assert dialog.locator("header b").inner_text() == "Leak 3"
+    expect(dialog.locator("header b")).to_have_text("Leak 3")
     assert dialog.locator("svg.view image").evaluate("image => image.getBBox().width") > 2
     assert page.url.endswith("#leak-3")
     dialog.get_by_role("button", name="Show in the table").click()
@@ -392,7 +392,7 @@ def test_from_the_lining_to_the_leak_and_back(page: Page, leaks: list[dict[str, 
     assert page.locator("#table tr.here td:first-child").inner_text() == "3"
     page.locator("#table tr.here").click()
     dialog.get_by_role("button", name="Next").click()
-    assert dialog.locator("header b").inner_text() == "Leak 5", "4 is rejected, and not in the table"
+    expect(dialog.locator("header b"), "4 is rejected, and not in the table").to_have_text("Leak 5")
     dialog.get_by_role("button", name="Show on the lining").click()
     assert page.locator("#strip-12400 a.here").get_attribute("href") == "#leak-5"
     page.locator("#strip-12400 figcaption button").click()
