@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from tunneldb.arrays import Float
-from tunneldb.registration.underwater.adjustment import Scan, fit, scan_of
+from tunneldb.registration.underwater.adjustment import Scan, fit
 from tunneldb.registration.underwater.first_pose import LevelScan
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
 from tunneldb.registration.underwater.observations import UPRIGHT, Patches, Pose, overlap_rows
@@ -133,20 +133,18 @@ def _settled(
         return None
     beside = sorted(started, key=lambda k: float(np.linalg.norm(started[k].pose.translation - pose.translation)))[:BESIDE]
     own, others = _levelled(scans[i], pose), [_levelled(scans[k], started[k].pose) for k in beside]
-    found, likelihood = _fitted_beside(own, others, walls, place.direction, hold_height=_tells_water(scans[i]))
+    found, likelihood = _fitted_beside(own, others, walls, place.direction)
     moved = abs(float((found.translation - pose.translation)[:2] @ place.direction))
     return (found, likelihood) if moved < MOST_MOVED else None
 
 
-def _fitted_beside(
-    own: Scan, others: Sequence[Scan], walls: Walls, direction: Float, *, hold_height: bool
-) -> tuple[Pose, float]:
+def _fitted_beside(own: Scan, others: Sequence[Scan], walls: Walls, direction: Float) -> tuple[Pose, float]:
     """Pose of a scan fitted to others that stay, tried again along the canal, and the likelihood of it by the bed."""
     pairs = [(k, len(others)) for k in range(len(others))]
 
     def fitted(start: Pose, reaches: Sequence[float]) -> Pose:
         free = replace(own, pose=start)
-        return fit([*others, free], walls, (), pairs, reaches, len(others), hold_height=hold_height).poses[-1]
+        return fit([*others, free], walls, (), pairs, reaches, len(others), hold_height=_tells_water(own)).poses[-1]
 
     def likelihood(one: Pose) -> float:
         rough = _roughness(own.smooth, one, direction)
@@ -161,7 +159,7 @@ def _fitted_beside(
     return found, likelihood(found)
 
 
-def _tells_water(scan: PreparedScan) -> bool:
+def _tells_water(scan: PreparedScan | Scan) -> bool:
     """Whether it shows where its walls end, at the water: it is level, while slopes that err add up from scan to scan."""
     return len(scan.edges) >= SOME_EDGES
 
@@ -170,7 +168,7 @@ def _levelled(scan: PreparedScan, pose: Pose) -> Scan:
     """The scan without ladders, as high as the water says."""
     if _tells_water(scan):
         pose = replace(pose, translation=np.array([*pose.translation[:2], -scan.flat.top]))
-    return scan_of(scan.thin, scan.patches, scan.smooth, scan.edges, pose, (), ())
+    return Scan(scan.patches, scan.smooth, scan.edges, pose, {})
 
 
 def _roughness(patches: Patches, pose: Pose, direction: Float) -> float:
@@ -268,5 +266,5 @@ def agreement(one: int, other: int, poses: tuple[Pose, Pose], reliefs: Reliefs, 
         return int(np.sign(said))
     scans = reliefs.scans
     own, beside = _levelled(scans[other], second), _levelled(scans[one], first)
-    _, closely = _fitted_beside(own, [beside], walls, look, hold_height=_tells_water(scans[other]))
+    _, closely = _fitted_beside(own, [beside], walls, look)
     return int(np.sign(closely)) if abs(closely) > SURE else 0

@@ -378,7 +378,7 @@ def overlap_rows(
             np.where(bed, mean @ apart, 0.0),
         ]
     )
-    residual = ((place - beside) * mean).sum(axis=1) + design @ np.array(common)
+    residual = ((place - beside) * mean).sum(axis=1) + design @ common
     close = np.abs(residual) < within
     i, k, place, beside = i[close], k[close], place[close], beside[close]
     mean, residual, design = mean[close], residual[close], design[close]
