@@ -69,10 +69,10 @@ def test_no_seam_shows_where_the_view_of_a_station_ends() -> None:
 def test_what_is_seen_beyond_the_limits_only_is_not_seen() -> None:
     chainage = GRID.chainages(slice(0, 1200))
     for window, limit in ((scan([30.0], 0.0)[0], RADIUS * np.tan(np.radians(75.0))), (scan([30.0], 0.0, 8.0)[0], 48.0**0.5)):
-        columns = slice(100, 1100)
+        columns = slice(150, 1050)
         state = pixel_states(window, columns, GRID, FLOOR, SectionOutliers.of(ROUND, MOST), 0.03)
         off = np.abs(chainage[columns] - 30.0)
-        assert reach(PIXEL) < 100
+        assert reach(PIXEL) < 150
         assert (window.weight[:, np.abs(chainage - 30.0) > limit + PIXEL] == 0).all()
         assert (state[1:-1, off > limit + PIXEL] == PixelState.EMPTY).all()
         assert (state[1:-1, off < limit - PIXEL] == PixelState.LINING).mean() > 0.99

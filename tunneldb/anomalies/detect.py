@@ -148,7 +148,7 @@ def _regions(dark: Bool, contrast: ContrastImage, min_area: float) -> list[Regio
     if not joints.any():
         return find_regions(dark, dark, contrast, min_area, _may_drip)
     parts = [find_regions(part, dark, contrast, min_area, _may_drip) for part in (dark & ~joints, joints)]
-    return sorted([*parts[0], *parts[1]], key=lambda region: (region.column, region.row))
+    return sorted([*parts[0], *parts[1]], key=lambda region: region.place)
 
 
 def _without_joints(regions: Sequence[Region], judged: Sequence[Anomaly | None], spacing: float) -> list[Anomaly | None]:

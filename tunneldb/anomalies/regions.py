@@ -95,6 +95,11 @@ class Region:
         return self.column + self.mask.shape[1]
 
     @property
+    def place(self) -> tuple[int, int, int]:
+        """Column and row of the lowest corner, and the first pixel of the lowest row: no two regions have the same."""
+        return self.column, self.row, self.column + int(self.mask[0].argmax())
+
+    @property
     def area(self) -> float:
         """m² in the unrolled plane."""
         return float(np.count_nonzero(self.mask)) * self.pixel**2
@@ -159,7 +164,7 @@ def find_regions(
     wanted = ends | large | (components.extent * grid.pixel >= LONG)
     if may_drip is None:
         found = _regions(runs, components.label, np.flatnonzero(wanted), dark, contrast)
-        return sorted(found, key=lambda region: (region.column, region.row))
+        return sorted(found, key=lambda region: region.place)
     whole, bridges = attach_drips(components, wanted, ends, grid, contrast.spacing)
     roots = np.unique(whole[whole != np.arange(len(whole))])
     for root, region in zip(roots.tolist(), _regions(runs, components.label, roots, dark, contrast), strict=True):
@@ -168,7 +173,7 @@ def find_regions(
             bridges = bridges[bridges[:, 3] != root]
     label = np.concatenate([whole[components.label], bridges[:, 3]])
     found = _regions(np.concatenate([runs, bridges[:, :3]]), label, np.unique(whole[wanted]), dark, contrast)
-    return sorted(found, key=lambda region: (region.column, region.row))
+    return sorted(found, key=lambda region: region.place)
 
 
 def _regions(runs: Int64, label: Intp, chosen: Intp, dark: Bool, contrast: ContrastImage) -> list[Region]:
@@ -257,7 +262,7 @@ def touching_groups(parts: Sequence[Region]) -> list[list[int]]:
     ]
     count, label = connected(len(parts), *np.array(pairs, dtype=np.int64).reshape(-1, 2).T)
     # In order of place, whatever order the kilometres came in.
-    places = sorted(range(len(parts)), key=lambda k: (parts[k].column, parts[k].row))
+    places = sorted(range(len(parts)), key=lambda k: parts[k].place)
     groups: list[list[int]] = [[] for _ in range(count)]
     for k in places:
         groups[label[k]].append(k)

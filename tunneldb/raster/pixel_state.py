@@ -9,6 +9,7 @@ import numpy as np
 from tunneldb.arrays import UInt8
 from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.raster import appendages as appendage
+from tunneldb.raster import relief
 from tunneldb.raster import ring_steps as step
 from tunneldb.raster.accumulator import Window
 from tunneldb.raster.floor import Floor
@@ -29,7 +30,7 @@ class PixelState(IntEnum):
 
 def reach(pixel: float) -> int:
     """How far, in pixels, what a pixel's state depends on lies from it at most."""
-    return appendage.reach(pixel) + step.reach(pixel)
+    return appendage.reach(pixel) + relief.reach(pixel) + step.reach(pixel)
 
 
 def pixel_states(window: Window, columns: slice, grid: Grid, floor: Floor, outliers: SectionOutliers, delta: float) -> UInt8:
@@ -48,7 +49,7 @@ def pixel_states(window: Window, columns: slice, grid: Grid, floor: Floor, outli
     outliers : SectionOutliers
         Where the surface leaves the wall.
     delta : float
-        Distance from the lining's plane from which a pixel is an appendage, m.
+        Distance from the lining's plane from which a pixel is an appendage, m; more where the lining has a relief of its own.
 
     Returns
     -------
@@ -65,10 +66,13 @@ def pixel_states(window: Window, columns: slice, grid: Grid, floor: Floor, outli
     if jumps.any():
         offset = offset - jumps
     # What counts for the planes of the columns, of what counts for the steps.
-    near = appendage.reach(grid.pixel)
+    near = appendage.reach(grid.pixel) + relief.reach(grid.pixel)
     first = max(columns.start - near, window.columns.start)
     offset = np.ascontiguousarray(offset[:, first - window.columns.start : columns.stop + near - window.columns.start])
     distance = appendage.distance_from_plane(offset, grid.pixel, (row, grid.first_column + first))
+    # Lining that is rough by itself is no appendage: distances count in parts of its relief.
+    limit = relief.relief_limit(distance, grid.pixel, (row, grid.first_column + first))
+    distance /= np.maximum(limit / np.float32(delta), np.float32(1.0))
     recess = appendage.recessed(offset, distance, grid.pixel, delta)
     off = appendage.off_plane(distance, recess, grid.pixel, delta)
     inner = slice(columns.start - window.columns.start, columns.stop - window.columns.start)

@@ -1,0 +1,1 @@
+"""Scenes that detection has never seen, written by others; see README.md."""
