@@ -23,15 +23,16 @@ from benchmarks.blind.score import by_phenomenon, calibration_error, hold, relia
 from benchmarks.common import RESULTS, print_table, progress, save, scratch_database
 from tunneldb.database import connect
 
-ROUNDS = sorted(path.name for path in Path(__file__).parent.glob("round_*"))
+ROUNDS = ("known", *sorted(path.name for path in Path(__file__).parent.glob("round_*")))
 HEADER = ("scene", "true", "found", "called", "right", "false", "leak F1", "area R", "area P", "area F1", "area p95",
           "edge p95", "pieces", "false/1000")  # fmt: skip
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.blind", description=__doc__.splitlines()[0])
-    parser.add_argument("rounds", nargs="*", metavar="ROUND", help=f"of {', '.join(ROUNDS)}")
-    parser.add_argument("--all", action="store_true", help="all rounds")
+    asked = parser.add_mutually_exclusive_group(required=True)
+    asked.add_argument("rounds", nargs="*", default=[], metavar="ROUND", help=f"of {', '.join(ROUNDS)}")
+    asked.add_argument("--all", action="store_true", help="all rounds")
     parser.add_argument("--only", default="", metavar="WORD", help="scenes with this in their name")
     parser.add_argument("--table", action="store_true", help="print the results stored last")
     parser.add_argument("--folder", type=Path, help="keep the files of the scenes here")
@@ -50,7 +51,7 @@ def main() -> None:
                 save(f"blind-{name}", {"outcomes": [one.to_json() for one in outcomes]})
         show(name, outcomes)
         every += outcomes
-    if len(every) > len(outcomes):
+    if arguments.all or len(arguments.rounds) > 1:
         show("all rounds", every)
 
 
@@ -77,22 +78,21 @@ def measure(name: str, only: str, folder: Path | None, dsn: str | None) -> list[
 
 def show(name: str, outcomes: list[Outcome]) -> None:
     """Print the tables of a round."""
-    scored = [hold(one) for one in outcomes]
     rows = [_cells(one.scene, [one]) for one in outcomes]
     print_table(name, HEADER, [*rows, _cells("all", outcomes)])
-    phenomena = by_phenomenon(scored)
+    phenomena = by_phenomenon(hold(outcomes))
     print_table("by phenomenon", ("", "true", "found", "area R"), [(k, n, f, f"{a:.2f}") for k, (n, f, a) in phenomena.items()])
-    count, stated, true = reliability(scored)
+    count, stated, true = reliability(outcomes)
     print_table("probabilities", ("", "stated", "true", "number"),
                 [("", f"{s:.2f}", f"{t:.2f}", int(n)) for n, s, t in zip(count, stated, true, strict=True) if n])  # fmt: skip
-    print(f"calibration error {calibration_error(scored):.3f}; looked at for each true leak {review(scored):.2f}")
+    print(f"calibration error {calibration_error(outcomes):.3f}; looked at for each true leak {review(outcomes):.2f}")
 
 
 def _cells(name: str, outcomes: list[Outcome]) -> list[str]:
-    v = row([hold(one) for one in outcomes])
+    v = row(hold(outcomes))
     counts = [str(int(v[key])) for key in ("true", "found", "called", "right", "false")]
-    shares = [f"{v[key]:.3f}" for key in ("leak_f1", "area_recall", "area_precision", "area_f1")]
-    cells = [name, *counts, *shares, f"{100 * v['area_p95']:.0f} %", f"{1000 * v['edge_p95']:.0f} mm",
+    shares = [f"{v[key]:.3f}" for key in ("f1", "area_recall", "area_precision", "area_f1")]
+    cells = [name, *counts, *shares, f"{100 * v['area_error_p95']:.0f} %", f"{1000 * v['edge_p95']:.0f} mm",
              f"{v['pieces']:.2f}", f"{v['false_per_1000']:.2f}"]  # fmt: skip
     return ["" if cell.startswith("nan") else cell for cell in cells]
 

@@ -77,3 +77,12 @@ def test_on_smooth_lining_nothing_changes():
     offset[150:160] = 0.05
     offset[:, 300:303] = 0.04
     np.testing.assert_array_equal(off(offset), off(offset, relief=False))
+
+
+@pytest.mark.parametrize(("spread", "share"), [(0.003, 0.0), (0.01, 0.0), (0.05, 0.0), (0.003, 0.3), (0.003, 0.6)])
+def test_what_need_not_be_known_changes_nothing_else(spread, share):
+    rng = np.random.default_rng(6)
+    distance = rng.normal(0, spread, (400, 600)).astype(np.float32)
+    distance[:, : round(share * 600)] += 0.1
+    whole, needed = (relief_limit(distance, PIXEL, (3, 5), least) for least in (0.0, 0.03))
+    np.testing.assert_array_equal(np.maximum(needed, 0.03), np.maximum(whole, 0.03))

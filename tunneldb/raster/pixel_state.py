@@ -71,7 +71,7 @@ def pixel_states(window: Window, columns: slice, grid: Grid, floor: Floor, outli
     offset = np.ascontiguousarray(offset[:, first - window.columns.start : columns.stop + near - window.columns.start])
     distance = appendage.distance_from_plane(offset, grid.pixel, (row, grid.first_column + first))
     # Lining that is rough by itself is no appendage: distances count in parts of its relief.
-    limit = relief.relief_limit(distance, grid.pixel, (row, grid.first_column + first))
+    limit = relief.relief_limit(distance, grid.pixel, (row, grid.first_column + first), delta)
     distance /= np.maximum(limit / np.float32(delta), np.float32(1.0))
     recess = appendage.recessed(offset, distance, grid.pixel, delta)
     off = appendage.off_plane(distance, recess, grid.pixel, delta)

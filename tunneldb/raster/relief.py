@@ -30,7 +30,7 @@ def reach(pixel: float) -> int:
     return (2 * half + 1) * tile
 
 
-def relief_limit(distance: Single, pixel: float, corner: tuple[int, int]) -> Single:
+def relief_limit(distance: Single, pixel: float, corner: tuple[int, int], least: float = 0.0) -> Single:
     """By how much the lining departs from its planes about each pixel: LIMIT standard deviations, m, at most MOST.
 
     The median departure over the tiles about each one, times that of a normal distribution: less than half of the tiles may
@@ -44,6 +44,8 @@ def relief_limit(distance: Single, pixel: float, corner: tuple[int, int]) -> Sin
         Side of a pixel, m.
     corner : (int, int)
         Row and column of its first pixel in an image of which this is a part; tiles lie alike in all parts.
+    least : float
+        What is less than this, m, need not be known: if all is, zeros are returned.
 
     Returns
     -------
@@ -60,20 +62,26 @@ def relief_limit(distance: Single, pixel: float, corner: tuple[int, int]) -> Sin
     ordered = np.sort(samples, axis=2)  # NaNs come last
     count = np.count_nonzero(~np.isnan(ordered), axis=2)
     median = np.take_along_axis(ordered, np.maximum(count - 1, 0)[:, :, None] // 2, axis=2)[:, :, 0]
-    about = _median_about(np.where(count > 0, median, np.nan), half)
+    about = _median_about(np.where(count > 0, median, np.nan), half, least / (LIMIT * MAD_TO_SIGMA))
     limit = np.minimum(LIMIT * MAD_TO_SIGMA * about, MOST).astype(np.float32)
     whole = np.repeat(np.repeat(limit, tile, axis=0), tile, axis=1)
     return np.asarray(whole[top : top + rows, left : left + columns])
 
 
-def _median_about(values: Single, half: int) -> Single:
-    """Median of the tiles about each one; of unknown ones the nearest that is known counts, if it is about them."""
+def _median_about(values: Single, half: int, least: float) -> Single:
+    """Median of the tiles about each one; of unknown ones the nearest that is known counts, if it is about them.
+
+    Zeros if no median is greater than the least: smooth lining is most of all that there is, and medians take long.
+    """
     known = np.isfinite(values)
     if not known.any():
         return np.zeros_like(values)
     far, place = ndimage.distance_transform_cdt(~known, "chessboard", return_indices=True)
     filled = np.where(far <= half, values[tuple(place)], np.float32(0.0))
-    return np.asarray(ndimage.median_filter(filled, 2 * half + 1, mode="nearest"))
+    side = 2 * half + 1
+    if not (ndimage.uniform_filter((filled > least).astype(np.float64), side, mode="nearest") > 0.5).any():
+        return np.zeros_like(values)
+    return np.asarray(ndimage.median_filter(filled, side, mode="nearest"))
 
 
 def _sides(pixel: float) -> tuple[int, int]:
