@@ -11,7 +11,7 @@ from shapely.geometry import Polygon, box
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.detect import Anomaly, Detection, find_anomalies
 from tunneldb.anomalies.regions import Region, RegionProperties
-from tunneldb.anomalies.verdict import classify, detectability
+from tunneldb.anomalies.verdict import classify
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.pixel_state import PixelState
@@ -272,4 +272,4 @@ def test_confidence_grows_with_contrast_size_and_support() -> None:
         assert told == sorted(told)
         assert len(set(told)) == len(told)
         assert 0 < told[0] < told[-1] < 1
-    assert classify(_region(30, 3.0)).confidence == detectability(_region(30, 3.0))
+

@@ -6,9 +6,9 @@ import numpy as np
 
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.windows import row_blocks
-from tunneldb.arrays import Bool, Int16, Int64, UInt8
+from tunneldb.arrays import Bool, Int16, Int64, Single, UInt8
 from tunneldb.compiled import kernel
-from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
 
@@ -16,7 +16,7 @@ BAND = 2
 """Pixels to both sides of the boundary that may change sides, each time."""
 
 TIMES = 2
-"""How many times they may."""
+"""How many times they may; twice as often where lining is averaged over windows, which blur the boundary more."""
 
 CONTRAST = 6
 """Half the side of the window in which the contrast of a region is taken, pixels."""
@@ -26,6 +26,9 @@ FEW = 5
 
 ENOUGH = 4
 """So many pixels tell whether one lies on this side or that: half of a contrast of four sigma is four of their mean's."""
+
+CERTAIN = 2.5
+"""Of pixels on either side of a boundary 1 of 160 then lies on the wrong side of half of the contrast."""
 
 EMPTY, RECESS = int(PixelState.EMPTY), int(PixelState.RECESS)
 
@@ -50,10 +53,14 @@ def refine_boundary(dark: Bool, contrast: ContrastImage, size: int) -> Bool:
     (rows, columns) bool array
         The same array.
     """
-    for _ in range(TIMES):
+    windows, sigmas, tile = np.zeros((1, 1), np.uint8), np.zeros((2, 1, 1), np.float32), max(dark.shape)
+    if contrast.texture is not None and contrast.texture.half.any():
+        windows, tile = contrast.texture.half, contrast.tile
+        sigmas = np.stack([contrast.texture.pixel_sigma, contrast.texture.sigma]) / np.float32(STEP["corrected"])
+    for _ in range(2 * TIMES if windows.any() else TIMES):
         interior, near = _about_boundary(dark)
         changed = np.zeros(len(near), np.bool_)
-        _changed(dark, interior, contrast.drop, contrast.state, near, size // 2, changed)
+        _changed(dark, interior, contrast.drop, contrast.state, windows, sigmas, tile, near, size // 2, changed)
         row, column = np.divmod(near[changed], dark.shape[1])
         dark[row, column] = ~dark[row, column]
     for columns, mask in mask_of_polygons(contrast.grid, contrast.drawn):
@@ -100,28 +107,47 @@ def _dilated(mask: Bool, axis: int, reach: int) -> Bool:
 
 @kernel
 def _changed(
-    dark: Bool, interior: Bool, drop: Int16, state: UInt8, near: Int64, most: int, changed: Bool
+    dark: Bool,
+    interior: Bool,
+    drop: Int16,
+    state: UInt8,
+    windows: UInt8,
+    sigmas: Single,
+    tile: int,
+    near: Int64,
+    most: int,
+    changed: Bool,
 ) -> None:  # pragma: no cover - compiled
     """Tell which of the pixels near the boundary change sides: ``changed`` (n,), False before.
 
     The contrast of a region is the mean drop of its interior about a pixel, of every other pixel; the pixel is dark if the mean
-    drop of the lining next to it, within up to ``most`` pixels, is more than half of that.
+    drop of the lining next to it, within up to ``most`` pixels, is more than half of that. In a tile with ``windows`` (half
+    their side, pixels) lining differs by the first of ``sigmas`` from pixel to pixel, by the second over a window, steps; there
+    so much about a pixel is averaged that half of the contrast is CERTAIN of what is left.
     """
     rows, columns = dark.shape
     for k in range(near.shape[0]):
         i, j = near[k] // columns, near[k] % columns
         if state[i, j] > RECESS:
             continue
+        down, along = i // tile, min(j // tile, windows.shape[1] - 1)
+        window = int(windows[down, along])
+        reach, step = max(CONTRAST, 2 * window), 2 if window == 0 else 3
         contrast, held = 0, 0
-        for m in range(i - CONTRAST, i + CONTRAST + 1, 2):
-            for n in range(j - CONTRAST, j + CONTRAST + 1, 2):
+        for m in range(i - reach, i + reach + 1, step):
+            for n in range(j - reach, j + reach + 1, step):
                 if 0 <= m < rows and 0 <= n < columns and interior[m, n] and drop[m, n] != NODATA:
                     contrast += drop[m, n]
                     held += 1
         if held < FEW:
             continue
-        level, seen, half = 0, 0, 0
-        while seen < ENOUGH and half < most:
+        half = 0
+        if window > 0:
+            least, single = sigmas[1, down, along], sigmas[0, down, along]
+            share = (single - 0.5 * contrast / held / CERTAIN) / max(single - least, 1e-6)
+            half = max(round(window * min(max(share, 0.0), 1.0)) - 1, 0)
+        level, seen = 0, 0
+        while seen < ENOUGH and half < max(most, window):
             half += 1
             level, seen = 0, 0
             for m in range(i - half, i + half + 1):

@@ -11,7 +11,11 @@ from shapely.geometry import Polygon
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.background.level_map import BackgroundMap
 from tunneldb.anomalies.boundary import refine_boundary
+from tunneldb.anomalies.evidence import EvidenceModel
+from tunneldb.anomalies.features import measure_regions
+from tunneldb.anomalies.hidden import behind_strips
 from tunneldb.anomalies.joints import crossed_joints, find_joints
+from tunneldb.anomalies.levels import weaker_parts
 from tunneldb.anomalies.regions import Region, find_regions
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
 from tunneldb.anomalies.verdict import Verdict, classify
@@ -57,14 +61,16 @@ class Anomaly:
     verdict: Verdict
 
     @classmethod
-    def of(cls, region: Region, min_area: float) -> Anomaly | None:
-        """Make an anomaly of a region; None if it holds no point or is too small.
+    def of(
+        cls, region: Region, min_area: float, model: EvidenceModel | None = None, features: Float | None = None
+    ) -> Anomaly | None:
+        """Make an anomaly of a region, judged by a model and its features; None if it holds no point or is too small.
 
         Leaks and dark spots must not be smaller than ``min_area``, m², joints no shorter than MIN_JOINT.
         """
-        if not region.filled:
+        if not may_count(region, min_area):
             return None
-        verdict = classify(region)
+        verdict = classify(region, model, features)
         if verdict.kind == "joint":
             if max(region.mask.shape) * region.pixel < MIN_JOINT:
                 return None
@@ -103,7 +109,9 @@ class Detection:
     wet_pixels: int
 
 
-def find_anomalies(contrast: ContrastImage, background: BackgroundMap, min_area: float) -> Detection:
+def find_anomalies(
+    contrast: ContrastImage, background: BackgroundMap, min_area: float, model: EvidenceModel | None = None
+) -> Detection:
     """Find what is dark in a kilometre.
 
     Parameters
@@ -114,19 +122,20 @@ def find_anomalies(contrast: ContrastImage, background: BackgroundMap, min_area:
         What they are relative to.
     min_area : float
         Smaller leaks are left out, m² in the unrolled plane.
+    model : EvidenceModel, optional
+        By which regions are judged; by default the one that comes with the program.
     """
     grid, state = contrast.grid, contrast.state
-    lining, possible = _lining_in_columns(state, grid.inner)
-    size = filter_size(_scanned_share(lining, possible, round(GAP / grid.pixel)))
+    lining, _ = _lining_in_columns(state, grid.inner)
     pixels = int(lining.sum())
     wet = np.zeros(state.shape, np.bool_)
     if not background.count:
-        return Detection([], [], wet.copy(), wet, size, pixels, 0)
-    dark = refine_boundary(dark_pixels(contrast, size), contrast, size)
+        return Detection([], [], wet.copy(), wet, filter_size(1.0), pixels, 0)
+    dark, size = find_dark(contrast)
     anomalies, cut, leaks = [], [], []
     ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
-    regions = _regions(dark, contrast, min_area)
-    judged = [Anomaly.of(region, min_area) for region in regions]
+    regions = find_dark_regions(dark, contrast, min_area, model)
+    judged = _judged(regions, min_area, model)
     if contrast.spacing:
         judged = _without_joints(regions, judged, contrast.spacing)
     for region, anomaly in zip(regions, judged, strict=True):
@@ -141,14 +150,53 @@ def find_anomalies(contrast: ContrastImage, background: BackgroundMap, min_area:
     return Detection(anomalies, cut, dark, wet, size, pixels, sum(region.filled for region in leaks))
 
 
-def _regions(dark: Bool, contrast: ContrastImage, min_area: float) -> list[Region]:
-    """Regions of the dark pixels, joints cut off from what they run through."""
-    inner = contrast.grid.inner
-    joints = find_joints(dark, inner.start, inner.stop, contrast.grid.pixel, contrast.spacing)
-    if not joints.any():
-        return find_regions(dark, dark, contrast, min_area, _may_drip)
-    parts = [find_regions(part, dark, contrast, min_area, _may_drip) for part in (dark & ~joints, joints)]
-    return sorted([*parts[0], *parts[1]], key=lambda region: region.place)
+def may_count(region: Region, min_area: float) -> bool:
+    """Whether a region holds points, and is large enough for a leak, m², or long enough for a joint."""
+    large = region.area >= min_area * (1 - 1e-12) or max(region.mask.shape) * region.pixel >= MIN_JOINT
+    return bool(region.filled) and large
+
+
+def _judged(regions: Sequence[Region], min_area: float, model: EvidenceModel | None) -> list[Anomaly | None]:
+    """Judge the regions of a kilometre, each held against those about it; None for what is too small."""
+    judged: list[Anomaly | None] = [None] * len(regions)
+    counted = [k for k, region in enumerate(regions) if may_count(region, min_area)]
+    for k, features in zip(counted, measure_regions([regions[k] for k in counted]), strict=True):
+        judged[k] = Anomaly.of(regions[k], min_area, model, features)
+    return judged
+
+
+def find_dark(contrast: ContrastImage) -> tuple[Bool, int]:
+    """Mark dark pixels: by the threshold, up to where half of their contrast is reached.
+
+    Returns
+    -------
+    dark : (rows, columns) bool array
+    size : int
+        Side of the median filter, pixels.
+    """
+    lining, possible = _lining_in_columns(contrast.state, contrast.grid.inner)
+    size = filter_size(_scanned_share(lining, possible, round(GAP / contrast.grid.pixel)))
+    return refine_boundary(dark_pixels(contrast, size), contrast, size), size
+
+
+def find_dark_regions(dark: Bool, contrast: ContrastImage, min_area: float, model: EvidenceModel | None = None) -> list[Region]:
+    """Regions of the dark pixels that may be leaks, joints or dark spots, joints cut off from what they run through."""
+
+    def may_drip(region: Region) -> bool:
+        return bool(region.filled) and classify(region, model).kind == "leak"
+
+    inner, pixel = contrast.grid.inner, contrast.grid.pixel
+    joints = find_joints(dark, inner.start, inner.stop, pixel, contrast.spacing)
+    plain = dark & ~joints
+    weak = weaker_parts(plain, contrast)
+    # The weaker part of a region is no dark lining for the darker one; that one ends at it.
+    parts = [(plain & ~weak, dark & ~weak), (weak, dark), (joints, dark)]
+    found = []
+    for part, others in parts:
+        if part.any():
+            whole = part | behind_strips(part, contrast.state, inner.start, inner.stop, pixel)
+            found += find_regions(whole, others, contrast, min_area, may_drip)
+    return sorted(found, key=lambda region: region.place)
 
 
 def _without_joints(regions: Sequence[Region], judged: Sequence[Anomaly | None], spacing: float) -> list[Anomaly | None]:
@@ -163,12 +211,9 @@ def _without_joints(regions: Sequence[Region], judged: Sequence[Anomaly | None],
     for k, even in zip(single, crossed_joints(middle, spacing).tolist(), strict=True):
         anomaly = found[k]
         if even and anomaly is not None:
-            found[k] = replace(anomaly, verdict=Verdict("joint", ("thin", "sparse"), even))
+            verdict = replace(anomaly.verdict, kind="joint", reasons=("thin", "sparse"), confidence=even)
+            found[k] = replace(anomaly, verdict=verdict)
     return found
-
-
-def _may_drip(region: Region) -> bool:
-    return bool(region.filled) and classify(region).kind == "leak"
 
 
 def background_places(contrast: ContrastImage, detection: Detection, chainage: Float, arc: Float) -> Bool:

@@ -14,6 +14,12 @@ from tunneldb.raster.pixel_state import PixelState
 ACROSS = 0.06
 """The step over a side is measured so far inside and outside, m: a wet patch ends within it, soot doesn't."""
 
+FAR = 0.2
+"""It is measured so far outside, too, m: what fades over decimetres, as halos of dust do, is still dark there."""
+
+BRIGHT = 2.0
+"""What is brighter than the background by so many standard deviations is so by chance in 2 of 100 pixels."""
+
 SHARP = 0.5
 """Part of the region's mean drop that is lost over a sharp side."""
 
@@ -29,6 +35,9 @@ ASIDE = 0.02
 
 FACING = ((-1, 0), (1, 0), (0, -1), (0, 1))
 """Rows and columns from a pixel to its four neighbours."""
+
+UPWARDS = (1, 0)
+"""Which of FACING leads to the crown, from rows at arcs above 0 and from those below."""
 
 
 class Sides(NamedTuple):
@@ -78,6 +87,9 @@ class Edges:
 
     def __init__(self, dark: Bool, contrast: ContrastImage) -> None:
         self.dark, self.state, self.drop = dark, contrast.state, contrast.drop
+        self.sigma, self.tile = contrast.sigma, contrast.tile
+        self.crown = contrast.grid.bottom + contrast.grid.rows
+        self.far = max(1, round(FAR / contrast.grid.pixel))
         self.across = max(1, round(ACROSS / contrast.grid.pixel))
         self.aside = max(1, round(ASIDE / contrast.grid.pixel))
         self.near = max(1, round(NEAR_LINE / contrast.grid.pixel))
@@ -94,26 +106,39 @@ class Edges:
         return Sides(*map(np.concatenate, zip(*found, strict=True)))
 
     def perimeter(self, sides: Sides, count: int) -> Float:
-        """Sides of each of so many regions: all, towards an appendage or the floor, towards lining in a recess.
+        """Sides of each of so many regions, by what they face: see :class:`RegionProperties`.
 
-        (regions, 3); :class:`RegionProperties` says more.
+        All, towards an appendage or the floor, towards lining in a recess, towards an appendage above, towards the floor:
+        (regions, 5).
         """
         state = self.state[sides.beyond(1, 0)]
-        masks = (np.ones(len(state), np.bool_), state > PixelState.RECESS, state == PixelState.RECESS)
+        off = state > PixelState.RECESS
+        above = sides.facing == np.where(sides.row < self.crown, UPWARDS[0], UPWARDS[1])
+        masks = (
+            np.ones(len(state), np.bool_), off, state == PixelState.RECESS, (state == PixelState.OFF) & above,
+            state == PixelState.FLOOR,
+        )  # fmt: skip
         return np.column_stack([np.bincount(sides.label[mask], minlength=count) for mask in masks]).astype(np.float64)
 
     def steps(self, sides: Sides, count: int) -> Float:
         """Where the drop is known on both sides, ACROSS from them: how many, sum of the drop inside and outside, dB.
 
-        (regions, 3).
+        Then of how many it is known FAR outside, too, the sum there, and how many lie beside bright lining: (regions, 6).
         """
         sides = sides.where(sides.facing < self.facings)
         for along, usable in ((1 - self.across, self._interior), (self.across, self._background)):
             sides = sides.where(self._inside(*sides.beyond(along, 0)))
             sides = sides.where(usable(*sides.beyond(along, 0)))
-        drops = (self.drop[sides.beyond(along, 0)] for along in (1 - self.across, self.across))
-        sums = (np.bincount(sides.label, drop, count) * STEP["corrected"] for drop in drops)
-        return np.column_stack([np.bincount(sides.label, minlength=count), *sums])
+        drops = [self.drop[sides.beyond(along, 0)] for along in (1 - self.across, self.across)]
+        sums = [np.bincount(sides.label, drop, count) * STEP["corrected"] for drop in drops]
+        row, column = sides.beyond(self.across, 0)
+        sigma = self.sigma[row // self.tile, np.minimum(column // self.tile, self.sigma.shape[1] - 1)]
+        bright = drops[1] * STEP["corrected"] < -BRIGHT * sigma
+        far = sides.where(self._inside(*sides.beyond(self.far, 0)))
+        far = far.where(self._background(*far.beyond(self.far, 0)))
+        outside = np.bincount(far.label, self.drop[far.beyond(self.far, 0)], count) * STEP["corrected"]
+        number, known = (np.bincount(one.label, minlength=count) for one in (sides, far))
+        return np.column_stack([number, *sums, known, outside, np.bincount(sides.label[bright], minlength=count)])
 
     def straight(self, sides: Sides, mean_drop: Float) -> Int64:
         """Count the sharp sides of regions, and those of them that lie on one straight line for each of the four directions.

@@ -45,6 +45,15 @@ class RegionProperties(NamedTuple):
         (:meth:`tunneldb.anomalies.region_edges.Edges.straight`).
     between : float
         Pixels between profiles, which show what the nearest profile does.
+    drop_square : float
+        Sum of the squares of the drop, dB², over the pixels with points.
+    far_steps, far_outside : float
+        Of ``steps``, sides at which it was measured :data:`tunneldb.anomalies.region_edges.FAR` outside, too; sum of the drop
+        there, dB.
+    bright : float
+        Of ``steps``, sides outside of which lining is brighter than dry lining is by chance.
+    off_above, floor : float
+        Sides towards an appendage in the direction of the crown, and those towards the floor.
     """
 
     sigma: float = 0.0
@@ -58,6 +67,12 @@ class RegionProperties(NamedTuple):
     sharp: float = 0.0
     straight: float = 0.0
     between: float = 0.0
+    drop_square: float = 0.0
+    far_steps: float = 0.0
+    far_outside: float = 0.0
+    bright: float = 0.0
+    off_above: float = 0.0
+    floor: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -205,7 +220,7 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
     Of the runs (row, first column, column behind the last one) the numbers of the regions are in order.
     """
     edges, found = Edges(dark, contrast), []
-    pixels, recess, steps, sigma, between = (np.zeros(count) for _ in range(5))
+    pixels, recess, steps, squares, sigma, between = (np.zeros(count) for _ in range(6))
     most = np.full(count, NODATA, np.int16)
     until = np.cumsum(runs[:, 2] - runs[:, 1])
     for part in np.split(np.arange(len(runs)), np.searchsorted(until, np.arange(PIXELS, until[-1], PIXELS))):
@@ -222,14 +237,19 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
             between += np.bincount(label[contrast.between[row, column]], minlength=count)
         pixels += np.bincount(label, minlength=count)
         steps += np.bincount(label, drop, count)
+        squares += np.bincount(label, drop.astype(np.float64) ** 2, count)
         np.maximum.at(most, label, drop)
         sigma += np.bincount(label, contrast.sigma[row // contrast.tile, column // contrast.tile], count)
     sides = Sides(*map(np.concatenate, zip(*found, strict=True)))
     drop_sum = steps * STEP["corrected"]
     straight = edges.straight(sides, drop_sum / np.maximum(pixels, 1))
     drop_max = np.where(pixels > 0, most * STEP["corrected"], -np.inf)
-    about = edges.perimeter(sides, count), edges.steps(sides, count)
-    return np.column_stack([pixels, drop_sum, drop_max, sigma, recess, *about, straight, between])
+    perimeter, about = edges.perimeter(sides, count), edges.steps(sides, count)
+    squares *= STEP["corrected"] ** 2
+    return np.column_stack(
+        [pixels, drop_sum, drop_max, sigma, recess, perimeter[:, :3], about[:, :3], straight, between, squares,
+         about[:, 3:], perimeter[:, 3:]]
+    )  # fmt: skip
 
 
 def merge_regions(parts: Sequence[Region]) -> Region:

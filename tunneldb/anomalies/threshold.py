@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from tunneldb.anomalies.background.contrast import ContrastImage
+from tunneldb.anomalies.background.texture import windowed
 from tunneldb.anomalies.windows import count_about, on_lining, row_blocks
-from tunneldb.arrays import Bool, UInt8
+from tunneldb.arrays import Bool, Int16, UInt8
 from tunneldb.raster.geotiff import STEP
 from tunneldb.raster.image import MAX_MEDIAN
 from tunneldb.raster.pixel_state import PixelState
@@ -54,18 +55,27 @@ def dark_pixels(contrast: ContrastImage, size: int) -> Bool:
     -------
     (rows, columns) bool array
     """
-    state, drop, tile = contrast.state, contrast.drop, contrast.tile
+    state, tile = contrast.state, contrast.tile
     limit = np.minimum(np.floor(3.0 * contrast.sigma / STEP["corrected"]), 32767).astype(np.int16)
     limit = np.repeat(limit, tile, axis=1)[:, : state.shape[1]]
     out = np.empty(state.shape, np.bool_)
     for rows, about in row_blocks(len(state), size // 2):
         lining = on_lining(state[about])
-        dark = lining & (drop[about] > limit[np.arange(about.start, about.stop) // tile])
+        dark = lining & (averaged(contrast, about) > limit[np.arange(about.start, about.stop) // tile])
         votes, dark_votes = (count_about(mask, rows, about, size // 2) for mask in (lining, dark))
         out[rows] = (2 * dark_votes > votes) & (votes > _least_votes(size)) & (state[rows] <= PixelState.RECESS)
     for columns, mask in mask_of_polygons(contrast.grid, contrast.drawn):
         out[:, columns][mask] = False
     return out
+
+
+def averaged(contrast: ContrastImage, rows: slice) -> Int16:
+    """Drop of some rows, over the windows of their tiles; see :mod:`tunneldb.anomalies.background.texture`."""
+    half = None if contrast.texture is None else contrast.texture.half
+    if half is None or not (most := int(half[rows.start // contrast.tile : (rows.stop - 1) // contrast.tile + 1].max())):
+        return contrast.drop[rows]
+    about = slice(max(rows.start - most, 0), min(rows.stop + most, len(contrast.drop)))
+    return windowed(contrast.state, contrast.drop, half, contrast.tile, rows, about)
 
 
 def seen_lining(state: UInt8, size: int) -> Iterator[tuple[slice, Bool]]:

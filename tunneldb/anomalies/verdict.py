@@ -1,40 +1,29 @@
-"""What a dark region is: a leak, a joint, or something else that is dark but dry."""
+"""What a dark region is: a leak, a joint, or something else that is dark but dry; how probable, and what speaks for it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from tunneldb.anomalies.region_shape import Shape, measure_shape
+from tunneldb.anomalies.degrees import FEW_PROFILES, MANY_PROFILES
+from tunneldb.anomalies.evidence import EvidenceModel, reasons_of, standard_model
+from tunneldb.anomalies.features import DEGREES, FEATURES, NAMES, measure_features
 from tunneldb.anomalies.regions import Region
-
-STRONG_CONTRAST, STRONG_DROP = 8.0, 3.0
-"""Standard deviations and dB from which a patch with straight sides may be water after all, that fills a panel between joints:
-of shades of concrete and mortar neither is expected, water takes away half of the light and more."""
-
-DARKEST_JOINT = 3.0
-"""A joint of up to 1 cm takes no more than half of the light from 2 cm, by which pixels and beam blur it, dB; what is darker is
-wet. Finer pixels are seen by a beam that is no finer."""
-
-RESOLVED = 0.02
-"""Limits of widths, areas and straightness hold in metres for pixels up to this size, m, and grow with larger ones: of few
-pixels sides look straight by chance, and leaks would be taken for something built."""
-
-STRAIGHT = 0.02
-"""Standard deviation of the sides of what was built about straight lines, m, at most."""
-
-POCKET = 0.3
-"""Bolt pockets are no longer, m."""
-
-FEW_PROFILES, MANY_PROFILES = 3.0, 6.0
-"""On so few profiles that lie apart anything looks straight along the tunnel; so many tell whether it is."""
-
-LEAST_STEPS = 0.2
-"""Length of the boundary of a region along which the step over it must be known to tell that it is soft, m."""
+from tunneldb.arrays import Float
 
 Kind = Literal["leak", "joint", "dark"]
+
+NAMED = 0.5
+"""What changes the odds by less than a factor of 1.6 is not named as a reason."""
+
+BUILT = ("thin", "rectangular", "stripe", "shape")
+"""Reasons that go by the outline, of which few profiles tell nothing."""
+
+LINE = NAMES.index("line")
+"""Number of the feature that tells joints from other things that are dark but dry."""
 
 
 @dataclass(frozen=True)
@@ -46,148 +35,57 @@ class Verdict:
     kind : {'leak', 'joint', 'dark'}
         A leak; a joint; or dark but dry.
     reasons : tuple of str
-        What speaks against a leak, the strongest first; of a leak what makes it doubtful, at last that it is ``sparse``: on
+        What speaks against a leak: what it looks like, and what the model goes by, the strongest first; of a leak what makes it doubtful, at last that it is ``sparse``: on
         fewer than FEW_PROFILES profiles that lie apart, so that its length and area may be wrong by as much as themselves.
     confidence : float
-        That it is of its kind, 0 to 1.
+        Probability that it is of its kind, 0 to 1; of joints and what is dark that it is no leak.
+    evidence : mapping
+        By how much each reason changes the odds of a leak, as logarithms; positive: for it.
+    features : (len(FEATURES),) float array
+        What was measured of it.
     """
 
     kind: Kind
     reasons: tuple[str, ...]
     confidence: float
+    evidence: Mapping[str, float]
+    features: Float
 
 
-def classify(region: Region) -> Verdict:
-    """Tell what a region is, by its shape and its sums.
+def classify(region: Region, model: EvidenceModel | None = None, features: Float | None = None) -> Verdict:
+    """Tell what a region is, by its features: a leak if that is more probable than not.
 
-    Each reason why it may be dry gets a degree between 0 and 1; the region is a leak unless one is above 1/2.
+    Parameters
+    ----------
+    region : Region
+    model : EvidenceModel, optional
+        By default the one that comes with the program.
+    features : (len(FEATURES),) float array, optional
+        What was measured of it; by default what can be of a region by itself.
     """
-    shape = measure_shape(region.mask, region.pixel)
-    degrees = degrees_of(region, shape)
-    against = sorted((name for name in degrees if degrees[name] > 0.0), key=lambda name: -degrees[name])
-    worst = max(degrees.values())
-    if worst <= 0.5:
-        if region.spacing and shape.along < FEW_PROFILES * region.spacing:
-            against.append("sparse")
-        return Verdict("leak", tuple(against), detectability(region) * (1.0 - worst))
-    reasons = tuple(name for name in against if degrees[name] > 0.5)
-    return Verdict("joint" if "thin" in reasons else "dark", reasons, worst)
+    model = model or standard_model()
+    features = measure_features(region) if features is None else features
+    contributions = model.contributions(features[None])[0]
+    if region.spacing:
+        built = np.array([feature.reason in BUILT for feature in FEATURES])
+        contributions[built] *= _told(region)
+    p = float(1.0 / (1.0 + np.exp(-model.constant - contributions.sum())))
+    kind: Kind = "leak" if p >= 0.5 else "joint" if features[LINE] >= 0.5 else "dark"
+    evidence = reasons_of(contributions)
+    against = [name for name, weight in sorted(evidence.items(), key=lambda item: item[1]) if weight <= -NAMED]
+    if kind != "leak":
+        looks = sorted((name for name in DEGREES if _degree(features, name) > 0.5), key=lambda name: -_degree(features, name))
+        against = [*looks, *(name for name in against if name not in looks)]
+    if kind == "leak" and region.spacing and region.mask.shape[1] * region.pixel < FEW_PROFILES * region.spacing:
+        against.append("sparse")
+    return Verdict(kind, tuple(against), p if kind == "leak" else 1.0 - p, evidence, features)
 
 
-def degrees_of(region: Region, shape: Shape) -> dict[str, float]:
-    """How much speaks for each of what a region may be instead of water, 0 to 1."""
-    return {
-        "faint": _ramp(region.contrast, 3.4, 3.0),
-        "thin": _thin(region, shape),
-        "recess": _recess(region),
-        "gradual": _gradual(region, shape),
-        "rectangular": _rectangular(region, shape),
-        "stripe": min(_stripe(shape, _straight(region)), _told(region, shape)),
-        "shadow": _shadow(region, shape),
-    }
+def _degree(features: Float, name: str) -> float:
+    return float(features[NAMES.index(f"{name}_degree")])
 
 
-def detectability(region: Region) -> float:
-    """How sure it is that a region is darker than dry lining, 0 to 1: by contrast, size and support."""
-    share = region.filled * region.pixel**2 / region.area
-    # Between profiles nothing was measured.
-    area = region.area * (1.0 - region.properties.between / region.filled) if region.filled else region.area
-    contrast = 1.0 - np.exp(-((region.contrast / 4.0) ** 2))
-    return float(contrast * area / (area + 0.02) * (1.0 - np.exp(-share / 0.15)))
-
-
-def _thin(region: Region, shape: Shape) -> float:
-    """Joints are at most 2 cm wide, which the beam, the pixels and the median filter widen, straight, not as dark as water."""
-    straight = _straight(region)
-    deviation = shape.deviation_along if shape.along > shape.across else shape.deviation_across
-    return min(
-        _told(region, shape),
-        _ramp(shape.mean_width, 0.10, 0.07),
-        _ramp(shape.length / max(shape.mean_width, region.pixel), 4.0, 8.0),
-        _ramp(deviation, 2.0 * straight, straight),
-        _ramp(region.drop_mean, DARKEST_JOINT + 0.5, DARKEST_JOINT),
-    )
-
-
-def _recess(region: Region) -> float:
-    """A bolt pocket is dark as a whole, and small: it is set back, and what is about it is not."""
-    properties, pixels = region.properties, np.count_nonzero(region.mask)
-    about = properties.perimeter_recess / properties.perimeter if properties.perimeter else 0.0
-    # A profile that hits a pocket stands for more than the pocket is long.
-    area = region.area / max(1.0, region.spacing / POCKET)
-    return min(_ramp(properties.recess / pixels, 0.3, 0.7), _ramp(about, 0.4, 0.2), _ramp(area, 0.12, 0.08))
-
-
-def _gradual(region: Region, shape: Shape) -> float:
-    """Soot and grime fade out; of the darkness of a wet patch most is reached within some centimetres of its edge.
-
-    Grime beneath a cable lies in a band along the tunnel, which water does not: there less softness is enough.
-    """
-    properties = region.properties
-    if properties.steps * region.pixel < LEAST_STEPS * _coarseness(region) * (1 - 1e-12) or region.drop_sum <= 0:
-        return 0.0
-    step = (properties.inside - properties.outside) / properties.steps / region.drop_mean
-    band = min(_ramp(shape.along / shape.across, 4.0, 8.0), _told(region, shape))
-    return _ramp(step, 0.6 + 0.25 * band, 0.3 + 0.25 * band)
-
-
-def _rectangular(region: Region, shape: Shape) -> float:
-    """What was built, a repaired patch or a segment of another shade: its sharp sides lie along the tunnel and around it.
-
-    However joints and appendages cut it up. Of a small blob or a narrow band along a joint more sides do by chance.
-    """
-    properties = region.properties
-    shown = properties.perimeter - properties.perimeter_off
-    if not properties.sharp or not shown:
-        return 0.0
-    width, area = shape.mean_width / _coarseness(region), region.area / _coarseness(region) ** 2
-    most = 0.71 + 0.15 * _ramp(width, 0.35, 0.2) + 0.12 * _ramp(area, 0.3, 0.1)
-    lines = _ramp(properties.straight / properties.sharp, most, most + 0.08)
-    # Water that fills a panel between joints is rectangular too, and darker than repairs are, and so are small blobs.
-    panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), _ramp(width, 0.45, 0.3))
-    sharp = _ramp(properties.sharp / shown, 0.15, 0.25)
-    return min(lines, sharp, _ramp(width, 0.16, 0.22), 1.0 - panel, _told(region, shape))
-
-
-def _strong(region: Region) -> float:
-    """Whether a region is as dark as water, and no shade of concrete is."""
-    return _ramp(min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP), 0.8, 1.0)
-
-
-def _stripe(shape: Shape, straight: float) -> float:
-    """A painted stripe: a band along the tunnel, straight and as wide at its ends; water along a joint keeps to no edge."""
-    neat = min(
-        _ramp(shape.deviation_box, straight, 0.6 * straight),
-        _ramp(shape.rectangularity, 0.85, 0.93),
-        _ramp(shape.corners, 0.4, 0.7),
-    )
-    # Ragged ones are as long as no leak along the tunnel.
-    long = min(_ramp(shape.along, 2.0, 2.5), _ramp(shape.deviation_along, 2.0 * straight, straight))
-    return min(_ramp(shape.aspect_ratio, 6.0, 10.0), max(neat, long))
-
-
-def _shadow(region: Region, shape: Shape) -> float:
-    """A narrow band beside a cable or a pipe; or what shows between appendages and ends nowhere on dry lining."""
-    properties = region.properties
-    beside = properties.perimeter_off / properties.perimeter if properties.perimeter else 0.0
-    return max(min(_ramp(beside, 0.25, 0.45), _ramp(shape.width, 0.14, 0.08)), _ramp(beside, 0.8, 0.9))
-
-
-def _told(region: Region, shape: Shape) -> float:
-    """Whether enough profiles show a region to tell how straight it is: 1 where they lie as close as pixels."""
-    return _ramp(shape.along / region.spacing, FEW_PROFILES, MANY_PROFILES) if region.spacing else 1.0
-
-
-def _straight(region: Region) -> float:
-    """Standard deviation up to which sides are straight, m."""
-    return STRAIGHT * _coarseness(region)
-
-
-def _coarseness(region: Region) -> float:
-    """How much larger the pixels are than those for which the limits hold in metres; 1 if they are not."""
-    return max(1.0, region.pixel / RESOLVED)
-
-
-def _ramp(value: float, none: float, full: float) -> float:
-    """From 0 at ``none`` to 1 at ``full``, whichever is the greater."""
-    return min(max((float(value) - none) / (full - none), 0.0), 1.0)
+def _told(region: Region) -> float:
+    """Whether enough profiles show a region to tell its outline, 0 to 1."""
+    profiles = region.mask.shape[1] * region.pixel / region.spacing
+    return min(max((profiles - FEW_PROFILES) / (MANY_PROFILES - FEW_PROFILES), 0.0), 1.0)

@@ -8,6 +8,7 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.level_map import BackgroundMap
+from tunneldb.anomalies.background.texture import Texture, measure_texture
 from tunneldb.arrays import Bool, Int16, Single, UInt8
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import PixelGrid
@@ -39,6 +40,9 @@ class ContrastImage:
         as close as pixels.
     between : (rows, columns) bool array or None
         Those pixels.
+    texture : Texture or None
+        The windows over which lining is averaged before it is told whether it is dark, and that ``sigma`` is of. None: pixels
+        by themselves.
     """
 
     grid: PixelGrid
@@ -49,6 +53,7 @@ class ContrastImage:
     drawn: tuple[Polygon, ...] = ()
     spacing: float = 0.0
     between: Bool | None = None
+    texture: Texture | None = None
 
 
 def contrast_image(picture: LiningImage, background: BackgroundMap) -> ContrastImage:
@@ -63,6 +68,8 @@ def contrast_image(picture: LiningImage, background: BackgroundMap) -> ContrastI
     for block, mask in mask_of_polygons(picture.grid, background.drawn):
         here = drop[:, block]
         here[mask] = np.minimum(here[mask], 0)
-    return ContrastImage(
-        picture.grid, picture.state, drop, background.level.tile, background.sigma, background.drawn, spacing, between
-    )
+    tile, texture, sigma = background.level.tile, None, background.sigma
+    if not spacing and background.count:
+        texture = measure_texture(picture.state, drop, sigma, tile, picture.grid.pixel)
+        sigma = texture.sigma
+    return ContrastImage(picture.grid, picture.state, drop, tile, sigma, background.drawn, spacing, between, texture)

@@ -208,7 +208,8 @@ def _statistics(histograms: Int32, until: Float, found: Float) -> None:  # pragm
     """Mean and standard deviation, in bins, and number of values of each histogram.
 
     The shortest interval that holds a share SHORTH of the values marks the background (Rousseeuw and Leroy, 1988: shorth), the
-    median deviation above its mean its standard deviation; then values within CLIP of it are averaged, until both rest.
+    lesser of the median deviations above and below its mean its standard deviation; then values within CLIP of it are averaged,
+    until both rest.
     ``until`` (bins + 1, 3) is working memory: number, sum and sum of squares up to each bin.
     """
     for n in range(histograms.shape[0]):
@@ -242,15 +243,15 @@ def _statistics(histograms: Int32, until: Float, found: Float) -> None:  # pragm
                             shortest = float(k - low)
                     elif k - low <= LONGER * shortest:
                         mean = (until[k, 1] - until[low, 1]) / held
-        # Half of the values above the mean lie below this place.
-        k = int(mean)
-        wanted = 0.5 * (until[k, 0] + histograms[n, first + k] * (mean - k) + total)
-        median = float(bins)
-        for k in range(bins):
-            if until[k + 1, 0] >= wanted and histograms[n, first + k] > 0:
-                median = k + (wanted - until[k, 0]) / histograms[n, first + k]
-                break
-        sigma = MAD_TO_SIGMA * (median - mean)
+        # Water makes the dark side wider, salts the bright one: the narrower side tells the standard deviation.
+        below = until[int(mean), 0] + histograms[n, first + int(mean)] * (mean - int(mean))
+        median = [float(bins), 0.0]
+        for turn, wanted in enumerate((0.5 * (below + total), 0.5 * below)):
+            for k in range(bins):
+                if until[k + 1, 0] >= wanted and histograms[n, first + k] > 0:
+                    median[turn] = k + (wanted - until[k, 0]) / histograms[n, first + k]
+                    break
+        sigma = MAD_TO_SIGMA * min(median[0] - mean, mean - median[1])
         for _ in range(30):
             reach = CLIP * sigma
             if reach < 0.5:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import ndimage
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.histogram import Residuals, window_statistics
+from tunneldb.anomalies.background.histogram import BIN, TILE_BINS, Residuals, window_statistics
 from tunneldb.anomalies.background.level import BackgroundLevel
 from tunneldb.anomalies.background.smooth import extrapolate, smooth_level
 from tunneldb.anomalies.windows import count_in_columns
@@ -49,6 +49,12 @@ PART = 0.15
 
 AROUND = 2.0
 """Half the side of the windows for the standard deviation, m: they hold a few segments of a ring."""
+
+BETWEEN = 5.0
+"""Half the side of the windows in which it is told by how much tiles differ, m: they hold some segments and blocks."""
+
+FEW_TILES = 50
+"""Fewer tiles don't tell it."""
 
 LEAST = 10.0
 """Percentile of the standard deviations of the kilometre below which none falls."""
@@ -178,14 +184,19 @@ class BackgroundFit:
             sigma[self.fixed] = plain[self.fixed]
         return sigma
 
-    def _between(self, histograms: UInt16) -> np.float32:
+    def _between(self, histograms: UInt16) -> Single:
         """Standard deviation of whole tiles about the model, dB: segments and blocks differ, towards bright as towards dark.
 
-        Wet ones don't count, for the bright half alone is looked at: 95 % of half a normal distribution lie within 1.96 σ.
+        Of the tiles about each one, without those that are set off.
         """
         level, _, count = window_statistics(histograms, np.ones(self.smooth.shape, np.bool_), 0)
-        bright = level[(count >= ENOUGH) & (level > 0.0) & ~self.fixed]
-        return np.float32(np.percentile(bright, 95.0) / 1.96 if len(bright) >= ENOUGH else 0.0)
+        known = (count >= ENOUGH) & ~self.fixed & ~self.outlying
+        place = np.floor(level / BIN) + TILE_BINS // 2
+        known &= (place >= 0) & (place < TILE_BINS)
+        levels = np.zeros((*level.shape, TILE_BINS), np.uint16)
+        levels[known, place[known].astype(np.int64)] = 1
+        _, sigma, number = window_statistics(levels, known, round(BETWEEN / (self.tile * self.grid.pixel)))
+        return extrapolate(np.where(number >= FEW_TILES, sigma, np.nan).astype(np.float32))
 
     def _histograms(self) -> UInt16:
         return Residuals(self.picture, self.level, self.lining > 0, self.every).of_tiles()

@@ -1,0 +1,82 @@
+"""Fit the model of evidence that comes with the program.
+
+    python -m benchmarks.evidence --pictures DIR                         # half an hour; pictures in DIR are not made again
+    python -m benchmarks.evidence --pictures DIR --families known set-1  # to these tunnels alone
+    python -m benchmarks.evidence --pictures DIR --write                 # writes tunneldb/anomalies/evidence.json
+
+Families are the rounds of blind scenes that were measured, the known phenomena, the leak set by seeds, and painted pictures.
+Each family is judged by a model fitted to all others; the number of rounds of boosting is the one of least loss there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.common import print_table
+from benchmarks.evidence.candidates import LEAK, candidates, together
+from benchmarks.evidence.fit import Array, cooled, fit_model, left_out, loss, temperature, weights_of
+from benchmarks.evidence.painted import paintings
+from benchmarks.evidence.pictures import pictures
+from tunneldb.anomalies import evidence
+
+FAMILIES = ("known", "round_01", "round_03", "set-1")
+PAINTINGS, PAINTED = 150, 0.25
+"""How many pictures are painted, and how much their regions count: less than those of scans."""
+
+ROUNDS = (80, 160, 320)
+VERSION = "1"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.evidence", description=__doc__.splitlines()[0])
+    parser.add_argument("--pictures", type=Path, required=True, help="where pictures are kept")
+    parser.add_argument("--families", nargs="+", default=FAMILIES, metavar="FAMILY", help=f"of {', '.join(FAMILIES)}")
+    parser.add_argument(
+        "--write", action="store_true", help="put the model in the place of the one that comes with the program"
+    )
+    parser.add_argument("--dsn", help="server to use; default: the embedded one")
+    arguments = parser.parse_args()
+    parts = [
+        candidates(family, picture, truth)
+        for family in arguments.families
+        for picture, truth in pictures(family, arguments.pictures, arguments.dsn)
+    ]
+    parts += paintings(PAINTINGS)
+    features, kinds, families = together(parts)
+    scenes = np.concatenate([np.full(len(part.kind), f"{part.family} {part.scene}", dtype=object) for part in parts])
+    weights = weights_of(scenes) * np.where(families == "painted", PAINTED, 1.0)
+    groups = families if len(set(families)) > 2 else scenes
+    held = {rounds: left_out(features, kinds, weights, groups, fitted(rounds)) for rounds in ROUNDS}
+    best = min(held, key=lambda rounds: loss(held[rounds], kinds, weights))
+    rows = [(rounds, f"{loss(p, kinds, weights):.3f}", *_right(p, kinds)) for rounds, p in held.items()]
+    print_table(f"{len(kinds)} regions, judged by models of other families", ("rounds", "loss", "recall", "precision"), rows)
+    count = {family: int((families == family).sum()) for family in sorted(set(families))}
+    model = fit_model(features, kinds, weights, best, VERSION, {"regions": count, "rounds": best})
+    model = cooled(model, max(temperature(held[best], kinds, weights), 1.0))
+    if arguments.write:
+        path = Path(evidence.__file__).with_name("evidence.json")
+        path.write_text(json.dumps(model.to_json(), separators=(",", ":")) + "\n")
+        print(path)
+
+
+def fitted(rounds: int):  # type: ignore[no-untyped-def]
+    """Fit with so many rounds; gives a function from features to probabilities."""
+
+    def fit(features: Array, kinds: np.ndarray, weights: Array):  # type: ignore[no-untyped-def]
+        return fit_model(features, kinds, weights, rounds, "", {}).probabilities
+
+    return fit
+
+
+def _right(probabilities: Array, kinds: np.ndarray) -> tuple[str, str]:
+    """Share of the leaks that are taken for such, and of what is taken for leaks that are."""
+    called, true = probabilities[:, LEAK] >= 0.5, kinds == LEAK
+    return f"{(called & true).sum() / true.sum():.3f}", f"{(called & true).sum() / max(called.sum(), 1):.3f}"
+
+
+if __name__ == "__main__":
+    main()

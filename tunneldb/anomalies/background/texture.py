@@ -1,0 +1,166 @@
+"""Over how large windows lining is averaged before it is told from water: where bricks, stones or facets of rock differ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from tunneldb.anomalies.background.histogram import BIN, TILE_BINS, window_statistics
+from tunneldb.anomalies.background.smooth import extrapolate
+from tunneldb.arrays import Bool, Float, Int16, Int64, Single, UInt8
+from tunneldb.compiled import kernel
+from tunneldb.raster.geotiff import NODATA, STEP
+from tunneldb.raster.pixel_state import PixelState
+
+TOLD = 2.0
+"""A drop by so much is to be three standard deviations of dry lining, dB: wet lining is seldom less dark (Xu et al., 2018)."""
+
+CELL = 0.1
+"""Side of the cells that windows are made of, m."""
+
+WINDOWS = (3, 5)
+"""Sides of the windows, cells: a brick is 0.25 m long, most stones of a wall and facets of rock are not much larger."""
+
+AROUND = 4.0
+"""Half the side of the windows in which it is told how much lining differs, m."""
+
+FEW = 100
+"""From fewer cells it isn't."""
+
+RECESS = int(PixelState.RECESS)
+
+
+@dataclass(frozen=True)
+class Texture:
+    """Of each tile (tiles down, tiles along).
+
+    Attributes
+    ----------
+    half : uint8 array
+        Half the side of the windows over which the lining is averaged, pixels; 0: pixels are taken by themselves.
+    sigma : float32 array
+        Standard deviation of dry lining, so averaged, dB.
+    pixel_sigma : float32 array
+        That of pixels by themselves, dB.
+    """
+
+    half: UInt8
+    sigma: Single
+    pixel_sigma: Single
+
+
+def measure_texture(state: UInt8, drop: Int16, sigma: Single, tile: int, pixel: float) -> Texture:
+    """Choose for each tile the smallest window over which lining differs so little that a drop of TOLD stands out.
+
+    Noise of pixels goes with their number; what bricks, stones or facets differ by goes only where a window holds several.
+    Where pixels themselves differ little, nothing is averaged.
+
+    Parameters
+    ----------
+    state, drop : (rows, columns) arrays
+        State of the pixels, and how much darker than the background they are, steps of the image.
+    sigma : (tiles down, tiles along) float32 array
+        Standard deviation of pixels of dry lining, dB.
+    tile : int
+        Side of a tile, pixels.
+    pixel : float
+        Side of a pixel, m.
+    """
+    limit = TOLD / 3.0
+    half = np.zeros(sigma.shape, np.uint8)
+    open_ = ndimage.median_filter(sigma, 5, mode="nearest") > limit
+    if not open_.any():
+        return Texture(half, sigma, sigma)
+    side = max(1, round(CELL / pixel))
+    total, count = _cells(state, drop, side)
+    out = sigma.copy()
+    for cells in WINDOWS:
+        means, known = _means(total, count, cells)
+        found = _spread(means, known, side, tile, sigma.shape, round(AROUND / (tile * pixel)))
+        better = open_ & np.isfinite(found) & (found < out)
+        half[better], out[better] = (cells * side) // 2, found[better]
+        open_ &= ndimage.median_filter(out, 5, mode="nearest") > limit
+    return Texture(half, out, sigma)
+
+
+def windowed(state: UInt8, drop: Int16, half: UInt8, tile: int, rows: slice, about: slice) -> Int16:
+    """Drop of some rows, averaged over the windows of their tiles.
+
+    Parameters
+    ----------
+    state, drop : (rows, columns) arrays
+    half : (tiles down, tiles along) uint8 array
+    tile : int
+    rows, about : slice
+        The rows, and those that the largest window takes in.
+
+    Returns
+    -------
+    (n, columns) int16 array
+        Steps of the image; NODATA where a window holds no lining.
+    """
+    held = (state[about] > PixelState.EMPTY) & (state[about] <= PixelState.RECESS) & (drop[about] != NODATA)
+    sums = np.zeros((2, held.shape[0] + 1, held.shape[1] + 1), np.int64)
+    np.cumsum(np.cumsum(np.where(held, drop[about], 0), axis=0, dtype=np.int64), axis=1, out=sums[0, 1:, 1:])
+    np.cumsum(np.cumsum(held, axis=0, dtype=np.int64), axis=1, out=sums[1, 1:, 1:])
+    out = drop[rows].copy()
+    _average(sums[0], sums[1], half, tile, rows.start, about.start, out)
+    return out
+
+
+@kernel
+def _average(
+    total: Int64, count: Int64, half: UInt8, tile: int, first: int, top: int, out: Int16
+) -> None:  # pragma: no cover - compiled
+    """Put means over windows in the place of drops (rows, columns), of which the first is row ``first`` of the image."""
+    rows, columns = total.shape[0] - 1, total.shape[1] - 1
+    for i in range(out.shape[0]):
+        for j in range(columns):
+            h = int(half[(first + i) // tile, min(j // tile, half.shape[1] - 1)])
+            if h == 0:
+                continue
+            m, n = max(first + i - top - h, 0), min(first + i - top + h + 1, rows)
+            k, q = max(j - h, 0), min(j + h + 1, columns)
+            held = count[n, q] - count[m, q] - count[n, k] + count[m, k]
+            if held:
+                out[i, j] = round((total[n, q] - total[m, q] - total[n, k] + total[m, k]) / held)
+            else:
+                out[i, j] = NODATA
+
+
+@kernel
+def _cell_sums(state: UInt8, drop: Int16, side: int, total: Int64, count: Int64) -> None:  # pragma: no cover - compiled
+    for i in range(state.shape[0]):
+        for j in range(state.shape[1]):
+            if 0 < state[i, j] <= RECESS and drop[i, j] != NODATA:
+                total[i // side, j // side] += drop[i, j]
+                count[i // side, j // side] += 1
+
+
+def _cells(state: UInt8, drop: Int16, side: int) -> tuple[Int64, Int64]:
+    """Sum of the drop over the lining of each cell, steps, and how many pixels that are."""
+    total, count = np.zeros((2, -(-state.shape[0] // side), -(-state.shape[1] // side)), np.int64)
+    _cell_sums(state, drop, side, total, count)
+    return total, count
+
+
+def _means(total: Int64, count: Int64, cells: int) -> tuple[Float, Bool]:
+    """Mean drop over windows of so many cells to a side, dB, and which of them are half full at least."""
+    around = [ndimage.uniform_filter(part.astype(np.float64), cells, mode="constant") for part in (total, count)]
+    full = float(np.median(count[count > 0])) if (count > 0).any() else 1.0
+    return STEP["corrected"] * around[0] / np.maximum(around[1], 1e-9), around[1] > 0.5 * full
+
+
+def _spread(means: Float, known: Bool, side: int, tile: int, shape: tuple[int, int], half: int) -> Single:
+    """Standard deviation of windows about each tile, dB; NaN where too few are known."""
+    row, column = np.nonzero(known)
+    bins = np.floor(means[row, column] / BIN).astype(np.int64) + TILE_BINS // 2
+    inside = (bins >= 0) & (bins < TILE_BINS)
+    down, along = ((at[inside] * side + side // 2) // tile for at in (row, column))
+    along = np.minimum(along, shape[1] - 1)
+    place = (np.minimum(down, shape[0] - 1) * shape[1] + along) * TILE_BINS + bins[inside]
+    histograms = np.bincount(place, minlength=shape[0] * shape[1] * TILE_BINS).astype(np.uint16).reshape(*shape, TILE_BINS)
+    _, sigma, count = window_statistics(histograms, np.ones(shape, np.bool_), half)
+    return extrapolate(np.where((count >= FEW) & (sigma > 0.0), sigma, np.nan).astype(np.float32))

@@ -1,0 +1,199 @@
+"""What of a dark region speaks for water or against it: measures of its contrast, its rim, its shape and what it lies at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+
+from tunneldb.anomalies.degrees import degrees_of
+from tunneldb.anomalies.region_shape import Shape, measure_shape
+from tunneldb.anomalies.regions import Region
+from tunneldb.arrays import Bool, Float
+
+class Feature(NamedTuple):
+    """A measure of a region.
+
+    Attributes
+    ----------
+    name : str
+    reason : str
+        What it speaks of: measures of the same are summed up when a verdict gives its reasons.
+    meaning : str
+        What it is, with its unit.
+    """
+
+    name: str
+    reason: str
+    meaning: str
+
+
+DEGREES = {
+    "thin": "like a joint",
+    "recess": "like a bolt pocket",
+    "gradual": "as if it faded out",
+    "rectangular": "like something with straight sides",
+    "stripe": "like a painted stripe",
+    "shadow": "like the shadow of an appendage",
+}
+"""Of :mod:`tunneldb.anomalies.degrees`; each stands for its reason."""
+
+FEATURES = (
+    Feature("contrast", "faint", "mean drop, standard deviations of dry lining"),
+    Feature("drop", "faint", "mean drop, dB"),
+    Feature("area", "small", "area, m², as a logarithm"),
+    Feature("mean_width", "thin", "area over the greater extent, m, as a logarithm"),
+    Feature("width", "thin", "diameter of the largest inscribed circle, m, as a logarithm"),
+    Feature("elongation", "thin", "greater extent over mean width, as a logarithm"),
+    Feature("waviness", "thin", "standard deviation of the long sides about straight lines, m"),
+    Feature("line", "thin", "degree to which it is as narrow, long and straight as a joint, 0 to 1"),
+    Feature("recess", "recess", "share of its pixels set back behind the wall"),
+    Feature("recess_rim", "recess", "share of its sides that face lining set back behind the wall"),
+    Feature("step", "gradual", "drop 6 cm inside less that 6 cm outside, over the mean drop"),
+    Feature("far_step", "gradual", "drop 6 cm inside less that 20 cm outside, over the mean drop"),
+    Feature("uneven", "gradual", "standard deviation of the drop over its mean"),
+    Feature("straight", "rectangular", "share of the sharp sides on four lines along and around the tunnel"),
+    Feature("sharp", "rectangular", "share of its sides that are sharp"),
+    Feature("box", "rectangular", "share that it fills of its box without what sticks out"),
+    Feature("corners", "rectangular", "share that it fills of the emptiest corner of that box"),
+    Feature("turned_box", "rectangular", "share that it fills of the smallest rectangle of any direction"),
+    Feature("aspect", "stripe", "length of the box along the tunnel over its width, as a logarithm"),
+    Feature("box_waviness", "stripe", "standard deviation of the sides of the box about straight lines, m"),
+    Feature("beside", "shadow", "share of its sides that face an appendage or the floor"),
+    Feature("beneath", "shadow", "share of its sides that face an appendage above"),
+    Feature("ragged", "shape", "perimeter over that of a circle of the same area, as a logarithm"),
+    Feature("taper", "shape", "how far its middle lies above that of its extent, in parts of this"),
+    Feature("upright", "shape", "extent around the tunnel over that along it, as a logarithm"),
+    Feature("bright_rim", "salts", "share of its rim with lining brighter than dry lining is by chance"),
+    Feature("foot", "foot", "share of its sides that face the floor"),
+    Feature("support", "small", "pixels that were measured, as a logarithm"),
+    Feature("alike", "repeated", "others like it within 5 m along the tunnel, their number as a logarithm: what is built repeats"),
+    *(Feature(f"{name}_degree", name, f"degree to which it looks {look}, 0 to 1") for name, look in DEGREES.items()),
+)
+"""In the order of `measure_features`."""
+
+
+NAMES = tuple(feature.name for feature in FEATURES)
+
+ALIKE = {"mean_width": 0.3, "drop": 0.3, "upright": 0.8}
+"""Regions are alike if these, as logarithms, differ by no more."""
+
+ABOUT = 5.0
+"""Regions that are farther apart along the tunnel are not held against each other, m."""
+
+
+def measure_regions(regions: Sequence[Region]) -> Float:
+    """Measure the dark regions of a kilometre, each by itself, and how many others are like it.
+
+    Returns
+    -------
+    (n, len(FEATURES)) float array
+        NaN where a measure can't be taken.
+    """
+    features = np.array([measure_features(region) for region in regions]).reshape(len(regions), len(FEATURES))
+    if len(regions):
+        values = {name: features[:, NAMES.index(name)] for name in ALIKE}
+        values["drop"] = np.log(np.maximum(values["drop"], 0.1))
+        chainage = np.array([0.5 * (region.column + region.stop) * region.pixel for region in regions])
+        places = np.column_stack([chainage / ABOUT, *(values[name] / width for name, width in ALIKE.items())])
+        alike = cKDTree(places).query_ball_point(places, 1.0, p=np.inf, return_length=True) - 1
+        features[:, NAMES.index("alike")] = np.log1p(alike)
+    return features
+
+
+def measure_features(region: Region) -> Float:
+    """Measure a region by itself.
+
+    Returns
+    -------
+    (len(FEATURES),) float array
+        NaN where a measure can't be taken, and for what others tell.
+    """
+    shape = measure_shape(region.mask, region.pixel)
+    degrees = degrees_of(region, shape)
+    measures = *_contrast(region), *_extent(shape), *_recess(region), *_rim(region, shape), *_place(region, shape)
+    return np.array([*measures, math.log(max(region.measured, 1)), math.nan, *(degrees[name] for name in DEGREES)])
+
+
+def _contrast(region: Region) -> tuple[float, float]:
+    return region.contrast, region.drop_mean
+
+
+def _extent(shape: Shape) -> tuple[float, ...]:
+    deviation = shape.deviation_along if shape.along > shape.across else shape.deviation_across
+    sizes = shape.area, shape.mean_width, max(shape.width, 1e-3), shape.length / shape.mean_width
+    elongation = shape.length / shape.mean_width
+    line = min(_ramp(shape.mean_width, 0.12, 0.06), _ramp(elongation, 4.0, 8.0), _ramp(deviation, 0.04, 0.02))
+    return *map(math.log, sizes), deviation, line
+
+
+def _recess(region: Region) -> tuple[float, float]:
+    properties = region.properties
+    return properties.recess / np.count_nonzero(region.mask), _ratio(properties.perimeter_recess, properties.perimeter)
+
+
+def _rim(region: Region, shape: Shape) -> tuple[float, ...]:
+    properties, mean = region.properties, max(region.drop_mean, 1e-6)
+    inside, outside = _ratio(properties.inside, properties.steps), _ratio(properties.outside, properties.steps)
+    far = _ratio(properties.far_outside, properties.far_steps)
+    variance = properties.drop_square / region.filled - region.drop_mean**2
+    shown = properties.perimeter - properties.perimeter_off
+    return (
+        (inside - outside) / mean, (inside - far) / mean, math.sqrt(max(variance, 0.0)) / mean,
+        _ratio(properties.straight, properties.sharp), _ratio(properties.sharp, shown),
+        shape.rectangularity, shape.corners, _turned_box(region.mask),
+        math.log(shape.aspect_ratio), shape.deviation_box,
+    )  # fmt: skip
+
+
+def _place(region: Region, shape: Shape) -> tuple[float, ...]:
+    properties = region.properties
+    return (
+        _ratio(properties.perimeter_off, properties.perimeter), _ratio(properties.off_above, properties.perimeter),
+        math.log(_perimeter(region.mask) * region.pixel / (2.0 * math.sqrt(math.pi * shape.area))),
+        _taper(region), math.log(shape.across / shape.along),
+        _ratio(properties.bright, properties.steps), _ratio(properties.floor, properties.perimeter),
+    )  # fmt: skip
+
+
+def _ramp(value: float, none: float, full: float) -> float:
+    """From 0 at ``none`` to 1 at ``full``, whichever is the greater."""
+    return min(max((float(value) - none) / (full - none), 0.0), 1.0)
+
+
+def _perimeter(mask: Bool) -> int:
+    """Sides of pixels on the outline of a mask and of its holes."""
+    padded = np.pad(mask, 1)
+    return sum(int(np.count_nonzero(np.diff(padded, axis=axis))) for axis in (0, 1))
+
+
+def _turned_box(mask: Bool) -> float:
+    """Share of the smallest rectangle of any direction that a mask fills."""
+    edge = mask & ~_eroded(mask)
+    row, column = np.nonzero(edge)
+    corners = np.concatenate([np.column_stack([column + x, row + y]) for x in (0, 1) for y in (0, 1)])
+    box = shapely.minimum_rotated_rectangle(shapely.multipoints(corners))
+    return float(np.count_nonzero(mask) / box.area)
+
+
+def _eroded(mask: Bool) -> Bool:
+    """Pixels all four neighbours of which are set."""
+    padded = np.pad(mask, 1)
+    return padded[2:, 1:-1] & padded[:-2, 1:-1] & padded[1:-1, 2:] & padded[1:-1, :-2]
+
+
+def _taper(region: Region) -> float:
+    """Height of the middle of its area above that of its extent, over this; water gathers above, and runs down narrower."""
+    counts = np.count_nonzero(region.mask, axis=1)
+    rows = len(counts)
+    middle = (np.arange(rows) + 0.5) @ counts / counts.sum()
+    up = -1.0 if region.row + 0.5 * rows >= 0.0 else 1.0  # rows grow with the arc, which is 0 at the crown
+    return float(up * (middle / rows - 0.5))
+
+
+def _ratio(part: float, whole: float) -> float:
+    return part / whole if whole else math.nan
