@@ -23,10 +23,10 @@ GROWS = {
     "contrast", "drop", "width", "waviness", "step", "far_step", "box_waviness", "taper", "support",
 }  # fmt: skip
 FALLS = {
-    "line", "recess", "recess_rim", "straight", "box", "corners", "turned_box", "beside", "alike", "thin_degree", "recess_degree",
-    "gradual_degree", "rectangular_degree", "stripe_degree", "shadow_degree",
+    "line", "recess", "recess_rim", "straight", "box", "corners", "turned_box", "beside", "alike", "thin_degree",
+    "recess_degree", "gradual_degree", "rectangular_degree", "stripe_degree", "shadow_degree",
 }  # fmt: skip
-"""Features with which the odds of a leak can only grow or fall, as physics has it; so none is learnt the wrong way round by chance."""
+"""Features with which the odds of a leak can only grow or fall, as physics has it: none is learnt the wrong way round."""
 
 
 def boosted(rounds: int) -> HistGradientBoostingClassifier:

@@ -1,4 +1,4 @@
-"""The model of evidence: probabilities, what features add to them, and its tables as a file."""
+"""The model of evidence: probabilities, what features add to them, and its trees as a file."""
 
 import json
 import math
@@ -8,63 +8,67 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from sklearn.ensemble import HistGradientBoostingClassifier
 
-from tunneldb.anomalies.evidence import KINDS, EvidenceModel, reasons_of, standard_model
-from tunneldb.anomalies.features import FEATURES
+from benchmarks.evidence.fit import boosted, fit_model
+from tunneldb.anomalies.evidence import EvidenceModel, reasons_of, standard_model
+from tunneldb.anomalies.features import FEATURES, NAMES
 
-FEW = EvidenceModel(
-    "few",
-    np.array([0.5, 0.0, -0.5]),
-    (np.array([1.0, 2.0]), *(np.empty(0) for _ in FEATURES[1:])),
-    (np.array([[1.0, 0, 0], [2.0, 0, 0], [3.0, 0, 0], [-4.0, 0, 0]]), *(np.zeros((2, 3)) for _ in FEATURES[1:])),
-    {},
-)
+ANY = arrays(float, (5, len(FEATURES)), elements=st.floats(-20, 20) | st.just(math.nan))
 
 
-@pytest.mark.parametrize(
-    ("value", "score"), [(0.0, 1.0), (1.0, 1.0), (1.1, 2.0), (2.0, 2.0), (2.1, 3.0), (np.inf, 3.0), (math.nan, -4.0)]
-)
-def test_a_value_on_a_limit_belongs_to_the_class_below_and_what_is_unknown_to_a_class_of_its_own(value, score):
-    features = np.zeros((1, len(FEATURES)))
-    features[0, 0] = value
-    assert FEW.contributions(features)[0, 0, 0] == score
-    powers = np.exp([0.5 + score, 0.0, -0.5])
-    np.testing.assert_allclose(FEW.probabilities(features)[0], powers / powers.sum())
+def grown(sign: int, features: np.ndarray, names: set[str]) -> np.ndarray:
+    """The same regions, of which some features are greater by 1."""
+    return features + sign * np.isin(NAMES, list(names))
 
 
-@given(features=arrays(float, (5, len(FEATURES)), elements=st.floats(-20, 20) | st.just(math.nan)))
-def test_probabilities_are_of_the_sum_of_what_the_features_add(features):
+def test_trees_are_those_of_the_library_that_fitted_them() -> None:
+    rng = np.random.default_rng(3)
+    features = rng.normal(0, 2, (900, len(FEATURES)))
+    features[rng.random(features.shape) < 0.1] = np.nan
+    leak = np.nan_to_num(features[:, 0]) + np.nan_to_num(features[:, 3]) ** 2 + rng.normal(0, 1, 900) > 3
+    weights = rng.uniform(0.2, 1.0, 900)
+    ours = fit_model(features, leak, weights, 40, "few", {})
+    theirs: HistGradientBoostingClassifier = boosted(40).fit(features, leak, sample_weight=weights)
+    np.testing.assert_allclose(ours.probabilities(features), theirs.predict_proba(features)[:, 1], atol=5e-4)
+
+
+@given(features=ANY)
+def test_probabilities_are_of_the_sum_of_what_the_features_add(features: np.ndarray) -> None:
     model = standard_model()
     p = model.probabilities(features)
-    assert np.all(p > 0)
-    np.testing.assert_allclose(p.sum(axis=1), 1.0)
+    assert np.all((p > 0) & (p < 1))
     added = model.contributions(features)
-    odds = (model.constant[0] - model.constant[2]) + (added[:, :, 0] - added[:, :, 2]).sum(axis=1)
-    np.testing.assert_allclose(np.log(p[:, 0] / p[:, 2]), odds, atol=1e-9)
-    for row, of_one in zip(added, odds, strict=True):
-        reasons = reasons_of(row, 0, 2)
-        assert sum(reasons.values()) + model.constant[0] - model.constant[2] == pytest.approx(of_one)
+    np.testing.assert_allclose(np.log(p / (1 - p)), model.constant + added.sum(axis=1), atol=1e-9)
+    for row in added:
+        reasons = reasons_of(row)
+        assert sum(reasons.values()) == pytest.approx(row.sum())
         assert [abs(weight) for weight in reasons.values()] == sorted(map(abs, reasons.values()), reverse=True)
 
 
-def test_a_model_is_the_same_from_its_file():
+@given(features=ANY)
+def test_darker_is_never_less_probable_and_what_looks_built_never_more(features: np.ndarray) -> None:
     model = standard_model()
-    again = EvidenceModel.from_json(json.loads(json.dumps(model.to_json())))
+    p = model.probabilities(features)
+    assert np.all(model.probabilities(grown(1, features, {"contrast", "drop", "width", "support"})) >= p - 1e-9)
+    assert np.all(model.probabilities(grown(1, features, {"straight", "box", "line", "beside", "alike"})) <= p + 1e-9)
+    assert np.all(model.probabilities(grown(1, features, {"gradual_degree", "recess_degree", "shadow_degree"})) <= p + 1e-9)
+
+
+def test_a_model_is_the_same_from_its_file_and_another_format_is_refused() -> None:
+    model = standard_model()
+    values = json.loads(json.dumps(model.to_json()))
+    again = EvidenceModel.from_json(values)
     features = np.random.default_rng(1).normal(0, 3, (50, len(FEATURES)))
     np.testing.assert_array_equal(again.probabilities(features), model.probabilities(features))
     assert again.version == model.version
+    with pytest.raises(ValueError, match="format 1"):
+        EvidenceModel.from_json({**values, "format": 1})
+    with pytest.raises(ValueError, match="of the features"):
+        EvidenceModel.from_json({**values, "features": list(NAMES[1:])})
 
 
-def test_a_feature_that_a_file_lacks_says_nothing_and_another_format_is_refused():
-    values = FEW.to_json()
-    del values["features"][FEATURES[0].name]
-    assert not EvidenceModel.from_json(values).contributions(np.ones((1, len(FEATURES)))).any()
-    with pytest.raises(ValueError, match="format 2"):
-        EvidenceModel.from_json({**values, "format": 2})
-
-
-def test_tables_are_small_and_of_all_features():
+def test_the_model_that_comes_with_the_program_is_small_and_says_what_it_was_fitted_to() -> None:
     values = standard_model().to_json()
-    assert list(values["features"]) == [feature.name for feature in FEATURES]
-    assert values["kinds"] == list(KINDS)
-    assert len(json.dumps(values)) < 50_000
+    assert len(json.dumps(values)) < 100_000
+    assert {"regions", "rounds"} <= set(values["trained_on"])

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from tunneldb.anomalies.features import FEATURES, measure_features
+from tunneldb.anomalies.features import NAMES, measure_features, measure_regions
 from tunneldb.anomalies.regions import Region, RegionProperties
 
-NAMES = [feature.name for feature in FEATURES]
 PIXEL = 0.02
 
 
@@ -64,3 +63,18 @@ def test_softness_and_brightness_of_the_rim_and_what_it_lies_at():
 def test_what_can_not_be_measured_is_unknown():
     found = measured(np.ones((4, 4), bool), perimeter=16, perimeter_off=16)
     assert np.isnan([found["step"], found["far_step"], found["straight"], found["bright_rim"], found["sharp"]]).all()
+
+
+def _line(chainage: float, width: int = 3, drop: float = 4.0) -> Region:
+    mask = np.ones((60, width), bool)
+    return Region(PIXEL, round(chainage / PIXEL), 0, mask, 60 * width, drop * 60 * width, drop, RegionProperties(sigma=60.0))
+
+
+def test_what_repeats_along_the_tunnel_is_alike() -> None:
+    joints = [_line(1.5 * k) for k in range(9)]
+    other = [_line(6.2, width=30), _line(6.4, drop=8.0), _line(40.0)]
+    alike = measure_regions([*joints, *other])[:, NAMES.index("alike")]
+    # Within 5 m are three to either side; four may be so by chance.
+    np.testing.assert_allclose(alike[:9], np.log1p([0, 0, 1, 2, 2, 2, 1, 0, 0]))
+    np.testing.assert_array_equal(alike[9:], 0.0)
+    assert measure_regions([]).shape == (0, len(NAMES))

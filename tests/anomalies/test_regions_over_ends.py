@@ -52,7 +52,8 @@ def assert_same(one: list[Anomaly], other: list[Anomaly]) -> None:
         assert (a.drop_mean, a.drop_max, a.image_share) == pytest.approx((b.drop_mean, b.drop_max, b.image_share))
         assert a.contrast == pytest.approx(b.contrast)
         # Which sides are sharp goes by the drop of each part; all other features are those of the whole.
-        alike = [k for k, feature in enumerate(FEATURES) if feature.name not in ("straight", "sharp", "built")]
+        by_part = {"straight", "sharp", "rectangular_degree"}
+        alike = [k for k, feature in enumerate(FEATURES) if feature.name not in by_part]
         assert a.verdict.features[alike] == pytest.approx(b.verdict.features[alike], nan_ok=True)
 
 

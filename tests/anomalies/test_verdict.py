@@ -25,8 +25,8 @@ WIDTH, HALF = 14.0, 4.0  # of the canvas: from chainage 0, and from arc -HALF to
 class Canvas:
     """Lining with noise on which to paint; each pixel is the mean of what it covers, as a pixel of points is."""
 
-    def __init__(self, seed: int = 0, filled: float = 0.8) -> None:
-        self.rng, self.filled = np.random.default_rng(seed), filled
+    def __init__(self, seed: int = 0, filled: float = 0.8, sigma: float = SIGMA) -> None:
+        self.rng, self.filled, self.sigma = np.random.default_rng(seed), filled, sigma
         self.grid = Grid.covering(0, PIXEL, -HALF, HALF)
         self.drop = np.zeros((self.grid.rows, round(WIDTH / PIXEL)))
         self.state = np.full(self.drop.shape, PixelState.LINING, np.uint8)
@@ -50,13 +50,13 @@ class Canvas:
         self.drop = np.maximum(self.drop, drop * ndimage.gaussian_filter(self.inside(shape), 0.4))
 
     def detect(self) -> Detection:
-        noisy = self.drop + self.rng.normal(0, SIGMA, self.drop.shape)
+        noisy = self.drop + self.rng.normal(0, self.sigma, self.drop.shape)
         empty = self.rng.random(self.drop.shape) > self.filled
         drop = np.full((self.grid.rows, self.grid.columns), NODATA, np.int16)
         state = np.zeros(drop.shape, np.uint8)
         drop[:, : self.drop.shape[1]] = np.where(empty, NODATA, np.rint(100 * noisy))
         state[:, : self.drop.shape[1]] = np.where(empty & (self.state == PixelState.LINING), PixelState.EMPTY, self.state)
-        sigma = np.full((self.grid.rows // 25, self.grid.columns // 25), SIGMA, np.float32)
+        sigma = np.full((self.grid.rows // 25, self.grid.columns // 25), self.sigma, np.float32)
         return find_anomalies(ContrastImage(self.grid, state, drop, 25, sigma), SimpleNamespace(count=1), 0.05)
 
 
@@ -75,15 +75,20 @@ def of_kind(found: Detection, kind: str) -> list[Anomaly]:
 
 
 @pytest.mark.parametrize("filled", [0.9, 0.4])
-@pytest.mark.parametrize("contrast", [4.0, 6.0, 25.0])
-def test_edges_areas_and_holes_of_leaks_hold_whatever_their_contrast(contrast: float, filled: float) -> None:
-    canvas = Canvas(1, filled)
+@pytest.mark.parametrize(("contrast", "sigma"), [(4.0, 0.3), (6.0, 0.3), (4.0, 0.8), (6.0, 0.6), (25.0, 0.3)])
+def test_edges_areas_and_holes_hold_whatever_the_contrast(contrast: float, sigma: float, filled: float) -> None:
+    """All are found. From 3 dB on they are leaks; up to 1.2 dB, less than damp lining loses, they are said to be faint."""
+    canvas = Canvas(1, filled, sigma)
     true = [blob(1.5 + 2.1 * k, arc, area, k) for k, area in enumerate((0.1, 0.2, 0.5, 1.0, 1.5, 0.3)) for arc in (-2.0, 2.0)]
     true[6] = true[6].difference(shapely.Point(1.5 + 2.1 * 3, -2.0).buffer(0.25))
     for leak in true:
-        canvas.paint(leak, contrast * SIGMA)
+        canvas.paint(leak, contrast * sigma)
     found = canvas.detect()
-    assert len(found.anomalies) == len(of_kind(found, "leak")) == len(true)
+    assert len(found.anomalies) == len(true)
+    if contrast * sigma >= 3.0:
+        assert len(of_kind(found, "leak")) == len(true)
+    elif contrast * sigma <= 1.5:
+        assert all("faint" in anomaly.verdict.reasons for anomaly in found.anomalies)
     errors = []
     for leak in true:
         (same,) = (anomaly for anomaly in found.anomalies if anomaly.outline.intersects(leak))
@@ -178,7 +183,7 @@ def test_repairs_that_joints_and_appendages_cut_up_have_straight_sides_still(dro
     for hidden in (box(2.3, 1.2, 2.65, 1.6), box(4.0, 0.8, 8.0, 0.95), box(9.9, 0.2, 10.2, 0.5), box(8.9, 1.1, 9.3, 1.5)):
         canvas.state[canvas.inside(hidden) > 0] = PixelState.OFF
     found = [anomaly for anomaly in canvas.detect().anomalies if anomaly.verdict.kind != "joint"]
-    assert len(found) == 4
+    assert len(found) == 3  # what the cable cuts in two is one
     assert all(anomaly.verdict.reasons[0] == "rectangular" for anomaly in found)
 
 
@@ -272,4 +277,3 @@ def test_confidence_grows_with_contrast_size_and_support() -> None:
         assert told == sorted(told)
         assert len(set(told)) == len(told)
         assert 0 < told[0] < told[-1] < 1
-

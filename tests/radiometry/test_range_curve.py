@@ -7,8 +7,9 @@ from tunneldb.errors import UserError
 from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.dependence import Dependence, class_means
 from tunneldb.radiometry.oren_nayar import incidence_db
-from tunneldb.radiometry.range_curve import estimate_range_curve
+from tunneldb.radiometry.range_curve import USABLE, RangeCurve, estimate_range_curve
 from tunneldb.radiometry.range_spline import RangeSpline, one_maximum
+from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.simulate import Parameters, simulate
 from tunneldb.simulate.radiometry import range_term
 
@@ -160,6 +161,21 @@ def test_range_and_incidence_that_are_one_function_are_refused():
     level = range_term(range_m) + incidence_db(4.0 / range_m, 15.0) + rng.normal(0, 0.3, len(place))
     with pytest.raises(UserError, match=r"uncertain by .* dB at .*scan a target"):
         estimate_range_curve(IntensitySamples(place, scan, range_m, 4.0 / range_m, level)).require()
+
+
+@pytest.mark.parametrize(("uncertain", "remarked", "refused"), [(0.29, False, False), (0.43, True, False), (0.76, True, True)])
+def test_an_uncertain_curve_is_remarked_and_a_useless_one_refused(uncertain, remarked, refused):
+    nodes = np.geomspace(2.0, 15.0, 30)
+    sigma = np.where(np.arange(30) == 20, uncertain, 0.05)
+    found = RangeCurve(ReferenceCurve(nodes, -20.0 * np.log10(nodes)), sigma, 12.0, 1.0, 2.0, 15.0, 900, 500, 0.2, 0.4)
+    assert bool(found.remark) == remarked
+    if remarked:
+        assert f"uncertain by {uncertain:.2f} dB at {nodes[20]:.1f} m" in found.remark
+    if refused:
+        with pytest.raises(UserError, match=r"can't be told apart.*scan a target"):
+            found.require(USABLE)
+    else:
+        found.require(USABLE)
 
 
 def test_too_little_lining_is_refused():

@@ -1,8 +1,8 @@
 """How probable it is that a dark region is a leak: trees of its features, boosted, and what each feature says in them.
 
-The logarithm of the odds is the sum of what the trees add (gradient boosting: Friedman, 2001). On its way through a tree a region
-passes nodes; by how much the mean of a node differs from that of the one before is due to the feature that was asked there
-(Saabas, 2014). So what each feature says can be told, and adds up.
+The logarithm of the odds is the sum of what the trees add (gradient boosting: Friedman, 2001). On its way through a tree a
+region passes nodes; by how much the mean of a node differs from that of the one before is due to the feature that was asked
+there (Saabas, 2014). So what each feature says can be told, and adds up.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class EvidenceModel:
         """Read stored trees."""
         if values["format"] != FORMAT or values["features"] != [feature.name for feature in FEATURES]:
             raise ValueError(f"trees of format {values['format']}, of the features {values['features']}")
-        arrays = {name: np.array(values[name], kind) for name, kind in ARRAYS.items()}
+        arrays: dict[str, Any] = {name: np.array(values[name], kind) for name, kind in ARRAYS.items()}
         return cls(version=values["version"], constant=values["constant"], trained_on=values["trained_on"], **arrays)
 
 

@@ -15,6 +15,7 @@ from tunneldb.anomalies.region_shape import Shape, measure_shape
 from tunneldb.anomalies.regions import Region
 from tunneldb.arrays import Bool, Float
 
+
 class Feature(NamedTuple):
     """A measure of a region.
 
@@ -71,7 +72,9 @@ FEATURES = (
     Feature("bright_rim", "salts", "share of its rim with lining brighter than dry lining is by chance"),
     Feature("foot", "foot", "share of its sides that face the floor"),
     Feature("support", "small", "pixels that were measured, as a logarithm"),
-    Feature("alike", "repeated", "others like it within 5 m along the tunnel, their number as a logarithm: what is built repeats"),
+    Feature(
+        "alike", "repeated", "others like it within 5 m along the tunnel, their number as a logarithm: what is built repeats"
+    ),
     *(Feature(f"{name}_degree", name, f"degree to which it looks {look}, 0 to 1") for name, look in DEGREES.items()),
 )
 """In the order of `measure_features`."""
@@ -84,6 +87,9 @@ ALIKE = {"mean_width": 0.3, "drop": 0.3, "upright": 0.8}
 
 ABOUT = 5.0
 """Regions that are farther apart along the tunnel are not held against each other, m."""
+
+BY_CHANCE = 4
+"""So many may be alike by chance; what is built repeats more often."""
 
 
 def measure_regions(regions: Sequence[Region]) -> Float:
@@ -101,7 +107,7 @@ def measure_regions(regions: Sequence[Region]) -> Float:
         chainage = np.array([0.5 * (region.column + region.stop) * region.pixel for region in regions])
         places = np.column_stack([chainage / ABOUT, *(values[name] / width for name, width in ALIKE.items())])
         alike = cKDTree(places).query_ball_point(places, 1.0, p=np.inf, return_length=True) - 1
-        features[:, NAMES.index("alike")] = np.log1p(alike)
+        features[:, NAMES.index("alike")] = np.log1p(np.maximum(alike - BY_CHANCE, 0))
     return features
 
 

@@ -35,8 +35,9 @@ class Verdict:
     kind : {'leak', 'joint', 'dark'}
         A leak; a joint; or dark but dry.
     reasons : tuple of str
-        What speaks against a leak: what it looks like, and what the model goes by, the strongest first; of a leak what makes it doubtful, at last that it is ``sparse``: on
-        fewer than FEW_PROFILES profiles that lie apart, so that its length and area may be wrong by as much as themselves.
+        Of what is no leak: what it looks like, then what else the model goes by, the strongest first. Of a leak what makes it
+        doubtful, at last that it is ``sparse``: on fewer than FEW_PROFILES profiles that lie apart, so that its length and
+        area may be wrong by as much as themselves.
     confidence : float
         Probability that it is of its kind, 0 to 1; of joints and what is dark that it is no leak.
     evidence : mapping

@@ -15,7 +15,7 @@ from tunneldb.errors import UserError
 from tunneldb.pointcloud.points import Points
 from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.correction import Observations, range_span
-from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
+from tunneldb.radiometry.range_curve import USABLE, RangeCurve, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.radiometry.robust_statistics import DryLevel, plain_statistics
 from tunneldb.radiometry.roughness import (
@@ -105,9 +105,10 @@ class Calibration:
     @property
     def note(self) -> str | None:
         """What the ledger is to say about it."""
-        if self.found is None or not self.found.hardly_overlaps:
+        if self.found is None:
             return None
-        return "hardly any lining was seen by two scans: the range curve rests on its being alike along the tunnel, within 5 m"
+        alone = "hardly any lining was seen by two scans: the range curve rests on its being alike along the tunnel, within 5 m"
+        return "; ".join(filter(None, [alone if self.found.hardly_overlaps else None, self.found.remark])) or None
 
 
 def observe_sample(points: Points, observer: Observer) -> Sample:
@@ -158,7 +159,7 @@ def calibrate(points: Points, observer: Observer, drawn: list[Polygon], survey: 
         return Calibration(observer, view, roughness_of(view, drawn), None)
     try:
         found = find_range_curve(view, observer)
-        found.require()
+        found.require(USABLE)
     except UserError as error:
         raise UserError(f"survey {survey}, kilometre {observer.km}: {error}; {BORROW}") from None
     observer = replace(observer, radiometer=replace(observer.radiometer, reference=found.curve))

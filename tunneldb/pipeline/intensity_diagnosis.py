@@ -25,7 +25,7 @@ from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
 from tunneldb.radiometry.diagnosis import Diagnosis, pool
 from tunneldb.radiometry.incidence import incidence_cosine
 from tunneldb.radiometry.oren_nayar import incidence_db
-from tunneldb.radiometry.range_curve import RangeCurve, estimate_range_curve
+from tunneldb.radiometry.range_curve import USABLE, RangeCurve, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.raster.observation import Observer
 from tunneldb.store.images import load_reference, load_regions
@@ -252,7 +252,7 @@ def _diagnosis(
 
 
 def _attempt(find: Callable[[], RangeCurve], raw: NDArray[np.floating]) -> tuple[RangeCurve | None, str | None]:
-    """A range curve if one could be found, and why detection would refuse it, if it would.
+    """A range curve if one could be found, and why detection would refuse it or what it would remark, if it would.
 
     One less certain than that intensity, dB, is within so much of its mean anywhere, says nothing and is not shown.
     """
@@ -261,10 +261,10 @@ def _attempt(find: Callable[[], RangeCurve], raw: NDArray[np.floating]) -> tuple
     except UserError as error:
         return None, str(error)
     try:
-        found.require()
+        found.require(USABLE)
     except UserError as error:
         return found if found.worst[0] < float(np.std(raw)) else None, str(error)
-    return found, None
+    return found, found.remark
 
 
 def _stations(path: Path, scanner: tuple[float, float, float] | None) -> dict[int, Float]:

@@ -32,7 +32,11 @@ from tunneldb.radiometry.regression import Fit, fit
 from tunneldb.radiometry.roughness import STEEPEST
 
 MOST_UNCERTAIN = 0.3
-"""Largest standard deviation of a curve that is used, dB: less than one of dry lining (Xu et al., 2018, Table 1)."""
+"""Largest standard deviation of a curve that needs no remark, dB: less than one of dry lining (Xu et al., 2018, Table 1)."""
+
+USABLE = 0.75
+"""Largest standard deviation of a curve that is used where drops are told from the lining about them, dB: twice as much is what
+damp lining loses at least (1.5 dB), and of the error only what changes within some metres remains."""
 
 FEWEST_CELLS = 200
 """Cells that it takes at least; fewer don't average out what a surface's texture does."""
@@ -101,14 +105,22 @@ class RangeCurve:
         """Whether it rests on cells being alike along the tunnel, as hardly any were seen by several scans."""
         return self.overlapping < FEWEST_CELLS
 
-    def require(self) -> None:
-        """Raise UserError where the curve is too uncertain to correct with."""
+    def require(self, most: float = MOST_UNCERTAIN) -> None:
+        """Raise UserError where the curve is more uncertain than ``most``, dB, so that it can't be corrected with."""
         sigma, at = self.worst
-        if not sigma <= MOST_UNCERTAIN:
+        if not sigma <= most:
             raise UserError(
                 f"range and incidence can't be told apart on this lining: the range curve is uncertain by {sigma:.2f} dB"
-                f" at {at:.1f} m (at most {MOST_UNCERTAIN:g} dB will do); {ADVICE}"
+                f" at {at:.1f} m (at most {most:g} dB will do); {ADVICE}"
             )
+
+    @property
+    def remark(self) -> str | None:
+        """What is to be known of a curve that is used though it is uncertain."""
+        sigma, at = self.worst
+        if sigma <= MOST_UNCERTAIN:
+            return None
+        return f"the range curve is uncertain by {sigma:.2f} dB at {at:.1f} m, and so are faint leaks there; {ADVICE}"
 
 
 def estimate_range_curve(

@@ -10,10 +10,10 @@ from scipy import ndimage
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.boundary import refine_boundary
+from tunneldb.anomalies.degrees import degrees_of
 from tunneldb.anomalies.region_shape import measure_shape
 from tunneldb.anomalies.regions import Region, find_regions
 from tunneldb.anomalies.threshold import filter_size, seen_lining
-from tunneldb.anomalies.degrees import degrees_of
 from tunneldb.arrays import Bool, Int32, Single
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.pixel_state import PixelState
