@@ -70,5 +70,5 @@ def test_a_model_is_the_same_from_its_file_and_another_format_is_refused() -> No
 
 def test_the_model_that_comes_with_the_program_is_small_and_says_what_it_was_fitted_to() -> None:
     values = standard_model().to_json()
-    assert len(json.dumps(values)) < 100_000
+    assert len(json.dumps(values)) < 150_000
     assert {"regions", "rounds"} <= set(values["trained_on"])
