@@ -47,6 +47,8 @@ def test_nothing_inner_is_called_from_python() -> None:
         tree = ast.parse(path.read_text("utf-8"))
         own = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and not decorators(node) & INNER}
         own |= {node.asname for node in ast.walk(tree) if isinstance(node, ast.alias) and node.asname}
+        # Rounds of blind scenes import their own functions so, the program none.
+        own |= {name.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level for name in node.names}
         found += [f"{path.name}:{line} {name}" for name, line in calls_from_python(tree) if name in inner - own]
     assert found == []
 
