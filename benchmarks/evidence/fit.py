@@ -24,7 +24,7 @@ GROWS = {
 }  # fmt: skip
 FALLS = {
     "line", "recess", "recess_rim", "straight", "box", "corners", "turned_box", "beside", "alike", "thin_degree",
-    "recess_degree", "gradual_degree", "rectangular_degree", "stripe_degree", "shadow_degree",
+    "uneven", "recess_degree", "gradual_degree", "rectangular_degree", "stripe_degree", "shadow_degree",
 }  # fmt: skip
 """Features with which the odds of a leak can only grow or fall, as physics has it: none is learnt the wrong way round."""
 

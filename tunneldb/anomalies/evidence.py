@@ -30,7 +30,7 @@ class EvidenceModel:
     Attributes
     ----------
     version : str
-        Names the model; stored with what it has judged.
+        Names the model.
     constant : float
         Logarithm of the odds before anything is known of a region.
     roots : (trees,) int array
