@@ -23,7 +23,7 @@ LEAST = 0.05
 """Regions are judged from this size on, m²: ``leak.min_area``; joints from :data:`tunneldb.anomalies.detect.MIN_JOINT` on."""
 
 LEAK, JOINT, DARK = range(3)
-"""Numbers of the kinds, as in `tunneldb.anomalies.evidence.KINDS`."""
+"""Numbers of the kinds; the model tells leaks from the other two."""
 
 
 @dataclass(frozen=True)

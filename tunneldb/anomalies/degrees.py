@@ -35,12 +35,11 @@ LEAST_STEPS = 0.2
 def degrees_of(region: Region, shape: Shape) -> dict[str, float]:
     """How much speaks for each of what a region may be instead of water, 0 to 1."""
     return {
-        "faint": _ramp(region.contrast, 3.4, 3.0),
         "thin": _thin(region, shape),
         "recess": _recess(region),
         "gradual": _gradual(region, shape),
         "rectangular": _rectangular(region, shape),
-        "stripe": min(_stripe(shape, _straight(region)), _told(region, shape)),
+        "stripe": min(_stripe(shape, _straight(region)), told(region)),
         "shadow": _shadow(region, shape),
     }
 
@@ -50,11 +49,11 @@ def _thin(region: Region, shape: Shape) -> float:
     straight = _straight(region)
     deviation = shape.deviation_along if shape.along > shape.across else shape.deviation_across
     return min(
-        _told(region, shape),
-        _ramp(shape.mean_width, 0.10, 0.07),
-        _ramp(shape.length / max(shape.mean_width, region.pixel), 4.0, 8.0),
-        _ramp(deviation, 2.0 * straight, straight),
-        _ramp(region.drop_mean, DARKEST_JOINT + 0.5, DARKEST_JOINT),
+        told(region),
+        ramp(shape.mean_width, 0.10, 0.07),
+        ramp(shape.length / max(shape.mean_width, region.pixel), 4.0, 8.0),
+        ramp(deviation, 2.0 * straight, straight),
+        ramp(region.drop_mean, DARKEST_JOINT + 0.5, DARKEST_JOINT),
     )
 
 
@@ -64,7 +63,7 @@ def _recess(region: Region) -> float:
     about = properties.perimeter_recess / properties.perimeter if properties.perimeter else 0.0
     # A profile that hits a pocket stands for more than the pocket is long.
     area = region.area / max(1.0, region.spacing / POCKET)
-    return min(_ramp(properties.recess / pixels, 0.3, 0.7), _ramp(about, 0.4, 0.2), _ramp(area, 0.12, 0.08))
+    return min(ramp(properties.recess / pixels, 0.3, 0.7), ramp(about, 0.4, 0.2), ramp(area, 0.12, 0.08))
 
 
 def _gradual(region: Region, shape: Shape) -> float:
@@ -76,8 +75,8 @@ def _gradual(region: Region, shape: Shape) -> float:
     if properties.steps * region.pixel < LEAST_STEPS * _coarseness(region) * (1 - 1e-12) or region.drop_sum <= 0:
         return 0.0
     step = (properties.inside - properties.outside) / properties.steps / region.drop_mean
-    band = min(_ramp(shape.along / shape.across, 4.0, 8.0), _told(region, shape))
-    return _ramp(step, 0.6 + 0.25 * band, 0.3 + 0.25 * band)
+    band = min(ramp(shape.along / shape.across, 4.0, 8.0), told(region))
+    return ramp(step, 0.6 + 0.25 * band, 0.3 + 0.25 * band)
 
 
 def _rectangular(region: Region, shape: Shape) -> float:
@@ -90,41 +89,41 @@ def _rectangular(region: Region, shape: Shape) -> float:
     if not properties.sharp or not shown:
         return 0.0
     width, area = shape.mean_width / _coarseness(region), region.area / _coarseness(region) ** 2
-    most = 0.71 + 0.15 * _ramp(width, 0.35, 0.2) + 0.12 * _ramp(area, 0.3, 0.1)
-    lines = _ramp(properties.straight / properties.sharp, most, most + 0.08)
+    most = 0.71 + 0.15 * ramp(width, 0.35, 0.2) + 0.12 * ramp(area, 0.3, 0.1)
+    lines = ramp(properties.straight / properties.sharp, most, most + 0.08)
     # Water that fills a panel between joints is rectangular too, and darker than repairs are, and so are small blobs.
-    panel = _strong(region) * max(_ramp(region.area, 0.8, 1.2), _ramp(width, 0.45, 0.3))
-    sharp = _ramp(properties.sharp / shown, 0.15, 0.25)
-    return min(lines, sharp, _ramp(width, 0.16, 0.22), 1.0 - panel, _told(region, shape))
+    panel = _strong(region) * max(ramp(region.area, 0.8, 1.2), ramp(width, 0.45, 0.3))
+    sharp = ramp(properties.sharp / shown, 0.15, 0.25)
+    return min(lines, sharp, ramp(width, 0.16, 0.22), 1.0 - panel, told(region))
 
 
 def _strong(region: Region) -> float:
     """Whether a region is as dark as water, and no shade of concrete is."""
-    return _ramp(min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP), 0.8, 1.0)
+    return ramp(min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP), 0.8, 1.0)
 
 
 def _stripe(shape: Shape, straight: float) -> float:
     """A painted stripe: a band along the tunnel, straight and as wide at its ends; water along a joint keeps to no edge."""
     neat = min(
-        _ramp(shape.deviation_box, straight, 0.6 * straight),
-        _ramp(shape.rectangularity, 0.85, 0.93),
-        _ramp(shape.corners, 0.4, 0.7),
+        ramp(shape.deviation_box, straight, 0.6 * straight),
+        ramp(shape.rectangularity, 0.85, 0.93),
+        ramp(shape.corners, 0.4, 0.7),
     )
     # Ragged ones are as long as no leak along the tunnel.
-    long = min(_ramp(shape.along, 2.0, 2.5), _ramp(shape.deviation_along, 2.0 * straight, straight))
-    return min(_ramp(shape.aspect_ratio, 6.0, 10.0), max(neat, long))
+    long = min(ramp(shape.along, 2.0, 2.5), ramp(shape.deviation_along, 2.0 * straight, straight))
+    return min(ramp(shape.aspect_ratio, 6.0, 10.0), max(neat, long))
 
 
 def _shadow(region: Region, shape: Shape) -> float:
     """A narrow band beside a cable or a pipe; or what shows between appendages and ends nowhere on dry lining."""
     properties = region.properties
     beside = properties.perimeter_off / properties.perimeter if properties.perimeter else 0.0
-    return max(min(_ramp(beside, 0.25, 0.45), _ramp(shape.width, 0.14, 0.08)), _ramp(beside, 0.8, 0.9))
+    return max(min(ramp(beside, 0.25, 0.45), ramp(shape.width, 0.14, 0.08)), ramp(beside, 0.8, 0.9))
 
 
-def _told(region: Region, shape: Shape) -> float:
+def told(region: Region) -> float:
     """Whether enough profiles show a region to tell how straight it is: 1 where they lie as close as pixels."""
-    return _ramp(shape.along / region.spacing, FEW_PROFILES, MANY_PROFILES) if region.spacing else 1.0
+    return ramp(region.mask.shape[1] * region.pixel / region.spacing, FEW_PROFILES, MANY_PROFILES) if region.spacing else 1.0
 
 
 def _straight(region: Region) -> float:
@@ -137,6 +136,6 @@ def _coarseness(region: Region) -> float:
     return max(1.0, region.pixel / RESOLVED)
 
 
-def _ramp(value: float, none: float, full: float) -> float:
+def ramp(value: float, none: float, full: float) -> float:
     """From 0 at ``none`` to 1 at ``full``, whichever is the greater."""
     return min(max((float(value) - none) / (full - none), 0.0), 1.0)

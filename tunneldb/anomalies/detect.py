@@ -11,7 +11,6 @@ from shapely.geometry import Polygon
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.background.level_map import BackgroundMap
 from tunneldb.anomalies.boundary import refine_boundary
-from tunneldb.anomalies.evidence import EvidenceModel
 from tunneldb.anomalies.features import measure_regions
 from tunneldb.anomalies.hidden import behind_strips
 from tunneldb.anomalies.joints import crossed_joints, find_joints
@@ -61,16 +60,14 @@ class Anomaly:
     verdict: Verdict
 
     @classmethod
-    def of(
-        cls, region: Region, min_area: float, model: EvidenceModel | None = None, features: Float | None = None
-    ) -> Anomaly | None:
-        """Make an anomaly of a region, judged by a model and its features; None if it holds no point or is too small.
+    def of(cls, region: Region, min_area: float, features: Float | None = None) -> Anomaly | None:
+        """Make an anomaly of a region, judged by its features; None if it holds no point or is too small.
 
         Leaks and dark spots must not be smaller than ``min_area``, m², joints no shorter than MIN_JOINT.
         """
         if not may_count(region, min_area):
             return None
-        verdict = classify(region, model, features)
+        verdict = classify(region, features)
         if verdict.kind == "joint":
             if max(region.mask.shape) * region.pixel < MIN_JOINT:
                 return None
@@ -109,9 +106,7 @@ class Detection:
     wet_pixels: int
 
 
-def find_anomalies(
-    contrast: ContrastImage, background: BackgroundMap, min_area: float, model: EvidenceModel | None = None
-) -> Detection:
+def find_anomalies(contrast: ContrastImage, background: BackgroundMap, min_area: float) -> Detection:
     """Find what is dark in a kilometre.
 
     Parameters
@@ -122,8 +117,6 @@ def find_anomalies(
         What they are relative to.
     min_area : float
         Smaller leaks are left out, m² in the unrolled plane.
-    model : EvidenceModel, optional
-        By which regions are judged; by default the one that comes with the program.
     """
     grid, state = contrast.grid, contrast.state
     lining, _ = _lining_in_columns(state, grid.inner)
@@ -134,8 +127,8 @@ def find_anomalies(
     dark, size = find_dark(contrast)
     anomalies, cut, leaks = [], [], []
     ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
-    regions = find_dark_regions(dark, contrast, min_area, model)
-    judged = _judged(regions, min_area, model)
+    regions = find_dark_regions(dark, contrast, min_area)
+    judged = _judged(regions, min_area)
     if contrast.spacing:
         judged = _without_joints(regions, judged, contrast.spacing)
     for region, anomaly in zip(regions, judged, strict=True):
@@ -156,12 +149,12 @@ def may_count(region: Region, min_area: float) -> bool:
     return bool(region.filled) and large
 
 
-def _judged(regions: Sequence[Region], min_area: float, model: EvidenceModel | None) -> list[Anomaly | None]:
+def _judged(regions: Sequence[Region], min_area: float) -> list[Anomaly | None]:
     """Judge the regions of a kilometre, each held against those about it; None for what is too small."""
     judged: list[Anomaly | None] = [None] * len(regions)
     counted = [k for k, region in enumerate(regions) if may_count(region, min_area)]
     for k, features in zip(counted, measure_regions([regions[k] for k in counted]), strict=True):
-        judged[k] = Anomaly.of(regions[k], min_area, model, features)
+        judged[k] = Anomaly.of(regions[k], min_area, features)
     return judged
 
 
@@ -179,12 +172,8 @@ def find_dark(contrast: ContrastImage) -> tuple[Bool, int]:
     return refine_boundary(dark_pixels(contrast, size), contrast, size), size
 
 
-def find_dark_regions(dark: Bool, contrast: ContrastImage, min_area: float, model: EvidenceModel | None = None) -> list[Region]:
+def find_dark_regions(dark: Bool, contrast: ContrastImage, min_area: float) -> list[Region]:
     """Regions of the dark pixels that may be leaks, joints or dark spots, joints cut off from what they run through."""
-
-    def may_drip(region: Region) -> bool:
-        return bool(region.filled) and classify(region, model).kind == "leak"
-
     inner, pixel = contrast.grid.inner, contrast.grid.pixel
     joints = find_joints(dark, inner.start, inner.stop, pixel, contrast.spacing)
     plain = dark & ~joints
@@ -195,8 +184,12 @@ def find_dark_regions(dark: Bool, contrast: ContrastImage, min_area: float, mode
     for part, others in parts:
         if part.any():
             whole = part | behind_strips(part, contrast.state, inner.start, inner.stop, pixel)
-            found += find_regions(whole, others, contrast, min_area, may_drip)
+            found += find_regions(whole, others, contrast, min_area, _may_drip)
     return sorted(found, key=lambda region: region.place)
+
+
+def _may_drip(region: Region) -> bool:
+    return bool(region.filled) and classify(region).kind == "leak"
 
 
 def _without_joints(regions: Sequence[Region], judged: Sequence[Anomaly | None], spacing: float) -> list[Anomaly | None]:

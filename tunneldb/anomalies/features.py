@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from tunneldb.anomalies.degrees import degrees_of
+from tunneldb.anomalies.degrees import degrees_of, ramp
 from tunneldb.anomalies.region_shape import Shape, measure_shape
 from tunneldb.anomalies.regions import Region
 from tunneldb.arrays import Bool, Float
@@ -133,7 +133,7 @@ def _extent(shape: Shape) -> tuple[float, ...]:
     deviation = shape.deviation_along if shape.along > shape.across else shape.deviation_across
     sizes = shape.area, shape.mean_width, max(shape.width, 1e-3), shape.length / shape.mean_width
     elongation = shape.length / shape.mean_width
-    line = min(_ramp(shape.mean_width, 0.12, 0.06), _ramp(elongation, 4.0, 8.0), _ramp(deviation, 0.04, 0.02))
+    line = min(ramp(shape.mean_width, 0.12, 0.06), ramp(elongation, 4.0, 8.0), ramp(deviation, 0.04, 0.02))
     return *map(math.log, sizes), deviation, line
 
 
@@ -164,11 +164,6 @@ def _place(region: Region, shape: Shape) -> tuple[float, ...]:
         _taper(region), math.log(shape.across / shape.along),
         _ratio(properties.bright, properties.steps), _ratio(properties.floor, properties.perimeter),
     )  # fmt: skip
-
-
-def _ramp(value: float, none: float, full: float) -> float:
-    """From 0 at ``none`` to 1 at ``full``, whichever is the greater."""
-    return min(max((float(value) - none) / (full - none), 0.0), 1.0)
 
 
 def _perimeter(mask: Bool) -> int:

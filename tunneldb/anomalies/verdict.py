@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from tunneldb.anomalies.degrees import FEW_PROFILES, MANY_PROFILES
-from tunneldb.anomalies.evidence import EvidenceModel, reasons_of, standard_model
+from tunneldb.anomalies.degrees import FEW_PROFILES, told
+from tunneldb.anomalies.evidence import reasons_of, standard_model
 from tunneldb.anomalies.features import DEGREES, FEATURES, NAMES, measure_features
 from tunneldb.anomalies.regions import Region
 from tunneldb.arrays import Float
@@ -53,23 +53,21 @@ class Verdict:
     features: Float
 
 
-def classify(region: Region, model: EvidenceModel | None = None, features: Float | None = None) -> Verdict:
+def classify(region: Region, features: Float | None = None) -> Verdict:
     """Tell what a region is, by its features: a leak if that is more probable than not.
 
     Parameters
     ----------
     region : Region
-    model : EvidenceModel, optional
-        By default the one that comes with the program.
     features : (len(FEATURES),) float array, optional
         What was measured of it; by default what can be of a region by itself.
     """
-    model = model or standard_model()
+    model = standard_model()
     features = measure_features(region) if features is None else features
     contributions = model.contributions(features[None])[0]
     if region.spacing:
         built = np.array([feature.reason in BUILT for feature in FEATURES])
-        contributions[built] *= _told(region)
+        contributions[built] *= told(region)
     p = float(1.0 / (1.0 + np.exp(-model.constant - contributions.sum())))
     kind: Kind = "leak" if p >= 0.5 else "joint" if features[LINE] >= 0.5 else "dark"
     evidence = reasons_of(contributions)
@@ -84,9 +82,3 @@ def classify(region: Region, model: EvidenceModel | None = None, features: Float
 
 def _degree(features: Float, name: str) -> float:
     return float(features[NAMES.index(f"{name}_degree")])
-
-
-def _told(region: Region) -> float:
-    """Whether enough profiles show a region to tell its outline, 0 to 1."""
-    profiles = region.mask.shape[1] * region.pixel / region.spacing
-    return min(max((profiles - FEW_PROFILES) / (MANY_PROFILES - FEW_PROFILES), 0.0), 1.0)
