@@ -33,8 +33,8 @@ def wilson(hits: Array, count: Array) -> tuple[Array, Array]:
     hits, count = np.asarray(hits, np.float64), np.asarray(count, np.float64)
     middle = (hits + Z**2 / 2) / (count + Z**2)
     half = Z / (count + Z**2) * np.sqrt(hits * (count - hits) / np.maximum(count, 1.0) + Z**2 / 4)
-    # At no hit and at nothing but hits an end is exactly 0 or 1.
-    return np.clip(middle - half, 0.0, 1.0), np.clip(middle + half, 0.0, 1.0)
+    # At no hit and at nothing but hits an end is 0 or 1, which rounding misses.
+    return np.where(hits == 0.0, 0.0, middle - half), np.where(hits == count, 1.0, middle + half)
 
 
 def ranks(probabilities: Array, shows: Sequence[Sequence[int]], true: int) -> Array:

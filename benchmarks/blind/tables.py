@@ -79,8 +79,8 @@ def _left_out(scored: Scored, refused: Sequence[str]) -> None:
     print(f"not demanded: {scored.small} true leaks smaller than {SMALLEST:g} m², {scored.limited} that can't be told (limit)")
     print(f"touched by nothing, without area error and edges: {untouched} of {int(v['true'])} true leaks")
     print(
-        f"not in leak P: {small} of the false ones, of {LEAST:g} to {SMALLEST:g} m²; with them it is {v['strict_precision']:.3f},"
-        f" leak F1 {v['strict_f1']:.3f}"
+        f"not in leak P: {small} of the false ones, of {LEAST:g} to {SMALLEST:g} m²;"
+        f" with them it is {v['strict_precision']:.3f}, leak F1 {v['strict_f1']:.3f}"
     )
     if refused:
         print(f"refused, and in no figure: {', '.join(refused)}")
