@@ -24,7 +24,7 @@ def draw_reliability(reliability: Reliability, title: str, path: Path) -> None:
     path : Path
         File to write, of one of FORMATS.
     """
-    figure = Figure(figsize=(6.0, 6.5), layout="constrained")
+    figure = Figure(figsize=(6.0, 7.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
     held = reliability.count > 0
     stated, true = reliability.stated[held], reliability.true[held]
@@ -32,7 +32,6 @@ def draw_reliability(reliability: Reliability, title: str, path: Path) -> None:
     upper.vlines(stated, reliability.low[held], reliability.high[held], color=COLOUR, label="interval of 95 % (Wilson)")
     upper.plot(stated, true, "o", color=COLOUR, label="regions of the class")
     upper.set(xlim=(0, 1), ylim=(0, 1), ylabel="share that are leaks", title=title)
-    upper.set_aspect("equal")
     upper.legend(loc="upper left")
     bars = lower.bar(BINS[:-1], reliability.count, np.diff(BINS), align="edge", color=COLOUR, edgecolor="white", log=True)
     lower.bar_label(bars, [str(number) if number else "" for number in reliability.count], fontsize=8)

@@ -46,6 +46,7 @@ def show(name: str, outcomes: Sequence[Outcome], refused: Sequence[str] = ()) ->
     _left_out(scored, refused)
     print_table("by size", CLASSED, [_figures(size, f) for size, f in by_size(scored)])
     print_table("by drop", CLASSED, [_figures(drop, f) for drop, f in by_drop(scored)])
+    print(f"of no drop: {(scored.comparison.found_group < 0).sum()} that are called and touch no true leak")
     phenomena = by_phenomenon(scored)
     print_table("by phenomenon", ("", "true", "found", "area R"), [(k, n, f, f"{a:.2f}") for k, (n, f, a) in phenomena.items()])
     _classes(outcomes)
