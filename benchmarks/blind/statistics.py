@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Z = 1.959963984540054
 """97.5 % quantile of the normal distribution: intervals hold the true share in 95 of 100 cases."""
@@ -17,7 +17,7 @@ CLASSES = 4
 Array = NDArray[np.float64]
 
 
-def wilson(hits: Array, count: Array) -> tuple[Array, Array]:
+def wilson(hits: ArrayLike, count: ArrayLike) -> tuple[Array, Array]:
     """Interval of 95 % of shares (Wilson, 1927, J. Am. Stat. Assoc. 22, 209–212), for trials that know nothing of each other.
 
     Parameters

@@ -104,7 +104,7 @@ def _classes(outcomes: Sequence[Outcome]) -> None:
             continue
         for agreement, what in zip(waterproofing(outcomes, told), ("scenes", f"stretches of {STRETCH:g} m"), strict=True):
             if not agreement.table.any():
-                print(f"\nclass of waterproofing (GB 50108): not known of any of {agreement.unknown} {what}")
+                print(f"\nclass of waterproofing (GB 50108) of {what}, by {of}: not known")
                 continue
             print_table(
                 f"class of waterproofing (GB 50108) of {what}, by {of}",
