@@ -30,7 +30,7 @@ def draw_reliability(reliability: Reliability, title: str, path: Path) -> None:
     stated, true = reliability.stated[held], reliability.true[held]
     upper.plot((0, 1), (0, 1), color=GREY, linestyle="--", label="probabilities that are true")
     upper.vlines(stated, reliability.low[held], reliability.high[held], color=COLOUR, label="interval of 95 % (Wilson)")
-    upper.plot(stated, true, "o", color=COLOUR, label="regions of the class")
+    upper.plot(stated, true, "o", color=COLOUR, clip_on=False, label="regions of the class")
     upper.set(xlim=(0, 1), ylim=(0, 1), ylabel="share that are leaks", title=title)
     upper.legend(loc="upper left")
     bars = lower.bar(BINS[:-1], reliability.count, np.diff(BINS), align="edge", color=COLOUR, edgecolor="white", log=True)
