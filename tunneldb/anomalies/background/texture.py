@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from tunneldb.anomalies.background.histogram import BIN, TILE_BINS, window_statistics
 from tunneldb.anomalies.background.smooth import extrapolate
-from tunneldb.arrays import Bool, Float, Int16, Int64, Single, UInt8
+from tunneldb.arrays import Bool, Float, Int16, Int32, Int64, Single, UInt8
 from tunneldb.compiled import kernel
 from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.pixel_state import PixelState
@@ -101,33 +101,47 @@ def windowed(state: UInt8, drop: Int16, half: UInt8, tile: int, rows: slice, abo
     (n, columns) int16 array
         Steps of the image; NODATA where a window holds no lining.
     """
-    held = (state[about] > PixelState.EMPTY) & (state[about] <= PixelState.RECESS) & (drop[about] != NODATA)
-    sums = np.zeros((2, held.shape[0] + 1, held.shape[1] + 1), np.int64)
-    np.cumsum(np.cumsum(np.where(held, drop[about], 0), axis=0, dtype=np.int64), axis=1, out=sums[0, 1:, 1:])
-    np.cumsum(np.cumsum(held, axis=0, dtype=np.int64), axis=1, out=sums[1, 1:, 1:])
+    # Sums may run over: differences, of which those over windows are made, are right nevertheless.
+    total, count = np.zeros((2, about.stop - about.start + 1, state.shape[1] + 1), np.int32)
+    _integrate(state[about], drop[about], total, count)
     out = drop[rows].copy()
-    _average(sums[0], sums[1], half, tile, rows.start, about.start, out)
+    _average(total, count, half, tile, rows.start, about.start, out)
     return out
 
 
 @kernel
+def _integrate(state: UInt8, drop: Int16, total: Int32, count: Int32) -> None:  # pragma: no cover - compiled
+    """Sum of the drop and number of the pixels of lining above and before each corner of a pixel (rows + 1, columns + 1)."""
+    for i in range(state.shape[0]):
+        added, held = np.int32(0), np.int32(0)
+        for j in range(state.shape[1]):
+            if 0 < state[i, j] <= RECESS and drop[i, j] != NODATA:
+                added += np.int32(drop[i, j])
+                held += np.int32(1)
+            total[i + 1, j + 1] = total[i, j + 1] + added
+            count[i + 1, j + 1] = count[i, j + 1] + held
+
+
+@kernel
 def _average(
-    total: Int64, count: Int64, half: UInt8, tile: int, first: int, top: int, out: Int16
+    total: Int32, count: Int32, half: UInt8, tile: int, first: int, top: int, out: Int16
 ) -> None:  # pragma: no cover - compiled
     """Put means over windows in the place of drops (rows, columns), of which the first is row ``first`` of the image."""
     rows, columns = total.shape[0] - 1, total.shape[1] - 1
     for i in range(out.shape[0]):
-        for j in range(columns):
-            h = int(half[(first + i) // tile, min(j // tile, half.shape[1] - 1)])
+        of_row = half[(first + i) // tile]
+        for begin in range(0, columns, tile):
+            h = int(of_row[min(begin // tile, len(of_row) - 1)])
             if h == 0:
                 continue
             m, n = max(first + i - top - h, 0), min(first + i - top + h + 1, rows)
-            k, q = max(j - h, 0), min(j + h + 1, columns)
-            held = count[n, q] - count[m, q] - count[n, k] + count[m, k]
-            if held:
-                out[i, j] = round((total[n, q] - total[m, q] - total[n, k] + total[m, k]) / held)
-            else:
-                out[i, j] = NODATA
+            for j in range(begin, min(begin + tile, columns)):
+                k, q = max(j - h, 0), min(j + h + 1, columns)
+                held = np.int32(count[n, q] - count[m, q] - count[n, k] + count[m, k])
+                if held:
+                    out[i, j] = round(np.int32(total[n, q] - total[m, q] - total[n, k] + total[m, k]) / held)
+                else:
+                    out[i, j] = NODATA
 
 
 @kernel
