@@ -225,12 +225,17 @@ def test_truth_of_the_lining_as_geopackage(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"lining": "brick"}, "lining 'brick' is unknown: use plain, cast, segments, shotcrete or tiles"),
+        ({"lining": "wood"}, "lining 'wood' is unknown: use plain, cast, segments, .*rock or rough_shotcrete"),
         ({"range_curve": "cube"}, "range curve 'cube' is unknown"),
         ({"joint_leaks": 1}, "joint leaks need joints, and lining plain has none"),
         ({"ring_step": 0.003, "lining": "tiles"}, "ring step needs rings, and lining tiles has none"),
         ({"niche_leaks": 1, "niches": False}, "niche leaks need niches"),
         ({"beam": -1.0}, "beam is -1"),
+        ({"chamfers": 6.0}, "chamfers need joints, and lining plain has none: use lining cast or segments"),
+        ({"pocket_leaks": 1, "lining": "cast"}, "pocket leaks need bolt pockets, and lining cast has none"),
+        ({"mesh": 0.01}, "mesh is 0.01 m: give 0 for none"),
+        ({"banding": 0.3, "density": 100.0}, "banding is from line to line"),
+        ({"patch_level": (2.0, -2.0)}, "patch level is 2 to -2"),
     ],
 )
 def test_bad_linings_are_the_users_errors(values: dict[str, Any], message: str) -> None:

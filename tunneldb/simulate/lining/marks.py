@@ -13,11 +13,14 @@ from shapely.ops import unary_union
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
+from tunneldb.simulate.lining.rings import Rings
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 TRIES = 600
 CLEAR = 0.15  # between marks, and between a mark and a leak, m
+# Chamfers of ring joints: width, m, and limits of their slant, degrees.
+CHAMFER, CHAMFER_SLANT = 0.05, (0.2, 1.5)
 DIGIT = (0.18, 0.30)  # width and height, m
 # Strokes of the digits as on a seven-segment display: ends in shares of the width and the height.
 _STROKES = {
@@ -31,7 +34,7 @@ _DIGITS = ("abcdef", "bc", "abged", "abgcd", "fgbc", "afgcd", "afgedc", "abc", "
 class Mark:
     """A rectangle about the line from ``one`` to ``other`` (chainage, arc), ``width`` m wide, with square ends.
 
-    ``kind`` is patch, paint (a stroke of a number) or stripe, ``level`` is added to the reflectance, dB.
+    ``kind`` is patch, paint (a stroke of a number), stripe or chamfer, ``level`` is added to the reflectance, dB.
     """
 
     kind: str
@@ -56,19 +59,25 @@ def mark_table(marks: list[Mark]) -> Float:
     return rows
 
 
-def _patch(s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
-    """A repaired rectangle."""
-    length, width, level = rng.uniform((0.5, 0.5, -2.0), (2.0, 2.0, 2.0)).tolist()
-    return [Mark("patch", (s - 0.5 * length, arc), (s + 0.5 * length, arc), width, level)]
+def _patch(p: Parameters, s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
+    """A repaired rectangle, turned by what is asked either way."""
+    (low, high), turn = p.patch_level, math.radians(p.patch_turn)
+    length, width, level = rng.uniform((0.5, 0.5, low), (2.0, 2.0, high)).tolist()
+    if turn and rng.random() < 0.5:
+        turn = -turn
+    along, across = 0.5 * length * math.cos(turn), 0.5 * length * math.sin(turn)
+    return [Mark("patch", (s - along, arc - across), (s + along, arc + across), width, level)]
 
 
-def _stripe(s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
+def _stripe(p: Parameters, s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
     """A painted line along the tunnel."""
     length, level = rng.uniform((2.0, -4.0), (10.0, 4.0)).tolist()
-    return [Mark("stripe", (s - 0.5 * length, arc), (s + 0.5 * length, arc), 0.1, level)]
+    low, high = p.stripe_width
+    width = float(rng.uniform(low, high)) if high > low else low
+    return [Mark("stripe", (s - 0.5 * length, arc), (s + 0.5 * length, arc), width, level)]
 
 
-def _number(s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
+def _number(p: Parameters, s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
     """Two to four painted digits, upright on the wall, to be read from inside the tunnel."""
     width, level = rng.uniform((0.03, -4.0), (0.05, 4.0)).tolist()
     up = -math.copysign(1.0, arc)
@@ -103,7 +112,7 @@ def place_marks(parameters: Parameters, tunnel: Tunnel, taken: list[BaseGeometry
             arc = float(rng.uniform(-lowest, lowest))
             if make is _number:  # where one reads it
                 arc = math.copysign(float(rng.uniform(0.55, 0.9)) * lowest, arc)
-            made = make(s, arc, rng)
+            made = make(p, s, arc, rng)
             outline = unary_union([m.polygon() for m in made])
             left, low, right, high = outline.bounds
             inside = left > line.start + 0.5 and right < line.end - 0.5 and low > -lowest and high < lowest
@@ -113,4 +122,18 @@ def place_marks(parameters: Parameters, tunnel: Tunnel, taken: list[BaseGeometry
             raise UserError(f"no room on the lining for mark {number + 1} of {len(wanted)}: ask for fewer patches, less paint")
         shapes.append(outline.buffer(CLEAR))
         marks += made
+    return marks
+
+
+def chamfers(parameters: Parameters, tunnel: Tunnel, rings: Rings, seed: np.random.SeedSequence) -> list[Mark]:
+    """Broken edges of the ring joints: dark bands across the whole lining, each a little askew."""
+    p, line, lowest = parameters, tunnel.line, tunnel.section.floor_arc
+    if p.chamfers == 0.0:
+        return []
+    rng = np.random.default_rng(seed)
+    joints = rings.first + np.arange(rings.level.size + 1) * rings.length
+    marks = []
+    for s in joints[(joints > line.start) & (joints < line.end)].tolist():
+        askew = lowest * math.tan(math.radians(float(rng.uniform(*CHAMFER_SLANT)))) * (1.0 if rng.random() < 0.5 else -1.0)
+        marks.append(Mark("chamfer", (s - askew, -lowest), (s + askew, lowest), CHAMFER, -p.chamfers))
     return marks
