@@ -49,7 +49,7 @@ WIDE_SET: tuple[Case, ...] = (
     _case("wet panels, segments", panel_leaks=2, **SEGMENTS),
     _case("soft rims", leak_edge=0.3),
     _case("fringes of salts", salt_fringe=0.1),
-    _case("drips far below", drip_gap=(0.12, 0.4)),
+    _case("drips far below", drip_gap=(0.12, 0.4), leaks=9, leak_area=(0.4, 2.0)),
     _case("salts on 4 %", salts=4.0),
     _case("chamfers, segments", chamfers=6.0, **SEGMENTS),
     _case("halos of grime", halos=6),
