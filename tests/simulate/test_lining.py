@@ -10,37 +10,14 @@ import numpy as np
 import pyogrio.raw
 import pytest
 import shapely
+from support.lining_scans import BARE, inside, scan
 
 from tunneldb.errors import UserError
 from tunneldb.simulate import Cloud, Parameters, Simulation, simulate, write
 from tunneldb.simulate.lining.reflectance import level as level_at
-from tunneldb.simulate.radiometry import oren_nayar
 from tunneldb.simulate.truth import dry_features
 
 pytestmark = pytest.mark.slow
-
-BARE: dict[str, Any] = {
-    "length": 30.0, "straight": 5.0, "scanner": "profiler", "profile_spacing": 0.04, "profile_points": 700, "leaks": 0,
-    "appendages": False, "niches": False, "range_noise": 0.0, "outliers": 0.0, "intensity_noise": 0.0,
-}  # fmt: skip
-
-
-def scan(**values: Any) -> tuple[Simulation, np.ndarray, np.ndarray]:
-    """A scan of the lining: the simulation, points (chainage, arc) of the lining, their level over plain lining, dB."""
-    p = Parameters(**{**BARE, **values})
-    cloud = simulate(p)
-    lining = cloud.klass == 0
-    level = cloud.reflectance - oren_nayar(np.cos(cloud.incidence.astype(float)), 12.0) - 10.0 * np.log10(0.3)
-    return Simulation(p), np.column_stack([cloud.chainage, cloud.arc])[lining], level[lining]
-
-
-def inside(outline: shapely.Geometry, points: np.ndarray) -> np.ndarray:
-    left, low, right, high = outline.bounds
-    within = (points[:, 0] >= left) & (points[:, 0] <= right) & (points[:, 1] >= low) & (points[:, 1] <= high)
-    shapely.prepare(outline)
-    within[within] = shapely.contains_xy(outline, points[within])
-    return within
-
 
 # Points of the simulator before it had linings: number; means of x, y, z from the origin and of the amplitude, standard
 # deviation of the offset, means of class and leak.

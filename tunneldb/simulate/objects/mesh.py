@@ -18,6 +18,8 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 WIRE, GAP, DROP = (0.002, 0.008), (0.02, 0.10), (-3.0, 5.0)
 # On rough lining the mesh spans from one height to the next: it lies at this share of the greatest, m.
 SPANS = 0.6
+# Newton's steps from the lining to the mesh, and the least cosine of incidence that they reckon with.
+STEPS, LEAST_SLANT = 4, 0.05
 
 
 class Mesh(NamedTuple):
@@ -43,15 +45,16 @@ def intersect_mesh(
 ) -> tuple[Int64, Float]:
     """Which of some ``rays`` (m,) meet a wire before what they meet else, at ranges ``r`` (n,), and their ranges there.
 
-    ``found`` (6, n) is what they meet on the lining, rows as of :func:`intersect_lining`.
+    ``found`` (6, n) is what they meet on the lining, rows as of :func:`intersect_lining`; the cosine of those is replaced.
     """
-    slant = np.maximum(found[3, rays], 0.05)
-    t, s = found[0, rays] - mesh.offset / slant, found[1, rays]
-    for _ in range(3):
-        place = tunnel.unroll_near(origin[rays] + t[:, None] * direction[rays], s, 1e-4)
-        t, s = t + (place.offset - mesh.offset) / slant, place.chainage
-    place = tunnel.unroll_near(origin[rays] + t[:, None] * direction[rays], s, 1e-4)
+    start, way, t, s = origin[rays], direction[rays], found[0, rays], found[1, rays]
+    place = tunnel.unroll_near(start + t[:, None] * way, s, 1e-4)
+    for _ in range(STEPS):
+        slant = np.maximum(-np.sum(place.normal * way, axis=1), LEAST_SLANT)
+        t = t + (place.offset - mesh.offset) / slant
+        place = tunnel.unroll_near(start + t[:, None] * way, place.chainage, 1e-4)
     from_wire = [np.abs(np.mod(x, mesh.spacing) - 0.5 * mesh.spacing) for x in (place.chainage, place.arc)]
     hit = (np.minimum(*from_wire) < 0.5 * mesh.wire) & (t > 0.0) & (t < r[rays])
     hit &= (np.abs(place.arc) < tunnel.section.floor_arc) & (np.abs(place.offset - mesh.offset) < mesh.wire)
+    found[3, rays[hit]] = slant[hit]
     return rays[hit], t[hit]

@@ -18,7 +18,7 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 # Limits of what is lost by two reflections, dB.
 LOSS = (3.0, 12.0)
-ABOVE = 1e-3  # m: the mirrored ray starts off the floor
+ABOVE = 1e-5  # m: the mirrored ray starts off the floor
 
 # Echoes of rays from places (n, 3) in directions (n, 3), near chainages (n,), without noise and stray points.
 Shoot = Callable[[Float, Float, Float], Echoes]
