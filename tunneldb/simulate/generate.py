@@ -131,12 +131,12 @@ class Simulation:
         openings = [n.footprint(self.tunnel) for n in self.niches]
         along = [a for a in self.appendages if a.is_run or a.klass != APPENDAGE]
         fixed = [a.footprint() for a in self.appendages if a not in along]
-        self.rings = build(parameters, self.tunnel, built)
+        self.rings = build(parameters, self.tunnel, built, chamfered)
         self.masonry: Masonry = lay_courses(parameters, coursed)
         room = Room(self.tunnel, fixed + openings, [a.footprint() for a in along])
         self.leaks: list[Leak] = self._leaks(room, wet, joints, refuge, drips, sited)
         self.marks: list[Mark] = place_marks(parameters, self.tunnel, [k.polygon for k in self.leaks] + openings, marked)
-        self.marks += chamfers(parameters, self.tunnel, self.rings, chamfered)
+        self.marks += chamfers(parameters, self.tunnel, self.rings)
         taken = openings + [m.polygon() for m in self.marks if m.kind != "chamfer"]
         self.blotches: list[Blotch] = place_blotches(parameters, self.tunnel, self.rings, self.leaks, taken, blotched)
         self.reflectance: Reflectance | None = lining_reflectance(

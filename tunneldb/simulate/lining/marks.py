@@ -13,14 +13,12 @@ from shapely.ops import unary_union
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.simulate.lining.rings import Rings
+from tunneldb.simulate.lining.rings import CHAMFER, Rings
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 TRIES = 600
 CLEAR = 0.15  # between marks, and between a mark and a leak, m
-# Chamfers of ring joints: width, m, and limits of their slant, degrees.
-CHAMFER, CHAMFER_SLANT = 0.05, (0.2, 1.5)
 DIGIT = (0.18, 0.30)  # width and height, m
 # Strokes of the digits as on a seven-segment display: ends in shares of the width and the height.
 _STROKES = {
@@ -125,15 +123,12 @@ def place_marks(parameters: Parameters, tunnel: Tunnel, taken: list[BaseGeometry
     return marks
 
 
-def chamfers(parameters: Parameters, tunnel: Tunnel, rings: Rings, seed: np.random.SeedSequence) -> list[Mark]:
+def chamfers(parameters: Parameters, tunnel: Tunnel, rings: Rings) -> list[Mark]:
     """Broken edges of the ring joints: dark bands across the whole lining, each a little askew."""
-    p, line, lowest = parameters, tunnel.line, tunnel.section.floor_arc
-    if p.chamfers == 0.0:
-        return []
-    rng = np.random.default_rng(seed)
-    joints = rings.first + np.arange(rings.level.size + 1) * rings.length
-    marks = []
-    for s in joints[(joints > line.start) & (joints < line.end)].tolist():
-        askew = lowest * math.tan(math.radians(float(rng.uniform(*CHAMFER_SLANT)))) * (1.0 if rng.random() < 0.5 else -1.0)
-        marks.append(Mark("chamfer", (s - askew, -lowest), (s + askew, lowest), CHAMFER, -p.chamfers))
-    return marks
+    line, lowest = tunnel.line, tunnel.section.floor_arc
+    joints = rings.first + np.arange(rings.askew.size) * rings.length
+    return [
+        Mark("chamfer", (s - askew * lowest, -lowest), (s + askew * lowest, lowest), CHAMFER, -parameters.chamfers)
+        for s, askew in zip(joints.tolist(), rings.askew.tolist(), strict=True)
+        if line.start < s < line.end
+    ]

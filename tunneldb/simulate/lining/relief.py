@@ -1,4 +1,4 @@
-"""Where the lining departs from its nominal section: lips between rings, a change of radius, bolt pockets, rough linings.
+"""Where the lining departs from its nominal section: lips and chamfers of rings, changes of radius, bolt pockets, roughness.
 
 The surface lies ``height`` m off the nominal one along its normal, into the tunnel. A ray is marched from where the
 highest place could be met, so that what it meets, and what that hides, is right for deep pockets and slanting rays too.
@@ -14,7 +14,7 @@ import numpy as np
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.compiled import inner, kernel
 from tunneldb.simulate.lining.masonry import Masonry, unit_height
-from tunneldb.simulate.lining.rings import Rings, pocket_drop, ring_of
+from tunneldb.simulate.lining.rings import CHAMFER_DEPTH, Rings, chamfer_depth, pocket_drop, ring_of
 from tunneldb.simulate.noise_field import mix, value_noise
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.section import nearest
@@ -89,7 +89,7 @@ def lining_relief(
 ) -> LiningRelief | None:
     """Relief as asked; None: the surface is the nominal one."""
     p = parameters
-    if not (p.lining in ROUGH or rings.pocket_depth or p.ring_step or p.radius_step):
+    if not (p.lining in ROUGH or rings.pocket_depth or p.chamfers or p.ring_step or p.radius_step):
         return None
     rng = np.random.default_rng(seed)
     step = np.clip(rng.standard_normal(rings.level.size), -3.0, 3.0) * p.ring_step
@@ -97,6 +97,7 @@ def lining_relief(
     rough = np.array(ROUGH.get(p.lining, ())).reshape(-1, 2) * scale
     facets = np.array(FACETS.get(p.lining, ())).reshape(-1, 2) * scale
     most = ROUGH_MOST * float(rough[:, 1].sum()) + float(facets[:, 1].sum()) + masonry.face
+    grooves = masonry.depth + (CHAMFER_DEPTH if p.chamfers else 0.0)
     return LiningRelief(
         rings,
         step,
@@ -105,7 +106,7 @@ def lining_relief(
         facets,
         masonry,
         int(seed.generate_state(1)[0]),
-        min(0.0, float(step.min(initial=0.0))) - rings.pocket_depth - p.radius_step - most - masonry.depth,
+        min(0.0, float(step.min(initial=0.0))) - rings.pocket_depth - p.radius_step - most - grooves,
         max(0.0, float(step.max(initial=0.0))) + most,
         tunnel.section.floor_arc,
         tunnel.section.floor,
@@ -136,7 +137,7 @@ def facet(x: float, y: float, salt: int) -> float:
 @inner
 def _rough(relief: LiningRelief, s: float, arc: float) -> float:
     """Height of a rough surface without steps, m."""
-    total = 0.0
+    total = -chamfer_depth(relief.rings, s, arc)
     for i in range(relief.rough.shape[0]):
         size = relief.rough[i, 0]
         total += relief.rough[i, 1] * value_noise(s / size, arc / size, relief.salt + i)
@@ -243,7 +244,7 @@ def intersect_relief(
                 ax, ay, az = tx, ty, tz
             found[3, i] = abs(ax * dx + ay * dy + az * dz)
             continue
-        if relief.rough.shape[0] > 0:
+        if relief.rough.shape[0] > 0 or relief.rings.askew.shape[0] > 0:
             h = 0.005
             hs = (_rough(relief, s + h, arc) - _rough(relief, s - h, arc)) / (2.0 * h)
             ha = (_rough(relief, s, arc + h) - _rough(relief, s, arc - h)) / (2.0 * h)
