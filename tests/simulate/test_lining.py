@@ -48,6 +48,22 @@ def test_old_seeds_keep_their_points(values: dict[str, Any], before: list[float]
     np.testing.assert_allclose(figures(simulate(Parameters(**values))), before, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"salts": 4.0, "salt_fringe": 0.1, "halos": 2, "shade": 0.5, "chamfers": 6.0},
+        {"banding": 0.3, "drift": 0.3, "gain_step": 1.0, "saturation": 20.0, "ghosts": 0.1},
+        {"mesh": 0.1, "patch_turn": 6.0, "patch_level": (-6.0, -3.0)},
+    ],
+)
+def test_a_phenomenon_moves_nothing_else(asked: dict[str, Any]) -> None:
+    common: dict[str, Any] = {"length": 40.0, "lining": "segments", "leaks": 4, "clutter": 3, "seed": 11}
+    plain, other = Simulation(Parameters(**common)), Simulation(Parameters(**common, **asked))
+    assert other.leaks == plain.leaks
+    assert other.appendages == plain.appendages
+    np.testing.assert_array_equal(other.rings.level, plain.rings.level)
+
+
 @pytest.fixture(scope="module")
 def segments() -> tuple[Simulation, np.ndarray, np.ndarray]:
     return scan(lining="segments", seed=2)
