@@ -8,7 +8,7 @@ which spans 4 of its standard deviations to more than 12.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -51,12 +51,16 @@ class Case:
     options: Mapping[str, Any] = field(default_factory=dict)
     reference: str = "measured"
 
+    def seed(self, seed: int, number: int) -> int:
+        """Seed of the simulation, by that of the set and the number in it."""
+        return 100 * seed + number
+
     def arguments(self, seed: int, number: int) -> list[object]:
         """Options of ``tunneldb simulate``; each tunnel has its own kilometre, so that results can be put side by side."""
         values = {**COMMON, **self.options}
         if values["lining"] in ("cast", "segments"):
             values.setdefault("joint_leaks", 3)
-        values["seed"] = 100 * seed + number
+        values["seed"] = self.seed(seed, number)
         values["start_chainage"] = KILOMETRE * (12 + number) + 310.0
         out: list[object] = []
         for name, value in values.items():
@@ -188,9 +192,9 @@ def _layer(path: Path, layer: str, column: str) -> tuple[list[BaseGeometry], NDA
     return list(shapely.from_wkb(wkb)), columns[list(meta["fields"]).index(column)]
 
 
-def prepare(case: Case, seed: int, folder: Path, dsn: str) -> Scene:
-    """Simulate a tunnel, unless its files are there, and take it as far as the ground."""
-    number = SET.index(case)
+def prepare(case: Case, seed: int, folder: Path, dsn: str, among: Sequence[Case] = SET) -> Scene:
+    """Simulate a tunnel of a set, unless its files are there, and take it as far as the ground."""
+    number = among.index(case)
     name = case.name.replace(",", "").replace(" ", "-")
     scene = Scene(folder, name, KILOMETRE * (12 + number) + 310.0)
     arguments = case.arguments(seed, number)

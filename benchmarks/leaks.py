@@ -1,7 +1,8 @@
-"""Leaks found on the benchmark set of simulated tunnels, against those put in (benchmarks/leak_set.py).
+"""Leaks found on a benchmark set of simulated tunnels, against those put in (benchmarks/leak_set.py, wide_set.py).
 
     python -m benchmarks.leaks                         # all tunnels, about 15 minutes on two cores
     python -m benchmarks.leaks --only static --seed 2  # those with a word in their name
+    python -m benchmarks.leaks --set wide              # one phenomenon a tunnel, about 20 minutes
     python -m benchmarks.leaks --folder DIR --images   # keep the files, with the images of each tunnel
 
 Each tunnel is made, loaded and run by the command line. Figures are those of ``tunneldb evaluate`` for leaks of 0.1 m² and
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import tempfile
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -26,11 +28,13 @@ from shapely.geometry.base import BaseGeometry
 from benchmarks.common import print_table, progress, save, scratch_database, tunneldb
 from benchmarks.leak_set import SET, Case, Truth, prepare
 from benchmarks.scene import Scene
+from benchmarks.wide_set import WIDE_SET
 from tunneldb.database import connect
 from tunneldb.evaluate.measure import HALF, Comparison, compare, figures
 from tunneldb.evaluate.survey import read_findings
 from tunneldb.store.survey import get_survey
 
+SETS: dict[str, Sequence[Case]] = {"leak": SET, "wide": WIDE_SET}
 SMALLEST, STRONG = 0.1, 4.0
 HEADER = (
     "tunnel", "true", "found", "strong", "found", "called", "false", "/1000 m²", "F1", "area F1", "IoU", "area err", "p95",
@@ -94,16 +98,17 @@ class Outcome:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dsn", help="server to use; default: the embedded one")
+    parser.add_argument("--set", choices=list(SETS), default="leak", help="which tunnels: leak_set.py or wide_set.py")
     parser.add_argument("--only", help="tunnels whose name holds this")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--folder", type=Path, help="where to make the files, or where they are; default: a temporary one")
     parser.add_argument("--images", action="store_true", help="write the images of each tunnel into the folder")
     arguments = parser.parse_args()
-    outcomes = []
+    cases, outcomes = SETS[arguments.set], []
     with nullcontext(arguments.folder) if arguments.folder else tempfile.TemporaryDirectory() as folder:
-        for case in chosen(arguments.only):
+        for case in chosen(arguments.only, cases):
             progress(case.name)
-            outcomes.append(measure(arguments.dsn, case, arguments.seed, Path(folder), arguments.images))
+            outcomes.append(measure(arguments.dsn, case, arguments.seed, Path(folder), arguments.images, cases))
             progress("  " + "  ".join(row(outcomes[-1].name, [outcomes[-1]])[1:]))
     print_table(
         f"Leaks of {SMALLEST} m² and more, seed {arguments.seed}",
@@ -113,20 +118,21 @@ def main() -> None:
     listed = [line for outcome in outcomes for line in lines(outcome)]
     print_table("Missed leaks and wrong ones", LIST_HEADER, listed)
     table = {outcome.name: plain([outcome]) for outcome in outcomes}
-    print(f"\n{save('leaks', {'seed': arguments.seed, 'tunnels': table, 'all': plain(outcomes), 'wrong': listed})}")
+    name = "leaks" if arguments.set == "leak" else f"leaks_{arguments.set}"
+    print(f"\n{save(name, {'seed': arguments.seed, 'tunnels': table, 'all': plain(outcomes), 'wrong': listed})}")
 
 
-def chosen(only: str | None) -> list[Case]:
-    cases = [case for case in SET if only is None or only in case.name]
+def chosen(only: str | None, among: Sequence[Case] = SET) -> list[Case]:
+    cases = [case for case in among if only is None or only in case.name]
     if not cases:
-        raise SystemExit("no such tunnel; there are: " + "; ".join(case.name for case in SET))
+        raise SystemExit("no such tunnel; there are: " + "; ".join(case.name for case in among))
     return cases
 
 
-def measure(dsn: str | None, case: Case, seed: int, folder: Path, images: bool = False) -> Outcome:
+def measure(dsn: str | None, case: Case, seed: int, folder: Path, images: bool = False, among: Sequence[Case] = SET) -> Outcome:
     """Make a tunnel, run it, and read what was found."""
     with scratch_database(dsn) as database:
-        scene = prepare(case, seed, folder, database)
+        scene = prepare(case, seed, folder, database, among)
         scene.run(database, "detect", "detect")
         if images:
             tunneldb("image", scene.name, "-o", folder / "images", dsn=database)

@@ -10,37 +10,14 @@ import numpy as np
 import pyogrio.raw
 import pytest
 import shapely
+from support.lining_scans import BARE, inside, scan
 
 from tunneldb.errors import UserError
 from tunneldb.simulate import Cloud, Parameters, Simulation, simulate, write
 from tunneldb.simulate.lining.reflectance import level as level_at
-from tunneldb.simulate.radiometry import oren_nayar
 from tunneldb.simulate.truth import dry_features
 
 pytestmark = pytest.mark.slow
-
-BARE: dict[str, Any] = {
-    "length": 30.0, "straight": 5.0, "scanner": "profiler", "profile_spacing": 0.04, "profile_points": 700, "leaks": 0,
-    "appendages": False, "niches": False, "range_noise": 0.0, "outliers": 0.0, "intensity_noise": 0.0,
-}  # fmt: skip
-
-
-def scan(**values: Any) -> tuple[Simulation, np.ndarray, np.ndarray]:
-    """A scan of the lining: the simulation, points (chainage, arc) of the lining, their level over plain lining, dB."""
-    p = Parameters(**{**BARE, **values})
-    cloud = simulate(p)
-    lining = cloud.klass == 0
-    level = cloud.reflectance - oren_nayar(np.cos(cloud.incidence.astype(float)), 12.0) - 10.0 * np.log10(0.3)
-    return Simulation(p), np.column_stack([cloud.chainage, cloud.arc])[lining], level[lining]
-
-
-def inside(outline: shapely.Geometry, points: np.ndarray) -> np.ndarray:
-    left, low, right, high = outline.bounds
-    within = (points[:, 0] >= left) & (points[:, 0] <= right) & (points[:, 1] >= low) & (points[:, 1] <= high)
-    shapely.prepare(outline)
-    within[within] = shapely.contains_xy(outline, points[within])
-    return within
-
 
 # Points of the simulator before it had linings: number; means of x, y, z from the origin and of the amplitude, standard
 # deviation of the offset, means of class and leak.
@@ -69,6 +46,22 @@ def figures(cloud: Cloud) -> list[float]:
 @pytest.mark.parametrize(("values", "before"), BEFORE)
 def test_old_seeds_keep_their_points(values: dict[str, Any], before: list[float]) -> None:
     np.testing.assert_allclose(figures(simulate(Parameters(**values))), before, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"salts": 4.0, "salt_fringe": 0.1, "halos": 2, "shade": 0.5, "chamfers": 6.0},
+        {"banding": 0.3, "drift": 0.3, "gain_step": 1.0, "saturation": 20.0, "ghosts": 0.1},
+        {"mesh": 0.1, "patch_turn": 6.0, "patch_level": (-6.0, -3.0)},
+    ],
+)
+def test_a_phenomenon_moves_nothing_else(asked: dict[str, Any]) -> None:
+    common: dict[str, Any] = {"length": 40.0, "lining": "segments", "leaks": 4, "clutter": 3, "seed": 11}
+    plain, other = Simulation(Parameters(**common)), Simulation(Parameters(**common, **asked))
+    assert other.leaks == plain.leaks
+    assert other.appendages == plain.appendages
+    np.testing.assert_array_equal(other.rings.level, plain.rings.level)
 
 
 @pytest.fixture(scope="module")
@@ -225,12 +218,17 @@ def test_truth_of_the_lining_as_geopackage(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"lining": "brick"}, "lining 'brick' is unknown: use plain, cast, segments, shotcrete or tiles"),
+        ({"lining": "wood"}, "lining 'wood' is unknown: use plain, cast, segments, .*rock or rough_shotcrete"),
         ({"range_curve": "cube"}, "range curve 'cube' is unknown"),
         ({"joint_leaks": 1}, "joint leaks need joints, and lining plain has none"),
         ({"ring_step": 0.003, "lining": "tiles"}, "ring step needs rings, and lining tiles has none"),
         ({"niche_leaks": 1, "niches": False}, "niche leaks need niches"),
         ({"beam": -1.0}, "beam is -1"),
+        ({"chamfers": 6.0}, "chamfers need joints, and lining plain has none: use lining cast or segments"),
+        ({"pocket_leaks": 1, "lining": "cast"}, "pocket leaks need bolt pockets, and lining cast has none"),
+        ({"mesh": 0.01}, "mesh is 0.01 m: give 0 for none"),
+        ({"banding": 0.3, "density": 100.0}, "banding is from line to line"),
+        ({"patch_level": (2.0, -2.0)}, "patch level is 2 to -2"),
     ],
 )
 def test_bad_linings_are_the_users_errors(values: dict[str, Any], message: str) -> None:

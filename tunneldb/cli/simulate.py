@@ -12,6 +12,7 @@ import click
 from tunneldb.cli.output import Verb, tell, verb
 from tunneldb.cli.progress import bar
 from tunneldb.simulate import PRESETS, Parameters, Simulation, write
+from tunneldb.simulate.parameters import CHOICES
 
 
 class _Option(NamedTuple):
@@ -86,27 +87,54 @@ _GROUPS: dict[str, list[_Option]] = {
     "Intensity and contents": [
         _Option("roughness", "DEG", "Oren–Nayar roughness of all surfaces (9 to 20 for concrete)."),
         _Option("intensity_noise", "DB", "Standard deviation of a point's intensity."),
+        _Option("banding", "DB", "Standard deviation of the gain from line to line (turns of the mirror, columns)."),
+        _Option("drift", "DB", "Standard deviation of the gain over time, in waves of a minute or two."),
+        _Option("gain_step", "DB", "Change of the gain at once, about the middle of the survey."),
+        _Option("saturation", "DB", "Greatest amplitude that the receiver gives [none]."),
+        _Option(
+            "noise_growth",
+            "SHARE",
+            "By how much of itself noise has grown at 10 m; four times that at 20 m.",
+        ),
+        _Option("ghosts", "SHARE", "Share of the floor's echoes that come from the wall by way of the floor, below ground."),
         _Option("leaks", "N", "Number of leaks [one every 12 m].", int),
         _Option("leak_area", "MIN MAX", "Area of leaks, m².", float, 2),
         _Option("leak_drop", "MIN MAX", "How much darker than dry lining leaks are, dB.", float, 2),
         _Option("leak_edge", "M", "Width over which a leak goes from dry to wet; its outline lies in the middle."),
         _Option("joint_leaks", "N", "Leaks along joints, bands 0.1 to 0.4 m wide; with --lining cast or segments.", int),
         _Option("niche_leaks", "N", "Leaks on the back walls of niches.", int),
+        _Option("cable_leaks", "N", "Leaks across cables, pipes and trays.", int),
+        _Option("foot_leaks", "N", "Leaks at the foot of the wall, down to the floor.", int),
+        _Option("springline_leaks", "N", "Wet joints along the springline, 0.1 to 0.2 m by 5 to 8 m.", int),
+        _Option("pocket_leaks", "N", "Weeping bolt pockets, each with a streak; with --lining segments.", int),
+        _Option("ring_leaks", "N", "Whole wet rings from foot to foot, across what hangs there.", int),
+        _Option("panel_leaks", "N", "Wet panels with straight edges: a segment, or a rectangle.", int),
+        _Option("drip_gap", "MIN MAX", "Limits of the distance between a leak and its --drips, m.", float, 2),
+        _Option("salt_fringe", "M", "Width of the bright salts round each leak."),
     ],
     "Make and looks of the lining": [
         _Option(
             "lining",
             "NAME",
-            "plain, cast (blocks), segments (rings of segments with bolt pockets), shotcrete or tiles.",
-            click.Choice(["plain", "cast", "segments", "shotcrete", "tiles"]),
+            "plain, cast (blocks), segments (rings of segments with bolt pockets), shotcrete, tiles, brick, stone, "
+            "rock (unlined, in rough facets) or rough_shotcrete.",
+            click.Choice(list(CHOICES["lining"])),
         ),
         _Option("ring", "M", "Length of the blocks of cast and of the rings of segments [10, 1.5]."),
         _Option("ring_step", "M", "Standard deviation of the radius from ring to ring or block to block."),
         _Option("radius_step", "M", "How much wider the section is over the second half."),
         _Option("soot", "DB", "Darkening of the crown."),
         _Option("grime", "DB", "Darkening beneath cables and trays."),
-        _Option("patches", "N", "Repaired rectangles, 2 dB darker to 2 dB brighter.", int),
+        _Option("patches", "N", "Repaired rectangles.", int),
+        _Option("patch_level", "MIN MAX", "How much brighter they are, dB; negative: darker.", float, 2),
+        _Option("patch_turn", "DEG", "By how much they are turned, either way."),
         _Option("paint", "N", "Painted numbers and stripes in turn, 4 dB darker to 4 dB brighter.", int),
+        _Option("stripe_width", "MIN MAX", "Width of the stripes, m.", float, 2),
+        _Option("salts", "%", "Share of the lining that is white with salts."),
+        _Option("salt_level", "DB", "How much brighter salts are."),
+        _Option("halos", "N", "Spots of grime shaped as leaks, which fade over 0.25 m.", int),
+        _Option("chamfers", "DB", "Drop of broken edges of the ring joints, 5 cm wide, slanting by a degree or so."),
+        _Option("shade", "DB", "Standard deviation of the level from half ring to half ring."),
         _Option(
             "clutter",
             "N",
@@ -114,6 +142,10 @@ _GROUPS: dict[str, list[_Option]] = {
             "and a junction box every 10 m.",
             int,
         ),
+        _Option("thin_cables", "N", "Bundles of cables and flat ducts on the wall, 3 to 25 mm thick.", int),
+        _Option("trunking", "N", "Closed boxes along the whole tunnel, 0.1 to 0.4 m deep.", int),
+        _Option("sheets", "N", "Sheets before the wall, 1 to 8 m long.", int),
+        _Option("mesh", "M", "Distance between the wires of a mesh before the lining, 0: none."),
     ],
     "Floor and what stands free": [
         _Option("people", "N", "People standing about.", int),
@@ -195,6 +227,7 @@ def _options(command: Callable[..., None]) -> Callable[..., None]:
         "tunneldb simulate out --name bend --section horseshoe --length 100 --radius 300 --slope 4",
         "tunneldb simulate out --section box --scanner profiler --leaks 20 --leak-area 0.1 2 --seed 7",
         "tunneldb simulate out --length 50 --people 4 --equipment 6 --spheres 6 --ballast 0.02 --sleepers --catenary",
+        "tunneldb simulate out --length 40 --lining brick --salts 4 --salt-fringe 0.1 --foot-leaks 2 --banding 0.3",
         "tunneldb simulate out --name km --length 25000 --radius 4000 --scanner profiler --density 100 --no-truth",
     ],
 )
@@ -227,9 +260,12 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
                              sphere; leak -1 for none; thing, where something stands free: its number, 0 for none
     OUT/NAME.truth.geojson   leaks as polygons in the plane (chainage, arc), with drips as multipolygons
     OUT/NAME.truth.gpkg      the same as layer leak; layer dry: what is dark but dry (joint, pocket, patch, paint,
-                             stripe, soot, grime)
+                             stripe, soot, grime, halo, chamfer, shade); layer bright, if any: what is brighter
+                             (salts, fringe, patch, paint, stripe, shade), its drop negative
     OUT/NAME.spheres.csv     id,x,y,z,radius,kind of the target spheres, if any; id is their number among the things
     OUT/NAME.json            all parameters, appendages, niches, things that stand free
+
+    The kind of a leak is wall, joint, niche, cable, foot, springline, pocket, ring or panel.
 
     Lengths are in metres, angles in degrees, levels in dB.
     """  # noqa: D301 - \b is click's mark for lines to be kept

@@ -12,21 +12,28 @@ import numpy as np
 
 from tunneldb.arrays import Float, Int32, Int64, Single, UInt8, UInt16
 from tunneldb.simulate.floor_profile import slabs
+from tunneldb.simulate.instrument import Instrument, noise_scale
 from tunneldb.simulate.lining import ballast as ground
+from tunneldb.simulate.lining.blotches import Blotch, place_blotches
+from tunneldb.simulate.lining.leak_sites import site_leaks
 from tunneldb.simulate.lining.leaks import Leak, Room, place
-from tunneldb.simulate.lining.marks import Mark, place_marks
+from tunneldb.simulate.lining.marks import Mark, chamfers, place_marks
+from tunneldb.simulate.lining.masonry import Masonry, lay_courses
 from tunneldb.simulate.lining.reflectance import Reflectance, lining_reflectance
 from tunneldb.simulate.lining.relief import lining_relief
 from tunneldb.simulate.lining.rings import build
 from tunneldb.simulate.lining.seepage import joint_leaks, niche_leaks, with_drips
-from tunneldb.simulate.objects.fixtures import FLOOR, RAIL, Appendage, Niche, furnish, refuges
+from tunneldb.simulate.objects.fixtures import APPENDAGE, FLOOR, RAIL, Appendage, Niche, furnish, refuges
+from tunneldb.simulate.objects.mesh import hang_mesh
 from tunneldb.simulate.objects.overhead import overhead, sleepers
 from tunneldb.simulate.objects.primitives import Primitive, TargetSphere, parts_table
 from tunneldb.simulate.objects.wall_clutter import clutter
+from tunneldb.simulate.objects.wall_covers import covers
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.placement import stand
 from tunneldb.simulate.radiometry import counts, reference_curve
 from tunneldb.simulate.rays.beam import blur
+from tunneldb.simulate.rays.ghosts import mirror
 from tunneldb.simulate.rays.scene import scene
 from tunneldb.simulate.rays.trace import Echoes, Tracer
 from tunneldb.simulate.scanner import BlockPlan, Scanner
@@ -88,10 +95,12 @@ class Simulation:
     parameters : Parameters
     tunnel : Tunnel
         Exact geometry.
-    appendages, niches, leaks, marks : list
+    appendages, niches, leaks, marks, blotches : list
         What is in it.
     rings : Rings
         How the lining is put together.
+    masonry : Masonry
+        Its bricks or stones.
     reflectance : Reflectance or None
         How bright it is from place to place; None: plain.
     things : list of Primitive
@@ -100,32 +109,45 @@ class Simulation:
         Target spheres; sphere i is thing i.
     scanner : Scanner
         Poses.
+    instrument : Instrument
+        Its own part in the intensity.
     """
 
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
         self.tunnel: Tunnel = parameters.tunnel()
         # Later streams come behind, so that a seed keeps its points.
-        streams = np.random.SeedSequence(parameters.seed).spawn(14)
-        furniture, wet, reference, self._seed, free, loose, built, marked, coated, joints, refuge, drips, moved, hung = streams
+        streams = np.random.SeedSequence(parameters.seed).spawn(21)
+        furniture, wet, reference, self._seed, free, loose, built = streams[:7]
+        marked, coated, joints, refuge, drips, moved, hung = streams[7:14]
+        covered, coursed, sited, blotched, chamfered, meshed, electric = streams[14:]
         self.appendages: list[Appendage] = (
             furnish(self.tunnel, np.random.default_rng(furniture)) if parameters.appendages else []
         )
         self.niches: list[Niche] = refuges(self.tunnel) if parameters.niches else []
         self.appendages += clutter(parameters, self.tunnel, self.appendages, hung)
+        self.appendages += covers(parameters, self.tunnel, self.appendages, covered)
         self.appendages += slabs(parameters, self.tunnel)
-        obstacles = [a.footprint() for a in self.appendages] + [n.footprint(self.tunnel) for n in self.niches]
-        self.rings = build(parameters, self.tunnel, built)
-        self.leaks: list[Leak] = self._leaks(Room(self.tunnel, obstacles), wet, joints, refuge, drips)
         openings = [n.footprint(self.tunnel) for n in self.niches]
+        along = [a for a in self.appendages if a.is_run or a.klass != APPENDAGE]
+        fixed = [a.footprint() for a in self.appendages if a not in along]
+        self.rings = build(parameters, self.tunnel, built, chamfered)
+        self.masonry: Masonry = lay_courses(parameters, coursed)
+        room = Room(self.tunnel, fixed + openings, [a.footprint() for a in along])
+        self.leaks: list[Leak] = self._leaks(room, wet, joints, refuge, drips, sited)
         self.marks: list[Mark] = place_marks(parameters, self.tunnel, [k.polygon for k in self.leaks] + openings, marked)
+        self.marks += chamfers(parameters, self.tunnel, self.rings)
+        taken = openings + [m.polygon() for m in self.marks if m.kind != "chamfer"]
+        self.blotches: list[Blotch] = place_blotches(parameters, self.tunnel, self.rings, self.leaks, taken, blotched)
         self.reflectance: Reflectance | None = lining_reflectance(
-            parameters, self.tunnel, self.rings, self.appendages, self.marks, coated
+            parameters, self.tunnel, self.rings, self.masonry, self.appendages, self.marks, self.blotches, coated
         )
-        self._relief = lining_relief(parameters, self.tunnel, self.rings, moved)
+        self._relief = lining_relief(parameters, self.tunnel, self.rings, self.masonry, moved)
+        self._mesh = hang_mesh(parameters, self._relief.high if self._relief is not None else 0.0, meshed)
         self._radiometry = parameters.radiometry()
         self.reference = reference_curve(parameters.max_range, np.random.default_rng(reference), self._radiometry.near_loss)
         self.scanner = Scanner(parameters, self.tunnel)
+        self.instrument = Instrument.of(parameters, *self.scanner.times(), electric)
         standing, spheres = stand(parameters, self.tunnel, self.scanner, self.appendages, self.niches, free)
         self.spheres: list[TargetSphere] = spheres
         self.things: list[Primitive] = standing + overhead(parameters, self.tunnel, loose, len(standing) + 1)
@@ -147,14 +169,19 @@ class Simulation:
         joints: np.random.SeedSequence,
         refuge: np.random.SeedSequence,
         drips: np.random.SeedSequence,
+        sited: np.random.SeedSequence,
     ) -> list[Leak]:
-        """Leaks on the wall, along joints, in niches, numbered in this order."""
+        """Leaks on the wall, along joints, in niches, at particular places, numbered in this order.
+
+        The last have the first choice of place, as some need a whole ring.
+        """
         p, tunnel = self.parameters, self.tunnel
+        at_sites = site_leaks(p, tunnel, self.rings, self.appendages, room, sited)
         leaks = place(tunnel, room, p.leak_count(), p.leak_area, p.leak_drop, np.random.default_rng(wall))
         leaks += joint_leaks(p, tunnel, self.rings, room, joints)
-        leaks += niche_leaks(p, tunnel, self.niches, refuge)
+        leaks += niche_leaks(p, tunnel, self.niches, refuge) + at_sites
         leaks = [replace(leak, id=i + 1) for i, leak in enumerate(leaks)]
-        return with_drips(leaks, tunnel, room, drips) if p.drips else leaks
+        return with_drips(leaks, p.drip_gap, room, drips) if p.drips else leaks
 
     def make(self, plan: BlockPlan) -> Cloud:
         """Points of one block; the same for the same seed and index, whenever it is made."""
@@ -175,9 +202,20 @@ class Simulation:
                 return tracer.trace(rays.origin[index], direction, rays.hint[index], np.zeros(many), np.ones((many, 2)))
 
             found = blur(found, rays, p.beam, again, self.tunnel, radiometry, rng)
+        if p.ghosts > 0.0:
+
+            def by_floor(origin: Float, direction: Float, hint: Float) -> Echoes:
+                """Without noise and stray points."""
+                return tracer.trace(origin, direction, hint, np.zeros(len(hint)), np.ones((len(hint), 2)))
+
+            found = mirror(found, rays, p.ghosts, p.max_range, by_floor, self.tunnel, rng)
         is_ground = (found.klass == FLOOR) | (found.klass == RAIL)
+        noise *= noise_scale(p.noise_growth, found.range)
         reflectance = radiometry.reflectance(found.cosine, is_ground, found.drop) + noise
-        amplitude = radiometry.amplitude(found.range, reflectance)
+        reflectance += self.instrument.gain(rays.time[found.ray], rays.line[found.ray])
+        full = radiometry.amplitude(found.range, reflectance)
+        amplitude = self.instrument.capped(full)
+        reflectance -= full - amplitude
         return Cloud(
             xyz=found.xyz + self.tunnel.line.origin,
             time=rays.time[found.ray],
@@ -208,6 +246,8 @@ class Simulation:
             1.0 if p.beam == 0.0 else 0.0,
             p.relief,
             p.max_range,
+            self._mesh,
+            p.noise_growth,
         )
 
     def blocks(self, workers: int | None = None) -> Iterator[tuple[BlockPlan, Cloud]]:

@@ -50,6 +50,29 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "clutter": (0, 30, "runs"),
     "joint_leaks": (0, 100_000, "leaks"),
     "niche_leaks": (0, 100_000, "leaks"),
+    "cable_leaks": (0, 100_000, "leaks"),
+    "foot_leaks": (0, 100_000, "leaks"),
+    "springline_leaks": (0, 100_000, "leaks"),
+    "pocket_leaks": (0, 100_000, "leaks"),
+    "ring_leaks": (0, 100_000, "leaks"),
+    "panel_leaks": (0, 100_000, "leaks"),
+    "salts": (0.0, 50.0, "%"),
+    "salt_level": (0.5, 15.0, "dB"),
+    "salt_fringe": (0.0, 0.5, "m"),
+    "chamfers": (0.0, 15.0, "dB"),
+    "halos": (0, 100_000, "spots"),
+    "patch_turn": (0.0, 45.0, "degrees"),
+    "shade": (0.0, 5.0, "dB"),
+    "thin_cables": (0, 30, "runs"),
+    "trunking": (0, 10, "runs"),
+    "sheets": (0, 10_000, "sheets"),
+    "mesh": (0.0, 1.0, "m"),
+    "banding": (0.0, 5.0, "dB"),
+    "drift": (0.0, 5.0, "dB"),
+    "gain_step": (-10.0, 10.0, "dB"),
+    "saturation": (0.0, 60.0, "dB"),
+    "noise_growth": (0.0, 10.0, "(share)"),
+    "ghosts": (0.0, 0.5, "(share)"),
     "people": (0, 5000, "people"),
     "equipment": (0, 5000, "things"),
     "bollards": (0, 5000, "bollards"),
@@ -68,10 +91,12 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "section": ("circular", "horseshoe", "box"),
     "scanner": ("static", "profiler"),
     "range_curve": ("near_loss", "inverse_square"),
-    "lining": ("plain", "cast", "segments", "shotcrete", "tiles"),
+    "lining": ("plain", "cast", "segments", "shotcrete", "tiles", "brick", "stone", "rock", "rough_shotcrete"),
 }
 # Usual lengths of the blocks of cast lining and of rings of segments, m.
 RINGS = {"cast": 10.0, "segments": 1.5}
+# Pairs of growing numbers, and the least that they may be.
+PAIRS = {"leak_area": 1e-3, "leak_drop": 0.1, "drip_gap": 0.01, "patch_level": -15.0, "stripe_width": 0.01}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,19 +156,46 @@ class Parameters:
     leak_edge: float = 0.008
     joint_leaks: int = 0
     niche_leaks: int = 0
+    cable_leaks: int = 0
+    foot_leaks: int = 0
+    springline_leaks: int = 0
+    pocket_leaks: int = 0
+    ring_leaks: int = 0
+    panel_leaks: int = 0
     drips: bool = False
+    drip_gap: tuple[float, float] = (0.03, 0.12)
     appendages: bool = True
     niches: bool = True
 
-    lining: Literal["plain", "cast", "segments", "shotcrete", "tiles"] = "plain"
+    lining: Literal["plain", "cast", "segments", "shotcrete", "tiles", "brick", "stone", "rock", "rough_shotcrete"] = "plain"
     ring: float | None = None
     ring_step: float = 0.0
     radius_step: float = 0.0
     soot: float = 0.0
     grime: float = 0.0
     patches: int = 0
+    patch_level: tuple[float, float] = (-2.0, 2.0)
+    patch_turn: float = 0.0
     paint: int = 0
+    stripe_width: tuple[float, float] = (0.1, 0.1)
+    salts: float = 0.0
+    salt_level: float = 4.0
+    salt_fringe: float = 0.0
+    halos: int = 0
+    chamfers: float = 0.0
+    shade: float = 0.0
     clutter: int = 0
+    thin_cables: int = 0
+    trunking: int = 0
+    sheets: int = 0
+    mesh: float = 0.0
+
+    banding: float = 0.0
+    drift: float = 0.0
+    gain_step: float = 0.0
+    saturation: float | None = None
+    noise_growth: float = 0.0
+    ghosts: float = 0.0
 
     people: int = 0
     equipment: int = 0
@@ -180,14 +232,21 @@ class Parameters:
             raise UserError(f"density is {self.density:g} points/m²: give 0.1 to 1000000")
         if self.seed < 0:
             raise UserError(f"seed is {self.seed}: give 0 or more")
-        for name, floor in (("leak_area", 1e-3), ("leak_drop", 0.1)):
+        for name, floor in PAIRS.items():
             low, high = getattr(self, name)
             if not floor <= low <= high:
                 raise UserError(f"{name.replace('_', ' ')} is {low:g} to {high:g}: give two growing numbers from {floor:g}")
-        if self.joint_leaks and not self.ring_length():
-            raise UserError(f"joint leaks need joints, and lining {self.lining} has none: use lining cast or segments")
-        if self.ring_step and not self.ring_length():
-            raise UserError(f"ring step needs rings, and lining {self.lining} has none: use lining cast or segments")
+        needs = {"joint_leaks": "need joints", "ring_step": "needs rings", "chamfers": "need joints"}
+        for name, what in needs.items():
+            if getattr(self, name) and not self.ring_length():
+                text = f"{name.replace('_', ' ')} {what}, and lining {self.lining} has none"
+                raise UserError(f"{text}: use lining cast or segments")
+        if self.pocket_leaks and self.lining != "segments":
+            raise UserError(f"pocket leaks need bolt pockets, and lining {self.lining} has none: use lining segments")
+        if 0.0 < self.mesh < 0.02:
+            raise UserError(f"mesh is {self.mesh:g} m: give 0 for none, or 0.02 m and more between wires")
+        if self.banding and self.density is not None:
+            raise UserError("banding is from line to line, and evenly spread points have none: leave out --density")
         if self.niche_leaks and not self.niches:
             raise UserError("niche leaks need niches: leave out --no-niches")
         self.crs()

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tunneldb.arrays import Float, UInt16
+from tunneldb.arrays import Float, Int64, UInt16
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
@@ -27,13 +27,17 @@ LOWEST_ZENITH = 150.0
 
 
 class Rays(NamedTuple):
-    """Rays from the line's origin: origins and unit directions (n, 3), chainage of the scanner, time (s), scan id."""
+    """Rays from the line's origin: origins and unit directions (n, 3), chainage of the scanner, time (s), scan id.
+
+    ``line`` is the number of the scan line: the turn of a profiler's mirror, the column of a station; 0 for even points.
+    """
 
     origin: Float
     direction: Float
     hint: Float
     time: Float
     scan_id: UInt16
+    line: Int64
 
 
 @dataclass(frozen=True)
@@ -115,6 +119,13 @@ class Scanner:
                     yield BlockPlan(index, float(s), 0, first * p.profile_points, last * p.profile_points, float(t))
                     index += 1
 
+    def times(self) -> tuple[float, float]:
+        """GPS times at which the survey begins and ends, s."""
+        if self.parameters.scanner == "static":
+            return START_TIME, START_TIME + STATION_TIME * self.station_chainage.size
+        begin, end = self.time_at(np.array([self.tunnel.line.start, self.tunnel.line.end])).tolist()
+        return begin, end
+
     def _file_edges(self) -> Float:
         """Start, kilometre marks, end."""
         line = self.tunnel.line
@@ -165,6 +176,7 @@ class Scanner:
             np.full(n, plan.chainage),
             START_TIME + STATION_TIME * k + pace * shot.astype(np.float64),
             np.full(n, k + 1, dtype=np.uint16),
+            k * columns + shot // rows,
         )
 
     def _profiler_rays(self, plan: BlockPlan) -> Rays:
@@ -177,7 +189,7 @@ class Scanner:
         angle = 2.0 * np.pi / p.profile_points * ((shot % p.profile_points) + 0.5)
         # From the floor round by the left wall, so that the seam of a profile lies on the floor.
         direction = -np.sin(angle)[:, None] * f.u - np.cos(angle)[:, None] * f.w
-        return Rays(origin, direction, s, self.time_at(s), np.ones(s.size, dtype=np.uint16))
+        return Rays(origin, direction, s, self.time_at(s), np.ones(s.size, dtype=np.uint16), shot // p.profile_points)
 
     def _uniform_rays(self, plan: BlockPlan, rng: np.random.Generator, density: float) -> Rays:
         """Rays to points spread evenly over the surface, from the trolley beside them or the nearest station."""
@@ -198,4 +210,4 @@ class Scanner:
             origin = self._at(s, p.scanner_offset)
         direction = target - origin
         direction /= np.linalg.norm(direction, axis=1)[:, None]
-        return Rays(origin, direction, hint, time, scan_id)
+        return Rays(origin, direction, hint, time, scan_id, np.zeros(n, dtype=np.int64))

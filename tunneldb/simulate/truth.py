@@ -115,32 +115,52 @@ def grime(reflectance: Reflectance, start: float, end: float) -> list[Dry]:
     return dry
 
 
+def _painted(simulation: Simulation) -> list[tuple[BaseGeometry, str, float]]:
+    """Outline on the lining, kind and level (dB) of marks and blotches."""
+    line, lowest = simulation.tunnel.line, simulation.tunnel.section.floor_arc
+    lining = box(line.start, -lowest, line.end, lowest)
+    all_of_them = [(m.polygon(), m.kind, m.level) for m in simulation.marks]
+    all_of_them += [(b.polygon(), b.kind, b.level) for b in simulation.blotches]
+    inside = [(o if lining.contains(o) else o.intersection(lining), kind, level) for o, kind, level in all_of_them]
+    return [row for row in inside if row[0].area > 0.0]
+
+
 def dry_features(simulation: Simulation) -> list[Dry]:
     """Everything on the lining that is dark but dry."""
     line, lowest = simulation.tunnel.line, simulation.tunnel.section.floor_arc
     dry = joints(simulation.rings, line.start, line.end, lowest)
-    dry += [Dry(m.polygon(), m.kind, -m.level) for m in simulation.marks if m.level < 0.0]
+    dry += [Dry(outline, kind, -level) for outline, kind, level in _painted(simulation) if level < 0.0]
     if simulation.reflectance is not None:
         dry += soot(simulation.reflectance, line.start, line.end) + grime(simulation.reflectance, line.start, line.end)
     return dry
 
 
+def bright_features(simulation: Simulation) -> list[Dry]:
+    """Marks and blotches that are brighter than the lining; their drop is negative."""
+    return [Dry(outline, kind, -level) for outline, kind, level in _painted(simulation) if level > 0.0]
+
+
 def write_truth(simulation: Simulation, path: Path) -> None:
-    """Write leaks and what is dark but dry as layers ``leak`` and ``dry`` of a GeoPackage, in the unrolled plane as built."""
+    """Write leaks and what is dark but dry as layers ``leak`` and ``dry`` of a GeoPackage, in the unrolled plane as built.
+
+    What is bright comes in a layer ``bright`` of the same columns, where there is any.
+    """
     lay, leaks = as_built(simulation), leaks_as_built(simulation)
-    dry = [d._replace(outline=lay(d.outline)) for d in dry_features(simulation)]
+    dry, bright = ([d._replace(outline=lay(d.outline)) for d in f(simulation)] for f in (dry_features, bright_features))
     wet = {
         "id": np.array([k.id for k in leaks], dtype=np.int32),
         "kind": np.array([k.kind for k in leaks], dtype=object),
         "area": np.array([k.area for k in leaks], dtype=np.float64),
         "drop_db": np.array([k.drop for k in leaks], dtype=np.float64),
     }
-    dark = {
-        "kind": np.array([d.kind for d in dry], dtype=object),
-        "drop_db": np.array([d.drop for d in dry], dtype=np.float64),
-    }
     _write_layer(path, "leak", [k.polygon for k in leaks], wet, append=False)
-    _write_layer(path, "dry", [d.outline for d in dry], dark, append=True)
+    for layer, features in (("dry", dry), ("bright", bright)):
+        columns = {
+            "kind": np.array([d.kind for d in features], dtype=object),
+            "drop_db": np.array([d.drop for d in features], dtype=np.float64),
+        }
+        if features or layer == "dry":
+            _write_layer(path, layer, [d.outline for d in features], columns, append=True)
 
 
 def _write_layer(path: Path, layer: str, outlines: list[BaseGeometry], columns: dict[str, NDArray], append: bool) -> None:  # type: ignore[type-arg]

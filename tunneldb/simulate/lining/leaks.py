@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +27,9 @@ END, FLOOR_MARGIN, OBSTACLE_MARGIN, LEAK_MARGIN = 1.0, 0.3, 0.25, 0.3
 class Leak:
     """A wet patch: id, outline in the unrolled plane (m), area on the surface (m²), drop (dB).
 
-    ``kind`` is wall, joint (along one) or niche (on its back wall). With drips the outline has several parts.
+    ``kind`` is wall, joint (along one), niche (on its back wall), or where it was put: cable (across something that runs along
+    the wall), foot (beside the floor), springline, pocket (a bolt's), ring (from foot to foot) or panel. With drips the outline
+    has several parts.
     """
 
     id: int
@@ -51,7 +54,7 @@ def star(rng: np.random.Generator, elongation: float) -> Polygon:
     return Polygon(np.column_stack([radius * np.cos(angle), elongation * radius * np.sin(angle)]))
 
 
-def _shape(rng: np.random.Generator, area: float, down: int, holed: bool) -> Polygon:
+def wet_patch(rng: np.random.Generator, area: float, down: int, holed: bool) -> Polygon:
     """A patch of the given area around the origin; drips run ``down`` (+1 or -1 in arc) from large ones."""
     patch: BaseGeometry = star(rng, float(rng.uniform(0.8, 1.8)))
     if area > 0.3:
@@ -73,20 +76,26 @@ def _shape(rng: np.random.Generator, area: float, down: int, holed: bool) -> Pol
 
 
 class Room:
-    """Where leaks may lie on the lining: clear of obstacles, floor, tunnel ends and each other."""
+    """Where leaks may lie on the lining: clear of obstacles, floor, tunnel ends and each other.
 
-    def __init__(self, tunnel: Tunnel, obstacles: list[Polygon]) -> None:
+    What runs along the tunnel, walls and floor, is passed by ``runs``: a leak may be asked to lie across it.
+    """
+
+    def __init__(self, tunnel: Tunnel, obstacles: list[Polygon], runs: Sequence[Polygon] = ()) -> None:
         line = tunnel.line
         self.start, self.end = line.start + END, line.end - END
         self.lowest = tunnel.section.floor_arc - FLOOR_MARGIN
         self._taken = [prep(o.buffer(OBSTACLE_MARGIN)) for o in obstacles]
+        self._runs = [prep(r.buffer(OBSTACLE_MARGIN)) for r in runs]
+        self._foot = tunnel.section.floor_arc
         self._leaks: list[BaseGeometry] = []
 
-    def holds(self, outline: BaseGeometry) -> bool:
-        """Whether a leak can lie there."""
+    def holds(self, outline: BaseGeometry, across: bool = False) -> bool:
+        """Whether a leak can lie there; ``across``: down to the floor too, and across what runs along the tunnel."""
         left, low, right, high = outline.bounds
-        inside = low > -self.lowest and high < self.lowest and left > self.start and right < self.end
-        return inside and outline.is_valid and not any(t.intersects(outline) for t in self._taken)
+        lowest, taken = (self._foot, self._taken) if across else (self.lowest, self._taken + self._runs)
+        inside = low >= -lowest and high <= lowest and left > self.start and right < self.end
+        return inside and outline.is_valid and not any(t.intersects(outline) for t in taken)
 
     def take(self, outline: BaseGeometry) -> None:
         """Keep others away."""
@@ -122,7 +131,7 @@ def place(
         for _ in range(600):
             s = float(rng.uniform(line.start + end_margin, line.end - end_margin))
             arc = float(rng.uniform(-room.lowest, room.lowest))
-            polygon = _shape(rng, float(size), 1 if arc >= 0 else -1, number % 3 == 0 and size >= 0.5)
+            polygon = wet_patch(rng, float(size), 1 if arc >= 0 else -1, number % 3 == 0 and size >= 0.5)
             for _ in range(2):  # simplifying moved the area a little
                 factor = math.sqrt(size / polygon.area)
                 polygon = affinity.scale(polygon, factor, factor, origin=(0.0, 0.0))
@@ -139,19 +148,26 @@ def place(
     return [Leak(i + 1, *item) for i, item in enumerate(leaks)]
 
 
-def edge_table(leaks: list[Leak]) -> tuple[Float, Int64, Float]:
-    """Rows of edges (x1, y1, x2, y2), first edge of each leak (n+1,), and per leak: bounds (4) and drop."""
-    edges, first, rows = [np.empty((0, 4))], [0], np.zeros((len(leaks), 5))
-    for row, leak in zip(rows, leaks, strict=True):
+def outline_edges(outlines: Sequence[Polygon | MultiPolygon]) -> tuple[Float, Int64]:
+    """Rows of edges (x1, y1, x2, y2) of outlines with their holes, and the first edge of each outline (n+1,)."""
+    edges, first = [np.empty((0, 4))], [0]
+    for outline in outlines:
         own = []
-        for part in getattr(leak.polygon, "geoms", [leak.polygon]):
+        for part in getattr(outline, "geoms", [outline]):
             for ring in (part.exterior, *part.interiors):
                 xy = np.asarray(ring.coords)
                 own.append(np.hstack([xy[:-1], xy[1:]]))
         edges += own
         first.append(first[-1] + sum(len(e) for e in own))
+    return np.ascontiguousarray(np.vstack(edges)), np.array(first, dtype=np.int64)
+
+
+def edge_table(leaks: list[Leak]) -> tuple[Float, Int64, Float]:
+    """Rows of edges (x1, y1, x2, y2), first edge of each leak (n+1,), and per leak: bounds (4) and drop."""
+    rows = np.zeros((len(leaks), 5))
+    for row, leak in zip(rows, leaks, strict=True):
         row[:4], row[4] = leak.polygon.bounds, leak.drop
-    return np.ascontiguousarray(np.vstack(edges)), np.array(first, dtype=np.int64), rows
+    return *outline_edges([leak.polygon for leak in leaks]), rows
 
 
 @inner

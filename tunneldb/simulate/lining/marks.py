@@ -13,6 +13,7 @@ from shapely.ops import unary_union
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
+from tunneldb.simulate.lining.rings import CHAMFER, Rings
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
@@ -31,7 +32,7 @@ _DIGITS = ("abcdef", "bc", "abged", "abgcd", "fgbc", "afgcd", "afgedc", "abc", "
 class Mark:
     """A rectangle about the line from ``one`` to ``other`` (chainage, arc), ``width`` m wide, with square ends.
 
-    ``kind`` is patch, paint (a stroke of a number) or stripe, ``level`` is added to the reflectance, dB.
+    ``kind`` is patch, paint (a stroke of a number), stripe or chamfer, ``level`` is added to the reflectance, dB.
     """
 
     kind: str
@@ -56,19 +57,25 @@ def mark_table(marks: list[Mark]) -> Float:
     return rows
 
 
-def _patch(s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
-    """A repaired rectangle."""
-    length, width, level = rng.uniform((0.5, 0.5, -2.0), (2.0, 2.0, 2.0)).tolist()
-    return [Mark("patch", (s - 0.5 * length, arc), (s + 0.5 * length, arc), width, level)]
+def _patch(p: Parameters, s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
+    """A repaired rectangle, turned by what is asked either way."""
+    (low, high), turn = p.patch_level, math.radians(p.patch_turn)
+    length, width, level = rng.uniform((0.5, 0.5, low), (2.0, 2.0, high)).tolist()
+    if turn and rng.random() < 0.5:
+        turn = -turn
+    along, across = 0.5 * length * math.cos(turn), 0.5 * length * math.sin(turn)
+    return [Mark("patch", (s - along, arc - across), (s + along, arc + across), width, level)]
 
 
-def _stripe(s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
+def _stripe(p: Parameters, s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
     """A painted line along the tunnel."""
     length, level = rng.uniform((2.0, -4.0), (10.0, 4.0)).tolist()
-    return [Mark("stripe", (s - 0.5 * length, arc), (s + 0.5 * length, arc), 0.1, level)]
+    low, high = p.stripe_width
+    width = float(rng.uniform(low, high)) if high > low else low
+    return [Mark("stripe", (s - 0.5 * length, arc), (s + 0.5 * length, arc), width, level)]
 
 
-def _number(s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
+def _number(p: Parameters, s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
     """Two to four painted digits, upright on the wall, to be read from inside the tunnel."""
     width, level = rng.uniform((0.03, -4.0), (0.05, 4.0)).tolist()
     up = -math.copysign(1.0, arc)
@@ -103,7 +110,7 @@ def place_marks(parameters: Parameters, tunnel: Tunnel, taken: list[BaseGeometry
             arc = float(rng.uniform(-lowest, lowest))
             if make is _number:  # where one reads it
                 arc = math.copysign(float(rng.uniform(0.55, 0.9)) * lowest, arc)
-            made = make(s, arc, rng)
+            made = make(p, s, arc, rng)
             outline = unary_union([m.polygon() for m in made])
             left, low, right, high = outline.bounds
             inside = left > line.start + 0.5 and right < line.end - 0.5 and low > -lowest and high < lowest
@@ -114,3 +121,14 @@ def place_marks(parameters: Parameters, tunnel: Tunnel, taken: list[BaseGeometry
         shapes.append(outline.buffer(CLEAR))
         marks += made
     return marks
+
+
+def chamfers(parameters: Parameters, tunnel: Tunnel, rings: Rings) -> list[Mark]:
+    """Broken edges of the ring joints: dark bands across the whole lining, each a little askew."""
+    line, lowest = tunnel.line, tunnel.section.floor_arc
+    joints = rings.first + np.arange(rings.askew.size) * rings.length
+    return [
+        Mark("chamfer", (s - askew * lowest, -lowest), (s + askew * lowest, lowest), CHAMFER, -parameters.chamfers)
+        for s, askew in zip(joints.tolist(), rings.askew.tolist(), strict=True)
+        if line.start < s < line.end
+    ]

@@ -1,4 +1,4 @@
-"""How bright the lining is from place to place: its make, soot, grime and marks, in dB added to the reflectance."""
+"""How bright the lining is from place to place: its make, soot, grime, marks and blotches, in dB added to the reflectance."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import numpy as np
 
 from tunneldb.arrays import Float, Int64
 from tunneldb.compiled import kernel
+from tunneldb.simulate.lining.blotches import Blotch, BlotchTable, add_blotches, blotch_table
 from tunneldb.simulate.lining.marks import Mark, mark_table
+from tunneldb.simulate.lining.masonry import Masonry, unit_level
 from tunneldb.simulate.lining.rings import Rings, ring_level
 from tunneldb.simulate.noise_field import normal_field, smooth_field
 from tunneldb.simulate.objects.fixtures import Appendage, bin_of, bins
@@ -21,6 +23,13 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 FORMWORK, FORMWORK_SIZE = 0.2, (1.0, 2.0)
 # Texture of shotcrete: limits of its standard deviation, dB, and of its correlation length, m.
 SHOTCRETE, SHOTCRETE_SIZE = (0.3, 0.5), (0.2, 0.8)
+# Texture of other linings alike.
+TEXTURES = {
+    "rough_shotcrete": ((0.3, 1.0), (0.1, 1.0)),
+    "stone": ((0.2, 0.8), (0.1, 0.5)),
+    "brick": ((0.1, 0.5), (0.2, 1.0)),
+    "rock": ((0.5, 1.5), (0.2, 1.5)),
+}
 # Tiles: limits of their size, m; standard deviation from tile to tile, dB; width, m, and drop, dB, of the grout.
 TILE, TILE_LEVEL, GROUT, GROUT_DROP = (0.15, 0.30), 0.2, 0.005, 1.0
 # Soot: width as a share of the lining's half arc (the level falls as a Gauss curve); length of its changes along the
@@ -37,6 +46,7 @@ class Reflectance(NamedTuple):
     Attributes
     ----------
     rings : Rings
+    masonry : Masonry
     salt : int
         Of the fields.
     texture : (2,)
@@ -49,11 +59,13 @@ class Reflectance(NamedTuple):
         Bands: side (+1, -1), distance of the upper edge from the crown along the arc, m, length of fading, m, dB.
     marks, mark_bins, mark_list
         Rows of :func:`mark_table`, by chainage.
+    blotches : BlotchTable
     start : float
         Chainage of the tunnel's start, m.
     """
 
     rings: Rings
+    masonry: Masonry
     salt: int
     texture: Float
     tile: float
@@ -62,6 +74,7 @@ class Reflectance(NamedTuple):
     marks: Float
     mark_bins: Int64
     mark_list: Int64
+    blotches: BlotchTable
     start: float
 
 
@@ -69,19 +82,24 @@ def lining_reflectance(
     parameters: Parameters,
     tunnel: Tunnel,
     rings: Rings,
+    masonry: Masonry,
     furniture: Sequence[Appendage],
     marks: list[Mark],
+    blotches: list[Blotch],
     seed: np.random.SeedSequence,
 ) -> Reflectance | None:
     """Levels as asked; None: the lining is plain."""
     p, line, half = parameters, tunnel.line, tunnel.section.floor_arc
-    if p.lining == "plain" and not (p.soot or p.grime or marks):
+    if p.lining == "plain" and not (p.soot or p.grime or marks or blotches):
         return None
     make, black, bands = (np.random.default_rng(s) for s in seed.spawn(3))
     texture = {
         "cast": (FORMWORK, float(make.uniform(*FORMWORK_SIZE))),
         "shotcrete": (float(make.uniform(*SHOTCRETE)), float(make.uniform(*SHOTCRETE_SIZE))),
     }.get(p.lining, (0.0, 1.0))
+    if p.lining in TEXTURES:
+        spread, size = TEXTURES[p.lining]
+        texture = float(make.uniform(*spread)), float(make.uniform(*size))
     runs = [a for a in furniture if a.kind in ("cable", "tray", "pipe") and abs(a.arc) > 0.3 * half] if p.grime else []
     grime = [
         (math.copysign(1.0, a.arc), abs(a.arc) + 0.5 * a.width, bands.uniform(*GRIME_FADE), p.grime * bands.uniform(0.5, 1.0))
@@ -90,6 +108,7 @@ def lining_reflectance(
     rows = mark_table(marks)
     return Reflectance(
         rings,
+        masonry,
         int(seed.generate_state(1)[0]),
         np.array(texture),
         float(make.uniform(*TILE)) if p.lining == "tiles" else 0.0,
@@ -97,6 +116,7 @@ def lining_reflectance(
         np.array(grime).reshape(-1, 4),
         rows,
         *bins(rows[:, 0], rows[:, 1], line.start, line.end),
+        blotch_table(blotches, tunnel),
         line.start,
     )
 
@@ -150,6 +170,8 @@ def level(reflectance: Reflectance, s: Float, arc: Float) -> Float:
     texture, size = own.texture.tolist()
     if texture > 0.0:
         total += texture * smooth_field(s / size, arc / size, own.salt)
+    if own.masonry.length > 0.0:
+        total += unit_level(own.masonry, s, arc)
     if own.tile > 0.0:
         total += _tiles(own, s, arc)
     asked, middle, width = own.soot.tolist()
@@ -160,4 +182,6 @@ def level(reflectance: Reflectance, s: Float, arc: Float) -> Float:
         total -= _grime(own, s, arc)
     if len(own.marks):
         _mark_level(own.marks, own.mark_bins, own.mark_list, own.start, s, arc, total)
+    if len(own.blotches.rows):
+        add_blotches(own.blotches, own.start, s, arc, total)
     return total

@@ -1,4 +1,4 @@
-"""Where the lining departs from its nominal section: lips between rings, a change of radius, bolt pockets, shotcrete.
+"""Where the lining departs from its nominal section: lips and chamfers of rings, changes of radius, bolt pockets, roughness.
 
 The surface lies ``height`` m off the nominal one along its normal, into the tunnel. A ray is marched from where the
 highest place could be met, so that what it meets, and what that hides, is right for deep pockets and slanting rays too.
@@ -13,15 +13,28 @@ import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.compiled import inner, kernel
-from tunneldb.simulate.lining.rings import Rings, pocket_drop, ring_of
-from tunneldb.simulate.noise_field import value_noise
+from tunneldb.simulate.lining.masonry import Masonry, unit_height
+from tunneldb.simulate.lining.rings import CHAMFER_DEPTH, Rings, chamfer_depth, pocket_drop, ring_of
+from tunneldb.simulate.noise_field import mix, value_noise
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.section import nearest
 from tunneldb.simulate.tunnel.tunnel import Tunnel, foot, gradient
 
-# Relief of shotcrete: wavelengths, m, and standard deviations, m; its fields lie within 2.4 standard deviations.
-ROUGH_SIZE, ROUGH = (0.25, 0.08), (0.006, 0.002)
+# Relief by lining: wavelengths and standard deviations of smooth fields, m, which lie within 2.4 standard deviations.
+ROUGH = {
+    "shotcrete": ((0.25, 0.006), (0.08, 0.002)),
+    "rough_shotcrete": ((0.6, 0.025), (0.2, 0.010), (0.06, 0.004)),
+    "brick": ((0.05, 0.0006),),
+    "stone": ((0.15, 0.004), (0.05, 0.0015)),
+    "rock": ((0.05, 0.003),),
+}
 ROUGH_MOST = 2.4
+# Facets of unlined rock: sizes and greatest heights, m.
+FACETS = {"rock": ((0.8, 0.15), (0.25, 0.04))}
+# By how much that of a tunnel differs from these.
+ROUGHER = {"rough_shotcrete": (0.5, 1.5), "brick": (0.3, 2.0), "stone": (0.3, 2.0), "rock": (0.4, 1.6)}
+_PART = 1.0 / 65535.0
+_MASK = np.uint64(0xFFFF)
 # Least and greatest step of the march, m; share of the gap to the surface that a step takes.
 SHORTEST, LONGEST, SHARE = 0.002, 0.02, 0.9
 HALVINGS = 17
@@ -40,8 +53,11 @@ class LiningRelief(NamedTuple):
         Height of each ring, m.
     wider : (2,)
         Chainage from which the section is wider, and by how much, m.
-    rough : float
-        1: shotcrete; 0: smooth.
+    rough : (k, 2)
+        Wavelengths and standard deviations of smooth fields, m.
+    facets : (k, 2)
+        Sizes and greatest heights of facets, m.
+    masonry : Masonry
     salt : int
         Of the fields.
     low, high : float
@@ -53,7 +69,9 @@ class LiningRelief(NamedTuple):
     rings: Rings
     step: Float
     wider: Float
-    rough: float
+    rough: Float
+    facets: Float
+    masonry: Masonry
     salt: int
     low: float
     high: float
@@ -66,34 +84,66 @@ def wider_from(tunnel: Tunnel) -> float:
     return 0.5 * (tunnel.line.start + tunnel.line.end)
 
 
-def lining_relief(parameters: Parameters, tunnel: Tunnel, rings: Rings, seed: np.random.SeedSequence) -> LiningRelief | None:
+def lining_relief(
+    parameters: Parameters, tunnel: Tunnel, rings: Rings, masonry: Masonry, seed: np.random.SeedSequence
+) -> LiningRelief | None:
     """Relief as asked; None: the surface is the nominal one."""
     p = parameters
-    is_rough = p.lining == "shotcrete"
-    if not (is_rough or rings.pocket_depth or p.ring_step or p.radius_step):
+    if not (p.lining in ROUGH or rings.pocket_depth or p.chamfers or p.ring_step or p.radius_step):
         return None
     rng = np.random.default_rng(seed)
     step = np.clip(rng.standard_normal(rings.level.size), -3.0, 3.0) * p.ring_step
-    rough = ROUGH_MOST * sum(ROUGH) if is_rough else 0.0
+    scale = np.array([1.0, float(rng.uniform(*ROUGHER[p.lining])) if p.lining in ROUGHER else 1.0])
+    rough = np.array(ROUGH.get(p.lining, ())).reshape(-1, 2) * scale
+    facets = np.array(FACETS.get(p.lining, ())).reshape(-1, 2) * scale
+    most = ROUGH_MOST * float(rough[:, 1].sum()) + float(facets[:, 1].sum()) + masonry.face
+    grooves = masonry.depth + (CHAMFER_DEPTH if p.chamfers else 0.0)
     return LiningRelief(
         rings,
         step,
         np.array([wider_from(tunnel), p.radius_step]),
-        1.0 if is_rough else 0.0,
+        rough,
+        facets,
+        masonry,
         int(seed.generate_state(1)[0]),
-        min(0.0, float(step.min(initial=0.0))) - rings.pocket_depth - p.radius_step - rough,
-        max(0.0, float(step.max(initial=0.0))) + rough,
+        min(0.0, float(step.min(initial=0.0))) - rings.pocket_depth - p.radius_step - most - grooves,
+        max(0.0, float(step.max(initial=0.0))) + most,
         tunnel.section.floor_arc,
         tunnel.section.floor,
     )
 
 
 @inner
+def _node(i: int, j: int, salt: int) -> float:
+    """Height of a node, -1 to 1."""
+    return 2.0 * _PART * float((mix(i, j, salt) >> np.uint64(32)) & _MASK) - 1.0
+
+
+@inner
+def facet(x: float, y: float, salt: int) -> float:
+    """Surface of plane triangles over a plane, -1 to 1: nodes are a grid of side 1, each cell is cut along either diagonal."""
+    i, j = math.floor(x), math.floor(y)
+    tx, ty = x - i, y - j
+    a, b, c, d = _node(i, j, salt), _node(i + 1, j, salt), _node(i, j + 1, salt), _node(i + 1, j + 1, salt)
+    if mix(i, j, salt) & np.uint64(1):
+        if tx + ty < 1.0:
+            return a + (b - a) * tx + (c - a) * ty
+        return d + (c - d) * (1.0 - tx) + (b - d) * (1.0 - ty)
+    if tx > ty:
+        return a + (b - a) * tx + (d - b) * ty
+    return a + (d - c) * tx + (c - a) * ty
+
+
+@inner
 def _rough(relief: LiningRelief, s: float, arc: float) -> float:
-    """Height of shotcrete, m."""
-    total = 0.0
-    for i in range(2):
-        total += ROUGH[i] * value_noise(s / ROUGH_SIZE[i], arc / ROUGH_SIZE[i], relief.salt + i)
+    """Height of a rough surface without steps, m."""
+    total = -chamfer_depth(relief.rings, s, arc)
+    for i in range(relief.rough.shape[0]):
+        size = relief.rough[i, 0]
+        total += relief.rough[i, 1] * value_noise(s / size, arc / size, relief.salt + i)
+    for i in range(relief.facets.shape[0]):
+        size = relief.facets[i, 0]
+        total += relief.facets[i, 1] * facet(s / size, arc / size, relief.salt + 10 + i)
     return total
 
 
@@ -107,9 +157,9 @@ def height(relief: LiningRelief, s: float, arc: float) -> float:
         total += relief.step[ring_of(relief.rings, s)]
         if pocket_drop(relief.rings, s, arc) > 0.0:
             total -= relief.rings.pocket_depth
-    if relief.rough > 0.0:
-        total += _rough(relief, s, arc)
-    return total
+    if relief.masonry.length > 0.0:
+        total += unit_height(relief.masonry, s, arc)
+    return total + _rough(relief, s, arc)
 
 
 @inner
@@ -194,7 +244,7 @@ def intersect_relief(
                 ax, ay, az = tx, ty, tz
             found[3, i] = abs(ax * dx + ay * dy + az * dz)
             continue
-        if relief.rough > 0.0:
+        if relief.rough.shape[0] > 0 or relief.rings.askew.shape[0] > 0:
             h = 0.005
             hs = (_rough(relief, s + h, arc) - _rough(relief, s - h, arc)) / (2.0 * h)
             ha = (_rough(relief, s, arc + h) - _rough(relief, s, arc - h)) / (2.0 * h)

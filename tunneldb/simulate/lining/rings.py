@@ -24,6 +24,8 @@ POCKET = (0.15, 0.20)
 POCKET_FROM_JOINT = 0.25
 POCKETS = (0.25, 0.75)
 POCKET_DEPTH, POCKET_DROP = (0.05, 0.08), (1.0, 3.0)
+# Chamfers of ring joints: width and depth, m; limits of their slant, degrees.
+CHAMFER, CHAMFER_DEPTH, CHAMFER_SLANT = 0.05, 0.015, (0.2, 1.5)
 
 
 class Rings(NamedTuple):
@@ -50,6 +52,8 @@ class Rings(NamedTuple):
         Of the bolt pockets of a segment, dB.
     pocket_depth : float
         m; 0: there are none.
+    askew : (n + 1,)
+        Chamfers of ring joints: chainage that they gain with arc, m/m; none where joints are sharp.
     """
 
     first: float
@@ -64,17 +68,18 @@ class Rings(NamedTuple):
     seam_drop: Float
     pocket_drop: Float
     pocket_depth: float
+    askew: Float
 
 
-def build(parameters: Parameters, tunnel: Tunnel, seed: np.random.SeedSequence) -> Rings:
-    """Rings of a lining as asked."""
+def build(parameters: Parameters, tunnel: Tunnel, seed: np.random.SeedSequence, chamfered: np.random.SeedSequence) -> Rings:
+    """Rings of a lining as asked; chamfers have random numbers of their own."""
     p, line = parameters, tunnel.line
     shape = np.random.default_rng(seed)
     length = p.ring_length()
     period = 2.0 * tunnel.section.half_perimeter / SEGMENTS
     if length == 0.0:
         none, wide = np.empty(0), np.empty((0, 0))
-        return Rings(0.0, 0.0, none, none, none, period, none, wide, wide, wide, np.empty((0, 0, 2)), 0.0)
+        return Rings(0.0, 0.0, none, none, none, period, none, wide, wide, wide, np.empty((0, 0, 2)), 0.0, none)
     first = line.start - float(shape.uniform(0.0, length))
     n = math.ceil((line.end - first) / length) + 1
     segmented = p.lining == "segments"
@@ -95,7 +100,26 @@ def build(parameters: Parameters, tunnel: Tunnel, seed: np.random.SeedSequence) 
         shape.uniform(*drop, (n, m)),
         shape.uniform(*POCKET_DROP, (n, m, 2)),
         float(shape.uniform(*POCKET_DEPTH)) if segmented else 0.0,
+        _askew(n + 1 if p.chamfers else 0, np.random.default_rng(chamfered)),
     )
+
+
+def _askew(count: int, rng: np.random.Generator) -> Float:
+    """How much chamfers gain in chainage with arc, m/m, either way."""
+    return np.tan(np.radians(rng.uniform(*CHAMFER_SLANT, count))) * rng.choice([-1.0, 1.0], count)
+
+
+@inner
+def chamfer_depth(rings: Rings, s: float, arc: float) -> float:
+    """Depth of the chamfer of a ring joint at a place, m: a groove with plane sides; 0: there is none."""
+    if rings.askew.shape[0] == 0:
+        return 0.0
+    nearest = math.floor((s - rings.first) / rings.length + 0.5)
+    deepest = 0.0
+    for j in range(max(nearest - 1, 0), min(nearest + 2, rings.askew.shape[0])):
+        off = abs(s - rings.first - j * rings.length - rings.askew[j] * arc) / math.sqrt(1.0 + rings.askew[j] ** 2)
+        deepest = max(deepest, CHAMFER_DEPTH * (1.0 - 2.0 * off / CHAMFER))
+    return deepest
 
 
 @inner

@@ -24,13 +24,12 @@ BAND_WIDTH, BAND_LENGTH = (0.1, 0.4), (0.5, 3.0)
 ALONG_RINGS = 0.7
 # Leaks in niches: limits of area, m², and distance to the edges of the back wall, m.
 NICHE_AREA, NICHE_MARGIN = (0.05, 0.8), 0.1
-# Drips: leaks from this area on (m²) have them with this probability; limits of the gap below the leak, of their
-# length and width, m.
+# Drips: leaks from this area on (m²) have them with this probability; limits of their length and width, m.
 DRIPPING, DRIP_SHARE = 0.1, 0.7
-DRIP_GAP, DRIP_LENGTH, DRIP_WIDTH = (0.03, 0.12), (0.03, 0.30), (0.02, 0.06)
+DRIP_LENGTH, DRIP_WIDTH = (0.03, 0.30), (0.02, 0.06)
 
 
-def _band(length: float, width: float, rng: np.random.Generator) -> Polygon:
+def band_of(length: float, width: float, rng: np.random.Generator) -> Polygon:
     """A band about the x axis, of uneven width, narrower at its ends."""
     x = np.linspace(-1.0, 1.0, 25)
     sides = []
@@ -58,10 +57,10 @@ def joint_leaks(parameters: Parameters, tunnel: Tunnel, rings: Rings, room: Room
             length, width = rng.uniform((BAND_LENGTH[0], BAND_WIDTH[0]), (BAND_LENGTH[1], BAND_WIDTH[1])).tolist()
             i = int(rng.integers(0, rings.level.size))
             if m == 0 or rng.random() < ALONG_RINGS:
-                band = affinity.rotate(_band(length, width, rng), 90.0, origin=(0.0, 0.0))
+                band = affinity.rotate(band_of(length, width, rng), 90.0, origin=(0.0, 0.0))
                 s, arc = rings.first + i * rings.length, float(rng.uniform(-lowest, lowest))
             else:
-                band = _band(min(length, rings.length), width, rng)
+                band = band_of(min(length, rings.length), width, rng)
                 half = 0.5 * m * rings.period
                 s = rings.first + (i + 0.5) * rings.length
                 arc = (rings.shift[i] + int(rng.integers(0, m)) * rings.period + half) % (2.0 * half) - half
@@ -116,12 +115,12 @@ def niche_leaks(parameters: Parameters, tunnel: Tunnel, niches: list[Niche], see
     return leaks
 
 
-def _drip(leak: Polygon | MultiPolygon, down: float, rng: np.random.Generator) -> Polygon | None:
+def _drip(leak: Polygon | MultiPolygon, down: float, gaps: tuple[float, float], rng: np.random.Generator) -> Polygon | None:
     """A drop or a streak on the wall below a leak, apart from it; None: the leak is not above the place tried."""
     left, low, right, high = leak.bounds
     x = float(rng.uniform(0.8 * left + 0.2 * right, 0.2 * left + 0.8 * right))
     across = leak.intersection(LineString([(x, low - 0.1), (x, high + 0.1)]))
-    gap, length, width = rng.uniform(*np.array([DRIP_GAP, DRIP_LENGTH, DRIP_WIDTH]).T).tolist()
+    gap, length, width = rng.uniform(*np.array([gaps, DRIP_LENGTH, DRIP_WIDTH]).T).tolist()
     if across.is_empty:
         return None
     edge = across.bounds[3] if down > 0.0 else across.bounds[1]
@@ -129,8 +128,11 @@ def _drip(leak: Polygon | MultiPolygon, down: float, rng: np.random.Generator) -
     return LineString([(x, begin), (x + float(rng.normal(0.0, 0.01)), begin + down * length)]).buffer(0.5 * width)
 
 
-def with_drips(leaks: list[Leak], tunnel: Tunnel, room: Room, seed: np.random.SeedSequence) -> list[Leak]:
-    """The leaks, those of some size with one to three drips below them that belong to their truth."""
+def with_drips(leaks: list[Leak], gaps: tuple[float, float], room: Room, seed: np.random.SeedSequence) -> list[Leak]:
+    """The leaks, those of some size with one to three drips below them that belong to their truth.
+
+    ``gaps`` are the limits of the distance between a drip and its leak, m.
+    """
     dripping = []
     for leak, sequence in zip(leaks, seed.spawn(len(leaks)), strict=True):
         rng = np.random.default_rng(sequence)
@@ -138,7 +140,7 @@ def with_drips(leaks: list[Leak], tunnel: Tunnel, room: Room, seed: np.random.Se
         if leak.kind == "niche" or leak.area < DRIPPING or rng.random() > DRIP_SHARE:
             dripping.append(leak)
             continue
-        drips = [_drip(leak.polygon, down, rng) for _ in range(int(rng.integers(1, 4)))]
+        drips = [_drip(leak.polygon, down, gaps, rng) for _ in range(int(rng.integers(1, 4)))]
         apart = unary_union([d for d in drips if d is not None and room.bears(d, leak.polygon)])
         outline = leak.polygon.union(apart)
         scale = leak.area_surface / leak.area

@@ -31,7 +31,7 @@ class Appendage:
     Attributes
     ----------
     kind : str
-        cable, pipe, tray, box, sign, lamp or rail; walkway, kerb or carriageway.
+        cable, pipe, tray, duct, trunking, sheet, box, sign, lamp or rail; walkway, kerb or carriageway.
     start, end : float
         Chainage, m.
     arc : float
@@ -57,6 +57,11 @@ class Appendage:
     def is_tube(self) -> bool:
         """Whether it is round."""
         return self.kind in ("cable", "pipe")
+
+    @property
+    def is_run(self) -> bool:
+        """Whether it runs along the wall from end to end."""
+        return self.kind in ("cable", "pipe", "tray", "duct", "trunking")
 
     @property
     def klass(self) -> int:

@@ -51,6 +51,15 @@ def _plate(kind: str, s: float, arc: float, rng: np.random.Generator) -> list[Ap
     return [Appendage("box", s, s + length, arc, 0.5 * depth, width, depth, drop)]
 
 
+def is_free(items: list[Appendage], hung: list[Appendage]) -> bool:
+    """Whether there is room for items beside what hangs there."""
+    return all(
+        min(a.end, b.end) + APART < max(a.start, b.start) or abs(a.arc - b.arc) > 0.5 * (a.width + b.width) + APART
+        for a in items
+        for b in hung
+    )
+
+
 def clutter(
     parameters: Parameters, tunnel: Tunnel, furniture: list[Appendage], seed: np.random.SeedSequence
 ) -> list[Appendage]:
@@ -66,20 +75,13 @@ def clutter(
     hung = [a for a in furniture if abs(a.arc) < lowest]
     own: list[Appendage] = []
 
-    def is_free(items: list[Appendage]) -> bool:
-        return all(
-            min(a.end, b.end) + APART < max(a.start, b.start) or abs(a.arc - b.arc) > 0.5 * (a.width + b.width) + APART
-            for a in items
-            for b in hung + own
-        )
-
     def arc(rng: np.random.Generator) -> float:
         return math.copysign(float(rng.uniform(*BETWEEN)) * lowest, float(rng.uniform(-1.0, 1.0)))
 
     for i in range(parameters.clutter):
         for _ in range(TRIES):
             made = _run(("cable", "bundle", "pipe")[i % 3], arc(runs), line.start, line.end, runs)
-            if is_free(made):
+            if is_free(made, hung + own):
                 break
         else:
             raise UserError(f"no room on the walls for run {i + 1} of {parameters.clutter}: ask for less clutter")
@@ -88,7 +90,7 @@ def clutter(
         for kind in ("sign", "box"):
             for _ in range(TRIES):
                 made = _plate(kind, s + float(plates.uniform(0.0, 2.0)), arc(plates), plates)
-                if is_free(made):
+                if is_free(made, hung + own):
                     own += made
                     break
     return own

@@ -8,10 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from tunneldb.arrays import Float, Int64
+from tunneldb.simulate.instrument import noise_scale
 from tunneldb.simulate.lining.ballast import Ground, bumps, intersect_ground
 from tunneldb.simulate.lining.reflectance import Reflectance, level
 from tunneldb.simulate.lining.relief import LiningRelief, intersect_relief
 from tunneldb.simulate.objects.fixtures import APPENDAGE, FLOOR, LINING, NICHE, OUTLIER
+from tunneldb.simulate.objects.mesh import Mesh, intersect_mesh
 from tunneldb.simulate.objects.primitives import BEAM, Parts, intersect_parts
 from tunneldb.simulate.rays.intersect import intersect_appendages, intersect_lining, intersect_niches, wetness
 from tunneldb.simulate.rays.scene import Scene
@@ -91,6 +93,10 @@ class Tracer:
         Height of small-scale relief of the lining, m.
     furthest : float
         Greatest range, m.
+    mesh : Mesh or None
+        Wires before the lining.
+    noise_growth : float
+        How the error of ranges grows with them (:func:`noise_scale`).
     """
 
     tunnel: Tunnel
@@ -103,6 +109,8 @@ class Tracer:
     stray: float
     relief: float
     furthest: float
+    mesh: Mesh | None = None
+    noise_growth: float = 0.0
 
     def trace(self, origin: Float, direction: Float, hint: Float, noise: Float, chance: Float) -> Echoes:
         """Shoot rays.
@@ -165,6 +173,9 @@ class Tracer:
         leak[bare], drop[bare] = wetness(scene, *at)
         if self.reflectance is not None:
             drop[bare] -= level(self.reflectance, *at)
+        if self.mesh is not None:
+            rays, at_wire = intersect_mesh(self.mesh, self.tunnel, origin, direction, bare, found, r)
+            r[rays], klass[rays], drop[rays], leak[rays], height[rays] = at_wire, APPENDAGE, self.mesh.drop, -1, 0.0
         behind = wall
         if self.parts is not None:
             r[is_open] = 2.0 * self.furthest
@@ -181,9 +192,10 @@ class Tracer:
         # Not the contrary of both: where incidence is undefined, the echo is kept.
         keep = np.flatnonzero(inside & ~is_open & ~((r > self.furthest) | (cosine < MINIMUM_COSINE)))
         true = r[keep]
-        measured = true + noise[keep]
+        noise = noise[keep] * noise_scale(self.noise_growth, true)
+        measured = true + noise
         if self.relief > 0.0:
-            measured = true + (noise[keep] - height[keep] / np.maximum(cosine[keep], 0.3))
+            measured = true + (noise - height[keep] / np.maximum(cosine[keep], 0.3))
         klass, drop, leak, thing = klass[keep], drop[keep], leak[keep], thing[keep]
         is_stray = self._stray(measured, klass, thing, behind[keep], edge[keep], chance[keep])
         klass[is_stray], leak[is_stray], thing[is_stray] = OUTLIER, -1, 0

@@ -1,0 +1,63 @@
+"""Multipath: rays that the wet floor mirrors, so that the wall is seen a second time below the ground.
+
+The pulse goes by the floor to the wall and back the same way. Its range is the length of the way to the floor and from there
+to the wall, along the direction in which it was sent: the wall's mirror image.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tunneldb.arrays import Float
+from tunneldb.simulate.objects.fixtures import FLOOR, OUTLIER
+from tunneldb.simulate.rays.trace import Echoes
+from tunneldb.simulate.scanner import Rays
+from tunneldb.simulate.tunnel.tunnel import Tunnel
+
+# Limits of what is lost by two reflections, dB.
+LOSS = (3.0, 12.0)
+ABOVE = 1e-5  # m: the mirrored ray starts off the floor
+
+# Echoes of rays from places (n, 3) in directions (n, 3), near chainages (n,), without noise and stray points.
+Shoot = Callable[[Float, Float, Float], Echoes]
+
+
+def mirror(
+    echoes: Echoes, rays: Rays, share: float, furthest: float, shoot: Shoot, tunnel: Tunnel, rng: np.random.Generator
+) -> Echoes:
+    """Turn a share of the echoes of the floor into ghosts, where the mirrored ray meets something within range."""
+    chosen = np.flatnonzero((echoes.klass == FLOOR) & (rng.random(len(echoes.ray)) < share))
+    loss = rng.uniform(*LOSS, len(chosen))
+    direction = rays.direction[echoes.ray[chosen]]
+    up = tunnel.line.frame(echoes.chainage[chosen]).w
+    mirrored = direction - 2.0 * np.sum(direction * up, axis=1)[:, None] * up
+    spot = rays.origin[echoes.ray[chosen]] + echoes.range[chosen, None] * direction + ABOVE * up
+    there = shoot(spot, mirrored, echoes.chainage[chosen])
+    rows, whole = chosen[there.ray], echoes.range[chosen[there.ray]] + there.range
+    within = whole <= furthest
+    there = there.take(np.flatnonzero(within))
+    rows, whole, direction = rows[within], whole[within], direction[there.ray]
+    if not len(rows):
+        return echoes
+    measured = whole + echoes.measured[rows] - echoes.range[rows]
+    xyz = rays.origin[echoes.ray[rows]] + measured[:, None] * direction
+    place = tunnel.unroll_near(xyz, echoes.chainage[rows], 1e-6)
+    after = Echoes(
+        ray=echoes.ray[rows],
+        measured=measured,
+        xyz=xyz,
+        chainage=place.chainage,
+        arc=place.arc,
+        offset=place.offset,
+        klass=np.full(len(rows), OUTLIER),
+        leak=np.full(len(rows), -1),
+        drop=there.drop + loss[there.ray],
+        cosine=there.cosine,
+        range=whole,
+        thing=np.zeros(len(rows), dtype=np.int64),
+    )
+    for column, values in zip(echoes, after, strict=True):
+        column[rows] = values
+    return echoes
