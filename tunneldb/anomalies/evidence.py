@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -47,6 +47,9 @@ class EvidenceModel:
         Mean of what a tree adds to the logarithm of the odds, from this node on.
     trained_on : mapping
         What it was fitted to.
+    factors : (len(FEATURES),) float array
+        By how much more or less each feature counts than in the trees: 1, but for what was learned from an owner's reviews
+        (:mod:`tunneldb.anomalies.learning`). Not stored with the trees.
     """
 
     version: str
@@ -59,6 +62,7 @@ class EvidenceModel:
     right: Intp
     value: Float
     trained_on: Mapping[str, Any]
+    factors: Float = field(default_factory=lambda: np.ones(len(FEATURES)))
 
     def contributions(self, features: Float) -> Float:
         """What each feature adds to the logarithm of the odds.
@@ -82,7 +86,7 @@ class EvidenceModel:
             after = np.where(goes_left, self.left[at], self.right[at])
             np.add.at(out, (np.broadcast_to(row, at.shape), asked), self.value[after] - self.value[at])
             at = after
-        return out
+        return out * self.factors
 
     def probabilities(self, features: Float) -> Float:
         """Probability (n,) that each region is a leak."""
