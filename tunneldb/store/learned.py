@@ -117,8 +117,8 @@ def load_measured(conn: psycopg.Connection[Any], tunnels: Iterable[int]) -> Meas
         SELECT a.id, a.survey_id, s.tunnel_id, (a.chainage_from + a.chainage_to) / 2, a.detected,
                a.kind = 'joint' AND 'sparse' = ANY (a.reasons),
                CASE WHEN a.review = 'rejected' THEN 'rejected'
-                    WHEN a.judged IS NOT NULL THEN 'renamed to ' || a.judged
-                    WHEN a.review = 'confirmed' THEN 'confirmed ' || a.kind ELSE '' END,
+                    WHEN a.judged <> a.kind THEN 'renamed to ' || a.judged
+                    WHEN a.review = 'confirmed' OR a.judged = a.kind THEN 'confirmed ' || a.kind ELSE '' END,
                a.review <> 'rejected' AND coalesce(a.judged, a.kind) = 'leak', a.feature_list_id, a.features
           FROM tunnel.anomaly a
           JOIN tunnel.survey s ON s.id = a.survey_id
