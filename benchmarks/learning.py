@@ -29,7 +29,7 @@ from benchmarks.common import print_table, progress
 from benchmarks.evidence.candidates import DARK, LEAK
 from benchmarks.evidence.painted import CELL, HALF, LONG, THINGS, Painting, blob, patch, uneven
 from tunneldb.anomalies.evidence import EvidenceModel, standard_model
-from tunneldb.anomalies.learning import Reviewed, learn
+from tunneldb.anomalies.learning import Adjustment, Reviewed, learn
 
 REVIEWS = (0, 25, 50, 100, 200, 400)
 STARTS = 6
@@ -145,7 +145,7 @@ def inspections(first: Tunnel, second: Tunnel, count: int) -> tuple[float, str]:
     model = standard_model()
     wrong, ways = [], []
     for start in range(0, FIRST, FIRST // STARTS):
-        adjustment = learn(model, first.reviewed(start, count)).adjustment
+        adjustment = learn(model, first.reviewed(start, count)).adjustment if count else Adjustment()
         wrong.append(errors_of(adjustment.apply(model, "learned"), second))
         ways.append(adjustment.way)
     return float(np.mean(wrong)), "/".join(str(ways.count(way)) for way in ("base", "recalibrated", "refit"))

@@ -122,6 +122,8 @@ def test_a_plan_changes_nothing(reviewed: psycopg.Connection) -> None:
     assert told["chosen"] in ("recalibrated", "refit")
     losses = {one["way"]: one["loss"] for one in told["held_out"]}
     assert losses[told["chosen"]] == min(losses.values()) < losses["base"]
+    base = told["held_out"][0]
+    assert (base["false_leaks"], base["missed"]) == (told["reviews"]["rejected"], 0)  # all are called leaks as yet
     (changes,) = told["changes"]
     assert (changes["survey"], changes["anomalies"]) == (SURVEY, MANY)
     assert changes["from_leak"] > 0.6 * MANY

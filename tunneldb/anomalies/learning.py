@@ -120,13 +120,22 @@ class HeldOut:
     way : {'base', 'recalibrated', 'refit'}
     loss : float
         Mean negative logarithm of the probability of what was said.
-    wrong : int
-        Leaks that it takes for none, and the other way round.
+    false_leaks : int
+        What it takes for leaks and was said to be none.
+    missed : int
+        Leaks that it takes for none.
     """
 
     way: Way
     loss: float
-    wrong: int
+    false_leaks: int
+    missed: int
+
+    @classmethod
+    def of(cls, way: Way, odds: Float, leak: Bool) -> HeldOut:
+        """Hold logarithms of the odds (n,) of leaks against what was said."""
+        called = odds >= 0.0
+        return cls(way, float(losses(odds, leak).mean()), int((called & ~leak).sum()), int((leak & ~called).sum()))
 
 
 @dataclass(frozen=True)
@@ -159,6 +168,7 @@ def learn(model: EvidenceModel, reviewed: Reviewed) -> Lesson:
     model : EvidenceModel
         As it comes with the program.
     reviewed : Reviewed
+        At least one.
     """
     leak, count = reviewed.leak, len(reviewed.leak)
     parts = by_reason(weigh(model, reviewed.features, reviewed.outline))
@@ -169,15 +179,15 @@ def learn(model: EvidenceModel, reviewed: Reviewed) -> Lesson:
         ways.append(("recalibrated", _recalibration(model.constant, parts)))
     if ways and count >= FEWEST_REFIT:
         ways += [("refit", _refit(model.constant, parts, width)) for width in FACTORS]
-    base = losses(model.constant + parts.sum(axis=1), leak)
+    plain = model.constant + parts.sum(axis=1)
+    base = losses(plain, leak)
     tried: dict[Way, tuple[Float, Float, _Problem]] = {}
     for way, problem in ways:
         odds = problem.held_out(leak, fold)
         loss = losses(odds, leak)
         if way not in tried or loss.sum() < tried[way][1].sum():
             tried[way] = odds, loss, problem
-    held_out = [HeldOut("base", _mean(base), _wrong(model.constant + parts.sum(axis=1), leak))]
-    held_out += [HeldOut(way, _mean(loss), _wrong(odds, leak)) for way, (odds, loss, _) in tried.items()]
+    held_out = [HeldOut.of("base", plain, leak), *(HeldOut.of(way, odds, leak) for way, (odds, _, _) in tried.items())]
     better = {way: loss.sum() for way, (_, loss, _) in tried.items() if _beyond_chance(base - loss, stretch)}
     adjustment = Adjustment()
     if better:
@@ -266,11 +276,3 @@ def _beyond_chance(gain: Float, stretch: Int64) -> bool:
     """Whether the sum of gains (n,) is more than CHANCE standard errors, where those of a stretch come and go together."""
     sums = np.bincount(stretch, gain)
     return bool(gain.sum() > CHANCE * np.sqrt((sums**2).sum()))
-
-
-def _wrong(odds: Float, leak: Bool) -> int:
-    return int(np.count_nonzero((odds >= 0.0) != leak))
-
-
-def _mean(loss: Float) -> float:
-    return float(loss.mean()) if len(loss) else 0.0

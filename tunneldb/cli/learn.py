@@ -87,8 +87,11 @@ def _print_plan(plan: Plan) -> None:
         click.echo(line, err=True)
     sorts = ", ".join(f"{count} {sort}" for sort, count in plan.reviews.items())
     click.echo(f"{lesson.reviews} reviews: {sorts}")
-    rows = [(one.way, f"{one.loss:.3f}", one.wrong, "chosen" if one.way == adjustment.way else "") for one in lesson.held_out]
-    print_table(("on reviews held out", "loss", "wrong", ""), rows, right=(1, 2))
+    rows = [
+        (one.way, f"{one.loss:.3f}", one.false_leaks, one.missed, "chosen" if one.way == adjustment.way else "")
+        for one in lesson.held_out
+    ]
+    print_table(("on reviews held out", "loss", "false leaks", "missed leaks", ""), rows, right=(1, 2, 3))
     if adjustment.way == "recalibrated":
         click.echo(f"logarithms of odds times {adjustment.slope:.2f}, plus {adjustment.offset:+.2f}")
     elif adjustment.factors:
