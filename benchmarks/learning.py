@@ -28,7 +28,7 @@ from shapely.geometry import LineString
 from benchmarks.common import print_table, progress
 from benchmarks.evidence.candidates import DARK, LEAK
 from benchmarks.evidence.painted import CELL, HALF, LONG, THINGS, Painting, blob, patch, uneven
-from tunneldb.anomalies.evidence import EvidenceModel, standard_model
+from tunneldb.anomalies.evidence import standard_model
 from tunneldb.anomalies.learning import Adjustment, Reviewed, learn
 
 REVIEWS = (0, 25, 50, 100, 200, 400)
@@ -124,12 +124,13 @@ def main() -> None:
     parser.add_argument("--regions", type=Path, help="where painted regions are kept")
     parser.add_argument("--owners", nargs="+", choices=OWNERS, default=list(OWNERS), metavar="OWNER", help=", ".join(OWNERS))
     arguments = parser.parse_args()
-    rows, ways = [], []
+    rows, missing, ways = [], [], []
     for owner in arguments.owners:
         first, second = (tunnel_of(owner, other, arguments.regions) for other in (False, True))
-        errors, chosen = zip(*(inspections(first, second, count) for count in REVIEWS), strict=True)
+        errors, missed, chosen = zip(*(inspections(first, second, count) for count in REVIEWS), strict=True)
         halved = next((str(count) for count, wrong in zip(REVIEWS, errors, strict=True) if wrong <= 0.5 * errors[0]), "-")
         rows.append((owner, len(second.leak), int(second.leak.sum()), *(f"{wrong:.1f}" for wrong in errors), halved))
+        missing.append((owner, *(f"{lost:.1f}" for lost in missed)))
         ways.append((owner, *chosen))
     head = [str(count) for count in REVIEWS]
     print_table(
@@ -137,22 +138,25 @@ def main() -> None:
         ("owner", "regions", "leaks", *head, "halved by"),
         rows,
     )
+    print_table("of these, leaks that are taken for none", ("owner", *head), missing)
     print_table("what was chosen: base / recalibrated / refit", ("owner", *head), ways)
 
 
-def inspections(first: Tunnel, second: Tunnel, count: int) -> tuple[float, str]:
-    """Mean number of errors in the second tunnel after so many reviews in the first; how often each way was chosen."""
+def inspections(first: Tunnel, second: Tunnel, count: int) -> tuple[float, float, str]:
+    """Mean number of errors in the second tunnel after so many reviews in the first, of missed leaks in them; what was chosen."""
     model = standard_model()
-    wrong, ways = [], []
+    wrong, missed, ways = [], [], []
     for start in range(0, FIRST, FIRST // STARTS):
         adjustment = learn(model, first.reviewed(start, count)).adjustment if count else Adjustment()
-        wrong.append(errors_of(adjustment.apply(model, "learned"), second))
+        called = adjustment.apply(model, "learned").probabilities(second.features) >= 0.5
+        wrong.append(np.count_nonzero(called != second.leak))
+        missed.append(np.count_nonzero(second.leak & ~called))
         ways.append(adjustment.way)
-    return float(np.mean(wrong)), "/".join(str(ways.count(way)) for way in ("base", "recalibrated", "refit"))
-
-
-def errors_of(model: EvidenceModel, tunnel: Tunnel) -> int:
-    return int(np.count_nonzero((model.probabilities(tunnel.features) >= 0.5) != tunnel.leak))
+    return (
+        float(np.mean(wrong)),
+        float(np.mean(missed)),
+        "/".join(str(ways.count(way)) for way in ("base", "recalibrated", "refit")),
+    )
 
 
 def tunnel_of(owner: str, second: bool, folder: Path | None) -> Tunnel:
