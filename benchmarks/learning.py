@@ -17,6 +17,7 @@ import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import shapely
@@ -29,7 +30,7 @@ from benchmarks.common import print_table, progress
 from benchmarks.evidence.candidates import DARK, LEAK
 from benchmarks.evidence.painted import CELL, HALF, LONG, THINGS, Painting, blob, patch, uneven
 from tunneldb.anomalies.evidence import standard_model
-from tunneldb.anomalies.learning import Adjustment, Reviewed, learn
+from tunneldb.anomalies.learning import Adjustment, Reviewed, Way, learn
 
 REVIEWS = (0, 25, 50, 100, 200, 400)
 STARTS = 6
@@ -139,11 +140,11 @@ def main() -> None:
         rows,
     )
     print_table("of these, leaks that are taken for none", ("owner", *head), missing)
-    print_table("what was chosen: base / recalibrated / refit", ("owner", *head), ways)
+    print_table(f"what was chosen: {' / '.join(get_args(Way))}", ("owner", *head), ways)
 
 
 def inspections(first: Tunnel, second: Tunnel, count: int) -> tuple[float, float, str]:
-    """Mean number of errors in the second tunnel after so many reviews in the first, of missed leaks in them; what was chosen."""
+    """Mean number of errors in the second tunnel after so many reviews in the first, of missed leaks in them, and the ways."""
     model = standard_model()
     wrong, missed, ways = [], [], []
     for start in range(0, FIRST, FIRST // STARTS):
@@ -155,7 +156,7 @@ def inspections(first: Tunnel, second: Tunnel, count: int) -> tuple[float, float
     return (
         float(np.mean(wrong)),
         float(np.mean(missed)),
-        "/".join(str(ways.count(way)) for way in ("base", "recalibrated", "refit")),
+        "/".join(str(ways.count(way)) for way in get_args(Way)),
     )
 
 

@@ -56,10 +56,13 @@ def _learned_model() -> None:
         sa.Column("base", sa.Text(), nullable=False, comment="Version of the model that it adjusts"),
         sa.Column(
             "way", sa.Text(), nullable=False,
-            comment="recalibrated (slope and offset of the logarithm of the odds) or refit (a factor for each reason, and an "
-            "offset)",
+            comment="recalibrated (slope and offset of the logarithm of the odds), refit (a factor for each reason, and an "
+            "offset) or extended (terms of features, too)",
         ),
-        sa.Column("parameters", JSONB(), nullable=False, comment="Slope, offset, and factors by reason"),
+        sa.Column(
+            "parameters", JSONB(), nullable=False,
+            comment="Slope, offset, factors by reason; centre, scale and weight by feature",
+        ),
         sa.Column("surveys", ARRAY(sa.Text()), nullable=False, comment="Surveys whose reviews it was learned from"),
         sa.Column("reviews", JSONB(), nullable=False, comment="How many reviews of each kind"),
         sa.Column(
@@ -74,7 +77,7 @@ def _learned_model() -> None:
         ),
         sa.Column("undone_by", sa.Text(), comment="Who took it back"),
         sa.Column("undone_at", sa.DateTime(timezone=True), comment="When it was taken back"),
-        sa.CheckConstraint("way IN ('recalibrated', 'refit')", name=op.f("learned_model_way_check")),
+        sa.CheckConstraint("way IN ('recalibrated', 'refit', 'extended')", name=op.f("learned_model_way_check")),
         sa.ForeignKeyConstraint(
             ["tunnel_id"], ["tunnel.tunnel.id"], name=op.f("learned_model_tunnel_id_fkey"), ondelete="CASCADE"
         ),

@@ -40,10 +40,11 @@ COMMENT ON VIEW tunnel_api.anomaly IS
 COMMENT ON VIEW tunnel_api.leak IS 'Water leaks: anomalies of kind leak, with their three geometries; review, remark and kind can be updated';
 
 CREATE OR REPLACE VIEW tunnel_api.anomaly_evidence AS
-SELECT a.id AS anomaly_id, a.survey_id, s.name AS survey, e.key AS reason, e.value::double precision AS log_odds
+SELECT a.id * 100 + e.n AS id, a.id AS anomaly_id, a.survey_id, s.name AS survey, e.reason, e.log_odds
   FROM tunnel.anomaly a
   JOIN tunnel.survey s ON s.id = a.survey_id
- CROSS JOIN LATERAL jsonb_each_text(a.evidence) e;
+ CROSS JOIN LATERAL (SELECT v.key AS reason, v.value::double precision AS log_odds, row_number() OVER (ORDER BY v.key) AS n
+                       FROM jsonb_each_text(a.evidence) v) e;
 COMMENT ON VIEW tunnel_api.anomaly_evidence IS 'What speaks for each anomaly being a leak and against it: a row for each reason';
 COMMENT ON COLUMN tunnel_api.anomaly_evidence.anomaly_id IS 'Its id in the view anomaly';
 COMMENT ON COLUMN tunnel_api.anomaly_evidence.reason IS 'What was measured: faint, thin, rectangular, …';

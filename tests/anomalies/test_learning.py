@@ -53,7 +53,7 @@ def test_a_slope_and_an_offset_are_found_again(stairs: EvidenceModel) -> None:
     assert lesson.adjustment.way == "recalibrated"
     assert lesson.adjustment.slope == pytest.approx(0.5, abs=0.04)
     assert lesson.adjustment.offset == pytest.approx(-1.0, abs=0.1)
-    assert [one.way for one in lesson.held_out] == ["base", "recalibrated", "refit"]
+    assert [one.way for one in lesson.held_out] == ["base", "recalibrated", "refit", "extended"]
     assert lesson.held_out[1].loss < lesson.held_out[0].loss
 
 
@@ -61,12 +61,33 @@ def test_a_reason_that_says_nothing_there_no_longer_counts(stairs: EvidenceModel
     truth = Adjustment("refit", 1.0, 0.3, {"faint": 0.0, "salts": 2.0})
     adjustment = learn(stairs, drawn(stairs, 3000, 2, truth)).adjustment
     assert adjustment.way == "refit"
-    assert adjustment.factors is not None
     assert adjustment.factors["faint"] < 0.15
     assert adjustment.factors["salts"] == pytest.approx(2.0, abs=0.3)
     others = [factor for reason, factor in adjustment.factors.items() if reason not in ("faint", "salts")]
     assert np.abs(np.array(others) - 1.0).max() < 0.25
     assert adjustment.offset == pytest.approx(0.3, abs=0.15)
+
+
+def test_what_the_trees_do_not_ask_is_learned(stairs: EvidenceModel) -> None:
+    """Leaks are such by a feature that no tree asks for, too: what each scale of it is worth is found again."""
+    silent = next(k for k in range(len(FEATURES)) if k not in SPEAKING and FEATURES[k].reason == "rectangular")
+    truth = Adjustment("extended", 1.0, -0.4, {}, {NAMES[silent]: (0.0, 1.0, -1.5)})
+    adjustment = learn(stairs, drawn(stairs, 3000, 7, truth)).adjustment
+    assert adjustment.way == "extended"
+    centre, scale, weight = adjustment.terms[NAMES[silent]]
+    assert (centre, scale) == (pytest.approx(0.0, abs=0.1), pytest.approx(1.0, abs=0.1))
+    assert weight == pytest.approx(-1.5, abs=0.25)
+    others = [term[2] for name, term in adjustment.terms.items() if name != NAMES[silent]]
+    assert np.abs(others).mean() < 0.1
+
+
+def test_a_feature_that_could_not_be_measured_says_nothing_of_its_own(stairs: EvidenceModel) -> None:
+    features = np.zeros((2, len(FEATURES)))
+    features[1] = np.nan
+    own = Adjustment("extended", 1.0, 0.0, {}, dict.fromkeys(NAMES, (0.0, 1.0, 0.5))).apply(stairs, "x")
+    assert (own.contributions(features) == stairs.contributions(features)).all()
+    far = np.full((1, len(FEATURES)), 1e6)
+    assert own.contributions(far) == pytest.approx(stairs.contributions(far) + 3.0 * 0.5)
 
 
 @pytest.mark.parametrize("leak", [True, False])

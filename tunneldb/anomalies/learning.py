@@ -1,25 +1,26 @@
 """What the reviews of an owner's tunnels teach the model of evidence: how sure it may be, and how much each reason counts.
 
-Two ways to adjust the model are held against the model as it is, on reviews of other places than those that they were fitted
-to: to *recalibrate* it, a slope and an offset of the logarithm of the odds (Platt, 1999), and to *refit* the weights of its
-reasons, a factor for each and an offset. Both have Gaussian priors about no change (ridge), so that few reviews change little.
+Ways to adjust the model are held against the model as it is, on reviews of other places than those that they were fitted to:
+to *recalibrate* it, a slope and an offset of the logarithm of the odds (Platt, 1999); to *refit* the weights of its reasons, a
+factor for each and an offset; and to *extend* it, by terms that are linear in its features, beside these. All have Gaussian
+priors about no change (ridge), so that few reviews change little.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 from scipy.optimize import minimize
 
-from tunneldb.anomalies.evidence import EvidenceModel
-from tunneldb.anomalies.features import FEATURES
-from tunneldb.anomalies.verdict import weigh
+from tunneldb.anomalies.evidence import EvidenceModel, deviations
+from tunneldb.anomalies.features import FEATURES, NAMES
+from tunneldb.anomalies.verdict import weigh, weigh_built
 from tunneldb.arrays import Bool, Float, Int64
 
-Way = Literal["base", "recalibrated", "refit"]
+Way = Literal["base", "recalibrated", "refit", "extended"]
 
 SLOPE, OFFSET = 0.25, 1.0
 """Standard deviations of slope and offset before any review: an owner's leaks are more or less frequent by a factor of 2.7."""
@@ -27,7 +28,10 @@ SLOPE, OFFSET = 0.25, 1.0
 FACTORS = (0.125, 0.25, 0.5)
 """Standard deviations of the reasons' factors that are tried."""
 
-FEWEST, FEWEST_REFIT = 10, 50
+TERMS = (0.125, 0.25, 0.5)
+"""Of the terms of features, beside factors of the greatest of FACTORS."""
+
+FEWEST, FEWEST_REFIT = 10, 25
 """With fewer reviews nothing is learned; with fewer than the second the reasons' weights stay."""
 
 CHANCE = 1.5
@@ -52,38 +56,42 @@ class Adjustment:
 
     Attributes
     ----------
-    way : {'base', 'recalibrated', 'refit'}
-        Not at all; slope and offset alone; or factors and offset.
+    way : {'base', 'recalibrated', 'refit', 'extended'}
+        Not at all; slope and offset alone; factors and offset; or terms of features, too.
     slope, offset : float
         What the logarithm of the odds is multiplied by, and what is added then.
     factors : mapping
         Of reasons: by how much more or less they count; 1 for those without.
+    terms : mapping
+        Of features: centre, scale, and the logarithm of the odds by scale; none for those without.
     """
 
     way: Way = "base"
     slope: float = 1.0
     offset: float = 0.0
-    factors: Mapping[str, float] | None = None
+    factors: Mapping[str, float] = field(default_factory=dict)
+    terms: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     def apply(self, model: EvidenceModel, name: str) -> EvidenceModel:
         """Adjust a model; its version is that of the model, ``+``, and a name."""
-        factors = self.factors or {}
-        each = np.array([factors.get(feature.reason, 1.0) for feature in FEATURES])
+        each = np.array([self.factors.get(feature.reason, 1.0) for feature in FEATURES])
+        own = np.array([self.terms.get(feature.name, (0.0, 1.0, 0.0)) for feature in FEATURES]).T
         return replace(
             model,
             version=f"{model.version}+{name}",
             constant=self.slope * model.constant + self.offset,
             factors=self.slope * each * model.factors,
+            own=own,
         )
 
     def to_json(self) -> dict[str, Any]:
         """Parameters as they are stored."""
-        return {"slope": self.slope, "offset": self.offset, "factors": dict(self.factors or {})}
+        return {"slope": self.slope, "offset": self.offset, "factors": dict(self.factors), "terms": dict(self.terms)}
 
     @classmethod
     def from_json(cls, way: Way, values: Mapping[str, Any]) -> Adjustment:
         """Read stored parameters."""
-        return cls(way, values["slope"], values["offset"], values["factors"])
+        return cls(way, values["slope"], values["offset"], values["factors"], values["terms"])
 
 
 @dataclass(frozen=True)
@@ -117,7 +125,7 @@ class HeldOut:
 
     Attributes
     ----------
-    way : {'base', 'recalibrated', 'refit'}
+    way : {'base', 'recalibrated', 'refit', 'extended'}
     loss : float
         Mean negative logarithm of the probability of what was said.
     false_leaks : int
@@ -179,6 +187,9 @@ def learn(model: EvidenceModel, reviewed: Reviewed) -> Lesson:
         ways.append(("recalibrated", _recalibration(model.constant, parts)))
     if ways and count >= FEWEST_REFIT:
         ways += [("refit", _refit(model.constant, parts, width)) for width in FACTORS]
+        centre, scale = spread_of(reviewed.features)
+        told = weigh_built(deviations(reviewed.features, centre, scale), reviewed.outline)
+        ways += [("extended", _refit(model.constant, parts, FACTORS[-1], told, width)) for width in TERMS]
     plain = model.constant + parts.sum(axis=1)
     base = losses(plain, leak)
     tried: dict[Way, tuple[Float, Float, _Problem]] = {}
@@ -192,8 +203,18 @@ def learn(model: EvidenceModel, reviewed: Reviewed) -> Lesson:
     adjustment = Adjustment()
     if better:
         way = min(better, key=lambda one: better[one])
-        adjustment = _adjustment(way, tried[way][2].fit(leak))
+        adjustment = _adjustment(way, tried[way][2].fit(leak), reviewed.features)
     return Lesson(adjustment, held_out, count)
+
+
+def spread_of(features: Float) -> tuple[Float, Float]:
+    """Mean and standard deviation (len(FEATURES),) of features (n, len(FEATURES)); 0 and 1 where nothing differs."""
+    known = np.isfinite(features)
+    count = np.maximum(known.sum(axis=0), 1)
+    centre = np.where(known, features, 0.0).sum(axis=0) / count
+    variance = np.where(known, features - centre, 0.0) ** 2
+    scale = np.sqrt(variance.sum(axis=0) / count)
+    return centre, np.where(scale > 1e-9, scale, 1.0)
 
 
 def by_reason(contributions: Float) -> Float:
@@ -223,8 +244,8 @@ def losses(odds: Float, leak: Bool) -> Float:
 class _Problem:
     """Logistic regression with a Gaussian prior.
 
-    The logarithm of the odds is ``constant + design @ weights``; weights that multiply evidence are not negative, as what
-    counted the other way round would be none.
+    The logarithm of the odds is ``constant + design @ weights``; weights that multiply evidence, whose prior is 1, are not
+    negative, as what counted the other way round would be none.
     """
 
     constant: float
@@ -242,7 +263,7 @@ class _Problem:
             wrong = 1.0 / (1.0 + np.exp(-odds)) - said
             return float(losses(odds, leak[rows]).sum() + 0.5 * off @ off), design.T @ wrong + off / self.width
 
-        bounds = [(0.0, None)] * (len(self.prior) - 1) + [(None, None)]
+        bounds = [(0.0 if prior else None, None) for prior in self.prior.tolist()]
         return np.asarray(minimize(cost, self.prior, jac=True, method="L-BFGS-B", bounds=bounds).x)
 
     def held_out(self, leak: Bool, fold: Int64) -> Float:
@@ -259,17 +280,24 @@ def _recalibration(constant: float, parts: Float) -> _Problem:
     return _Problem(0.0, np.column_stack([odds, np.ones(len(odds))]), np.array([1.0, 0.0]), np.array([SLOPE, OFFSET]))
 
 
-def _refit(constant: float, parts: Float, width: float) -> _Problem:
-    count = parts.shape[1]
-    prior, widths = np.append(np.ones(count), 0.0), np.append(np.full(count, width), OFFSET)
-    return _Problem(constant, np.column_stack([parts, np.ones(len(parts))]), prior, widths)
+def _refit(constant: float, parts: Float, width: float, told: Float | None = None, term: float = 0.0) -> _Problem:
+    """Factors of parts (n, reasons), terms of what features tell (n, features), and an offset, and how wide they spread."""
+    told = np.empty((len(parts), 0)) if told is None else told
+    counts = parts.shape[1], told.shape[1], 1
+    prior, widths = np.repeat([1.0, 0.0, 0.0], counts), np.repeat([width, term, OFFSET], counts)
+    return _Problem(constant, np.column_stack([parts, told, np.ones(len(parts))]), prior, widths)
 
 
-def _adjustment(way: Way, weights: Float) -> Adjustment:
+def _adjustment(way: Way, weights: Float, features: Float) -> Adjustment:
     *scales, offset = weights.tolist()
     if way == "recalibrated":
         return Adjustment(way, scales[0], offset)
-    return Adjustment(way, 1.0, offset, dict(zip(REASONS, scales, strict=True)))
+    factors = dict(zip(REASONS, scales[: len(REASONS)], strict=True))
+    if way == "refit":
+        return Adjustment(way, 1.0, offset, factors)
+    centre, scale = spread_of(features)
+    terms = np.column_stack([centre, scale, scales[len(REASONS) :]]).tolist()
+    return Adjustment(way, 1.0, offset, factors, dict(zip(NAMES, terms, strict=True)))
 
 
 def _beyond_chance(gain: Float, stretch: Int64) -> bool:

@@ -88,8 +88,13 @@ def classify(region: Region, features: Float | None = None, model: EvidenceModel
 
 def weigh(model: EvidenceModel, features: Float, outline: Float) -> Float:
     """What features (n, len(FEATURES)) add to the odds, as logarithms, where outlines (n,) tell more or less."""
+    return weigh_built(model.contributions(features), outline)
+
+
+def weigh_built(contributions: Float, outline: Float) -> Float:
+    """What features (n, len(FEATURES)) say, less where they go by outlines (n,) that tell less."""
     built = np.array([feature.reason in BUILT for feature in FEATURES])
-    return model.contributions(features) * np.where(built, outline[:, None], 1.0)
+    return contributions * np.where(built, outline[:, None], 1.0)
 
 
 def _degree(features: Float, name: str) -> float:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from tunneldb.pipeline.learn import Plan
     from tunneldb.store.learned import Learned
 
+STRONGEST = 8
+"""So many terms of features are printed; ``--json`` has all."""
+
 
 @verb(
     examples=[
@@ -37,9 +40,10 @@ def learn(settings: Settings, surveys: tuple[str, ...], apply_: bool, undo: bool
     """Learn from what inspectors confirmed, rejected and renamed in SURVEY... how far evidence of leaks holds there.
 
     Without --apply it changes nothing, and says what would change: how the reviews agree with the model of evidence as it
-    comes with the program, recalibrated (how sure it may be) and, from 50 reviews on, refit (how much each reason counts), each
-    judged on reviews of other places than those that it was fitted to; and which anomalies would be taken for something else.
-    The best of the three is chosen; where neither of the others is better by more than chance, nothing is learned.
+    comes with the program, recalibrated (how sure it may be) and, from 25 reviews on, refit (how much each reason counts) and
+    extended (what was measured speaks for itself, too), each judged on reviews of other places than those that it was fitted
+    to; and which anomalies would be taken for something else. The best is chosen; where none is better than the model as it is
+    by more than chance, nothing is learned. Few false leaks may be paid for with missed ones: both are stated.
 
     What is applied holds for the tunnels of the surveys, all surveys of them: their stage detect is stale then, until tunneldb
     run SURVEY --stale. Reviews stay. Of anomalies that were detected before their features were stored reviews teach nothing
@@ -98,6 +102,10 @@ def _print_plan(plan: Plan) -> None:
         most = sorted(adjustment.factors.items(), key=lambda item: -abs(item[1] - 1.0))
         factors = ", ".join(f"{reason} {factor:.2f}" for reason, factor in most)
         click.echo(f"reasons count by these factors: {factors}; offset {adjustment.offset:+.2f}")
+    if adjustment.terms:
+        weights = sorted(((name, weight) for name, (_, _, weight) in adjustment.terms.items()), key=lambda item: -abs(item[1]))
+        told = ", ".join(f"{name} {weight:+.2f}" for name, weight in weights[:STRONGEST])
+        click.echo(f"logarithms of odds by standard deviations of features, the strongest: {told}")
     changes = [(one.survey, one.anomalies, one.to_leak, one.from_leak) for one in plan.changes]
     print_table(("survey", "anomalies", "become leaks", "no longer leaks"), changes, right=(1, 2, 3))
     largest = [

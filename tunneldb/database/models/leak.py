@@ -227,7 +227,7 @@ class LearnedModel(Base):
 
     __tablename__ = "learned_model"
     __table_args__ = (
-        one_of("way", "recalibrated", "refit"),
+        one_of("way", "recalibrated", "refit", "extended"),
         Index(None, "tunnel_id"),
         {"comment": "What was learned of each tunnel from reviews; the last that was not undone is in force"},
     )
@@ -236,10 +236,12 @@ class LearnedModel(Base):
     tunnel_id: Mapped[int] = mapped_column(parent("tunnel"), comment="Tunnel whose surveys it is for")
     base: Mapped[str] = mapped_column(comment="Version of the model that it adjusts")
     way: Mapped[str] = mapped_column(
-        comment="recalibrated (slope and offset of the logarithm of the odds) or refit (a factor for each reason, and an "
-        "offset)"
+        comment="recalibrated (slope and offset of the logarithm of the odds), refit (a factor for each reason, and an offset) "
+        "or extended (terms of features, too)"
     )
-    parameters: Mapped[dict[str, Any]] = mapped_column(comment="Slope, offset, and factors by reason")
+    parameters: Mapped[dict[str, Any]] = mapped_column(
+        comment="Slope, offset, factors by reason; centre, scale and weight by feature"
+    )
     surveys: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Surveys whose reviews it was learned from")
     reviews: Mapped[dict[str, Any]] = mapped_column(comment="How many reviews of each kind")
     loss_base: Mapped[float] = mapped_column(
