@@ -24,7 +24,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy import ndimage
 from shapely import affinity
-from shapely.geometry import LineString
+from shapely.geometry import LineString, Point, Polygon
 
 from benchmarks.common import print_table, progress
 from benchmarks.evidence.candidates import DARK, LEAK
@@ -90,6 +90,31 @@ def old_stain(art: Painting, s: float, a: float) -> None:
     art.paint(art.cover(shape, art.log(0.006, 0.08)) * uneven(art), art.log(1.5, 6.0), DARK)
 
 
+def rust_run(art: Painting, s: float, a: float) -> None:
+    """Rust that runs down the wall from an anchor: narrow, tapering, soft at its sides."""
+    down, length, half = (1.0 if a >= 0 else -1.0), art.uniform(0.5, 1.4), art.uniform(0.05, 0.12)
+    top = a - 0.5 * down * length
+    shape = Polygon(
+        [(s - half, top), (s + half, top), (s + 0.3 * half, top + down * length), (s - 0.3 * half, top + down * length)]
+    )
+    art.paint(art.cover(shape.union(Point(s, top).buffer(1.4 * half)), art.log(0.01, 0.03)), art.log(2.0, 6.0), DARK)
+
+
+def tar_band(art: Painting, s: float, a: float) -> None:
+    """Tar brushed over a joint around the tunnel: wider than the joint, with ragged sides, even."""
+    t = np.linspace(a - 1.3, a + 1.3, 60)
+    sides = [art.uniform(0.08, 0.16) + ndimage.gaussian_filter(art.rng.normal(0, 0.05, len(t)), 1.5) for _ in range(2)]
+    shape = Polygon([*zip(s - sides[0], t, strict=True), *zip((s + sides[1])[::-1], t[::-1], strict=True)]).buffer(0)
+    art.paint(art.cover(shape), art.log(3.0, 7.0), DARK)
+
+
+def moss(art: Painting, s: float, a: float) -> None:
+    """Moss: many small patches close together, soft and uneven."""
+    for _ in range(art.rng.integers(4, 9)):
+        shape = blob(art, s + art.uniform(-0.8, 0.8), a + art.uniform(-0.8, 0.8), art.log(0.04, 0.25))
+        art.paint(art.cover(shape, art.log(0.015, 0.04)) * uneven(art), art.log(1.5, 4.0), DARK)
+
+
 USUAL = tuple(THINGS)
 OWNERS: dict[str, tuple[tuple[Maker, float], ...]] = {
     "as elsewhere": USUAL,
@@ -97,6 +122,9 @@ OWNERS: dict[str, tuple[tuple[Maker, float], ...]] = {
     "painted markings": (*USUAL, (marking, 15.0)),
     "damp-looking repairs": (*USUAL, (damp_repair, 15.0)),
     "salts tell": (*((make, share) for make, share in USUAL if make is not patch), (salted, 8.0), (old_stain, 12.0)),
+    "rust runs": (*USUAL, (rust_run, 15.0)),
+    "tarred joints": (*USUAL, (tar_band, 15.0)),
+    "moss": (*USUAL, (moss, 8.0)),
 }
 """What an owner's tunnels show, and how often in proportion: what tunnels usually do, and what is their own."""
 
