@@ -1,6 +1,6 @@
 """How many reviews it takes until detection knows an owner's dirt.
 
-    python -m benchmarks.learning                    # ten minutes
+    python -m benchmarks.learning                    # a quarter of an hour
     python -m benchmarks.learning --regions DIR      # regions in DIR are not painted again
 
 Owners have two tunnels each, in which water shows as it does elsewhere, and dirt of their own. An inspector reviews the first
