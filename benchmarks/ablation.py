@@ -32,7 +32,7 @@ from tunneldb.anomalies import detect as detection
 from tunneldb.anomalies import regions as region
 from tunneldb.anomalies.background.level import BackgroundLevel
 from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
-from tunneldb.anomalies.verdict import Verdict
+from tunneldb.anomalies.verdict import Verdict, classify
 from tunneldb.cli.main import main as command
 from tunneldb.database import connect
 from tunneldb.pipeline import detect as stage
@@ -97,6 +97,11 @@ def one_level(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) -> Back
     flat = [np.zeros_like(part) for part in (local.level.rings, local.level.bands, local.level.smooth)]
     level = BackgroundLevel(local.level.tile, dry.mean, *flat)
     return BackgroundMap(local.grid, level, np.full_like(local.sigma, dry.sigma), dry.mean, dry.sigma, local.count)
+
+
+def all_leaks(*judged: Any) -> Verdict:
+    """Whatever is judged is a leak."""
+    return replace(classify(*judged), kind="leak", reasons=(), confidence=1.0)
 
 
 def corrected_by(law: str) -> list[Replacement]:
@@ -187,7 +192,7 @@ PARTS = (
     Part("removal of appendages: none", [(lining.appendage, "off_plane", nothing_off)]),
     Part("recesses: taken for appendages", [(stage, "lining_image", after(stage.lining_image, recess_is_off))]),
     Part("steps of the radius: left in", [(lining.step, "steps", lambda offset, *others: np.zeros_like(offset))]),
-    Part("judging: all that is dark is a leak", [(detection, "classify", lambda region: Verdict("leak", (), 1.0))]),
+    Part("judging: all that is dark is a leak", [(detection, "classify", all_leaks)]),
     Part("edges: where three sigma lie", [(detection, "refine_boundary", lambda dark, contrast, size: dark)]),
     Part("drips: left alone", [(region, "attach_drips", no_drips)]),
     Part("range curve: auto for measured, and the other way round", swap_curve=True, points="by the other curve"),

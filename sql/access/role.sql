@@ -104,7 +104,7 @@ BEGIN
     -- who may execute the function of a trigger may put it on a view of his own, which says what was before and after
     FOR f IN SELECT p.oid FROM pg_proc p
               WHERE p.pronamespace = 'tunnel_api'::regnamespace
-                AND (p.prorettype = 'trigger'::regtype OR p.proname = 'note_edit') LOOP
+                AND (p.prorettype = 'trigger'::regtype OR p.proname IN ('note_edit', 'note_learned')) LOOP
         EXECUTE format('REVOKE EXECUTE ON FUNCTION %s FROM tunnel_operator', f);
     END LOOP;
     GRANT USAGE ON SCHEMA tunnel_queue TO tunnel_operator;

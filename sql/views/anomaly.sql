@@ -2,6 +2,15 @@
 -- each with a view of its own for QGIS: unrolled (chainage, arc; SRID 0), on the map beside the axis, and in space.
 -- Views named leak hold the anomalies of kind leak. Needs stationing (geometry/stationing.sql).
 
+-- What each reason adds to the logarithm of the odds of a leak, the strongest first, as "faint +2.3, rectangular -1.2".
+CREATE OR REPLACE FUNCTION tunnel_api.evidence_text(evidence jsonb) RETURNS text
+LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE SET search_path = pg_catalog, pg_temp AS $$
+    SELECT string_agg(e.key || ' ' || to_char(e.value::numeric, 'FMSG990.0'), ', ' ORDER BY abs(e.value::numeric) DESC, e.key)
+      FROM jsonb_each_text($1) e WHERE abs(e.value::numeric) >= 0.05
+$$;
+COMMENT ON FUNCTION tunnel_api.evidence_text(jsonb) IS
+    'What speaks for a leak and against it, in words: logarithms of odds by reason, the strongest first';
+
 CREATE OR REPLACE VIEW tunnel_api.anomaly AS
 SELECT a.id, a.survey_id, s.name AS survey, a.km,
        (SELECT min(g.n) FROM tunnel.segment g
@@ -14,6 +23,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.area, a.drop_mean, a.drop_max, a.image_share,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.detected, a.created_at, a.detected_at,
        a.detected AND a.review <> 'rejected' AS counted,
+       tunnel_api.evidence_text(a.evidence) AS evidence, a.model,
        a.unrolled::public.geometry(Polygon, 0) AS unrolled,
        a.map::public.geometry AS map,
        a.surface::public.geometry AS surface
@@ -28,6 +38,17 @@ CREATE OR REPLACE VIEW tunnel_api.leak AS SELECT * FROM tunnel_api.anomaly WHERE
 COMMENT ON VIEW tunnel_api.anomaly IS
     'What is darker than dry lining, with three geometries: leaks, joints, other dark spots; review, remark and kind can be updated';
 COMMENT ON VIEW tunnel_api.leak IS 'Water leaks: anomalies of kind leak, with their three geometries; review, remark and kind can be updated';
+
+CREATE OR REPLACE VIEW tunnel_api.anomaly_evidence AS
+SELECT a.id * 100 + e.n AS id, a.id AS anomaly_id, a.survey_id, s.name AS survey, e.reason, e.log_odds
+  FROM tunnel.anomaly a
+  JOIN tunnel.survey s ON s.id = a.survey_id
+ CROSS JOIN LATERAL (SELECT v.key AS reason, v.value::double precision AS log_odds, row_number() OVER (ORDER BY v.key) AS n
+                       FROM jsonb_each_text(a.evidence) v) e;
+COMMENT ON VIEW tunnel_api.anomaly_evidence IS 'What speaks for each anomaly being a leak and against it: a row for each reason';
+COMMENT ON COLUMN tunnel_api.anomaly_evidence.anomaly_id IS 'Its id in the view anomaly';
+COMMENT ON COLUMN tunnel_api.anomaly_evidence.reason IS 'What was measured: faint, thin, rectangular, …';
+COMMENT ON COLUMN tunnel_api.anomaly_evidence.log_odds IS 'What it adds to the logarithm of the odds of a leak; negative: against one';
 
 -- The views of one geometry, and the comments on the columns of all eight.
 DO $$
@@ -76,10 +97,12 @@ BEGIN
         ('reviewed_at', 'When it was reviewed or judged last, set by the database'),
         ('remark', 'The reviewer''s remark'),
         ('detected', 'False when the last detection found it no more (kept for its review)'),
-        ('counted', 'Whether sums count it: found last, and not rejected')) AS t (name, text)
+        ('counted', 'Whether sums count it: found last, and not rejected'),
+        ('evidence', 'What speaks for a leak (+) and against it (-): logarithms of odds by reason, the strongest first; NULL from before'),
+        ('model', 'Version of the model of evidence that judged it; NULL from before')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
       JOIN pg_class c ON c.oid = a.attrelid
-     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname ~ '^(anomaly|leak)(_|$)'
+     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname ~ '^(anomaly|leak)(_unrolled|_map|_3d)?$'
     LOOP
         EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', comment.view, comment."column", comment.text);
     END LOOP;

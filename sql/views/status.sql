@@ -27,7 +27,7 @@ COMMENT ON COLUMN tunnel_api.run.job_id IS 'Job of the queue that it was (tunnel
 -- Last run of each stage on each kilometre of a survey that was ever loaded or worked on, waits to be loaded or is wanted,
 -- and whether its result is out of date. Load rests on the files that touch the kilometre; what the others rest on, here and on
 -- both neighbours, is in tunnel.stage; what reads the survey rests on its positions, reference and intensity, what reads sonar on
--- the points below the water.
+-- the points below the water, what judges on what was learned from reviews (leaks/learned.sql: which, and not when).
 -- A result is stale when one of these came to be since its run began, is stale itself, or is of a stage that never ran here, as
 -- ground in a database that was made before there was that stage. Runs are put in order by their times:
 -- a result commits under a lock that each run takes just before it begins (see queue_lock), so that none which it did not
@@ -46,6 +46,7 @@ AS $$
     WITH RECURSIVE stage AS MATERIALIZED (  -- the stages that each rests on, by their numbers: here, and on both neighbours
         SELECT s.step, s.name, s.name = 'segments' AS of_segments, 'axis' = ANY (s.reads) AS of_axis,
                'survey' = ANY (s.reads) AS of_survey, 'sonar' = ANY (s.reads) AS of_sonar,
+               'learned' = ANY (s.reads) AS of_learned,
                ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads) ORDER BY 1) AS here,
                ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads_beside) ORDER BY 1) AS beside
           FROM tunnel.stage s
@@ -55,7 +56,7 @@ AS $$
          CROSS JOIN LATERAL unnest(CASE w.way WHEN 0 THEN s.here ELSE s.beside END) AS n (source)
     ), attempt AS MATERIALIZED (
         SELECT r.km, s.step, r.id, r.outcome, r.started_at, r.finished_at, r.message, r.parameters, r.backend_pid, r.backend_start,
-               r.counts ->> 'kept' = '0' AS void
+               r.counts ->> 'kept' = '0' AS void, (r.counts ->> 'learned')::integer AS learned
           FROM tunnel.run r JOIN stage s ON s.name = r.stage
          WHERE r.survey_id = $1 AND r.km BETWEEN $2 AND $3
     ), last AS (
@@ -92,7 +93,7 @@ AS $$
     ), moved AS (
         SELECT DISTINCT t.km FROM turned t WHERE tunnel_api.segment_moved($1, t.n, t.planes)
     ), cell AS MATERIALIZED (
-        SELECT k.km, s.step, d.started_at, d.finished_at
+        SELECT k.km, s.step, d.started_at, d.finished_at, d.learned
           FROM kilometre k CROSS JOIN stage s
           LEFT JOIN success d ON d.km = k.km AND d.step = s.step
     ), input AS (  -- the newest of what each rests on; as late, the first that came since or never ran: here, before, after
@@ -119,6 +120,7 @@ AS $$
                        END
                    WHEN s.of_survey AND v.settings_at > c.started_at THEN 'positions, reference or intensity set since'
                    WHEN s.of_sonar AND w.changed_at > c.started_at THEN 'sonar scans loaded or registered since'
+                   WHEN s.of_learned AND c.learned IS DISTINCT FROM v.learned THEN 'what is learned from reviews is another since'
                    WHEN s.of_segments AND m.km IS NOT NULL THEN 'axis edited since'
                END AS reason
           FROM cell c
@@ -129,7 +131,8 @@ AS $$
           LEFT JOIN edit e ON e.km = c.km
           LEFT JOIN moved m ON m.km = c.km
           LEFT JOIN tunnel.water_level w ON w.survey_id = $1 AND w.km = c.km
-         CROSS JOIN (SELECT s.settings_at FROM tunnel.survey s WHERE s.id = $1) v
+         CROSS JOIN (SELECT s.settings_at, tunnel_api.learned_in_force(s.tunnel_id) AS learned
+                       FROM tunnel.survey s WHERE s.id = $1) v
     ), ripple AS (  -- what is stale, and what rests on it
         SELECT d.km, d.step FROM direct d WHERE d.reason IS NOT NULL
          UNION

@@ -112,7 +112,8 @@ def test_what_is_wrong_is_told_with_what_was_done_before(example: str, tmp_path:
         ["ground", "a.laz", "-o", "b.laz"],
         ["spheres", "nobody", "--radius", "0.07"], ["intensity", "nobody"], ["server", "stop"], ["server", "status"],
         ["server", "start"], ["tunnel", "remove", "demo"], ["survey", "remove", "nobody", "--yes"], ["tunnel", "add", "demo"],
-        ["members", "nobody"], ["spots", "nobody"], ["simulate-structure", str(tmp_path), "--stations", "0"],
+        ["members", "nobody"], ["spots", "nobody"], ["learn", example],
+        ["simulate-structure", str(tmp_path), "--stations", "0"],
         ["simulate-canal", str(tmp_path), "--length", "1"],
         ["survey", "add", "x"], ["export", example, "-o", str(tmp_path / "x.pdf")], ["status", example, "--watch"],
     ):  # fmt: skip

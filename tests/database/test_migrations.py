@@ -76,6 +76,28 @@ def test_images_of_the_first_revision_are_kept(empty_dsn: str) -> None:
         assert sorted(connection.execute(query)) == [("b", f"b{b}") for b in range(3)]
 
 
+def test_anomalies_from_before_are_kept_without_features(empty_dsn: str) -> None:
+    with sqlalchemy_engine(empty_dsn).begin() as session:
+        session.exec_driver_sql("CREATE EXTENSION postgis")
+        command.upgrade(alembic_config(session), "0020")
+        session.exec_driver_sql(
+            """
+            INSERT INTO tunnel.tunnel (name, srid, alignment) VALUES ('t', 25830, 'SRID=25830;LINESTRINGZ(0 0 0, 0 9 0)');
+            INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)
+            SELECT t.id, 'a', '2024-05-04', 'none', 'mobile' FROM tunnel.tunnel t;
+            INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean,
+                                        drop_max, image_share, unrolled, map, surface, review)
+            SELECT s.id, 0, 1, 2, 0, 1, 12, 1, 3, 4, 1, ST_MakeEnvelope(1, 0, 2, 1), ST_MakeEnvelope(1, 0, 2, 1, 25830),
+                   ST_Force3D(ST_MakeEnvelope(1, 0, 2, 1, 25830)), 'confirmed' FROM tunnel.survey s;
+            """
+        )
+    with open_connection(empty_dsn) as connection:
+        install(connection, STAGES)
+        kept = connection.execute("SELECT review, features, feature_list_id, evidence, model FROM tunnel.anomaly").fetchall()
+        assert kept == [("confirmed", None, None, None, None)]
+        assert connection.execute("SELECT kind, evidence, model FROM tunnel_api.leak").fetchall() == [("leak", None, None)]
+
+
 def test_a_second_install_changes_nothing(dsn: str) -> None:
     before = dump(dsn, "--schema-only")
     with open_connection(dsn) as connection:
@@ -269,7 +291,7 @@ def test_a_deleted_survey_takes_its_rows_along(example: str, conn: psycopg.Conne
         "SELECT relname FROM pg_class WHERE relnamespace = 'tunnel'::regnamespace AND relkind IN ('r', 'p')"
     ).fetchall()
     for (table,) in tables:
-        if table not in ("alembic_version", "stage"):  # of no survey
+        if table not in ("alembic_version", "stage", "feature_list"):  # of no survey
             count = conn.execute(sql.SQL("SELECT count(*) FROM {}").format(sql.Identifier("tunnel", table))).fetchone()
             assert count == (0,), table
 

@@ -13,9 +13,16 @@ import shapely
 from click.testing import CliRunner, Result
 from support.databases import Copies
 
+from tunneldb.anomalies.evidence import standard_model
+from tunneldb.anomalies.features import NAMES
+from tunneldb.anomalies.learning import Adjustment
 from tunneldb.cli.main import main
+from tunneldb.pipeline import detect as job
+from tunneldb.pipeline.parameters import settings
 from tunneldb.simulate import Parameters, Simulation, generate, write
 from tunneldb.simulate.lining.leaks import Leak
+from tunneldb.store.learned import apply_learned
+from tunneldb.store.survey import get_survey
 
 NAME = "wet"
 START = 12_310.0
@@ -253,6 +260,67 @@ def test_a_rerun_gives_the_same_and_reviews_survive(detected: psycopg.Connection
     assert (report["leaks_again"], report["leaks_new"], report["leaks_kept_for_review"], report["leaks_gone"]) == (
         len(before), 0, 1, 1,
     )  # fmt: skip
+
+
+def test_what_was_measured_is_stored_with_what_it_says(detected: psycopg.Connection) -> None:
+    conn = detected
+    survey, values = get_survey(conn, NAME), settings()
+    inputs = job.load_inputs(conn, survey, int(START // 1000), values)
+    assert inputs.sample is not None
+    result = job.compute_detection(inputs, inputs.sample, values, lambda window: None, lambda share: None)
+    rows = conn.execute(
+        "SELECT ST_AsBinary(a.unrolled), a.features, a.evidence, a.model, a.kind, a.confidence, l.names"
+        "  FROM tunnel.anomaly a JOIN tunnel.feature_list l ON l.id = a.feature_list_id"
+    ).fetchall()
+    stored = {shapely.from_wkb(bytes(wkb)).wkb: rest for wkb, *rest in rows}
+    assert len(stored) == len(rows) == len(result.anomalies.anomalies) >= 3
+    for anomaly in result.anomalies.anomalies:
+        features, evidence, model, kind, confidence, names = stored[anomaly.outline.wkb]
+        assert names == [*NAMES, "outline"]
+        assert np.array_equal(features[:-1], anomaly.verdict.features, equal_nan=True)
+        assert features[-1] == anomaly.verdict.outline
+        assert evidence == pytest.approx(anomaly.verdict.evidence, abs=1e-4)
+        assert model == standard_model().version
+        odds = standard_model().constant + sum(evidence.values())
+        p = 1.0 / (1.0 + np.exp(-odds))
+        assert confidence == pytest.approx(p if kind == "leak" else 1.0 - p, abs=1e-3)
+
+
+def test_what_was_learned_judges_the_next_run_and_reviews_stay(detected: psycopg.Connection) -> None:
+    conn = detected
+    leaks = [key for (key,) in conn.execute("SELECT id FROM tunnel.anomaly WHERE kind = 'leak' ORDER BY id")]
+    confirmed, rejected, renamed = leaks[:3]
+    conn.execute("UPDATE tunnel_api.leak SET review = 'confirmed' WHERE id = %s", [confirmed])
+    conn.execute("UPDATE tunnel_api.leak SET review = 'rejected' WHERE id = %s", [rejected])
+    conn.execute("UPDATE tunnel_api.leak SET kind = 'joint' WHERE id = %s", [renamed])
+    said = "SELECT id, review, kind, reviewed_by, reviewed_at FROM tunnel_api.anomaly WHERE id = ANY (%s) ORDER BY id"
+    reviews = conn.execute(said, [leaks[:3]]).fetchall()
+    before = conn.execute("SELECT id, kind, confidence, features, evidence FROM tunnel.anomaly ORDER BY id").fetchall()
+    # The owner's leaks are said to be rarer by a factor of e^20: nothing is one.
+    tunnel = get_survey(conn, NAME).tunnel_id
+    adjustment = Adjustment("recalibrated", 0.5, -20.0)
+    assert apply_learned(conn, tunnel, adjustment, [NAME], {"rejected": 40}, (0.7, 0.3), None) == 1
+    conn.commit()
+    command("run", NAME, "--stale")
+    after = conn.execute("SELECT id, kind, confidence, features, evidence, model FROM tunnel.anomaly ORDER BY id").fetchall()
+    assert [row[0] for row in after] == [row[0] for row in before]
+    assert {kind for _, kind, *_ in after} <= {"joint", "dark"}
+    assert {model for *_, model in after} == {f"{standard_model().version}+learned 1"}
+    for was, now in zip(before, after, strict=True):
+        assert np.array_equal(was[3], now[3], equal_nan=True)
+        assert now[4] == pytest.approx({reason: 0.5 * value for reason, value in was[4].items()}, abs=1e-4)
+    assert (counts(conn)["learned"], counts(conn)["model"]) == (1, f"{standard_model().version}+learned 1")
+    # What was confirmed to be a leak is one still, whatever detection now takes it for.
+    now_said = conn.execute(said, [leaks[:3]]).fetchall()
+    assert [row for row in now_said if row[0] != rejected] == [row for row in reviews if row[0] != rejected]
+    assert [row[1] for row in now_said if row[0] == rejected] == ["rejected"]
+    conn.rollback()
+    assert "nothing of" in command("run", NAME, "--stale").output
+    command("learn", NAME, "--undo")
+    command("run", NAME, "--stale")
+    again = conn.execute("SELECT id, kind, confidence, features, evidence FROM tunnel.anomaly ORDER BY id").fetchall()
+    assert [row[:3] for row in again] == [row[:3] for row in before]
+    assert conn.execute(said, [leaks[:3]]).fetchall() == reviews
 
 
 def test_dry_and_homogeneous_regions_that_the_user_drew(detected: psycopg.Connection, scan: tuple[Simulation, Path]) -> None:

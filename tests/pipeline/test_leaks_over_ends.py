@@ -151,6 +151,7 @@ def test_leaks_over_the_end_are_what_they_are_elsewhere(sections: psycopg.Connec
         assert same.intersection(wet).area / same.union(wet).area > 0.8
         assert share_of(scan, same, APPENDAGE) < 0.05
         assert share_of(scan, same, FLOOR) < 0.05
+    assert conn.execute("SELECT count(*) FROM tunnel.anomaly WHERE features IS NULL OR model IS NULL").fetchone() == (0,)
     for km, west, east, share, area in conn.execute(
         "SELECT km, chainage_from, chainage_to, image_share, area / ST_Area(unrolled) FROM tunnel.anomaly"
     ):

@@ -100,6 +100,10 @@ def test_every_view_begins_with_a_stable_integer_key(
     conn: psycopg.Connection, example: str, points: None, queue: None, stationing: None
 ) -> None:
     conn.execute("UPDATE tunnel.scan_file SET unposed = 3")  # a remark
+    conn.execute('UPDATE tunnel.anomaly SET evidence = \'{"faint": 2.3, "thin": -1.1}\'')
+    conn.execute(
+        "SELECT tunnel_api.learned_apply(id, '1', 'recalibrated', '{}', '{}', '{}', 0.7, 0.6, NULL) FROM tunnel.tunnel"
+    )
     save_example_structures(conn, "demo-2024")
     save_example_registration(conn, "demo-2024")
     for view in views(conn):

@@ -11,6 +11,7 @@ from shapely.geometry import Polygon
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.background.level_map import BackgroundMap
 from tunneldb.anomalies.boundary import refine_boundary
+from tunneldb.anomalies.evidence import EvidenceModel
 from tunneldb.anomalies.features import measure_regions
 from tunneldb.anomalies.hidden import behind_strips
 from tunneldb.anomalies.joints import crossed_joints, find_joints
@@ -60,14 +61,16 @@ class Anomaly:
     verdict: Verdict
 
     @classmethod
-    def of(cls, region: Region, min_area: float, features: Float | None = None) -> Anomaly | None:
-        """Make an anomaly of a region, judged by its features; None if it holds no point or is too small.
+    def of(
+        cls, region: Region, min_area: float, features: Float | None = None, model: EvidenceModel | None = None
+    ) -> Anomaly | None:
+        """Make an anomaly of a region, judged by its features and a model; None if it holds no point or is too small.
 
         Leaks and dark spots must not be smaller than ``min_area``, m², joints no shorter than MIN_JOINT.
         """
         if not may_count(region, min_area):
             return None
-        verdict = classify(region, features)
+        verdict = classify(region, features, model)
         if verdict.kind == "joint":
             if max(region.mask.shape) * region.pixel < MIN_JOINT:
                 return None
@@ -106,7 +109,9 @@ class Detection:
     wet_pixels: int
 
 
-def find_anomalies(contrast: ContrastImage, background: BackgroundMap, min_area: float) -> Detection:
+def find_anomalies(
+    contrast: ContrastImage, background: BackgroundMap, min_area: float, model: EvidenceModel | None = None
+) -> Detection:
     """Find what is dark in a kilometre.
 
     Parameters
@@ -117,6 +122,8 @@ def find_anomalies(contrast: ContrastImage, background: BackgroundMap, min_area:
         What they are relative to.
     min_area : float
         Smaller leaks are left out, m² in the unrolled plane.
+    model : EvidenceModel, optional
+        What judges regions; by default the one that comes with the program. What the regions are does not depend on it.
     """
     grid, state = contrast.grid, contrast.state
     lining, _ = _lining_in_columns(state, grid.inner)
@@ -128,7 +135,7 @@ def find_anomalies(contrast: ContrastImage, background: BackgroundMap, min_area:
     anomalies, cut, leaks = [], [], []
     ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
     regions = find_dark_regions(dark, contrast, min_area)
-    judged = _judged(regions, min_area)
+    judged = _judged(regions, min_area, model)
     if contrast.spacing:
         judged = _without_joints(regions, judged, contrast.spacing)
     for region, anomaly in zip(regions, judged, strict=True):
@@ -149,12 +156,12 @@ def may_count(region: Region, min_area: float) -> bool:
     return bool(region.filled) and large
 
 
-def _judged(regions: Sequence[Region], min_area: float) -> list[Anomaly | None]:
+def _judged(regions: Sequence[Region], min_area: float, model: EvidenceModel | None) -> list[Anomaly | None]:
     """Judge the regions of a kilometre, each held against those about it; None for what is too small."""
     judged: list[Anomaly | None] = [None] * len(regions)
     counted = [k for k, region in enumerate(regions) if may_count(region, min_area)]
     for k, features in zip(counted, measure_regions([regions[k] for k in counted]), strict=True):
-        judged[k] = Anomaly.of(regions[k], min_area, features)
+        judged[k] = Anomaly.of(regions[k], min_area, features, model)
     return judged
 
 
@@ -189,6 +196,7 @@ def find_dark_regions(dark: Bool, contrast: ContrastImage, min_area: float) -> l
 
 
 def _may_drip(region: Region) -> bool:
+    # By the program's own model: what a region is must not change with what is learned from it.
     return bool(region.filled) and classify(region).kind == "leak"
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -21,6 +21,9 @@ from tunneldb.arrays import Bool, Float, Intp
 
 FORMAT = 2
 """Of the trees' file."""
+
+FAR = 3.0
+"""What lies farther out than so many scales counts as that."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,12 @@ class EvidenceModel:
         Mean of what a tree adds to the logarithm of the odds, from this node on.
     trained_on : mapping
         What it was fitted to.
+    factors : (len(FEATURES),) float array
+        By how much more or less each feature counts than in the trees: 1, but for what was learned from an owner's reviews
+        (:mod:`tunneldb.anomalies.learning`). Not stored with the trees.
+    own : (3, len(FEATURES)) float array
+        What was learned of each feature beside the trees: the value from which it counts, a scale, and the logarithm of the
+        odds by scale (:func:`deviations`); 0 for what was not. Not stored with the trees.
     """
 
     version: str
@@ -59,6 +68,8 @@ class EvidenceModel:
     right: Intp
     value: Float
     trained_on: Mapping[str, Any]
+    factors: Float = field(default_factory=lambda: np.ones(len(FEATURES)))
+    own: Float = field(default_factory=lambda: np.repeat([[0.0], [1.0], [0.0]], len(FEATURES), axis=1))
 
     def contributions(self, features: Float) -> Float:
         """What each feature adds to the logarithm of the odds.
@@ -82,7 +93,8 @@ class EvidenceModel:
             after = np.where(goes_left, self.left[at], self.right[at])
             np.add.at(out, (np.broadcast_to(row, at.shape), asked), self.value[after] - self.value[at])
             at = after
-        return out
+        centre, scale, weight = self.own
+        return out * self.factors + deviations(features, centre, scale) * weight
 
     def probabilities(self, features: Float) -> Float:
         """Probability (n,) that each region is a leak."""
@@ -111,6 +123,11 @@ ARRAYS: Mapping[str, type] = {
     "value": np.float64,
 }  # fmt: skip
 """Arrays of a model, and of what kind they are."""
+
+
+def deviations(features: Float, centre: Float, scale: Float) -> Float:
+    """How far features (n, len(FEATURES)) lie from their centres, in scales, FAR at the most; 0 where one can't be measured."""
+    return np.asarray(np.clip(np.nan_to_num((features - centre) / scale, nan=0.0), -FAR, FAR))
 
 
 def reasons_of(contributions: Float) -> dict[str, float]:

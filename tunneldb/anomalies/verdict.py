@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from tunneldb.anomalies.degrees import FEW_PROFILES, told
-from tunneldb.anomalies.evidence import reasons_of, standard_model
+from tunneldb.anomalies.evidence import EvidenceModel, reasons_of, standard_model
 from tunneldb.anomalies.features import DEGREES, FEATURES, NAMES, measure_features
 from tunneldb.anomalies.regions import Region
 from tunneldb.arrays import Float
@@ -44,6 +44,10 @@ class Verdict:
         By how much each reason changes the odds of a leak, as logarithms; positive: for it.
     features : (len(FEATURES),) float array
         What was measured of it.
+    outline : float
+        How much its outline tells, 0 to 1: by so much the reasons of BUILT count.
+    model : str
+        Version of the model that judged.
     """
 
     kind: Kind
@@ -51,9 +55,11 @@ class Verdict:
     confidence: float
     evidence: Mapping[str, float]
     features: Float
+    outline: float
+    model: str
 
 
-def classify(region: Region, features: Float | None = None) -> Verdict:
+def classify(region: Region, features: Float | None = None, model: EvidenceModel | None = None) -> Verdict:
     """Tell what a region is, by its features: a leak if that is more probable than not.
 
     Parameters
@@ -61,13 +67,13 @@ def classify(region: Region, features: Float | None = None) -> Verdict:
     region : Region
     features : (len(FEATURES),) float array, optional
         What was measured of it; by default what can be of a region by itself.
+    model : EvidenceModel, optional
+        What judges it; by default the model that comes with the program.
     """
-    model = standard_model()
+    model = model or standard_model()
     features = measure_features(region) if features is None else features
-    contributions = model.contributions(features[None])[0]
-    if region.spacing:
-        built = np.array([feature.reason in BUILT for feature in FEATURES])
-        contributions[built] *= told(region)
+    outline = told(region)
+    contributions = weigh(model, features[None], np.array([outline]))[0]
     p = float(1.0 / (1.0 + np.exp(-model.constant - contributions.sum())))
     kind: Kind = "leak" if p >= 0.5 else "joint" if features[LINE] >= 0.5 else "dark"
     evidence = reasons_of(contributions)
@@ -77,7 +83,18 @@ def classify(region: Region, features: Float | None = None) -> Verdict:
         against = [*looks, *(name for name in against if name not in looks)]
     if kind == "leak" and region.spacing and region.mask.shape[1] * region.pixel < FEW_PROFILES * region.spacing:
         against.append("sparse")
-    return Verdict(kind, tuple(against), p if kind == "leak" else 1.0 - p, evidence, features)
+    return Verdict(kind, tuple(against), p if kind == "leak" else 1.0 - p, evidence, features, outline, model.version)
+
+
+def weigh(model: EvidenceModel, features: Float, outline: Float) -> Float:
+    """What features (n, len(FEATURES)) add to the odds, as logarithms, where outlines (n,) tell more or less."""
+    return weigh_built(model.contributions(features), outline)
+
+
+def weigh_built(contributions: Float, outline: Float) -> Float:
+    """What features (n, len(FEATURES)) say, less where they go by outlines (n,) that tell less."""
+    built = np.array([feature.reason in BUILT for feature in FEATURES])
+    return contributions * np.where(built, outline[:, None], 1.0)
 
 
 def _degree(features: Float, name: str) -> float:

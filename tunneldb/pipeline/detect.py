@@ -45,6 +45,7 @@ from tunneldb.store.images import (
     save_radiometry,
     save_range_curve,
 )
+from tunneldb.store.learned import InForce, model_in_force
 from tunneldb.store.scene import load_arcs
 from tunneldb.store.sonar import water_level
 from tunneldb.store.sources import load_poses, sample, sources
@@ -78,6 +79,8 @@ class DetectionInputs:
         Whether the range curve is to be found on the lining.
     homogeneous, dry : list of Polygon
         Regions that the user drew.
+    judge : InForce
+        The model of evidence, with what was learned for the tunnel.
     """
 
     survey: str
@@ -88,6 +91,7 @@ class DetectionInputs:
     own_curve: bool
     homogeneous: list[Polygon]
     dry: list[Polygon]
+    judge: InForce
 
 
 @dataclass(frozen=True)
@@ -145,6 +149,7 @@ def detect(
         save_anomalies(conn, survey, km, inputs.observer.surface, [], [], 0.0)
         return {
             **counts,
+            "learned": inputs.judge.id,
             "pixels": images.pixels,
             "leaks": 0,
             "note": "no intensity: offset image only, no leaks sought",
@@ -181,6 +186,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
         survey.reference == "auto",
         load_regions(conn, survey, km, "homogeneous"),
         load_regions(conn, survey, km, "dry"),
+        model_in_force(conn, survey.tunnel_id),
     )
 
 
@@ -219,7 +225,7 @@ def compute_detection(
         counts |= {"sparse": round(sparse, 4), "least_density": round(density, 1)}
     background = map_background(lining, inputs.dry)
     contrast = contrast_image(lining, background)
-    found = find_anomalies(contrast, background, values["leak.min_area"])
+    found = find_anomalies(contrast, background, values["leak.min_area"], inputs.judge.model)
     return DetectionResult(
         counts,
         calibration,
@@ -255,9 +261,11 @@ def _save(
     save_range_curve(conn, survey, km, result.calibration.found)
     save_radiometry(conn, survey, km, roughness, result.background, found, result.dry_levels)
     save_coverage(conn, survey, km, result.coverage)
-    matched = save_anomalies(conn, survey, km, surface, found.anomalies, found.cut, min_area)
+    matched = save_anomalies(conn, survey, km, surface, found.anomalies, found.cut, min_area, inputs.judge.model)
     return {
         **result.counts,
+        "model": inputs.judge.model.version,
+        "learned": inputs.judge.id,
         "pixels": images.pixels,
         "lining_pixels": found.pixels,
         "wet_pixels": found.wet_pixels,
@@ -270,7 +278,7 @@ def _save(
         "leaks_again": matched.again,
         "leaks_kept_for_review": matched.kept,
         "leaks_gone": matched.gone,
-        **_report(result, survey.note, matched.other_pixels),
+        **_report(result, [survey.note, inputs.judge.note], matched.other_pixels),
     }
 
 
@@ -338,7 +346,7 @@ def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
     )
 
 
-def _report(result: DetectionResult, known_before: str | None, other_pixels: list[int]) -> Counts:
+def _report(result: DetectionResult, known_before: list[str | None], other_pixels: list[int]) -> Counts:
     """What the ledger says about the roughness, and what else there is to note."""
     roughness = result.calibration.roughness
 
@@ -353,7 +361,7 @@ def _report(result: DetectionResult, known_before: str | None, other_pixels: lis
         "incidence_from": known(roughness.incidence_from, 1),
         "incidence_to": known(roughness.incidence_to, 1),
     }
-    notes = [note for note in (known_before, result.calibration.note) if note]
+    notes = [note for note in (*known_before, result.calibration.note) if note]
     if text := roughness.note:
         notes.append(text)
     if other_pixels:

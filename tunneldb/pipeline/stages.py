@@ -33,7 +33,8 @@ class Stage:
         come out. Empty for ``load``, which goes by the files (`tunneldb.pipeline.load`).
     reads : tuple of str
         Stages whose results in the kilometre itself it rests on, directly or through another; ``survey`` where it rests on the
-        scanner's positions, the reference curve or the kind of intensity, ``sonar`` on what sonar scans saw below the water.
+        scanner's positions, the reference curve or the kind of intensity, ``sonar`` on what sonar scans saw below the water,
+        ``learned`` on what the model of evidence learned from reviews.
     reads_beside : tuple of str
         Stages whose results in the kilometres before and after it rests on.
     parameters : tuple of str
@@ -77,7 +78,7 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "detect",
         "tunneldb.pipeline.detect:detect",
-        ("load", "axis", "segments", "sections", "ground", "survey", "sonar"),
+        ("load", "axis", "segments", "sections", "ground", "survey", "sonar", "learned"),
         ("ground",),
         ("lining", "image", "intensity", "appendage", "leak"),
     ),

@@ -9,15 +9,18 @@ from typing import Any
 
 import psycopg
 import shapely
+from psycopg.types.json import Jsonb
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.detect import Anomaly
+from tunneldb.anomalies.evidence import EvidenceModel
 from tunneldb.anomalies.geometries import anomaly_geometries
 from tunneldb.anomalies.matching import match, match_parts
 from tunneldb.anomalies.regions import Region
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.anomaly_parts import Border, Cluster, link, replace_parts
+from tunneldb.store.learned import feature_list
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
@@ -72,6 +75,7 @@ def save_anomalies(
     found: Sequence[Anomaly],
     cut: Sequence[Region],
     min_area: float,
+    model: EvidenceModel | None = None,
 ) -> Matched:
     """Replace the anomalies of a kilometre and those over its ends; one that is found again keeps its id and its review.
 
@@ -91,13 +95,16 @@ def save_anomalies(
         Dark regions that reach its ends.
     min_area : float
         Smaller leaks over its ends are left out, m².
+    model : EvidenceModel, optional
+        What judges those over its ends; by default the one that comes with the program.
     """
     # What takes time comes before the lock.
-    rows = [_row(anomaly, surface, survey.srid) for anomaly in found]
+    order = feature_list(conn)
+    rows = [_row(anomaly, surface, survey.srid, order) for anomaly in found]
     border = replace_parts(conn, survey, km, cut)
     over: list[tuple[Cluster, Anomaly]] = []
     for cluster in border.clusters:
-        anomaly = Anomaly.of(cluster.region, min_area)
+        anomaly = Anomaly.of(cluster.region, min_area, model=model)
         if anomaly is None:
             link(conn, cluster, None)
         else:
@@ -108,7 +115,7 @@ def save_anomalies(
     pairs = match_parts([earlier[k].outline for k in at_end], [earlier[k].reviewed for k in at_end], wholes)
     taken = {number: earlier[at_end[k]] for number, k in pairs.items()}
     for number, (cluster, anomaly) in enumerate(over):
-        values = _row(anomaly, _surface_of(conn, survey, km, surface, anomaly), survey.srid)
+        values = _row(anomaly, _surface_of(conn, survey, km, surface, anomaly), survey.srid, order)
         link(conn, cluster, _write(conn, survey, values, taken.get(number)))
     left = [anomaly for anomaly in earlier if anomaly not in taken.values()]
     again = match([anomaly.outline for anomaly in left], [anomaly.outline for anomaly in found])
@@ -176,19 +183,25 @@ def _surface_of(conn: psycopg.Connection[Any], survey: Survey, km: int, surface:
 
 _INSERT = """
     INSERT INTO tunnel.anomaly (survey_id, km, kind, reasons, confidence, contrast, chainage_from, chainage_to, arc_from,
-                                arc_to, clock, area, drop_mean, drop_max, image_share, unrolled, map, surface)
+                                arc_to, clock, area, drop_mean, drop_max, image_share, feature_list_id, features, evidence,
+                                model, unrolled, map, surface)
     VALUES (%(survey)s, %(km)s, %(kind)s, %(reasons)s, %(confidence)s, %(contrast)s, %(chainage_from)s, %(chainage_to)s,
             %(arc_from)s, %(arc_to)s, %(clock)s, %(area)s, %(drop_mean)s, %(drop_max)s, %(image_share)s,
+            %(feature_list)s, %(features)s, %(evidence)s, %(model)s,
             public.ST_GeomFromWKB(%(unrolled)s, 0), public.ST_GeomFromWKB(%(map)s, %(srid)s::int),
             public.ST_GeomFromWKB(%(surface)s, %(srid)s::int))
     RETURNING id
 """
+# What an inspector has confirmed it to be it remains when detection now takes it for something else.
 _UPDATE = """
     UPDATE tunnel.anomaly
        SET km = %(km)s, kind = %(kind)s, reasons = %(reasons)s, confidence = %(confidence)s, contrast = %(contrast)s,
            chainage_from = %(chainage_from)s, chainage_to = %(chainage_to)s, arc_from = %(arc_from)s,
            arc_to = %(arc_to)s, clock = %(clock)s, area = %(area)s, drop_mean = %(drop_mean)s, drop_max = %(drop_max)s,
-           image_share = %(image_share)s, unrolled = public.ST_GeomFromWKB(%(unrolled)s, 0),
+           image_share = %(image_share)s, feature_list_id = %(feature_list)s, features = %(features)s,
+           evidence = %(evidence)s, model = %(model)s,
+           judged = CASE WHEN review = 'confirmed' AND judged IS NULL AND kind <> %(kind)s THEN kind ELSE judged END,
+           unrolled = public.ST_GeomFromWKB(%(unrolled)s, 0),
            map = public.ST_GeomFromWKB(%(map)s, %(srid)s::int),
            surface = public.ST_GeomFromWKB(%(surface)s, %(srid)s::int), detected = true, detected_at = now()
      WHERE id = %(id)s
@@ -205,7 +218,7 @@ def _write(conn: psycopg.Connection[Any], survey: Survey, values: dict[str, Any]
     return int(row[0])
 
 
-def _row(anomaly: Anomaly, surface: Surface, srid: int) -> dict[str, Any]:
+def _row(anomaly: Anomaly, surface: Surface, srid: int, order: int) -> dict[str, Any]:
     west, south, east, north = anomaly.outline.bounds
     geometries = anomaly_geometries(anomaly.outline, surface)
     return {
@@ -223,6 +236,10 @@ def _row(anomaly: Anomaly, surface: Surface, srid: int) -> dict[str, Any]:
         "drop_mean": anomaly.drop_mean,
         "drop_max": anomaly.drop_max,
         "image_share": anomaly.image_share,
+        "feature_list": order,
+        "features": [*anomaly.verdict.features.tolist(), anomaly.verdict.outline],
+        "evidence": Jsonb({reason: round(value, 4) for reason, value in anomaly.verdict.evidence.items()}),
+        "model": anomaly.verdict.model,
         "unrolled": shapely.to_wkb(anomaly.outline),
         "map": shapely.to_wkb(geometries.map),
         "surface": shapely.to_wkb(geometries.surface),

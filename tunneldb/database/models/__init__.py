@@ -9,7 +9,18 @@ from tunneldb.database.models.catalog import AlignmentElement, Pose, Reference, 
 from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
 from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
 from tunneldb.database.models.ground import Cluster, Ground, Lining, TargetSphere
-from tunneldb.database.models.leak import Anomaly, AnomalyPart, Coverage, Image, Radiometry, RangeCurve, Region, Waterproof
+from tunneldb.database.models.leak import (
+    Anomaly,
+    AnomalyPart,
+    Coverage,
+    FeatureList,
+    Image,
+    LearnedModel,
+    Radiometry,
+    RangeCurve,
+    Region,
+    Waterproof,
+)
 from tunneldb.database.models.sonar import Bed, Ladder, RegistrationResidual, SonarPoint, SonarScan
 from tunneldb.database.models.structures import Face, Member, Spot
 from tunneldb.database.models.work import Audit, Goal, Run, Stage, Worker
@@ -27,12 +38,14 @@ __all__ = [
     "Cluster",
     "Coverage",
     "Face",
+    "FeatureList",
     "FileKm",
     "Goal",
     "Ground",
     "Image",
     "Incoming",
     "Ladder",
+    "LearnedModel",
     "Lining",
     "Member",
     "Point",

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import datetime as dt
+from typing import Any
 
 from geoalchemy2 import WKBElement
 from sqlalchemy import BigInteger, Computed, ForeignKey, Identity, Index, Integer, Text, text
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
-from tunneldb.database.models.base import KM, NOW, SURVEY, Base, Floats, Reals, Review, geometry, one_of, parent
+from tunneldb.database.models.base import CLOCK, KM, NOW, SURVEY, Base, Floats, Reals, Review, geometry, one_of, parent
 
 
 class Radiometry(Base):
@@ -149,6 +150,18 @@ class Image(Base):
     tiff: Mapped[bytes] = mapped_column(comment="GeoTIFF in the unrolled plane (chainage, arc), m")
 
 
+class FeatureList(Base):
+    """An order of features."""
+
+    __tablename__ = "feature_list"
+    __table_args__ = {"comment": "In which order the features of anomalies are stored: versions of the program differ"}  # noqa: RUF012
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
+    names: Mapped[list[str]] = mapped_column(
+        ARRAY(Text), unique=True, comment="Their names; outline: how much the outline tells, 0 to 1"
+    )
+
+
 class Anomaly(Review, Base):
     """A leak, or what is dark but dry."""
 
@@ -199,6 +212,47 @@ class Anomaly(Review, Base):
     unrolled: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="In the unrolled plane (chainage, arc), m")
     map: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="On the map strip beside the axis, tunnel's SRID, m")
     surface: Mapped[WKBElement] = mapped_column(geometry("POLYGONZ"), comment="On the lining in space, tunnel's SRID, m")
+    feature_list_id: Mapped[int | None] = mapped_column(
+        ForeignKey(FeatureList.id), comment="Order of its features; none from before they were stored"
+    )
+    features: Mapped[Floats | None] = mapped_column(comment="What was measured of it; NaN what could not be")
+    evidence: Mapped[dict[str, Any] | None] = mapped_column(
+        comment="What each reason adds to the logarithm of the odds that it is a leak"
+    )
+    model: Mapped[str | None] = mapped_column(comment="Version of the model of evidence that judged it")
+
+
+class LearnedModel(Base):
+    """What the model of evidence learned from the reviews of a tunnel."""
+
+    __tablename__ = "learned_model"
+    __table_args__ = (
+        one_of("way", "recalibrated", "refit", "extended"),
+        Index(None, "tunnel_id"),
+        {"comment": "What was learned of each tunnel from reviews; the last that was not undone is in force"},
+    )
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
+    tunnel_id: Mapped[int] = mapped_column(parent("tunnel"), comment="Tunnel whose surveys it is for")
+    base: Mapped[str] = mapped_column(comment="Version of the model that it adjusts")
+    way: Mapped[str] = mapped_column(
+        comment="recalibrated (slope and offset of the logarithm of the odds), refit (a factor for each reason, and an offset) "
+        "or extended (terms of features, too)"
+    )
+    parameters: Mapped[dict[str, Any]] = mapped_column(
+        comment="Slope, offset, factors by reason; centre, scale and weight by feature"
+    )
+    surveys: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Surveys whose reviews it was learned from")
+    reviews: Mapped[dict[str, Any]] = mapped_column(comment="How many reviews of each kind")
+    loss_base: Mapped[float] = mapped_column(
+        comment="Mean negative logarithm of the probability of what was said, by the model that it adjusts"
+    )
+    loss: Mapped[float] = mapped_column(comment="The same, adjusted to reviews of other places")
+    note: Mapped[str | None] = mapped_column(comment="What its maker says of it")
+    applied_by: Mapped[str] = mapped_column(comment="Who applied it")
+    active_from: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Since when it is in force")
+    undone_by: Mapped[str | None] = mapped_column(comment="Who took it back")
+    undone_at: Mapped[dt.datetime | None] = mapped_column(comment="When it was taken back")
 
 
 class AnomalyPart(Base):

@@ -386,6 +386,20 @@
         </config>
       </editWidget>
     </field>
+    <field name="evidence" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="model" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
   </fieldConfiguration>
   <aliases>
     <alias index="0" field="id" name="Leak"/>
@@ -416,6 +430,8 @@
     <alias index="25" field="created_at" name="First detected"/>
     <alias index="26" field="detected_at" name="Last detected"/>
     <alias index="27" field="counted" name="Counted in sums"/>
+    <alias index="28" field="evidence" name="Evidence for (+) and against (-)"/>
+    <alias index="29" field="model" name="Judged by model"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -446,6 +462,8 @@
     <field name="created_at" editable="0"/>
     <field name="detected_at" editable="0"/>
     <field name="counted" editable="0"/>
+    <field name="evidence" editable="0"/>
+    <field name="model" editable="0"/>
   </editable>
   <editorlayout>tablayout</editorlayout>
   <attributeEditorForm>
@@ -466,6 +484,7 @@
       <attributeEditorField name="found" index="12" showLabel="1"/>
       <attributeEditorField name="confidence" index="14" showLabel="1"/>
       <attributeEditorField name="reasons" index="13" showLabel="1"/>
+      <attributeEditorField name="evidence" index="28" showLabel="1"/>
       <attributeEditorField name="contrast" index="15" showLabel="1"/>
       <attributeEditorField name="drop_mean" index="17" showLabel="1"/>
       <attributeEditorField name="drop_max" index="18" showLabel="1"/>
@@ -477,6 +496,7 @@
       <attributeEditorField name="created_at" index="25" showLabel="1"/>
       <attributeEditorField name="detected_at" index="26" showLabel="1"/>
       <attributeEditorField name="counted" index="27" showLabel="1"/>
+      <attributeEditorField name="model" index="29" showLabel="1"/>
       <attributeEditorField name="survey" index="2" showLabel="1"/>
     </attributeEditorContainer>
   </attributeEditorForm>

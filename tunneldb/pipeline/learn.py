@@ -1,0 +1,229 @@
+"""Learning from reviews: what the model of evidence would be like, and what it would change; applied and taken back."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import psycopg
+
+from tunneldb.anomalies.evidence import EvidenceModel, standard_model
+from tunneldb.anomalies.features import NAMES
+from tunneldb.anomalies.learning import Lesson, Reviewed, learn
+from tunneldb.anomalies.verdict import weigh
+from tunneldb.arrays import Bool, Float
+from tunneldb.errors import UserError
+from tunneldb.store.learned import (
+    Measured,
+    apply_learned,
+    load_measured,
+    model_in_force,
+    places_of,
+    surveys_of,
+    undo_learned,
+)
+from tunneldb.store.survey import Survey, get_survey
+
+LARGEST = 10
+"""So many changes are listed."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """An anomaly of which detection would think otherwise.
+
+    Attributes
+    ----------
+    id : int
+    survey, label : str
+        Where it is.
+    was, will_be : str
+        leak, joint or dark.
+    before, after : float
+        Probability that it is a leak.
+    """
+
+    id: int
+    survey: str
+    label: str
+    was: str
+    will_be: str
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class Changes:
+    """How many anomalies of a survey would be of another kind.
+
+    Attributes
+    ----------
+    survey : str
+    anomalies : int
+        Those that were found last and have features.
+    to_leak, from_leak : int
+    """
+
+    survey: str
+    anomalies: int
+    to_leak: int
+    from_leak: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What reviews teach, and what would change.
+
+    Attributes
+    ----------
+    tunnels : mapping
+        Names of the tunnels that it is for, by their keys.
+    surveys : sequence of str
+        Whose reviews were taken.
+    lesson : Lesson
+    reviews : mapping
+        How many reviews of each sort were used.
+    without : mapping
+        Of surveys, how many anomalies were reviewed and have no features.
+    changes : sequence of Changes
+        Of all surveys of the tunnels, against what is in force.
+    largest : sequence of Change
+        The largest changes of probability, LARGEST at the most, those to another kind first.
+    """
+
+    tunnels: Mapping[int, str]
+    surveys: Sequence[str]
+    lesson: Lesson
+    reviews: Mapping[str, int]
+    without: Mapping[str, int]
+    changes: Sequence[Changes]
+    largest: Sequence[Change]
+
+    @property
+    def loss(self) -> float:
+        """Mean loss on reviews held out of the way that was chosen."""
+        way = self.lesson.adjustment.way
+        return next(one.loss for one in self.lesson.held_out if one.way == way)
+
+
+def get_surveys(conn: psycopg.Connection[Any], names: Sequence[str]) -> list[Survey]:
+    """Surveys of these names, each once."""
+    return [get_survey(conn, name) for name in dict.fromkeys(names)]
+
+
+def plan_learning(conn: psycopg.Connection[Any], surveys: Sequence[Survey]) -> Plan:
+    """Learn from the reviews of surveys, and tell what it would change in their tunnels; nothing is written.
+
+    Raises
+    ------
+    UserError
+        If nothing was reviewed, or of nothing that was reviewed the features are stored.
+    """
+    tunnels = {survey.tunnel_id: survey.tunnel for survey in surveys}
+    names = [survey.name for survey in surveys]
+    measured = load_measured(conn, tunnels)
+    reviewed = (measured.said != "") & np.isin(measured.survey, [survey.id for survey in surveys])
+    without = {survey.name: int((reviewed & ~measured.known & (measured.survey == survey.id)).sum()) for survey in surveys}
+    if not reviewed.any():
+        raise UserError(
+            f"no anomaly of {' or '.join(names)} was reviewed yet: confirm, reject or rename some, in QGIS or through the view"
+            " tunnel_api.leak"
+        )
+    used = reviewed & measured.known
+    if not used.any():
+        raise UserError("; ".join(no_features(without)))
+    lesson = learn(standard_model(), _reviewed(measured, used))
+    sorts = Counter(measured.said[used].tolist())
+    changes, largest = _changes(conn, measured, lesson, tunnels)
+    return Plan(tunnels, names, lesson, dict(sorted(sorts.items())), without, changes, largest)
+
+
+def no_features(without: Mapping[str, int]) -> list[str]:
+    """Say of which surveys reviewed anomalies have no features, a line for each."""
+    return [
+        f"{survey}: {count} reviewed {'anomaly has' if count == 1 else 'anomalies have'} no features: run detect again:"
+        f" tunneldb run {survey} --from detect"
+        for survey, count in without.items()
+        if count
+    ]
+
+
+def apply_plan(conn: psycopg.Connection[Any], plan: Plan, note: str | None) -> dict[str, int]:
+    """Put what was learned in force for each tunnel of a plan; return its numbers by tunnel, none if nothing was learned."""
+    adjustment = plan.lesson.adjustment
+    if adjustment.way == "base":
+        return {}
+    losses = plan.lesson.held_out[0].loss, plan.loss
+    return {
+        tunnel: apply_learned(conn, key, adjustment, plan.surveys, plan.reviews, losses, note)
+        for key, tunnel in plan.tunnels.items()
+    }
+
+
+def undo_learning(conn: psycopg.Connection[Any], surveys: Sequence[Survey]) -> dict[str, int]:
+    """Take back what was last learned for the tunnels of surveys; return its numbers by tunnel.
+
+    Raises
+    ------
+    UserError
+        If for one of them nothing is in force.
+    """
+    undone = {}
+    for key, tunnel in {survey.tunnel_id: survey.tunnel for survey in surveys}.items():
+        number = undo_learned(conn, key)
+        if number is None:
+            raise UserError(f"nothing that was learned is in force for tunnel {tunnel}: there is nothing to undo")
+        undone[tunnel] = number
+    return undone
+
+
+def _reviewed(measured: Measured, rows: Bool) -> Reviewed:
+    return Reviewed(
+        measured.features[rows], measured.outline[rows], measured.leak[rows], measured.tunnel[rows], measured.chainage[rows]
+    )
+
+
+def _changes(
+    conn: psycopg.Connection[Any], measured: Measured, lesson: Lesson, tunnels: Mapping[int, str]
+) -> tuple[list[Changes], list[Change]]:
+    """What would be judged otherwise than by what is in force."""
+    new = lesson.adjustment.apply(standard_model(), "learned")
+    before = np.full(len(measured.id), np.nan)
+    for tunnel in tunnels:
+        here = measured.tunnel == tunnel
+        before[here] = _probabilities(model_in_force(conn, tunnel).model, measured, here)
+    after = _probabilities(new, measured, np.ones(len(measured.id), np.bool_))
+    judged = measured.known & measured.detected & ~measured.crossed
+    to_leak, from_leak = judged & (before < 0.5) & (after >= 0.5), judged & (before >= 0.5) & (after < 0.5)
+    counts = [
+        Changes(name, *(int((rows & (measured.survey == key)).sum()) for rows in (judged, to_leak, from_leak)))
+        for key, name in surveys_of(conn, tunnels).items()
+    ]
+    moved = np.where(judged, np.abs(after - before), 0.0) + (to_leak | from_leak)
+    first = [k for k in np.argsort(-moved, kind="stable")[:LARGEST].tolist() if moved[k] > 0.005]
+    places = places_of(conn, measured.id[first].tolist())
+    line = measured.features[:, NAMES.index("line")] >= 0.5
+
+    def kind(k: int, p: Float) -> str:
+        return "leak" if p[k] >= 0.5 else "joint" if line[k] else "dark"
+
+    return counts, [
+        Change(
+            int(measured.id[k]),
+            *places[int(measured.id[k])],
+            kind(k, before),
+            kind(k, after),
+            float(before[k]),
+            float(after[k]),
+        )
+        for k in first
+    ]
+
+
+def _probabilities(model: EvidenceModel, measured: Measured, rows: Bool) -> Float:
+    """Probabilities of leaks; NaN where features are not known."""
+    odds = model.constant + weigh(model, measured.features[rows], measured.outline[rows]).sum(axis=1)
+    return np.asarray(np.where(measured.known[rows], 1.0 / (1.0 + np.exp(-odds)), np.nan))
