@@ -98,7 +98,7 @@ def _few(xy: Float, start: Float, free: int, sigma: float | None) -> Adjustment:
     square = float(distance[used] @ distance[used])
     own = np.sqrt(square / freedom) if freedom > 0 else np.nan
     scale = _scale(own, freedom, sigma)
-    inverse: Float = np.linalg.pinv(slopes.T @ slopes)
+    inverse = np.linalg.pinv(slopes.T @ slopes).astype(np.float64)
     ellipse = Ellipse(parameters, _padded(inverse * scale**2))
     return Adjustment(ellipse, free, distance, used, float(own), scale, freedom, _inflation(inverse, int(used.sum())))
 
@@ -134,15 +134,13 @@ def _scale(own: float, freedom: int, sigma: float | None) -> float:
 
 
 def _many(xy: Float, start: Float, free: int) -> Adjustment:
-    parameters, held = start, CIRCLE
-    scale = np.inf
-    for _ in range(_SETTLING):
+    parameters, scale = start, np.inf
+    for step in range(_SETTLING):
         before = scale
         scale = max(MAD_TO_SIGMA * float(np.median(np.abs(distances(parameters, xy)[0]))), _LEAST_SCALE)
-        if held == free and abs(scale - before) < 1e-3 * scale:
+        if step > 1 and abs(scale - before) < 1e-3 * scale:
             break
-        parameters = solve(xy, parameters, held, CUT * scale)
-        held = free
+        parameters = solve(xy, parameters, free if step else CIRCLE, CUT * scale)
     distance, slopes = distances(parameters, xy)
     slopes = slopes[:, :free]
     u = distance / (CUT * scale)
@@ -154,7 +152,7 @@ def _many(xy: Float, start: Float, free: int) -> Adjustment:
     inner = slopes[used].T @ slopes[used]
     covariance = outer @ inner @ outer * float(influence @ influence) / max(freedom, 1)
     sigma = float(np.sqrt(influence @ distance / max(weights(u).sum() - free, 1.0)))
-    inverse: Float = np.linalg.pinv(inner)
+    inverse = np.linalg.pinv(inner).astype(np.float64)
     inflation = _inflation(inverse, int(used.sum()))
     return Adjustment(
         Ellipse(parameters, _padded(covariance)), free, distance, used, max(sigma, scale), scale, freedom, inflation

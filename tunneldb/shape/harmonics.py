@@ -96,13 +96,13 @@ def fit_harmonics(clock: Float, radius: Float, orders: int, scale: float) -> Har
     orders = min(orders, (len(clock) - 1) // 2)
     design = _design(np.radians(clock), orders)
     coefficients = np.linalg.lstsq(design, radius, rcond=None)[0]
-    inverse: Float = np.linalg.pinv(design.T @ design)
+    inverse = np.linalg.pinv(design.T @ design).astype(np.float64)
     left, freedom = radius - design @ coefficients, len(clock) - design.shape[1]
     if freedom > _OWN:
         scale = float(np.sqrt(left @ left / freedom))
     inflation = np.sqrt(np.diag(inverse)[1:].reshape(-1, 2).max(axis=1) * len(clock) / 2.0)
     determined = tuple(bool(value <= HOPELESS) for value in inflation)
-    return Harmonics(coefficients, inverse * scale**2, determined, np.sort(clock))
+    return Harmonics(coefficients, (inverse * scale**2).astype(np.float64), determined, np.sort(clock))
 
 
 def _design(clock: Float, orders: int) -> Float:
