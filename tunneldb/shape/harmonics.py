@@ -95,7 +95,7 @@ def fit_harmonics(clock: Float, radius: Float, orders: int, scale: float) -> Har
     """
     orders = min(orders, (len(clock) - 1) // 2)
     design = _design(np.radians(clock), orders)
-    coefficients = np.linalg.lstsq(design, radius, rcond=None)[0]
+    coefficients = np.linalg.lstsq(design, radius, rcond=None)[0].astype(np.float64)
     inverse = np.linalg.pinv(design.T @ design).astype(np.float64)
     left, freedom = radius - design @ coefficients, len(clock) - design.shape[1]
     if freedom > _OWN:
