@@ -1,7 +1,7 @@
 """Rings against results published by others, and against the rings that points were simulated from.
 
-    python -m benchmarks.rings               # about a minute on two cores
-    python -m benchmarks.rings --rings 100   # of each kind of simulated ring
+python -m benchmarks.rings               # about a minute on two cores
+python -m benchmarks.rings --rings 100   # of each kind of simulated ring
 """
 
 from __future__ import annotations
@@ -111,7 +111,9 @@ def main() -> None:
     table, each = against_published()
     header = ("mm", "median", "95 % below", "greatest", "target", "within %")
     print_table("217 surveyed rings against the published results", header, table)
-    print_table("rings that differ by more: ours less theirs, mm", ("ring", "chainage", "right", "up", "radius", "remark"), each)
+    print_table(
+        "rings that differ by more: ours less theirs, mm", ("ring", "chainage", "right", "up", "radius", "remark"), each
+    )
     truth = against_truth(options.rings, options.points)
     titles = ("95 % of errors below", "radius mm", "ovality %", "centre mm", "ms a ring")
     print_table(f"simulated rings of {options.points} points, {1e3 * NOISE:g} mm noise", titles, truth)

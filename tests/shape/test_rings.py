@@ -17,7 +17,11 @@ EIGHT = np.arange(8) * 45.0
 
 
 def ring(
-    clock: Float = EIGHT, radius: float = 2.9, flattening: float = 0.0, largest: float = 0.0, centre: tuple[float, float] = (0, 0)
+    clock: Float = EIGHT,
+    radius: float = 2.9,
+    flattening: float = 0.0,
+    largest: float = 0.0,
+    centre: tuple[float, float] = (0, 0),
 ) -> Float:
     """Points (n, 2) of an ellipse at clock positions, the largest diameter at the clock position ``largest``, °."""
     at, turned = np.radians(clock), np.radians(clock - largest)
@@ -88,9 +92,7 @@ def test_a_chord_is_the_distance_of_its_ends() -> None:
     shift=st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3)),
     seed=st.integers(0, 1000),
 )
-def test_rings_turn_shift_and_grow_with_their_points(
-    angle: float, scale: float, shift: tuple[float, float], seed: int
-) -> None:
+def test_rings_turn_shift_and_grow_with_their_points(angle: float, scale: float, shift: tuple[float, float], seed: int) -> None:
     random = np.random.default_rng(seed)
     points = ring(flattening=0.02, largest=20.0) + random.normal(0.0, 0.002, (8, 2))
     a = np.radians(angle)
