@@ -22,6 +22,10 @@ Of dense points a circle needs 90°, an ellipse 210° of a ring. An ellipse need
 neither circle nor ellipse is magnified alike.
 """
 
+BESIDE = (3,)
+"""Orders of harmonics that are fitted with an ellipse to many points. Left out, they shift it where a part is unseen; with a
+fourth one a ring without its floor determines no ellipse."""
+
 _SETTLING = 8
 _LEAST_SCALE = 1e-6  # m
 
@@ -37,7 +41,7 @@ class Adjustment:
     free : int
         CIRCLE or ELLIPSE.
     distance : (n,) float array
-        Of all points from it, outwards positive, m.
+        Of all points from it, outwards positive, m; of many points less the harmonics that were fitted with it.
     used : (n,) bool array
         Which have weight.
     sigma : float
@@ -134,29 +138,45 @@ def _scale(own: float, freedom: int, sigma: float | None) -> float:
 
 
 def _many(xy: Float, start: Float, free: int) -> Adjustment:
-    parameters, scale = start, np.inf
+    """Adjust to many points; an ellipse together with what rings are beside it, if the points tell both."""
+    if free == ELLIPSE:
+        together = _weighted(xy, start, free, _beside(xy, start))
+        if together.inflation <= HOPELESS[ELLIPSE]:
+            return together
+    return _weighted(xy, start, free, np.empty((len(xy), 0)))
+
+
+def _beside(xy: Float, start: Float) -> Float:
+    """Harmonics of the orders `BESIDE` by the points' directions from the centre of the beginning, columns (n, 2 each)."""
+    angle = np.arctan2(*(xy - start[:2]).T)
+    return np.column_stack([wave(order * angle) for order in BESIDE for wave in (np.cos, np.sin)])
+
+
+def _weighted(xy: Float, start: Float, free: int, beside: Float) -> Adjustment:
+    parameters, scale, distance = start, np.inf, distances(start, xy)[0]
     for step in range(_SETTLING):
         before = scale
-        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(distances(parameters, xy)[0]))), _LEAST_SCALE)
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(distance))), _LEAST_SCALE)
         if step > 1 and abs(scale - before) < 1e-3 * scale:
             break
-        parameters = solve(xy, parameters, free if step else CIRCLE, CUT * scale)
-    distance, slopes = distances(parameters, xy)
-    slopes = slopes[:, :free]
+        found = solve(xy, parameters, free if step else CIRCLE, CUT * scale, beside)
+        parameters = found[:ELLIPSE]
+        distance = distances(parameters, xy)[0] - beside @ found[ELLIPSE:]
+    slopes = np.hstack([distances(parameters, xy)[1][:, :free], -beside])
+    count = slopes.shape[1]
     u = distance / (CUT * scale)
     used = np.abs(u) < 1.0
-    freedom = int(used.sum()) - free
+    freedom = int(used.sum()) - count
     # Variance of robust estimates (Huber, 1981, section 7.6): the influence of each residual, and how fast it changes.
     influence = weights(u) * distance
     outer = np.linalg.pinv(slopes.T @ (slopes * rate(u)[:, None]))
     inner = slopes[used].T @ slopes[used]
-    covariance = outer @ inner @ outer * float(influence @ influence) / max(freedom, 1)
-    sigma = float(np.sqrt(influence @ distance / max(weights(u).sum() - free, 1.0)))
-    inverse = np.linalg.pinv(inner).astype(np.float64)
+    covariance = (outer @ inner @ outer)[:free, :free] * float(influence @ influence) / max(freedom, 1)
+    sigma = float(np.sqrt(influence @ distance / max(weights(u).sum() - count, 1.0)))
+    inverse = np.linalg.pinv(inner)[:free, :free].astype(np.float64)
     inflation = _inflation(inverse, int(used.sum()))
-    return Adjustment(
-        Ellipse(parameters, _padded(covariance)), free, distance, used, max(sigma, scale), scale, freedom, inflation
-    )
+    ellipse = Ellipse(parameters, _padded(covariance))
+    return Adjustment(ellipse, free, distance, used, max(sigma, scale), scale, freedom, inflation)
 
 
 def _padded(covariance: Float) -> Float:

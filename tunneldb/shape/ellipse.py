@@ -141,7 +141,7 @@ def distances(parameters: Float, xy: Float) -> tuple[Float, Float]:
     return out, -np.column_stack([nx, ny, nx * c + ny * d, nx * c - ny * d, nx * d + ny * c])
 
 
-def solve(xy: Float, start: Float, free: int, limit: float | None = None) -> Float:
+def solve(xy: Float, start: Float, free: int, limit: float | None = None, beside: Float | None = None) -> Float:
     """Ellipse of the least squares of distances, or of the least of Tukey's losses.
 
     Parameters
@@ -154,21 +154,26 @@ def solve(xy: Float, start: Float, free: int, limit: float | None = None) -> Flo
         CIRCLE or ELLIPSE.
     limit : float, optional
         Distance from which a point has no weight (Tukey's biweight), m; without one all count alike.
+    beside : (n, m) float array, optional
+        What the distances may hold beside the ellipse, columns that are fitted with it.
 
     Returns
     -------
-    (5,) float array
+    (5 + m,) float array
+        Parameters, and by how much of each column the points lie outside.
     """
+    more = np.empty((len(xy), 0)) if beside is None else beside
 
     def whole(x: Float) -> Float:
-        return np.concatenate([x, start[free:]])
+        return np.concatenate([x[:free], start[free:]])
 
     def residuals(x: Float) -> Float:
-        return distances(whole(x), xy)[0]
+        return distances(whole(x), xy)[0] - more @ x[free:]
 
     def slopes(x: Float) -> Float:
-        return distances(whole(x), xy)[1][:, :free]
+        return np.hstack([distances(whole(x), xy)[1][:, :free], -more])
 
     robust = {} if limit is None else {"loss": loss, "f_scale": limit}
-    found = least_squares(residuals, start[:free], slopes, method="trf", xtol=1e-12, ftol=1e-14, gtol=1e-14, **robust)
-    return whole(found.x)
+    begun = np.concatenate([start[:free], np.zeros(more.shape[1])])
+    found = least_squares(residuals, begun, slopes, method="trf", xtol=1e-10, ftol=1e-12, gtol=1e-12, **robust)
+    return np.concatenate([whole(found.x), found.x[free:]])
