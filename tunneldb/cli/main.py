@@ -44,6 +44,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "spots": ("tunneldb.cli.spots:spots", "List or export what on members differs from their own surface."),
     "spheres": ("tunneldb.cli.spheres:spheres", "Find target spheres, and compare them with control points."),
     "axis": ("tunneldb.cli.axis:axis", "Show how far the measured axis lies from the one given, by element of its design."),
+    "rings": (
+        "tunneldb.cli.rings:rings",
+        "Measure rings from surveyed points: deviation from the design axis, radius, ovality, chords.",
+    ),
     "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),
     "export": (
         "tunneldb.cli.export:export",

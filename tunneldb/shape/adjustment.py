@@ -1,0 +1,192 @@
+"""Adjusting an ellipse to points of which some are wrong: few points by testing each, many by Tukey's weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, norm
+from scipy.stats import t as student
+
+from tunneldb.arrays import Bool, Float
+from tunneldb.robust import MAD_TO_SIGMA
+from tunneldb.shape.circle import nearest_to_half, taubin
+from tunneldb.shape.ellipse import CIRCLE, ELLIPSE, Ellipse, distances, solve
+from tunneldb.shape.limits import BAD_SHARE, FEW, LEVEL_KNOWN, LEVEL_OWN, WORSE
+from tunneldb.shape.tukey import CUT, rate, weights
+
+HOPELESS = {CIRCLE: 10.0, ELLIPSE: 5.0}
+"""Nothing is stated of a circle or an ellipse whose worst standard error is so many times that of as many points all around.
+
+Of dense points a circle needs 90°, an ellipse 210° of a ring. An ellipse needs more than its noise demands: what of a ring is
+neither circle nor ellipse is magnified alike.
+"""
+
+BESIDE = (3,)
+"""Orders of harmonics that are fitted with an ellipse to many points. Left out, they shift it where a part is unseen; with a
+fourth one a ring without its floor determines no ellipse."""
+
+_SETTLING = 8
+_LEAST_SCALE = 1e-6  # m
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """An ellipse, or a circle, with what it rests on.
+
+    Attributes
+    ----------
+    ellipse : Ellipse
+        With the covariance.
+    free : int
+        CIRCLE or ELLIPSE.
+    distance : (n,) float array
+        Of all points from it, outwards positive, m; of many points less the harmonics that were fitted with it.
+    used : (n,) bool array
+        Which have weight.
+    sigma : float
+        Standard deviation of a point's distance, from the points that are used, m; NaN where none is left over.
+    scale : float
+        What the standard errors rest on: sigma, or what was known of points before, m.
+    freedom : int
+        Points used less parameters.
+    inflation : float
+        How many times greater the worst standard error is than that of as many points evenly around the ring.
+    """
+
+    ellipse: Ellipse
+    free: int
+    distance: Float
+    used: Bool
+    sigma: float
+    scale: float
+    freedom: int
+    inflation: float
+
+
+def begin(xy: Float) -> Float | None:
+    """Circle to begin with, as parameters (5,), m; None where points lie on a line."""
+    found = taubin(xy) if len(xy) <= FEW else nearest_to_half(xy)
+    return None if found is None else np.concatenate([found, [0.0, 0.0]])
+
+
+def adjust(xy: Float, start: Float, free: int, sigma: float | None = None) -> Adjustment:
+    """Adjust a circle or an ellipse.
+
+    Parameters
+    ----------
+    xy : (n, 2) float array
+        Points, m, n at least ``free``.
+    start : (5,) float array
+        Circle to begin with, as `begin` finds it.
+    free : int
+        CIRCLE or ELLIPSE.
+    sigma : float, optional
+        Standard deviation of a point's distance as it is known from elsewhere, m. Of few points it decides which is wrong.
+    """
+    return _few(xy, start, free, sigma) if len(xy) <= FEW else _many(xy, start, free)
+
+
+def _few(xy: Float, start: Float, free: int, sigma: float | None) -> Adjustment:
+    used = np.ones(len(xy), bool)
+    may_go = int(np.ceil(len(xy) * BAD_SHARE))
+    while True:
+        parameters = solve(xy[used], start, free)
+        wrong = _worst(xy[used], parameters, free, sigma) if (~used).sum() < may_go else None
+        if wrong is None:
+            break
+        used[np.flatnonzero(used)[wrong]] = False
+    distance, slopes = distances(parameters, xy)
+    slopes = slopes[used, :free]
+    freedom = int(used.sum()) - free
+    square = float(distance[used] @ distance[used])
+    own = np.sqrt(square / freedom) if freedom > 0 else np.nan
+    scale = _scale(own, freedom, sigma)
+    inverse = np.linalg.pinv(slopes.T @ slopes).astype(np.float64)
+    ellipse = Ellipse(parameters, _padded(inverse * scale**2))
+    return Adjustment(ellipse, free, distance, used, float(own), scale, freedom, _inflation(inverse, int(used.sum())))
+
+
+def _worst(xy: Float, parameters: Float, free: int, sigma: float | None) -> int | None:
+    """Point that cannot belong to the others, if there is one (Baarda, 1968; by its own residuals after Pope, 1976).
+
+    Each is held against the ellipse through all others: its residual in units of that residual's standard deviation, which
+    is the smaller the more the point itself has drawn the ellipse to it.
+    """
+    distance, slopes = distances(parameters, xy)
+    slopes = slopes[:, :free]
+    freedom = len(xy) - free - (sigma is None)
+    if freedom < 2:  # the residuals are all one and the same: which point is wrong cannot be told
+        return None
+    share = 1.0 - np.einsum("ij,jk,ik->i", slopes, np.linalg.pinv(slopes.T @ slopes), slopes)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lifted = np.where(share > 1e-6, distance**2 / share, 0.0)  # what the sum of squares loses with the point
+    worst = int(np.argmax(lifted))
+    if sigma is not None:
+        return worst if lifted[worst] > (sigma * norm.isf(LEVEL_KNOWN / (2 * len(xy)))) ** 2 else None
+    left = max(float(distance @ distance - lifted[worst]), _LEAST_SCALE**2) / freedom
+    return worst if lifted[worst] > left * student.isf(LEVEL_OWN / (2 * len(xy)), freedom) ** 2 else None
+
+
+def _scale(own: float, freedom: int, sigma: float | None) -> float:
+    """Standard deviation of a point for the standard errors: the known one, unless the ring is clearly worse, m."""
+    if sigma is None:
+        return float(own)
+    if freedom > 0 and own**2 * freedom > sigma**2 * chi2.isf(WORSE, freedom):
+        return float(own)
+    return sigma
+
+
+def _many(xy: Float, start: Float, free: int) -> Adjustment:
+    """Adjust to many points; an ellipse together with what rings are beside it, if the points tell both."""
+    if free == ELLIPSE:
+        together = _weighted(xy, start, free, _beside(xy, start))
+        if together.inflation <= HOPELESS[ELLIPSE]:
+            return together
+    return _weighted(xy, start, free, np.empty((len(xy), 0)))
+
+
+def _beside(xy: Float, start: Float) -> Float:
+    """Harmonics of the orders `BESIDE` by the points' directions from the centre of the beginning, columns (n, 2 each)."""
+    angle = np.arctan2(*(xy - start[:2]).T)
+    return np.column_stack([wave(order * angle) for order in BESIDE for wave in (np.cos, np.sin)])
+
+
+def _weighted(xy: Float, start: Float, free: int, beside: Float) -> Adjustment:
+    parameters, scale, distance = start, np.inf, distances(start, xy)[0]
+    for step in range(_SETTLING):
+        before = scale
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(distance))), _LEAST_SCALE)
+        if step > 1 and abs(scale - before) < 1e-3 * scale:
+            break
+        found = solve(xy, parameters, free if step else CIRCLE, CUT * scale, beside)
+        parameters = found[:ELLIPSE]
+        distance = distances(parameters, xy)[0] - beside @ found[ELLIPSE:]
+    slopes = np.hstack([distances(parameters, xy)[1][:, :free], -beside])
+    count = slopes.shape[1]
+    u = distance / (CUT * scale)
+    used = np.abs(u) < 1.0
+    freedom = int(used.sum()) - count
+    # Variance of robust estimates (Huber, 1981, section 7.6): the influence of each residual, and how fast it changes.
+    influence = weights(u) * distance
+    outer = np.linalg.pinv(slopes.T @ (slopes * rate(u)[:, None]))
+    inner = slopes[used].T @ slopes[used]
+    covariance = (outer @ inner @ outer)[:free, :free] * float(influence @ influence) / max(freedom, 1)
+    sigma = float(np.sqrt(influence @ distance / max(weights(u).sum() - count, 1.0)))
+    inverse = np.linalg.pinv(inner)[:free, :free].astype(np.float64)
+    inflation = _inflation(inverse, int(used.sum()))
+    ellipse = Ellipse(parameters, _padded(covariance))
+    return Adjustment(ellipse, free, distance, used, max(sigma, scale), scale, freedom, inflation)
+
+
+def _padded(covariance: Float) -> Float:
+    whole = np.zeros((ELLIPSE, ELLIPSE))
+    whole[: len(covariance), : len(covariance)] = covariance
+    return whole
+
+
+def _inflation(inverse: Float, count: int) -> float:
+    """Worst standard error by that of as many points evenly around a circle: 1/√n of the radius, √(2/n) of all else."""
+    even = np.full(len(inverse), 2.0 / count)
+    even[2] = 1.0 / count
+    return float(np.sqrt((np.diag(inverse) / even).max()))

@@ -1,0 +1,229 @@
+"""The shape of one ring from its points: its plane, then circle, ellipse and harmonics in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from tunneldb.arrays import Bool, Float
+from tunneldb.shape.adjustment import HOPELESS, Adjustment, adjust, begin
+from tunneldb.shape.departures import Departure, clock_of, departures
+from tunneldb.shape.ellipse import CIRCLE, ELLIPSE
+from tunneldb.shape.harmonics import Harmonics, fit_harmonics
+from tunneldb.shape.limits import FEW
+from tunneldb.shape.plane import RingPlane, fit_plane
+
+LEAST_POINTS = 5
+"""A circle and two points to check it."""
+
+FLAT = RingPlane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), 0.0)
+"""Plane of points that are given in it: right is x, up is z."""
+
+_POOLED_FREEDOM = 24
+"""Points left over in all rings together from which on they say what a point is good for."""
+
+
+class RingRefusedError(ValueError):
+    """Points of which no ring can be made; the message says why, as a remark."""
+
+
+@dataclass(frozen=True)
+class Ring:
+    """A ring as fitted.
+
+    Attributes
+    ----------
+    plane : RingPlane
+        The plane that the rest is in.
+    adjustment : Adjustment
+        Ellipse, or circle where the points determine no ellipse.
+    harmonics : Harmonics
+        Of the radius about the ellipse's centre.
+    inward, outward : Departure
+        Greatest departures from the circle of the mean radius.
+    gap : float
+        Widest angle at the centre without a point, °.
+    along : (n,) float array
+        Distance of each point from the plane, up-chainage, m.
+    """
+
+    plane: RingPlane
+    adjustment: Adjustment
+    harmonics: Harmonics
+    inward: Departure
+    outward: Departure
+    gap: float
+    along: Float
+
+    @property
+    def is_ellipse(self) -> bool:
+        """Whether its ellipse is determined."""
+        return self.adjustment.free == ELLIPSE
+
+    @property
+    def used(self) -> Bool:
+        """Which points the fit rests on, (n,)."""
+        return self.adjustment.used
+
+    @property
+    def centre(self) -> Float:
+        """Centre in space (3,), m."""
+        return self.plane.to_space(self.adjustment.ellipse.centre)
+
+    @property
+    def centre_covariance(self) -> Float:
+        """Its covariance (3, 3), m²: of the fit in the plane, and of the plane along the tunnel."""
+        across = np.vstack([self.plane.right, self.plane.up])
+        along = self.plane.spread**2 / max(int(self.used.sum()), 1)
+        within = across.T @ self.adjustment.ellipse.covariance[:2, :2] @ across
+        return np.asarray(within + along * np.outer(self.plane.normal, self.plane.normal))
+
+
+def fit_ring(
+    points: Float,
+    ahead: Float | None = None,
+    *,
+    across: bool = False,
+    offset: Float | None = None,
+    sigma: float | None = None,
+    orders: int = 3,
+) -> Ring:
+    """Fit the shape of a ring.
+
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) float array
+        Points, m: to the right and up in the ring's plane, or in space. From eight of a total station to thousands of a scan.
+    ahead : (3,) float array, optional
+        Direction of the axis up-chainage; needed in space.
+    across : bool
+        Take the plane across ``ahead`` instead of the one that the points lie in: for those of a scan, which fill the ring's
+        length.
+    offset : (n,) float array, optional
+        How far each point stands before the lining, towards the centre, m.
+    sigma : float, optional
+        What a point is good for, its standard deviation across the lining, m; of few points it tells which is wrong.
+    orders : int
+        Harmonics that are wanted.
+
+    Raises
+    ------
+    RingRefusedError
+        When there are fewer than 5 points, or they determine no circle.
+    """
+    if len(points) < LEAST_POINTS:
+        raise RingRefusedError(f"{len(points)} points, a ring needs {LEAST_POINTS}")
+    plane = _plane(points, ahead, across)
+    xy = points if points.shape[1] == 2 else plane.project(points)
+    start = begin(xy)
+    if start is None:
+        raise RingRefusedError("the points lie on a line")
+    if offset is not None:
+        out = xy - start[:2]
+        xy = xy + out / np.linalg.norm(out, axis=1)[:, None] * offset[:, None]
+        start[2] += float(np.median(offset))
+    adjustment = _adjusted(xy, start, sigma)
+    ellipse, used = adjustment.ellipse, adjustment.used
+    clock = clock_of(xy[used], ellipse.centre)
+    radius = np.linalg.norm(xy[used] - ellipse.centre, axis=1)
+    harmonics = fit_harmonics(clock, radius, orders, adjustment.scale)
+    along = np.zeros(len(points)) if points.shape[1] == 2 else plane.along(points)
+    return Ring(plane, adjustment, harmonics, *departures(xy, adjustment), _gap(clock), along)
+
+
+def _plane(points: Float, ahead: Float | None, across: bool) -> RingPlane:
+    if points.shape[1] == 2:
+        return FLAT
+    if ahead is None:
+        raise ValueError("points in space need the direction of the axis")
+    if across:
+        return RingPlane.across(np.median(points, axis=0), ahead)
+    plane = fit_plane(points, ahead)
+    if plane is None:
+        raise RingRefusedError("the points lie on a line or level, and make no plane across the tunnel")
+    return plane
+
+
+def _adjusted(xy: Float, start: Float, sigma: float | None) -> Adjustment:
+    """Ellipse where it is determined, else circle; refused where not even that is."""
+    if len(xy) > ELLIPSE:
+        ellipse = adjust(xy, start, ELLIPSE, sigma)
+        if ellipse.inflation <= HOPELESS[ELLIPSE] and ellipse.freedom > 0 and _sensible(ellipse):
+            return ellipse
+    circle = adjust(xy, start, CIRCLE, sigma)
+    if not circle.inflation <= HOPELESS[CIRCLE]:
+        seen = 360.0 - _gap(clock_of(xy[circle.used], circle.ellipse.centre))
+        raise RingRefusedError(f"the points lie on {seen:.0f}° of a circle, which does not determine it")
+    return circle
+
+
+def _sensible(adjustment: Adjustment) -> bool:
+    """Whether an ellipse is one of a ring: not flattened to less than half, as those are that run through stray points."""
+    return adjustment.ellipse.radius > 0.0 and adjustment.ellipse.flattening < adjustment.ellipse.radius / 3.0
+
+
+def _gap(clock: Float) -> float:
+    """Widest angle without a point, °."""
+    at = np.sort(clock)
+    return float(np.diff(at, append=at[0] + 360.0).max())
+
+
+def pooled_sigma(rings: Sequence[Ring]) -> float | None:
+    """What a point is good for, from all rings of few points together, m; None where they say too little.
+
+    The median of the rings' own variances, each by what of it is exceeded by chance in half of all cases: rings with an
+    error do not move it.
+    """
+    few = [ring.adjustment for ring in rings if ring.adjustment.freedom > 0 and len(ring.used) <= FEW]
+    if sum(one.freedom for one in few) < _POOLED_FREEDOM:
+        return None
+    ratios = [one.sigma**2 * one.freedom / chi2.median(one.freedom) for one in few]
+    return float(np.sqrt(np.median(ratios)))
+
+
+@dataclass(frozen=True)
+class RingPoints:
+    """Points of one ring, as `fit_ring` takes them; lengths m."""
+
+    points: Float
+    ahead: Float | None = None
+    offset: Float | None = None
+
+
+def fit_rings(
+    rings: Sequence[RingPoints], sigma: float | None = None, orders: int = 3
+) -> tuple[list[Ring | str], float | None]:
+    """Fit many rings of few points: first each by itself, then with what all of them say a point is good for.
+
+    Parameters
+    ----------
+    rings
+        Points of each.
+    sigma : float, optional
+        What a point is good for, m, where that is known; else it is found.
+    orders : int
+        Harmonics that are wanted.
+
+    Returns
+    -------
+    rings : list of Ring or str
+        Each ring, or why there is none.
+    sigma : float or None
+        What a point was taken to be good for, m.
+    """
+    if sigma is None:
+        alone = [_tried(ring, None, orders) for ring in rings]
+        sigma = pooled_sigma([ring for ring in alone if isinstance(ring, Ring)])
+        if sigma is None:
+            return alone, None
+    return [_tried(ring, sigma, orders) for ring in rings], sigma
+
+
+def _tried(ring: RingPoints, sigma: float | None, orders: int) -> Ring | str:
+    try:
+        return fit_ring(ring.points, ring.ahead, offset=ring.offset, sigma=sigma, orders=orders)
+    except RingRefusedError as refused:
+        return str(refused)
