@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,9 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from benchmarks.blind.scene import Scene
+from benchmarks.blind.waterproof import classes, read_coverage
 from benchmarks.common import tunneldb
+from tunneldb.anomalies.coverage import Coverage
 from tunneldb.evaluate.survey import read_findings
 from tunneldb.store.survey import Survey, get_survey
 
@@ -47,6 +50,13 @@ class Outcome:
         Lining that was seen, m².
     seconds : float
         What ``run`` took.
+    other : list
+        What is dark but dry, or bright.
+    other_kinds : list of str
+        What each is.
+    true_classes, told_classes, found_classes : sequences of int or None
+        Classes of waterproofing, of the scene and then of each stretch of it, by all true leaks, by those that can be told, and
+        by what was taken for leaks; see :func:`benchmarks.blind.waterproof.classes`. Empty where the scene was refused.
     """
 
     scene: str
@@ -64,11 +74,21 @@ class Outcome:
     seconds: float
     other: list[BaseGeometry] = field(default_factory=list)
     other_kinds: list[str] = field(default_factory=list)
+    true_classes: Sequence[int | None] = ()
+    told_classes: Sequence[int | None] = ()
+    found_classes: Sequence[int | None] = ()
 
     @property
     def leaks(self) -> list[int]:
         """Numbers of what was taken for leaks."""
         return [k for k, kind in enumerate(self.kinds) if kind == "leak"]
+
+    def classed(self, conn: psycopg.Connection[Any], coverage: Mapping[int, Coverage]) -> Outcome:
+        """Work out the classes of waterproofing on the lining seen."""
+        told = [shape for shape, limit in zip(self.true, self.limits, strict=True) if not limit]
+        found = [self.found[k] for k in self.leaks]
+        true_classes, told_classes, found_classes = (classes(conn, coverage, leaks) for leaks in (self.true, told, found))
+        return replace(self, true_classes=true_classes, told_classes=told_classes, found_classes=found_classes)
 
     def to_json(self) -> dict[str, Any]:
         out = asdict(self)
@@ -115,16 +135,17 @@ def outcome(conn: psycopg.Connection[Any], scene: Scene, folder: Path, seconds: 
         (survey.id,),
     ).fetchall()
     kinds = [str(row[1]) for row in rows]
-    return Outcome(
+    seen = read_findings(conn, survey).seen if np.isfinite(seconds) else 0.0
+    made = Outcome(
         scene.name, scene.lining, scene.phenomenon, true,
         [float(p.get("drop_db", "nan")) for p in properties],
         [str(p.get("phenomenon", "")) for p in properties],
         [str(p.get("limit") or "") for p in properties],
         [shapely.from_wkb(bytes(row[0])) for row in rows], kinds,
         [float(row[2]) if kind == "leak" else 1.0 - float(row[2]) for row, kind in zip(rows, kinds, strict=True)],
-        [list(row[3]) for row in rows], read_findings(conn, survey).seen if np.isfinite(seconds) else 0.0, seconds,
-        other, [str(p.get("kind", "")) for p in marks],
+        [list(row[3]) for row in rows], seen, seconds, other, [str(p.get("kind", "")) for p in marks],
     )  # fmt: skip
+    return made.classed(conn, read_coverage(conn, survey.id))
 
 
 def _layer(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> tuple[list[BaseGeometry], list[dict[str, Any]]]:

@@ -3,6 +3,7 @@
     python -m benchmarks.evidence --pictures DIR                         # an hour; pictures in DIR are not made again
     python -m benchmarks.evidence --pictures DIR --families known set-1  # to these tunnels alone
     python -m benchmarks.evidence --pictures DIR --write                 # writes tunneldb/anomalies/evidence.json
+    python -m benchmarks.evidence --pictures DIR --judge                 # detection by models that know no tunnel of the family
 
 Families are the rounds of blind scenes that were measured, the known phenomena, the leak set by seeds, and painted pictures.
 Each family is judged by a model fitted to all others; of the numbers of rounds of boosting the fewest is taken that does there
@@ -18,8 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.common import print_table
-from benchmarks.evidence.candidates import LEAK, candidates, together
+from benchmarks.evidence.candidates import candidates, together
 from benchmarks.evidence.fit import Array, cooled, fit_model, left_out, loss, temperature, weights_of
+from benchmarks.evidence.judge import Regions, judge
 from benchmarks.evidence.painted import paintings
 from benchmarks.evidence.pictures import pictures
 from tunneldb.anomalies import evidence
@@ -42,6 +44,7 @@ def main() -> None:
     parser.add_argument(
         "--write", action="store_true", help="put the model in the place of the one that comes with the program"
     )
+    parser.add_argument("--judge", action="store_true", help="detect in each family by a model fitted to the others")
     parser.add_argument("--dsn", help="server to use; default: the embedded one")
     arguments = parser.parse_args()
     parts = [
@@ -50,9 +53,8 @@ def main() -> None:
         for picture, truth in pictures(family, arguments.pictures, arguments.dsn)
     ]
     parts += paintings(PAINTINGS)
-    features, kinds, families = together(parts)
-    leak = kinds == LEAK
-    scenes = np.concatenate([np.full(len(part.kind), f"{part.family} {part.scene}", dtype=object) for part in parts])
+    features, leak, families = together(parts)
+    scenes = np.concatenate([np.full(len(part.leak), f"{part.family} {part.scene}", dtype=object) for part in parts])
     weights = weights_of(scenes) * np.where(families == "painted", PAINTED, 1.0)
     groups = families if len(set(families)) > 2 else scenes
     scanned = families != "painted"
@@ -63,6 +65,9 @@ def main() -> None:
     print_table(
         f"{scanned.sum()} regions of scans, judged by models of other families", ("rounds", "loss", "recall", "precision"), rows
     )
+    if arguments.judge:
+        regions = Regions(features, leak, weights, families, held[best])
+        judge(regions, best, arguments.families, arguments.pictures, arguments.dsn)
     count = {family: int((families == family).sum()) for family in sorted(set(families))}
     model = fit_model(features, leak, weights, best, VERSION, {"regions": count, "rounds": best})
     model = cooled(model, max(temperature(held[best][scanned], leak[scanned], weights[scanned]), 1.0))

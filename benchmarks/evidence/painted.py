@@ -16,7 +16,7 @@ from scipy import ndimage
 from shapely import affinity
 from shapely.geometry import Polygon, box
 
-from benchmarks.evidence.candidates import DARK, JOINT, LEAK, LEAST, MOSTLY, Candidates
+from benchmarks.evidence.candidates import LEAST, MOSTLY, Candidates
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.detect import find_dark, find_dark_regions, may_count
 from tunneldb.anomalies.features import measure_regions
@@ -45,7 +45,7 @@ class Painting:
         self.y = (HALF - (np.arange(self.grid.rows) + 0.5) * PIXEL)[:, None]
         self.drop = np.zeros((self.grid.rows, len(self.x)))
         self.state = np.full(self.drop.shape, PixelState.LINING, np.uint8)
-        self.kind = np.full(self.drop.shape, DARK, np.uint8)
+        self.wet = np.zeros(self.drop.shape, np.bool_)
 
     def uniform(self, low: float, high: float) -> float:
         return float(self.rng.uniform(low, high))
@@ -58,13 +58,13 @@ class Painting:
         held = shapely.contains_xy(shape, *np.broadcast_arrays(self.x, self.y)).astype(float)
         return ndimage.gaussian_filter(held, max(soft, 0.004) / PIXEL)
 
-    def paint(self, amount: Array, drop: float, kind: int) -> None:
-        """Darken by a drop, dB, where an amount (0 to 1) is; what is at least half of it is of a kind."""
+    def paint(self, amount: Array, drop: float, wet: bool = False) -> None:
+        """Darken by a drop, dB, where an amount (0 to 1) is; where it is 0.4 and more it is wet, or dry, whatever was there."""
         self.drop = np.maximum(self.drop, drop * amount)
-        self.kind[amount >= 0.4] = kind
+        self.wet[amount >= 0.4] = wet
 
-    def regions(self) -> Iterator[tuple[Array, int, float]]:
-        """Features, kind and area of the dark regions."""
+    def regions(self) -> Iterator[tuple[Array, bool]]:
+        """Features of the dark regions, and whether each is a leak."""
         noisy = self.drop + self.rng.normal(0, self.sigma, self.drop.shape)
         empty = (self.rng.random(self.drop.shape) > self.filled) & (self.state != PixelState.OFF)
         drop = np.where(empty, NODATA, np.rint(100 * noisy)).astype(np.int16)
@@ -76,10 +76,8 @@ class Painting:
         for region, features in zip(regions, measure_regions(regions), strict=True):
             rows, columns = region.mask.shape
             top = self.grid.bottom + self.grid.rows - region.row - rows
-            part = self.kind[top : top + rows, region.column : region.column + columns]
-            counts = np.bincount(part[region.mask[::-1]], minlength=3)
-            if counts.max() >= MOSTLY * counts.sum():
-                yield features, int(counts.argmax()), region.area
+            part = self.wet[top : top + rows, region.column : region.column + columns]
+            yield features, bool(part[region.mask[::-1]].mean() >= MOSTLY)
 
 
 def blob(art: Painting, s: float, a: float, area: float, elongation: float = 1.0) -> Polygon:
@@ -110,7 +108,7 @@ def patch(art: Painting, s: float, a: float) -> None:
                     [(x - width, a), (x + width, a), (x + width / 2, a + down * length), (x - width / 2, a + down * length)]
                 )
             )
-    art.paint(art.cover(shape, art.log(0.006, 0.08)) * uneven(art), art.log(0.9, 9.0), LEAK)
+    art.paint(art.cover(shape, art.log(0.006, 0.08)) * uneven(art), art.log(0.9, 9.0), wet=True)
     if art.rng.random() < 0.2:
         rim = ndimage.binary_dilation(art.cover(shape) > 0.5, iterations=int(art.uniform(2, 8)))
         art.drop[rim & (art.drop < 0.2)] -= art.uniform(1.0, 4.0)
@@ -121,7 +119,7 @@ def curtain(art: Painting, s: float, a: float) -> None:
     x = np.linspace(s - art.uniform(0.1, 0.8), s + art.uniform(0.1, 0.8), 12)
     ends = top + down * np.array([art.uniform(0.4, 2.2) for _ in x])
     shape = Polygon([(x[0], top), *zip(x, ends, strict=True), (x[-1], top)]).buffer(0.02)
-    art.paint(art.cover(shape, art.log(0.006, 0.05)) * uneven(art), art.log(1.5, 8.0), LEAK)
+    art.paint(art.cover(shape, art.log(0.006, 0.05)) * uneven(art), art.log(1.5, 8.0), wet=True)
 
 
 def band(art: Painting, s: float, a: float, straight: bool = False) -> None:
@@ -136,9 +134,9 @@ def band(art: Painting, s: float, a: float, straight: bool = False) -> None:
     line = [*zip(t, low, strict=True), *zip(t[::-1], high[::-1], strict=True)]
     shape = Polygon([(s + v, a + u) if around else (s + u, a + v) for u, v in line]).buffer(0)
     if straight:
-        art.paint(art.cover(shape), art.log(1.2, 7.0), JOINT)
+        art.paint(art.cover(shape), art.log(1.2, 7.0))
     else:
-        art.paint(art.cover(shape, art.log(0.006, 0.04)) * uneven(art), art.log(1.5, 8.0), LEAK)
+        art.paint(art.cover(shape, art.log(0.006, 0.04)) * uneven(art), art.log(1.5, 8.0), wet=True)
 
 
 def joint(art: Painting, s: float, a: float) -> None:
@@ -147,37 +145,37 @@ def joint(art: Painting, s: float, a: float) -> None:
 
 def wet_panel(art: Painting, s: float, a: float) -> None:
     shape = box(s - art.uniform(0.6, 1.1), a - art.uniform(0.6, 1.3), s + art.uniform(0.6, 1.1), a + art.uniform(0.6, 1.3))
-    art.paint(art.cover(shape) * uneven(art), art.log(2.4, 7.0), LEAK)
+    art.paint(art.cover(shape) * uneven(art), art.log(2.4, 7.0), wet=True)
 
 
 def repair(art: Painting, s: float, a: float) -> None:
     shape = box(s - art.log(0.12, 1.2), a - art.log(0.12, 1.2), s + art.log(0.12, 1.2), a + art.log(0.12, 1.2))
     if art.rng.random() < 0.3:
         shape = affinity.rotate(shape, art.uniform(-25, 25))
-    art.paint(art.cover(shape), art.log(0.6, 4.5), DARK)
+    art.paint(art.cover(shape), art.log(0.6, 4.5))
 
 
 def shade(art: Painting, s: float, a: float) -> None:
     shape = box(s - art.uniform(0.6, 1.4), a - art.uniform(0.6, 1.4), s + art.uniform(0.6, 1.4), a + art.uniform(0.6, 1.4))
-    art.paint(art.cover(shape), art.log(0.5, 2.0), DARK)
+    art.paint(art.cover(shape), art.log(0.5, 2.0))
 
 
 def soot(art: Painting, s: float, a: float) -> None:
     along, around = art.log(0.2, 1.2), art.log(0.2, 1.2)
     amount = np.exp(-(((art.x - s) / along) ** 2) - ((art.y - a) / around) ** 2)
-    art.paint(amount * (1 + 0.2 * (uneven(art) - 1)), art.log(0.8, 5.0), DARK)
+    art.paint(amount * (1 + 0.2 * (uneven(art) - 1)), art.log(0.8, 5.0))
 
 
 def halo(art: Painting, s: float, a: float) -> None:
     far = np.hypot(art.x - s, art.y - a)
     size = art.uniform(0.1, 0.4)
-    art.paint(np.clip((1.8 * size - far) / size, 0, 1), art.log(0.8, 4.0), DARK)
+    art.paint(np.clip((1.8 * size - far) / size, 0, 1), art.log(0.8, 4.0))
     art.state[(np.abs(art.x - s) < 0.3 * size) & (np.abs(art.y - a) < 0.3 * size)] = PixelState.OFF
 
 
 def stripe(art: Painting, s: float, a: float) -> None:
     half = art.uniform(0.02, 0.15)
-    art.paint(art.cover(box(s - 1.35, a - half, s + art.uniform(0.3, 1.35), a + half)), art.log(0.8, 5.0), DARK)
+    art.paint(art.cover(box(s - 1.35, a - half, s + art.uniform(0.3, 1.35), a + half)), art.log(0.8, 5.0))
 
 
 def grime(art: Painting, s: float, a: float) -> None:
@@ -185,7 +183,7 @@ def grime(art: Painting, s: float, a: float) -> None:
     down = 1.0 if a >= 0 else -1.0
     below = (art.y - a) * down
     along = np.clip((1.35 - np.abs(art.x - s)) / art.uniform(0.1, 0.8), 0, 1)
-    art.paint(along * np.where(below > 0, np.exp(-np.maximum(below, 0) / art.log(0.08, 0.5)), 0.0), art.log(1.0, 5.0), DARK)
+    art.paint(along * np.where(below > 0, np.exp(-np.maximum(below, 0) / art.log(0.08, 0.5)), 0.0), art.log(1.0, 5.0))
     art.state[(np.abs(art.y - a) < art.uniform(0.02, 0.08)) & (np.abs(art.x - s) < 1.45)] = PixelState.OFF
 
 
@@ -193,7 +191,7 @@ def shadow(art: Painting, s: float, a: float) -> None:
     """Beside a pipe, or between two."""
     half, width = art.uniform(0.03, 0.1), art.uniform(0.03, 0.12)
     near = np.abs(art.x - s) < 1.4
-    art.paint(art.cover(box(s - 1.3, a + half, s + 1.3, a + half + width)), art.log(1.5, 7.0), DARK)
+    art.paint(art.cover(box(s - 1.3, a + half, s + 1.3, a + half + width)), art.log(1.5, 7.0))
     art.state[(np.abs(art.y - a) < half) & near] = PixelState.OFF
     if art.rng.random() < 0.5:
         art.state[(np.abs(art.y - a - 2 * half - width) < half) & near] = PixelState.OFF
@@ -204,14 +202,14 @@ def between(art: Painting, s: float, a: float) -> None:
     half, long, frame = art.log(0.05, 0.4), art.log(0.15, 1.2), art.uniform(0.06, 0.2)
     shown = box(s - long, a - half, s + long, a + half)
     art.state[(art.cover(shown.buffer(frame, join_style="mitre")) > 0.5) & (art.cover(shown) < 0.5)] = PixelState.OFF
-    art.paint(art.cover(shown), art.log(1.0, 6.0), DARK)
+    art.paint(art.cover(shown), art.log(1.0, 6.0))
 
 
 def pocket(art: Painting, s: float, a: float) -> None:
     half = art.uniform(0.08, 0.16)
     shape = box(s - half, a - half, s + half, a + half)
     art.state[art.cover(shape) > 0.5] = PixelState.RECESS
-    art.paint(art.cover(shape), art.log(1.0, 6.0), DARK)
+    art.paint(art.cover(shape), art.log(1.0, 6.0))
 
 
 def crossed(art: Painting, s: float, a: float) -> None:
@@ -248,7 +246,6 @@ def paintings(count: int, first: int = 1) -> list[Candidates]:
             for a in (-HALF + CELL / 2, 0.1, HALF - CELL / 2):
                 makers[art.rng.choice(len(makers), p=often / often.sum())](art, float(s), float(a))
         found = list(art.regions())
-        features = np.array([row for row, _, _ in found]).reshape(len(found), -1)
-        kinds, areas = np.array([kind for _, kind, _ in found], np.int64), np.array([area for _, _, area in found])
-        parts.append(Candidates(f"painting {seed}", "painted", features, kinds, areas))
+        features = np.array([row for row, _ in found]).reshape(len(found), -1)
+        parts.append(Candidates(f"painting {seed}", "painted", features, np.array([leak for _, leak in found], np.bool_)))
     return parts

@@ -68,15 +68,18 @@ def cut(picture: LiningImage) -> LiningImage:
     return LiningImage(part, picture.state[:, first:stop].copy(), picture.level[:, first:stop].copy(), picture.gaps)
 
 
-def pictures(family: str, folder: Path, dsn: str | None) -> Iterator[tuple[LiningImage, Outcome]]:
-    """Pictures of a round of scenes, or of the leak set (``set-SEED``), and their truth.
+def pictures(family: str, folder: Path, dsn: str | None, only: str = "") -> Iterator[tuple[LiningImage, Outcome]]:
+    """Pictures of a round of scenes, or of the leak set (``set-SEED``), and their truth; of those with a word in their name.
 
-    Those in the folder are not made again; scenes that the program refuses have none.
+    Those in the folder are not made again. Scenes that the program refuses have none, but a file ``SCENE.refused``, without
+    which they are tried again.
     """
     here = folder / family
     here.mkdir(parents=True, exist_ok=True)
-    for name in _names(family):
-        path = here / f"{name}.pickle"
+    for name in names(family):
+        path, refused = here / f"{name}.pickle", here / f"{name}.refused"
+        if only not in name or refused.is_file():
+            continue
         if not path.is_file():
             progress(f"{family} {name}")
             with scratch_database(dsn) as database:
@@ -87,12 +90,14 @@ def pictures(family: str, folder: Path, dsn: str | None) -> Iterator[tuple[Linin
                 )
             if made is None:
                 progress(f"{family} {name} was refused")
+                refused.touch()
                 continue
             path.write_bytes(pickle.dumps(made))
         yield pickle.loads(path.read_bytes())
 
 
-def _names(family: str) -> list[str]:
+def names(family: str) -> list[str]:
+    """Names of the tunnels of a family."""
     if family.startswith("set"):
         return [case.name for case in SET]
     return [scene.name for scene in importlib.import_module(f"benchmarks.blind.{family}").SCENES]

@@ -58,7 +58,8 @@ COMMENT ON FUNCTION tunnel_api.section_corner(float8, float8, float8, float8, fl
 -- 2. A class that holds a corner (its points fit no line, the lines of its neighbours meet in it) gives way to the corner; so
 --    do up to three in a row where a pipe or a cable runs beside the corner.
 -- 3. Up to three classes that stand inwards of the smooth wall on both sides, by more than `protrusion` and by more than the
---    lining is uneven here, are something hung on it: they are rejected.
+--    lining is uneven here, are something hung on it: they are rejected. Beside up to three that are empty, in a shadow, or
+--    rejected the wall is looked for behind them. A chamfer between two walls is none: its points lie on a line.
 -- 4. Between the classes left the curve is a cubic in polar coordinates, or two lines with a corner where the wall turns
 --    by more than 30° at once. Empty and rejected classes are bridged and marked.
 -- Arc is the length of this curve from the upward direction, positive to the right. NULL if under a third of the classes
@@ -78,7 +79,8 @@ DECLARE
     turn float8; chord float8; usual float8; uneven float8; tolerance float8; loose float8;
     differences float8[] := '{}'::float8[];
     angles float8[] := '{}'::float8[]; radii float8[] := '{}'::float8[]; slopes float8[] := '{}'::float8[];   -- the classes left, once round and more
-    apart boolean;
+    apart boolean; chamfer boolean;
+    beside int[];   -- classes before and after some, counted on from theirs
     wide float8; way float8;
     angle float8; x0 float8; y0 float8; x1 float8; y1 float8; cx float8; cy float8; length float8;
     corners float8[] := '{}'::float8[];   -- angle and radius of each corner
@@ -155,26 +157,46 @@ BEGIN
     -- 3. what hangs on the wall
     FOR g IN 1 .. 3 LOOP
         FOR k IN 1 .. classes LOOP
-            -- classes k .. k+g-1 stand between i and j; the wall must go on smoothly before i and after j
-            first := (k + classes - 3) % classes + 1;
-            i := (k + classes - 2) % classes + 1;
-            j := (k + g - 1) % classes + 1;
-            last := (k + g) % classes + 1;
+            CONTINUE WHEN class_state[k] <> 'measured';
+            -- classes k .. k+g-1 stand between i and j, the next that are measured; the wall must go on smoothly before i and
+            -- after j
+            beside := ARRAY[k - 1, k - 2, k + g, k + g + 1];
+            FOR c IN 1 .. 4 LOOP
+                a := CASE WHEN c < 3 THEN -1 ELSE 1 END;
+                IF c % 2 = 0 THEN
+                    beside[c] := beside[c - 1] + a;
+                END IF;
+                FOR skipped IN 1 .. 3 LOOP
+                    EXIT WHEN class_state[(beside[c] + 2 * classes - 1) % classes + 1] = 'measured';
+                    beside[c] := beside[c] + a;
+                END LOOP;
+            END LOOP;
+            first := (beside[2] + 2 * classes - 1) % classes + 1;
+            i := (beside[1] + 2 * classes - 1) % classes + 1;
+            j := (beside[3] - 1) % classes + 1;
+            last := (beside[4] - 1) % classes + 1;
             CONTINUE WHEN class_state[first] <> 'measured' OR class_state[i] <> 'measured'
                 OR class_state[j] <> 'measured' OR class_state[last] <> 'measured';
+            way := (beside[3] - beside[1]) * step;
+            -- where it turns a corner between them, points that lie on lines are a chamfer
+            chamfer := abs(way - (atan(b[j]) - atan(b[i]))) > radians(45);
             apart := true;
-            FOR c IN 0 .. g - 1 LOOP
-                a := (k + c - 1) % classes + 1;
-                apart := apart AND class_state[a] = 'measured' AND r[a] < tunnel_api.section_between(
-                    (c + 1.0) / (g + 1), r[i], (g + 1) * step * r[i] * b[i], r[j], (g + 1) * step * r[j] * b[j]) - tolerance;
+            FOR c IN k .. k + g - 1 LOOP
+                a := (c - 1) % classes + 1;
+                apart := apart AND class_state[a] = 'measured' AND NOT (chamfer AND sigma[a] <= greatest(3 * usual, 0.01))
+                    AND r[a] < tunnel_api.section_between((c - beside[1])::float8 / (beside[3] - beside[1]),
+                        r[i], way * r[i] * b[i], r[j], way * r[j] * b[j]) - tolerance;
                 EXIT WHEN NOT apart;
             END LOOP;
             CONTINUE WHEN NOT apart;
-            wide := (g + 2) * step;
+            wide := (beside[3] - beside[2]) * step;
             CONTINUE WHEN abs(r[i] - tunnel_api.section_between(
-                    1.0 / (g + 2), r[first], wide * r[first] * b[first], r[j], wide * r[j] * b[j])) > tolerance
-                OR abs(r[j] - tunnel_api.section_between(
-                    (g + 1.0) / (g + 2), r[i], wide * r[i] * b[i], r[last], wide * r[last] * b[last])) > tolerance;
+                    (beside[1] - beside[2])::float8 / (beside[3] - beside[2]),
+                    r[first], wide * r[first] * b[first], r[j], wide * r[j] * b[j])) > tolerance;
+            wide := (beside[4] - beside[1]) * step;
+            CONTINUE WHEN abs(r[j] - tunnel_api.section_between(
+                    (beside[3] - beside[1])::float8 / (beside[4] - beside[1]),
+                    r[i], wide * r[i] * b[i], r[last], wide * r[last] * b[last])) > tolerance;
             FOR c IN 0 .. g - 1 LOOP
                 class_state[(k + c - 1) % classes + 1] := 'rejected';
             END LOOP;

@@ -12,9 +12,9 @@ STEP = 5.0
 WIDTH, HEIGHT, ABOVE = 8.0, 6.0, 2.6  # of a box, m; its top lies so far above the axis
 
 
-def outline(*, haunch: float = 0.0) -> shapely.LinearRing:
+def outline(*, haunch: float = 0.0, width: float = WIDTH) -> shapely.LinearRing:
     """A box about the axis, of which the upper corners may be cut off."""
-    w, top, bottom = WIDTH / 2, ABOVE, ABOVE - HEIGHT
+    w, top, bottom = width / 2, ABOVE, ABOVE - HEIGHT
     return shapely.LinearRing(
         [(-w, bottom), (-w, top - haunch), (-w + haunch, top), (w - haunch, top), (w, top - haunch), (w, bottom)]
     )
@@ -81,3 +81,28 @@ def test_a_haunch_is_no_corner_with_something_before_it(conn: psycopg.Connection
     arc, _ = curve(conn, seen(ring))
     for degrees in (-80, -70, 70, 80):
         assert arc[degrees + 180] == pytest.approx(true_arc(ring, degrees), abs=0.05)
+
+
+@pytest.mark.parametrize("haunch", [0.5, 0.6, 0.7])
+@pytest.mark.parametrize("cable", [1.7, 1.8, 1.9, 2.0])
+def test_a_haunch_with_a_cable_below_it_is_no_box_in_a_corner(conn: psycopg.Connection, haunch: float, cable: float) -> None:
+    ring = outline(haunch=haunch, width=4.8)
+    arc, _ = curve(conn, seen(ring, shapely.Point(2.3, cable).buffer(0.04)))
+    assert arc[90 + 180] == pytest.approx(true_arc(ring, 90), abs=0.05)
+
+
+@pytest.mark.parametrize("shadow", [1, 2, 3])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_duct_in_its_own_shadow_is_not_the_wall(conn: psycopg.Connection, side: int, shadow: int) -> None:
+    """On both sides of what stands 0.3 m before the wall no point shows it for some classes."""
+    duct = 36 + side * 18 - (side < 0)
+    columns: list[list[float | None]] = [list(column) for column in classes(seen(outline()))]
+    for k in range(duct - shadow, duct + shadow + 1):
+        columns[0][k] = columns[0][k] - 0.3 if k == duct else None
+    row = conn.execute(
+        "SELECT class_state"
+        " FROM tunnel_api.section_curve(%s, %s::float8[], %s::float8[], %s::float8[], %s::float8[])",
+        (STEP, *columns),
+    ).fetchone()
+    assert row is not None
+    assert row[0][duct] == "rejected"

@@ -1,0 +1,79 @@
+"""Detection on a picture: search and judgement alone, as the stage ``detect`` does them, by any model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from unittest import mock
+
+import numpy as np
+
+from benchmarks.blind.run import Outcome
+from benchmarks.evidence.candidates import LEAST
+from tunneldb.anomalies import verdict
+from tunneldb.anomalies.background.contrast import contrast_image
+from tunneldb.anomalies.background.level_map import map_background
+from tunneldb.anomalies.coverage import Coverage, measure_coverage
+from tunneldb.anomalies.detect import Anomaly, Detection, find_anomalies
+from tunneldb.anomalies.evidence import EvidenceModel
+from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.raster.image import LiningImage
+
+
+@contextmanager
+def judged_by(model: EvidenceModel) -> Iterator[None]:
+    """Have regions judged by a model, and not by the one that comes with the program."""
+    with mock.patch.object(verdict, "standard_model", return_value=model):
+        yield
+
+
+def detect(picture: LiningImage, truth: Outcome) -> tuple[Outcome, dict[int, Coverage]]:
+    """Find what is dark in a picture.
+
+    Parameters
+    ----------
+    picture : LiningImage
+        Stays as it is.
+    truth : Outcome
+        What was found when the picture was made counts no more.
+
+    Returns
+    -------
+    outcome : Outcome
+        Without classes of waterproofing.
+    coverage : dict of int to Coverage
+        Of the picture's kilometre.
+    """
+    picture = LiningImage(picture.grid, picture.state, picture.level.copy(), picture.gaps)
+    background = map_background(picture, [])
+    contrast = contrast_image(picture, background)
+    found = find_anomalies(contrast, background, LEAST)
+    coverage = measure_coverage(contrast.state, found.wet, picture.grid, found.size)
+    anomalies = _whole(found)
+    verdicts = [anomaly.verdict for anomaly in anomalies]
+    outcome = Outcome(
+        truth.scene, truth.lining, truth.phenomenon, truth.true, truth.drops, truth.phenomena, truth.limits,
+        [anomaly.outline for anomaly in anomalies], [one.kind for one in verdicts],
+        [one.confidence if one.kind == "leak" else 1.0 - one.confidence for one in verdicts],
+        [list(one.reasons) for one in verdicts], float(coverage.seen.sum()), truth.seconds, truth.other, truth.other_kinds,
+    )  # fmt: skip
+    return outcome, _of_kilometre(picture, coverage)
+
+
+def _whole(found: Detection) -> list[Anomaly]:
+    """What was found, with what reaches an end of the kilometre: there is no other beyond."""
+    cut = [Anomaly.of(region, LEAST) for region in found.cut]
+    return [*found.anomalies, *(anomaly for anomaly in cut if anomaly is not None)]
+
+
+def _of_kilometre(picture: LiningImage, coverage: Coverage) -> dict[int, Coverage]:
+    """Coverage from the beginning of the kilometre to its end; nothing is known of it outside the picture."""
+    start = picture.grid.west + picture.grid.inner.start * picture.grid.pixel
+    km = int((start + coverage.step / 2) // KILOMETRE)
+    before = round((start - km * KILOMETRE) / coverage.step)
+    after = round(KILOMETRE / coverage.step) - before - len(coverage.lining)
+    return {
+        km: Coverage(
+            coverage.step, *(np.pad(areas, (before, after)) for areas in (coverage.lining, coverage.seen, coverage.wet))
+        )
+    }
