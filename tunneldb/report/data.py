@@ -256,7 +256,7 @@ def read_radiometry(conn: psycopg.Connection[Any], survey: Survey, low: float, h
 def read_others(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> dict[str, int]:
     """Count what is dark but no leak: joints and other dark spots."""
     rows = conn.execute(
-        "SELECT kind, count(*) FROM tunnel_api.anomaly WHERE survey_id = %s AND detected AND kind <> 'leak'"
+        "SELECT kind, count(*) FROM tunnel_api.anomaly WHERE survey_id = %s AND detected AND NOT wet"
         " AND chainage_to > %s AND chainage_from < %s GROUP BY kind",
         [survey.id, low, high],
     ).fetchall()

@@ -168,7 +168,7 @@ class LeakList:
 _CHOSEN = sql.SQL(
     "FROM tunnel_api.anomaly WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed') AND area >= %(min_area)s"
     " AND (%(min_confidence)s = 0 OR confidence >= %(min_confidence)s)"
-    " AND %(kind)s IN (kind, 'all') AND chainage_to > %(low)s AND chainage_from < %(high)s"
+    " AND CASE %(kind)s WHEN 'all' THEN true WHEN 'leak' THEN wet ELSE kind = %(kind)s END AND chainage_to > %(low)s AND chainage_from < %(high)s"
     " AND (%(clock)s::float8[] IS NULL OR tunnel_api.clock_between(clock, (%(clock)s)[1], (%(clock)s)[2]))"
 )
 
