@@ -85,7 +85,7 @@ def _catalogue() -> None:
             "geometries <@ '{polygon,line,point}' AND cardinality(geometries) > 0", name=op.f("finding_kind_geometries_check")
         ),
         sa.CheckConstraint(
-            "CASE code WHEN 'leak' THEN wet WHEN 'joint' THEN NOT wet WHEN 'dark' THEN NOT wet ELSE true END",
+            "(code <> 'leak' OR wet) AND (code NOT IN ('joint', 'dark') OR NOT wet)",
             name=op.f("finding_kind_wet_check"),
         ),
         schema="tunnel",
@@ -113,18 +113,14 @@ def _catalogue() -> None:
 
 def _anomaly() -> None:
     anything, in_space = Geometry("GEOMETRY", spatial_index=False), Geometry("GEOMETRYZ", dimension=3, spatial_index=False)
-    key = {
-        "comment": "Findings: what is darker than dry lining (leaks, joints, dark spots) and what people drew, in three geometries"
-    }
     op.create_table_comment(
-        "anomaly", key["comment"], schema="tunnel",
+        "anomaly", "Findings: leaks, joints and dark spots that were detected, and what people drew, in three geometries", schema="tunnel",
         existing_comment="What is darker than dry lining: leaks, joints and other dark spots, in three geometries",
     )  # fmt: skip
     for column in (
         sa.Column(
             "origin", sa.Text(), server_default=sa.text("'detected'"), nullable=False,
-            comment="How its outline came about: detected, drawn, redrawn, split or merged; all but the first detection leaves "
-            "alone",
+            comment="How its outline came about: detected, drawn, redrawn, split or merged; detection changes the first alone",
         ),
         sa.Column(
             "by_hand", sa.Boolean(), server_default=sa.text("false"), nullable=False,
@@ -134,7 +130,7 @@ def _anomaly() -> None:
         sa.Column("width", sa.Double(), comment="Width of a line, such as a crack, m"),
         sa.Column("length", sa.Double(), comment="Length of a line on the surface, m"),
         sa.Column(
-            "shape", anything, comment="The line or point of one that is none but has an outline about it, in the unrolled plane, m"
+            "shape", anything, comment="The line or point that it is, if it is no polygon, in the unrolled plane, m"
         ),
         sa.Column("shape_map", anything, comment="The same on the map strip, tunnel's SRID, m"),
         sa.Column("shape_surface", in_space, comment="The same in space, tunnel's SRID, m"),

@@ -2,14 +2,15 @@
 -- care of views/edit.sql: rows are locked, what somebody else did meanwhile stays or refuses the later one, and the audit has it.
 
 -- What the audit has of a finding.
-CREATE OR REPLACE FUNCTION tunnel_api.finding_state(finding tunnel.anomaly) RETURNS jsonb
-LANGUAGE sql STABLE PARALLEL SAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
+CREATE OR REPLACE FUNCTION tunnel_api.finding_state(id bigint) RETURNS jsonb
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
     SELECT jsonb_strip_nulls(jsonb_build_object(
-        'kind', coalesce($1.judged, $1.kind), 'severity', $1.severity, 'width', $1.width, 'review', $1.review, 'remark', $1.remark,
-        'origin', $1.origin, 'parent_id', $1.parent_id, 'merged_into', $1.merged_into,
-        'geom', ST_AsEWKT(coalesce($1.shape, $1.unrolled))))
+        'kind', coalesce(a.judged, a.kind), 'severity', a.severity, 'width', a.width, 'review', a.review, 'remark', a.remark,
+        'origin', a.origin, 'parent_id', a.parent_id, 'merged_into', a.merged_into,
+        'geom', ST_AsEWKT(coalesce(a.shape, a.unrolled))))
+      FROM tunnel.anomaly a WHERE a.id = $1
 $$;
-COMMENT ON FUNCTION tunnel_api.finding_state(tunnel.anomaly) IS
+COMMENT ON FUNCTION tunnel_api.finding_state(bigint) IS
     'What the audit has of a finding: what people can change, geometry in the unrolled plane as EWKT';
 
 -- Which wet findings are the same, about a place of the unrolled plane. One that was detected is the same as what a person drew,
@@ -17,23 +18,30 @@ COMMENT ON FUNCTION tunnel_api.finding_state(tunnel.anomaly) IS
 -- person drew is the same as a detected one that covers half of it and much more: that one counts, unless it is rejected. Lines
 -- and points are none, for they have no area of their own.
 CREATE OR REPLACE FUNCTION tunnel_api.link_findings(survey_id int, place geometry) RETURNS void
-LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    about constant geometry := ST_Expand(place, 0.01);
+    changed record;
+BEGIN
+    FOR changed IN
     WITH near AS MATERIALIZED (
         SELECT a.id, a.origin <> 'detected' AS by_person, a.review, a.same_as, a.unrolled, a.wet AND a.detected
                AND a.merged_into IS NULL AND a.shape IS NULL AS apt
           FROM tunnel.anomaly a
-         WHERE a.survey_id = $1 AND a.unrolled && ST_Expand($2, 0.01)
+         WHERE a.survey_id = survey_key AND a.unrolled && about
     ), pair AS MATERIALIZED (
         SELECT d.id AS found, h.id AS drawn, d.review, ST_Area(ST_Intersection(d.unrolled, h.unrolled)) AS shared,
                ST_Area(d.unrolled) AS found_area, ST_Area(h.unrolled) AS drawn_area
           FROM near d
-          JOIN tunnel.anomaly h ON h.survey_id = $1 AND h.unrolled && d.unrolled AND h.origin <> 'detected' AND h.wet
+          JOIN tunnel.anomaly h ON h.survey_id = survey_key AND h.unrolled && d.unrolled AND h.origin <> 'detected' AND h.wet
                AND h.merged_into IS NULL AND h.shape IS NULL
          WHERE d.apt AND NOT d.by_person
          UNION
         SELECT d.id, h.id, d.review, ST_Area(ST_Intersection(d.unrolled, h.unrolled)), ST_Area(d.unrolled), ST_Area(h.unrolled)
           FROM near h
-          JOIN tunnel.anomaly d ON d.survey_id = $1 AND d.unrolled && h.unrolled AND d.origin = 'detected' AND d.wet AND d.detected
+          JOIN tunnel.anomaly d ON d.survey_id = survey_key AND d.unrolled && h.unrolled AND d.origin = 'detected' AND d.wet AND d.detected
                AND d.merged_into IS NULL AND d.shape IS NULL
          WHERE h.apt AND h.by_person
     ), covered AS (
@@ -51,9 +59,12 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, publi
          UNION
         SELECT a.id, a.same_as FROM link l JOIN tunnel.anomaly a ON a.id = l.id
     )
-    UPDATE tunnel.anomaly a SET same_as = l.other
-      FROM concerned c LEFT JOIN link l ON l.id = c.id
-     WHERE a.id = c.id AND a.same_as IS DISTINCT FROM l.other
+    SELECT c.id, l.other FROM concerned c LEFT JOIN link l ON l.id = c.id
+     WHERE c.same_as IS DISTINCT FROM l.other ORDER BY c.id
+    LOOP
+        UPDATE tunnel.anomaly a SET same_as = changed.other WHERE a.id = changed.id;
+    END LOOP;
+END
 $$;
 COMMENT ON FUNCTION tunnel_api.link_findings(int, geometry) IS
 'Marks which wet findings of a survey about a place (unrolled plane) are the same, so that each counts once: called after each change of an outline, a kind or a review, and by detection.';
@@ -164,6 +175,32 @@ $$;
 COMMENT ON FUNCTION tunnel_api.add_finding(int, text, geometry, float8, int, text, text, text, boolean, bigint) IS
     'A new finding (unrolled plane) with all that follows from its outline; its id. For draw_finding and finding_split alone';
 
+-- After the surface has changed: outlines in the unrolled plane stay. One that now reaches beyond the lining stays as it was.
+CREATE OR REPLACE FUNCTION tunnel_api.renew_findings(survey_id int, km int) RETURNS void
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    kilometre constant int := km;
+    was tunnel.anomaly;
+BEGIN
+    FOR was IN SELECT a.* FROM tunnel.anomaly a
+                WHERE a.survey_id = survey_key AND a.km = kilometre AND a.origin <> 'detected' ORDER BY a.id FOR UPDATE LOOP
+        BEGIN
+            UPDATE tunnel.anomaly a
+               SET clock = f.clock, area = f.area, length = f.length, map = f.map, surface = f.surface, shape_map = f.shape_map,
+                   shape_surface = f.shape_surface
+              FROM tunnel_api.drawn_figures(survey_key, coalesce(was.shape, was.unrolled), was.width) f
+             WHERE a.id = was.id AND NOT (f.surface = was.surface AND f.map = was.map);
+        EXCEPTION WHEN invalid_parameter_value THEN
+            NULL;
+        END;
+    END LOOP;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.renew_findings(int, int) IS
+'Works out anew where what people drew in a kilometre lies on the map and in space, after the axis or the sections have changed; called by detection. The outlines in the unrolled plane stay.';
+
 -- Detection writes its findings of a survey under this lock, and so sees all that was drawn before, and none is drawn meanwhile;
 -- who draws does not wait for who draws.
 CREATE OR REPLACE FUNCTION tunnel_api.lock_findings(survey_id int) RETURNS void
@@ -182,6 +219,7 @@ DECLARE
     its tunnel.survey;
     was tunnel.anomaly;
     is_now tunnel.anomaly;
+    before jsonb;
     old_row jsonb;
     new_row jsonb;
     was_row jsonb;
@@ -209,6 +247,7 @@ BEGIN
         IF NOT FOUND THEN
             RETURN NULL;  -- gone meanwhile
         END IF;
+        before := tunnel_api.finding_state(was.id);
         IF was.merged_into IS NOT NULL THEN
             RAISE EXCEPTION 'finding % is merged into %, which stands for it', was.id, was.merged_into
                 USING ERRCODE = 'feature_not_supported';
@@ -222,7 +261,7 @@ BEGIN
                 USING ERRCODE = 'feature_not_supported';
         END IF;
         DELETE FROM tunnel.anomaly a WHERE a.id = was.id;
-        PERFORM tunnel_api.note_edit(OLD.survey, 'anomaly', was.id, tunnel_api.finding_state(was), NULL);
+        PERFORM tunnel_api.note_edit(OLD.survey, 'anomaly', was.id, before, NULL);
         PERFORM tunnel_api.link_findings(was.survey_id, was.unrolled);
         RETURN OLD;
     END IF;
@@ -252,8 +291,8 @@ BEGIN
                 USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
         END IF;
         NEW.kind := new_row ->> 'kind';
-        NEW.severity := new_row ->> 'severity';
-        NEW.width := new_row ->> 'width';
+        NEW.severity := (new_row ->> 'severity')::smallint;
+        NEW.width := (new_row ->> 'width')::float8;
         NEW.review := new_row ->> 'review';
         NEW.remark := new_row ->> 'remark';
         PERFORM tunnel_api.check_finding(NEW.severity, NEW.width, NEW.review);
@@ -286,7 +325,7 @@ BEGIN
     END IF;
     SELECT a.* INTO is_now FROM tunnel.anomaly a WHERE a.id = NEW.id;
     PERFORM tunnel_api.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = is_now.survey_id), 'anomaly', is_now.id,
-                                 CASE TG_OP WHEN 'UPDATE' THEN tunnel_api.finding_state(was) END, tunnel_api.finding_state(is_now));
+                                 before, tunnel_api.finding_state(is_now.id));
     PERFORM tunnel_api.link_findings(is_now.survey_id, ST_Collect(was.unrolled, is_now.unrolled));
     IF TG_OP = 'UPDATE' AND (redrawn OR is_now.wet <> was.wet) THEN
         PERFORM tunnel_api.mark_dry(is_now.survey_id, is_now.unrolled);
@@ -331,7 +370,8 @@ LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_pat
 DECLARE
     finding constant bigint := id;
     was tunnel.anomaly;
-    made tunnel.anomaly;
+    made bigint;
+    before jsonb;
     name text;
     survey_key int;
     blade geometry;
@@ -359,15 +399,15 @@ BEGIN
         RAISE EXCEPTION 'the line does not split finding %: it must cross it from side to side', finding
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
+    before := tunnel_api.finding_state(finding);
     PERFORM tunnel_api.redraw(finding, parts[1], was.width, 'split');
     ids := ARRAY[finding];
     FOREACH part IN ARRAY parts[2:] LOOP
         ids := ids || tunnel_api.add_finding(survey_key, coalesce(was.judged, was.kind), part, was.width, was.severity, was.review,
                                              was.remark, 'split', was.by_hand, finding);
     END LOOP;
-    FOR made IN SELECT a.* FROM tunnel.anomaly a WHERE a.id = ANY (ids) ORDER BY a.id LOOP
-        PERFORM tunnel_api.note_edit(name, 'anomaly', made.id, CASE made.id WHEN finding THEN tunnel_api.finding_state(was) END,
-                                     tunnel_api.finding_state(made));
+    FOREACH made IN ARRAY ids LOOP
+        PERFORM tunnel_api.note_edit(name, 'anomaly', made, CASE made WHEN finding THEN before END, tunnel_api.finding_state(made));
     END LOOP;
     PERFORM tunnel_api.link_findings(survey_key, was.unrolled);
     RETURN ids;
@@ -387,7 +427,7 @@ DECLARE
     name text;
     oldest tunnel.anomaly;
     was tunnel.anomaly;
-    made tunnel.anomaly;
+    before jsonb;
     whole geometry;
     a_part geometry;
     rest geometry;
@@ -438,14 +478,15 @@ BEGIN
         whole := ST_Union(whole, CASE ST_Dimension(whole) WHEN 1 THEN ST_ShortestLine(a_part, rest)
                                       ELSE ST_Buffer(ST_ShortestLine(a_part, rest), 0.005) END);
     END LOOP;
+    before := tunnel_api.finding_state(oldest.id);
     PERFORM tunnel_api.redraw(oldest.id, whole, oldest.width, 'merged');
+    PERFORM tunnel_api.note_edit(name, 'anomaly', oldest.id, before, tunnel_api.finding_state(oldest.id));
     FOR was IN SELECT a.* FROM tunnel.anomaly a WHERE a.id = ANY (wanted) AND a.id <> oldest.id ORDER BY a.id LOOP
-        UPDATE tunnel.anomaly a SET merged_into = oldest.id, same_as = NULL WHERE a.id = was.id RETURNING a.* INTO made;
-        PERFORM tunnel_api.note_edit(name, 'anomaly', was.id, tunnel_api.finding_state(was), tunnel_api.finding_state(made));
+        before := tunnel_api.finding_state(was.id);
+        UPDATE tunnel.anomaly a SET merged_into = oldest.id, same_as = NULL WHERE a.id = was.id;
+        PERFORM tunnel_api.note_edit(name, 'anomaly', was.id, before, tunnel_api.finding_state(was.id));
     END LOOP;
     UPDATE tunnel.anomaly a SET merged_into = oldest.id WHERE a.merged_into = ANY (wanted) AND a.merged_into <> oldest.id;
-    SELECT a.* INTO made FROM tunnel.anomaly a WHERE a.id = oldest.id;
-    PERFORM tunnel_api.note_edit(name, 'anomaly', oldest.id, tunnel_api.finding_state(oldest), tunnel_api.finding_state(made));
     PERFORM tunnel_api.link_findings(surveys[1], place);
     RETURN oldest.id;
 END

@@ -29,7 +29,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.arc_from, a.arc_to, a.clock,
        coalesce(a.judged, a.kind) AS kind, k.label AS kind_label, CASE WHEN NOT a.by_hand THEN a.kind END AS found, a.wet,
        a.origin, a.by_hand, a.severity, v.label AS severity_label, a.width, a.length, a.area,
-       a.drop_mean IS NOT NULL AS measured, a.drop_mean, a.drop_max, a.image_share, a.contrast, a.confidence, a.reasons,
+       a.image_share IS NOT NULL AS measured, a.drop_mean, a.drop_max, a.image_share, a.contrast, a.confidence, a.reasons,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.drawn_by, a.drawn_at,
        a.detected, a.created_at, CASE WHEN NOT a.by_hand THEN a.detected_at END AS detected_at,
        o.ids IS NOT NULL AS also_detected, o.ids AS detected_as,
@@ -40,9 +40,9 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
             WHEN a.review = 'rejected' THEN 'rejected' WHEN a.aside THEN 'dry' WHEN NOT a.detected THEN 'gone'
             ELSE a.review END AS state,
        (SELECT count(*) FROM tunnel.photo p WHERE p.anomaly_id = a.id) AS photos,
-       coalesce(a.shape, a.unrolled)::public.geometry(Geometry, 0) AS unrolled,
-       coalesce(a.shape_map, a.map)::public.geometry AS map,
-       coalesce(a.shape_surface, a.surface)::public.geometry AS surface
+       coalesce(a.shape, a.unrolled) AS unrolled,
+       coalesce(a.shape_map, a.map) AS map,
+       coalesce(a.shape_surface, a.surface) AS surface
   FROM tunnel.anomaly a
   JOIN tunnel.survey s ON s.id = a.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
@@ -95,7 +95,7 @@ BEGIN
         ('width', 'Width of a line, m'),
         ('length', 'Length of a line on the surface, m'),
         ('area', 'Area on the lining, m²; of a line length times width, of a point 0'),
-        ('measured', 'Whether drop and image_share are known: what was drawn or redrawn waits for the next detect'),
+        ('measured', 'Whether it was measured on the image: what was drawn or redrawn waits for the next detect'),
         ('drop_mean', 'Mean drop of corrected intensity below dry lining, dB'),
         ('drop_max', 'Greatest drop of corrected intensity below dry lining, dB'),
         ('image_share', 'Share of its outline on which the image holds measurements, 0-1'),
@@ -159,7 +159,7 @@ SELECT min(a.id) AS id, a.survey_id, s.name AS survey, coalesce(a.judged, a.kind
        count(*) FILTER (WHERE a.merged_into IS NULL AND a.same_as IS NOT NULL) AS same,
        count(*) FILTER (WHERE a.aside AND a.merged_into IS NULL AND a.same_as IS NULL) AS dry,
        count(*) FILTER (WHERE NOT a.detected AND NOT a.aside AND a.review <> 'rejected') AS gone,
-       count(*) FILTER (WHERE c.counted AND a.drop_mean IS NULL) AS to_measure,
+       count(*) FILTER (WHERE c.counted AND a.image_share IS NULL) AS to_measure,
        coalesce(sum(a.area) FILTER (WHERE c.counted), 0) AS area, coalesce(sum(a.length) FILTER (WHERE c.counted), 0) AS length
   FROM tunnel.anomaly a
   JOIN tunnel.survey s ON s.id = a.survey_id

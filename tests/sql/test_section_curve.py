@@ -100,7 +100,8 @@ def test_a_duct_in_its_own_shadow_is_not_the_wall(conn: psycopg.Connection, side
     for k in range(duct - shadow, duct + shadow + 1):
         columns[0][k] = columns[0][k] - 0.3 if k == duct else None
     row = conn.execute(
-        "SELECT class_state FROM tunnel_api.section_curve(%s, %s::float8[], %s::float8[], %s::float8[], %s::float8[])",
+        "SELECT class_state"
+        " FROM tunnel_api.section_curve(%s, %s::float8[], %s::float8[], %s::float8[], %s::float8[])",
         (STEP, *columns),
     ).fetchone()
     assert row is not None

@@ -40,11 +40,11 @@ class Leak:
         Hours, 12 is the crown.
     area, inside : float
         Its area, and that of its part in the stretch reported, m².
-    drop_mean, drop_max : float
+    drop_mean, drop_max : float or None
         dB below dry lining.
     contrast, confidence : float or None
         Drop in standard deviations of dry lining; 0 to 1.
-    image_share : float
+    image_share : float or None
         Share of it on which the image holds measurements, 0 to 1.
     review : str
         open, confirmed or rejected.
@@ -65,11 +65,11 @@ class Leak:
     clock: float
     area: float
     inside: float
-    drop_mean: float
-    drop_max: float
+    drop_mean: float | None
+    drop_max: float | None
     contrast: float | None
     confidence: float | None
-    image_share: float
+    image_share: float | None
     review: str
     reviewed_by: str | None
     reviewed_at: dt.datetime | None

@@ -18,9 +18,9 @@ class FindingKind(Base):
     __table_args__ = (
         CheckConstraint("code ~ '^[a-z][a-z0-9_]*$'", name="code"),
         CheckConstraint("geometries <@ '{polygon,line,point}' AND cardinality(geometries) > 0", name="geometries"),
-        CheckConstraint("CASE code WHEN 'leak' THEN wet WHEN 'joint' THEN NOT wet WHEN 'dark' THEN NOT wet ELSE true END", name="wet"),
+        CheckConstraint("(code <> 'leak' OR wet) AND (code NOT IN ('joint', 'dark') OR NOT wet)", name="wet"),
         {"comment": "Kinds of findings, which an owner extends; those of detection are leak, joint and dark"},
-    )  # fmt: skip
+    )
 
     code: Mapped[str] = mapped_column(primary_key=True, comment="Its code, in lower case")
     label: Mapped[str] = mapped_column(comment="Its name, in the owner's words")

@@ -190,7 +190,7 @@ class Anomaly(Review, Base):
         Index(None, "unrolled", postgresql_using="gist"),
         Index(None, "map", postgresql_using="gist"),
         {
-            "comment": "Findings: what is darker than dry lining (leaks, joints, dark spots) and what people drew, in three geometries"
+            "comment": "Findings: leaks, joints and dark spots that were detected, and what people drew, in three geometries"
         },
     )
 
@@ -238,7 +238,7 @@ class Anomaly(Review, Base):
     model: Mapped[str | None] = mapped_column(comment="Version of the model of evidence that judged it")
     origin: Mapped[str] = mapped_column(
         server_default=text("'detected'"),
-        comment="How its outline came about: detected, drawn, redrawn, split or merged; all but the first detection leaves alone",
+        comment="How its outline came about: detected, drawn, redrawn, split or merged; detection changes the first alone",
     )
     by_hand: Mapped[bool] = mapped_column(
         server_default=text("false"), comment="Whether it was drawn, or split off what was: never detected"
@@ -248,7 +248,7 @@ class Anomaly(Review, Base):
     length: Mapped[float | None] = mapped_column(comment="Length of a line on the surface, m")
     shape: Mapped[WKBElement | None] = mapped_column(
         geometry("GEOMETRY"),
-        comment="The line or point of one that is none but has an outline about it, in the unrolled plane, m",
+        comment="The line or point that it is, if it is no polygon, in the unrolled plane, m",
     )
     shape_map: Mapped[WKBElement | None] = mapped_column(
         geometry("GEOMETRY"), comment="The same on the map strip, tunnel's SRID, m"
