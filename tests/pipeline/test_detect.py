@@ -347,8 +347,8 @@ def test_dry_and_homogeneous_regions_that_the_user_drew(detected: psycopg.Connec
 
 def test_what_people_drew_is_measured_and_stays(detected: psycopg.Connection) -> None:
     conn = detected
-    key, drop = conn.execute(
-        "SELECT id, drop_mean FROM tunnel_api.leak WHERE counted AND area > 0.2 ORDER BY area DESC LIMIT 1"
+    key, drop, held = conn.execute(
+        "SELECT id, drop_mean, image_share FROM tunnel_api.leak WHERE counted AND area > 0.2 ORDER BY area DESC LIMIT 1"
     ).fetchone()
     conn.execute(
         "UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, -0.05), review = 'confirmed' WHERE id = %s", [key]
@@ -375,7 +375,7 @@ def test_what_people_drew_is_measured_and_stays(detected: psycopg.Connection) ->
     mean, most, share, also = conn.execute(figures, [key]).fetchone()
     assert mean == pytest.approx(drop, rel=0.15)
     assert most > mean
-    assert share > 0.9
+    assert share == pytest.approx(held, abs=0.1)
     assert also
     assert conn.execute(figures, [dry]).fetchone()[0] == pytest.approx(mean, rel=0.2)
     assert 0 < conn.execute(figures, [line]).fetchone()[2] <= 1

@@ -189,9 +189,7 @@ class Anomaly(Review, Base):
         Index(None, "dry_region_id"),
         Index(None, "unrolled", postgresql_using="gist"),
         Index(None, "map", postgresql_using="gist"),
-        {
-            "comment": "Findings: leaks, joints and dark spots that were detected, and what people drew, in three geometries"
-        },
+        {"comment": "Findings: leaks, joints and dark spots that were detected, and what people drew, in three geometries"},
     )
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
