@@ -114,7 +114,8 @@ def _catalogue() -> None:
 def _anomaly() -> None:
     anything, in_space = Geometry("GEOMETRY", spatial_index=False), Geometry("GEOMETRYZ", dimension=3, spatial_index=False)
     op.create_table_comment(
-        "anomaly", "Findings: leaks, joints and dark spots that were detected, and what people drew, in three geometries", schema="tunnel",
+        "anomaly", "Findings: leaks, joints and dark spots that were detected, and what people drew, in three geometries",
+        schema="tunnel",
         existing_comment="What is darker than dry lining: leaks, joints and other dark spots, in three geometries",
     )  # fmt: skip
     for column in (

@@ -16,6 +16,7 @@ from tunneldb.anomalies.features import NAMES
 from tunneldb.anomalies.verdict import Verdict
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.anomalies import Matched, save_anomalies
+from tunneldb.store.learned import load_measured
 from tunneldb.store.survey import get_survey
 
 SUMS = (
@@ -95,6 +96,19 @@ def test_a_rerun_leaves_what_was_redrawn_and_links_what_it_finds(conn: psycopg.C
     rerun(conn, surface, [])
     assert state(conn, key) == "confirmed"
     assert conn.execute("SELECT also_detected FROM tunnel_api.lining_finding WHERE id = %s", [key]).fetchone() == (False,)
+
+
+def test_learning_takes_what_is_found_of_the_redrawn_as_that_is_reviewed(conn: psycopg.Connection, surface: Surface) -> None:
+    leaks = [box(12350.0, 0.0, 12351.0, 1.0), box(12353.0, 0.0, 12354.0, 1.0)]
+    rerun(conn, surface, leaks)
+    ids = [row[0] for row in conn.execute("SELECT id FROM tunnel_api.leak WHERE counted ORDER BY id DESC LIMIT 2")][::-1]
+    for key, review in zip(ids, ("confirmed", "rejected"), strict=True):
+        conn.execute(
+            "UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, 0.05), review = %s WHERE id = %s", [review, key]
+        )
+    rerun(conn, surface, leaks)
+    measured = load_measured(conn, [1])
+    assert measured.said[measured.known & (measured.detected)].tolist()[:2] == ["confirmed leak", "rejected"]
 
 
 def test_what_was_rejected_or_merged_is_not_resurrected(conn: psycopg.Connection, surface: Surface) -> None:
