@@ -78,7 +78,7 @@ def _points(conn: psycopg.Connection, survey_id: int) -> None:
 
 
 def draw_findings(conn: psycopg.Connection, survey: str) -> dict[str, int]:
-    """Draw findings, redraw the confirmed leak and put a dry region over another; their ids, and that of the region."""
+    """Draw findings, draw over one leak and put a dry region over another; their ids, and that of the region."""
 
     def drawn(kind: str, shape: str, severity: int | None, width: float | None = None) -> int:
         row = conn.execute(
@@ -102,7 +102,7 @@ def draw_findings(conn: psycopg.Connection, survey: str) -> dict[str, int]:
     place = "FROM tunnel.anomaly WHERE kind = 'leak' AND %s BETWEEN chainage_from AND chainage_to"
     made["leak"], made["dry leak"] = (
         conn.execute(f"SELECT id {place}".encode(), (at,)).fetchone()[0]  # type: ignore[index]
-        for at in (CONFIRMED, OLD)
+        for at in (OLD, COPIED)
     )
     made["leak over it"] = conn.execute(  # type: ignore[index]
         "INSERT INTO tunnel_api.finding_unrolled (survey_id, kind, geom) "

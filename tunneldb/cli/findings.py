@@ -33,6 +33,10 @@ class _FindingsGroup(VerbGroup):
             args = ["list", *args]
         return super().parse_args(ctx, args)
 
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return a verb; what names none is a survey that is to be listed."""
+        return super().get_command(ctx, cmd_name) or super().get_command(ctx, "list")
+
 
 @click.group(cls=_FindingsGroup)
 def findings() -> None:
