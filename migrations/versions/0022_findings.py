@@ -217,6 +217,15 @@ def _anomaly_indexes() -> None:
         name = "_".join(["anomaly", *columns, "idx"])
         op.drop_index(name, "anomaly", schema="tunnel")
         op.create_index(name, "anomaly", columns, schema="tunnel", postgresql_include=included)
+    op.create_index("anomaly_kind_idx", "anomaly", ["survey_id", sa.text("COALESCE(judged, kind)")], schema="tunnel")
+    op.create_index(
+        op.f("anomaly_survey_id_severity_idx"), "anomaly", ["survey_id", "severity"], schema="tunnel",
+        postgresql_where=sa.text("severity IS NOT NULL"),
+    )  # fmt: skip
+    op.create_index(
+        "anomaly_uncounted_idx", "anomaly", ["survey_id"], schema="tunnel",
+        postgresql_where=sa.text("NOT (detected AND review <> 'rejected' AND NOT aside)"),
+    )  # fmt: skip
     op.create_index(
         "anomaly_by_hand_idx", "anomaly", ["survey_id", "chainage_from"], schema="tunnel",
         postgresql_where=sa.text("origin <> 'detected'"),

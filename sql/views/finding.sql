@@ -211,27 +211,32 @@ COMMENT ON COLUMN tunnel_api.dry_region.geom IS 'Polygon in the unrolled plane (
 -- An example of an owner's view, by the Specifications for the National Tunnel Inventory (FHWA): severity 1 to 4 as condition
 -- states CS1 to CS4, findings without one as CS2. Of the liner what no finding touches is in CS1, too.
 CREATE OR REPLACE VIEW tunnel_api.snti_condition AS
-SELECT s.id::bigint * 10 + e.n AS id, s.id AS survey_id, s.name AS survey, e.element, e.unit,
-       q.cs1 + CASE WHEN e.n = 1 THEN greatest(coalesce((SELECT sum(c.lining_total) FROM tunnel.coverage c
+SELECT s.id::bigint * 10 + q.n AS id, s.id AS survey_id, s.name AS survey, q.element, q.unit,
+       q.cs1 + CASE WHEN q.n = 1 THEN greatest(coalesce((SELECT sum(c.lining_total) FROM tunnel.coverage c
                                                           WHERE c.survey_id = s.id), 0) - q.cs1 - q.cs2 - q.cs3 - q.cs4, 0)
                     ELSE 0 END AS cs1,
        q.cs2, q.cs3, q.cs4
   FROM tunnel.survey s
- CROSS JOIN (VALUES
-        (1, 'liner', 'm²', ARRAY['leak', 'spall', 'delamination', 'efflorescence', 'corroded']),
-        (2, 'cracks', 'm', ARRAY['crack']),
-        (3, 'joints', 'm', ARRAY['damaged_joint']),
-        (4, 'bolts', 'each', ARRAY['missing_bolt']),
-        (5, 'drips', 'each', ARRAY['drip'])) AS e (n, element, unit, kinds)
  CROSS JOIN LATERAL (
-        SELECT coalesce(sum(f.amount) FILTER (WHERE f.state = 1), 0) AS cs1, coalesce(sum(f.amount) FILTER (WHERE f.state = 2), 0) AS cs2,
-               coalesce(sum(f.amount) FILTER (WHERE f.state = 3), 0) AS cs3, coalesce(sum(f.amount) FILTER (WHERE f.state = 4), 0) AS cs4
-          FROM (SELECT coalesce(a.severity, 2) AS state,
-                       CASE e.unit WHEN 'm²' THEN a.area WHEN 'each' THEN 1::float8
-                                   ELSE coalesce(a.length, a.chainage_to - a.chainage_from) END AS amount
+        SELECT e.n, e.element, e.unit, coalesce(sum(m.amount) FILTER (WHERE g.state = 1), 0) AS cs1,
+               coalesce(sum(m.amount) FILTER (WHERE g.state = 2), 0) AS cs2,
+               coalesce(sum(m.amount) FILTER (WHERE g.state = 3), 0) AS cs3,
+               coalesce(sum(m.amount) FILTER (WHERE g.state = 4), 0) AS cs4
+          FROM (VALUES
+                (1, 'liner', 'm²', ARRAY['leak', 'spall', 'delamination', 'efflorescence', 'corroded']),
+                (2, 'cracks', 'm', ARRAY['crack']),
+                (3, 'joints', 'm', ARRAY['damaged_joint']),
+                (4, 'bolts', 'each', ARRAY['missing_bolt']),
+                (5, 'drips', 'each', ARRAY['drip'])) AS e (n, element, unit, kinds)
+          LEFT JOIN (
+                SELECT coalesce(a.judged, a.kind) AS kind, coalesce(a.severity, 2) AS state, count(*)::float8 AS findings,
+                       sum(a.area) AS area, sum(coalesce(a.length, a.chainage_to - a.chainage_from)) AS length
                   FROM tunnel.anomaly a
                  WHERE a.survey_id = s.id AND a.detected AND a.review <> 'rejected' AND NOT a.aside
-                   AND coalesce(a.judged, a.kind) = ANY (e.kinds)) f) q;
+                 GROUP BY 1, 2) g ON g.kind = ANY (e.kinds)
+         CROSS JOIN LATERAL (
+                SELECT CASE e.unit WHEN 'm²' THEN g.area WHEN 'each' THEN g.findings ELSE g.length END AS amount) m
+         GROUP BY e.n, e.element, e.unit) q;
 COMMENT ON VIEW tunnel_api.snti_condition IS
     'Example: quantities of elements in the condition states of FHWA''s SNTI, from the severity of counted findings (none: CS2); of the liner the rest of what was scanned is in CS1. Owners make their own';
 COMMENT ON COLUMN tunnel_api.snti_condition.element IS 'liner, cracks, joints, bolts or drips';

@@ -182,6 +182,11 @@ class Anomaly(Review, Base):
         Index(None, "survey_id", "area"),
         Index(None, "survey_id", "created_at"),
         Index("anomaly_gone_idx", "survey_id", postgresql_where=text("NOT detected")),
+        Index("anomaly_kind_idx", "survey_id", text("COALESCE(judged, kind)")),
+        Index(None, "survey_id", "severity", postgresql_where=text("severity IS NOT NULL")),
+        Index(
+            "anomaly_uncounted_idx", "survey_id", postgresql_where=text("NOT (detected AND review <> 'rejected' AND NOT aside)")
+        ),
         Index("anomaly_by_hand_idx", "survey_id", "chainage_from", postgresql_where=text("origin <> 'detected'")),
         Index(None, "merged_into"),
         Index(None, "same_as"),
