@@ -67,6 +67,7 @@ def upgrade() -> None:
 def _catalogue() -> None:
     kinds = op.create_table(
         "finding_kind",
+        sa.Column("id", sa.Integer(), sa.Identity(), nullable=False, comment="Key"),
         sa.Column("code", sa.Text(), nullable=False, comment="Its code, in lower case"),
         sa.Column("label", sa.Text(), nullable=False, comment="Its name, in the owner's words"),
         sa.Column("geometries", ARRAY(sa.Text()), nullable=False, comment="What it may be drawn as: polygon, line, point"),
@@ -80,6 +81,7 @@ def _catalogue() -> None:
             comment="Whether it is offered for what is drawn",
         ),
         sa.PrimaryKeyConstraint("code", name=op.f("finding_kind_pkey")),
+        sa.UniqueConstraint("id", name=op.f("finding_kind_id_key")),
         sa.CheckConstraint("code ~ '^[a-z][a-z0-9_]*$'", name=op.f("finding_kind_code_check")),
         sa.CheckConstraint(
             "geometries <@ '{polygon,line,point}' AND cardinality(geometries) > 0", name=op.f("finding_kind_geometries_check")

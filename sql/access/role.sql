@@ -111,7 +111,7 @@ BEGIN
                 AND (p.prorettype = 'trigger'::regtype OR p.proname IN ('note_edit', 'note_learned')) LOOP
         EXECUTE format('REVOKE EXECUTE ON FUNCTION %s FROM tunnel_operator', f);
     END LOOP;
-    GRANT INSERT, UPDATE, DELETE ON tunnel_api.finding_kind TO tunnel_operator;
+    GRANT INSERT, DELETE, UPDATE (code, label, geometries, wet, position, active) ON tunnel_api.finding_kind TO tunnel_operator;
     GRANT UPDATE (label, text) ON tunnel_api.severity TO tunnel_operator;
     GRANT USAGE ON SCHEMA tunnel_queue TO tunnel_operator;
     GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA tunnel_queue TO tunnel_operator;

@@ -3,7 +3,7 @@
 -- views here all. Drawn and edited through finding_unrolled, finding_map and finding_3d (views/draw.sql).
 
 CREATE OR REPLACE VIEW tunnel_api.finding_kind AS
-SELECT k.code, k.label, k.geometries, k.wet, k.position, k.active FROM tunnel.finding_kind k;
+SELECT k.id, k.code, k.label, k.geometries, k.wet, k.position, k.active FROM tunnel.finding_kind k;
 COMMENT ON VIEW tunnel_api.finding_kind IS
     'Kinds of findings; operators add their own and change words, places and what is offered. One that was used is not deleted, but set inactive';
 COMMENT ON COLUMN tunnel_api.finding_kind.code IS 'Its code, in lower case';

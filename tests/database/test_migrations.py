@@ -113,7 +113,8 @@ def test_anomalies_from_before_become_findings_and_sums_stay(empty_dsn: str) -> 
                    ST_Force3D(ST_MakeEnvelope(1, 0, 2, 1, 25830)), k.kind, k.judged, k.review
               FROM tunnel.survey s, (VALUES ('leak', NULL, 'open'), ('leak', 'joint', 'open'), ('dark', 'leak', 'confirmed'),
                                             ('joint', NULL, 'rejected')) AS k (kind, judged, review);
-            INSERT INTO tunnel.region (survey_id, kind, geom) SELECT s.id, 'dry', ST_MakeEnvelope(5, 0, 6, 1) FROM tunnel.survey s;
+            INSERT INTO tunnel.region (survey_id, kind, geom)
+            SELECT s.id, 'dry', ST_MakeEnvelope(5, 0, 6, 1) FROM tunnel.survey s;
             """
         )
     with open_connection(empty_dsn) as connection:

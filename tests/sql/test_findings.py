@@ -270,7 +270,10 @@ def test_photos_are_paths_with_captions_and_in_the_audit(person: psycopg.Connect
 @pytest.mark.parametrize("person", ["otto"], indirect=True)
 def test_operators_extend_the_catalogue_and_wet_follows(person: psycopg.Connection) -> None:
     before = wet(person)
-    person.execute("INSERT INTO tunnel_api.finding_kind VALUES ('seepage', 'Sickerstelle', '{polygon}', true, 5, true)")
+    person.execute(
+        "INSERT INTO tunnel_api.finding_kind (code, label, geometries, wet, position) "
+        "VALUES ('seepage', 'Sickerstelle', '{polygon}', true, 5)"
+    )
     key = draw(person, FREE, "seepage")
     assert wet(person)[0] == before[0] + 1
     person.execute("UPDATE tunnel_api.finding_kind SET wet = false WHERE code = 'seepage'")

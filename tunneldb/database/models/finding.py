@@ -22,6 +22,7 @@ class FindingKind(Base):
         {"comment": "Kinds of findings, which an owner extends; those of detection are leak, joint and dark"},
     )
 
+    id: Mapped[int] = mapped_column(Identity(), unique=True, comment="Key")
     code: Mapped[str] = mapped_column(primary_key=True, comment="Its code, in lower case")
     label: Mapped[str] = mapped_column(comment="Its name, in the owner's words")
     geometries: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="What it may be drawn as: polygon, line, point")
