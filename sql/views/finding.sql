@@ -13,7 +13,7 @@ COMMENT ON COLUMN tunnel_api.finding_kind.wet IS 'Whether it counts as wet in st
 COMMENT ON COLUMN tunnel_api.finding_kind.position IS 'Its place in lists';
 COMMENT ON COLUMN tunnel_api.finding_kind.active IS 'Whether it is offered for what is drawn';
 
-CREATE OR REPLACE VIEW tunnel_api.severity AS SELECT s.id, s.label, s.text FROM tunnel.severity s;
+CREATE OR REPLACE VIEW tunnel_api.severity AS SELECT s.id::int AS id, s.label, s.text FROM tunnel.severity s;
 COMMENT ON VIEW tunnel_api.severity IS 'Words for the degrees of severity, 1 (the least) to 4; operators change them to their own';
 COMMENT ON COLUMN tunnel_api.severity.id IS '1, the least, to 4';
 COMMENT ON COLUMN tunnel_api.severity.label IS 'Its name, in the owner''s words';

@@ -178,3 +178,19 @@ def test_a_layer_in_another_system_is_refused(conn: psycopg.Connection, tmp_path
     done = run("findings", "import", NAME, path)
     assert done.exit_code == 2
     assert f"3D in EPSG:{SRID}" in done.stderr
+
+
+def test_what_was_drawn_is_in_the_list_of_leaks_and_in_the_report_without_figures_that_nobody_measured(
+    conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    conn.execute(DRAWN)
+    conn.commit()
+    key = conn.execute("SELECT max(id) FROM tunnel_api.leak WHERE origin = 'drawn'").fetchone()[0]
+    conn.rollback()
+    for name in ("leaks.gpkg", "leaks.geojson", "leaks.csv", "leaks.txt"):
+        assert run("leaks", NAME, "-o", tmp_path / name).exit_code in (0, 1)
+    (drawn,) = [f for f in json.loads((tmp_path / "leaks.geojson").read_text())["features"] if f["id"] == key]
+    assert (drawn["properties"]["drop_mean"], drawn["properties"]["counted"]) == (None, True)
+    done = run("report", NAME, "-o", tmp_path / "report.html")
+    assert done.exit_code in (0, 1), done.output
+    assert run("export", NAME, "-o", tmp_path / "all.gpkg").exit_code in (0, 1)

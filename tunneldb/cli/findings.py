@@ -46,10 +46,10 @@ def findings() -> None:
 @findings.command(
     "list",
     examples=[
-        "tunneldb findings ringo-2024",
-        "tunneldb findings ringo-2024 --kind crack --kind spall --min-severity 3 -o defects.gpkg",
-        "tunneldb findings ringo-2024 --origin drawn --from 511+700 --to 511+800 --format csv",
-        "tunneldb findings ringo-2024 --state all --count",
+        "tunneldb findings list ringo-2024",
+        "tunneldb findings list ringo-2024 --kind crack --kind spall --min-severity 3 -o defects.gpkg",
+        "tunneldb findings list ringo-2024 --origin drawn --from 511+700 --to 511+800 --format csv",
+        "tunneldb findings list ringo-2024 --state all --count",
     ],
 )
 @click.argument("survey")
@@ -99,6 +99,8 @@ def list_findings(
 
     Listed is what counts: open and confirmed. With --state the rest: rejected; gone, which the last detection did not find
     again; dry, which a dry region took away; same, for which another stands that shows the same; merged into another.
+
+    The word list may be left out: tunneldb findings SURVEY.
     """
     form = form or (_BY_SUFFIX.get(output.suffix.lower(), "table") if output else "table")
     if form == "gpkg" and output is None:
