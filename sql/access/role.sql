@@ -1,6 +1,6 @@
 -- Who may do what. Three group roles without login, to be granted to people:
 --   tunnel_viewer     reads the views of tunnel_api and calls its read-only functions
---   tunnel_inspector  and reviews leaks and spots, moves axis vertices and draws regions, through the views
+--   tunnel_inspector  and reviews leaks and spots, draws findings and regions, and moves axis vertices, through the views
 --   tunnel_operator   and loads and processes: owns schema tunnel and what lies in it
 -- Runs last, after every function and view, as the database's owner. Where that may not create roles, it says what a
 -- superuser has to run, and goes on: the owner can do everything without them.
@@ -85,7 +85,11 @@ BEGIN
         TO tunnel_inspector;
     GRANT UPDATE (review, remark) ON tunnel_api.spot, tunnel_api.spot_face, tunnel_api.spot_map, tunnel_api.spot_3d, tunnel_api.spot_sheet
         TO tunnel_inspector;
-    GRANT INSERT, DELETE, UPDATE (kind, geom) ON tunnel_api.region TO tunnel_inspector;
+    GRANT INSERT, DELETE, UPDATE (kind, geom, reason) ON tunnel_api.region TO tunnel_inspector;
+    GRANT INSERT, DELETE, UPDATE (kind, severity, width, review, remark, geom) ON
+        tunnel_api.finding_unrolled, tunnel_api.finding_map, tunnel_api.finding_3d TO tunnel_inspector;
+    GRANT INSERT, DELETE, UPDATE (path, caption) ON tunnel_api.finding_photo TO tunnel_inspector;
+    GRANT EXECUTE ON FUNCTION tunnel_api.finding_split(bigint, geometry), tunnel_api.finding_merge(bigint[]) TO tunnel_inspector;
 END
 $$;
 
@@ -107,6 +111,8 @@ BEGIN
                 AND (p.prorettype = 'trigger'::regtype OR p.proname IN ('note_edit', 'note_learned')) LOOP
         EXECUTE format('REVOKE EXECUTE ON FUNCTION %s FROM tunnel_operator', f);
     END LOOP;
+    GRANT INSERT, DELETE, UPDATE (code, label, geometries, wet, position, active) ON tunnel_api.finding_kind TO tunnel_operator;
+    GRANT UPDATE (label, text) ON tunnel_api.severity TO tunnel_operator;
     GRANT USAGE ON SCHEMA tunnel_queue TO tunnel_operator;
     GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA tunnel_queue TO tunnel_operator;
     GRANT USAGE ON ALL SEQUENCES IN SCHEMA tunnel_queue TO tunnel_operator;

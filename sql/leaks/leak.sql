@@ -40,8 +40,7 @@ AS $$
     SELECT coalesce(sum(CASE WHEN l.chainage_from >= g.low AND l.chainage_to <= g.high THEN l.area
         ELSE (SELECT tunnel_api.area_between(a.unrolled, a.area, g.low, g.high) FROM tunnel.anomaly a WHERE a.id = l.id) END), 0)
     FROM given g
-    JOIN tunnel.anomaly l ON l.survey_id = g.id AND l.detected AND l.review <> 'rejected'
-        AND coalesce(l.judged, l.kind) = 'leak'
+    JOIN tunnel.anomaly l ON l.survey_id = g.id AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.aside
         AND l.chainage_from > g.low - 1e-6 - g.longest AND l.chainage_to > g.low AND l.chainage_from < g.high
     WHERE g.low < g.high
 $$;

@@ -150,7 +150,7 @@ BEGIN
         SELECT l.id, l.area, l.chainage_from AS low, l.chainage_to AS high, generate_series(
             greatest(width_bucket(l.chainage_from, g.low), 1), width_bucket(l.chainage_to, g.low)) AS n
         FROM given g CROSS JOIN tunnel.anomaly l
-        WHERE l.survey_id = survey_key AND l.detected AND l.review <> 'rejected' AND coalesce(l.judged, l.kind) = 'leak'
+        WHERE l.survey_id = survey_key AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.aside
             AND l.chainage_from > first_leak AND l.chainage_to > first_start AND l.chainage_from < last_end
     ), cut AS (
         SELECT l.n, l.id, greatest(l.low, g.low[l.n]) AS low, least(l.high, g.high[l.n]) AS high, l.area AS whole,
@@ -282,7 +282,7 @@ BEGIN
     ), leak AS MATERIALIZED (
         SELECT l.id, l.area, (l.chainage_from + l.chainage_to) / 2 AS chainage
         FROM found t JOIN tunnel.anomaly l ON l.chainage_to > t.chainage_from AND l.chainage_from < t.chainage_to
-        WHERE l.survey_id = survey_key AND l.detected AND l.review <> 'rejected' AND coalesce(l.judged, l.kind) = 'leak'
+        WHERE l.survey_id = survey_key AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.aside
             AND l.chainage_from > t.chainage_from - 1e-6 - (
                 SELECT max(o.chainage_to - o.chainage_from) FROM tunnel.anomaly o WHERE o.survey_id = survey_key)
     ), breach AS (

@@ -1,6 +1,7 @@
 -- Views of what is darker than dry lining. A leak on a vertical wall has no area in plan, so there are three geometries,
 -- each with a view of its own for QGIS: unrolled (chainage, arc; SRID 0), on the map beside the axis, and in space.
--- Views named leak hold the anomalies of kind leak. Needs stationing (geometry/stationing.sql).
+-- Views named leak hold the wet ones: of kind leak, and drips that people drew. What is merged into another, the same as what a
+-- person drew, or taken away by a dry region is in views/finding.sql alone. Needs stationing (geometry/stationing.sql).
 
 -- What each reason adds to the logarithm of the odds of a leak, the strongest first, as "faint +2.3, rectangular -1.2".
 CREATE OR REPLACE FUNCTION tunnel_api.evidence_text(evidence jsonb) RETURNS text
@@ -23,7 +24,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.area, a.drop_mean, a.drop_max, a.image_share,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.detected, a.created_at, a.detected_at,
        a.detected AND a.review <> 'rejected' AS counted,
-       tunnel_api.evidence_text(a.evidence) AS evidence, a.model,
+       tunnel_api.evidence_text(a.evidence) AS evidence, a.model, a.wet, a.origin,
        a.unrolled::public.geometry(Polygon, 0) AS unrolled,
        a.map::public.geometry AS map,
        a.surface::public.geometry AS surface
@@ -31,13 +32,14 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
   JOIN tunnel.survey s ON s.id = a.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
  CROSS JOIN LATERAL (SELECT (a.chainage_from + a.chainage_to) / 2 AS chainage,
-                            floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m;
+                            floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m
+ WHERE NOT a.aside AND (a.wet OR a.kind IN ('leak', 'joint', 'dark'));
 
-CREATE OR REPLACE VIEW tunnel_api.leak AS SELECT * FROM tunnel_api.anomaly WHERE kind = 'leak';
+CREATE OR REPLACE VIEW tunnel_api.leak AS SELECT * FROM tunnel_api.anomaly WHERE wet;
 
 COMMENT ON VIEW tunnel_api.anomaly IS
-    'What is darker than dry lining, with three geometries: leaks, joints, other dark spots; review, remark and kind can be updated';
-COMMENT ON VIEW tunnel_api.leak IS 'Water leaks: anomalies of kind leak, with their three geometries; review, remark and kind can be updated';
+    'What is darker than dry lining or was drawn as wet, with three geometries: leaks, joints, other dark spots; review, remark and kind can be updated';
+COMMENT ON VIEW tunnel_api.leak IS 'Water leaks: anomalies that are wet, detected and drawn, with their three geometries; review, remark and kind can be updated';
 
 CREATE OR REPLACE VIEW tunnel_api.anomaly_evidence AS
 SELECT a.id * 100 + e.n AS id, a.id AS anomaly_id, a.survey_id, s.name AS survey, e.reason, e.log_odds
@@ -83,21 +85,23 @@ BEGIN
         ('arc_from', 'Least arc, m from the crown, positive right looking up-chainage'),
         ('arc_to', 'Greatest arc, m'),
         ('clock', 'Clock position of the middle, hours: 12 is the crown, 3 the right wall looking up-chainage'),
-        ('kind', 'leak, joint or dark (dark but dry): as an inspector judged it, else as found'),
+        ('kind', 'leak, joint or dark (dark but dry), or another of finding_kind: as an inspector judged it, else as found'),
         ('found', 'What detection takes it for'),
         ('reasons', 'Why detection takes it for that'),
         ('confidence', 'How sure detection is of that, 0-1; NULL from before there were kinds'),
         ('contrast', 'Mean drop in standard deviations of the dry lining about it; NULL from before there were kinds'),
         ('area', 'Area on the lining, m²'),
-        ('drop_mean', 'Mean drop of corrected intensity below dry lining, dB'),
-        ('drop_max', 'Greatest drop of corrected intensity below dry lining, dB'),
-        ('image_share', 'Share of the polygon on which the image holds measurements, 0-1'),
+        ('drop_mean', 'Mean drop of corrected intensity below dry lining, dB; NULL until what was drawn is measured'),
+        ('drop_max', 'Greatest drop of corrected intensity below dry lining, dB; NULL until then'),
+        ('image_share', 'Share of the polygon on which the image holds measurements, 0-1; NULL until then'),
         ('review', 'open, confirmed or rejected'),
         ('reviewed_by', 'Who reviewed or judged it last, set by the database'),
         ('reviewed_at', 'When it was reviewed or judged last, set by the database'),
         ('remark', 'The reviewer''s remark'),
         ('detected', 'False when the last detection found it no more (kept for its review)'),
         ('counted', 'Whether sums count it: found last, and not rejected'),
+        ('wet', 'Whether its kind counts as wet: those are in the views of leaks'),
+        ('origin', 'How its outline came about: detected, drawn, redrawn, split or merged (lining_finding has more of it)'),
         ('evidence', 'What speaks for a leak (+) and against it (-): logarithms of odds by reason, the strongest first; NULL from before'),
         ('model', 'Version of the model of evidence that judged it; NULL from before')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0

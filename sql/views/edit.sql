@@ -87,7 +87,7 @@ BEGIN
             OLD.kind, OLD.id, coalesce(NEW.review, 'empty')
             USING ERRCODE = 'check_violation';
     END IF;
-    IF judging AND (NEW.kind IS NULL OR NEW.kind <> ALL (kinds)) THEN
+    IF judging AND NEW.kind IS DISTINCT FROM OLD.kind AND (NEW.kind IS NULL OR NEW.kind <> ALL (kinds)) THEN
         RAISE EXCEPTION 'the kind of % % can be %, not %', OLD.kind, OLD.id,
             array_to_string(kinds[:cardinality(kinds) - 1], ', ') || ' or ' || kinds[cardinality(kinds)],
             coalesce(NEW.kind, 'empty')
@@ -127,8 +127,10 @@ BEGIN
     ELSE
         UPDATE tunnel.anomaly a
            SET review = NEW.review, remark = NEW.remark, reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at,
-               judged = CASE WHEN NEW.kind = was.kind THEN a.judged ELSE nullif(NEW.kind, a.kind) END
+               kind = CASE WHEN a.by_hand THEN NEW.kind ELSE a.kind END,
+               judged = CASE WHEN a.by_hand THEN NULL WHEN NEW.kind = was.kind THEN a.judged ELSE nullif(NEW.kind, a.kind) END
          WHERE a.id = OLD.id;
+        PERFORM tunnel_api.link_findings(a.survey_id, a.unrolled) FROM tunnel.anomaly a WHERE a.id = OLD.id;
     END IF;
     PERFORM tunnel_api.note_edit(OLD.survey, TG_ARGV[0], OLD.id, to_jsonb(was),
                                  jsonb_build_object('review', NEW.review, 'remark', NEW.remark, 'kind', NEW.kind));
@@ -161,6 +163,7 @@ LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_
 DECLARE
     was tunnel.region;
     its tunnel.survey;
+    most float8;
 BEGIN
     IF TG_OP = 'DELETE' THEN
         DELETE FROM tunnel.region r WHERE r.id = OLD.id RETURNING r.* INTO was;
@@ -168,7 +171,8 @@ BEGIN
             RETURN NULL;  -- gone meanwhile
         END IF;
         PERFORM tunnel_api.note_edit(OLD.survey, 'region', OLD.id,
-                                     jsonb_build_object('kind', was.kind, 'geom', ST_AsEWKT(was.geom)), NULL);
+                                     jsonb_strip_nulls(jsonb_build_object('kind', was.kind, 'reason', was.reason, 'geom', ST_AsEWKT(was.geom))), NULL);
+        PERFORM tunnel_api.mark_dry(was.survey_id, was.geom);
         RETURN OLD;
     END IF;
     IF NOT coalesce(ST_IsValid(NEW.geom), false) THEN
@@ -178,10 +182,10 @@ BEGIN
     IF TG_OP = 'UPDATE' THEN
         IF (NEW.id, NEW.survey_id, NEW.survey, NEW.drawn_by, NEW.drawn_at) IS DISTINCT FROM
            (OLD.id, OLD.survey_id, OLD.survey, OLD.drawn_by, OLD.drawn_at) THEN
-            RAISE EXCEPTION 'of a region only the kind and the outline (geom) can be edited'
+            RAISE EXCEPTION 'of a region only the kind, the reason and the outline (geom) can be edited'
                 USING ERRCODE = 'feature_not_supported';
         END IF;
-        IF NEW.kind IS NOT DISTINCT FROM OLD.kind AND NEW.geom = OLD.geom THEN
+        IF (NEW.kind, NEW.reason) IS NOT DISTINCT FROM (OLD.kind, OLD.reason) AND NEW.geom = OLD.geom THEN
             RETURN NEW;
         END IF;
         SELECT r.* INTO was FROM tunnel.region r WHERE r.id = OLD.id FOR UPDATE;
@@ -190,10 +194,12 @@ BEGIN
         END IF;
         NEW.kind := CASE WHEN NEW.kind = OLD.kind THEN was.kind ELSE NEW.kind END;
         NEW.geom := CASE WHEN NEW.geom = OLD.geom THEN was.geom ELSE NEW.geom END;
-        IF NEW.kind IS NOT DISTINCT FROM was.kind AND NEW.geom = was.geom THEN
+        NEW.reason := CASE WHEN NEW.reason IS NOT DISTINCT FROM OLD.reason THEN was.reason ELSE NEW.reason END;
+        IF (NEW.kind, NEW.reason) IS NOT DISTINCT FROM (was.kind, was.reason) AND NEW.geom = was.geom THEN
             RETURN NEW;
         END IF;
-        IF was.kind NOT IN (OLD.kind, NEW.kind) OR NOT (was.geom = OLD.geom OR was.geom = NEW.geom) THEN
+        IF was.kind NOT IN (OLD.kind, NEW.kind) OR NOT (was.geom = OLD.geom OR was.geom = NEW.geom)
+           OR (was.reason IS DISTINCT FROM OLD.reason AND was.reason IS DISTINCT FROM NEW.reason) THEN
             RAISE EXCEPTION 'region % was changed meanwhile', OLD.id
                 USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
         END IF;
@@ -208,20 +214,27 @@ BEGIN
         NEW.survey_id := its.id;
         NEW.survey := its.name;
     END IF;
+    SELECT t.dry_region_limit INTO most
+      FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = NEW.survey_id;
+    IF NEW.kind = 'dry' AND ST_Area(NEW.geom) > most AND coalesce(trim(NEW.reason), '') = '' THEN
+        RAISE EXCEPTION 'a dry region of % m² is larger than % m²: its reason must say why',
+            round(ST_Area(NEW.geom)::numeric, 1), most USING ERRCODE = 'check_violation';
+    END IF;
     NEW.drawn_by := session_user;
     NEW.drawn_at := clock_timestamp();
     IF TG_OP = 'INSERT' THEN
-        INSERT INTO tunnel.region (survey_id, kind, geom, drawn_by, drawn_at)
-        VALUES (NEW.survey_id, NEW.kind, NEW.geom, NEW.drawn_by, NEW.drawn_at)
+        INSERT INTO tunnel.region (survey_id, kind, geom, drawn_by, drawn_at, reason)
+        VALUES (NEW.survey_id, NEW.kind, NEW.geom, NEW.drawn_by, NEW.drawn_at, NEW.reason)
         RETURNING id INTO NEW.id;
     ELSE
         UPDATE tunnel.region
-           SET kind = NEW.kind, geom = NEW.geom, drawn_by = NEW.drawn_by, drawn_at = NEW.drawn_at
+           SET kind = NEW.kind, geom = NEW.geom, drawn_by = NEW.drawn_by, drawn_at = NEW.drawn_at, reason = NEW.reason
          WHERE id = OLD.id;
     END IF;
     PERFORM tunnel_api.note_edit(NEW.survey, 'region', NEW.id,
-                                 CASE TG_OP WHEN 'UPDATE' THEN jsonb_build_object('kind', was.kind, 'geom', ST_AsEWKT(was.geom)) END,
-                                 jsonb_build_object('kind', NEW.kind, 'geom', ST_AsEWKT(NEW.geom)));
+                                 CASE TG_OP WHEN 'UPDATE' THEN jsonb_strip_nulls(jsonb_build_object('kind', was.kind, 'reason', was.reason, 'geom', ST_AsEWKT(was.geom))) END,
+                                 jsonb_strip_nulls(jsonb_build_object('kind', NEW.kind, 'reason', NEW.reason, 'geom', ST_AsEWKT(NEW.geom))));
+    PERFORM tunnel_api.mark_dry(NEW.survey_id, ST_Collect(was.geom, NEW.geom));
     RETURN NEW;
 END
 $$;

@@ -36,7 +36,7 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
          GROUP BY i
         HAVING sum(least(g.chainage_to, e.chainage_to, (i + 1) * 50) - greatest(g.chainage_from, e.chainage_from, i * 50)) >= 1
             OR EXISTS (SELECT FROM tunnel.anomaly x
-                        WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND coalesce(x.judged, x.kind) = 'leak'
+                        WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND x.wet AND NOT x.aside
                           AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(i * 50, -1e4, (i + 1) * 50, 1e4)
                           AND x.chainage_to > greatest(e.chainage_from, i * 50)
                           AND x.chainage_from < least(e.chainage_to, (i + 1) * 50))) n
@@ -62,7 +62,7 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
                coalesce(sum(tunnel_api.area_between(x.unrolled, x.area, r.chainage_from, r.chainage_to)),
                         CASE WHEN c.lining IS NOT NULL THEN 0 END) AS wet_area
           FROM tunnel.anomaly x
-         WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND coalesce(x.judged, x.kind) = 'leak'
+         WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND x.wet AND NOT x.aside
            AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(b.chainage_from, -1e4, b.chainage_to, 1e4)
            AND x.chainage_to > r.chainage_from AND x.chainage_from < r.chainage_to) l ON true
  CROSS JOIN LATERAL (SELECT tunnel_api.coverage_statement(s.id, r.chainage_from, r.chainage_to) AS said) g

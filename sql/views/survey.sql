@@ -140,11 +140,12 @@ COMMENT ON COLUMN tunnel_api.section_unrolled.arc_from IS 'Arc at the left end, 
 COMMENT ON COLUMN tunnel_api.section_unrolled.arc_to IS 'Arc at the right end, straight below the axis, m';
 
 CREATE OR REPLACE VIEW tunnel_api.region AS
-SELECT r.id, r.survey_id, s.name AS survey, r.kind, r.drawn_by, r.drawn_at,
+SELECT r.id, r.survey_id, s.name AS survey, r.kind, r.drawn_by, r.drawn_at, r.reason,
        r.geom::public.geometry(Polygon, 0) AS geom
   FROM tunnel.region r
   JOIN tunnel.survey s ON s.id = r.survey_id;
 COMMENT ON VIEW tunnel_api.region IS
     'Regions of the unrolled plane drawn by hand for the intensity correction; rows may be added, changed and deleted';
 COMMENT ON COLUMN tunnel_api.region.kind IS 'homogeneous (one material: gives the roughness) or dry (dry lining: gives the threshold)';
+COMMENT ON COLUMN tunnel_api.region.reason IS 'Why it is drawn: a dry region larger than the tunnel''s limit (dry_region) needs one';
 COMMENT ON COLUMN tunnel_api.region.geom IS 'Polygon in the unrolled plane (chainage, arc), m';

@@ -98,6 +98,41 @@ def test_anomalies_from_before_are_kept_without_features(empty_dsn: str) -> None
         assert connection.execute("SELECT kind, evidence, model FROM tunnel_api.leak").fetchall() == [("leak", None, None)]
 
 
+def test_anomalies_from_before_become_findings_and_sums_stay(empty_dsn: str) -> None:
+    with sqlalchemy_engine(empty_dsn).begin() as session:
+        session.exec_driver_sql("CREATE EXTENSION postgis")
+        command.upgrade(alembic_config(session), "0021")
+        session.exec_driver_sql(
+            """
+            INSERT INTO tunnel.tunnel (name, srid, alignment) VALUES ('t', 25830, 'SRID=25830;LINESTRINGZ(0 0 0, 0 9 0)');
+            INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)
+            SELECT t.id, 'a', '2024-05-04', 'none', 'mobile' FROM tunnel.tunnel t;
+            INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean,
+                                        drop_max, image_share, unrolled, map, surface, kind, judged, review)
+            SELECT s.id, 0, 1, 2, 0, 1, 12, 1, 3, 4, 1, ST_MakeEnvelope(1, 0, 2, 1), ST_MakeEnvelope(1, 0, 2, 1, 25830),
+                   ST_Force3D(ST_MakeEnvelope(1, 0, 2, 1, 25830)), k.kind, k.judged, k.review
+              FROM tunnel.survey s, (VALUES ('leak', NULL, 'open'), ('leak', 'joint', 'open'), ('dark', 'leak', 'confirmed'),
+                                            ('joint', NULL, 'rejected')) AS k (kind, judged, review);
+            INSERT INTO tunnel.region (survey_id, kind, geom)
+            SELECT s.id, 'dry', ST_MakeEnvelope(5, 0, 6, 1) FROM tunnel.survey s;
+            """
+        )
+    with open_connection(empty_dsn) as connection:
+        install(connection, STAGES)
+        rows = connection.execute(
+            "SELECT kind, found, wet, origin, state FROM tunnel_api.lining_finding ORDER BY id"
+        ).fetchall()
+        assert rows == [
+            ("leak", "leak", True, "detected", "open"),
+            ("joint", "leak", False, "detected", "open"),
+            ("leak", "dark", True, "detected", "confirmed"),
+            ("joint", "joint", False, "detected", "rejected"),
+        ]
+        assert connection.execute("SELECT count(*) FROM tunnel_api.leak WHERE counted").fetchone() == (2,)
+        assert connection.execute("SELECT leaks, reason FROM tunnel_api.dry_region").fetchall() == [(0, None)]
+        assert connection.execute("SELECT count(*) FROM tunnel_api.finding_kind").fetchone() == (13,)
+
+
 def test_a_second_install_changes_nothing(dsn: str) -> None:
     before = dump(dsn, "--schema-only")
     with open_connection(dsn) as connection:
@@ -291,7 +326,7 @@ def test_a_deleted_survey_takes_its_rows_along(example: str, conn: psycopg.Conne
         "SELECT relname FROM pg_class WHERE relnamespace = 'tunnel'::regnamespace AND relkind IN ('r', 'p')"
     ).fetchall()
     for (table,) in tables:
-        if table not in ("alembic_version", "stage", "feature_list"):  # of no survey
+        if table not in ("alembic_version", "stage", "feature_list", "finding_kind", "severity"):  # of no survey
             count = conn.execute(sql.SQL("SELECT count(*) FROM {}").format(sql.Identifier("tunnel", table))).fetchone()
             assert count == (0,), table
 

@@ -345,6 +345,45 @@ def test_dry_and_homogeneous_regions_that_the_user_drew(detected: psycopg.Connec
     assert shapely.union_all(list(before.values())).symmetric_difference(shapely.union_all(list(after.values()))).area < 0.05
 
 
+def test_what_people_drew_is_measured_and_stays(detected: psycopg.Connection) -> None:
+    conn = detected
+    key, drop, held = conn.execute(
+        "SELECT id, drop_mean, image_share FROM tunnel_api.leak WHERE counted AND area > 0.2 ORDER BY area DESC LIMIT 1"
+    ).fetchone()
+    conn.execute(
+        "UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, -0.05), review = 'confirmed' WHERE id = %s", [key]
+    )
+    (dry,) = conn.execute(
+        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, geom) "
+        "SELECT %s, 'spall', ST_Translate(geom, 0, 0.01) FROM tunnel_api.finding_unrolled WHERE id = %s RETURNING id",
+        [NAME, key],
+    ).fetchone()
+    (line,) = conn.execute(
+        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, width, geom) SELECT %s, 'crack', 0.002, "
+        "ST_MakeLine(ST_Point(chainage_from, arc_from), ST_Point(chainage_to, arc_to)) FROM tunnel_api.leak WHERE id = %s "
+        "RETURNING id",
+        [NAME, key],
+    ).fetchone()
+    conn.commit()
+    kept = "SELECT id, unrolled, review, origin FROM tunnel_api.lining_finding WHERE id = ANY (%s) ORDER BY id"
+    before = conn.execute(kept, [[key, dry, line]]).fetchall()
+    number = conn.execute("SELECT count(*), sum(area) FROM tunnel_api.leak WHERE counted").fetchone()
+    conn.rollback()
+    command("run", NAME, "--from", "sections")
+    assert conn.execute(kept, [[key, dry, line]]).fetchall() == before
+    figures = "SELECT drop_mean, drop_max, image_share, also_detected FROM tunnel_api.lining_finding WHERE id = %s"
+    mean, most, share, also = conn.execute(figures, [key]).fetchone()
+    assert mean == pytest.approx(drop, rel=0.15)
+    assert most > mean
+    assert share == pytest.approx(held, abs=0.1)
+    assert also
+    assert conn.execute(figures, [dry]).fetchone()[0] == pytest.approx(mean, rel=0.2)
+    assert 0 < conn.execute(figures, [line]).fetchone()[2] <= 1
+    assert conn.execute("SELECT count(*), sum(area) FROM tunnel_api.leak WHERE counted").fetchone() == (
+        number[0], pytest.approx(number[1], rel=1e-3),
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("kind", ["reflectance", "linear"])
 def test_other_kinds_of_intensity(conn: psycopg.Connection, scan: tuple[Simulation, Path], kind: str) -> None:
     prepare(scan[1], "profiler", kind)

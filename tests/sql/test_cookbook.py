@@ -16,7 +16,7 @@ import shapely
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from psycopg.rows import dict_row
-from support.cookbook_survey import CONFIRMED, GONE, MOVED, NICHE, OLD, POINTS, SPARSE, prepare
+from support.cookbook_survey import CONFIRMED, GONE, MOVED, NICHE, OLD, POINTS, SPARSE, draw_findings, prepare
 from support.example_objects import FLOOR, HALF_FLOOR, SPHERES, THINGS, beside
 from support.example_survey import GIRTH, NAME, SEEN_FROM, WET, example_surface
 
@@ -26,6 +26,9 @@ from tunneldb.database import connect
 PAGE = Path(__file__).parents[2] / "docs" / "cookbook.md"
 QUESTION = re.compile(r"^### (.+?)$(?:(?!^#).)*?^```sql\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 QUESTIONS = dict(QUESTION.findall(PAGE.read_text("utf-8")))
+OF_FINDINGS = dict(QUESTION.findall(PAGE.read_text("utf-8").partition("\n## Findings\n")[2]))
+"""Those that are asked after findings were drawn."""
+
 PLACE = (12345.0, 2.0, 0.1)
 """Chainage, arc and offset of the point that is asked about in place of the page's, m."""
 
@@ -73,6 +76,7 @@ class Asked:
     answers: dict[str, Rows]
     anomalies: list[Leak]
     who: str
+    drawn: dict[str, int]
 
     @property
     def leaks(self) -> list[Leak]:
@@ -99,13 +103,16 @@ def asked(server_dsn: str, example_template: str) -> Iterator[Asked]:
     with connect(make_conninfo(server_dsn, dbname=database)) as conn:
         prepare(conn, NAME)
         conn.commit()
-        answers = {title: put(conn, query) for title, query in QUESTIONS.items()}
+        answers = {title: put(conn, query) for title, query in QUESTIONS.items() if title not in OF_FINDINGS}
         rows = conn.execute(
             "SELECT id, kind, detected, review, area, confidence, ST_AsBinary(unrolled), ST_AsBinary(map), ST_AsBinary(surface)"
             " FROM tunnel.anomaly ORDER BY chainage_from"
         ).fetchall()
         anomalies = [Leak(*row[:6], *(shapely.from_wkb(bytes(wkb)) for wkb in row[6:])) for row in rows]
-        yield Asked(answers, anomalies, conn.execute(WHO).fetchone()[0])
+        drawn = draw_findings(conn, NAME)
+        conn.commit()
+        answers |= {title: put(conn, query) for title, query in OF_FINDINGS.items()}
+        yield Asked(answers, anomalies, conn.execute(WHO).fetchone()[0], drawn)
     with psycopg.connect(server_dsn, autocommit=True) as admin:
         admin.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(sql.Identifier(database)))
 
@@ -415,6 +422,71 @@ def spheres(rows: Rows, a: Asked) -> None:
         close(row, 1, apart_mm=0.2 * np.sqrt(3))
 
 
+def kinds(rows: Rows, a: Asked) -> None:
+    found = {(row["kind"], row["origin"]): row for row in rows}
+    cracks = found["crack", "drawn"]
+    assert (cracks["counted"], cracks["confirmed"]) == (3, 3)
+    close(cracks, 3, area_m2=3 * 0.002 + 4 * 0.001)
+    assert float(cracks["length_m"]) == pytest.approx(7.5, rel=0.01)
+    assert found["spall", "merged"]["counted"] == 1
+    close(found["spall", "merged"], area_m2=1.25)
+    assert found["spall", "drawn"]["counted"] == 0
+    assert found["leak", "detected"]["counted"] == len(a.wet) - 2  # one is drawn over, one in a dry region
+
+
+def cracks(rows: Rows, a: Asked) -> None:
+    assert ids(rows) == [a.drawn["longer crack"], a.drawn["long crack"]]
+    assert [row["severity_label"] for row in rows] == ["critical", "moderate"]
+    assert [float(row["width_mm"]) for row in rows] == [1.0, 2.0]
+    assert [float(row["length_m"]) for row in rows] == pytest.approx([4.0, 3.0], rel=0.01)
+
+
+def without_photo(rows: Rows, a: Asked) -> None:
+    assert ids(rows) == [a.drawn["short crack"], a.drawn["longer crack"], a.drawn["bolt"]]
+
+
+def drawers(rows: Rows, a: Asked) -> None:
+    assert [(row["drawn_by"], row["origin"], row["findings"]) for row in rows] == [(a.who, "drawn", 6), (a.who, "merged", 1)]
+
+
+def not_counted(rows: Rows, a: Asked) -> None:
+    said = {row["id"]: (row["state"], row["stands_for_it"], row["dry_region_id"]) for row in rows}
+    assert said[a.drawn["other spall"]] == ("merged", a.drawn["spall"], None)
+    assert said[a.drawn["leak"]] == ("same", a.drawn["leak over it"], None)
+    assert said[a.drawn["dry leak"]] == ("dry", None, a.drawn["region"])
+    assert said[a.at(GONE)] == ("gone", None, None)
+    rejected = {leak.id for leak in a.anomalies if leak.review == "rejected"}
+    assert {key for key, (state, *_) in said.items() if state == "rejected"} == rejected != set()
+
+
+def found_too(rows: Rows, a: Asked) -> None:
+    assert [(row["id"], row["detected_as"]) for row in rows] == [(a.drawn["leak over it"], [a.drawn["leak"]])]
+
+
+def to_measure(rows: Rows, a: Asked) -> None:
+    names = ("long crack", "longer crack", "short crack", "bolt", "spall", "leak over it")
+    assert ids(rows) == [a.drawn[name] for name in names]
+
+
+def dry_regions(rows: Rows, a: Asked) -> None:
+    (row,) = [row for row in rows if row["id"] == a.drawn["region"]]
+    assert (row["reason"], row["drawn_by"], row["leaks"], row["leak_ids"]) == ("seen dry", a.who, 1, [a.drawn["dry leak"]])
+    leak = next(leak for leak in a.anomalies if leak.id == a.drawn["dry leak"])
+    close(row, 1, area_m2=leak.unrolled.buffer(0.1).envelope.area)
+
+
+def conditions(rows: Rows, a: Asked) -> None:
+    said = {row["element"]: [float(row[f"cs{n}"]) for n in range(1, 5)] for row in rows}
+    assert said["cracks"] == pytest.approx([0, 3.0, 0, 4.5], rel=0.01)
+    assert said["bolts"] == [0, 0, 1, 0]
+    assert said["liner"][2] == pytest.approx(1.25, abs=0.01)
+
+
+def before_redrawn(rows: Rows, a: Asked) -> None:
+    assert [(row["who"], row["became"]) for row in rows] == [(a.who, None), (a.who, "merged")]
+    assert all(row["outline_before"].startswith("POLYGON((") for row in rows)
+
+
 CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which leaks over 0.2 m² are there between two chainages, and on which segment?": over,
     "Which drip from above?": above,
@@ -454,6 +526,16 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "What stands in the tunnel?": tall,
     "How high is the ground, and how wide?": ground,
     "How well do the scans agree on a target sphere?": spheres,
+    "How many findings of each kind are there, and how did they come about?": kinds,
+    "Which cracks are longer than a metre, the most severe first?": cracks,
+    "Which severe findings have no photo?": without_photo,
+    "Who drew what, and when?": drawers,
+    "Which findings do not count, and what stands for them?": not_counted,
+    "What did detection find of what was drawn?": found_too,
+    "Which findings wait to be measured?": to_measure,
+    "What did dry regions take away?": dry_regions,
+    "How much of each element is in which condition?": conditions,
+    "How was a finding before it was redrawn?": before_redrawn,
 }
 
 

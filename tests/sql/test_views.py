@@ -104,6 +104,7 @@ def test_every_view_begins_with_a_stable_integer_key(
     conn.execute(
         "SELECT tunnel_api.learned_apply(id, '1', 'recalibrated', '{}', '{}', '{}', 0.7, 0.6, NULL) FROM tunnel.tunnel"
     )
+    conn.execute("INSERT INTO tunnel.photo (anomaly_id, path) SELECT min(id), 'p.jpg' FROM tunnel.anomaly")
     save_example_structures(conn, "demo-2024")
     save_example_registration(conn, "demo-2024")
     for view in views(conn):

@@ -75,3 +75,45 @@ def _points(conn: psycopg.Connection, survey_id: int) -> None:
             (start, classes),
         )
     conn.execute("SELECT tunnel_api.partition_swap(1, 12)")
+
+
+def draw_findings(conn: psycopg.Connection, survey: str) -> dict[str, int]:
+    """Draw findings, draw over one leak and put a dry region over another; their ids, and that of the region."""
+
+    def drawn(kind: str, shape: str, severity: int | None, width: float | None = None) -> int:
+        row = conn.execute(
+            "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width, geom) "
+            "VALUES (%s, %s, %s, %s, %s) RETURNING id",
+            (survey, kind, severity, width, shape),
+        ).fetchone()
+        assert row is not None
+        return int(row[0])
+
+    made = {
+        "long crack": drawn("crack", "LINESTRING(12350 0, 12353 0)", 2, 0.002),
+        "longer crack": drawn("crack", "LINESTRING(12360 0, 12364 0)", 4, 0.001),
+        "short crack": drawn("crack", "LINESTRING(12354 0, 12354.5 0)", 4),
+        "bolt": drawn("missing_bolt", "POINT(12370 -1)", 3),
+        "spall": drawn("spall", "POLYGON((12380 0, 12381 0, 12381 1, 12380 1, 12380 0))", 3),
+        "other spall": drawn("spall", "POLYGON((12380.5 1, 12381 1, 12381 1.5, 12380.5 1.5, 12380.5 1))", None),
+    }
+    conn.execute("INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (%s, 'spall.jpg')", (made["spall"],))
+    conn.execute("SELECT tunnel_api.finding_merge(%s)", ([made["spall"], made["other spall"]],))
+    place = "FROM tunnel.anomaly WHERE kind = 'leak' AND %s BETWEEN chainage_from AND chainage_to"
+    made["leak"], made["dry leak"] = (
+        conn.execute(f"SELECT id {place}".encode(), (at,)).fetchone()[0]  # type: ignore[index]
+        for at in (OLD, COPIED)
+    )
+    made["leak over it"] = conn.execute(  # type: ignore[index]
+        "INSERT INTO tunnel_api.finding_unrolled (survey_id, kind, geom) "
+        "SELECT survey_id, 'leak', ST_Buffer(unrolled, 0.1) FROM tunnel.anomaly WHERE id = %s RETURNING id",
+        (made["leak"],),
+    ).fetchone()[0]
+    conn.execute("UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, 0.1) WHERE id = %s", (made["leak over it"],))
+    made["region"] = conn.execute(  # type: ignore[index]
+        "INSERT INTO tunnel_api.region (survey_id, kind, reason, geom) "
+        "SELECT survey_id, 'dry', 'seen dry', ST_Envelope(ST_Buffer(unrolled, 0.1)) FROM tunnel.anomaly "
+        "WHERE id = %s RETURNING id",
+        (made["dry leak"],),
+    ).fetchone()[0]
+    return made

@@ -38,6 +38,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "worker": ("tunneldb.cli.worker:worker", "Do what batches ask for, also of other machines."),
     "stop": ("tunneldb.cli.worker:stop", "Ask all workers to end what they are at and leave."),
     "leaks": ("tunneldb.cli.leaks:leaks", "List or export the leaks that were found."),
+    "findings": ("tunneldb.cli.findings:findings", "List, export or import findings of all kinds, detected and drawn."),
     "learn": ("tunneldb.cli.learn:learn", "Learn from reviews how far evidence of leaks holds in a tunnel."),
     "evaluate": ("tunneldb.cli.evaluate:evaluate", "Hold the leaks that were found against true ones."),
     "members": ("tunneldb.cli.members:members", "Find the members of structures, and what differs from its own surface."),

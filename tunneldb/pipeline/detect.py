@@ -14,6 +14,7 @@ from tunneldb.anomalies.background.contrast import contrast_image
 from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
 from tunneldb.anomalies.coverage import Coverage, measure_coverage
 from tunneldb.anomalies.detect import Detection, find_anomalies
+from tunneldb.anomalies.measure import Measurement, measure_outline
 from tunneldb.anomalies.sparse import least_density, leave_out_sparse
 from tunneldb.arrays import UInt8
 from tunneldb.errors import UserError
@@ -35,6 +36,7 @@ from tunneldb.raster.profiles import find_gaps
 from tunneldb.raster.rasterize import Counts, rasterize
 from tunneldb.store.anomalies import save_anomalies
 from tunneldb.store.coverage import seen_share
+from tunneldb.store.findings import Drawn, load_drawn, save_measured
 from tunneldb.store.images import (
     ImageStore,
     drop_coverage,
@@ -81,6 +83,8 @@ class DetectionInputs:
         Regions that the user drew.
     judge : InForce
         The model of evidence, with what was learned for the tunnel.
+    drawn : list of Drawn
+        Findings whose outlines people drew, to be measured.
     """
 
     survey: str
@@ -92,6 +96,7 @@ class DetectionInputs:
     homogeneous: list[Polygon]
     dry: list[Polygon]
     judge: InForce
+    drawn: list[Drawn]
 
 
 @dataclass(frozen=True)
@@ -112,6 +117,8 @@ class DetectionResult:
     dry_levels : three DryLevel
         Dry lining points, raw and corrected by Lambert's law and Oren–Nayar.
     coverage : Coverage
+    drawn : list of Measurement
+        What the image shows of the outlines that people drew.
     """
 
     counts: Counts
@@ -121,6 +128,7 @@ class DetectionResult:
     anomalies: Detection
     dry_levels: tuple[DryLevel, DryLevel, DryLevel]
     coverage: Coverage
+    drawn: list[Measurement]
 
 
 def detect(
@@ -187,6 +195,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
         load_regions(conn, survey, km, "homogeneous"),
         load_regions(conn, survey, km, "dry"),
         model_in_force(conn, survey.tunnel_id),
+        load_drawn(conn, survey, km),
     )
 
 
@@ -234,6 +243,7 @@ def compute_detection(
         found,
         dry_sigma(view, contrast, found, roughness, inputs.dry),
         measure_coverage(contrast.state, found.wet, inputs.grid, found.size),
+        [measure_outline(contrast, finding.outline) for finding in inputs.drawn] if background.count else [],
     )
 
 
@@ -262,6 +272,8 @@ def _save(
     save_radiometry(conn, survey, km, roughness, result.background, found, result.dry_levels)
     save_coverage(conn, survey, km, result.coverage)
     matched = save_anomalies(conn, survey, km, surface, found.anomalies, found.cut, min_area, inputs.judge.model)
+    if result.background.count:
+        save_measured(conn, inputs.drawn, result.drawn)
     return {
         **result.counts,
         "model": inputs.judge.model.version,

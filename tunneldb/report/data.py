@@ -40,11 +40,11 @@ class Leak:
         Hours, 12 is the crown.
     area, inside : float
         Its area, and that of its part in the stretch reported, m².
-    drop_mean, drop_max : float
+    drop_mean, drop_max : float or None
         dB below dry lining.
     contrast, confidence : float or None
         Drop in standard deviations of dry lining; 0 to 1.
-    image_share : float
+    image_share : float or None
         Share of it on which the image holds measurements, 0 to 1.
     review : str
         open, confirmed or rejected.
@@ -65,11 +65,11 @@ class Leak:
     clock: float
     area: float
     inside: float
-    drop_mean: float
-    drop_max: float
+    drop_mean: float | None
+    drop_max: float | None
     contrast: float | None
     confidence: float | None
-    image_share: float
+    image_share: float | None
     review: str
     reviewed_by: str | None
     reviewed_at: dt.datetime | None
@@ -256,7 +256,7 @@ def read_radiometry(conn: psycopg.Connection[Any], survey: Survey, low: float, h
 def read_others(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> dict[str, int]:
     """Count what is dark but no leak: joints and other dark spots."""
     rows = conn.execute(
-        "SELECT kind, count(*) FROM tunnel_api.anomaly WHERE survey_id = %s AND detected AND kind <> 'leak'"
+        "SELECT kind, count(*) FROM tunnel_api.anomaly WHERE survey_id = %s AND detected AND NOT wet"
         " AND chainage_to > %s AND chainage_from < %s GROUP BY kind",
         [survey.id, low, high],
     ).fetchall()

@@ -20,6 +20,7 @@ from tunneldb.anomalies.regions import Region
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.anomaly_parts import Border, Cluster, link, replace_parts
+from tunneldb.store.findings import settle_findings
 from tunneldb.store.learned import feature_list
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
@@ -56,13 +57,15 @@ class Matched:
 class _Earlier:
     """An anomaly of an earlier run, and whether it may be a part of one over an end of the kilometre or the other way round.
 
-    What an inspector says of its kind counts as a review; a leak is what he takes for one, else what detection took for one.
+    Whatever an inspector says of it counts as a review; a leak is what he takes for one, else what detection took for one. One
+    that a dry region takes away is not found again for that, and stays.
     """
 
     id: int
     km: int
     reviewed: bool
     leak: bool
+    dry: bool
     outline: Polygon
     at_end: bool
 
@@ -81,7 +84,9 @@ def save_anomalies(
 
     An anomaly is found again, be it of another kind now, when it and an earlier one overlap best with each other, by at least
     0.3 of their union; over an end of the kilometre, when it and an earlier one share 0.3 of the smaller, so that a leak of
-    which only a part was known remains the same one. Of those not found again the reviewed ones stay, marked as not detected.
+    which only a part was known remains the same one. Of those not found again the reviewed ones stay, marked as not detected,
+    and those that a dry region takes away. What people drew, redrew, split or merged is left alone; what is found of it counts
+    with that once (tunnel_api.link_findings).
 
     Parameters
     ----------
@@ -123,9 +128,11 @@ def save_anomalies(
         _write(conn, survey, values, left[again[number]] if number in again else None)
     # One of a neighbour that was given up before stays as it is.
     lost = [one for k, one in enumerate(left) if k not in again.values() and (one.km == km or one.id in border.anomalies)]
+    lost = [one for one in lost if not one.dry]
     kept, gone = [one for one in lost if one.reviewed], [one for one in lost if not one.reviewed]
     conn.execute("UPDATE tunnel.anomaly SET detected = false WHERE id = ANY (%s)", ([one.id for one in kept],))
     conn.execute("DELETE FROM tunnel.anomaly WHERE id = ANY (%s)", ([one.id for one in gone],))
+    settle_findings(conn, survey, km)
     known = [(anomaly, number in again) for number, anomaly in enumerate(found)]
     known += [(anomaly, number in taken) for number, (_, anomaly) in enumerate(over)]
     leaks = [before for anomaly, before in known if anomaly.verdict.kind == "leak"]
@@ -147,10 +154,11 @@ def _earlier(conn: psycopg.Connection[Any], survey: Survey, km: int, border: Bor
     """
     rows = conn.execute(
         """
-        SELECT l.id, l.km, l.review <> 'open' OR l.judged IS NOT NULL, coalesce(l.judged, l.kind) = 'leak',
-               public.ST_AsBinary(l.unrolled), l.id = ANY (%(over)s)
+        SELECT l.id, l.km, l.review <> 'open' OR l.judged IS NOT NULL OR l.merged_into IS NOT NULL OR l.severity IS NOT NULL
+                   OR l.remark IS NOT NULL OR EXISTS (SELECT FROM tunnel.photo p WHERE p.anomaly_id = l.id),
+               l.wet, l.dry_region_id IS NOT NULL AND l.review = 'open', public.ST_AsBinary(l.unrolled), l.id = ANY (%(over)s)
           FROM tunnel.anomaly l
-         WHERE l.survey_id = %(survey)s
+         WHERE l.survey_id = %(survey)s AND l.origin = 'detected'
            AND (l.id = ANY (%(over)s)
                 OR (l.km BETWEEN %(first)s AND %(last)s AND (l.km = %(km)s OR NOT l.detected)
                     AND NOT EXISTS (SELECT FROM tunnel.anomaly_part p WHERE p.survey_id = l.survey_id AND p.anomaly_id = l.id)))
@@ -160,9 +168,9 @@ def _earlier(conn: psycopg.Connection[Any], survey: Survey, km: int, border: Bor
         {"survey": survey.id, "km": km, "first": border.first, "last": border.last, "over": sorted(border.anomalies)},
     ).fetchall()
     found = []
-    for key, of, reviewed, leak, wkb, over in rows:
+    for key, of, reviewed, leak, dry, wkb, over in rows:
         outline = shapely.from_wkb(bytes(wkb))
-        found.append(_Earlier(key, of, reviewed, leak, outline, over or _near_end(outline, km, border)))
+        found.append(_Earlier(key, of, reviewed, leak, dry, outline, over or _near_end(outline, km, border)))
     return found
 
 

@@ -26,7 +26,7 @@ class Work:
     anomalies : int
         Leaks and other dark spots there.
     reviewed : int
-        Of them, those that somebody has reviewed.
+        Of them, those that somebody has reviewed or drawn.
     edited : int
         Vertices of the axis that somebody has moved.
     """
@@ -42,7 +42,7 @@ def work_in(conn: psycopg.Connection[Any], survey: Survey, kms: list[int]) -> Wo
         """
         SELECT (SELECT count(*) FROM tunnel.anomaly l WHERE l.survey_id = %(survey)s AND l.km = ANY (%(kms)s)),
                (SELECT count(*) FROM tunnel.anomaly l WHERE l.survey_id = %(survey)s AND l.km = ANY (%(kms)s)
-                   AND (l.review <> 'open' OR l.judged IS NOT NULL)),
+                   AND (l.review <> 'open' OR l.judged IS NOT NULL OR l.origin <> 'detected')),
                (SELECT count(*) FROM tunnel.axis_vertex v WHERE v.survey_id = %(survey)s AND v.km = ANY (%(kms)s)
                    AND v.edited_at IS NOT NULL)
         """,

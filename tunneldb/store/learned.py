@@ -110,18 +110,23 @@ def feature_list(conn: psycopg.Connection[Any]) -> int:
 
 
 def load_measured(conn: psycopg.Connection[Any], tunnels: Iterable[int]) -> Measured:
-    """Read the anomalies of all surveys of some tunnels, in order of tunnel, survey and chainage."""
+    """Read the anomalies of all surveys of some tunnels, in order of tunnel, survey and chainage.
+
+    What stands for one, as redrawn or merged, says of it what was said of that. What people drew has no features.
+    """
     orders = {key: _order(names) for key, names in conn.execute("SELECT id, names FROM tunnel.feature_list")}
     rows = conn.execute(
         """
         SELECT a.id, a.survey_id, s.tunnel_id, (a.chainage_from + a.chainage_to) / 2, a.detected,
                a.kind = 'joint' AND 'sparse' = ANY (a.reasons),
-               CASE WHEN a.review = 'rejected' THEN 'rejected'
+               CASE WHEN r.review = 'rejected' THEN 'rejected'
                     WHEN a.judged <> a.kind THEN 'renamed to ' || a.judged
-                    WHEN a.review = 'confirmed' OR a.judged = a.kind THEN 'confirmed ' || a.kind ELSE '' END,
-               a.review <> 'rejected' AND coalesce(a.judged, a.kind) = 'leak', a.feature_list_id, a.features
+                    WHEN r.review = 'confirmed' OR a.judged = a.kind THEN 'confirmed ' || a.kind ELSE '' END,
+               r.review <> 'rejected' AND a.wet, a.feature_list_id, a.features
           FROM tunnel.anomaly a
           JOIN tunnel.survey s ON s.id = a.survey_id
+          LEFT JOIN tunnel.anomaly h ON h.id = coalesce(a.merged_into, a.same_as) AND h.origin <> 'detected'
+         CROSS JOIN LATERAL (SELECT CASE a.review WHEN 'open' THEN coalesce(h.review, a.review) ELSE a.review END AS review) r
          WHERE s.tunnel_id = ANY (%s)
          ORDER BY s.tunnel_id, s.id, a.chainage_from, a.id
         """,

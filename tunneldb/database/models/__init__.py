@@ -7,6 +7,7 @@ decibels, seconds, square metres, unless a comment says otherwise.
 from tunneldb.database.models.base import AUDIT_SCHEMA, SCHEMA, Base
 from tunneldb.database.models.catalog import AlignmentElement, Pose, Reference, Station, StationEquation, Survey, Tunnel
 from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
+from tunneldb.database.models.finding import FindingKind, Photo, Severity
 from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
 from tunneldb.database.models.ground import Cluster, Ground, Lining, TargetSphere
 from tunneldb.database.models.leak import (
@@ -40,6 +41,7 @@ __all__ = [
     "Face",
     "FeatureList",
     "FileKm",
+    "FindingKind",
     "Goal",
     "Ground",
     "Image",
@@ -48,6 +50,7 @@ __all__ = [
     "LearnedModel",
     "Lining",
     "Member",
+    "Photo",
     "Point",
     "Pose",
     "Radiometry",
@@ -60,6 +63,7 @@ __all__ = [
     "Section",
     "SectionClass",
     "Segment",
+    "Severity",
     "SonarPoint",
     "SonarScan",
     "Spot",

@@ -17,6 +17,7 @@ class Tunnel(Base):
     __tablename__ = "tunnel"
     __table_args__ = (
         CheckConstraint("spacing > 0", name="spacing"),
+        CheckConstraint("dry_region_limit >= 0", name="dry_region_limit"),
         {"comment": "A structure: its spatial reference, stationing and given axis"},
     )
 
@@ -27,6 +28,9 @@ class Tunnel(Base):
     )
     start_chainage: Mapped[float] = mapped_column(
         server_default=text("0"), comment="Chainage of the given axis's first vertex, m"
+    )
+    dry_region_limit: Mapped[float] = mapped_column(
+        server_default=text("50"), comment="Area above which a dry region must say why it is drawn, m²"
     )
     spacing: Mapped[float] = mapped_column(
         server_default=text("10"), comment="Distance between vertices of the averaged axis, m of chainage"

@@ -6,11 +6,15 @@ import datetime as dt
 from typing import Any
 
 from geoalchemy2 import WKBElement
-from sqlalchemy import BigInteger, Computed, ForeignKey, Identity, Index, Integer, Text, text
+from sqlalchemy import BigInteger, CheckConstraint, Computed, ForeignKey, Identity, Index, Integer, SmallInteger, Text, text
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
 from tunneldb.database.models.base import CLOCK, KM, NOW, SURVEY, Base, Floats, Reals, Review, geometry, one_of, parent
+from tunneldb.database.models.finding import FindingKind, Severity
+
+_SUMMED = ["kind", "judged", "review", "detected", "area", "wet", "aside"]
+"""Columns that sums over anomalies need: they come from an index alone."""
 
 
 class Radiometry(Base):
@@ -125,6 +129,7 @@ class Region(Base):
     geom: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="Region in the unrolled plane (chainage, arc), m")
     drawn_by: Mapped[str] = mapped_column(server_default=text("CURRENT_USER"), comment="Who drew it")
     drawn_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was drawn")
+    reason: Mapped[str | None] = mapped_column(comment="Why; a dry region larger than the tunnel's limit needs one")
 
 
 class Image(Base):
@@ -167,22 +172,30 @@ class Anomaly(Review, Base):
 
     __tablename__ = "anomaly"
     __table_args__ = (
-        one_of("kind", "leak", "joint", "dark"),
-        one_of("judged", "leak", "joint", "dark"),
         one_of("review", "open", "confirmed", "rejected"),
-        Index(None, "survey_id", "km", postgresql_include=["kind", "judged", "review", "detected", "area", "drop_max"]),
-        Index(
-            None, "survey_id", "chainage_from", "chainage_to",
-            postgresql_include=["id", "kind", "judged", "review", "detected", "area"],
-        ),
+        one_of("origin", "detected", "drawn", "redrawn", "split", "merged"),
+        CheckConstraint("width > 0", name="width"),
+        CheckConstraint("merged_into <> id AND same_as <> id", name="other"),
+        Index(None, "survey_id", "km", postgresql_include=[*_SUMMED, "drop_max"]),
+        Index(None, "survey_id", "chainage_from", "chainage_to", postgresql_include=["id", *_SUMMED]),
         Index("anomaly_length_idx", "survey_id", text("(chainage_to - chainage_from)")),
         Index(None, "survey_id", "area"),
         Index(None, "survey_id", "created_at"),
         Index("anomaly_gone_idx", "survey_id", postgresql_where=text("NOT detected")),
+        Index("anomaly_kind_idx", "survey_id", text("COALESCE(judged, kind)")),
+        Index(None, "survey_id", "severity", postgresql_where=text("severity IS NOT NULL")),
+        Index(
+            "anomaly_uncounted_idx", "survey_id", postgresql_where=text("NOT (detected AND review <> 'rejected' AND NOT aside)")
+        ),
+        Index("anomaly_by_hand_idx", "survey_id", "chainage_from", postgresql_where=text("origin <> 'detected'")),
+        Index(None, "merged_into"),
+        Index(None, "same_as"),
+        Index(None, "parent_id"),
+        Index(None, "dry_region_id"),
         Index(None, "unrolled", postgresql_using="gist"),
         Index(None, "map", postgresql_using="gist"),
-        {"comment": "What is darker than dry lining: leaks, joints and other dark spots, in three geometries"},
-    )  # fmt: skip
+        {"comment": "Findings: leaks, joints and dark spots that were detected, and what people drew, in three geometries"},
+    )
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
@@ -195,7 +208,9 @@ class Anomaly(Review, Base):
         comment="Clock position of its middle, hours: 12 is the crown, 3 is right looking up-chainage"
     )
     kind: Mapped[str] = mapped_column(
-        server_default=text("'leak'"), comment="What detection takes it for: leak, joint or dark (dark but dry)"
+        ForeignKey(FindingKind.code),
+        server_default=text("'leak'"),
+        comment="What detection takes it for: leak, joint or dark (dark but dry); of what was drawn, what it was drawn as",
     )
     reasons: Mapped[list[str]] = mapped_column(
         ARRAY(Text), server_default=text("'{}'"), comment="Why, such as thin, straight, gradual, rectangular, recess"
@@ -204,11 +219,15 @@ class Anomaly(Review, Base):
     contrast: Mapped[float | None] = mapped_column(
         comment="Mean drop in standard deviations of the dry lining about it; none from before"
     )
-    judged: Mapped[str | None] = mapped_column(comment="What an inspector takes it for, where he says so")
-    area: Mapped[float] = mapped_column(comment="Area on the surface, m²")
-    drop_mean: Mapped[float] = mapped_column(comment="Mean drop below dry lining, dB")
-    drop_max: Mapped[float] = mapped_column(comment="Greatest drop below dry lining, dB")
-    image_share: Mapped[float] = mapped_column(comment="Share of its pixels that hold measured data, 0 to 1")
+    judged: Mapped[str | None] = mapped_column(
+        ForeignKey(FindingKind.code), comment="What an inspector takes it for, where he says so"
+    )
+    area: Mapped[float] = mapped_column(comment="Area on the surface, m²; of a line length times width, of a point 0")
+    drop_mean: Mapped[float | None] = mapped_column(comment="Mean drop below dry lining, dB; none until measured")
+    drop_max: Mapped[float | None] = mapped_column(comment="Greatest drop below dry lining, dB; none until measured")
+    image_share: Mapped[float | None] = mapped_column(
+        comment="Share of its pixels that hold measured data, 0 to 1; none until measured"
+    )
     unrolled: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="In the unrolled plane (chainage, arc), m")
     map: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="On the map strip beside the axis, tunnel's SRID, m")
     surface: Mapped[WKBElement] = mapped_column(geometry("POLYGONZ"), comment="On the lining in space, tunnel's SRID, m")
@@ -220,6 +239,49 @@ class Anomaly(Review, Base):
         comment="What each reason adds to the logarithm of the odds that it is a leak"
     )
     model: Mapped[str | None] = mapped_column(comment="Version of the model of evidence that judged it")
+    origin: Mapped[str] = mapped_column(
+        server_default=text("'detected'"),
+        comment="How its outline came about: detected, drawn, redrawn, split or merged; detection changes the first alone",
+    )
+    by_hand: Mapped[bool] = mapped_column(
+        server_default=text("false"), comment="Whether it was drawn, or split off what was: never detected"
+    )
+    severity: Mapped[int | None] = mapped_column(SmallInteger, ForeignKey(Severity.id), comment="Severity, 1 to 4")
+    width: Mapped[float | None] = mapped_column(comment="Width of a line, such as a crack, m")
+    length: Mapped[float | None] = mapped_column(comment="Length of a line on the surface, m")
+    shape: Mapped[WKBElement | None] = mapped_column(
+        geometry("GEOMETRY"),
+        comment="The line or point that it is, if it is no polygon, in the unrolled plane, m",
+    )
+    shape_map: Mapped[WKBElement | None] = mapped_column(
+        geometry("GEOMETRY"), comment="The same on the map strip, tunnel's SRID, m"
+    )
+    shape_surface: Mapped[WKBElement | None] = mapped_column(
+        geometry("GEOMETRYZ"), comment="The same in space, tunnel's SRID, m"
+    )
+    drawn_by: Mapped[str | None] = mapped_column(comment="Who drew its outline last; none of what was detected")
+    drawn_at: Mapped[dt.datetime | None] = mapped_column(comment="When its outline was drawn last")
+    parent_id: Mapped[int | None] = mapped_column(
+        ForeignKey("tunnel.anomaly.id", ondelete="SET NULL"), comment="Finding that it was split off"
+    )
+    merged_into: Mapped[int | None] = mapped_column(
+        ForeignKey("tunnel.anomaly.id", ondelete="SET NULL"), comment="Finding that it is merged into: that one counts"
+    )
+    same_as: Mapped[int | None] = mapped_column(
+        ForeignKey("tunnel.anomaly.id", ondelete="SET NULL"), comment="Finding that is the same: that one counts"
+    )
+    dry_region_id: Mapped[int | None] = mapped_column(
+        ForeignKey(Region.id, ondelete="SET NULL"), comment="Dry region that it lies in: it does not count while it is open"
+    )
+    wet: Mapped[bool] = mapped_column(
+        server_default=text("true"), comment="Whether its kind counts as wet: kept by the database, from finding_kind"
+    )
+    aside: Mapped[bool] = mapped_column(
+        Computed(
+            "merged_into IS NOT NULL OR same_as IS NOT NULL OR (dry_region_id IS NOT NULL AND review = 'open')", persisted=True
+        ),
+        comment="Whether another stands for it, or a dry region takes it away",
+    )
 
 
 class LearnedModel(Base):

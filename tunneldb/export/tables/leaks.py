@@ -56,9 +56,9 @@ class Anomaly:
         Mean drop in standard deviations of the dry lining about it.
     area : float
         On the surface, m².
-    drop_mean, drop_max : float
+    drop_mean, drop_max : float or None
         dB below dry lining.
-    image_share : float
+    image_share : float or None
         0 to 1.
     review : str
         open, confirmed or rejected.
@@ -85,9 +85,9 @@ class Anomaly:
     reasons: list[str]
     contrast: float | None
     area: float
-    drop_mean: float
-    drop_max: float
-    image_share: float
+    drop_mean: float | None
+    drop_max: float | None
+    image_share: float | None
     review: str
     reviewed_by: str | None
     reviewed_at: dt.datetime | None
@@ -168,7 +168,8 @@ class LeakList:
 _CHOSEN = sql.SQL(
     "FROM tunnel_api.anomaly WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed') AND area >= %(min_area)s"
     " AND (%(min_confidence)s = 0 OR confidence >= %(min_confidence)s)"
-    " AND %(kind)s IN (kind, 'all') AND chainage_to > %(low)s AND chainage_from < %(high)s"
+    " AND CASE %(kind)s WHEN 'all' THEN true WHEN 'leak' THEN wet ELSE kind = %(kind)s END"
+    " AND chainage_to > %(low)s AND chainage_from < %(high)s"
     " AND (%(clock)s::float8[] IS NULL OR tunnel_api.clock_between(clock, (%(clock)s)[1], (%(clock)s)[2]))"
 )
 
@@ -258,9 +259,9 @@ _CELLS: dict[str, Callable[[Anomaly], str]] = {
     "conf.": lambda leak: "" if leak.confidence is None else f"{leak.confidence:.2f}",
     "contrast": lambda leak: "" if leak.contrast is None else f"{leak.contrast:.1f}",
     "area m²": lambda leak: f"{leak.area:.2f}",
-    "drop dB": lambda leak: f"{leak.drop_mean:.1f}",
-    "max dB": lambda leak: f"{leak.drop_max:.1f}",
-    "image": lambda leak: f"{100 * leak.image_share:.0f} %",
+    "drop dB": lambda leak: "" if leak.drop_mean is None else f"{leak.drop_mean:.1f}",
+    "max dB": lambda leak: "" if leak.drop_max is None else f"{leak.drop_max:.1f}",
+    "image": lambda leak: "" if leak.image_share is None else f"{100 * leak.image_share:.0f} %",
     "review": lambda leak: leak.review if leak.detected else f"{leak.review}, not found again",
     "by": lambda leak: leak.reviewed_by or "",
 }

@@ -168,7 +168,7 @@
     const facts = [
       ["Area", `${fixed(leak.area, 2)} m²`], ["Clock", leak.clockLabel], ["Arc, m", arc(leak)], ["Length", `${fixed(leak.length, 2)} m`],
       ["Drop, most", `${fixed(leak.drop, 1)}, ${fixed(leak.dropMax, 1)} dB`], ["Contrast", `${fixed(leak.contrast, 1)} σ`],
-      ["Confidence", fixed(leak.confidence, 2)], ["Measured", `${Math.round(100 * leak.imageShare)} % of it`],
+      ["Confidence", fixed(leak.confidence, 2)], ["Measured", leak.imageShare === null ? "not yet" : `${Math.round(100 * leak.imageShare)} % of it`],
     ];
     const list = make("dl", {}, ...facts.map(([term, value]) => make("div", {}, make("dt", {}, term), make("dd", {}, value))));
     if (leak.by) list.append(make("div", { class: "long" }, make("dt", {}, "Reviewed"), make("dd", {}, `${leak.review} by ${leak.by}, ${leak.at}`)));

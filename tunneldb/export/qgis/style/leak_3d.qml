@@ -375,6 +375,20 @@
         </config>
       </editWidget>
     </field>
+    <field name="wet" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="origin" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
   </fieldConfiguration>
   <aliases>
     <alias index="0" field="id" name="Leak"/>
@@ -407,6 +421,8 @@
     <alias index="27" field="counted" name="Counted in sums"/>
     <alias index="28" field="evidence" name="Evidence for (+) and against (-)"/>
     <alias index="29" field="model" name="Judged by model"/>
+    <alias index="30" field="wet" name="Wet"/>
+    <alias index="31" field="origin" name="Origin of the outline"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -439,6 +455,8 @@
     <field name="counted" editable="0"/>
     <field name="evidence" editable="0"/>
     <field name="model" editable="0"/>
+    <field name="wet" editable="0"/>
+    <field name="origin" editable="0"/>
   </editable>
   <editorlayout>tablayout</editorlayout>
   <attributeEditorForm>
@@ -472,6 +490,7 @@
       <attributeEditorField name="detected_at" index="26" showLabel="1"/>
       <attributeEditorField name="counted" index="27" showLabel="1"/>
       <attributeEditorField name="model" index="29" showLabel="1"/>
+      <attributeEditorField name="origin" index="31" showLabel="1"/>
       <attributeEditorField name="survey" index="2" showLabel="1"/>
     </attributeEditorContainer>
   </attributeEditorForm>

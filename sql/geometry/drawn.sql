@@ -1,0 +1,183 @@
+-- What is drawn on the lining, on the unrolled image or on the map strip, and all that follows from it. Needs roll, unroll and
+-- carry_over (geometry/shape.sql).
+
+-- A point of the map strip (tunnel's SRID) in the unrolled plane (chainage, arc; SRID 0), from a chainage near it: the plane of
+-- the axis through it is sought step by step, each of which leaves the arc's share of the radius of curvature. NULL where there
+-- is no axis. The inverse of map_point.
+CREATE OR REPLACE FUNCTION tunnel_api.unmap_point(survey_id int, point geometry, near float8)
+RETURNS geometry
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+AS $$
+DECLARE
+    at float8 := near;
+    axis geometry;
+    beside geometry;
+    right_x float8;
+    right_y float8;
+    along float8;
+BEGIN
+    FOR n IN 1..50 LOOP
+        axis := tunnel_api.map_point(survey_id, at, 0);
+        beside := tunnel_api.map_point(survey_id, at, 1);
+        IF axis IS NULL THEN
+            RETURN NULL;
+        END IF;
+        right_x := ST_X(beside) - ST_X(axis);
+        right_y := ST_Y(beside) - ST_Y(axis);
+        along := (ST_Y(point) - ST_Y(axis)) * right_x - (ST_X(point) - ST_X(axis)) * right_y;
+        IF abs(along) < 1e-7 THEN
+            RETURN ST_MakePoint(at, (ST_X(point) - ST_X(axis)) * right_x + (ST_Y(point) - ST_Y(axis)) * right_y);
+        END IF;
+        at := at + along;
+    END LOOP;
+    RETURN NULL;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.unmap_point(int, geometry, float8) IS
+'A point of the map strip (tunnel''s SRID) in the unrolled plane (chainage, arc; m), sought from a chainage near it; NULL where there is no axis. The inverse of map_point.';
+
+
+CREATE OR REPLACE FUNCTION tunnel_api.unmap_strip(survey_id int, shape geometry)
+RETURNS geometry
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+DECLARE
+    survey_key constant int := survey_id;
+    kind constant text := GeometryType(shape);
+    middle constant geometry := ST_Force2D(ST_PointOnSurface(shape));
+    near float8;
+    rings geometry[];
+BEGIN
+    IF kind NOT IN ('POINT', 'LINESTRING', 'POLYGON') THEN
+        RAISE EXCEPTION 'a point, a line or a polygon is needed, not a %', kind USING HINT = 'Use ST_Dump for the parts.';
+    END IF;
+    SELECT g.chainage_from + ST_LineLocatePoint(ST_Force2D(g.geom), middle) * (g.chainage_to - g.chainage_from) INTO near
+      FROM tunnel.segment g WHERE g.survey_id = survey_key ORDER BY ST_Distance(ST_Force2D(g.geom), middle) LIMIT 1;
+    SELECT array_agg(q.ring ORDER BY q.i) INTO rings
+    FROM (SELECT r.i, CASE WHEN bool_or(p.carried IS NULL) THEN NULL
+                           WHEN kind = 'POINT' THEN (array_agg(p.carried))[1]
+                           ELSE ST_MakeLine(p.carried ORDER BY p.j) END AS ring
+          FROM (SELECT d.path[1] AS i, ST_Segmentize(ST_ExteriorRing(d.geom), 1.0) AS line
+                FROM ST_DumpRings(CASE WHEN kind = 'POLYGON' THEN ST_Force2D(shape) END) d
+                UNION ALL
+                SELECT 0, ST_Segmentize(ST_Force2D(shape), 1.0) WHERE kind <> 'POLYGON') r
+          CROSS JOIN LATERAL (
+              SELECT coalesce(v.path[1], 1) AS j, tunnel_api.unmap_point(survey_key, v.geom, near) AS carried
+              FROM ST_DumpPoints(r.line) v) p
+          GROUP BY r.i) q;
+    IF rings IS NULL OR array_position(rings, NULL) IS NOT NULL THEN
+        RETURN NULL;
+    ELSIF kind = 'POLYGON' THEN
+        RETURN ST_MakePolygon(rings[1], rings[2:]);
+    END IF;
+    RETURN rings[1];
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.unmap_strip(int, geometry) IS
+'A point, line or polygon of the map strip (tunnel''s SRID) in the unrolled plane (chainage, arc; m; SRID 0), edges cut to pieces of a metre. NULL if any vertex lies beyond the ends of the axis. The inverse of map_strip.';
+
+
+-- Clock position of a place on the lining, as detection has it: of the ray from the axis to it, above 0 up to 12.
+CREATE OR REPLACE FUNCTION tunnel_api.clock_at(survey_id int, chainage float8, arc float8)
+RETURNS float8
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+DECLARE
+    place constant geometry := tunnel_api.roll(survey_id, chainage, arc, 0);
+    s tunnel.segment;
+    frame float8[];
+    hours float8;
+BEGIN
+    SELECT q.* INTO s FROM tunnel.segment q
+    WHERE q.survey_id = clock_at.survey_id AND q.chainage_from <= clock_at.chainage ORDER BY q.chainage_from DESC LIMIT 1;
+    IF place IS NULL OR s.n IS NULL THEN
+        RETURN NULL;
+    END IF;
+    frame := tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to,
+        (chainage - s.chainage_from) / (s.chainage_to - s.chainage_from));
+    hours := degrees(atan2(
+        (ST_X(place) - frame[1]) * frame[7] + (ST_Y(place) - frame[2]) * frame[8] + (ST_Z(place) - frame[3]) * frame[9],
+        (ST_X(place) - frame[1]) * frame[10] + (ST_Y(place) - frame[2]) * frame[11] + (ST_Z(place) - frame[3]) * frame[12])) / 30;
+    RETURN CASE WHEN hours > 0 THEN hours ELSE hours + 12 END;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.clock_at(int, float8, float8) IS
+'Clock position (hours above 0 up to 12: 12 is the crown, 3 right looking up-chainage) of a place of the unrolled plane (m); NULL off the tunnel.';
+
+
+-- A polygon drawn is its own outline; a line has one as wide as it is, at least a centimetre, and a point one of 5 cm about it, so
+-- that all can be found, drawn and exported as polygons. Area on the surface: that in the unrolled plane times the mean stretch
+-- of the surface against it (slope, curve) at 16 places.
+CREATE OR REPLACE FUNCTION tunnel_api.drawn_figures(
+    survey_id int, drawn geometry, width float8,
+    OUT km int, OUT chainage_from float8, OUT chainage_to float8, OUT arc_from float8, OUT arc_to float8, OUT clock float8,
+    OUT area float8, OUT length float8, OUT unrolled geometry, OUT map geometry, OUT surface geometry,
+    OUT shape geometry, OUT shape_map geometry, OUT shape_surface geometry)
+LANGUAGE plpgsql STABLE PARALLEL SAFE CALLED ON NULL INPUT
+SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+AS $$
+#variable_conflict use_variable
+DECLARE
+    given constant geometry := ST_SetSRID(ST_Force2D(
+        CASE WHEN ST_NumGeometries(drawn) = 1 THEN ST_GeometryN(drawn, 1) ELSE drawn END), 0);
+    kind constant text := GeometryType(given);
+    step constant float8 := 0.01;
+    middle geometry;
+BEGIN
+    IF given IS NULL OR ST_IsEmpty(given) THEN
+        RAISE EXCEPTION 'a finding needs a place: a polygon, a line or a point' USING ERRCODE = 'null_value_not_allowed';
+    ELSIF kind NOT IN ('POINT', 'LINESTRING', 'POLYGON') THEN
+        RAISE EXCEPTION 'a finding is one polygon, line or point, not a %', lower(kind) USING ERRCODE = 'invalid_parameter_value';
+    ELSIF NOT (ST_XMin(given) > '-Infinity' AND ST_XMax(given) < 'Infinity' AND ST_YMin(given) > '-Infinity'
+               AND ST_YMax(given) < 'Infinity') THEN
+        RAISE EXCEPTION 'the drawing has a coordinate that is no finite number' USING ERRCODE = 'invalid_parameter_value';
+    ELSIF kind = 'POLYGON' AND NOT ST_IsValid(given) OR kind = 'LINESTRING' AND ST_Length(given) = 0 THEN
+        RAISE EXCEPTION 'the drawing is not valid: %', CASE kind WHEN 'POLYGON' THEN ST_IsValidReason(given) ELSE 'no length' END
+            USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    unrolled := CASE kind WHEN 'POLYGON' THEN given
+                          WHEN 'LINESTRING' THEN ST_Buffer(given, greatest(width, 0.01) / 2, 'endcap=flat join=mitre')
+                          ELSE ST_Buffer(given, 0.05, 'quad_segs=4') END;
+    surface := tunnel_api.roll(survey_id, unrolled);
+    IF surface IS NULL AND kind <> 'POLYGON' THEN  -- at the very edge of the lining
+        unrolled := ST_Buffer(given, 1e-4, 'endcap=flat join=mitre');
+        surface := tunnel_api.roll(survey_id, unrolled);
+    END IF;
+    map := tunnel_api.map_strip(survey_id, unrolled);
+    IF surface IS NULL OR map IS NULL THEN
+        RAISE EXCEPTION 'the drawing reaches beyond the lining: it lies between chainage % and % m, arc % and % m',
+            round(ST_XMin(given)::numeric, 2), round(ST_XMax(given)::numeric, 2), round(ST_YMin(given)::numeric, 2),
+            round(ST_YMax(given)::numeric, 2) USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    middle := CASE kind WHEN 'POLYGON' THEN CASE WHEN ST_Contains(given, ST_Centroid(given)) THEN ST_Centroid(given)
+                                                   ELSE ST_PointOnSurface(given) END WHEN 'POINT' THEN given
+                        ELSE ST_LineInterpolatePoint(given, 0.5) END;
+    IF kind = 'POLYGON' THEN
+        SELECT ST_Area(given) * coalesce(avg(sqrt(
+                   ((ST_Y(l.p) - ST_Y(h.p)) * (ST_Z(c.p) - ST_Z(h.p)) - (ST_Z(l.p) - ST_Z(h.p)) * (ST_Y(c.p) - ST_Y(h.p))) ^ 2
+                   + ((ST_Z(l.p) - ST_Z(h.p)) * (ST_X(c.p) - ST_X(h.p)) - (ST_X(l.p) - ST_X(h.p)) * (ST_Z(c.p) - ST_Z(h.p))) ^ 2
+                   + ((ST_X(l.p) - ST_X(h.p)) * (ST_Y(c.p) - ST_Y(h.p)) - (ST_Y(l.p) - ST_Y(h.p)) * (ST_X(c.p) - ST_X(h.p))) ^ 2)
+                   / step ^ 2), 1) INTO area
+          FROM ST_Dump(ST_GeneratePoints(given, 16, 1)) d
+         CROSS JOIN LATERAL (SELECT tunnel_api.roll(survey_id, ST_X(d.geom), ST_Y(d.geom)) AS p) h
+         CROSS JOIN LATERAL (SELECT tunnel_api.roll(survey_id, ST_X(d.geom) + step, ST_Y(d.geom)) AS p) l
+         CROSS JOIN LATERAL (SELECT tunnel_api.roll(survey_id, ST_X(d.geom), ST_Y(d.geom) + step) AS p) c;
+    ELSE
+        shape := given;
+        shape_map := tunnel_api.map_strip(survey_id, given);
+        shape_surface := tunnel_api.roll(survey_id, given);
+        length := CASE kind WHEN 'LINESTRING' THEN ST_3DLength(shape_surface) END;
+        area := coalesce(length * width, 0);
+    END IF;
+    chainage_from := ST_XMin(unrolled);
+    chainage_to := ST_XMax(unrolled);
+    arc_from := ST_YMin(unrolled);
+    arc_to := ST_YMax(unrolled);
+    km := floor((chainage_from + chainage_to) / 2000);
+    clock := tunnel_api.clock_at(survey_id, ST_X(middle), ST_Y(middle));
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.drawn_figures(int, geometry, float8) IS
+'All that follows from a polygon, line (with its width, m) or point drawn in the unrolled plane (chainage, arc; m): kilometre and clock position of its middle, extent, area and length on the surface, outline and three geometries. An error if it is not valid or reaches beyond the lining.';

@@ -1,0 +1,247 @@
+-- Findings on the lining: what was detected and what people drew, of all kinds, with what became of each. Rows are those of
+-- tunnel.anomaly, so that ids are those of the views leak and anomaly; these show what is dark or wet and counts for itself, the
+-- views here all. Drawn and edited through finding_unrolled, finding_map and finding_3d (views/draw.sql).
+
+CREATE OR REPLACE VIEW tunnel_api.finding_kind AS
+SELECT k.id, k.code, k.label, k.geometries, k.wet, k.position, k.active FROM tunnel.finding_kind k;
+COMMENT ON VIEW tunnel_api.finding_kind IS
+    'Kinds of findings; operators add their own and change words, places and what is offered. One that was used is not deleted, but set inactive';
+COMMENT ON COLUMN tunnel_api.finding_kind.code IS 'Its code, in lower case';
+COMMENT ON COLUMN tunnel_api.finding_kind.label IS 'Its name, in the owner''s words';
+COMMENT ON COLUMN tunnel_api.finding_kind.geometries IS 'What it may be drawn as: polygon, line, point';
+COMMENT ON COLUMN tunnel_api.finding_kind.wet IS 'Whether it counts as wet in statistics and classes';
+COMMENT ON COLUMN tunnel_api.finding_kind.position IS 'Its place in lists';
+COMMENT ON COLUMN tunnel_api.finding_kind.active IS 'Whether it is offered for what is drawn';
+
+CREATE OR REPLACE VIEW tunnel_api.severity AS SELECT s.id::int AS id, s.label, s.text FROM tunnel.severity s;
+COMMENT ON VIEW tunnel_api.severity IS 'Words for the degrees of severity, 1 (the least) to 4; operators change them to their own';
+COMMENT ON COLUMN tunnel_api.severity.id IS '1, the least, to 4';
+COMMENT ON COLUMN tunnel_api.severity.label IS 'Its name, in the owner''s words';
+COMMENT ON COLUMN tunnel_api.severity.text IS 'What it means';
+
+CREATE OR REPLACE VIEW tunnel_api.lining_finding AS
+SELECT a.id, a.survey_id, s.name AS survey, a.km,
+       (SELECT min(g.n) FROM tunnel.segment g
+         WHERE g.survey_id = a.survey_id AND g.n BETWEEN m.near - 2 AND m.near + 2
+           AND m.chainage BETWEEN g.chainage_from AND g.chainage_to) AS segment,
+       a.chainage_from, a.chainage_to,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, m.chainage) l) AS label,
+       a.arc_from, a.arc_to, a.clock,
+       coalesce(a.judged, a.kind) AS kind, k.label AS kind_label, CASE WHEN NOT a.by_hand THEN a.kind END AS found, a.wet,
+       a.origin, a.by_hand, a.severity, v.label AS severity_label, a.width, a.length, a.area,
+       a.image_share IS NOT NULL AS measured, a.drop_mean, a.drop_max, a.image_share, a.contrast, a.confidence, a.reasons,
+       a.review, a.reviewed_by, a.reviewed_at, a.remark, a.drawn_by, a.drawn_at,
+       a.detected, a.created_at, CASE WHEN NOT a.by_hand THEN a.detected_at END AS detected_at,
+       o.ids IS NOT NULL AS also_detected, o.ids AS detected_as,
+       a.parent_id, a.merged_into, (SELECT array_agg(x.id ORDER BY x.id) FROM tunnel.anomaly x WHERE x.merged_into = a.id) AS merged,
+       a.same_as, a.dry_region_id,
+       a.detected AND a.review <> 'rejected' AND NOT a.aside AS counted,
+       CASE WHEN a.merged_into IS NOT NULL THEN 'merged' WHEN a.same_as IS NOT NULL THEN 'same'
+            WHEN a.review = 'rejected' THEN 'rejected' WHEN a.aside THEN 'dry' WHEN NOT a.detected THEN 'gone'
+            ELSE a.review END AS state,
+       (SELECT count(*) FROM tunnel.photo p WHERE p.anomaly_id = a.id) AS photos,
+       coalesce(a.shape, a.unrolled) AS unrolled,
+       coalesce(a.shape_map, a.map) AS map,
+       coalesce(a.shape_surface, a.surface) AS surface
+  FROM tunnel.anomaly a
+  JOIN tunnel.survey s ON s.id = a.survey_id
+  JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+  LEFT JOIN tunnel.finding_kind k ON k.code = coalesce(a.judged, a.kind)
+  LEFT JOIN tunnel.severity v ON v.id = a.severity
+  LEFT JOIN LATERAL (SELECT array_agg(x.id ORDER BY x.id) AS ids FROM tunnel.anomaly x
+                      WHERE x.same_as = a.id AND NOT x.by_hand AND x.detected) o ON true
+ CROSS JOIN LATERAL (SELECT (a.chainage_from + a.chainage_to) / 2 AS chainage,
+                            floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m;
+COMMENT ON VIEW tunnel_api.lining_finding IS
+    'Findings on the lining, detected and drawn, of all kinds and states, with their three geometries: polygons, lines and points as they are. To be edited through finding_unrolled, finding_map and finding_3d';
+
+-- The views of one geometry, and the comments on the columns of all four.
+DO $$
+DECLARE
+    shown record;
+    comment record;
+    others text;
+BEGIN
+    SELECT string_agg(quote_ident(attname), ', ' ORDER BY attnum) INTO others
+      FROM pg_attribute
+     WHERE attrelid = 'tunnel_api.lining_finding'::regclass AND attnum > 0 AND attname NOT IN ('unrolled', 'map', 'surface');
+    FOR shown IN SELECT * FROM (VALUES
+        ('unrolled', 'unrolled', 'in the unrolled plane (chainage, arc), SRID 0'),
+        ('map', 'map', 'on the map strip beside the axis, in the tunnel''s SRID'),
+        ('3d', 'surface', 'on the lining in space, in the tunnel''s SRID')) AS g (suffix, geometry, text)
+    LOOP
+        EXECUTE format('CREATE OR REPLACE VIEW tunnel_api.%I AS SELECT %s, %I AS geom FROM tunnel_api.lining_finding',
+                       'finding_' || shown.suffix, others, shown.geometry);
+        EXECUTE format('COMMENT ON VIEW tunnel_api.%I IS %L', 'finding_' || shown.suffix,
+                       'Findings ' || shown.text || ': polygons, lines and points are drawn, redrawn and reviewed here, and what was '
+                       'drawn is deleted');
+    END LOOP;
+    FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
+        ('segment', 'Number of the segment that holds its middle'),
+        ('label', 'Station of its middle, as 12+345.678'),
+        ('chainage_from', 'Least chainage, m'),
+        ('chainage_to', 'Greatest chainage, m'),
+        ('arc_from', 'Least arc, m from the crown, positive right looking up-chainage'),
+        ('arc_to', 'Greatest arc, m'),
+        ('clock', 'Clock position of the middle, hours: 12 is the crown, 3 the right wall looking up-chainage'),
+        ('kind', 'Code of its kind (finding_kind), as an inspector judged it, else as found or drawn'),
+        ('kind_label', 'Name of its kind'),
+        ('found', 'What detection takes it for; NULL of what was drawn'),
+        ('wet', 'Whether its kind counts as wet'),
+        ('origin', 'How its outline came about: detected, drawn, redrawn, split or merged'),
+        ('by_hand', 'Whether it was drawn, never detected: only that can be deleted'),
+        ('severity', 'Severity, 1 (the least) to 4'),
+        ('severity_label', 'Its name'),
+        ('width', 'Width of a line, m'),
+        ('length', 'Length of a line on the surface, m'),
+        ('area', 'Area on the lining, m²; of a line length times width, of a point 0'),
+        ('measured', 'Whether it was measured on the image: what was drawn or redrawn waits for the next detect'),
+        ('drop_mean', 'Mean drop of corrected intensity below dry lining, dB'),
+        ('drop_max', 'Greatest drop of corrected intensity below dry lining, dB'),
+        ('image_share', 'Share of its outline on which the image holds measurements, 0-1'),
+        ('contrast', 'Mean drop in standard deviations of the dry lining about it'),
+        ('confidence', 'How sure detection is of what it found, 0-1; NULL of what was drawn'),
+        ('reasons', 'Why detection takes it for that'),
+        ('review', 'open, confirmed or rejected; what is drawn is confirmed unless it says otherwise'),
+        ('reviewed_by', 'Who reviewed or judged it last, set by the database'),
+        ('reviewed_at', 'When it was reviewed or judged last, set by the database'),
+        ('drawn_by', 'Who drew its outline last, set by the database'),
+        ('drawn_at', 'When its outline was drawn last, set by the database'),
+        ('detected', 'False when the last detection found it no more (kept for what people said of it); true of what was drawn'),
+        ('created_at', 'When it was first found or drawn'),
+        ('detected_at', 'When it was last detected; NULL of what was drawn'),
+        ('also_detected', 'Whether the last detection found the same'),
+        ('detected_as', 'Ids of what it found: they are listed as same and not counted'),
+        ('parent_id', 'Finding that it was split off'),
+        ('merged_into', 'Finding that it is merged into: that one counts'),
+        ('merged', 'Ids of the findings that are merged into it'),
+        ('same_as', 'Finding that is the same: that one counts'),
+        ('dry_region_id', 'Dry region (dry_region) that it lies in; it does not count while it is open'),
+        ('counted', 'Whether sums count it: there, not rejected, and nothing else stands for it'),
+        ('state', 'open, confirmed, rejected, gone (not found again), dry (taken away by a dry region), same or merged (another counts)'),
+        ('photos', 'How many photos it has (finding_photo)'),
+        ('unrolled', 'In the unrolled plane'),
+        ('map', 'On the map strip beside the axis, tunnel''s SRID'),
+        ('surface', 'On the lining in space, tunnel''s SRID')) AS t (name, text)
+      JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
+      JOIN pg_class c ON c.oid = a.attrelid
+     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v'
+       AND c.relname IN ('lining_finding', 'finding_unrolled', 'finding_map', 'finding_3d')
+    LOOP
+        EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', comment.view, comment."column", comment.text);
+    END LOOP;
+END
+$$;
+COMMENT ON COLUMN tunnel_api.finding_unrolled.geom IS 'In the unrolled plane (chainage, arc), m';
+COMMENT ON COLUMN tunnel_api.finding_map.geom IS 'On the map strip beside the axis, tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.finding_3d.geom IS 'On the lining in space, tunnel''s SRID';
+
+CREATE OR REPLACE VIEW tunnel_api.finding_photo AS
+SELECT p.id, p.anomaly_id AS finding_id, a.survey_id, s.name AS survey, p.path, p.caption, p.added_by, p.added_at
+  FROM tunnel.photo p
+  JOIN tunnel.anomaly a ON a.id = p.anomaly_id
+  JOIN tunnel.survey s ON s.id = a.survey_id;
+COMMENT ON VIEW tunnel_api.finding_photo IS 'Photos of findings, by path or URL; rows may be added, changed and deleted';
+COMMENT ON COLUMN tunnel_api.finding_photo.finding_id IS 'Its finding';
+COMMENT ON COLUMN tunnel_api.finding_photo.path IS 'Path or URL';
+COMMENT ON COLUMN tunnel_api.finding_photo.caption IS 'What it shows';
+COMMENT ON COLUMN tunnel_api.finding_photo.added_by IS 'Who added it, set by the database';
+COMMENT ON COLUMN tunnel_api.finding_photo.added_at IS 'When it was added, set by the database';
+
+-- How many there are of each kind and origin, and what becomes of each: the states are those of lining_finding.
+CREATE OR REPLACE VIEW tunnel_api.finding_count AS
+SELECT min(a.id) AS id, a.survey_id, s.name AS survey, coalesce(a.judged, a.kind) AS kind, a.wet, a.origin,
+       count(*) FILTER (WHERE c.counted) AS counted,
+       count(*) FILTER (WHERE c.counted AND a.review = 'open') AS open,
+       count(*) FILTER (WHERE c.counted AND a.review = 'confirmed') AS confirmed,
+       count(*) FILTER (WHERE a.review = 'rejected' AND a.merged_into IS NULL AND a.same_as IS NULL) AS rejected,
+       count(*) FILTER (WHERE a.merged_into IS NOT NULL) AS merged,
+       count(*) FILTER (WHERE a.merged_into IS NULL AND a.same_as IS NOT NULL) AS same,
+       count(*) FILTER (WHERE a.aside AND a.merged_into IS NULL AND a.same_as IS NULL) AS dry,
+       count(*) FILTER (WHERE NOT a.detected AND NOT a.aside AND a.review <> 'rejected') AS gone,
+       count(*) FILTER (WHERE c.counted AND a.image_share IS NULL) AS to_measure,
+       coalesce(sum(a.area) FILTER (WHERE c.counted), 0) AS area, coalesce(sum(a.length) FILTER (WHERE c.counted), 0) AS length
+  FROM tunnel.anomaly a
+  JOIN tunnel.survey s ON s.id = a.survey_id
+ CROSS JOIN LATERAL (SELECT a.detected AND a.review <> 'rejected' AND NOT a.aside AS counted) c
+ GROUP BY a.survey_id, s.name, coalesce(a.judged, a.kind), a.wet, a.origin;
+COMMENT ON VIEW tunnel_api.finding_count IS 'How many findings of each kind and origin a survey has, and what became of them';
+COMMENT ON COLUMN tunnel_api.finding_count.id IS 'Least id among them: a key';
+COMMENT ON COLUMN tunnel_api.finding_count.kind IS 'Code of the kind';
+COMMENT ON COLUMN tunnel_api.finding_count.wet IS 'Whether the kind counts as wet';
+COMMENT ON COLUMN tunnel_api.finding_count.origin IS 'detected, drawn, redrawn, split or merged';
+COMMENT ON COLUMN tunnel_api.finding_count.counted IS 'How many sums count: open and confirmed';
+COMMENT ON COLUMN tunnel_api.finding_count.open IS 'Of these, those not reviewed yet';
+COMMENT ON COLUMN tunnel_api.finding_count.confirmed IS 'Of these, those confirmed or drawn';
+COMMENT ON COLUMN tunnel_api.finding_count.rejected IS 'Rejected, not counted';
+COMMENT ON COLUMN tunnel_api.finding_count.merged IS 'Merged into another, which counts for them';
+COMMENT ON COLUMN tunnel_api.finding_count.same IS 'The same as another, which counts for them';
+COMMENT ON COLUMN tunnel_api.finding_count.dry IS 'Taken away by a dry region';
+COMMENT ON COLUMN tunnel_api.finding_count.gone IS 'Not found again by the last detection, though not rejected';
+COMMENT ON COLUMN tunnel_api.finding_count.to_measure IS 'Counted, but without measured figures until the next detect';
+COMMENT ON COLUMN tunnel_api.finding_count.area IS 'Area of those counted, m²';
+COMMENT ON COLUMN tunnel_api.finding_count.length IS 'Length of those counted, m';
+
+CREATE OR REPLACE VIEW tunnel_api.dry_region AS
+SELECT r.id, r.survey_id, s.name AS survey, ST_XMin(r.geom) AS chainage_from, ST_XMax(r.geom) AS chainage_to,
+       tunnel_api.station_label(s.tunnel_id, ST_XMin(r.geom)) AS label_from,
+       tunnel_api.station_label(s.tunnel_id, ST_XMax(r.geom)) AS label_to,
+       ST_YMin(r.geom) AS arc_from, ST_YMax(r.geom) AS arc_to, ST_Area(r.geom) AS area, t.dry_region_limit AS area_limit, r.reason,
+       r.drawn_by, r.drawn_at, l.leaks, l.leaks_area, l.ids AS leak_ids, r.geom::public.geometry(Polygon, 0) AS geom
+  FROM tunnel.region r
+  JOIN tunnel.survey s ON s.id = r.survey_id
+  JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+ CROSS JOIN LATERAL (
+        SELECT count(*) AS leaks, coalesce(sum(a.area), 0) AS leaks_area, array_agg(a.id ORDER BY a.id) AS ids
+          FROM tunnel.anomaly a
+         WHERE a.dry_region_id = r.id AND a.review = 'open' AND a.merged_into IS NULL AND a.same_as IS NULL) l
+ WHERE r.kind = 'dry';
+COMMENT ON VIEW tunnel_api.dry_region IS
+    'Dry regions and what each took away: open leaks that lie in it by half are kept but not counted, and come back with its removal';
+COMMENT ON COLUMN tunnel_api.dry_region.arc_from IS 'Least arc, m';
+COMMENT ON COLUMN tunnel_api.dry_region.arc_to IS 'Greatest arc, m';
+COMMENT ON COLUMN tunnel_api.dry_region.area IS 'Its area in the unrolled plane, m²';
+COMMENT ON COLUMN tunnel_api.dry_region.area_limit IS 'Area above which it must say why (tunnel.tunnel.dry_region_limit), m²';
+COMMENT ON COLUMN tunnel_api.dry_region.reason IS 'Why it was drawn';
+COMMENT ON COLUMN tunnel_api.dry_region.leaks IS 'How many open leaks it took away';
+COMMENT ON COLUMN tunnel_api.dry_region.leaks_area IS 'Their area, m²';
+COMMENT ON COLUMN tunnel_api.dry_region.leak_ids IS 'Their ids (lining_finding)';
+COMMENT ON COLUMN tunnel_api.dry_region.geom IS 'Polygon in the unrolled plane (chainage, arc), m';
+
+-- An example of an owner's view, by the Specifications for the National Tunnel Inventory (FHWA): severity 1 to 4 as condition
+-- states CS1 to CS4, findings without one as CS2. Of the liner what no finding touches is in CS1, too.
+CREATE OR REPLACE VIEW tunnel_api.snti_condition AS
+SELECT s.id::bigint * 10 + q.n AS id, s.id AS survey_id, s.name AS survey, q.element, q.unit,
+       q.cs1 + CASE WHEN q.n = 1 THEN greatest(coalesce((SELECT sum(c.lining_total) FROM tunnel.coverage c
+                                                          WHERE c.survey_id = s.id), 0) - q.cs1 - q.cs2 - q.cs3 - q.cs4, 0)
+                    ELSE 0 END AS cs1,
+       q.cs2, q.cs3, q.cs4
+  FROM tunnel.survey s
+ CROSS JOIN LATERAL (
+        SELECT e.n, e.element, e.unit, coalesce(sum(m.amount) FILTER (WHERE g.state = 1), 0) AS cs1,
+               coalesce(sum(m.amount) FILTER (WHERE g.state = 2), 0) AS cs2,
+               coalesce(sum(m.amount) FILTER (WHERE g.state = 3), 0) AS cs3,
+               coalesce(sum(m.amount) FILTER (WHERE g.state = 4), 0) AS cs4
+          FROM (VALUES
+                (1, 'liner', 'm²', ARRAY['leak', 'spall', 'delamination', 'efflorescence', 'corroded']),
+                (2, 'cracks', 'm', ARRAY['crack']),
+                (3, 'joints', 'm', ARRAY['damaged_joint']),
+                (4, 'bolts', 'each', ARRAY['missing_bolt']),
+                (5, 'drips', 'each', ARRAY['drip'])) AS e (n, element, unit, kinds)
+          LEFT JOIN (
+                SELECT coalesce(a.judged, a.kind) AS kind, coalesce(a.severity, 2) AS state, count(*)::float8 AS findings,
+                       sum(a.area) AS area, sum(coalesce(a.length, a.chainage_to - a.chainage_from)) AS length
+                  FROM tunnel.anomaly a
+                 WHERE a.survey_id = s.id AND a.detected AND a.review <> 'rejected' AND NOT a.aside
+                 GROUP BY 1, 2) g ON g.kind = ANY (e.kinds)
+         CROSS JOIN LATERAL (
+                SELECT CASE e.unit WHEN 'm²' THEN g.area WHEN 'each' THEN g.findings ELSE g.length END AS amount) m
+         GROUP BY e.n, e.element, e.unit) q;
+COMMENT ON VIEW tunnel_api.snti_condition IS
+    'Example: quantities of elements in the condition states of FHWA''s SNTI, from the severity of counted findings (none: CS2); of the liner the rest of what was scanned is in CS1. Owners make their own';
+COMMENT ON COLUMN tunnel_api.snti_condition.element IS 'liner, cracks, joints, bolts or drips';
+COMMENT ON COLUMN tunnel_api.snti_condition.unit IS 'm², m or each';
+COMMENT ON COLUMN tunnel_api.snti_condition.cs1 IS 'Quantity in condition state 1, good';
+COMMENT ON COLUMN tunnel_api.snti_condition.cs2 IS 'Condition state 2, fair';
+COMMENT ON COLUMN tunnel_api.snti_condition.cs3 IS 'Condition state 3, poor';
+COMMENT ON COLUMN tunnel_api.snti_condition.cs4 IS 'Condition state 4, severe';

@@ -1,0 +1,196 @@
+"""The verbs findings and findings import: lists, files that other programs read, and imports that are whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import psycopg
+import pyogrio.raw
+import pytest
+import shapely
+from click.testing import CliRunner, Result
+from support.example_survey import NAME, SRID
+
+from tunneldb.cli.main import main
+
+
+@pytest.fixture(scope="session")
+def template(example_template: str) -> str:
+    return example_template
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+def import_csv(folder: Path, text: str, *options: str) -> Result:
+    path = folder / "theirs.csv"
+    path.write_text(text, encoding="utf-8")
+    return run("findings", "import", NAME, path, *options)
+
+
+def ids(result: Result) -> list[int]:
+    assert result.exit_code == 0, result.output
+    return [finding["id"] for finding in json.loads(result.stdout)["findings"]]
+
+
+DRAWN = (
+    "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width, geom) VALUES "
+    "('demo-2024', 'crack', 3, 0.002, 'LINESTRING(12350 1, 12353 1.5)'), "
+    "('demo-2024', 'missing_bolt', 1, NULL, 'POINT(12360 -2)'), "
+    "('demo-2024', 'leak', NULL, NULL, 'POLYGON((12350 0, 12351 0, 12351 1, 12350 0))')"
+)
+
+
+def test_the_list_is_what_counts_and_is_filtered(conn: psycopg.Connection) -> None:
+    conn.execute(DRAWN)
+    conn.commit()
+    counted = [r[0] for r in conn.execute("SELECT id FROM tunnel_api.lining_finding WHERE counted ORDER BY id")]
+    conn.rollback()
+    assert sorted(ids(run("findings", NAME, "--json"))) == counted
+    assert len(ids(run("findings", NAME, "--kind", "crack", "--kind", "missing_bolt", "--json"))) == 2
+    assert len(ids(run("findings", NAME, "--min-severity", 3, "--json"))) == 1
+    assert len(ids(run("findings", NAME, "--origin", "drawn", "--from", "12+349", "--to", "12+352", "--json"))) == 2
+    assert len(ids(run("findings", NAME, "--state", "rejected", "--json"))) == 1
+    assert len(ids(run("findings", NAME, "--state", "all", "--json"))) == len(counted) + 1
+    listed = run("findings", NAME).stdout
+    assert listed.count("\n") == len(counted) + 1
+    assert "missing_bolt" in listed
+    assert "kind" in run("findings", NAME, "--count").stdout
+    wrong = run("findings", NAME, "--kind", "ghost")
+    assert wrong.exit_code == 2
+    assert wrong.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("geometry", ["unrolled", "map", "3d"])
+def test_files_hold_what_the_database_has(conn: psycopg.Connection, tmp_path: Path, geometry: str) -> None:
+    conn.execute(DRAWN)
+    conn.commit()
+    column = {"3d": "surface"}.get(geometry, geometry)
+    rows = conn.execute(
+        f"SELECT id, severity, length, remark, ST_AsBinary({column}) FROM tunnel_api.lining_finding "
+        "WHERE counted ORDER BY id".encode()
+    ).fetchall()
+    conn.rollback()
+    for name in ("f.gpkg", "f.geojson", "f.csv"):
+        assert run("findings", NAME, "--geometry", geometry, "-o", tmp_path / name).exit_code == 0
+    meta, _, shapes, values = pyogrio.raw.read(str(tmp_path / "f.gpkg"))
+    held = dict(zip(meta["fields"], values, strict=True))
+    order = np.argsort(held["id"])
+    assert held["id"][order].tolist() == [row[0] for row in rows]
+    for k, row in zip(order, rows, strict=True):
+        assert shapely.from_wkb(shapes[k]).equals_exact(shapely.from_wkb(bytes(row[4])), 1e-9)
+        assert (None if np.isnan(held["severity"][k]) else held["severity"][k]) == row[1]
+        assert (None if np.isnan(held["length"][k]) else held["length"][k]) == row[2]
+    features = json.loads((tmp_path / "f.geojson").read_text())["features"]
+    assert sorted(feature["id"] for feature in features) == [row[0] for row in rows]
+    lines = list(csv.DictReader(io.StringIO((tmp_path / "f.csv").read_text())))
+    assert {int(line["id"]): line["geometry"].split()[0] for line in lines} == {
+        row[0]: shapely.from_wkb(bytes(row[4])).geom_type.upper() for row in rows
+    }
+
+
+def test_a_csv_of_another_system_is_imported_whole(conn: psycopg.Connection, tmp_path: Path) -> None:
+    x, y, z = conn.execute("SELECT ST_X(p), ST_Y(p), ST_Z(p) FROM tunnel_api.roll(1, 12360, 1.5) p").fetchone()
+    conn.rollback()
+    text = (
+        "Art;Station;Offset;x;y;z;wkt;chainage_from;chainage_to;arc_from;arc_to;severity;remark;photo\n"
+        f";;;;;;;;;;;;;\nBolzen;12360,0;-2,0;;;;;;;;;2;fehlt;bilder/1.jpg\nBolzen;;;{x};{y};{z};;;;;;;;\n"
+        "Riss;;;;;;LINESTRING(12350 0, 12352 1);;;;;4;;\nleak;;;;;;;12350;12351;1;2;;;\n"
+    )
+    done = import_csv(tmp_path, text, "--map", "Bolzen=missing_bolt", "--map", "Riss=crack", "--column", "kind=Art",
+                      "--column", "chainage=Station", "--column", "arc=Offset")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert done.stdout == f"{NAME}: 4 findings imported: 1 crack, 1 leak, 2 missing_bolt\n"
+    rows = conn.execute(
+        "SELECT kind, severity, remark, photos, (chainage_from + chainage_to) / 2, (arc_from + arc_to) / 2, origin "
+        "FROM tunnel_api.lining_finding WHERE by_hand ORDER BY id"
+    ).fetchall()
+    assert rows == [
+        ("missing_bolt", 2, "fehlt", 1, pytest.approx(12360), pytest.approx(-2), "drawn"),
+        ("missing_bolt", None, None, 0, pytest.approx(12360, abs=1e-3), pytest.approx(1.5, abs=1e-3), "drawn"),
+        ("crack", 4, None, 0, pytest.approx(12351, abs=0.01), pytest.approx(0.5, abs=0.01), "drawn"),
+        ("leak", None, None, 0, pytest.approx(12350.5), pytest.approx(1.5), "drawn"),
+    ]
+
+
+def test_each_bad_row_is_one_line_and_nothing_is_half_written(conn: psycopg.Connection, tmp_path: Path) -> None:
+    text = (
+        "kind,chainage,arc,severity\nmissing_bolt,12360,0,1\nghost,12360,0,1\nmissing_bolt,99999,0,1\nmissing_bolt,here,0,1\n"
+        "missing_bolt,12361,0,7\nmissing_bolt,12361,0,big\nleak,12361,0,\n"
+    )
+    done = import_csv(tmp_path, text)
+    assert done.exit_code == 2
+    lines = done.stderr.splitlines()
+    assert [line.split("row ")[1].split(":")[0] for line in lines[:-1]] == ["3", "4", "5", "6", "7", "8"]
+    assert lines[-1].endswith("6 rows are wrong, so nothing was imported")
+    for line, said in zip(
+        lines, ("not ghost", "beyond the lining", "no place", "1 to 4", "'big'", "not as point"), strict=False
+    ):
+        assert said in line
+    assert conn.execute("SELECT count(*) FROM tunnel_api.lining_finding WHERE by_hand").fetchone() == (0,)
+
+
+@pytest.mark.parametrize("geometry", ["unrolled", "3d"])
+def test_what_was_exported_is_imported_as_it_was(conn: psycopg.Connection, tmp_path: Path, geometry: str) -> None:
+    conn.execute(DRAWN)
+    conn.commit()
+    path = tmp_path / "drawn.gpkg"
+    assert run("findings", NAME, "--origin", "drawn", "--geometry", geometry, "-o", path).exit_code == 0
+    done = run("findings", "import", NAME, path)
+    assert done.exit_code == 0, done.output
+    rows = conn.execute(
+        "SELECT kind, severity, width, round(area::numeric, 3), round(length::numeric, 3) FROM tunnel_api.lining_finding "
+        "WHERE by_hand ORDER BY id"
+    ).fetchall()
+    assert sorted(rows[:3], key=str) == sorted(rows[3:], key=str)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        ("art,chainage,arc\n", (), "has no column kind"),
+        ("kind,a,b\nleak,1,2\n", (), "does not say where the findings lie"),
+        ("kind,chainage,arc\n", ("--column", "arc=Offset"), "has no column Offset"),
+        ("kind,chainage,arc\n", ("--map", "Riss"), "two names with = between"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_one_line(
+    conn: psycopg.Connection, tmp_path: Path, text: str, options: tuple[str, ...], said: str
+) -> None:
+    done = import_csv(tmp_path, text, *options)
+    assert done.exit_code == 2
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_layer_in_another_system_is_refused(conn: psycopg.Connection, tmp_path: Path) -> None:
+    path = tmp_path / "far.gpkg"
+    pyogrio.raw.write(
+        str(path), shapely.to_wkb(np.array([shapely.Point(1, 2, 3)], object)), [np.array(["spall"], object)],
+        np.array(["kind"]),
+        geometry_type="Point Z", crs="EPSG:32633", driver="GPKG", layer="far",
+    )  # fmt: skip
+    done = run("findings", "import", NAME, path)
+    assert done.exit_code == 2
+    assert f"3D in EPSG:{SRID}" in done.stderr
+
+
+def test_what_was_drawn_is_in_the_list_of_leaks_and_in_the_report_without_figures_that_nobody_measured(
+    conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    conn.execute(DRAWN)
+    conn.commit()
+    key = conn.execute("SELECT max(id) FROM tunnel_api.leak WHERE origin = 'drawn'").fetchone()[0]
+    conn.rollback()
+    for name in ("leaks.gpkg", "leaks.geojson", "leaks.csv", "leaks.txt"):
+        assert run("leaks", NAME, "-o", tmp_path / name).exit_code in (0, 1)
+    (drawn,) = [f for f in json.loads((tmp_path / "leaks.geojson").read_text())["features"] if f["id"] == key]
+    assert (drawn["properties"]["drop_mean"], drawn["properties"]["counted"]) == (None, True)
+    done = run("report", NAME, "-o", tmp_path / "report.html")
+    assert done.exit_code in (0, 1), done.output
+    assert run("export", NAME, "-o", tmp_path / "all.gpkg").exit_code in (0, 1)

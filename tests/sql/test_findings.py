@@ -1,0 +1,315 @@
+"""Findings that people make: drawn, redrawn, split, merged and deleted through the views, with the rights of an inspector."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import psycopg
+import pytest
+import shapely
+from psycopg.conninfo import make_conninfo
+from shapely.geometry import LineString, Point, Polygon, box
+from support.example_survey import NAME, example_surface
+
+from tunneldb.anomalies.geometries import anomaly_geometries
+from tunneldb.geometry.surface import Surface
+
+INSPECTOR = pytest.mark.parametrize("person", ["ines"], indirect=True)
+FREE = box(12350.0, 0.5, 12352.0, 1.5)
+"""A place of the unrolled plane where nothing was found."""
+
+
+@pytest.fixture(scope="session")
+def template(example_template: str) -> str:
+    return example_template
+
+
+@pytest.fixture(scope="module")
+def surface() -> Surface:
+    return example_surface()[0]
+
+
+def draw(conn: psycopg.Connection, shape: shapely.Geometry, kind: str = "leak", **others: Any) -> int:
+    """Draw a finding on the unrolled image; its id."""
+    columns = {"survey": NAME, "kind": kind, **others}
+    query = (
+        f"INSERT INTO tunnel_api.finding_unrolled ({', '.join(columns)}, geom) VALUES "
+        f"({', '.join(['%s'] * len(columns))}, ST_GeomFromWKB(%s, 0)) RETURNING id"
+    )
+    return int(conn.execute(query.encode(), [*columns.values(), shapely.to_wkb(shape)]).fetchone()[0])
+
+
+def row(conn: psycopg.Connection, key: int, columns: str) -> tuple[Any, ...]:
+    found = conn.execute(f"SELECT {columns} FROM tunnel_api.lining_finding WHERE id = {key}".encode()).fetchone()
+    assert found is not None
+    return found
+
+
+def wet(conn: psycopg.Connection) -> tuple[int, float]:
+    """How many leaks of the survey count, and their area: by the statistics, which the view and the counts must agree with."""
+    patches, area = conn.execute(
+        "SELECT patches, wet_area FROM tunnel_api.leak_statistics(%s, '-Infinity', 'Infinity')", [NAME]
+    ).fetchone()
+    for query in (
+        "SELECT count(*), sum(area) FROM tunnel_api.leak WHERE counted",
+        "SELECT count(*), sum(area) FROM tunnel_api.lining_finding WHERE counted AND wet",
+        "SELECT sum(counted), sum(area) FROM tunnel_api.finding_count WHERE wet",
+        "SELECT sum(leaks), sum(wet_area) FROM tunnel_api.km_statistics",
+        "SELECT sum(patches), tunnel_api.wet_area('demo-2024', -1e9, 1e9) FROM tunnel_api.km_waterproof",
+    ):
+        assert conn.execute(query.encode()).fetchone() == (patches, pytest.approx(area)), query
+    return patches, area
+
+
+@INSPECTOR
+def test_of_what_is_drawn_on_the_unrolled_image_all_else_follows(person: psycopg.Connection, surface: Surface) -> None:
+    before = wet(person)
+    key = draw(person, FREE, severity=3, remark="under the lamp")
+    truth = anomaly_geometries(FREE, surface)
+    area, clock, map_wkb, surface_wkb = row(person, key, "area, clock, ST_AsBinary(map), ST_AsBinary(surface)")
+    assert area == pytest.approx(truth.area, rel=1e-3)
+    assert clock == pytest.approx(truth.clock, abs=0.05)
+    assert shapely.hausdorff_distance(shapely.from_wkb(bytes(map_wkb)), truth.map) < 1e-3
+    assert shapely.hausdorff_distance(shapely.from_wkb(bytes(surface_wkb)), truth.surface) < 1e-3
+    assert row(person, key, "origin, by_hand, review, reviewed_by, drawn_by, severity_label, measured, drop_mean, counted") == (
+        "drawn", True, "confirmed", "ines", "ines", "serious", False, None, True,
+    )  # fmt: skip
+    assert row(person, key, "km, chainage_from, chainage_to, arc_from, arc_to, remark, label") == (
+        12, 12350.0, 12352.0, 0.5, 1.5, "under the lamp", "12+351.000",
+    )  # fmt: skip
+    assert wet(person) == (before[0] + 1, pytest.approx(before[1] + area))
+
+
+@INSPECTOR
+@pytest.mark.parametrize("shape", [FREE, LineString([(12350.0, -1.0), (12352.0, 2.0)]), Point(12351.0, 1.0)], ids=str)
+def test_drawn_in_one_place_it_lies_at_the_same_in_the_others(person: psycopg.Connection, shape: shapely.Geometry) -> None:
+    kind = {"Polygon": "spall", "LineString": "crack", "Point": "missing_bolt"}[shape.geom_type]
+    first = draw(person, shape, kind)
+    for view in ("map", "3d"):
+        (key,) = person.execute(
+            f"INSERT INTO tunnel_api.finding_{view} (survey, kind, geom) SELECT survey, kind, geom "
+            f"FROM tunnel_api.finding_{view} WHERE id = {first} RETURNING id".encode()
+        ).fetchone()
+        wkb, clock, length = row(person, key, "ST_AsBinary(unrolled), clock, length")
+        again = shapely.from_wkb(bytes(wkb))
+        assert again.geom_type == shape.geom_type
+        assert shapely.hausdorff_distance(again, shape) < 1e-3
+        assert (clock, length) == pytest.approx(row(person, first, "clock, length"), rel=1e-3)
+
+
+@INSPECTOR
+def test_what_is_redrawn_keeps_number_and_review_and_loses_what_was_measured(person: psycopg.Connection) -> None:
+    (key,) = person.execute("SELECT min(id) FROM tunnel_api.leak WHERE review = 'confirmed'").fetchone()
+    was = row(person, key, "area, review, reviewed_by, remark, found")
+    person.execute(
+        "UPDATE tunnel_api.finding_unrolled SET geom = ST_Scale(geom, 'POINT(1 2)'::geometry, ST_Centroid(geom)) WHERE id = %s",
+        [key],
+    )
+    now = row(person, key, "area, review, reviewed_by, remark, found")
+    assert now == (pytest.approx(2 * was[0], rel=0.01), *was[1:])
+    assert row(person, key, "origin, by_hand, measured, drop_mean, drop_max, image_share, contrast, confidence, drawn_by") == (
+        "redrawn", False, False, None, None, None, None, None, "ines",
+    )  # fmt: skip
+    wet(person)
+    entry = person.execute("SELECT view, action, before, after FROM tunnel_api.audit WHERE row_id = %s ORDER BY id DESC", [key])
+    view, action, before, after = entry.fetchone()
+    assert (view, action, set(before), set(after)) == ("anomaly", "update", {"geom", "origin"}, {"geom", "origin"})
+    person.execute("UPDATE tunnel_api.finding_unrolled SET geom = %s::geometry WHERE id = %s", [before["geom"], key])
+    assert row(person, key, "area")[0] == pytest.approx(was[0], rel=1e-3)
+
+
+@INSPECTOR
+def test_the_larger_part_keeps_the_number_and_the_oldest_keeps_it_again(person: psycopg.Connection) -> None:
+    before = wet(person)
+    key = draw(person, FREE, severity=2)
+    (ids,) = person.execute("SELECT tunnel_api.finding_split(%s, 'LINESTRING(12350.5 0, 12350.5 2)')", [key]).fetchone()
+    assert ids[0] == key
+    assert row(person, key, "chainage_from, chainage_to, origin") == (12350.5, 12352.0, "split")
+    assert row(person, ids[1], "chainage_from, chainage_to, origin, parent_id, severity, review, by_hand") == (
+        12350.0, 12350.5, "split", key, 2, "confirmed", True,
+    )  # fmt: skip
+    (area,) = row(person, key, "area")
+    assert wet(person) == (before[0] + 2, pytest.approx(before[1] + area * 4 / 3, rel=1e-3))
+    assert person.execute("SELECT tunnel_api.finding_merge(%s)", [ids[::-1]]).fetchone() == (key,)
+    assert row(person, key, "origin, merged, chainage_from, state") == ("merged", [ids[1]], 12350.0, "confirmed")
+    assert row(person, ids[1], "merged_into, state, counted") == (key, "merged", False)
+    assert wet(person) == (before[0] + 1, pytest.approx(before[1] + area * 4 / 3, rel=1e-3))
+    for statement, said in (
+        (f"DELETE FROM tunnel_api.finding_map WHERE id = {key}", "stands for others"),
+        (f"UPDATE tunnel_api.finding_map SET review = 'open' WHERE id = {ids[1]}", f"is merged into {key}"),
+        (f"SELECT tunnel_api.finding_split({key}, 'LINESTRING(0 0, 1 1)')", "does not split|beyond the lining"),
+        (f"SELECT tunnel_api.finding_split({key}, 'LINESTRING(12340 0, 12341 0)')", "does not split"),
+        (f"SELECT tunnel_api.finding_merge(ARRAY[{key}, {ids[1]}])", "is merged into"),
+        (
+            f"SELECT tunnel_api.finding_merge(ARRAY[{key}, (SELECT max(id) + 1 FROM tunnel_api.lining_finding)])",
+            "not all there",
+        ),
+    ):
+        with pytest.raises(psycopg.Error, match=said):
+            person.execute(statement.encode())
+
+
+@INSPECTOR
+def test_only_what_was_drawn_is_deleted(person: psycopg.Connection) -> None:
+    before = wet(person)
+    key = draw(person, FREE)
+    person.execute("DELETE FROM tunnel_api.finding_unrolled WHERE id = %s", [key])
+    assert wet(person) == before
+    gone = person.execute("SELECT action, before FROM tunnel_api.audit WHERE row_id = %s ORDER BY id DESC", [key]).fetchone()
+    assert (gone[0], gone[1]["kind"]) == ("delete", "leak")
+    again = person.execute(
+        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, geom) VALUES (%s, %s, %s) RETURNING id",
+        [NAME, gone[1]["kind"], gone[1]["geom"]],
+    ).fetchone()
+    assert row(person, again[0], "unrolled") == (person.execute("SELECT %s::geometry", [gone[1]["geom"]]).fetchone()[0],)
+    with pytest.raises(psycopg.errors.FeatureNotSupported, match="finding 1 was detected: reject it instead"):
+        person.execute("DELETE FROM tunnel_api.finding_unrolled WHERE id = 1")
+
+
+@INSPECTOR
+@pytest.mark.parametrize(
+    ("shape", "others", "said"),
+    [
+        (box(12350.0, 0.0, 12351.0, 30.0), {}, "the drawing reaches beyond the lining: it lies between chainage 12350.00 and"),
+        (box(12499.0, 0.0, 12505.0, 1.0), {}, "beyond the lining"),
+        (Polygon([(12350, 0), (12351, 1), (12351, 0), (12350, 1)]), {}, "the drawing is not valid: Self-intersection"),
+        (Point(12350, 0), {}, "leak is drawn as polygon, not as point"),
+        (LineString([(12350, 0), (12351, 0)]), {"kind": "spall"}, "spall is drawn as polygon or point, not as line"),
+        (FREE, {"kind": "ghost"}, "the kind of a finding can be leak, drip, crack, .*, not ghost"),
+        (FREE, {"severity": 5}, "the severity of a finding is 1 to 4, not 5"),
+        (FREE, {"review": "maybe"}, "can be open, confirmed or rejected, not maybe"),
+        (FREE, {"survey": "nowhere"}, "there is none named nowhere"),
+        (Polygon(), {}, "a finding needs a place"),
+        (LineString([(12350, 0), (12351, 0)]), {"kind": "crack", "width": -0.1}, "the width of a line is above 0"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_in_one_line(
+    person: psycopg.Connection, shape: shapely.Geometry, others: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(psycopg.Error, match=said) as error:
+        draw(person, shape, **{"kind": "leak", **others})
+    assert "\n" not in str(error.value.diag.message_primary)
+
+
+@INSPECTOR
+def test_a_line_has_length_and_width_and_a_point_neither(person: psycopg.Connection) -> None:
+    line = LineString([(12350.0, 1.0), (12353.0, 1.0)])
+    key = draw(person, line, "crack", width=0.002)
+    length, area, kind = row(person, key, "length, area, GeometryType(unrolled)")
+    assert (length, area, kind) == (pytest.approx(3.0, rel=0.05), pytest.approx(0.002 * length), "LINESTRING")
+    person.execute("UPDATE tunnel_api.finding_map SET width = 0.004 WHERE id = %s", [key])
+    assert row(person, key, "area, origin")[:2] == (pytest.approx(0.004 * length), "drawn")
+    point = draw(person, Point(12351.0, 2.0), "drip", severity=1)
+    assert row(person, point, "area, length, wet, GeometryType(unrolled)") == (0.0, None, True, "POINT")
+    wet(person)
+
+
+@INSPECTOR
+def test_drawn_over_what_was_detected_it_counts_once(person: psycopg.Connection) -> None:
+    before = wet(person)
+    (key, wkb, area) = person.execute(
+        "SELECT id, ST_AsBinary(unrolled), area FROM tunnel_api.leak WHERE review = 'open' ORDER BY id LIMIT 1"
+    ).fetchone()
+    outline = shapely.from_wkb(bytes(wkb))
+    drawn = draw(person, outline.buffer(0.2))
+    assert row(person, key, "same_as, state, counted") == (drawn, "same", False)
+    assert row(person, drawn, "also_detected, detected_as, counted") == (True, [key], True)
+    assert wet(person)[0] == before[0]
+    person.execute("UPDATE tunnel_api.finding_map SET review = 'rejected' WHERE id = %s", [drawn])
+    assert wet(person) == (before[0] - 1, pytest.approx(before[1] - area))
+    person.execute("DELETE FROM tunnel_api.finding_3d WHERE id = %s", [drawn])
+    assert wet(person) == (before[0], pytest.approx(before[1]))
+    inner = draw(person, outline.buffer(-0.3))  # a small part of it
+    assert row(person, inner, "same_as, counted") == (key, False)
+    assert wet(person) == (before[0], pytest.approx(before[1]))
+    person.execute("UPDATE tunnel_api.leak SET review = 'rejected' WHERE id = %s", [key])
+    assert row(person, inner, "same_as, counted") == (None, True)
+    assert wet(person)[0] == before[0]
+
+
+@INSPECTOR
+def test_a_dry_region_marks_leaks_and_gives_them_back(person: psycopg.Connection, conn: psycopg.Connection) -> None:
+    before = wet(person)
+    key, wkb, area = person.execute(
+        "SELECT id, ST_AsBinary(unrolled), area FROM tunnel_api.leak WHERE review = 'open' ORDER BY id LIMIT 1"
+    ).fetchone()
+    conn.rollback()
+    outline = shapely.box(*shapely.from_wkb(bytes(wkb)).bounds).buffer(0.1, join_style="mitre")
+    insert = (
+        "INSERT INTO tunnel_api.region (survey, kind, geom, reason) VALUES (%s, 'dry', ST_GeomFromWKB(%s, 0), %s) RETURNING id"
+    )
+    with pytest.raises(psycopg.errors.CheckViolation, match=r"is larger than 50 m²: its reason must say why"):
+        person.execute(insert, [NAME, shapely.to_wkb(outline.buffer(5.0)), " "])
+    (region,) = person.execute(insert, [NAME, shapely.to_wkb(outline), None]).fetchone()
+    assert row(person, key, "state, dry_region_id, counted") == ("dry", region, False)
+    assert wet(person) == (before[0] - 1, pytest.approx(before[1] - area))
+    said = person.execute(
+        "SELECT leaks, leaks_area, leak_ids, drawn_by, chainage_from FROM tunnel_api.dry_region WHERE id = %s", [region]
+    )
+    assert said.fetchone() == (1, pytest.approx(area), [key], "ines", pytest.approx(outline.bounds[0]))
+    person.execute("DELETE FROM tunnel_api.region WHERE id = %s", [region])
+    assert wet(person) == (before[0], pytest.approx(before[1]))
+
+
+@INSPECTOR
+def test_photos_are_paths_with_captions_and_in_the_audit(person: psycopg.Connection) -> None:
+    key = draw(person, FREE)
+    (photo,) = person.execute(
+        "INSERT INTO tunnel_api.finding_photo (finding_id, path, caption) VALUES (%s, 'photos/1.jpg', 'wet') RETURNING id",
+        [key],
+    ).fetchone()
+    person.execute("UPDATE tunnel_api.finding_photo SET caption = 'very wet' WHERE id = %s", [photo])
+    assert row(person, key, "photos") == (1,)
+    with pytest.raises(psycopg.Error, match="needs a path or URL"):
+        person.execute("INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (%s, '')", [key])
+    person.execute("DELETE FROM tunnel_api.finding_photo WHERE id = %s", [photo])
+    actions = person.execute("SELECT action FROM tunnel_api.audit WHERE view = 'photo' ORDER BY id").fetchall()
+    assert actions == [("insert",), ("update",), ("delete",)]
+
+
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
+def test_operators_extend_the_catalogue_and_wet_follows(person: psycopg.Connection) -> None:
+    before = wet(person)
+    person.execute(
+        "INSERT INTO tunnel_api.finding_kind (code, label, geometries, wet, position) "
+        "VALUES ('seepage', 'Sickerstelle', '{polygon}', true, 5)"
+    )
+    key = draw(person, FREE, "seepage")
+    assert wet(person)[0] == before[0] + 1
+    person.execute("UPDATE tunnel_api.finding_kind SET wet = false WHERE code = 'seepage'")
+    assert wet(person)[0] == before[0]
+    assert row(person, key, "kind_label, wet") == ("Sickerstelle", False)
+    with pytest.raises(psycopg.errors.ForeignKeyViolation):
+        person.execute("DELETE FROM tunnel_api.finding_kind WHERE code = 'seepage'")
+
+
+def test_two_inspectors_at_once_on_one_finding(people: None, dsn: str, example: str) -> None:
+    with (
+        psycopg.connect(make_conninfo(dsn, user="ines")) as first,
+        psycopg.connect(make_conninfo(dsn, user="otto")) as second,
+    ):
+        key = draw(first, FREE, remark="new")
+        draw(second, box(12380.0, 0.0, 12381.0, 1.0))  # neither waits
+        first.commit()
+        second.commit()
+        first.execute("UPDATE tunnel_api.finding_unrolled SET severity = 3 WHERE id = %s", [key])
+        second.execute("SET lock_timeout = '100ms'")
+        second.commit()
+        with pytest.raises(psycopg.errors.LockNotAvailable):
+            second.execute("UPDATE tunnel_api.finding_unrolled SET remark = 'mine' WHERE id = %s", [key])
+        second.rollback()
+        first.commit()
+        second.execute("UPDATE tunnel_api.finding_unrolled SET remark = 'mine' WHERE id = %s", [key])
+        second.commit()
+        assert row(first, key, "severity, remark") == (3, "mine")
+
+
+@INSPECTOR
+def test_conditions_by_fhwa_are_sums_of_what_is_counted(person: psycopg.Connection) -> None:
+    draw(person, LineString([(12350.0, 1.0), (12353.0, 1.0)]), "crack", width=0.002, severity=4)
+    draw(person, Point(12360.0, 1.0), "missing_bolt")
+    states = {r[0]: r[1:] for r in person.execute("SELECT element, unit, cs1, cs2, cs3, cs4 FROM tunnel_api.snti_condition")}
+    assert states["cracks"] == ("m", 0, 0, 0, pytest.approx(3.0, rel=0.05))
+    assert states["bolts"] == ("each", 0, 1, 0, 0)
+    lining = person.execute("SELECT sum(lining_area) FROM tunnel_api.km_statistics").fetchone()[0]
+    assert sum(states["liner"][1:]) == pytest.approx(lining)

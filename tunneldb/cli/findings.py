@@ -1,0 +1,243 @@
+"""The verbs ``findings`` and ``findings import``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast
+
+import click
+import psycopg
+
+from tunneldb.cli.leaks import parse_clock
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import VerbGroup, records, tell
+from tunneldb.cli.stretch import parse_stretch, stretch_options
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect
+from tunneldb.errors import UserError
+from tunneldb.export.tables.findings import COUNTED, Chosen, Finding, as_csv, as_geojson, read_findings, write_gpkg
+from tunneldb.export.tables.leaks import Geometry, clock_label
+from tunneldb.files import replacing
+from tunneldb.pipeline.findings import import_findings
+from tunneldb.store.survey import Survey, get_survey
+
+_BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
+_STATES = ("open", "confirmed", "rejected", "gone", "dry", "same", "merged")
+
+
+class _FindingsGroup(VerbGroup):
+    """Its verb is ``list`` where none is named: ``tunneldb findings SURVEY``."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if args and args[0] not in self.commands and args[0] not in ctx.help_option_names:
+            args = ["list", *args]
+        return super().parse_args(ctx, args)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return a verb; what names none is a survey that is to be listed."""
+        return super().get_command(ctx, cmd_name) or super().get_command(ctx, "list")
+
+
+@click.group(cls=_FindingsGroup)
+def findings() -> None:
+    """List what was found and drawn on the lining, of all kinds, or import what another system has."""
+
+
+@findings.command(
+    "list",
+    examples=[
+        "tunneldb findings list ringo-2024",
+        "tunneldb findings list ringo-2024 --kind crack --kind spall --min-severity 3 -o defects.gpkg",
+        "tunneldb findings list ringo-2024 --origin drawn --from 511+700 --to 511+800 --format csv",
+        "tunneldb findings list ringo-2024 --state all --count",
+    ],
+)
+@click.argument("survey")
+@click.option("--kind", "kinds", multiple=True, metavar="KIND", help="Only of this kind; as often as needed.")
+@click.option(
+    "--origin", "origins", multiple=True, type=click.Choice(["detected", "drawn", "redrawn", "split", "merged"]),
+    help="Only of this origin; as often as needed.",
+)  # fmt: skip
+@click.option(
+    "--state", "states", multiple=True, type=click.Choice([*_STATES, "all"]),
+    help="Only in this state, or all; as often as needed. Default: open and confirmed, which count.",
+)  # fmt: skip
+@click.option("--min-severity", type=click.IntRange(1, 4), help="Only of at least this severity.")
+@click.option("--min-area", type=click.FloatRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
+@stretch_options
+@click.option("--clock", metavar="A-B", help="Only those between these hours, clockwise; 12 is the crown: 10-2 or 10:30-1:30.")
+@click.option(
+    "--geometry", type=click.Choice(["unrolled", "map", "3d"]), default="unrolled", show_default=True,
+    help="Coordinates: chainage and arc; the strip on the map beside the axis; on the lining in space.",
+)  # fmt: skip
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["table", "csv", "geojson", "gpkg"]),
+    help="Default: by the ending of -o, else a table.",
+)
+@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write.")
+@click.option("--count", is_flag=True, help="How many there are of each kind and origin instead, and what became of them.")
+@click.pass_obj
+def list_findings(
+    settings: Settings,
+    survey: str,
+    kinds: tuple[str, ...],
+    origins: tuple[str, ...],
+    states: tuple[str, ...],
+    min_severity: int | None,
+    min_area: float,
+    start: str | None,
+    end: str | None,
+    clock: str | None,
+    geometry: str,
+    form: str | None,
+    output: Path | None,
+    count: bool,
+) -> None:
+    """List the findings of SURVEY, detected and drawn, or write them to a file.
+
+    Listed is what counts: open and confirmed. With --state the rest: rejected; gone, which the last detection did not find
+    again; dry, which a dry region took away; same, for which another stands that shows the same; merged into another.
+
+    The word list may be left out: tunneldb findings SURVEY.
+    """
+    form = form or (_BY_SUFFIX.get(output.suffix.lower(), "table") if output else "table")
+    if form == "gpkg" and output is None:
+        raise UserError("a GeoPackage needs a file to be written to: add -o findings.gpkg")
+    hours = parse_clock(clock) if clock else None
+    with connect(settings.dsn) as conn:
+        found = get_survey(conn, survey)
+        if count:
+            _print_counts(conn, found)
+            return
+        if unknown := set(kinds) - {code for (code,) in conn.execute("SELECT code FROM tunnel_api.finding_kind")}:
+            raise UserError(
+                f"there is no kind {', '.join(sorted(unknown))} of findings: SELECT code FROM tunnel_api.finding_kind"
+            )
+        stretch = parse_stretch(conn, found, start, end)
+        wanted = () if "all" in states else states or COUNTED
+        chosen = Chosen(kinds, origins, wanted, stretch.low, stretch.high, hours, min_area, min_severity or 0)
+        rows = read_findings(conn, found, cast(Geometry, geometry), chosen)
+    tell(survey=survey, listed=len(rows), geometry=geometry, findings=rows)
+    if output is None:
+        _print(rows, form, cast(Geometry, geometry), found)
+        return
+    with replacing(output) as temporary:
+        if form == "gpkg":
+            write_gpkg(temporary, rows, cast(Geometry, geometry), found.srid)
+        elif form == "geojson":
+            temporary.write_text(as_geojson(rows, cast(Geometry, geometry), found.srid), encoding="utf-8")
+        else:
+            temporary.write_text(as_csv(rows), encoding="utf-8")
+    tell(file=output)
+    click.echo(f"{len(rows)} findings to {output}", err=True)
+
+
+def _print(rows: list[Finding], form: str, geometry: Geometry, survey: Survey) -> None:
+    if form == "csv":
+        click.echo(as_csv(rows), nl=False)
+    elif form == "geojson":
+        click.echo(as_geojson(rows, geometry, survey.srid), nl=False)
+    else:
+        header = [
+            "id",
+            "chainage",
+            "arc m",
+            "clock",
+            "kind",
+            "origin",
+            "severity",
+            "area m²",
+            "length m",
+            "state",
+            "by",
+            "remark",
+        ]
+        cells = [
+            [
+                row.id, row.label, f"{row.arc_from:+.2f} to {row.arc_to:+.2f}", clock_label(row.clock), row.kind,
+                row.origin + (", also detected" if row.also_detected else ""), row.severity, f"{row.area:.3f}",
+                None if row.length is None else f"{row.length:.2f}", _state(row), row.drawn_by or row.reviewed_by, row.remark,
+            ]
+            for row in rows
+        ]  # fmt: skip
+        print_table(header, cells, right=(0, 1, 2, 3, 6, 7, 8))
+
+
+def _state(row: Finding) -> str:
+    other = row.merged_into or row.same_as
+    return row.state if other is None else f"{row.state} as {other}" if row.state == "same" else f"{row.state} into {other}"
+
+
+def _print_counts(conn: psycopg.Connection, survey: Survey) -> None:
+    names = [
+        "kind",
+        "origin",
+        "counted",
+        "open",
+        "confirmed",
+        "rejected",
+        "merged",
+        "same",
+        "dry",
+        "gone",
+        "to_measure",
+        "area",
+    ]
+    rows = conn.execute(
+        "SELECT c.kind, c.origin, counted, open, confirmed, rejected, merged, same, dry, gone, to_measure, area"
+        " FROM tunnel_api.finding_count c JOIN tunnel_api.finding_kind k ON k.code = c.kind"
+        " WHERE survey_id = %s ORDER BY k.position, c.kind, c.origin",
+        [survey.id],
+    ).fetchall()
+    tell(survey=survey.name, counts=records(names, rows))
+    print_table([*names[:-2], "to measure", "area m²"], [[*row[:-1], f"{row[-1]:.3f}"] for row in rows], right=range(2, 12))
+
+
+@findings.command(
+    "import",
+    examples=[
+        "tunneldb findings import ringo-2024 defects.gpkg --map Riss=crack --map Abplatzung=spall --column kind=Art",
+        "tunneldb findings import ringo-2024 drips.csv --column chainage=Station --column arc=Offset",
+    ],
+)
+@click.argument("survey")
+@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
+@click.option("--map", "kinds", multiple=True, metavar="THEIRS=OURS", help="Their name of a kind and ours; as often as needed.")
+@click.option(
+    "--column", "columns", multiple=True, metavar="OURS=THEIRS", help="Our name of a column and theirs; as often as needed."
+)
+@click.option("--layer", metavar="NAME", help="Layer of a GeoPackage; default: its only one.")
+@click.pass_obj
+def import_(
+    settings: Settings, survey: str, file: Path, kinds: tuple[str, ...], columns: tuple[str, ...], layer: str | None
+) -> None:
+    """Import the findings of another system from FILE into SURVEY: all, or, if anything is wrong with a row, none.
+
+    FILE is CSV, GeoPackage or GeoJSON. It says of each its kind, and may say severity (1 to 4), width (m), review, remark and
+    photo (path or URL). Polygons, lines and points of a layer without a coordinate system are in chainage and arc, m; in the
+    tunnel's they must be 3D, on the lining. A CSV says where each lies by wkt (chainage and arc), by chainage_from,
+    chainage_to, arc_from and arc_to, by chainage and arc, or by x, y and z. What is wrong is told row by row; then nothing is
+    imported.
+    """
+    theirs, ours = _pairs(kinds, "--map"), _pairs(columns, "--column")
+    with connect(settings.dsn) as conn:
+        done = import_findings(conn, get_survey(conn, survey), file, theirs, ours, layer)
+    for line in done.wrong:
+        click.echo(line, err=True)
+    tell(survey=survey, imported=len(done.ids), kinds=dict(done.kinds), ids=done.ids, wrong=done.wrong)
+    if done.wrong:
+        raise UserError(f"{file}: {len(done.wrong)} rows are wrong, so nothing was imported")
+    said = ", ".join(f"{number} {kind}" for kind, number in sorted(done.kinds.items()))
+    click.echo(f"{survey}: {len(done.ids)} findings imported" + (f": {said}" if said else ""))
+
+
+def _pairs(given: tuple[str, ...], option: str) -> dict[str, str]:
+    pairs = {}
+    for text in given:
+        left, equals, right = text.partition("=")
+        if not (left and equals and right):
+            raise UserError(f"{option} takes two names with = between them, not {text!r}")
+        pairs[left] = right
+    return pairs

@@ -1,0 +1,247 @@
+"""Findings of another system into a survey: whole, or not at all."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import psycopg
+import pyogrio.raw
+import shapely
+from psycopg import sql
+from pyogrio.errors import DataLayerError, DataSourceError
+from pyproj import CRS
+from shapely.geometry.base import BaseGeometry
+
+from tunneldb.csvfile import read_header, read_texts
+from tunneldb.errors import UserError
+from tunneldb.geometry.crs import fits_srid, is_local, srid_name
+from tunneldb.store.survey import Survey
+
+COLUMNS = ("kind", "severity", "width", "review", "remark", "photo")
+"""What is read of each row beside its place; all but the kind may be missing."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of a file.
+
+    Attributes
+    ----------
+    number : int
+        Its number: of a CSV the line, else the feature, from 1.
+    values : mapping of str to str
+        What it says, by our names; empty values are left out.
+    shape : geometry or None
+        Where it lies.
+    view : {'unrolled', '3d'}
+        In which coordinates.
+    """
+
+    number: int
+    values: Mapping[str, str]
+    shape: BaseGeometry | None
+    view: str
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What was imported: how many of each kind, and their ids in order of the file; or what is wrong with which row."""
+
+    kinds: Counter[str]
+    ids: list[int]
+    wrong: list[str]
+
+
+def import_findings(
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    path: Path,
+    kinds: Mapping[str, str],
+    columns: Mapping[str, str],
+    layer: str | None = None,
+) -> Imported:
+    """Import findings from a CSV, GeoPackage or GeoJSON file in one transaction; none if any row is wrong.
+
+    Parameters
+    ----------
+    conn, survey
+        Where to. The connection must not be in autocommit.
+    path : Path
+        The file. A CSV says where each lies by ``wkt`` (chainage and arc), by ``chainage_from``, ``chainage_to``, ``arc_from``
+        and ``arc_to`` (a rectangle), by ``chainage`` and ``arc``, or by ``x``, ``y``, ``z`` (points). Shapes of other files lie
+        in the unrolled plane if they have no coordinate system, else in space, in the tunnel's.
+    kinds : mapping
+        Our kind by theirs; what is not in it is ours.
+    columns : mapping
+        Their column by ours.
+    layer : str, optional
+        Layer of a GeoPackage; by default its only one.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, or lacks a column.
+    """
+    rows = _read_csv(path, columns) if path.suffix.lower() in (".csv", ".txt") else _read_layer(path, survey, columns, layer)
+    ids, wrong = [], []
+    made: Counter[str] = Counter()
+    for row in rows:
+        theirs = row.values.get("kind", "")
+        kind = kinds.get(theirs, theirs)
+        try:
+            with conn.transaction():
+                ids.append(_insert(conn, survey, row, kind))
+            made[kind] += 1
+        except ValueError as error:
+            wrong.append(f"{path}, row {row.number}: {error}")
+        except psycopg.Error as error:
+            wrong.append(f"{path}, row {row.number}: {error.diag.message_primary or str(error).splitlines()[0]}")
+    if wrong:
+        conn.rollback()
+        return Imported(Counter(), [], wrong)
+    conn.commit()
+    return Imported(made, ids, [])
+
+
+def _insert(conn: psycopg.Connection[Any], survey: Survey, row: Row, kind: str) -> int:
+    if row.shape is None:
+        raise ValueError("it has no place")
+    query = sql.SQL(
+        "INSERT INTO tunnel_api.{} (survey_id, kind, severity, width, review, remark, geom)"
+        " VALUES (%s, %s, %s, %s, %s, %s, public.ST_GeomFromWKB(%s, %s)) RETURNING id"
+    ).format(sql.Identifier(f"finding_{row.view}"))
+    found = conn.execute(
+        query,
+        [
+            survey.id,
+            kind or None,
+            _number(row, "severity", int),
+            _number(row, "width", float),
+            row.values.get("review"),
+            row.values.get("remark"),
+            shapely.to_wkb(row.shape),
+            survey.srid if row.view == "3d" else 0,
+        ],
+    ).fetchone()
+    assert found is not None
+    if "photo" in row.values:
+        conn.execute("INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (%s, %s)", [found[0], row.values["photo"]])
+    return int(found[0])
+
+
+def _number(row: Row, name: str, kind: type[int] | type[float]) -> float | None:
+    text = row.values.get(name)
+    if text is None:
+        return None
+    try:
+        value = float(text.replace(",", "."))
+    except ValueError:
+        raise ValueError(f"{name} is {text!r}, not a number") from None
+    if not math.isfinite(value) or kind(value) != value:
+        raise ValueError(f"{name} is {text}, not a {'whole ' if kind is int else ''}number")
+    return kind(value)
+
+
+def _read_csv(path: Path, columns: Mapping[str, str]) -> Iterator[Row]:
+    header = read_header(path)
+
+    def column(name: str) -> list[str] | None:
+        theirs = columns.get(name, name)
+        if theirs not in header:
+            if name in columns:
+                raise UserError(f"{path} has no column {theirs}: its header is {','.join(header)!r}")
+            return None
+        return read_texts(path, theirs)
+
+    texts = {name: found for name in (*COLUMNS, *_PLACES) if (found := column(name)) is not None}
+    if "kind" not in texts:
+        raise UserError(f"{path} has no column kind: say which by --column kind=THEIRS; its header is {','.join(header)!r}")
+    ways = [way for way in _WAYS if all(name in texts for name in way)]
+    if not ways:
+        raise UserError(
+            f"{path} does not say where the findings lie: it needs columns wkt; chainage_from, chainage_to, arc_from"
+            f" and arc_to; chainage and arc; or x, y and z (--column OURS=THEIRS); its header is {','.join(header)!r}"
+        )
+    lines = _line_numbers(path)
+    for k in range(len(texts["kind"])):
+        values = {name: found[k] for name, found in texts.items() if found[k]}
+        yield _row(lines[k], values, next((way for way in ways if all(name in values for name in way)), None))
+
+
+_WAYS = (("wkt",), ("chainage_from", "chainage_to", "arc_from", "arc_to"), ("chainage", "arc"), ("x", "y", "z"))
+"""Columns that say where a finding lies; of several the first that a row has."""
+
+_PLACES = tuple(name for way in _WAYS for name in way)
+
+
+def _line_numbers(path: Path) -> list[int]:
+    """Line of each row that is not empty, as read_texts has them."""
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        reader = csv.reader(file)
+        next(reader, None)
+        return [reader.line_num for row in reader if any(cell.strip() for cell in row)]
+
+
+def _row(number: int, values: Mapping[str, str], way: tuple[str, ...] | None) -> Row:
+    """A row of a CSV; one whose place cannot be read has none that is of use."""
+    if way is None:
+        return Row(number, values, None, "unrolled")
+    if way == ("wkt",):
+        try:
+            return Row(number, values, shapely.from_wkt(values["wkt"]), "unrolled")
+        except shapely.errors.GEOSException:
+            return Row(number, values, None, "unrolled")
+    try:
+        place = [float(values[name].replace(",", ".")) for name in way]
+    except ValueError:
+        return Row(number, values, None, "unrolled")
+    if len(place) == 4:
+        return Row(number, values, shapely.box(place[0], place[2], place[1], place[3]), "unrolled")
+    return Row(number, values, shapely.Point(place), "3d" if len(place) == 3 else "unrolled")
+
+
+def _read_layer(path: Path, survey: Survey, columns: Mapping[str, str], layer: str | None) -> Iterator[Row]:
+    if not path.is_file():
+        raise UserError(f"{path}: there is no such file")
+    try:
+        meta, _, shapes, found = pyogrio.raw.read(str(path), layer=layer)
+    except (DataSourceError, DataLayerError, RuntimeError, ValueError) as error:
+        raise UserError(f"{path}: cannot be read: {str(error).strip().splitlines()[0]}") from None
+    view = _view(path, meta["crs"], survey)
+    names = list(meta["fields"])
+    wanted = {ours: columns.get(ours, ours) for ours in COLUMNS}
+    if missing := [theirs for ours, theirs in wanted.items() if theirs not in names and (ours == "kind" or ours in columns)]:
+        raise UserError(
+            f"{path} has no column {', '.join(missing)}: it has {', '.join(names)}; say which by --column OURS=THEIRS"
+        )
+    held = {ours: found[names.index(theirs)] for ours, theirs in wanted.items() if theirs in names}
+    for k, data in enumerate([] if shapes is None else shapes):
+        values = {ours: str(column[k]) for ours, column in held.items() if not _empty(column[k])}
+        yield Row(k + 1, values, None if data is None else shapely.from_wkb(data), view)
+
+
+def _empty(value: Any) -> bool:
+    return value is None or value == "" or (isinstance(value, float) and math.isnan(value)) or value != value
+
+
+def _view(path: Path, given: str | None, survey: Survey) -> str:
+    """Which coordinates a layer is in: the unrolled plane, which has no system, or the tunnel's."""
+    crs = None if given is None else CRS(given)
+    if (
+        crs is None
+        or is_local(crs)
+        or (path.suffix.lower() in (".geojson", ".json") and '"crs"' not in path.read_text("utf-8"))
+    ):
+        return "unrolled"
+    if fits_srid(crs, survey.srid):
+        return "3d"
+    raise UserError(
+        f"{path} is in {crs.name}: findings are in the unrolled plane, without a coordinate system, or 3D"
+        f" in {srid_name(survey.srid)}"
+    )

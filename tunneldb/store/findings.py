@@ -1,0 +1,72 @@
+"""Findings that people drew: their outlines for detection to measure, and what follows from a new surface."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import psycopg
+import shapely
+from psycopg import sql
+from shapely.geometry import Polygon
+
+from tunneldb.anomalies.measure import Measurement
+from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.store.survey import Survey
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A finding whose outline is a person's.
+
+    Attributes
+    ----------
+    id : int
+        Key.
+    drawn_at : datetime
+        When it was drawn last: what is measured of an outline holds only for that.
+    outline : Polygon
+        (chainage, arc), m.
+    """
+
+    id: int
+    drawn_at: dt.datetime
+    outline: Polygon
+
+
+def load_drawn(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Drawn]:
+    """Read the findings of a kilometre, by their middles, whose outlines people drew."""
+    rows = conn.execute(
+        "SELECT id, drawn_at, public.ST_AsBinary(unrolled) FROM tunnel.anomaly"
+        " WHERE survey_id = %s AND km = %s AND origin <> 'detected' AND merged_into IS NULL ORDER BY id",
+        (survey.id, km),
+    ).fetchall()
+    return [Drawn(key, at, shapely.from_wkb(bytes(wkb))) for key, at, wkb in rows]
+
+
+def save_measured(conn: psycopg.Connection[Any], drawn: Sequence[Drawn], measured: Sequence[Measurement]) -> None:
+    """Write what was measured of outlines, but of those that were redrawn meanwhile."""
+    with conn.cursor() as cursor:
+        cursor.executemany(
+            "UPDATE tunnel.anomaly SET drop_mean = %s, drop_max = %s, contrast = %s, image_share = %s"
+            " WHERE id = %s AND drawn_at = %s",
+            [
+                (found.drop_mean, found.drop_max, found.contrast, found.image_share, finding.id, finding.drawn_at)
+                for finding, found in zip(drawn, measured, strict=True)
+            ],
+        )
+
+
+def settle_findings(conn: psycopg.Connection[Any], survey: Survey, km: int) -> None:
+    """Bring what people drew in a kilometre together with what detection found there.
+
+    Outlines in the unrolled plane stay; where they lie on the map and in space follows the surface of now. What is the same
+    counts once, and what lies in dry regions is marked.
+    """
+    place = (km * KILOMETRE, (km + 1) * KILOMETRE)
+    conn.execute("SELECT tunnel_api.renew_findings(%s, %s)", (survey.id, km))
+    for function in ("link_findings", "mark_dry"):
+        query = sql.SQL("SELECT {}(%s, public.ST_MakeEnvelope(%s, -1e4, %s, 1e4))")
+        conn.execute(query.format(sql.Identifier("tunnel_api", function)), (survey.id, *place))
