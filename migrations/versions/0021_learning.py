@@ -45,6 +45,7 @@ def _anomaly() -> None:
         op.f("anomaly_feature_list_id_fkey"), "anomaly", "feature_list", ["feature_list_id"], ["id"],
         source_schema="tunnel", referent_schema="tunnel",
     )  # fmt: skip
+    op.create_index(op.f("anomaly_feature_list_id_idx"), "anomaly", ["feature_list_id"], schema="tunnel")
 
 
 def _learned_model() -> None:

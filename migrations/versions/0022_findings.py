@@ -232,8 +232,9 @@ def _anomaly_indexes() -> None:
         "anomaly_by_hand_idx", "anomaly", ["survey_id", "chainage_from"], schema="tunnel",
         postgresql_where=sa.text("origin <> 'detected'"),
     )  # fmt: skip
-    for name in ("merged_into", "same_as", "parent_id", "dry_region_id"):
+    for name in ("judged", "severity", "merged_into", "same_as", "parent_id", "dry_region_id"):
         op.create_index(op.f(f"anomaly_{name}_idx"), "anomaly", [name], schema="tunnel")
+    op.create_index("anomaly_kind_key_idx", "anomaly", ["kind"], schema="tunnel")
 
 
 def _photo() -> None:

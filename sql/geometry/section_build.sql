@@ -2,9 +2,10 @@
 
 -- The angular classes of each section of a kilometre, as arrays over the classes (NULL for an empty one).
 --
--- The slab of a section begins at half_width to both sides of its plane and doubles, up to max_half_width, until nine classes
+-- The slab of a section begins at half_width to both sides of its plane and doubles, up to four times that, until nine classes
 -- of ten hold four times min_points points: enough for their median to tell the wall from the cables and brackets before it,
--- the bolt pockets in it. Where profiles are far apart it widens until the classes fill. A class of min_points points counts.
+-- the bolt pockets in it. Where profiles are far apart it widens further, up to max_half_width, until nine of ten hold
+-- min_points: a class of so many counts.
 CREATE OR REPLACE FUNCTION tunnel_api.section_gather(
     survey_id int, km int, angle_step float8, half_width float8, max_half_width float8, min_points int)
 RETURNS TABLE (
@@ -32,7 +33,8 @@ BEGIN
                 SELECT c.segment, c.half
                 FROM class c
                 GROUP BY c.segment, c.half
-                HAVING count(*) FILTER (WHERE c.points >= 4 * section_gather.min_points) >= 0.9 * classes
+                HAVING count(*) FILTER (WHERE c.points >= section_gather.min_points
+                                            * CASE WHEN slab < 4 * section_gather.half_width THEN 4 ELSE 1 END) >= 0.9 * classes
                     OR slab >= section_gather.max_half_width
             )
             SELECT d.segment, d.half, slab, array_agg(c.radius ORDER BY i), array_agg(c.slope ORDER BY i),
@@ -51,7 +53,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.section_gather(int, int, float8, float8, float8, int) IS
-'Angular classes of each section of one kilometre as arrays; the slab (width: half of it, m) is widened until nine classes of ten hold four times min_points points; a class of min_points points counts.';
+'Angular classes of each section of one kilometre as arrays; the slab (width: half of it, m) is widened until nine classes of ten hold four times min_points points, from four times half_width on min_points; a class of so many counts.';
 
 
 -- Whether a section has a roof: at least a third of the classes within 45° of the upward direction are filled (radius: over the

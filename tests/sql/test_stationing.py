@@ -173,11 +173,12 @@ def test_equations_are_shown_with_the_station_back(conn: psycopg.Connection, tun
 
 
 def labelled_views(conn: psycopg.Connection) -> list[tuple[str, str, str]]:
-    """View, column of labels, and what gives the chainage of each."""
+    """View, column of labels, and what gives the chainage of each; the labels of catalogues are words."""
     rows = conn.execute(
         "SELECT c.relname, array_agg(a.attname::text) FROM pg_class c"
         " JOIN pg_attribute a ON a.attrelid = c.oid AND a.attnum > 0"
-        " WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname <> 'station_equation'"
+        " WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v'"
+        " AND c.relname NOT IN ('station_equation', 'finding_kind', 'severity')"
         " GROUP BY c.relname HAVING array_agg(a.attname::text) && '{label,label_from,label_to}'"
     ).fetchall()
     return [

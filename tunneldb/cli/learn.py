@@ -25,7 +25,6 @@ STRONGEST = 8
     examples=[
         "tunneldb learn ringo-2024",
         "tunneldb learn ringo-2024 ringo-2025 --apply --note 'soot at the portals'",
-        "tunneldb run ringo-2024 --stale",
         "tunneldb learn ringo-2024 --list",
         "tunneldb learn ringo-2024 --undo",
     ],

@@ -188,6 +188,10 @@ class Anomaly(Review, Base):
             "anomaly_uncounted_idx", "survey_id", postgresql_where=text("NOT (detected AND review <> 'rejected' AND NOT aside)")
         ),
         Index("anomaly_by_hand_idx", "survey_id", "chainage_from", postgresql_where=text("origin <> 'detected'")),
+        Index(None, "feature_list_id"),
+        Index("anomaly_kind_key_idx", "kind"),
+        Index(None, "judged"),
+        Index(None, "severity"),
         Index(None, "merged_into"),
         Index(None, "same_as"),
         Index(None, "parent_id"),
