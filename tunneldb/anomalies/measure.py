@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.contrast import ContrastImage
-from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.geotiff import NODATA, STEP
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def measure_outline(contrast: ContrastImage, outline: Polygon) -> Measurement:
     share = float(np.count_nonzero(held)) / len(chainage)
     if not held.any():
         return Measurement(None, None, None, share)
-    decibels = 0.01 * drop[held].astype(np.float64)
+    decibels = STEP["corrected"] * drop[held].astype(np.float64)
     sigma = contrast.sigma[row[held] // contrast.tile, column[held] // contrast.tile].astype(np.float64)
     known = sigma > 0
     relative = float(decibels[known].sum() / sigma[known].sum()) if known.any() else None
