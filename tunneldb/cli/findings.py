@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import cast
+from typing import cast, get_args
 
 import click
 import psycopg
@@ -12,17 +12,14 @@ from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
 from tunneldb.cli.stretch import parse_stretch, stretch_options
-from tunneldb.cli.tables import print_table
+from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.export.tables.findings import COUNTED, Chosen, Finding, as_csv, as_geojson, read_findings, write_gpkg
+from tunneldb.export.tables.findings import COUNTED, Chosen, Finding, State, as_csv, as_geojson, read_findings, write_gpkg
 from tunneldb.export.tables.leaks import Geometry, clock_label
 from tunneldb.files import replacing
 from tunneldb.pipeline.findings import import_findings
 from tunneldb.store.survey import Survey, get_survey
-
-_BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
-_STATES = ("open", "confirmed", "rejected", "gone", "dry", "same", "merged")
 
 
 class _FindingsGroup(VerbGroup):
@@ -59,7 +56,7 @@ def findings() -> None:
     help="Only of this origin; as often as needed.",
 )  # fmt: skip
 @click.option(
-    "--state", "states", multiple=True, type=click.Choice([*_STATES, "all"]),
+    "--state", "states", multiple=True, type=click.Choice([*get_args(State), "all"]),
     help="Only in this state, or all; as often as needed. Default: open and confirmed, which count.",
 )  # fmt: skip
 @click.option("--min-severity", type=click.IntRange(1, 4), help="Only of at least this severity.")
@@ -102,9 +99,7 @@ def list_findings(
 
     The word list may be left out: tunneldb findings SURVEY.
     """
-    form = form or (_BY_SUFFIX.get(output.suffix.lower(), "table") if output else "table")
-    if form == "gpkg" and output is None:
-        raise UserError("a GeoPackage needs a file to be written to: add -o findings.gpkg")
+    form = table_format(form, output, "findings")
     hours = parse_clock(clock) if clock else None
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)

@@ -15,7 +15,7 @@ from tunneldb.cli.coverage import say_coverage, say_no_crs, say_remarks
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import records, tell, verb
 from tunneldb.cli.stretch import parse_stretch, stretch_options
-from tunneldb.cli.tables import print_table
+from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.tables.leak_files import as_csv, as_geojson, write_gpkg
@@ -27,7 +27,6 @@ from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
-_BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
 _WIDTH = 1000  # a pipe or a file has no width: nothing is to be cut there
 _HOUR = r"(1[0-2]|[1-9])(?::([0-5]\d))?"
 _CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
@@ -113,9 +112,7 @@ def leaks(
     """
     settings: Settings = context.obj
     chosen = cast(Geometry, geometry)
-    form = form or (_BY_SUFFIX.get(output.suffix.lower(), "table") if output else "table")
-    if form == "gpkg" and output is None:
-        raise UserError("a GeoPackage needs a file to be written to: add -o leaks.gpkg")
+    form = table_format(form, output, "leaks")
     filtered = start is not None or end is not None or clock is not None or min_area > 0 or min_confidence > 0
     if by_km and (output is not None or form != "table" or kind != "leak" or filtered):
         raise UserError("--by-km prints a table of all leaks; elsewhere read the view tunnel_api.km_waterproof")

@@ -10,7 +10,7 @@ import click
 from tunneldb.cli.coverage import say_no_crs
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.tables import print_table
+from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import replacing
@@ -18,8 +18,6 @@ from tunneldb.store.survey import get_survey
 
 if TYPE_CHECKING:
     from tunneldb.export.tables.spots import Geometry, SpotList
-
-_BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
 
 
 @verb(
@@ -76,9 +74,7 @@ def spots(
 
     settings: Settings = context.obj
     chosen = cast("Geometry", geometry)
-    form = form or (_BY_SUFFIX.get(output.suffix.lower(), "table") if output else "table")
-    if form == "gpkg" and output is None:
-        raise UserError("a GeoPackage needs a file to be written to: add -o spots.gpkg")
+    form = table_format(form, output, "spots")
     if form == "table" and output is not None:
         raise UserError(f"{output}: spots are written as .csv, .geojson or .gpkg: let its name end so, or say --format")
     with connect(settings.dsn) as conn:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -12,6 +13,23 @@ from rich.text import Text
 from tunneldb.arrays import Int64
 from tunneldb.classification.classes import PointClass
 from tunneldb.cli.output import tell
+from tunneldb.errors import UserError
+
+_BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
+
+
+def table_format(form: str | None, output: Path | None, what: str) -> str:
+    """Return the format asked for, else that of a file's ending, else ``table``.
+
+    Raises
+    ------
+    UserError
+        If a GeoPackage of what is written has no file to be written to.
+    """
+    form = form or (_BY_SUFFIX.get(output.suffix.lower(), "table") if output else "table")
+    if form == "gpkg" and output is None:
+        raise UserError(f"a GeoPackage needs a file to be written to: add -o {what}.gpkg")
+    return form
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[Any]], right: Sequence[int] = ()) -> None:
