@@ -36,6 +36,16 @@ def test_areas_are_those_of_the_pixels(pixel, halo, step, size):
         np.testing.assert_allclose(areas, counts * pixel**2, rtol=1e-5)
 
 
+def test_steps_begin_with_the_kilometre_where_the_grid_does_not():
+    grid = Grid.covering(3, 0.1, -3.0, 3.0, 12, (3120.0, 3190.0))
+    state, dark = picture(np.random.default_rng(2), grid)
+    found = measure_coverage(state, dark, grid, 5)
+    assert len(found.lining) == 10_000
+    lining = (state <= PixelState.RECESS)[:, grid.inner].sum(axis=0) * 0.01
+    np.testing.assert_allclose(found.lining[1000:2000], lining, rtol=1e-5)
+    assert not np.delete(found.lining, np.arange(1000, 2000)).any()
+
+
 def test_floor_and_appendages_do_not_count_and_what_was_not_scanned_is_not_seen():
     grid = Grid.covering(0, 0.1, 0.0, 1.0)
     state = np.zeros((grid.rows, grid.columns), np.uint8)

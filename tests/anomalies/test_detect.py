@@ -114,6 +114,21 @@ def test_with_a_halo_the_grid_has_a_block_more_at_either_end_and_lines_up_with_t
         assert image.inner_blocks() == []
 
 
+@pytest.mark.parametrize(
+    ("between", "covered"),
+    [((2970.0, 4200.0), (0, 20)), ((3030.0, 3101.0), (0, 3)), ((3050.0, 3100.0), (1, 2)), ((3999.0, 5000.0), (19, 20))],
+)
+def test_grid_of_a_short_tunnel_covers_the_blocks_in_which_it_lies_and_lines_up_with_the_whole(between, covered):
+    whole = Grid.covering(3, 0.5, -1.2, 1.0, 7)
+    part = Grid.covering(3, 0.5, -1.2, 1.0, 7, between)
+    assert part.covered == covered
+    assert part.columns == 100 * (covered[1] - covered[0] + 2)
+    place = np.array([3000.0 + 50.0 * covered[0] + 10.3]), np.array([0.2])
+    assert part.first_column + part.place(*place)[1] == whole.first_column + whole.place(*place)[1]
+    assert part.first_block == whole.first_block + covered[0]
+    assert part.west == whole.west + 50.0 * covered[0]
+
+
 @pytest.mark.parametrize("kind", ["raw", "offset"])
 def test_an_image_comes_back_from_its_file(kind):
     values = np.random.default_rng(3).normal(0, 5, (70, 300)).astype(np.float32)

@@ -9,7 +9,7 @@ import numpy as np
 from tunneldb.anomalies.threshold import seen_lining
 from tunneldb.anomalies.windows import count_in_columns
 from tunneldb.arrays import Bool, Single, UInt8
-from tunneldb.raster.grid import Grid
+from tunneldb.raster.grid import BLOCKS, Grid
 from tunneldb.raster.pixel_state import PixelState
 
 STEP = 0.1
@@ -57,7 +57,9 @@ def measure_coverage(state: UInt8, dark: Bool, grid: Grid, size: int) -> Coverag
         for k, mask in enumerate((state[rows] <= PixelState.RECESS, seen, seen & dark[rows])):
             counts[k] += count_in_columns(mask[:, inner])
     columns = _columns_of_step(grid)
-    areas = (counts.reshape(3, -1, columns).sum(axis=2) * grid.pixel**2).astype(np.float32)
+    steps = grid.block_columns // columns
+    areas = np.zeros((3, BLOCKS * steps), np.float32)
+    areas[:, steps * grid.covered[0] : steps * grid.covered[1]] = counts.reshape(3, -1, columns).sum(axis=2) * grid.pixel**2
     return Coverage(columns * grid.pixel, areas[0], areas[1], areas[2])
 
 

@@ -347,15 +347,16 @@ def _gather(
 
 
 def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
-    """Grid of a kilometre and its halo, from the lowest to the highest arc of their sections."""
+    """Grid of a kilometre and its halo: blocks that have a surface, from the lowest to the highest arc of their sections."""
     first, last = km * KILOMETRE - surface.reach, (km + 1) * KILOMETRE + surface.reach
     if not ((surface.chainages >= first) & (surface.chainages <= last)).any():
         raise UserError(f"kilometre {km} has no sections yet: run its stages segments and sections first")
     beyond = halo(pixel)  # what is farther away counts only where profiles lie apart, and adds no rows
     inside = (surface.chainages >= first - beyond * pixel) & (surface.chainages <= last + beyond * pixel)
-    return Grid.covering(
-        km, pixel, float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max()), halo_of_profiles(pixel)
-    )
+    low, high = float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max())
+    beyond_sections = surface.reach + pixel  # so that no lining touches an end that is not the kilometre's
+    ends = surface.chainages[0] - beyond_sections, surface.chainages[-1] + beyond_sections
+    return Grid.covering(km, pixel, low, high, halo_of_profiles(pixel), ends)
 
 
 def _report(result: DetectionResult, known_before: list[str | None], other_pixels: list[int]) -> Counts:

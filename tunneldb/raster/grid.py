@@ -14,6 +14,9 @@ from tunneldb.geometry.stationing import KILOMETRE
 BLOCK = 50.0
 """Length of a block of the image along the tunnel, m."""
 
+BLOCKS = round(KILOMETRE / BLOCK)
+"""Blocks of a kilometre."""
+
 
 class PixelGrid:
     """Pixels of an unrolled surface: columns along its first coordinate, rows from the greatest of its second.
@@ -111,7 +114,8 @@ class Grid(PixelGrid):
     """Pixels of one kilometre in the unrolled plane: columns along the chainage, rows from the greatest arc.
 
     With a halo the grid has a block more before the kilometre and one after it, so that pixels at its ends can be judged by
-    what lies about them. Rows and columns of the grids of all kilometres line up.
+    what lies about them. Rows and columns of the grids of all kilometres line up. Where a tunnel begins or ends within the
+    kilometre, the grid covers the blocks in which it lies.
 
     Attributes
     ----------
@@ -125,6 +129,8 @@ class Grid(PixelGrid):
         Number of rows.
     halo : int
         Columns beyond each end of the kilometre that take points, at most a block; 0 for the kilometre alone.
+    covered : pair of int
+        The first block of the kilometre that is covered, and the one after the last.
     """
 
     km: int
@@ -132,10 +138,13 @@ class Grid(PixelGrid):
     bottom: int
     rows: int
     halo: int = 0
+    covered: tuple[int, int] = (0, BLOCKS)
 
     @classmethod
-    def covering(cls, km: int, pixel: float, arc_min: float, arc_max: float, halo: int = 0) -> Grid:
-        """Make the grid that covers the given arcs, m, and a halo, pixels.
+    def covering(
+        cls, km: int, pixel: float, arc_min: float, arc_max: float, halo: int = 0, chainages: tuple[float, float] | None = None
+    ) -> Grid:
+        """Make the grid that covers the given arcs, m, a halo, pixels, and the blocks between two chainages, m; all by default.
 
         Raises
         ------
@@ -145,7 +154,11 @@ class Grid(PixelGrid):
         if not pixel >= 0.002 or abs(BLOCK / pixel - round(BLOCK / pixel)) > 1e-6:
             raise UserError(f"image.pixel must be at least 0.002 m and divide 50 m: {pixel:g} m does not")
         bottom, top = int(np.floor(arc_min / pixel)), int(np.ceil(arc_max / pixel))
-        return cls(km, pixel, bottom, top - bottom, halo)
+        if chainages is None:
+            return cls(km, pixel, bottom, top - bottom, halo)
+        west, east = np.array(chainages) / BLOCK - km * BLOCKS
+        first = int(np.clip(np.floor(west), 0, BLOCKS - 1))
+        return cls(km, pixel, bottom, top - bottom, halo, (first, int(np.clip(np.ceil(east), first + 1, BLOCKS))))
 
     @property
     def columns(self) -> int:
@@ -160,7 +173,8 @@ class Grid(PixelGrid):
     @property
     def blocks(self) -> int:
         """Number of blocks."""
-        return round(KILOMETRE / BLOCK) + 2 * self._ahead
+        first, stop = self.covered
+        return stop - first + 2 * self._ahead
 
     @property
     def _ahead(self) -> int:
@@ -169,7 +183,7 @@ class Grid(PixelGrid):
 
     @property
     def inner(self) -> slice:
-        """Columns of the kilometre itself."""
+        """Columns of the kilometre itself that are covered."""
         return slice(self._ahead * self.block_columns, (self.blocks - self._ahead) * self.block_columns)
 
     @property
@@ -186,7 +200,7 @@ class Grid(PixelGrid):
     @property
     def first_block(self) -> int:
         """Number of the first block, counted from chainage 0."""
-        return self.km * round(KILOMETRE / BLOCK) - self._ahead
+        return self.km * BLOCKS + self.covered[0] - self._ahead
 
     @property
     def first_column(self) -> int:
