@@ -22,7 +22,7 @@ class Lining:
     """Lining from chainage 400 m on, 8 m of arc: a truth without noise, and pictures of it."""
 
     def __init__(self, length=60.0, arc=8.0, pixel=PIXEL, start=400.0, km=0):
-        self.grid = Grid(km, pixel, round(-arc / 2 / pixel), round(arc / pixel), round(0.5 / pixel))
+        self.grid = Grid.covering(km, pixel, -arc / 2, arc / 2, round(0.5 / pixel), (start, start + length))
         first = round((start - self.grid.west) / pixel)
         self.columns = slice(first, first + round(length / pixel))
         self.chainage, self.arc = self.grid.chainages(self.columns), self.grid.arcs()[:, None]

@@ -24,7 +24,7 @@ def wall(spread: float, along: float, across: float, seed: int = 3) -> np.ndarra
 
 
 def image(drop: np.ndarray, sigma: float) -> ContrastImage:
-    grid = Grid(0, PIXEL, -200, 400)
+    grid = Grid(0, PIXEL, -200, 400, covered=(0, 1))
     steps, state = np.full((400, grid.columns), NODATA, np.int16), np.zeros((400, grid.columns), np.uint8)
     steps[:, :800], state[:, :800] = np.rint(100 * drop), PixelState.LINING
     tiles = np.full((16, grid.columns // TILE), sigma, np.float32)

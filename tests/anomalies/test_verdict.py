@@ -27,7 +27,7 @@ class Canvas:
 
     def __init__(self, seed: int = 0, filled: float = 0.8, sigma: float = SIGMA) -> None:
         self.rng, self.filled, self.sigma = np.random.default_rng(seed), filled, sigma
-        self.grid = Grid.covering(0, PIXEL, -HALF, HALF)
+        self.grid = Grid.covering(0, PIXEL, -HALF, HALF, chainages=(0.0, WIDTH))
         self.drop = np.zeros((self.grid.rows, round(WIDTH / PIXEL)))
         self.state = np.full(self.drop.shape, PixelState.LINING, np.uint8)
         self.chainage, self.arc = (np.arange(self.drop.shape[1]) + 0.5) * PIXEL, self.grid.arcs()[:, None]
