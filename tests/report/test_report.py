@@ -462,7 +462,7 @@ def test_thousands_of_leaks_come_by_pages(example: str, conn: psycopg.Connection
     survey = get_survey(conn, example)
     conn.commit()
     path = tmp_path / "many.html"
-    assert write_html(conn, survey, path, pictures=5) == 506, "and one is rejected"
+    assert write_html(conn, survey, path, pictures=5).leaks == 506, "and one is rejected"
     page = browser.new_page()
     troubles = watch(page)
     page.goto(path.as_uri())

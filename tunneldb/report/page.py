@@ -153,8 +153,9 @@ def _template(name: str, owner: Owner) -> jinja2.Template:
         lstrip_blocks=True,
     )
     environment.filters |= {
-        "percent": text.percent, "number": text.number, "whole": text.whole, "when": text.when, "day": owner.words.day,
-        "kilometres": text.kilometres, "size": text.size, "css": text.css, "counters": text.counters, "clock": clock_label, "signed": text.signed,
+        "percent": text.percent, "number": text.number, "whole": text.whole, "signed": text.signed, "clock": clock_label,
+        "when": text.when, "day": owner.words.day, "kilometres": text.kilometres, "size": text.size, "css": text.css,
+        "counters": text.counters,
     }  # fmt: skip
     environment.globals |= {"_": owner.words, "owner": owner}
     environment.globals |= {"origins": ORIGINS, "severities": SEVERITIES, "uncounted": UNCOUNTED, "said": STATE_WORDS}

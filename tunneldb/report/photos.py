@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 from urllib import request
 from urllib.error import HTTPError
-from urllib.parse import urlsplit
 
 import psycopg
 from PIL import Image, ImageOps
@@ -107,11 +106,12 @@ def _have(path: str, folder: Path, end: float) -> tuple[str | None, str]:
 
 
 def _read(path: str, folder: Path, end: float) -> bytes:
-    scheme = urlsplit(path).scheme.lower() if "://" in path else ""
+    scheme, separator, rest = path.partition("://")
+    scheme = scheme.lower() if separator else ""
     if scheme in ("http", "https"):
         return _fetch(path, end)
     if scheme == "file":
-        path = request.url2pathname(urlsplit(path).path)
+        path = request.url2pathname(rest)
     elif scheme:
         raise _NotHadError("neither a file nor http:// or https://")
     try:
@@ -121,7 +121,7 @@ def _read(path: str, folder: Path, end: float) -> bytes:
         if not file.is_file() or file.stat().st_size > LARGEST:
             raise _NotHadError("no image that can be read")
         return file.read_bytes()
-    except (OSError, ValueError) as error:  # of a path that holds a zero byte
+    except OSError as error:
         raise _NotHadError("may not be read") from error
 
 

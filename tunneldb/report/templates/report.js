@@ -34,7 +34,7 @@
   const columns = [
     ["No.", "id", (l) => l.id, "n"],
     [data.place, "chainage", (l) => l.label, ""],
-    ...(several ? [["Kind", "kind", kind, ""]] : []),
+    ...(several ? [["Kind", "kind", kind, "kinds"]] : []),
     ["Clock", "clock", (l) => l.clockLabel, "n"],
     ["Arc m", "arcFrom", arc, "n minor"],
     ["Length m", "length", (l) => fixed(l.length, 2), "n minor"],
@@ -42,7 +42,7 @@
     ["Drop dB", "drop", (l) => fixed(l.drop, 1), "n minor"],
     ["Contrast σ", "contrast", (l) => fixed(l.contrast, 1), "n minor"],
     ["Confidence", "confidence", (l) => fixed(l.confidence, 2), "n minor"],
-    ...(leaks.some((leak) => leak.severity) ? [["Severity", "severity", (l) => _(l.severityLabel), ""]] : []),
+    ...(leaks.some((leak) => leak.severity) ? [["Severity", "severity", (l) => _(l.severityLabel), "minor"]] : []),
     ["Review", "review", review, ""],
     ["By", "by", (l) => l.by, "minor"],
     ["Remark", "remark", (l) => l.remark, "minor remark"],
