@@ -241,6 +241,15 @@ def test_digest_tells_another_finding(drawn: str, tmp_path: Path) -> None:
     assert digests[0] == digests[1] != digests[2]
 
 
+def test_of_too_many_the_gravest_have_rows(drawn: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(findings, "MOST", 2)
+    with connect(drawn) as conn:
+        chapter = findings.read_findings_chapter(conn, get_survey(conn, NAME), (0.0, 1e5), frozenset(), tmp_path, table=True)
+    (cracks,) = [kind for kind in chapter.kinds if kind.count.kind == "crack"]
+    assert [row.severity for _, rows in cracks.groups for row in rows] == [3, 2]
+    assert [(row.severity, row.state) for row in cracks.beyond] == [(1, "rejected")]
+
+
 TEMPLATE = """
 language = "de"
 client = "Bahn & Söhne"

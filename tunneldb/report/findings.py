@@ -22,6 +22,9 @@ from tunneldb.store.survey import Survey
 UNCOUNTED = tuple(state for state in STATES if state not in COUNTED)
 """States of what no sum counts."""
 
+MOST = 2000
+"""Rows of a kind at most; of more those that count first, then by severity and size, and a line says how many have none."""
+
 STATE_WORDS = {
     "confirmed": "confirmed",
     "open": "open",
@@ -48,12 +51,15 @@ class KindChapter:
         How many stand here without a row: detected, and nobody has said anything of them.
     tabled : bool
         Whether these are in the table of leaks.
+    beyond : list of Finding
+        Those for which there is no row, as there are too many.
     """
 
     count: KindCount
     groups: list[tuple[str, list[Finding]]]
     plain: int
     tabled: bool
+    beyond: list[Finding]
 
 
 @dataclass(frozen=True)
@@ -72,6 +78,8 @@ class FindingsChapter:
         All of them.
     leaks : frozenset of int
         Ids of those that are reported as leaks.
+    merged : dict of int to list of int
+        Ids of those that are merged into one, by its id.
     """
 
     kinds: list[KindChapter]
@@ -79,6 +87,7 @@ class FindingsChapter:
     photos: dict[int, list[Thumbnail]]
     by_id: dict[int, Finding]
     leaks: frozenset[int]
+    merged: dict[int, list[int]]
 
     @property
     def states(self) -> dict[str, int]:
@@ -122,10 +131,6 @@ class FindingsChapter:
         there = {finding.severity or 0 for finding in self.marks}
         return [(severity, self.severities.get(severity, "")) for severity in sorted(there, reverse=True)]
 
-    def merged_from(self, key: int) -> list[int]:
-        """Ids of those that are merged into one."""
-        return sorted(other.id for other in self.by_id.values() if other.merged_into == key)
-
 
 def read_findings_chapter(
     conn: psycopg.Connection[Any],
@@ -158,27 +163,33 @@ def read_findings_chapter(
     for finding in found:
         kinds[finding.kind].append(finding)
     counts = count_findings(found, read_kinds(conn))
+    chapters = [_chapter(count, kinds[count.kind], leaks if table else frozenset()) for count in counts]
+    taken = [finding.id for chapter in chapters for _, rows in chapter.groups for finding in rows if finding.photos]
     pictures: defaultdict[int, list[Thumbnail]] = defaultdict(list)
-    taken = [finding.id for finding in found if finding.photos]
     for photo in make_thumbnails(read_photos(conn, survey, taken), photos):
         pictures[photo.photo.finding_id].append(photo)
-    return FindingsChapter(
-        [_chapter(count, kinds[count.kind], leaks if table else frozenset()) for count in counts],
-        read_severities(conn),
-        dict(pictures),
-        {finding.id: finding for finding in found},
-        leaks,
-    )
+    merged: defaultdict[int, list[int]] = defaultdict(list)
+    for finding in sorted(found, key=lambda finding: finding.id):
+        if finding.merged_into is not None:
+            merged[finding.merged_into].append(finding.id)
+    by_id = {finding.id: finding for finding in found}
+    return FindingsChapter(chapters, read_severities(conn), dict(pictures), by_id, leaks, dict(merged))
 
 
 def _chapter(count: KindCount, findings: Sequence[Finding], tabled: frozenset[int]) -> KindChapter:
-    listed = [finding for finding in findings if not _is_plain(finding, tabled)]
-    groups = [(state, [finding for finding in listed if finding.state == state]) for state in ("confirmed", "open", *UNCOUNTED)]
+    noted = [finding for finding in findings if not _is_plain(finding, tabled)]
+    first = sorted(noted, key=lambda one: (not one.counted, -(one.severity or 0), -one.area, -(one.length or 0.0), one.id))
+    shown = {finding.id for finding in first[:MOST]}
+    groups = [
+        (state, [finding for finding in noted if finding.state == state and finding.id in shown])
+        for state in ("confirmed", "open", *UNCOUNTED)
+    ]
     return KindChapter(
         count,
         [(state, rows) for state, rows in groups if rows],
-        len(findings) - len(listed),
+        len(findings) - len(noted),
         any(finding.id in tabled for finding in findings),
+        first[MOST:],
     )
 
 
@@ -192,8 +203,9 @@ def _is_plain(finding: Finding, tabled: frozenset[int]) -> bool:
 
 
 def digest_findings(digest: hashlib._Hash, found: FindingsChapter | None, regions: Sequence[DryRegion]) -> None:
-    """Add what is reported of findings that have a row, their photos, and of dry regions that took something away."""
-    for finding in found.listed if found else []:
+    """Add what is reported of findings that somebody noted, their photos, and of dry regions that took something away."""
+    beyond = [finding for kind in found.kinds for finding in kind.beyond] if found else []
+    for finding in [*(found.listed if found else []), *sorted(beyond, key=lambda finding: finding.id)]:
         stated = (
             finding.id, finding.kind, finding.origin, finding.state, finding.severity, finding.drawn_by, finding.reviewed_by,
             finding.remark, f"{finding.area:.4f}", f"{finding.length or 0:.4f}", finding.geometry.wkb_hex,
