@@ -247,7 +247,7 @@ class _Report:
             "runs": runs,
             "versions": text.versions(runs),
             "radiometry": data.read_radiometry(conn, survey, low, high),
-            "people": text.reviewers(self.leaks),
+            "people": text.reviewers(self.findings.by_id.values() if self.findings else []),
             "structures": self.structures,
             "underwater": self.underwater,
             "edits": [text.edit(edit, numbers) for edit in edits],

@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 from markupsafe import Markup
 
+from tunneldb.export.tables.findings import Finding
 from tunneldb.report.data import Edit, Leak, Row
 
 DASH = "–"
@@ -171,18 +172,18 @@ def _scaled(bars: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [bar | {"width": round(100 * bar["count"] / most, 1)} for bar in bars]
 
 
-def reviewers(leaks: Sequence[Leak]) -> list[dict[str, Any]]:
-    """Return who reviewed how many leaks, and when first and last."""
-    by: defaultdict[str, list[Leak]] = defaultdict(list)
-    for leak in leaks:
-        if leak.reviewed_by and leak.reviewed_at:
-            by[leak.reviewed_by].append(leak)
+def reviewers(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """Return who reviewed how many findings, and when first and last."""
+    by: defaultdict[str, list[Finding]] = defaultdict(list)
+    for finding in findings:
+        if finding.reviewed_by and finding.reviewed_at:
+            by[finding.reviewed_by].append(finding)
     people = []
     for name, theirs in sorted(by.items()):
-        moments = [leak.reviewed_at for leak in theirs if leak.reviewed_at]
+        moments = [finding.reviewed_at for finding in theirs if finding.reviewed_at]
         people.append(
             {"name": name, "first": min(moments), "last": max(moments)}
-            | {state: sum(leak.review == state for leak in theirs) for state in ("open", "confirmed", "rejected")}
+            | {state: sum(finding.review == state for finding in theirs) for state in ("open", "confirmed", "rejected")}
         )
     return people
 

@@ -39,6 +39,8 @@ _LEAK = (
     (Column("Reviewed by"), "reviewed_by"), (Column("Reviewed, UTC"), "reviewed_at"), (Column("Reasons"), "reasons"),
 )  # fmt: skip
 
+_NAMES = {"leak": "Leaks", "joint": "Joints", "dark": "Dark spots", "all": "Leaks, joints, dark spots"}
+
 
 def write_findings(
     path: Path,
@@ -96,7 +98,7 @@ def write_leaks(path: Path, title: str, leaks: LeakList, regions: Sequence[DryRe
     write_workbook(
         path,
         [
-            Sheet("Leaks", [column for column, _ in _LEAK], [_cells(row, _LEAK) for row in leaks.rows]),
+            Sheet(_NAMES[leaks.kind], [column for column, _ in _LEAK], [_cells(row, _LEAK) for row in leaks.rows]),
             Sheet(
                 "Counts",
                 [*(Column(head, _WHOLE) for head in heads), Column("Area in the stretch, m²", "0.0000")],
