@@ -312,7 +312,7 @@ def test_a_report_without_tables_of_leaks_lists_them_by_kind(drawn: str, tmp_pat
         ("a = ", "is not TOML"), ("klient = 1", "klient: there is no such key"), ("client = 5", "client: takes a text, not 5"),
         ('language = "xx"', "language: 'xx' is none of de, en, sl"), ('logo = "none.png"', "logo: there is no file"),
         ('logo = "owner.toml"', "is no image"), ('chapters = "leaks"', "chapters: takes a list"),
-        ('chapters = ["leeks"]', "chapters: there is no chapter 'leeks'"), ("chapters = []", "chapters: takes a list"),
+        ('chapters = ["leeks"]', "chapters: there is no chapter 'leeks'"), ("chapters = []", "chapters: takes a list"), ("chapters = [[1]]", "there is no chapter [1]"),
         ('chapters = ["leaks", "leaks"]', "'leaks' stands there 2 times"), ("headings = 1", "headings: takes a table"),
         ('[headings]\n"Leeks" = "x"', "headings.'Leeks': there is no such heading"),
         ('[headings]\n"Leaks" = 1', "headings.Leaks: takes a text, not 1"),

@@ -167,7 +167,7 @@ def _chapters(given: _Given) -> tuple[str, ...]:
     if not isinstance(chapters, list) or not chapters:
         given.refuse("chapters", f"takes a list of names, not {chapters!r}")
     for name in chapters:
-        if name not in CHAPTERS:
+        if not isinstance(name, str) or name not in CHAPTERS:
             given.refuse("chapters", f"there is no chapter {name!r}; there are {', '.join(CHAPTERS)}")
         if chapters.count(name) > 1:
             given.refuse("chapters", f"{name!r} stands there {chapters.count(name)} times")
