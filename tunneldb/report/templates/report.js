@@ -200,7 +200,10 @@
       const other = place < 0 ? undefined : listed[place + by];
       return make("button", { type: "button", ...(other ? { onclick: go(other) } : { disabled: "" }) }, text);
     };
-    dialog.replaceChildren(card(leak), make("div", { class: "bar-of" },
+    const shown = card(leak);
+    const photos = $(`#finding-${leak.id} + .photos td:last-child`); // they stand with the findings, once
+    if (photos) shown.append(make("div", { class: "photos" }, ...[...photos.children].map((photo) => photo.cloneNode(true))));
+    dialog.replaceChildren(shown, make("div", { class: "bar-of" },
       step(-1, _("Previous")), step(1, _("Next")),
       ...($("#lining") ? [make("button", { type: "button", class: "to-strip", onclick: () => { dialog.close(); find(leak); } }, _("Show on the lining"))] : []),
       ...(tabled ? [make("button", { type: "button", class: "to-table", onclick: () => { dialog.close(); point(leak); } }, _("Show in the table"))] : []),
