@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import csv
+import datetime as dt
 import io
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import openpyxl
 import psycopg
 import pyogrio.raw
 import pytest
@@ -92,6 +95,74 @@ def test_files_hold_what_the_database_has(conn: psycopg.Connection, tmp_path: Pa
     assert {int(line["id"]): line["geometry"].split()[0] for line in lines} == {
         row[0]: shapely.from_wkb(bytes(row[4])).geom_type.upper() for row in rows
     }
+
+
+def sheet(path: Path, name: str) -> list[dict[str, Any]]:
+    """Rows of a sheet of a workbook by their headings, and each cell the type of which it is."""
+    head, *rows = openpyxl.load_workbook(path)[name].iter_rows(values_only=True)
+    return [dict(zip(head, row, strict=True)) for row in rows]
+
+
+def test_the_workbook_is_what_the_database_has(conn: psycopg.Connection, tmp_path: Path) -> None:
+    """Read by another library: numbers, moments, what is left out, counts as in `finding_count` and `--json`; no formulas."""
+    conn.execute(DRAWN)
+    formula = '=HYPERLINK("http://evil","x")'
+    conn.execute("UPDATE tunnel_api.finding_unrolled SET remark = %s WHERE kind = 'crack'", [formula])
+    conn.execute("UPDATE tunnel_api.finding_unrolled SET remark = '@SUM(1)', review = 'rejected' WHERE kind = 'missing_bolt'")
+    conn.commit()
+    select = (
+        "SELECT id, kind, severity, area, length, drawn_at, state, remark FROM tunnel_api.lining_finding WHERE counted = %s"
+    )
+    path = tmp_path / "f.xlsx"
+    told = json.loads(run("findings", NAME, "-o", path, "--json").stdout)
+    names = ("No.", "Code of kind", "Severity", "Area, m²", "Length, m", "Drawn, UTC", "State", "Remark")
+    for name, counted in (("Findings", True), ("Left out", False)):
+        rows = {row["No."]: row for row in sheet(path, name)}
+        for key, *values in conn.execute(select, [counted]).fetchall():
+            moment = values[4] and values[4].astimezone(dt.UTC).replace(tzinfo=None, microsecond=0)
+            expected = [key, *values[:4], moment, *values[5:]]
+            row = rows.pop(key)
+            assert [row[n] for n in names] == [pytest.approx(v) if isinstance(v, float) else v for v in expected]
+        assert rows == {}
+    cells = [cell for page in openpyxl.load_workbook(path) for row in page.iter_rows() for cell in row]
+    assert {cell.data_type for cell in cells} <= {"s", "n", "b", "d"}, "no formula"
+    assert formula in [cell.value for cell in cells]
+    counts = {row["Code of kind"]: row for row in sheet(path, "Counts")}
+    total = counts.pop(None)
+    stated = conn.execute(
+        "SELECT kind, sum(counted), sum(open), sum(rejected), sum(gone), sum(area), sum(length) FROM tunnel_api.finding_count"
+        " GROUP BY kind"
+    ).fetchall()
+    names = ("Counted", "Open", "Not counted: rejected", "Not counted: gone", "Area, m²", "Length, m")
+    assert {kind: [row[n] for n in names] for kind, row in counts.items()} == {
+        kind: [*map(int, values[:4]), *map(pytest.approx, values[4:])] for kind, *values in stated
+    }
+    assert {row["kind"]: (row["counted"], row["area"]) for row in told["kinds"]} == {
+        row[0]: (row[1], pytest.approx(row[5])) for row in stated
+    }
+    assert total["Counted"] == len(sheet(path, "Findings"))
+    assert [row["Their numbers"] for row in sheet(path, "Dry regions")] == [None]
+    run("leaks", NAME, "-o", tmp_path / "l.xlsx")
+    leaks = json.loads(run("leaks", NAME, "--json").stdout)
+    *_, total = sheet(tmp_path / "l.xlsx", "Counts")
+    assert (total["Counted"], total["Area in the stretch, m²"]) == (leaks["count"], pytest.approx(leaks["area"]))
+    assert [row["No."] for row in sheet(tmp_path / "l.xlsx", "Leaks")] == [leak["id"] for leak in leaks["leaks"]]
+
+
+def test_a_file_that_ends_otherwise_is_refused(conn: psycopg.Connection, tmp_path: Path) -> None:
+    for arguments in (("findings", NAME, "-o", tmp_path / "f.txt"), ("findings", NAME, "--format", "xlsx")):
+        done = run(*arguments)
+        assert (done.exit_code, done.stderr.count("\n"), list(tmp_path.iterdir())) == (2, 1, [])
+        assert ".xlsx" in done.stderr
+
+
+def test_of_what_an_end_of_the_stretch_cuts_its_part_is_summed(conn: psycopg.Connection) -> None:
+    conn.execute(DRAWN)
+    conn.commit()
+    told = json.loads(run("findings", NAME, "--from", "12+351", "--to", "12+400", "--kind", "crack", "--json").stdout)
+    ((whole, share),) = [(row["length"], row["share"]) for row in told["findings"]]
+    assert share == pytest.approx(2 / 3)
+    assert told["kinds"][0]["length"] == pytest.approx(whole * 2 / 3)
 
 
 def test_a_csv_of_another_system_is_imported_whole(conn: psycopg.Connection, tmp_path: Path) -> None:

@@ -211,7 +211,7 @@ def test_digest_tells_another_state(example: str, conn: psycopg.Connection, tmp_
     run("report", example, "-o", paths[2])
     assert digest(paths[0]) == digest(paths[1]) != digest(paths[2])
     text = paths[2].read_text("utf-8")
-    assert "leak or dark spot 2</td><td>review: open → rejected</td>" in text, "the audit"
+    assert "finding 2</td><td>review: open → rejected</td>" in text, "the audit"
     assert re.search(r"<td class=\"n\">0</td><td class=\"n\">1</td><td class=\"n\">0</td>", text), "and by whom"
 
 
@@ -462,7 +462,7 @@ def test_thousands_of_leaks_come_by_pages(example: str, conn: psycopg.Connection
     survey = get_survey(conn, example)
     conn.commit()
     path = tmp_path / "many.html"
-    assert write_html(conn, survey, path, pictures=5) == 506, "and one is rejected"
+    assert write_html(conn, survey, path, pictures=5).leaks == 506, "and one is rejected"
     page = browser.new_page()
     troubles = watch(page)
     page.goto(path.as_uri())

@@ -35,7 +35,12 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     assert "no chainage" in command("report", "hall-1", "-o", page, "--from", "0", code=2)
     conn.execute("UPDATE tunnel_api.spot SET review = 'rejected', remark = 'a <shadow>' WHERE number = 2")
     conn.commit()
-    assert "2 spots" in command("report", "hall-1", "-o", page)
+    (tmp_path / "owner.toml").write_text('language = "sl"\nclient = "Hala"', "utf-8")
+    assert "2 spots" in command("report", "hall-1", "-o", page, "--template", tmp_path / "owner.toml")
+    assert {"<h2>Konstrukcije</h2>", "<dt>Naročnik</dt><dd>Hala</dd>"} <= set(
+        re.findall("<h2>.*</h2>|<dt>.*</dd>", page.read_text())
+    )
+    command("report", "hall-1", "-o", page)
     text = page.read_text()
     listed = json.loads(command("spots", "hall-1", "--json"))
     # What was not seen stands before any number.

@@ -14,6 +14,8 @@ from support.example_survey import KM, NAME, example_surface
 from tunneldb.anomalies.detect import Anomaly
 from tunneldb.anomalies.features import NAMES
 from tunneldb.anomalies.verdict import Verdict
+from tunneldb.export.tables.finding_counts import STATES, count_findings
+from tunneldb.export.tables.findings import Chosen, read_findings
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.anomalies import Matched, save_anomalies
 from tunneldb.store.learned import load_measured
@@ -30,6 +32,12 @@ SUMS = (
     "< floor(chainage_to / 50))::int, sum(wet_area) FROM tunnel_api.sheet",
 )
 """How many leaks count and their area, wherever it is stated: the first is of the statistics, the last of the sheets."""
+
+STATED = b"""
+    SELECT kind, sum(area), sum(counted)::int, sum(rejected)::int, sum(gone)::int, sum(dry)::int, sum(same)::int,
+           sum(merged)::int
+      FROM tunnel_api.finding_count GROUP BY kind ORDER BY kind
+"""
 
 
 @pytest.fixture(scope="session")
@@ -61,7 +69,14 @@ def wet(conn: psycopg.Connection) -> tuple[int, float]:
     first, *others = [conn.execute(query.encode()).fetchone() for query in SUMS]
     for query, other in zip(SUMS[1:], others, strict=True):
         assert other == (first[0], pytest.approx(first[1], rel=1e-6)), query
+    assert documents(conn) == conn.execute(STATED).fetchall()
     return first
+
+
+def documents(conn: psycopg.Connection) -> list[tuple[object, ...]]:
+    """Return what report, workbook and ``findings --json`` state of each kind, as all three do by one function."""
+    counts = count_findings(read_findings(conn, get_survey(conn, NAME), chosen=Chosen(states=())))
+    return [(one.kind, pytest.approx(one.area, rel=1e-6), one.counted, *(one.states[s] for s in STATES[2:])) for one in counts]
 
 
 def draw(conn: psycopg.Connection, shape: Polygon) -> int:

@@ -15,8 +15,11 @@ from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.export.tables.dry_regions import read_dry_regions
+from tunneldb.export.tables.finding_counts import count_findings, read_kinds, read_severities
 from tunneldb.export.tables.findings import COUNTED, Chosen, Finding, State, as_csv, as_geojson, read_findings, write_gpkg
 from tunneldb.export.tables.leaks import Geometry, clock_label
+from tunneldb.export.tables.workbooks import write_findings
 from tunneldb.files import replacing
 from tunneldb.pipeline.findings import import_findings
 from tunneldb.store.survey import Survey, get_survey
@@ -46,6 +49,7 @@ def findings() -> None:
         "tunneldb findings list ringo-2024",
         "tunneldb findings list ringo-2024 --kind crack --kind spall --min-severity 3 -o defects.gpkg",
         "tunneldb findings list ringo-2024 --origin drawn --from 511+700 --to 511+800 --format csv",
+        "tunneldb findings list ringo-2024 -o findings.xlsx",
         "tunneldb findings list ringo-2024 --state all --count",
     ],
 )
@@ -70,7 +74,7 @@ def findings() -> None:
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["table", "csv", "geojson", "gpkg"]),
+    type=click.Choice(["table", "csv", "geojson", "gpkg", "xlsx"]),
     help="Default: by the ending of -o, else a table.",
 )
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write.")
@@ -97,9 +101,12 @@ def list_findings(
     Listed is what counts: open and confirmed. With --state the rest: rejected; gone, which the last detection did not find
     again; dry, which a dry region took away; same, for which another stands that shows the same; merged into another.
 
+    An Excel workbook has sheets of what is listed, of counts, of what else fits but for its state, and of dry regions. The
+    counts are in kinds of --json, too, of whatever state.
+
     The word list may be left out: tunneldb findings SURVEY.
     """
-    form = table_format(form, output, "findings")
+    form = table_format(form, output, "findings", ("csv", "geojson", "gpkg", "xlsx"))
     hours = parse_clock(clock) if clock else None
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
@@ -112,15 +119,21 @@ def list_findings(
             )
         stretch = parse_stretch(conn, found, start, end)
         wanted = () if "all" in states else states or COUNTED
-        chosen = Chosen(kinds, origins, wanted, stretch.low, stretch.high, hours, min_area, min_severity or 0)
-        rows = read_findings(conn, found, cast(Geometry, geometry), chosen)
-    tell(survey=survey, listed=len(rows), geometry=geometry, findings=rows)
+        chosen = Chosen(kinds, origins, (), stretch.low, stretch.high, hours, min_area, min_severity or 0)
+        fitting = read_findings(conn, found, cast(Geometry, geometry), chosen)
+        severities, regions = read_severities(conn), read_dry_regions(conn, found, stretch.low, stretch.high)
+        counts = count_findings(fitting, read_kinds(conn))
+    rows = [row for row in fitting if not wanted or row.state in wanted]
+    tell(survey=survey, listed=len(rows), geometry=geometry, findings=rows, kinds=counts, dry_regions=regions)
     if output is None:
         _print(rows, form, cast(Geometry, geometry), found)
         return
     with replacing(output) as temporary:
         if form == "gpkg":
             write_gpkg(temporary, rows, cast(Geometry, geometry), found.srid)
+        elif form == "xlsx":
+            others = [row for row in fitting if wanted and row.state not in wanted]
+            write_findings(temporary, found.name, rows, others, counts, severities, regions)
         elif form == "geojson":
             temporary.write_text(as_geojson(rows, cast(Geometry, geometry), found.srid), encoding="utf-8")
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import cast
 
@@ -18,8 +19,10 @@ from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.export.tables.dry_regions import DryRegion, read_dry_regions
 from tunneldb.export.tables.leak_files import as_csv, as_geojson, write_gpkg
 from tunneldb.export.tables.leaks import Geometry, Kind, LeakList, Selection, as_table, read_leaks
+from tunneldb.export.tables.workbooks import write_leaks
 from tunneldb.files import replacing
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
@@ -37,6 +40,7 @@ _CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
         "tunneldb leaks ringo-2024",
         "tunneldb leaks ringo-2024 --from 511+700 --to 511+800 --clock 10-2 --min-area 0.1",
         "tunneldb leaks ringo-2024 --min-confidence 0.8 -o leaks.gpkg --geometry 3d",
+        "tunneldb leaks ringo-2024 -o leaks.xlsx",
         "tunneldb leaks ringo-2024 --by-km",
     ],
     wrong="done, but not all that was asked for has been searched for leaks, or nothing of it was seen: what, is said first",
@@ -59,7 +63,7 @@ _CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["table", "csv", "geojson", "gpkg"]),
+    type=click.Choice(["table", "csv", "geojson", "gpkg", "xlsx"]),
     help="Default: by the ending of -o, else a table.",
 )
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write.")
@@ -112,7 +116,7 @@ def leaks(
     """
     settings: Settings = context.obj
     chosen = cast(Geometry, geometry)
-    form = table_format(form, output, "leaks")
+    form = table_format(form, output, "leaks", ("table", "csv", "geojson", "gpkg", "xlsx"))
     filtered = start is not None or end is not None or clock is not None or min_area > 0 or min_confidence > 0
     if by_km and (output is not None or form != "table" or kind != "leak" or filtered):
         raise UserError("--by-km prints a table of all leaks; elsewhere read the view tunnel_api.km_waterproof")
@@ -141,7 +145,8 @@ def leaks(
                 say_coverage(coverage, found, on_stdout=form == "table")
                 _print(listed, form, chosen, found)
             else:
-                _write_file(listed, form, chosen, found, output)
+                regions = read_dry_regions(conn, found, low, high) if form == "xlsx" else []
+                _write_file(listed, form, chosen, found, output, regions)
                 say_coverage(coverage, found)
                 click.echo(f"{listed.total} to {output}", err=True)
             if form == "geojson" and chosen != "unrolled":
@@ -151,10 +156,14 @@ def leaks(
         context.exit(1)
 
 
-def _write_file(listed: LeakList, form: str, geometry: Geometry, survey: Survey, output: Path) -> None:
+def _write_file(
+    listed: LeakList, form: str, geometry: Geometry, survey: Survey, output: Path, regions: Sequence[DryRegion]
+) -> None:
     with replacing(output) as temporary:
         if form == "gpkg":
             write_gpkg(temporary, listed, geometry, survey.srid)
+        elif form == "xlsx":
+            write_leaks(temporary, survey.name, listed, regions)
         else:
             temporary.write_text(_text(listed, form, geometry, survey), encoding="utf-8")
     tell(file=output)

@@ -17,7 +17,8 @@ from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import replacing, told_to_end
-from tunneldb.report.page import CARDS, write_html, write_site_html
+from tunneldb.report.owner import Owner, read_owner
+from tunneldb.report.page import CARDS, Written, write_html, write_site_html
 from tunneldb.report.pdf import find_browser, print_pdf
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.survey import Survey, get_survey
@@ -33,6 +34,7 @@ _PRINTING = 1.2  # time in which it prints a page as a multiple of that in which
     examples=[
         "tunneldb report demo-2024 -o report.html",
         "tunneldb report demo-2024 -o part.pdf --from 12+300 --to 12+350",
+        "tunneldb report demo-2024 -o bericht.pdf --template owner.toml --photos photos",
     ]
 )
 @click.argument("survey")
@@ -41,13 +43,34 @@ _PRINTING = 1.2  # time in which it prints a page as a multiple of that in which
     help="File to write: .html, or .pdf, which needs Chromium or Chrome.",
 )  # fmt: skip
 @stretch_options
+@click.option(
+    "--template",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Owner's template, TOML: logo, client, project, standard, language of the headings, chapters, colours.",
+)
+@click.option(
+    "--photos",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Where relative paths of photos begin. Default: the current folder.",
+)
 @click.pass_obj
-def report(settings: Settings, survey: str, output: Path, start: str | None, end: str | None) -> None:
+def report(
+    settings: Settings,
+    survey: str,
+    output: Path,
+    start: str | None,
+    end: str | None,
+    template: Path | None,
+    photos: Path | None,
+) -> None:
     """Write the inspection report of SURVEY, to be handed over and signed.
 
     It says first where leaks could be missed: what was not searched for them, is out of date or was hardly seen. It states
     what was scanned and how much of the lining was seen, class of waterproofing, the unrolled lining with its
-    leaks, each leak with picture and cross-section, statistics, parameters and versions, and who reviewed what. Where members
+    leaks, each leak with picture and cross-section, statistics, findings of all kinds with photos, dry regions, parameters and
+    versions, and who reviewed what. Where members
     of structures were found, a chapter states what of them could be judged, their spots, and each member's faces unrolled; of a
     site that is all.
 
@@ -59,42 +82,51 @@ def report(settings: Settings, survey: str, output: Path, start: str | None, end
     if suffix not in (".html", ".htm", ".pdf"):
         raise UserError(f"{output}: a report ends in .html or .pdf")
     browser = find_browser() if suffix == ".pdf" else None
+    owner = read_owner(template) if template else Owner()
+    if photos is not None and not photos.is_dir():
+        raise UserError(f"--photos {photos}: there is no such folder")
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey, site=True)
         if found.site:
             conn.rollback()
-            _write_site(conn, found, output, browser, start or end)
+            _write_site(conn, found, output, browser, start or end, owner)
             return
         stretch = parse_stretch(conn, found, start, end)
         coverage = read_coverage(conn, found, stretch.low, stretch.high)
         conn.rollback()
         with told_to_end(), replacing(output) as temporary, bar("strips") as shown:
             if browser is None:
-                leaks = _write(conn, found, stretch, temporary, shown, paper=False)
+                written = _write(conn, found, stretch, temporary, shown, owner, photos, paper=False)
             else:
                 with tempfile.TemporaryDirectory(prefix="tunneldb-report-") as folder:
                     page = Path(folder) / "report.html"
-                    leaks = _write(conn, found, stretch, page, shown, paper=True)
+                    written = _write(conn, found, stretch, page, shown, owner, photos, paper=True)
                     conn.close()  # a browser may take minutes
                     _print(browser, page, temporary, shown)
-    tell(survey=survey, file=output, leaks=leaks, bytes=output.stat().st_size)
+    leaks, missing = written.leaks, [photo.photo.path for photo in written.missing]
+    tell(survey=survey, file=output, leaks=leaks, findings=written.findings, bytes=output.stat().st_size)
+    tell(missing_photos=missing)
     say_coverage(coverage, found)
+    for photo in written.missing:
+        click.echo(f"finding {photo.photo.finding_id}: photo {photo.photo.path}: {photo.trouble}", err=True)
     sought = leaks or coverage.searched_share
     click.echo(f"{output}: {leaks} leaks" if sought else f"{output}: leaks were not searched for", err=True)
 
 
-def _write_site(conn: psycopg.Connection, survey: Survey, output: Path, browser: str | None, asked: str | None) -> None:
+def _write_site(
+    conn: psycopg.Connection, survey: Survey, output: Path, browser: str | None, asked: str | None, owner: Owner
+) -> None:
     """Write the report of a site, of which structures are all there is, and say what it counts."""
     if asked:
         raise UserError(f"{asked}: survey {survey.name} is of a site, which has no chainage: leave --from and --to out")
     with told_to_end(), replacing(output) as temporary, bar("reports") as shown:
         if browser is None:
-            spots = write_site_html(conn, survey, temporary)
+            spots = write_site_html(conn, survey, temporary, owner)
         else:
             with tempfile.TemporaryDirectory(prefix="tunneldb-report-") as folder:
                 page = Path(folder) / "report.html"
                 task = shown.add_task(f"report of {survey.name}", total=1)
-                spots = write_site_html(conn, survey, page)
+                spots = write_site_html(conn, survey, page, owner)
                 shown.update(task, completed=1)
                 conn.close()
                 _print(browser, page, temporary, shown)
@@ -102,13 +134,23 @@ def _write_site(conn: psycopg.Connection, survey: Survey, output: Path, browser:
     click.echo(f"{output}: {spots} spots", err=True)
 
 
-def _write(conn: psycopg.Connection, survey: Survey, stretch: Stretch, page: Path, shown: Progress, *, paper: bool) -> int:
-    """Write the page, for the screen or to be printed, and show how far it is; returns the number of leaks."""
+def _write(
+    conn: psycopg.Connection,
+    survey: Survey,
+    stretch: Stretch,
+    page: Path,
+    shown: Progress,
+    owner: Owner,
+    photos: Path | None,
+    *,
+    paper: bool,
+) -> Written:
+    """Write the page, for the screen or to be printed, and show how far it is."""
     task = shown.add_task(f"report of {survey.name}", total=None)
     return write_html(
         conn, survey, page, stretch.low, stretch.high,
         progress=lambda done, count: shown.update(task, completed=done, total=count),
-        pictures=CARDS if paper else None, form="JPEG" if paper else "WEBP",
+        pictures=CARDS if paper else None, form="JPEG" if paper else "WEBP", owner=owner, photos=photos,
     )  # fmt: skip
 
 

@@ -12,7 +12,6 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
-from tunneldb.errors import UserError
 from tunneldb.files import replacing
 from tunneldb.store.survey import get_survey
 
@@ -74,9 +73,7 @@ def spots(
 
     settings: Settings = context.obj
     chosen = cast("Geometry", geometry)
-    form = table_format(form, output, "spots")
-    if form == "table" and output is not None:
-        raise UserError(f"{output}: spots are written as .csv, .geojson or .gpkg: let its name end so, or say --format")
+    form = table_format(form, output, "spots", ("csv", "geojson", "gpkg"))
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey, site=True)
         listed = read_spots(conn, found, chosen, SpotSelection(cast(Kind, kind), min_area, min_confidence))

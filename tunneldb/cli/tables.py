@@ -15,20 +15,35 @@ from tunneldb.classification.classes import PointClass
 from tunneldb.cli.output import tell
 from tunneldb.errors import UserError
 
-_BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg"}
+_BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg", ".xlsx": "xlsx"}
+_NEED_FILE = {"gpkg": "a GeoPackage", "xlsx": "an Excel workbook"}
 
 
-def table_format(form: str | None, output: Path | None, what: str) -> str:
+def table_format(form: str | None, output: Path | None, what: str, files: Sequence[str]) -> str:
     """Return the format asked for, else that of a file's ending, else ``table``.
+
+    Parameters
+    ----------
+    form, output : str, Path
+        What was asked for.
+    what : str
+        What is written, in the plural.
+    files : sequence of str
+        Formats in which it is written to a file.
 
     Raises
     ------
     UserError
-        If a GeoPackage of what is written has no file to be written to.
+        If a file's ending says none of them, or the format needs a file and there is none.
     """
     form = form or (_BY_SUFFIX.get(output.suffix.lower(), "table") if output else "table")
-    if form == "gpkg" and output is None:
-        raise UserError(f"a GeoPackage needs a file to be written to: add -o {what}.gpkg")
+    if form in _NEED_FILE and output is None:
+        raise UserError(f"{_NEED_FILE[form]} needs a file to be written to: add -o {what}.{form}")
+    if output is not None and form not in files:
+        endings = [f".{name}" for name in files if name != "table"]
+        raise UserError(
+            f"{output}: {what} are written as {', '.join(endings[:-1])} or {endings[-1]}: let its name end so, or say --format"
+        )
     return form
 
 

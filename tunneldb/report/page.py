@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,16 @@ from markupsafe import Markup
 from tunneldb import __version__
 from tunneldb.database import snapshot
 from tunneldb.errors import UserError
+from tunneldb.export.tables.dry_regions import read_dry_regions
+from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES
 from tunneldb.export.tables.leaks import clock_label
 from tunneldb.raster.gap_fill import TOLD
 from tunneldb.report import data, text
 from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, without_detection
+from tunneldb.report.findings import STATE_WORDS, UNCOUNTED, digest_findings, read_findings_chapter
 from tunneldb.report.lining import Form
+from tunneldb.report.owner import CHAPTERS, Owner
+from tunneldb.report.photos import Thumbnail
 from tunneldb.report.strip import LETTERS, Progress, Strips
 from tunneldb.report.structures import StructuresChapter, read_structures
 from tunneldb.report.underwater import read_underwater
@@ -31,6 +37,26 @@ from tunneldb.store.survey import Survey
 CARDS = 400
 """Leaks of which a printed report shows picture and section at most, the largest first; the HTML file shows those of all."""
 
+_OF_LEAKS = frozenset({"seen", "classes", "leaks", "statistics"})
+"""Chapters that say nothing where no leak was sought."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a report counts.
+
+    Attributes
+    ----------
+    leaks, findings : int
+        How many leaks, and findings of all kinds, sums count: there, and not rejected.
+    missing : list of Thumbnail
+        Photos that can't be had.
+    """
+
+    leaks: int
+    findings: int
+    missing: list[Thumbnail]
+
 
 def write_html(
     conn: psycopg.Connection[Any],
@@ -41,7 +67,9 @@ def write_html(
     progress: Progress = lambda done, count: None,
     pictures: int | None = None,
     form: Form = "WEBP",
-) -> int:
+    owner: Owner | None = None,
+    photos: Path | None = None,
+) -> Written:
     """Write the report of a survey, or of the stretch between two chainages, m, as an HTML file; the connection must be idle.
 
     Parameters
@@ -54,21 +82,23 @@ def write_html(
         Only of so many leaks, the largest, pictures go into the file.
     form : {'WEBP', 'JPEG'}
         Format of the pictures.
-
-    Returns
-    -------
-    int
-        Number of leaks that it counts: found last, and not rejected.
+    owner : Owner, optional
+        What the owner wants of it.
+    photos : Path, optional
+        Folder in which relative paths of photos begin; else the current one.
     """
+    wanted = Owner() if owner is None else owner
     with snapshot(conn):
         search = read_coverage(conn, survey, low, high)
-        report = _Report(conn, survey, *data.find_stretch(conn, survey, low, high), search, progress, pictures, form)
+        ends = data.find_stretch(conn, survey, low, high)
+        report = _Report(conn, survey, *ends, search, progress, pictures, form, wanted, Path() if photos is None else photos)
         with path.open("w", encoding="utf-8") as file:
-            file.writelines(_template("report.html").generate(report.context()))
-        return sum(leak.counts for leak in report.leaks)
+            file.writelines(_template("report.html", wanted).generate(report.context()))
+        found = report.findings
+        return Written(sum(leak.counts for leak in report.leaks), found.counted if found else 0, found.missing if found else [])
 
 
-def write_site_html(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> int:
+def write_site_html(conn: psycopg.Connection[Any], survey: Survey, path: Path, owner: Owner | None = None) -> int:
     """Write the report of a survey of a site, which is the chapter on structures; the connection must be idle.
 
     Returns
@@ -101,7 +131,7 @@ def write_site_html(conn: psycopg.Connection[Any], survey: Survey, path: Path) -
             "crs": text.crs(crs_text(conn, survey.srid)),
         }
         with path.open("w", encoding="utf-8") as file:
-            file.writelines(_template("site.html").generate(context))
+            file.writelines(_template("site.html", Owner() if owner is None else owner).generate(context))
         return found.spots.count
 
 
@@ -114,7 +144,7 @@ def _digest_spots(digest: hashlib._Hash, found: StructuresChapter) -> hashlib._H
     return digest
 
 
-def _template(name: str) -> jinja2.Template:
+def _template(name: str, owner: Owner) -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("tunneldb.report"),
         autoescape=jinja2.select_autoescape(["html"]),
@@ -123,9 +153,12 @@ def _template(name: str) -> jinja2.Template:
         lstrip_blocks=True,
     )
     environment.filters |= {
-        "percent": text.percent, "number": text.number, "whole": text.whole, "when": text.when, "day": text.day,
-        "kilometres": text.kilometres, "size": text.size, "css": text.css,
+        "percent": text.percent, "number": text.number, "whole": text.whole, "signed": text.signed, "clock": clock_label,
+        "when": text.when, "day": owner.words.day, "kilometres": text.kilometres, "size": text.size, "css": text.css,
+        "counters": text.counters,
     }  # fmt: skip
+    environment.globals |= {"_": owner.words, "owner": owner}
+    environment.globals |= {"origins": ORIGINS, "severities": SEVERITIES, "uncounted": UNCOUNTED, "said": STATE_WORDS}
     return environment.get_template(name)
 
 
@@ -134,7 +167,7 @@ class _Report:
 
     Parameters
     ----------
-    conn, survey, low, high, progress, pictures, form
+    conn, survey, low, high, progress, pictures, form, owner, photos
         As in :func:`write_html`; the stretch as far as the survey reaches.
     search : Coverage
         What can be said of the stretch asked for, also where the survey does not reach.
@@ -150,13 +183,22 @@ class _Report:
         progress: Progress,
         pictures: int | None,
         form: Form,
+        owner: Owner,
+        photos: Path,
     ) -> None:
+        self.owner = owner
         self.conn, self.survey, self.low, self.high, self.search = conn, survey, low, high, search
         self.leaks = data.read_leaks(conn, survey, low, high)
         self.coverage = data.read_bins(conn, survey, low, high)
         by_size = sorted(self.leaks, key=lambda leak: (leak.review == "rejected", -leak.area))
         pictured = {leak.id for leak in by_size[:pictures]}
-        self.strips = Strips(conn, survey, low, high, self.leaks, self.coverage, pictured, form, progress)
+        ids = frozenset(leak.id for leak in self.leaks)
+        table = "leaks" in owner.chapters and survey.intensity_kind != "none"
+        self.findings = read_findings_chapter(conn, survey, (low, high), ids, photos, table=table)
+        self.underwater = read_underwater(conn, survey, low, high)
+        self.regions = read_dry_regions(conn, survey, low, high)
+        marks = self.findings.marks if self.findings else []
+        self.strips = Strips(conn, survey, low, high, self.leaks, marks, self.coverage, pictured, form, progress, owner.words)
         self.place = data.place_name(conn, survey)
         self.cards = min(CARDS, len(pictured))
         self.part = (low, high) != data.find_stretch(conn, survey, -np.inf, np.inf)
@@ -177,6 +219,12 @@ class _Report:
             "version": __version__,
             "now": dt.datetime.now(dt.UTC),
             "digest": self._digest(),
+            "chapters": self.owner.chapters,
+            "nav": [(name, CHAPTERS[name]) for name in self.owner.chapters if name != "summary" and self._says(name)],
+            "left_out": [heading for name, heading in CHAPTERS.items() if name not in self.owner.chapters and self._says(name)],
+            "findings": self.findings,
+            "regions": self.regions,
+            "place": self.place,
             "low": low,
             "high": high,
             "low_label": self._labels([low])[0],
@@ -199,9 +247,9 @@ class _Report:
             "runs": runs,
             "versions": text.versions(runs),
             "radiometry": data.read_radiometry(conn, survey, low, high),
-            "people": text.reviewers(self.leaks),
+            "people": text.reviewers(self.findings.by_id.values() if self.findings else []),
             "structures": self.structures,
-            "underwater": read_underwater(conn, survey, low, high),
+            "underwater": self.underwater,
             "edits": [text.edit(edit, numbers) for edit in edits],
             "edits_in_all": edits_in_all,
             "part": self.part,
@@ -220,6 +268,13 @@ class _Report:
             "table": self._table(),
             "cards": self.cards,
         }
+
+    def _says(self, chapter: str) -> bool:
+        """Whether a chapter has anything to say."""
+        if chapter in _OF_LEAKS:
+            return self.survey.intensity_kind != "none"
+        there = {"findings": self.findings, "dry": self.regions, "structures": self.structures, "underwater": self.underwater}
+        return chapter not in there or bool(there[chapter])
 
     def _labels(self, chainages: list[float]) -> list[str]:
         return data.label_chainages(self.conn, self.survey, chainages)
@@ -241,6 +296,7 @@ class _Report:
             wkb = leak.outline.wkb_hex
             stated = (leak.id, leak.review, leak.detected, leak.reviewed_by, leak.remark, f"{leak.area:.4f}", wkb)
             digest.update(repr(stated).encode())
+        digest_findings(digest, self.findings, self.regions)
         if self.structures:
             _digest_spots(digest, self.structures)
         return digest.hexdigest()[:16]
@@ -280,16 +336,22 @@ class _Report:
                 round(leak.area, 5), round(leak.inside, 5), text.rounded(leak.drop_mean, 1), text.rounded(leak.drop_max, 1),
                 text.rounded(leak.contrast, 1), text.rounded(leak.confidence, 2), text.rounded(leak.image_share, 2),
                 leak.review, leak.reviewed_by or "", text.when(leak.reviewed_at) if leak.reviewed_at else "",
-                leak.remark or "", int(leak.detected), self.strips.of(leak),
+                leak.remark or "", int(leak.detected), self.strips.of(leak), *self._as_finding(leak.id),
             ]
             for leak in self.leaks
         ]  # fmt: skip
         return text.script_json(
             {
                 **{"columns": TABLE, "rows": rows, "cards": self.cards, "strip": self.strips.length, "place": self.place},
-                "searched": self.search.searched_share > 0,
+                **{"searched": self.search.searched_share > 0, "words": self.owner.words.texts},
             }
         )
+
+    def _as_finding(self, key: int) -> tuple[str, str, int | None, str]:
+        """Return name of the kind, origin, severity and its name of a leak."""
+        assert self.findings is not None  # leaks are findings
+        finding = self.findings.by_id[key]
+        return finding.kind_label, finding.origin, finding.severity, finding.severity_label or ""
 
 
 TABLE = [
@@ -309,6 +371,6 @@ TABLE = [
         "contrast",
         "confidence",
     ),
-    *("imageShare", "review", "by", "at", "remark", "detected", "strip"),
+    *("imageShare", "review", "by", "at", "remark", "detected", "strip", "kind", "origin", "severity", "severityLabel"),
 ]
 """Columns of the table, as the script of the page calls them."""

@@ -10,10 +10,13 @@ import numpy as np
 import psycopg
 from markupsafe import Markup
 
+from tunneldb.export.tables.findings import Finding
 from tunneldb.report import text
 from tunneldb.report.data import CoverageBins, Leak, Row, label_chainages, read_statistics
 from tunneldb.report.drawing import Section, Sign, near, outline_path, place_signs, share_path, ticks, without_detection
+from tunneldb.report.findings import Mark, draw_mark
 from tunneldb.report.lining import Form, Lining, Picture, Window
+from tunneldb.report.words import Words
 from tunneldb.store.survey import Survey
 
 PICTURE, SHAPE = 256, 4 / 3
@@ -53,8 +56,10 @@ class Strip:
         Chainage and label.
     leaks : list of (Leak, str)
         Leaks with the path of their outline, x from ``low``.
+    marks : list of Mark
+        Findings that are no leaks.
     signs : list of Sign
-        Their numbers.
+        Numbers of the leaks.
     rows : int
         Rows in which these stand, at least 1.
     ribbon : str
@@ -74,6 +79,7 @@ class Strip:
     picture: Picture | None
     ticks: list[tuple[float, str]]
     leaks: list[tuple[Leak, str]]
+    marks: list[Mark]
     signs: list[Sign]
     rows: int
     ribbon: str
@@ -98,6 +104,8 @@ class Strips:
         The stretch, m.
     leaks : sequence of Leak
         Leaks in it.
+    findings : sequence of Finding
+        Findings in it that are no leaks.
     coverage : Coverage
         What was seen of it.
     pictured : collection of int
@@ -106,6 +114,8 @@ class Strips:
         Format of the pictures.
     progress : callable
         Told after each strip.
+    words : Words
+        The language in which they are captioned.
 
     Attributes
     ----------
@@ -124,13 +134,15 @@ class Strips:
         low: float,
         high: float,
         leaks: Sequence[Leak],
+        findings: Sequence[Finding],
         coverage: CoverageBins,
         pictured: Collection[int],
         form: Form,
         progress: Progress,
+        words: Words,
     ) -> None:
         self.conn, self.survey, self.low, self.high = conn, survey, low, high
-        self.leaks, self.coverage, self.progress = leaks, coverage, progress
+        self.leaks, self.findings, self.coverage, self.progress, self.words = leaks, findings, coverage, progress, words
         self._pictured, self._form = pictured, form
         self.length = strip_length(high - low)
         row = conn.execute(
@@ -173,15 +185,20 @@ class Strips:
             number=int(start),
             low=low,
             high=high,
-            title=f"{text.short(names[0])} to {text.short(names[1])}",
+            title=self.words("{low} to {high}", low=text.short(names[0]), high=text.short(names[1])),
             picture=picture,
             ticks=[(place, text.short(name)) for place, name in zip(places, names[2:], strict=True)],
             leaks=[(leak, outline_path(leak.outline, low, self.north, self.length / 2000)) for leak in leaks],
+            marks=[
+                draw_mark(finding, low, self.north, self.length / 2000)
+                for finding in self.findings
+                if finding.chainage_to >= low and finding.chainage_from <= high
+            ],
             signs=signs,
             rows=1 + max((sign.row for sign in signs), default=0),
             ribbon=share_path(self.coverage, low, high, 0.0, 0.8 * self.length / LETTERS),
             blank=without_detection(self.coverage, low, high) if sought else [],
-            summary=_summary(stated, len(wet) - len(signs)) if sought else "",
+            summary=_summary(stated, len(wet) - len(signs), self.words) if sought else "",
             details=text.script_json(self._details(lining, [leak for leak in leaks if self.of(leak) == int(start)])),
         )
 
@@ -219,10 +236,11 @@ class Strips:
         return [(chainage, Section.of(radius, arc)) for chainage, radius, arc in rows]
 
 
-def _summary(stated: Row, unnumbered: int) -> str:
+def _summary(stated: Row, unnumbered: int, words: Words) -> str:
     """How many leaks there are on a strip and how much of the lining was seen; so many leaks have no number beside it."""
     if stated["patches"] is None:
-        return "leaks were not searched for"
+        return words("leaks were not searched for")
     count = stated["patches"]
-    without = f", the {unnumbered} smallest without a number here" if unnumbered else ""
-    return f"{count} leak{'s' * (count != 1)}{without}, {text.percent(stated['seen_share'])} of the lining seen"
+    leaks = words("1 leak") if count == 1 else words("{count} leaks", count=count)
+    without = words(", the {count} smallest without a number here", count=unnumbered) if unnumbered else ""
+    return leaks + without + words(", {share} of the lining seen", share=text.percent(stated["seen_share"]))

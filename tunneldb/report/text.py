@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby, pairwise
@@ -13,6 +14,7 @@ import numpy as np
 import shapely
 from markupsafe import Markup
 
+from tunneldb.export.tables.findings import Finding
 from tunneldb.report.data import Edit, Leak, Row
 
 DASH = "–"
@@ -36,6 +38,11 @@ def percent(share: float | None, decimals: int = 1) -> str:
 def number(value: float | None, decimals: int = 2) -> str:
     """Return a number with so many decimals, thousands apart; a dash for none."""
     return DASH if value is None else f"{value:,.{decimals}f}".replace(",", SPACE).replace("-", "−")
+
+
+def signed(value: float) -> str:
+    """Return a length in m with its sign, as of an arc."""
+    return f"{round(value, 2) + 0.0:+.2f}".replace("-", "−")
 
 
 def whole(value: float | None) -> str:
@@ -85,6 +92,12 @@ def kilometres(numbers: Iterable[int]) -> str:
 def css(value: str) -> str:
     """Text for a string in a style sheet: only what cannot end it."""
     return "".join(c if c.isalnum() or c in " .,:;·–-_+()/" else f"\\{ord(c):x} " for c in value)
+
+
+def counters(said: str) -> str:
+    """Text with {page} and {pages} in it as content of a style sheet: strings between the counters of pages."""
+    parts = re.split(r"\{(pages?)\}", said)
+    return " ".join(f"counter({part})" if n % 2 else f'"{css(part)}"' for n, part in enumerate(parts) if part)
 
 
 def stale(rows: Sequence[Row]) -> dict[str, list[tuple[str, str]]]:
@@ -159,35 +172,48 @@ def _scaled(bars: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [bar | {"width": round(100 * bar["count"] / most, 1)} for bar in bars]
 
 
-def reviewers(leaks: Sequence[Leak]) -> list[dict[str, Any]]:
-    """Return who reviewed how many leaks, and when first and last."""
-    by: defaultdict[str, list[Leak]] = defaultdict(list)
-    for leak in leaks:
-        if leak.reviewed_by and leak.reviewed_at:
-            by[leak.reviewed_by].append(leak)
+def reviewers(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """Return who reviewed how many findings, and when first and last."""
+    by: defaultdict[str, list[Finding]] = defaultdict(list)
+    for finding in findings:
+        if finding.reviewed_by and finding.reviewed_at:
+            by[finding.reviewed_by].append(finding)
     people = []
     for name, theirs in sorted(by.items()):
-        moments = [leak.reviewed_at for leak in theirs if leak.reviewed_at]
+        moments = [finding.reviewed_at for finding in theirs if finding.reviewed_at]
         people.append(
             {"name": name, "first": min(moments), "last": max(moments)}
-            | {state: sum(leak.review == state for leak in theirs) for state in ("open", "confirmed", "rejected")}
+            | {state: sum(finding.review == state for finding in theirs) for state in ("open", "confirmed", "rejected")}
         )
     return people
 
 
-_WHAT = {"anomaly": "leak or dark spot", "axis_vertex": "axis vertex", "region": "region", "spot": "spot"}
+_WHAT = {"anomaly": "finding", "axis_vertex": "axis vertex", "region": "region", "spot": "spot", "photo": "photo"}
 
 
 def edit(entry: Edit, spots: Mapping[int, int]) -> dict[str, str]:
-    """Return a change made by hand in words: who, when, of what, and each column from what to what.
+    """Return a change made by hand in words: who and when, of what, and each column from what to what.
 
     People know spots by their numbers, which ``spots`` has by key; of one that is gone the key is all that is left.
     """
     before, after = entry.before or {}, entry.after or {}
-    names = sorted({*before, *after}) if entry.action == "update" else ["geom"]  # only regions come and go
-    changes = "; ".join(_change(name, before.get(name), after.get(name)) for name in names)
-    which = entry.row_id if entry.view != "spot" else spots.get(entry.row_id, f"that is gone, key {entry.row_id}")
+    which = str(entry.row_id if entry.view != "spot" else spots.get(entry.row_id, f"that is gone, key {entry.row_id}"))
+    if entry.action == "update":
+        changes = "; ".join(_change(name, before.get(name), after.get(name)) for name in sorted({*before, *after}))
+    else:
+        changes = _come_or_gone(entry.view, before, after)
+    if finding := {**before, **after}.get("finding_id"):
+        which += f" of finding {finding}"
     return {"at": when(entry.at), "who": entry.who, "what": f"{_WHAT[entry.view]} {which}", "change": changes}
+
+
+def _come_or_gone(view: str, before: Row, after: Row) -> str:
+    """Return in words that something was drawn, added, deleted or removed, and what it was."""
+    verb = ("added" if after else "removed") if view == "photo" else "drawn" if after else "deleted"
+    stated = {
+        name: value for name, value in (after or before).items() if name not in ("geom", "finding_id") and value is not None
+    }
+    return verb + (f": {', '.join(f'{name} {value}' for name, value in sorted(stated.items()))}" if stated else "")
 
 
 def _change(name: str, before: Any, after: Any) -> str:

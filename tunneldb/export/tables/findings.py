@@ -36,7 +36,8 @@ DECIMALS = 4
 class Finding:
     """A finding, as tunnel_api.lining_finding has it; names are those of its columns.
 
-    Lengths are in m, areas in m², drops in dB, clock positions in hours.
+    Lengths are in m, areas in m², drops in dB, clock positions in hours. ``share`` is that of it which lies in the stretch that
+    was asked for, 0 to 1: sums count it by that part.
     """
 
     id: int
@@ -63,16 +64,24 @@ class Finding:
     also_detected: bool
     merged_into: int | None
     same_as: int | None
+    parent_id: int | None
+    dry_region_id: int | None
     drawn_by: str | None
     drawn_at: dt.datetime | None
     reviewed_by: str | None
     reviewed_at: dt.datetime | None
     remark: str | None
     photos: int
+    share: float
     geometry: BaseGeometry
 
+    @property
+    def middle(self) -> float:
+        """Chainage of its middle, m."""
+        return (self.chainage_from + self.chainage_to) / 2
 
-COLUMNS = tuple(field.name for field in fields(Finding) if field.name != "geometry")
+
+COLUMNS = tuple(field.name for field in fields(Finding) if field.name not in ("share", "geometry"))
 _PLACE = {"unrolled": "unrolled", "map": "map", "3d": "surface"}
 
 
@@ -106,20 +115,30 @@ class Chosen:
     min_severity: int = 0
 
 
+# Of a polygon by its area, as sums of leaks have it; of a line by its length; a point lies in it or not.
+_SHARE = sql.SQL(
+    "CASE WHEN chainage_from >= %(low)s AND chainage_to <= %(high)s THEN 1"
+    " WHEN public.ST_Dimension(unrolled) = 2 THEN tunnel_api.area_between(unrolled, 1, %(low)s, %(high)s)"
+    " WHEN public.ST_Dimension(unrolled) = 1 THEN public.ST_Length(public.ST_ClipByBox2D(unrolled, public.ST_MakeBox2D("
+    "public.ST_MakePoint(greatest(%(low)s, -1e9), -1e4), public.ST_MakePoint(least(%(high)s, 1e9), 1e4))))"
+    " / nullif(public.ST_Length(unrolled), 0) ELSE 1 END"
+)
+
+
 def read_findings(
     conn: psycopg.Connection[Any], survey: Survey, geometry: Geometry = "unrolled", chosen: Chosen | None = None
 ) -> list[Finding]:
     """Read findings of a survey, in order of chainage."""
     wanted = Chosen() if chosen is None else chosen
     query = sql.SQL(
-        "SELECT {}, public.ST_AsBinary({}) FROM tunnel_api.lining_finding WHERE survey_id = %(survey)s"
+        "SELECT {}, coalesce({}, 1), public.ST_AsBinary({}) FROM tunnel_api.lining_finding WHERE survey_id = %(survey)s"
         " AND (%(kinds)s::text[] = '{{}}' OR kind = ANY (%(kinds)s))"
         " AND (%(origins)s::text[] = '{{}}' OR origin = ANY (%(origins)s))"
         " AND (%(states)s::text[] = '{{}}' OR state = ANY (%(states)s)) AND area >= %(min_area)s"
         " AND coalesce(severity, 0) >= %(min_severity)s AND chainage_to > %(low)s AND chainage_from < %(high)s"
         " AND (%(clock)s::float8[] IS NULL OR tunnel_api.clock_between(clock, (%(clock)s)[1], (%(clock)s)[2]))"
         " ORDER BY chainage_from + chainage_to, arc_from, id"
-    ).format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)), sql.Identifier(_PLACE[geometry]))
+    ).format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)), _SHARE, sql.Identifier(_PLACE[geometry]))
     rows = conn.execute(
         query,
         {
@@ -134,7 +153,7 @@ def read_findings(
             "min_severity": wanted.min_severity,
         },
     ).fetchall()
-    names = (*COLUMNS, "geometry")
+    names = (*COLUMNS, "share", "geometry")
     return [Finding(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True))) for row in rows]
 
 
@@ -197,7 +216,7 @@ def write_gpkg(path: Path, findings: Sequence[Finding], geometry: Geometry, srid
 
 
 _TYPE: dict[str, Any] = {
-    **dict.fromkeys(("id", "merged_into", "same_as"), np.int64),
+    **dict.fromkeys(("id", "merged_into", "same_as", "parent_id", "dry_region_id"), np.int64),
     **dict.fromkeys(("km", "severity", "photos"), np.int32),
     **dict.fromkeys(("counted", "also_detected"), np.bool_),
     **dict.fromkeys(("drawn_at", "reviewed_at"), "datetime64[ms]"),

@@ -4,6 +4,8 @@
   const data = JSON.parse($("#data").textContent);
   const leaks = data.rows.map((row) => Object.fromEntries(data.columns.map((name, i) => [name, row[i]])));
   const byId = new Map(leaks.map((leak) => [leak.id, leak]));
+  const _ = (text, values = {}) => (data.words[text] ?? text).replace(/\{(\w+)\}/g, (whole, name) => values[name] ?? whole);
+  const tabled = $("#leaks") !== null; // an owner's template may leave chapters out
   const PAGE = 100;
   const state = { sort: "chainage", up: true, page: 0, stretch: null, all: false };
 
@@ -23,13 +25,16 @@
 
   const fixed = (value, decimals) => (value === null ? "–" : value.toFixed(decimals));
   const signed = (value) => (value > 0 ? "+" : value < 0 ? "−" : "") + Math.abs(value).toFixed(2);
-  const arc = (leak) => `${signed(leak.arcFrom)} to ${signed(leak.arcTo)}`;
-  const review = (leak) => make("span", { class: `review ${leak.review}` }, leak.review + (leak.detected ? "" : ", not found again"));
+  const arc = (leak) => _("{low} to {high}", { low: signed(leak.arcFrom), high: signed(leak.arcTo) });
+  const review = (leak) => make("span", { class: `review ${leak.review}` }, _(leak.review) + (leak.detected ? "" : _(", not found again")));
 
   // Columns of the table: heading, key, cell, class; minor ones are left out on a phone.
+  const several = new Set(leaks.map((leak) => leak.kind)).size > 1 || leaks.some((leak) => leak.origin !== "detected");
+  const kind = (leak) => _(leak.kind) + (leak.origin === "detected" ? "" : `, ${_(leak.origin)}`);
   const columns = [
     ["No.", "id", (l) => l.id, "n"],
     [data.place, "chainage", (l) => l.label, ""],
+    ...(several ? [["Kind", "kind", kind, "kinds"]] : []),
     ["Clock", "clock", (l) => l.clockLabel, "n"],
     ["Arc m", "arcFrom", arc, "n minor"],
     ["Length m", "length", (l) => fixed(l.length, 2), "n minor"],
@@ -37,6 +42,7 @@
     ["Drop dB", "drop", (l) => fixed(l.drop, 1), "n minor"],
     ["Contrast σ", "contrast", (l) => fixed(l.contrast, 1), "n minor"],
     ["Confidence", "confidence", (l) => fixed(l.confidence, 2), "n minor"],
+    ...(leaks.some((leak) => leak.severity) ? [["Severity", "severity", (l) => _(l.severityLabel), "minor"]] : []),
     ["Review", "review", review, ""],
     ["By", "by", (l) => l.by, "minor"],
     ["Remark", "remark", (l) => l.remark, "minor remark"],
@@ -78,6 +84,7 @@
 
   let listed = [];
   function show(here = null) {
+    if (!tabled) { listed = leaks; return; }
     listed = state.all ? leaks : chosen();
     const pages = Math.max(1, Math.ceil(listed.length / PAGE));
     if (here !== null) {
@@ -88,14 +95,14 @@
     // sums are those of the summary: of leaks found last and not rejected, the part that lies in the stretch reported
     const area = listed.filter((leak) => leak.detected && leak.review !== "rejected").reduce((sum, leak) => sum + leak.inside, 0);
     $("#found").textContent = !data.searched && !leaks.length
-      ? "Leaks were not searched for"
+      ? _("Leaks were not searched for")
       : state.all
-        ? `${listed.length} leaks, with those rejected, in order of chainage`
-        : `${listed.length} of ${leaks.length} leaks, ${area.toFixed(2)} m²`;
+        ? _("{count} leaks, with those rejected, in order of chainage", { count: listed.length })
+        : _("{count} of {all} leaks, {area} m²", { count: listed.length, all: leaks.length, area: area.toFixed(2) });
     $("#table thead").replaceChildren(
       make("tr", {}, ...columns.map(([heading, key, , kind]) => {
         const sorted = state.sort === key ? { "aria-sort": state.up ? "ascending" : "descending" } : {};
-        return make("th", { class: kind, ...sorted }, state.all ? heading : make("button", { type: "button", onclick: () => sortBy(key) }, heading));
+        return make("th", { class: kind, ...sorted }, state.all ? _(heading) : make("button", { type: "button", onclick: () => sortBy(key) }, _(heading)));
       })),
     );
     const part = state.all ? listed : listed.slice(state.page * PAGE, (state.page + 1) * PAGE);
@@ -104,15 +111,15 @@
     $("#pages").replaceChildren(
       ...(pages > 1
         ? [
-            make("button", { type: "button", onclick: turn(-1), ...(state.page === 0 ? { disabled: "" } : {}) }, "Previous"),
-            `Page ${state.page + 1} of ${pages}`,
-            make("button", { type: "button", onclick: turn(1), ...(state.page === pages - 1 ? { disabled: "" } : {}) }, "Next"),
+            make("button", { type: "button", onclick: turn(-1), ...(state.page === 0 ? { disabled: "" } : {}) }, _("Previous")),
+            _("Page {page} of {pages}", { page: state.page + 1, pages }),
+            make("button", { type: "button", onclick: turn(1), ...(state.page === pages - 1 ? { disabled: "" } : {}) }, _("Next")),
           ]
         : []),
     );
     const chip = $("#stretch");
     chip.hidden = state.stretch === null;
-    if (state.stretch !== null) chip.textContent = `Only ${$(`#strip-${state.stretch} figcaption b`).textContent} ✕`;
+    if (state.stretch !== null) chip.textContent = _("Only {stretch} ✕", { stretch: $(`#strip-${state.stretch} figcaption b`).textContent });
   }
 
   function row(leak, here) {
@@ -141,43 +148,48 @@
     const [width, height] = shown.size;
     const bar = [0.5, 1, 2, 5, 10, 20, 50].findLast((length) => length < width / 2) ?? 0.5;
     const [x, y] = [width * 0.04, height * 0.95];
-    const drawing = make("svg:svg", { viewBox: `0 0 ${width} ${height}`, class: `view ${leak.review}`, role: "img", "aria-label": `Lining about leak ${leak.id}` });
+    const drawing = make("svg:svg", { viewBox: `0 0 ${width} ${height}`, class: `view ${leak.review}`, role: "img", "aria-label": _("Lining about leak {id}", { id: leak.id }) });
     if (shown.picture) {
       drawing.append(make("svg:image", { width, height, preserveAspectRatio: "none", href: shown.picture }));
     }
     drawing.append(make("svg:path", { d: shown.outline }));
     for (let n = 0; n < 2; n += 1) drawing.append(make("svg:line", { x1: x, x2: x + bar, y1: y, y2: y, class: "scale" }));
-    const caption = shown.picture ? `${width.toFixed(1)} m of lining; bar ${bar} m` : `No image here; bar ${bar} m`;
+    const caption = shown.picture ? _("{width} m of lining; bar {bar} m", { width: width.toFixed(1), bar }) : _("No image here; bar {bar} m", { bar });
     return make("figure", {}, drawing, make("figcaption", {}, caption));
   }
 
   function section(leak, shown) {
-    const drawing = make("svg:svg", { viewBox: shown.box, class: "section", role: "img", "aria-label": `Cross-section at leak ${leak.id}` });
+    const drawing = make("svg:svg", { viewBox: shown.box, class: "section", role: "img", "aria-label": _("Cross-section at leak {id}", { id: leak.id }) });
     drawing.append(make("svg:path", { d: shown.section, class: "lining" }), make("svg:path", { d: shown.band, class: "band" }));
     drawing.append(make("svg:path", { d: "M-.15 0H.15M0-.15V.15", class: "axis" }));
     const [x, y, width, height] = shown.box.split(" ").map(Number);
     for (const [hour, at, up] of [["12", 0, y + 0.35], ["3", x + width - 0.35, 0], ["6", 0, y + height - 0.35], ["9", x + 0.35, 0]]) {
       drawing.append(make("svg:text", { x: at, y: up }, hour));
     }
-    const off = Math.abs(shown.at) < 0.05 ? "" : ` ${Math.abs(shown.at).toFixed(1)} m ${shown.at > 0 ? "up" : "down"}-chainage`;
-    return make("figure", {}, drawing, make("figcaption", {}, `Section${off}`));
+    const far = { distance: Math.abs(shown.at).toFixed(1) };
+    const off = Math.abs(shown.at) < 0.05
+      ? _("Section")
+      : shown.at > 0 ? _("Section {distance} m up-chainage", far) : _("Section {distance} m down-chainage", far);
+    return make("figure", {}, drawing, make("figcaption", {}, off));
   }
 
   function card(leak) {
     const shown = detail(leak);
     const facts = [
-      ["Area", `${fixed(leak.area, 2)} m²`], ["Clock", leak.clockLabel], ["Arc, m", arc(leak)], ["Length", `${fixed(leak.length, 2)} m`],
-      ["Drop, most", `${fixed(leak.drop, 1)}, ${fixed(leak.dropMax, 1)} dB`], ["Contrast", `${fixed(leak.contrast, 1)} σ`],
-      ["Confidence", fixed(leak.confidence, 2)], ["Measured", leak.imageShare === null ? "not yet" : `${Math.round(100 * leak.imageShare)} % of it`],
+      [_("Area"), `${fixed(leak.area, 2)} m²`], [_("Clock"), leak.clockLabel], [_("Arc, m"), arc(leak)], [_("Length"), `${fixed(leak.length, 2)} m`],
+      [_("Drop, most"), `${fixed(leak.drop, 1)}, ${fixed(leak.dropMax, 1)} dB`], [_("Contrast"), `${fixed(leak.contrast, 1)} σ`],
+      [_("Confidence"), fixed(leak.confidence, 2)], [_("Measured"), leak.imageShare === null ? _("not yet") : _("{share} % of it", { share: Math.round(100 * leak.imageShare) })],
     ];
     const list = make("dl", {}, ...facts.map(([term, value]) => make("div", {}, make("dt", {}, term), make("dd", {}, value))));
-    if (leak.by) list.append(make("div", { class: "long" }, make("dt", {}, "Reviewed"), make("dd", {}, `${leak.review} by ${leak.by}, ${leak.at}`)));
-    if (leak.remark) list.append(make("div", { class: "long" }, make("dt", {}, "Remark"), make("dd", {}, leak.remark)));
+    if (leak.by) list.append(make("div", { class: "long" }, make("dt", {}, _("Reviewed")), make("dd", {}, _("{state} by {who}, {when}", { state: _(leak.review), who: leak.by, when: leak.at }))));
+    if (leak.severity) list.append(make("div", {}, make("dt", {}, _("Severity")), make("dd", {}, _(leak.severityLabel))));
+    if (leak.origin !== "detected") list.append(make("div", {}, make("dt", {}, _("Origin")), make("dd", {}, _(leak.origin))));
+    if (leak.remark) list.append(make("div", { class: "long" }, make("dt", {}, _("Remark")), make("dd", {}, leak.remark)));
     const pictures = make("div", { class: "pictures" });
     if (shown) pictures.append(picture(leak, shown));
     if (shown && shown.section) pictures.append(section(leak, shown));
     return make("article", { class: "card" },
-      make("header", {}, make("b", {}, `Leak ${leak.id}`), make("span", {}, leak.label), review(leak)), pictures, list);
+      make("header", {}, make("b", {}, `${_(leak.kind)} ${leak.id}`), make("span", {}, leak.label), review(leak)), pictures, list);
   }
 
   const dialog = $("#leak");
@@ -188,11 +200,14 @@
       const other = place < 0 ? undefined : listed[place + by];
       return make("button", { type: "button", ...(other ? { onclick: go(other) } : { disabled: "" }) }, text);
     };
-    dialog.replaceChildren(card(leak), make("div", { class: "bar-of" },
-      step(-1, "Previous"), step(1, "Next"),
-      make("button", { type: "button", class: "to-strip", onclick: () => { dialog.close(); find(leak); } }, "Show on the lining"),
-      make("button", { type: "button", class: "to-table", onclick: () => { dialog.close(); point(leak); } }, "Show in the table"),
-      make("button", { type: "button", class: "close", onclick: () => dialog.close() }, "Close")));
+    const shown = card(leak);
+    const photos = $(`#finding-${leak.id} + .photos td:last-child`); // they stand with the findings, once
+    if (photos) shown.append(make("div", { class: "photos" }, ...[...photos.children].map((photo) => photo.cloneNode(true))));
+    dialog.replaceChildren(shown, make("div", { class: "bar-of" },
+      step(-1, _("Previous")), step(1, _("Next")),
+      ...($("#lining") ? [make("button", { type: "button", class: "to-strip", onclick: () => { dialog.close(); find(leak); } }, _("Show on the lining"))] : []),
+      ...(tabled ? [make("button", { type: "button", class: "to-table", onclick: () => { dialog.close(); point(leak); } }, _("Show in the table"))] : []),
+      make("button", { type: "button", class: "close", onclick: () => dialog.close() }, _("Close"))));
     if (!dialog.open) dialog.showModal();
   }
 
@@ -222,17 +237,18 @@
 
   // On paper there are all leaks in the table, and cards of the largest.
   function toPaper() {
-    if (state.all) return;
+    if (state.all || !tabled) return;
     Object.assign(state, { all: true });
     show();
     const largest = [...leaks].sort((a, b) => (a.review === "rejected") - (b.review === "rejected") || b.area - a.area).slice(0, data.cards);
     const order = largest.sort((a, b) => a.chainage - b.chainage || a.id - b.id);
     $("#sheets-note").textContent = order.length < leaks.length
-      ? `The ${order.length} largest of ${leaks.length} leaks, in order of chainage; the HTML file of this report shows each.`
-      : order.length ? `All ${order.length} leaks, in order of chainage.` : "";
+      ? _("The {count} largest of {all} leaks, in order of chainage; the HTML file of this report shows each.", { count: order.length, all: leaks.length })
+      : order.length ? _("All {count} leaks, in order of chainage.", { count: order.length }) : "";
     $("#sheets .cards").replaceChildren(...order.map(card));
   }
   function toScreen() {
+    if (!tabled) return;
     state.all = false;
     show();
     $("#sheets .cards").replaceChildren();
@@ -248,9 +264,11 @@
     window.print();
   }
 
-  $("#filters").addEventListener("input", () => { state.page = 0; show(); });
-  $("#filters").addEventListener("submit", (event) => event.preventDefault());
-  $("#stretch").addEventListener("click", () => { state.stretch = null; show(); });
+  if (tabled) {
+    $("#filters").addEventListener("input", () => { state.page = 0; show(); });
+    $("#filters").addEventListener("submit", (event) => event.preventDefault());
+    $("#stretch").addEventListener("click", () => { state.stretch = null; show(); });
+  }
   $("#print").addEventListener("click", print);
   dialog.addEventListener("close", () => {
     if (location.hash.startsWith("#leak-")) history.replaceState(null, "", location.pathname + location.search);
@@ -261,7 +279,7 @@
     const link = event.target.closest?.('a[href^="#leak-"]');
     if (link && link.getAttribute("href") === location.hash) follow();
     const caption = event.target.closest?.(".strip figcaption button");
-    if (caption) { state.stretch = Number(caption.value); state.page = 0; show(); $("#leaks").scrollIntoView(); }
+    if (caption && tabled) { state.stretch = Number(caption.value); state.page = 0; show(); $("#leaks").scrollIntoView(); }
   });
   window.addEventListener("hashchange", follow);
   window.addEventListener("beforeprint", toPaper);

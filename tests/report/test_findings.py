@@ -1,0 +1,381 @@
+"""Chapters on findings and dry regions, photos, the owner's template: against the database and the other documents."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import io
+import json
+import re
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from typing import Any
+
+import openpyxl
+import psycopg
+import pypdf
+import pytest
+from click.testing import CliRunner, Result
+from PIL import Image
+from playwright.sync_api import sync_playwright
+from psycopg import sql
+from psycopg.conninfo import make_conninfo
+from support.example_survey import NAME
+
+from tunneldb.cli.main import main
+from tunneldb.database import connect
+from tunneldb.errors import UserError
+from tunneldb.report import findings
+from tunneldb.report.owner import CHAPTERS, Owner, read_owner
+from tunneldb.report.photos import Photo, make_thumbnails
+from tunneldb.report.words import languages, read_language
+from tunneldb.store.survey import get_survey
+
+DRAWN = """
+    INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width, review, remark, geom) VALUES
+    ('demo-2024', 'crack', 3, 0.002, 'confirmed', '<b>open</b>', 'LINESTRING(12350 1, 12353 1.5)'),
+    ('demo-2024', 'crack', 1, NULL, 'rejected', 'a scratch', 'LINESTRING(12360 1, 12361 1.5)'),
+    ('demo-2024', 'crack', 2, 0.001, 'open', NULL, 'LINESTRING(12398 -1, 12402 -1)'),
+    ('demo-2024', 'missing_bolt', 4, NULL, 'confirmed', NULL, 'POINT(12360 -2)'),
+    ('demo-2024', 'drip', 2, NULL, 'confirmed', NULL, 'POINT(12370 0.5)'),
+    ('demo-2024', 'delamination', NULL, NULL, 'open', 'hollow', 'POLYGON((12380 0, 12382 0, 12382 1, 12380 1, 12380 0))'),
+    ('demo-2024', 'leak', 2, NULL, 'confirmed', NULL, 'POLYGON((12390 0, 12391 0, 12391 1, 12390 1, 12390 0))'),
+    ('demo-2024', 'leak', 2, NULL, 'confirmed', NULL, 'POLYGON((12391.5 0, 12392 0, 12392 1, 12391.5 1, 12391.5 0))');
+    SELECT tunnel_api.finding_split(id, 'LINESTRING(12380.5 -1, 12380.5 2)')
+      FROM tunnel_api.lining_finding WHERE kind = 'delamination';
+    SELECT tunnel_api.finding_merge(array_agg(id)) FROM tunnel_api.lining_finding WHERE kind = 'leak' AND origin = 'drawn';
+    UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, 0.05) WHERE id = 5;
+    INSERT INTO tunnel_api.region (survey_id, kind, reason, geom)
+        SELECT id, 'dry', 'oil', ST_MakeEnvelope(12470, -1, 12472, 2, 0) FROM tunnel.survey;
+"""
+KINDS = ["leak", "drip", "crack", "delamination", "missing_bolt", "joint", "dark"]
+"""Those that occur, in the order of the catalogue."""
+
+
+def run(dsn: str, *arguments: object, code: int = 0) -> Result:
+    result = CliRunner().invoke(main, ["--dsn", dsn, *map(str, arguments)], catch_exceptions=False)
+    assert result.exit_code == code, result.output
+    return result
+
+
+def image(size: tuple[int, int], form: str, **options: Any) -> bytes:
+    data = io.BytesIO()
+    Image.new("RGB", size, "#c04020").save(data, form, **options)
+    return data.getvalue()
+
+
+class Answer(BaseHTTPRequestHandler):
+    """A web server that has one photo, and sends whoever asks for another to a file."""
+
+    def do_GET(self) -> None:
+        self.send_response({"/1.jpg": 200, "/away": 302}.get(self.path, 404))
+        if self.path == "/away":
+            self.send_header("Location", "file:///etc/hostname")
+        self.end_headers()
+        if self.path == "/1.jpg":
+            self.wfile.write(image((1200, 900), "JPEG"))
+
+    def log_message(self, *arguments: object) -> None: ...
+
+
+@pytest.fixture(scope="module")
+def web() -> Iterator[str]:
+    with HTTPServer(("127.0.0.1", 0), Answer) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Photos: one that its camera held upright, one that is none."""
+    folder = tmp_path_factory.mktemp("photos")
+    exif = Image.Exif()
+    exif[0x0112] = 6  # to be turned by a quarter
+    (folder / "upright.jpg").write_bytes(image((1600, 1200), "JPEG", exif=exif))
+    (folder / "broken.jpg").write_text("no image")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def drawn(server_dsn: str, example_template: str, web: str) -> Iterator[str]:
+    """DSN of a copy of the example with findings, photos and a dry region, which is only read."""
+    database = sql.Identifier("tunneldb_findings")
+    with psycopg.connect(server_dsn, autocommit=True) as admin:
+        admin.execute(sql.SQL("CREATE DATABASE {} TEMPLATE {}").format(database, sql.Identifier(example_template)))
+        dsn = make_conninfo(server_dsn, dbname="tunneldb_findings")
+        with connect(dsn) as conn:
+            conn.execute(DRAWN)
+            for path in ("upright.jpg", "gone.jpg", "broken.jpg", f"{web}/1.jpg", f"{web}/2.jpg"):
+                conn.execute(
+                    "INSERT INTO tunnel_api.finding_photo (finding_id, path, caption)"
+                    " SELECT id, %s, 'of it' FROM tunnel_api.lining_finding WHERE kind = 'crack' AND severity = 3",
+                    [path],
+                )
+        yield dsn
+        admin.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(database))
+
+
+@pytest.fixture(scope="module")
+def report(drawn: str, folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("report") / "r.html"
+    told = json.loads(run(drawn, "report", NAME, "-o", path, "--photos", folder, "--json").stdout)
+    assert [missing.rpartition("/")[2] for missing in told["missing_photos"]] == ["gone.jpg", "broken.jpg", "2.jpg"]
+    return path
+
+
+def section(text: str, name: str) -> str:
+    (found,) = re.findall(rf'<section id="{name}".*?</section>', text, re.DOTALL)
+    return found
+
+
+def cells(row: str) -> list[str]:
+    return [html.unescape(re.sub("<[^>]*>", "", cell)).strip() for cell in re.findall(r"<td.*?</td>", row, re.DOTALL)]
+
+
+def table(text: str) -> list[list[str]]:
+    return [cells(row) for row in re.findall(r"<tr(?: [^>]*)?>.*?</tr>", text, re.DOTALL) if "<td" in row]
+
+
+def test_report_workbook_json_and_view_count_alike(drawn: str, report: Path, tmp_path: Path) -> None:
+    with connect(drawn) as conn:
+        view = conn.execute(
+            "SELECT k.label, sum(c.confirmed)::int, sum(c.open)::int, sum(c.counted)::int, sum(c.area), sum(c.length),"
+            " sum(c.rejected)::int, sum(c.gone)::int, sum(c.dry)::int, sum(c.same)::int, sum(c.merged)::int"
+            " FROM tunnel_api.finding_count c JOIN tunnel_api.finding_kind k ON k.code = c.kind GROUP BY k.code, k.label"
+            " ORDER BY min(k.position)"
+        ).fetchall()
+        patches, wet = conn.execute(
+            "SELECT patches, wet_area FROM tunnel_api.leak_statistics(%s, '-Infinity', 'Infinity')", [NAME]
+        ).fetchone()
+    text = report.read_text("utf-8")
+    overview = section(text, "findings")
+    *kinds, everything = table(overview.partition("By state")[2].partition("</table>")[0])
+    numbers = [[float(cell.replace("–", "0")) for cell in row[1:]] for row in kinds]
+    assert [row[0] for row in kinds] == [row[0] for row in view]
+    assert numbers == [[pytest.approx(value, abs=0.006) for value in row[1:]] for row in view]
+    assert float(everything[3]) == sum(row[3] for row in view)
+    assert sum(row[3] for row in view[:2]) == patches, "leaks and drips are the leaks of the statistics"
+    assert sum(row[4] for row in view[:2]) == pytest.approx(wet)
+    told = json.loads(run(drawn, "findings", NAME, "-o", tmp_path / "f.xlsx", "--json").stdout)
+    assert [kind["kind"] for kind in told["kinds"]] == KINDS
+    head, *rows, _ = openpyxl.load_workbook(tmp_path / "f.xlsx")["Counts"].iter_rows(values_only=True)
+    for row, kind, stated in zip(rows, told["kinds"], view, strict=True):
+        of = dict(zip(head, row, strict=True))
+        assert (kind["counted"], kind["area"], kind["length"]) == (stated[3], *map(pytest.approx, stated[4:6]))
+        assert (of["Counted"], of["Area, m²"], of["Length, m"]) == (stated[3], *map(pytest.approx, stated[4:6]))
+        assert [of[f"Not counted: {state}"] for state in findings.UNCOUNTED] == list(stated[6:])
+        assert sum(kind["origins"].values()) == sum(kind["severities"].values()) == stated[3]
+
+
+def test_each_finding_has_a_row_or_is_in_a_line_that_says_so(drawn: str, report: Path) -> None:
+    text = report.read_text("utf-8")
+    with connect(drawn) as conn:
+        for kind in KINDS:
+            rows = conn.execute(
+                "SELECT id, state, label, coalesce(severity_label, '–') FROM tunnel_api.lining_finding WHERE kind = %s", [kind]
+            ).fetchall()
+            chapter = section(text, f"kind-{kind}")
+            listed = {
+                int(key): cells(row) for key, row in re.findall(r'<tr id="finding-(\d+)".*?>(.*?)</tr>', chapter, re.DOTALL)
+            }
+            without = sum(map(int, re.findall(r"Without a row here, [^:]*: (\d+)", chapter)))
+            assert len(listed) + without == len(rows), kind
+            order = re.findall(r'<span class="review \w+">([^,]*), (\d+)', chapter)
+            states = {findings.STATE_WORDS[row[1]] for row in rows if row[0] in listed}
+            assert {state for state, _ in order} == states
+            assert sum(int(count) for _, count in order) == len(listed)
+            for key, _, label, severity in rows:
+                if key in listed:
+                    assert (listed[key][0], listed[key][1], listed[key][6]) == (str(key), label, severity)
+        (merged,) = conn.execute("SELECT id FROM tunnel_api.lining_finding WHERE origin = 'merged'").fetchone()
+        region, ids = conn.execute("SELECT id, leak_ids FROM tunnel_api.dry_region WHERE reason = 'oil'").fetchone()
+    assert f"; merged into {merged}" in section(text, "kind-leak")
+    assert "<b>open" not in section(text, "kind-crack"), "a remark is text"
+    (row,) = [row for row in table(section(text, "dry")) if row[0] == str(region)]
+    assert row[6:] == ["oil", f"1 ({0.785:.3f} m²): {ids[0]}"] or row[7].endswith(f": {ids[0]}")
+
+
+def test_photos_are_small_and_upright_and_what_is_missing_is_a_line(report: Path, web: str) -> None:
+    chapter = section(report.read_text("utf-8"), "kind-crack")
+    sizes = [
+        Image.open(io.BytesIO(base64.b64decode(data))).size
+        for data in re.findall(r'<img src="data:image/jpeg;base64,([^"]+)" alt="of it">', chapter)
+    ]
+    assert sizes == [(360, 480), (480, 360)]
+    assert re.findall(r'<p class="lost">(.*?)</p>', chapter) == [
+        "Photo gone.jpg (of it): no such file",
+        "Photo broken.jpg (of it): no image that can be read",
+        f"Photo {web}/2.jpg (of it): could not be fetched: 404 Not Found",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("path", "trouble"),
+    [
+        ("{web}/away", "could not be fetched: "), ("file://{folder}/gone.jpg", "no such file"), ("", "no image"),
+        ("/dev/zero", "no image"), ("ftp://nowhere/1.jpg", "neither a file nor"), ("a\0b", "no such file"),
+        ("http://[", "could not be fetched: "), ("file://{folder}/upright.jpg", ""),
+    ],
+)  # fmt: skip
+def test_no_photo_fails_the_report(web: str, folder: Path, path: str, trouble: str) -> None:
+    (photo,) = make_thumbnails([Photo(1, 1, path.format(web=web, folder=folder), None)], folder)
+    assert photo.trouble.startswith(trouble)
+    assert (photo.url is None) == bool(trouble)
+
+
+def test_digest_tells_another_finding(drawn: str, tmp_path: Path) -> None:
+    digests = []
+    with connect(drawn) as conn:
+        survey = get_survey(conn, NAME)
+        for change in ("SELECT", "SELECT", "UPDATE tunnel_api.finding_unrolled SET severity = 4 WHERE severity = 3"):
+            conn.execute(change)
+            chapter = findings.read_findings_chapter(conn, survey, (0.0, 1e5), frozenset(), tmp_path, table=True)
+            digest = hashlib.sha256()
+            findings.digest_findings(digest, chapter, [])
+            digests.append(digest.hexdigest())
+        conn.rollback()
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_of_too_many_the_gravest_have_rows(drawn: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(findings, "MOST", 2)
+    with connect(drawn) as conn:
+        chapter = findings.read_findings_chapter(conn, get_survey(conn, NAME), (0.0, 1e5), frozenset(), tmp_path, table=True)
+    (cracks,) = [kind for kind in chapter.kinds if kind.count.kind == "crack"]
+    assert [row.severity for _, rows in cracks.groups for row in rows] == [3, 2]
+    assert [(row.severity, row.state) for row in cracks.beyond] == [(1, "rejected")]
+
+
+TEMPLATE = """
+language = "de"
+client = "Bahn & Söhne"
+project = "Prüfung"
+standard = "Ril 853"
+logo = "logo.png"
+chapters = ["findings", "leaks", "dry", "signatures"]
+[severity_colours]
+3 = "#123456"
+[headings]
+"Crack" = "Spalt"
+"""
+
+
+def test_an_owners_template(drawn: str, folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "logo.png").write_bytes(image((2000, 500), "PNG"))
+    (tmp_path / "owner.toml").write_text(TEMPLATE, "utf-8")
+    path = tmp_path / "r.html"
+    run(drawn, "report", NAME, "-o", path, "--template", tmp_path / "owner.toml", "--photos", folder)
+    text = path.read_text("utf-8")
+    logo = base64.b64decode(re.findall(r'class="logo" src="data:image/png;base64,([^"]+)"', text)[0])
+    assert Image.open(io.BytesIO(logo)).size == (640, 160)
+    assert re.findall(r'<section id="(\w+)"(?! class="kind)', text) == ["findings", "leaks", "sheets", "dry", "signatures"]
+    left_out = re.findall(r"nicht in diesem Bericht:(.*)</p>", text)[0]
+    assert [name.strip() for name in left_out.split(",")] == [
+        "Zusammenfassung", "Gesehenes und nicht Gesehenes", "Dichtheit", "Auskleidung", "Statistik", "Verfahren",
+        "Prüfungen",
+    ]  # fmt: skip
+    for said in ("<h2>Spalt</h2>", "<dd>Bahn &amp; Söhne</dd>", "<h2>Unterschriften</h2>", "--severity: #123456", 'lang="de"'):
+        assert said in text
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 360, "height": 740})
+        troubles: list[str] = []
+        page.on("console", lambda message: troubles.append(message.text))
+        page.on("pageerror", lambda error: troubles.append(str(error)))
+        page.goto(f"{path.as_uri()}#leak-3")
+        assert page.locator("dialog header b").inner_text() == "Feuchtstelle 3"
+        assert page.locator("dialog svg.view image").count() == 1, "pictures are there without the chapter on the lining"
+        assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        words = " ".join(pypdf.PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True))).pages[0].extract_text().split())
+        assert re.search(r"Seite 1 von \d+", words)
+        assert troubles == []
+        browser.close()
+
+
+def test_a_report_without_tables_of_leaks_lists_them_by_kind(drawn: str, tmp_path: Path) -> None:
+    (tmp_path / "owner.toml").write_text('language = "sl"\nchapters = ["findings"]', "utf-8")
+    run(drawn, "report", NAME, "-o", tmp_path / "r.html", "--template", tmp_path / "owner.toml")
+    chapter = section((tmp_path / "r.html").read_text("utf-8"), "kind-leak")
+    with connect(drawn) as conn:
+        confirmed = conn.execute("SELECT id FROM tunnel_api.leak WHERE review = 'confirmed' AND kind = 'leak'").fetchall()
+    assert {f'<tr id="finding-{key}"' in chapter for (key,) in confirmed} == {True}
+    assert "<h2>Zamakanje</h2>" in chapter
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a = ", "is not TOML"), ("klient = 1", "klient: there is no such key"), ("client = 5", "client: takes a text, not 5"),
+        ('language = "xx"', "language: 'xx' is none of de, en, sl"), ('logo = "none.png"', "logo: there is no file"),
+        ('logo = "owner.toml"', "is no image"), ('chapters = "leaks"', "chapters: takes a list"),
+        ('chapters = ["leeks"]', "chapters: there is no chapter 'leeks'"), ("chapters = []", "chapters: takes a list"),
+        ("chapters = [[1]]", "there is no chapter [1]"),
+        ('chapters = ["leaks", "leaks"]', "'leaks' stands there 2 times"), ("headings = 1", "headings: takes a table"),
+        ('[headings]\n"Leeks" = "x"', "headings.'Leeks': there is no such heading"),
+        ('[headings]\n"Leaks" = 1', "headings.Leaks: takes a text, not 1"),
+        ('[headings]\n"{count} leaks" = "{number}"', "has other names in braces"),
+        ('[headings]\n"Leaks" = "{"', "has other names in braces"),
+        ('[severity_colours]\n5 = "#123456"', "severity_colours.5: severities are 1 to 4"),
+        ('[severity_colours]\n1 = "red"', "severity_colours.1: takes a colour such as #b8371d, not 'red'"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_template_is_one_line(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "owner.toml"
+    path.write_text(text, "utf-8")
+    with pytest.raises(UserError) as error:
+        read_owner(path)
+    assert str(error.value).startswith(f"{path}: ")
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_template_that_is_not_there_is_one_line(tmp_path: Path) -> None:
+    done = CliRunner().invoke(main, ["report", NAME, "-o", str(tmp_path / "r.html"), "--template", str(tmp_path / "no.toml")])
+    assert (done.exit_code, done.stderr) == (
+        2,
+        f"tunneldb: {tmp_path / 'no.toml'}: cannot be read: No such file or directory\n",
+    )
+
+
+def test_examples_of_templates_and_a_language_of_ones_own(tmp_path: Path) -> None:
+    for path in (Path(__file__).parents[2] / "docs" / "examples").glob("*.toml"):
+        assert read_owner(path) != Owner()
+    (tmp_path / "fr.toml").write_text('date = "%d/%m/%Y"\n[texts]\n"Leaks" = "Fuites"\n', "utf-8")
+    (tmp_path / "owner.toml").write_text('language = "fr.toml"', "utf-8")
+    words = read_owner(tmp_path / "owner.toml").words
+    assert (words.language, words("Leaks"), words("Cracks")) == ("fr", "Fuites", "Cracks")
+
+
+def test_catalogues_have_each_text_that_a_report_says(example_catalogue: frozenset[str]) -> None:
+    """And no other; with the same names in braces."""
+    for code in languages():
+        texts = read_language(code)["texts"]
+        assert set(texts) == example_catalogue, code
+        for english, said in texts.items():
+            assert sorted(re.findall(r"{\w+}", said)) == sorted(re.findall(r"{\w+}", english)), (code, english)
+    english = read_language("en")["texts"]
+    assert list(english) == list(english.values())
+
+
+@pytest.fixture
+def example_catalogue() -> frozenset[str]:
+    """Texts of templates and scripts, and those that are put together: states, origins, kinds, …"""
+    package = Path(findings.__file__).parent
+    texts = set(CHAPTERS.values()) | set(findings.STATE_WORDS.values()) | {"detected", "redrawn", "split", "merged"}
+    texts |= {"Chainage", "Station", "o’clock", "m²", "Client", "Project", "Standard"}
+    texts |= {"Prepared by", "Checked by", "Accepted by", "Name", "Position", "Date", "Signature"}
+    source = (package / "photos.py").read_text("utf-8")
+    texts |= {said for said in re.findall(r'_NotHadError\("([^"]+)"\)', source) if "fetched" not in said}
+    migration = next((package.parents[1] / "migrations" / "versions").glob("0022_*.py")).read_text("utf-8")
+    texts |= set(re.findall(r'^    \("\w+", "([^"]+)", \[', migration, re.MULTILINE))
+    texts |= set(re.findall(r'^    \(\d, "(\w+)",', migration, re.MULTILINE))
+    for path in [*(package / "templates").rglob("*.*"), package / "strip.py"]:
+        text = path.read_text("utf-8")
+        texts |= set(re.findall(r'(?<![\w.])(?:_|self\.words|words)\(\s*"([^"]+)"', text))
+        if path.suffix == ".js":
+            texts |= set(re.findall(r'\["([^"]+)", "\w+", (?:\(|kind|arc|review)', text))
+    return frozenset(texts)

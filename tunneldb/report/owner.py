@@ -1,0 +1,199 @@
+"""An owner's template of the report: a small TOML file with logo, client, language, standard, chapters and colours."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NoReturn
+
+from PIL import Image
+
+from tunneldb.errors import UserError
+from tunneldb.report.words import ENGLISH, Words, known_texts, languages, read_language
+
+CHAPTERS = {
+    "summary": "Summary",
+    "seen": "Seen and unseen",
+    "classes": "Waterproofing",
+    "lining": "Lining",
+    "leaks": "Leaks",
+    "statistics": "Statistics",
+    "findings": "Findings",
+    "dry": "Dry regions",
+    "structures": "Structures",
+    "underwater": "Under water",
+    "methods": "Methods",
+    "reviews": "Reviews",
+    "signatures": "Signatures",
+}
+"""Chapters in their usual order, by name, with what the navigation calls them."""
+
+COLOURS = {1: "#3a8f5c", 2: "#c9a100", 3: "#e0660b", 4: "#b8171d"}
+"""Usual colours of severities."""
+
+LOGO = 640
+"""Width and height of a logo at most, pixels."""
+
+_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
+_NAME = re.compile(r"\{\w+\}")
+_IMAGES = ("PNG", "JPEG", "WEBP", "GIF", "TIFF", "BMP")
+
+
+@dataclass(frozen=True)
+class Owner:
+    """What an owner wants of the report.
+
+    Attributes
+    ----------
+    words : Words
+        The language of its headings.
+    client, project, standard : str or None
+        For whom and what it is made, and by which standard it was inspected.
+    logo : str or None
+        The owner's, as a data URL.
+    chapters : tuple of str
+        Names of those wanted, in order.
+    colours : dict of int to str
+        Colours of severities, as #rrggbb.
+    """
+
+    words: Words = field(default_factory=Words)
+    client: str | None = None
+    project: str | None = None
+    standard: str | None = None
+    logo: str | None = None
+    chapters: tuple[str, ...] = tuple(CHAPTERS)
+    colours: Mapping[int, str] = field(default_factory=lambda: COLOURS)
+
+
+_KEYS = ("logo", "client", "project", "standard", "language", "chapters", "headings", "severity_colours")
+
+
+def read_owner(path: Path) -> Owner:
+    """Read an owner's template.
+
+    Raises
+    ------
+    UserError
+        If it cannot be read, or something in it is wrong: file, key and value are told.
+    """
+    given = _Given(path, _load(path))
+    given.refuse_others(_KEYS)
+    logo = given.text("logo")
+    return Owner(
+        words=_words(given),
+        client=given.text("client"),
+        project=given.text("project"),
+        standard=given.text("standard"),
+        logo=None if logo is None else _logo(given, path.parent / logo),
+        chapters=_chapters(given),
+        colours=_colours(given),
+    )
+
+
+def _load(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UserError(f"{path}: is not TOML: {error}") from error
+
+
+@dataclass(frozen=True)
+class _Given:
+    """What a file holds; what is wrong with it is told with the file's name, the key and the value."""
+
+    path: Path
+    values: dict[str, Any]
+
+    def refuse(self, key: str, said: str) -> NoReturn:
+        raise UserError(f"{self.path}: {key}: {said}")
+
+    def refuse_others(self, known: tuple[str, ...]) -> None:
+        for key in self.values:
+            if key not in known:
+                self.refuse(key, f"there is no such key; there are {', '.join(known)}")
+
+    def text(self, key: str) -> str | None:
+        value = self.values.get(key)
+        if value is not None and (not isinstance(value, str) or not value.strip()):
+            self.refuse(key, f"takes a text, not {value!r}")
+        return value
+
+    def table(self, key: str) -> dict[str, str]:
+        value = self.values.get(key, {})
+        if not isinstance(value, dict):
+            self.refuse(key, f"takes a table of texts, not {value!r}")
+        for name, said in value.items():
+            if not isinstance(said, str):
+                self.refuse(f"{key}.{name}", f"takes a text, not {said!r}")
+        return value
+
+    def texts(self, key: str) -> dict[str, str]:
+        """Return a table of what is said for English texts; each has the names in braces that the English has."""
+        table, known = self.table(key), known_texts()
+        for english, said in table.items():
+            if english not in known:
+                self.refuse(f"{key}.{english!r}", "there is no such heading; all are in languages/en.toml of the package")
+            stray = re.search(r"[{}]", _NAME.sub("", said))
+            if stray or set(_NAME.findall(said)) != set(_NAME.findall(english)):
+                self.refuse(f"{key}.{english!r}", f"{said!r} has other names in braces")
+        return table
+
+
+def _words(given: _Given) -> Words:
+    name = given.text("language") or ENGLISH
+    if name.endswith(".toml"):
+        path = given.path.parent / name
+        own = _Given(path, _load(path))
+        own.refuse_others(("date", "texts"))
+        code, date, texts = path.stem, own.text("date"), own.texts("texts")
+    elif name in languages():
+        catalogue = read_language(name)
+        code, date, texts = name, catalogue.get("date"), catalogue["texts"] if name != ENGLISH else {}
+    else:
+        given.refuse("language", f"{name!r} is none of {', '.join(languages())}, nor a .toml file of texts")
+    return Words(code, texts | given.texts("headings"), date)
+
+
+def _chapters(given: _Given) -> tuple[str, ...]:
+    chapters = given.values.get("chapters", list(CHAPTERS))
+    if not isinstance(chapters, list) or not chapters:
+        given.refuse("chapters", f"takes a list of names, not {chapters!r}")
+    for name in chapters:
+        if not isinstance(name, str) or name not in CHAPTERS:
+            given.refuse("chapters", f"there is no chapter {name!r}; there are {', '.join(CHAPTERS)}")
+        if chapters.count(name) > 1:
+            given.refuse("chapters", f"{name!r} stands there {chapters.count(name)} times")
+    return tuple(chapters)
+
+
+def _colours(given: _Given) -> dict[int, str]:
+    colours = given.table("severity_colours")
+    for name, colour in colours.items():
+        if name not in ("1", "2", "3", "4"):
+            given.refuse(f"severity_colours.{name}", "severities are 1 to 4")
+        if not _COLOUR.fullmatch(colour):
+            given.refuse(f"severity_colours.{name}", f"takes a colour such as #b8371d, not {colour!r}")
+    return COLOURS | {int(name): colour for name, colour in colours.items()}
+
+
+def _logo(given: _Given, path: Path) -> str:
+    """Return a logo, made smaller where it is larger than a cover needs, as a data URL."""
+    if not path.is_file():
+        given.refuse("logo", f"there is no file {path}")
+    try:
+        with Image.open(path, formats=_IMAGES) as image:
+            small = image.convert("RGBA")
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # as decoders of broken images raise
+        given.refuse("logo", f"{path} is no image that can be read (PNG, JPEG, WebP, GIF, TIFF, BMP)")
+    small.thumbnail((LOGO, LOGO))
+    data = io.BytesIO()
+    small.save(data, "PNG", optimize=True)
+    return f"data:image/png;base64,{base64.b64encode(data.getvalue()).decode()}"

@@ -1,0 +1,58 @@
+"""The language of a report's headings, labels and short statements: English as written, or as a catalogue translates it."""
+
+from __future__ import annotations
+
+import datetime as dt
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib.resources import files
+from typing import Any
+
+from tunneldb.report import text
+
+ENGLISH = "en"
+_FOLDER = files("tunneldb.report") / "languages"
+
+
+@dataclass(frozen=True)
+class Words:
+    """What a report says for each of its English texts.
+
+    Attributes
+    ----------
+    language : str
+        Its code, as ``de``.
+    texts : mapping of str to str
+        By the English text; what is not in it stays English.
+    date : str or None
+        How days are written, as ``strftime`` wants it; None for 4 May 2024.
+    """
+
+    language: str = ENGLISH
+    texts: Mapping[str, str] = field(default_factory=dict)
+    date: str | None = None
+
+    def __call__(self, english: str, **values: Any) -> str:
+        """Return a text in this language, values put in for the names in braces."""
+        said = self.texts.get(english, english)
+        return said.format(**values) if values else said
+
+    def day(self, date: dt.date) -> str:
+        """Return a day as it is written in this language."""
+        return date.strftime(self.date) if self.date else text.day(date)
+
+
+def languages() -> list[str]:
+    """Codes of the languages that there are."""
+    return sorted(entry.name.removesuffix(".toml") for entry in _FOLDER.iterdir() if entry.name.endswith(".toml"))
+
+
+def read_language(code: str) -> dict[str, Any]:
+    """Read a catalogue: ``date``, how days are written, and ``texts`` by the English ones."""
+    return tomllib.loads((_FOLDER / f"{code}.toml").read_text("utf-8"))
+
+
+def known_texts() -> frozenset[str]:
+    """All texts that can be said otherwise: those of the English catalogue, which says them as they are."""
+    return frozenset(read_language(ENGLISH)["texts"])
