@@ -140,7 +140,7 @@ def build() -> Survey:
     surface.blur(0.006)
     instrument = Instrument(_law, speckle=0.55, floor=-16.0, drift=0.25, offsets=0.0, jitter=0.0012, exponent=0.85)
     sweep = drive(axis, LENGTH, 0.1, 1.75, 0.018, 1000, 1.1, seed=81)
-    return Survey(axis, section, surface, _fittings(axis, surface), instrument, [sweep], 3400.0)
+    return Survey(axis, section, surface, _fittings(axis, surface), instrument, [sweep], 3400.0, reference=(4.0, 25.0))
 
 
 def _make(folder: Path) -> None:

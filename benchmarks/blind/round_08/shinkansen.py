@@ -145,7 +145,7 @@ def build() -> Survey:
         _law, speckle=0.7, floor=2.0, drift=0.35, offsets=0.0, jitter=0.002, mixed=0.5, exponent=0.9, digit=0.05
     )
     sweep = drive(axis, LENGTH, -2.15, 2.3, 0.024, 1500, 2.2, seed=82)
-    return Survey(axis, section, surface, _fittings(axis, surface), instrument, [sweep], 2400.0)
+    return Survey(axis, section, surface, _fittings(axis, surface), instrument, [sweep], 2400.0, reference=(4.0, 25.0))
 
 
 def _make(folder: Path) -> None:

@@ -107,7 +107,7 @@ def build() -> Survey:
     surface.blur(0.007)
     instrument = Instrument(_law, speckle=0.6, floor=-6.0, drift=0.3, offsets=0.0, jitter=0.0015, mixed=0.5, exponent=0.7)
     sweep = drive(axis, LENGTH, 0.05, 2.4, 0.019, 1150, 1.4, seed=88)
-    return Survey(axis, section, surface, _fittings(axis, surface), instrument, [sweep], 3300.0)
+    return Survey(axis, section, surface, _fittings(axis, surface), instrument, [sweep], 3300.0, reference=(4.0, 25.0))
 
 
 def _make(folder: Path) -> None:
