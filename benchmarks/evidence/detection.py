@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from unittest import mock
 
-import numpy as np
-
 from benchmarks.blind.run import Outcome
 from benchmarks.evidence.candidates import LEAST
 from tunneldb.anomalies import verdict
@@ -16,7 +14,6 @@ from tunneldb.anomalies.background.level_map import map_background
 from tunneldb.anomalies.coverage import Coverage, measure_coverage
 from tunneldb.anomalies.detect import Anomaly, Detection, find_anomalies
 from tunneldb.anomalies.evidence import EvidenceModel
-from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.raster.image import LiningImage
 
 
@@ -57,23 +54,10 @@ def detect(picture: LiningImage, truth: Outcome) -> tuple[Outcome, dict[int, Cov
         [one.confidence if one.kind == "leak" else 1.0 - one.confidence for one in verdicts],
         [list(one.reasons) for one in verdicts], float(coverage.seen.sum()), truth.seconds, truth.other, truth.other_kinds,
     )  # fmt: skip
-    return outcome, _of_kilometre(picture, coverage)
+    return outcome, {picture.grid.km: coverage}
 
 
 def _whole(found: Detection) -> list[Anomaly]:
     """What was found, with what reaches an end of the kilometre: there is no other beyond."""
     cut = [Anomaly.of(region, LEAST) for region in found.cut]
     return [*found.anomalies, *(anomaly for anomaly in cut if anomaly is not None)]
-
-
-def _of_kilometre(picture: LiningImage, coverage: Coverage) -> dict[int, Coverage]:
-    """Coverage from the beginning of the kilometre to its end; nothing is known of it outside the picture."""
-    start = picture.grid.west + picture.grid.inner.start * picture.grid.pixel
-    km = int((start + coverage.step / 2) // KILOMETRE)
-    before = round((start - km * KILOMETRE) / coverage.step)
-    after = round(KILOMETRE / coverage.step) - before - len(coverage.lining)
-    return {
-        km: Coverage(
-            coverage.step, *(np.pad(areas, (before, after)) for areas in (coverage.lining, coverage.seen, coverage.wet))
-        )
-    }

@@ -7,7 +7,7 @@ import os
 import pickle
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
@@ -19,53 +19,7 @@ from benchmarks.common import progress, scratch_database
 from benchmarks.leak_set import SET, Truth, prepare
 from tunneldb.database import connect
 from tunneldb.pipeline import detect as stage
-from tunneldb.raster.grid import PixelGrid
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
-
-
-@dataclass(frozen=True)
-class Stretch(PixelGrid):
-    """Some blocks of the grid of a kilometre."""
-
-    pixel: float
-    bottom: int
-    rows: int
-    first: int
-    width: int
-    block: int
-    judged: slice
-
-    @property
-    def columns(self) -> int:
-        return self.width
-
-    @property
-    def first_column(self) -> int:
-        return self.first
-
-    @property
-    def block_columns(self) -> int:
-        return self.block
-
-    @property
-    def blocks(self) -> int:
-        return self.width // self.block
-
-    @property
-    def inner(self) -> slice:
-        return self.judged
-
-
-def cut(picture: LiningImage) -> LiningImage:
-    """Copy of the blocks in which there is lining, and of one to either side."""
-    grid, block = picture.grid, picture.grid.block_columns
-    held = np.flatnonzero((picture.state == PixelState.LINING).any(axis=0))
-    first = max(int(held[0]) // block - 1, 0) * block
-    stop = min(int(held[-1]) // block + 2, grid.columns // block) * block
-    judged = slice(max(grid.inner.start - first, 0), min(grid.inner.stop - first, stop - first))
-    part = Stretch(grid.pixel, grid.bottom, grid.rows, grid.first_column + first, stop - first, block, judged)
-    return LiningImage(part, picture.state[:, first:stop].copy(), picture.level[:, first:stop].copy(), picture.gaps)
 
 
 def pictures(family: str, folder: Path, dsn: str | None, only: str = "") -> Iterator[tuple[LiningImage, Outcome]]:
@@ -137,7 +91,7 @@ def _tapped(work: Callable[[], float]) -> tuple[LiningImage | None, float]:
     seen: list[LiningImage] = []
 
     def tap(picture: LiningImage, *rest: object) -> object:
-        seen.append(cut(picture))
+        seen.append(replace(picture, state=picture.state.copy(), level=picture.level.copy()))
         return original(picture, *rest)
 
     original = stage.map_background
