@@ -44,12 +44,13 @@ PLACE, PLACE_CHAINAGE = (272039.859, 4765020.741, 644.405), 12345.0
 
 @dataclass(frozen=True)
 class Size:
-    """How much there is to be: kilometres from chainage 0 on, leaks, points, joints and dark spots per leak."""
+    """How much there is to be: kilometres from chainage 0 on, leaks, points, joints and dark spots, findings that were drawn."""
 
     kilometres: int = 25
     leaks: int = 100_000
     points: int = 60_000_000
     dry: int = 7_500
+    drawn: int = 20_000
 
 
 def make(connection: Connection, survey: str, size: Size) -> int:
@@ -293,6 +294,52 @@ SELECT m.edited_at, 'hansen', %(survey)s, 'axis_vertex', m.id, 'update', jsonb_b
 FROM moved m
 """
 
+# Eight kinds in turn, each by the program's own function; a leak is drawn over one that was detected. One in fifty waits to be
+# measured.
+DRAWN = """
+CREATE TEMPORARY TABLE drawn ON COMMIT DROP AS
+SELECT k AS number, tunnel_api.add_finding(%(id)s, q.kind, g.geom, CASE WHEN q.kind = 'crack' THEN 0.002 END, 1 + (k / 8) %% 4,
+    CASE k %% 40 WHEN 7 THEN 'open' ELSE 'confirmed' END, NULL, 'drawn', true, NULL) AS id
+FROM generate_series(0, %(drawn)s - 1) AS k
+CROSS JOIN LATERAL (SELECT ('{crack,spall,delamination,efflorescence,missing_bolt,damaged_joint,drip,leak}'::text[])[1 + k %% 8] AS kind,
+    (k + 0.5) * 1000 * %(kilometres)s / %(drawn)s AS c, (k * 0.618 %% 1 - 0.5) * 1.6 * %(corner)s AS a) q
+CROSS JOIN LATERAL (SELECT CASE
+    WHEN q.kind IN ('crack', 'damaged_joint') THEN ST_MakeLine(ST_MakePoint(q.c - 0.2, q.a), ST_MakePoint(q.c + 0.2, q.a + 1))
+    WHEN q.kind IN ('missing_bolt', 'drip') THEN ST_MakePoint(q.c, q.a)
+    WHEN q.kind = 'leak' THEN coalesce((SELECT ST_Buffer(ST_Envelope(x.unrolled), 0.02, 'join=mitre') FROM tunnel.anomaly x
+        WHERE x.survey_id = %(id)s AND x.kind = 'leak' AND x.chainage_from BETWEEN q.c AND q.c + 5 ORDER BY x.chainage_from LIMIT 1),
+        ST_MakeEnvelope(q.c, q.a, q.c + 0.3, q.a + 0.3))
+    ELSE ST_MakeEnvelope(q.c, q.a, q.c + 0.3, q.a + 0.3) END AS geom) g
+"""
+
+MEASURED = """
+UPDATE tunnel.anomaly a SET drop_mean = 2, drop_max = 3, image_share = 0.95, contrast = 3,
+    drawn_by = ('{hansen,iversen,olsen}'::text[])[1 + d.number %% 3], reviewed_by = ('{hansen,iversen,olsen}'::text[])[1 + d.number %% 3]
+FROM drawn d WHERE a.id = d.id AND d.number %% 50 > 0
+"""
+
+LINKED = """
+SELECT count(tunnel_api.link_findings(%(id)s, a.unrolled)) FROM drawn d JOIN tunnel.anomaly a ON a.id = d.id WHERE a.wet
+"""
+
+DRAWN_AUDIT = """
+INSERT INTO tunnel_audit.entry (at, who, survey, view, row_id, action, before, after)
+SELECT '2024-07-01 06:00Z'::timestamptz + d.number * interval '1 min', 'hansen', %(survey)s, 'anomaly', d.id,
+    CASE s.n WHEN 0 THEN 'insert' ELSE 'update' END, CASE s.n WHEN 1 THEN jsonb_build_object('geom', ST_AsEWKT(a.unrolled)) END,
+    jsonb_build_object('geom', ST_AsEWKT(a.unrolled))
+FROM drawn d JOIN tunnel.anomaly a ON a.id = d.id CROSS JOIN generate_series(0, 1) AS s (n)
+WHERE s.n = 0 OR d.number %% 20 = 0
+"""
+
+PHOTOS = """
+INSERT INTO tunnel.photo (anomaly_id, path) SELECT d.id, 'photos/' || d.number || '.jpg' FROM drawn d WHERE d.number %% 4 = 0
+"""
+
+DRY_REGIONS = """
+INSERT INTO tunnel_api.region (survey_id, kind, geom)
+SELECT %(id)s, 'dry', ST_MakeEnvelope(km * 1000 + 500, -1, km * 1000 + 504, 1, 0) FROM generate_series(0, %(kilometres)s - 1) AS km
+"""
+
 COVERAGE = """
 INSERT INTO tunnel.coverage (survey_id, km, step, lining, seen, wet)
 SELECT %(id)s, km, 0.1, array_agg(l.lining), array_agg(l.lining * l.share), array_agg(l.lining * l.share * 0.02)
@@ -348,6 +395,7 @@ STEPS = {
     "segments and sections": (SEGMENTS, COUNTED, SECTIONS),
     "leaks": (SPOTS, "ANALYZE spot", OUTLINES, ANOMALIES),
     "audit": (AUDIT, MOVED),
+    "what people drew": (*(f"ANALYZE tunnel.{table}" for table in ("anomaly", "segment", "section", "axis_vertex")), DRAWN, MEASURED, LINKED, DRAWN_AUDIT, PHOTOS, DRY_REGIONS),
     "coverage and radiometry": (COVERAGE, RADIOMETRY, CURVES),
     "ground, clusters, target spheres": (GROUND, CLUSTERS, SPHERES),
 }

@@ -156,12 +156,21 @@ BEGIN
 END
 $$;
 
+-- What the audit has of a region.
+CREATE OR REPLACE FUNCTION tunnel_api.region_state(region tunnel.region) RETURNS jsonb
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
+    SELECT jsonb_strip_nulls(jsonb_build_object('kind', $1.kind, 'reason', $1.reason, 'waits', nullif($1.waits, false),
+        'approved_by', $1.approved_by, 'geom', ST_AsEWKT($1.geom)))
+$$;
+COMMENT ON FUNCTION tunnel_api.region_state(tunnel.region) IS 'What the audit has of a region: kind, reason, outline as EWKT, whether it waits and who put it in force';
+
 -- Adds, changes or deletes a region drawn by hand in the unrolled plane (m). A new one names its survey by survey_id or,
 -- without that, by name.
 CREATE OR REPLACE FUNCTION tunnel_api.edit_region() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
 DECLARE
     was tunnel.region;
+    is_now tunnel.region;
     its tunnel.survey;
     most float8;
 BEGIN
@@ -170,8 +179,7 @@ BEGIN
         IF NOT FOUND THEN
             RETURN NULL;  -- gone meanwhile
         END IF;
-        PERFORM tunnel_api.note_edit(OLD.survey, 'region', OLD.id,
-                                     jsonb_strip_nulls(jsonb_build_object('kind', was.kind, 'reason', was.reason, 'geom', ST_AsEWKT(was.geom))), NULL);
+        PERFORM tunnel_api.note_edit(OLD.survey, 'region', OLD.id, tunnel_api.region_state(was), NULL);
         PERFORM tunnel_api.mark_dry(was.survey_id, was.geom);
         RETURN OLD;
     END IF;
@@ -180,8 +188,8 @@ BEGIN
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     IF TG_OP = 'UPDATE' THEN
-        IF (NEW.id, NEW.survey_id, NEW.survey, NEW.drawn_by, NEW.drawn_at) IS DISTINCT FROM
-           (OLD.id, OLD.survey_id, OLD.survey, OLD.drawn_by, OLD.drawn_at) THEN
+        IF (NEW.id, NEW.survey_id, NEW.survey, NEW.drawn_by, NEW.drawn_at, NEW.waits, NEW.approved_by, NEW.approved_at) IS DISTINCT FROM
+           (OLD.id, OLD.survey_id, OLD.survey, OLD.drawn_by, OLD.drawn_at, OLD.waits, OLD.approved_by, OLD.approved_at) THEN
             RAISE EXCEPTION 'of a region only the kind, the reason and the outline (geom) can be edited'
                 USING ERRCODE = 'feature_not_supported';
         END IF;
@@ -222,18 +230,28 @@ BEGIN
     END IF;
     NEW.drawn_by := session_user;
     NEW.drawn_at := clock_timestamp();
-    IF TG_OP = 'INSERT' THEN
-        INSERT INTO tunnel.region (survey_id, kind, geom, drawn_by, drawn_at, reason)
-        VALUES (NEW.survey_id, NEW.kind, NEW.geom, NEW.drawn_by, NEW.drawn_at, NEW.reason)
-        RETURNING id INTO NEW.id;
+    IF was.id IS NULL OR NEW.kind <> was.kind OR NOT NEW.geom = was.geom THEN
+        NEW.waits := NEW.kind = 'dry' AND ST_Area(NEW.geom) > most;
+        NEW.approved_by := NULL;
+        NEW.approved_at := NULL;
     ELSE
-        UPDATE tunnel.region
-           SET kind = NEW.kind, geom = NEW.geom, drawn_by = NEW.drawn_by, drawn_at = NEW.drawn_at, reason = NEW.reason
-         WHERE id = OLD.id;
+        NEW.waits := was.waits;
+        NEW.approved_by := was.approved_by;
+        NEW.approved_at := was.approved_at;
     END IF;
-    PERFORM tunnel_api.note_edit(NEW.survey, 'region', NEW.id,
-                                 CASE TG_OP WHEN 'UPDATE' THEN jsonb_strip_nulls(jsonb_build_object('kind', was.kind, 'reason', was.reason, 'geom', ST_AsEWKT(was.geom))) END,
-                                 jsonb_strip_nulls(jsonb_build_object('kind', NEW.kind, 'reason', NEW.reason, 'geom', ST_AsEWKT(NEW.geom))));
+    IF TG_OP = 'INSERT' THEN
+        INSERT INTO tunnel.region (survey_id, kind, geom, drawn_by, drawn_at, reason, waits)
+        VALUES (NEW.survey_id, NEW.kind, NEW.geom, NEW.drawn_by, NEW.drawn_at, NEW.reason, NEW.waits)
+        RETURNING * INTO is_now;
+        NEW.id := is_now.id;
+    ELSE
+        UPDATE tunnel.region r
+           SET kind = NEW.kind, geom = NEW.geom, drawn_by = NEW.drawn_by, drawn_at = NEW.drawn_at, reason = NEW.reason,
+               waits = NEW.waits, approved_by = NEW.approved_by, approved_at = NEW.approved_at
+         WHERE r.id = OLD.id RETURNING r.* INTO is_now;
+    END IF;
+    PERFORM tunnel_api.note_edit(NEW.survey, 'region', NEW.id, CASE TG_OP WHEN 'UPDATE' THEN tunnel_api.region_state(was) END,
+                                 tunnel_api.region_state(is_now));
     PERFORM tunnel_api.mark_dry(NEW.survey_id, ST_Collect(was.geom, NEW.geom));
     RETURN NEW;
 END
@@ -242,3 +260,27 @@ COMMENT ON FUNCTION tunnel_api.edit_region() IS 'Trigger of view region: writes 
 
 CREATE OR REPLACE TRIGGER edit INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.region
     FOR EACH ROW EXECUTE FUNCTION tunnel_api.edit_region();
+
+-- A dry region larger than the tunnel's limit takes nothing away until an operator has looked at it.
+CREATE OR REPLACE FUNCTION tunnel_api.dry_region_approve(region_id int) RETURNS int
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+DECLARE
+    was tunnel.region;
+    is_now tunnel.region;
+BEGIN
+    SELECT r.* INTO was FROM tunnel.region r WHERE r.id = region_id FOR UPDATE;
+    IF was.id IS NULL OR NOT was.waits THEN
+        RAISE EXCEPTION '%', CASE WHEN was.id IS NULL THEN format('there is no region %s', region_id)
+                                  ELSE format('region %s does not wait: it is in force', region_id) END
+            USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    UPDATE tunnel.region r SET waits = false, approved_by = session_user, approved_at = clock_timestamp()
+     WHERE r.id = region_id RETURNING r.* INTO is_now;
+    PERFORM tunnel_api.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = was.survey_id), 'region', region_id,
+                                 tunnel_api.region_state(was), tunnel_api.region_state(is_now));
+    PERFORM tunnel_api.mark_dry(was.survey_id, was.geom);
+    RETURN (SELECT d.leaks FROM tunnel_api.dry_region d WHERE d.id = region_id);
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.dry_region_approve(int) IS
+'Puts a dry region in force that is larger than dry_region_limit of its tunnel; for operators. Returns how many open leaks it took away.';

@@ -187,7 +187,7 @@ SELECT r.id, r.survey_id, s.name AS survey, ST_XMin(r.geom) AS chainage_from, ST
        tunnel_api.station_label(s.tunnel_id, ST_XMin(r.geom)) AS label_from,
        tunnel_api.station_label(s.tunnel_id, ST_XMax(r.geom)) AS label_to,
        ST_YMin(r.geom) AS arc_from, ST_YMax(r.geom) AS arc_to, ST_Area(r.geom) AS area, t.dry_region_limit AS area_limit, r.reason,
-       r.drawn_by, r.drawn_at, l.leaks, l.leaks_area, l.ids AS leak_ids, r.geom::public.geometry(Polygon, 0) AS geom
+       r.drawn_by, r.drawn_at, r.waits, r.approved_by, r.approved_at, l.leaks, l.leaks_area, l.ids AS leak_ids, r.geom::public.geometry(Polygon, 0) AS geom
   FROM tunnel.region r
   JOIN tunnel.survey s ON s.id = r.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
@@ -201,8 +201,11 @@ COMMENT ON VIEW tunnel_api.dry_region IS
 COMMENT ON COLUMN tunnel_api.dry_region.arc_from IS 'Least arc, m';
 COMMENT ON COLUMN tunnel_api.dry_region.arc_to IS 'Greatest arc, m';
 COMMENT ON COLUMN tunnel_api.dry_region.area IS 'Its area in the unrolled plane, m²';
-COMMENT ON COLUMN tunnel_api.dry_region.area_limit IS 'Area above which it must say why (tunnel.tunnel.dry_region_limit), m²';
+COMMENT ON COLUMN tunnel_api.dry_region.area_limit IS 'Area above which it must say why, and waits for an operator (tunnel.tunnel.dry_region_limit), m²';
 COMMENT ON COLUMN tunnel_api.dry_region.reason IS 'Why it was drawn';
+COMMENT ON COLUMN tunnel_api.dry_region.waits IS 'Whether it waits for an operator (dry_region_approve): until then it takes nothing away';
+COMMENT ON COLUMN tunnel_api.dry_region.approved_by IS 'Operator who put it in force, where it had to wait';
+COMMENT ON COLUMN tunnel_api.dry_region.approved_at IS 'When';
 COMMENT ON COLUMN tunnel_api.dry_region.leaks IS 'How many open leaks it took away';
 COMMENT ON COLUMN tunnel_api.dry_region.leaks_area IS 'Their area, m²';
 COMMENT ON COLUMN tunnel_api.dry_region.leak_ids IS 'Their ids (lining_finding)';

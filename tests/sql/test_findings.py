@@ -283,6 +283,98 @@ def test_operators_extend_the_catalogue_and_wet_follows(person: psycopg.Connecti
         person.execute("DELETE FROM tunnel_api.finding_kind WHERE code = 'seepage'")
 
 
+def undo(conn: psycopg.Connection, key: int) -> str:
+    return str(conn.execute("SELECT tunnel_api.finding_undo(%s)", [key]).fetchone()[0])
+
+
+def everything(conn: psycopg.Connection) -> list[tuple[Any, ...]]:
+    """All findings and photos, with all that is known of them but when."""
+    return conn.execute(
+        "SELECT to_jsonb(a) - ARRAY['drawn_at', 'reviewed_at', 'created_at', 'detected_at', 'map', 'surface', 'shape_map', 'shape_surface',"
+        " 'area', 'clock'] || jsonb_build_object('area', round(a.area::numeric, 5), 'clock', round(a.clock::numeric, 4),"
+        " 'unrolled', ST_AsText(a.unrolled, 6)),"
+        " (SELECT jsonb_agg(to_jsonb(p) - 'added_at') FROM tunnel_api.finding_photo p WHERE p.finding_id = a.id)"
+        " FROM tunnel_api.lining_finding a ORDER BY id"
+    ).fetchall()
+
+
+@INSPECTOR
+def test_each_step_is_taken_back_to_what_was_before(person: psycopg.Connection) -> None:
+    (found,) = person.execute("SELECT min(id) FROM tunnel_api.leak WHERE review = 'confirmed'").fetchone()
+    drawn = draw(person, FREE, "spall", remark="new")
+    person.execute("INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (%s, 'a.jpg')", [drawn])
+    crack = draw(person, LineString([(12360.0, 1.0), (12363.0, 1.5)]), "crack", width=0.002)
+    steps = (
+        (drawn, "redrawn", f"UPDATE tunnel_api.finding_map SET geom = ST_Buffer(geom, -0.1) WHERE id = {drawn}"),
+        (drawn, "reviewed", f"UPDATE tunnel_api.finding_3d SET remark = NULL, severity = 4, kind = 'other' WHERE id = {drawn}"),
+        (drawn, "deleted", f"DELETE FROM tunnel_api.finding_unrolled WHERE id = {drawn}"),
+        (drawn, "split", f"SELECT tunnel_api.finding_split({drawn}, 'LINESTRING(12350.5 0, 12350.5 2)')"),
+        (crack, "reviewed", f"UPDATE tunnel_api.finding_unrolled SET width = 0.01 WHERE id = {crack}"),
+        (crack, "split", f"SELECT tunnel_api.finding_split({crack}, 'LINESTRING(12361.7 0, 12361.7 2)')"),
+        (found, "reviewed", f"UPDATE tunnel_api.leak SET review = 'rejected', remark = 'soot', kind = 'dark' WHERE id = {found}"),
+        (found, "redrawn", f"UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, 0.2) WHERE id = {found}"),
+        (found, "split", f"""SELECT tunnel_api.finding_split(id, ST_MakeLine(ST_MakePoint((chainage_from + chainage_to) / 2, -20),
+            ST_MakePoint((chainage_from + chainage_to) / 2, 20))) FROM tunnel_api.lining_finding WHERE id = {found}"""),
+    )  # fmt: skip
+    for key, said, statement in steps:
+        before, sums = everything(person), wet(person)
+        person.execute(statement.encode())
+        assert everything(person) != before
+        assert undo(person, key) == said, statement
+        now = everything(person)
+        assert now == before, statement
+        assert wet(person) == (sums[0], pytest.approx(sums[1]))
+    entries = person.execute("SELECT undoes IS NULL, count(*) FROM tunnel_api.audit WHERE part_of IS NULL GROUP BY 1").fetchall()
+    assert dict(entries)[False] == len(steps), "each is in the audit"
+
+
+@INSPECTOR
+def test_a_merge_is_taken_back_whole(person: psycopg.Connection) -> None:
+    first, second, third = (draw(person, box(12350.0 + x, 0.5, 12350.0 + x + 1.0, 1.5), "spall") for x in (0.0, 1.2, 2.4))
+    states = [everything(person)]
+    for ids in ([second, third], [first, second]):
+        person.execute("SELECT tunnel_api.finding_merge(%s)", [ids])
+        states.append(everything(person))
+    assert row(person, third, "merged_into") == (first,)
+    with pytest.raises(psycopg.Error, match=f"finding {second} is not taken back: it was merged into finding {first}: take that back"):
+        undo(person, second)
+    assert (undo(person, first), everything(person)) == ("merged", states[1])
+    assert (undo(person, second), everything(person)) == ("merged", states[0])
+    # one that holds the other all
+    inner = draw(person, box(12350.2, 0.7, 12350.4, 0.9), "spall")
+    before = everything(person)
+    person.execute("SELECT tunnel_api.finding_merge(%s)", [[first, inner]])
+    assert (undo(person, first), everything(person)) == ("merged", before)
+    assert (undo(person, inner), undo(person, first)) == ("drawn", "drawn")
+
+
+def test_what_rests_on_a_step_or_is_another_s_is_not_taken_back(people: None, dsn: str, example: str) -> None:
+    with psycopg.connect(make_conninfo(dsn, user="ines")) as ines, psycopg.connect(make_conninfo(dsn, user="otto")) as otto:
+        key = draw(ines, FREE, "spall")
+        (ids,) = ines.execute("SELECT tunnel_api.finding_split(%s, 'LINESTRING(12350.5 0, 12350.5 2)')", [key]).fetchone()
+        ines.execute("UPDATE tunnel_api.finding_unrolled SET severity = 2 WHERE id = %s", [ids[1]])
+        photo = "INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (%s, 'a.jpg')"
+        ines.commit()
+        for step, key_, said in (
+            ("", key, f"finding {ids[1]}, a part of it, was changed since: take that back first"),
+            (f"SELECT tunnel_api.finding_undo({ids[1]})", ids[1], f"it was split off finding {key}: take that back"),
+            (photo % ids[1], key, f"finding {ids[1]}, a part of it, has photos"),
+            ("", 10**9, "there is no change of a finding 1000000000"),
+        ):
+            if step:
+                ines.execute(step.encode())
+                ines.commit()
+            with pytest.raises(psycopg.Error, match=said):
+                undo(ines, key_)
+            ines.rollback()
+        otto.execute("UPDATE tunnel_api.finding_unrolled SET remark = 'mine' WHERE id = %s", [key])
+        otto.commit()
+        with pytest.raises(psycopg.Error, match="its last change is of otto: only who made it, or an operator"):
+            undo(ines, key)
+        ines.rollback()
+        assert undo(otto, key) == "reviewed"
+
+
 def test_two_inspectors_at_once_on_one_finding(people: None, dsn: str, example: str) -> None:
     with (
         psycopg.connect(make_conninfo(dsn, user="ines")) as first,

@@ -130,6 +130,12 @@ class Region(Base):
     drawn_by: Mapped[str] = mapped_column(server_default=text("CURRENT_USER"), comment="Who drew it")
     drawn_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was drawn")
     reason: Mapped[str | None] = mapped_column(comment="Why; a dry region larger than the tunnel's limit needs one")
+    waits: Mapped[bool] = mapped_column(
+        server_default=text("false"),
+        comment="Whether it waits for an operator, being larger than the tunnel's limit: until then it marks nothing",
+    )
+    approved_by: Mapped[str | None] = mapped_column(comment="Operator who put it in force, where it had to wait")
+    approved_at: Mapped[dt.datetime | None] = mapped_column(comment="When")
 
 
 class Image(Base):
