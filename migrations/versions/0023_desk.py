@@ -30,7 +30,9 @@ def upgrade() -> None:
     )  # fmt: skip
     for column in (
         sa.Column("undoes", sa.BigInteger(), comment="Entry that this one takes back"),
-        sa.Column("part_of", sa.BigInteger(), comment="Entry of the step that this one is a part of: a split, a merge or a delete"),
+        sa.Column(
+            "part_of", sa.BigInteger(), comment="Entry of the step that this one is a part of: a split, a merge or a delete"
+        ),
         sa.Column("kept", JSONB(), comment="What had been measured of a finding before its outline changed"),
     ):
         op.add_column("entry", column, schema="tunnel_audit")

@@ -156,6 +156,45 @@ BEGIN
 END
 $$;
 
+-- What is drawn, redrawn and deleted in a layer of leaks or of what is dark but dry is a finding: TG_ARGV is the place, see
+-- draw_finding, and the kind of one that says none. Runs before the review of the same update.
+CREATE OR REPLACE FUNCTION tunnel_api.draw_anomaly() RETURNS trigger
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+DECLARE
+    view CONSTANT text := 'finding_' || TG_ARGV[0];
+    done bigint;
+BEGIN
+    IF TG_OP = 'INSERT' THEN
+        EXECUTE format('INSERT INTO tunnel_api.%I (survey_id, survey, kind, review, remark, geom)'
+                       ' VALUES ($1, $2, $3, $4, $5, $6) RETURNING id', view)
+           INTO NEW.id USING NEW.survey_id, NEW.survey, coalesce(NEW.kind, TG_ARGV[1]), NEW.review, NEW.remark, NEW.geom;
+        RETURN NEW;
+    ELSIF TG_OP = 'DELETE' THEN
+        EXECUTE format('DELETE FROM tunnel_api.%I WHERE id = $1', view) USING OLD.id;
+        GET DIAGNOSTICS done = ROW_COUNT;
+        RETURN CASE done WHEN 0 THEN NULL ELSE OLD END;
+    ELSIF ST_AsEWKB(NEW.geom) IS DISTINCT FROM ST_AsEWKB(OLD.geom) THEN
+        EXECUTE format('UPDATE tunnel_api.%I SET geom = $1 WHERE id = $2', view) USING NEW.geom, OLD.id;
+    END IF;
+    RETURN NEW;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.draw_anomaly() IS
+    'Trigger of the views of leaks and anomalies with one geometry: draws, redraws and deletes by the view of findings';
+
+DO $$
+DECLARE
+    place text;
+BEGIN
+    FOREACH place IN ARRAY ARRAY['unrolled', 'map', '3d'] LOOP
+        EXECUTE format('CREATE OR REPLACE TRIGGER draw INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.%I FOR EACH ROW'
+                       ' EXECUTE FUNCTION tunnel_api.draw_anomaly(%L, ''leak'')', 'leak_' || place, place);
+        EXECUTE format('CREATE OR REPLACE TRIGGER draw INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.%I FOR EACH ROW'
+                       ' EXECUTE FUNCTION tunnel_api.draw_anomaly(%L, ''dark'')', 'anomaly_' || place, place);
+    END LOOP;
+END
+$$;
+
 -- What the audit has of a region.
 CREATE OR REPLACE FUNCTION tunnel_api.region_state(region tunnel.region) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$

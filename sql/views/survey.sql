@@ -7,13 +7,14 @@
 -- table metadata" in its connection) to find type, SRID and Z.
 
 CREATE OR REPLACE VIEW tunnel_api.tunnel AS
-SELECT t.id, t.name, t.srid, t.start_chainage, t.spacing, t.design, t.created_at,
+SELECT t.id, t.name, t.srid, t.start_chainage, t.spacing, t.dry_region_limit, t.design, t.created_at,
        t.alignment IS NULL AS site, t.alignment::public.geometry AS geom
   FROM tunnel.tunnel t;
 COMMENT ON VIEW tunnel_api.tunnel IS 'Tunnels, with the axis as it was given';
 COMMENT ON COLUMN tunnel_api.tunnel.srid IS 'Coordinate reference system of all the tunnel''s geometry on the map; 0: local coordinates, metres of no place on Earth';
 COMMENT ON COLUMN tunnel_api.tunnel.start_chainage IS 'Chainage of the first vertex of the given axis, m';
 COMMENT ON COLUMN tunnel_api.tunnel.spacing IS 'Distance between the vertices of a survey''s axis, m';
+COMMENT ON COLUMN tunnel_api.tunnel.dry_region_limit IS 'Area above which a dry region must say why it is drawn, and waits for an operator, m²';
 COMMENT ON COLUMN tunnel_api.tunnel.design IS 'What the axis was read from or found in: file and alignment, file and layer, or scan; NULL of a table';
 COMMENT ON COLUMN tunnel_api.tunnel.geom IS 'Axis as given, in the tunnel''s SRID; NULL of a site';
 COMMENT ON COLUMN tunnel_api.tunnel.site IS 'Whether it is a site, which has no axis, and so no chainage, sections or unrolled lining';

@@ -23,7 +23,8 @@ EDITABLE = {
         for part in ("_unrolled", "_map", "_3d")
     },
     "finding_photo": {"path", "caption", "INSERT", "DELETE"},
-    **{base + part: KEEP for base in ("anomaly", "leak") for part in ("", "_unrolled", "_map", "_3d")},
+    **{base + part: KEEP for base in ("anomaly", "leak") for part in ("", "_3d")},
+    **{base + part: KEEP | {"geom", "INSERT", "DELETE"} for base in ("anomaly", "leak") for part in ("_unrolled", "_map")},
     **{"spot" + part: {"review", "remark"} for part in ("", "_face", "_map", "_3d", "_sheet")},
 }
 """What inspectors and operators may change of the views, and nobody else of any: columns, new rows, rows deleted."""

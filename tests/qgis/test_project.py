@@ -51,6 +51,12 @@ UNROLLED = {
 }  # fmt: skip
 NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet"}
 """Layers of the unrolled plane that its theme does not show."""
+FINDINGS = {
+    f"finding_{name}_{place}": kind + z
+    for place, z in (("map", ""), ("unrolled", ""), ("3d", "Z"))
+    for name, kind in (("point", "Point"), ("line", "LineString"), ("area", "Polygon"))
+}
+LISTS = {"finding_photo", "finding_kind", "severity"}
 STYLED = {*ON_MAP, *UNROLLED} - {"leak_sheet"}
 
 
@@ -113,7 +119,7 @@ def qgs(path: Path) -> str:
 def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str, Any]) -> None:
     layers = seen["layers"]
     assert {name for name, layer in layers.items() if not layer["valid"]} == set()
-    assert set(layers) == {*ON_MAP, *UNROLLED, "remark", *(f"demo-2024-km012-{kind}" for kind in IMAGES)}
+    assert set(layers) == {*ON_MAP, *UNROLLED, *FINDINGS, *LISTS, "remark", *(f"demo-2024-km012-{kind}" for kind in IMAGES)}
     assert seen["crs"] == "EPSG:25830"
     for name, kind in (ON_MAP | UNROLLED).items():
         layer = layers[name]
@@ -126,6 +132,13 @@ def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str
         assert (layer["wkb"], layer["features"]) == (kind, count), name
         assert layer["crs"] == ("EPSG:25830" if name in ON_MAP else ""), name
         assert layer["error"] == "", name
+    for name, kind in FINDINGS.items():
+        (count,) = rows.execute(  # type: ignore[misc]
+            "SELECT count(*) FROM tunnel_api.lining_finding WHERE GeometryType(unrolled) = upper(%s) AND (%s OR NOT wet)",
+            [kind.removesuffix("Z"), not name.endswith("3d")],
+        ).fetchone()
+        assert (layers[name]["wkb"], layers[name]["features"], layers[name]["error"]) == (kind, count, ""), name
+        assert layers[name]["crs"] == ("" if name.endswith("unrolled") else "EPSG:25830"), name
     (remarks,) = rows.execute("SELECT count(*) FROM tunnel_api.remark WHERE survey = 'demo-2024'").fetchone()  # type: ignore[misc]
     assert layers["remark"]["counted"] == remarks, "what stands beside its name is no estimate"
     for kind in IMAGES:
@@ -168,15 +181,25 @@ def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
 
 
 def test_themes_and_views(seen: dict[str, Any]) -> None:
-    assert set(seen["themes"]) == {"Map", "Unrolled", "3D", "Inspection sheets"}
+    assert set(seen["themes"]) == {"Map", "Unrolled", "Findings", "Findings on the map", "3D", "Inspection sheets"}
     assert set(seen["themes"]["Inspection sheets"]) == {
         "coverage_gap", "leak_sheet", "demo-2024-km012-corrected", "demo-2024-km012-corrected-filled",
     }  # fmt: skip
     assert set(seen["themes"]["Map"]) == {
         "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster", "outline",
     }  # fmt: skip
-    assert set(seen["themes"]["3D"]) == {"axis", "section", "leak_3d", "target_sphere", "ground"}
+    assert set(seen["themes"]["3D"]) == {
+        *(name for name in FINDINGS if name.endswith("3d")),
+        "axis",
+        "section",
+        "leak_3d",
+        "target_sphere",
+        "ground",
+    }
     images = {"demo-2024-km012-corrected", "demo-2024-km012-corrected-filled"}
+    unrolled = {name for name in FINDINGS if name.endswith("unrolled")}
+    assert set(seen["themes"]["Findings"]) == {*unrolled, "region", "sheet", *images}
+    assert set(seen["themes"]["Findings on the map"]) == {"axis", "outline", *(n for n in FINDINGS if n.endswith("map"))}
     assert set(seen["themes"]["Unrolled"]) == {*UNROLLED, *images} - NOT_AT_FIRST
     assert seen["bookmarks"] == ["Map", "Unrolled", "Unrolled, km 12"]
     # all there is to the map, without the unrolled plane: there a new 3D view begins

@@ -324,7 +324,9 @@ def test_each_step_is_taken_back_to_what_was_before(person: psycopg.Connection) 
         now = everything(person)
         assert now == before, statement
         assert wet(person) == (sums[0], pytest.approx(sums[1]))
-    entries = person.execute("SELECT undoes IS NULL, count(*) FROM tunnel_api.audit WHERE part_of IS NULL GROUP BY 1").fetchall()
+    entries = person.execute(
+        "SELECT undoes IS NULL, count(*) FROM tunnel_api.audit WHERE part_of IS NULL GROUP BY 1"
+    ).fetchall()
     assert dict(entries)[False] == len(steps), "each is in the audit"
 
 
@@ -336,7 +338,9 @@ def test_a_merge_is_taken_back_whole(person: psycopg.Connection) -> None:
         person.execute("SELECT tunnel_api.finding_merge(%s)", [ids])
         states.append(everything(person))
     assert row(person, third, "merged_into") == (first,)
-    with pytest.raises(psycopg.Error, match=f"finding {second} is not taken back: it was merged into finding {first}: take that back"):
+    with pytest.raises(
+        psycopg.Error, match=f"finding {second} is not taken back: it was merged into finding {first}: take that back"
+    ):
         undo(person, second)
     assert (undo(person, first), everything(person)) == ("merged", states[1])
     assert (undo(person, second), everything(person)) == ("merged", states[0])
