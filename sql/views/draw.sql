@@ -96,6 +96,24 @@ $$;
 COMMENT ON FUNCTION tunnel_api.mark_dry(int, geometry) IS
 'Marks the detected leaks of a survey about a place (unrolled plane) that lie in a dry region by half, and takes the mark from the others: called after each change of a region, and by detection.';
 
+-- Each change of findings adds rows to their sums; there need be no more of them than sums. Who does the same meanwhile has the
+-- rows that he has.
+CREATE OR REPLACE FUNCTION tunnel_api.pack_sums(survey_id int) RETURNS void
+LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
+    WITH apart AS (
+        DELETE FROM tunnel.finding_sum f
+         WHERE f.id IN (SELECT o.id FROM tunnel.finding_sum o WHERE o.survey_id = $1 FOR UPDATE SKIP LOCKED)
+        RETURNING f.*
+    )
+    INSERT INTO tunnel.finding_sum (survey_id, kind, wet, origin, severity, state, measured, findings, area, length, extent)
+    SELECT a.survey_id, a.kind, a.wet, a.origin, a.severity, a.state, a.measured, sum(a.findings), sum(a.area), sum(a.length), sum(a.extent)
+      FROM apart a
+     GROUP BY 1, 2, 3, 4, 5, 6, 7
+    HAVING sum(a.findings) <> 0 OR abs(sum(a.area)) + abs(sum(a.length)) + abs(sum(a.extent)) > 1e-9
+$$;
+COMMENT ON FUNCTION tunnel_api.pack_sums(int) IS
+    'Puts the rows together that changes of findings have added to their sums (tunnel.finding_sum); called by detection and imports';
+
 -- Refuses a kind that there is not, is not offered any more, or is not drawn so.
 CREATE OR REPLACE FUNCTION tunnel_api.check_kind(kind text, drawn geometry) RETURNS void
 LANGUAGE plpgsql STABLE PARALLEL SAFE CALLED ON NULL INPUT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
