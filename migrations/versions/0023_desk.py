@@ -86,7 +86,23 @@ def upgrade() -> None:
             op.f(f"entry_{name}_idx"), "entry", [name], schema="tunnel_audit",
             postgresql_where=sa.text(f"{name} IS NOT NULL"),
         )  # fmt: skip
+    _indexes()
     _sums()
+
+
+def _indexes() -> None:
+    """What does not count is read from the index alone, and what stands for another is found among its like."""
+    op.drop_index("anomaly_uncounted_idx", "anomaly", schema="tunnel")
+    op.create_index(
+        "anomaly_uncounted_idx", "anomaly", ["survey_id"], schema="tunnel",
+        postgresql_where=sa.text("NOT (detected AND review <> 'rejected' AND NOT aside)"),
+        postgresql_include=["id", "kind", "judged", "severity", "review", "detected", "aside", "merged_into", "same_as", "dry_region_id"],
+    )  # fmt: skip
+    op.drop_index("anomaly_same_as_idx", "anomaly", schema="tunnel")
+    op.create_index(
+        op.f("anomaly_same_as_idx"), "anomaly", ["same_as"], schema="tunnel",
+        postgresql_where=sa.text("same_as IS NOT NULL"),
+    )  # fmt: skip
 
 
 def _sums() -> None:

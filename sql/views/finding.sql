@@ -32,8 +32,10 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.image_share IS NOT NULL AS measured, a.drop_mean, a.drop_max, a.image_share, a.contrast, a.confidence, a.reasons,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.drawn_by, a.drawn_at,
        a.detected, a.created_at, CASE WHEN NOT a.by_hand THEN a.detected_at END AS detected_at,
-       EXISTS (SELECT FROM tunnel.anomaly x WHERE x.same_as = a.id AND NOT x.by_hand AND x.detected) AS also_detected,
-       (SELECT array_agg(x.id ORDER BY x.id) FROM tunnel.anomaly x WHERE x.same_as = a.id AND NOT x.by_hand AND x.detected) AS detected_as,
+       EXISTS (SELECT FROM tunnel.anomaly x
+                WHERE x.same_as = a.id AND x.same_as IS NOT NULL AND NOT x.by_hand AND x.detected) AS also_detected,
+       (SELECT array_agg(x.id ORDER BY x.id) FROM tunnel.anomaly x
+         WHERE x.same_as = a.id AND NOT x.by_hand AND x.detected) AS detected_as,
        a.parent_id, a.merged_into, (SELECT array_agg(x.id ORDER BY x.id) FROM tunnel.anomaly x WHERE x.merged_into = a.id) AS merged,
        a.same_as, a.dry_region_id,
        a.detected AND a.review <> 'rejected' AND NOT a.aside AS counted,

@@ -150,7 +150,9 @@ def _reload(conn: psycopg.Connection[Any], survey: Survey, former: Sequence[Reco
                 result.emptied.append(km)
                 so_far = result.lost
                 result.lost = Work(
-                    so_far.anomalies + lost.anomalies, so_far.reviewed + lost.reviewed, so_far.edited + lost.edited,
+                    so_far.anomalies + lost.anomalies,
+                    so_far.reviewed + lost.reviewed,
+                    so_far.edited + lost.edited,
                     so_far.drawn + lost.drawn,
                 )
 
