@@ -27,7 +27,7 @@ from typing import Any
 
 import psycopg
 from PIL import Image, ImageDraw
-from psycopg.conninfo import make_conninfo
+from psycopg.conninfo import conninfo_to_dict
 
 from benchmarks.common import print_table, progress, save, tunneldb
 from tunneldb.database import connect, resolve_dsn
@@ -100,7 +100,7 @@ def day(folder: Path, pictures: Path) -> list[dict[str, Any]]:
     with screen() as display:
         environment = {
             "PATH": "/usr/bin:/bin", "HOME": str(folder / "profile"), "DISPLAY": display, "LC_ALL": "C.UTF-8",
-            "DESK_FOLDER": str(folder), "DESK_PICTURES": str(pictures),
+            "DESK_FOLDER": str(folder), "DESK_PICTURES": str(pictures), "PGSERVICEFILE": str(folder / "pg_service.conf"),
         }  # fmt: skip
         command = ["qgis", "--nologo", "--noversioncheck", "--noplugins", "--profiles-path", folder / "profile"]
         ran = subprocess.run(
@@ -161,8 +161,13 @@ def run(folder: Path, pictures: Path) -> int:
     prepare(folder)
     photographs(folder)
     dsn = resolve_dsn(None)
-    tunneldb("--dsn", make_conninfo(dsn, user=INSPECTOR), "qgis", SURVEY, "-o", folder / "desk.qgz")
+    theirs = conninfo_to_dict(dsn) | {"user": INSPECTOR}
+    lines = (f"{key}={value}" for key, value in theirs.items())
+    (folder / "pg_service.conf").write_text("\n".join(["[desk]", *lines, ""]))
+    tunneldb("qgis", SURVEY, "-o", folder / "desk.qgz", "--service", "desk")
     with connect(dsn) as conn:
+        conn.execute("DELETE FROM tunnel.anomaly WHERE origin <> 'detected'")  # of a day before
+        conn.commit()
         (before,) = conn.execute("SELECT coalesce(max(id), 0) FROM tunnel_api.audit").fetchone()  # type: ignore[misc]
         conn.rollback()
         progress("the day in QGIS Desktop")

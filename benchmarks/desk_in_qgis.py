@@ -6,6 +6,7 @@ is written to ``day.json``. A step is a generator: at each ``yield`` QGIS goes o
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import os
 import traceback
@@ -33,6 +34,7 @@ from qgis.PyQt.QtWidgets import (
 )
 from qgis.utils import iface
 
+faulthandler.enable()
 POLL, SETTLED = 60, 3  # milliseconds between looks, and looks without drawing until QGIS has settled
 WINDOW = (1500, 950)
 FOLDER, PICTURES = Path(os.environ["DESK_FOLDER"]), Path(os.environ["DESK_PICTURES"])
@@ -70,13 +72,13 @@ def day() -> Iterator[None]:
         press(iface.actionAddFeature())
         yield
         for _, label, code, severity, corners in (row for row in DRAWN if row[0] == shape):
-            draw(corners, {"kind": label, "severity": severity, "width": "0.0020" if code == "crack" else "", "remark": "seen"})
+            yield from draw(corners, {"kind": label, "severity": severity, "width": "0.0020" if code == "crack" else "", "remark": "seen"})
             note("drawn", kind=code)
-            if code == "spall" and not (PICTURES / "desk-form.png").exists():
-                yield
         press(iface.actionSaveActiveLayerEdits())
         press(iface.actionToggleEditing())
         yield
+    iface.messageBar().clearWidgets()
+    yield
     grab("desk-findings.png")
     areas, lines = layers["area"], layers["line"]
 
@@ -100,7 +102,7 @@ def day() -> Iterator[None]:
     for step in ("split", "undone", "split"):
         choose(areas, {"split": "Split", "undone": "Undo"}[step])
         yield
-        click((12354.9, -1.2))
+        click((12354.3, -1.2))
         yield
         if step == "split":
             click((12354.6, -2.5))
@@ -109,10 +111,11 @@ def day() -> Iterator[None]:
         note(step)
         yield
 
-    # merged: two spalls side by side, one of which is drawn nearer first
+    # merged again
     select_layer(areas)
     press(iface.actionSelectRectangle())
-    drag((12353.8, -1.7), (12355.4, -0.4))
+    click((12354.3, -1.2))
+    click((12354.9, -1.2), modifier=Qt.ShiftModifier)
     yield
     choose(areas, "Merge")
     yield
@@ -126,7 +129,7 @@ def day() -> Iterator[None]:
     areas.removeSelection()
     press(iface.actionToggleEditing())
     press(iface.actionSelectRectangle())
-    drag((12359.8, -1.7), (12361.4, -0.4))
+    click((12360.6, -1.2))
     yield
     press(iface.mainWindow().findChild(QAction, "mActionDeleteSelected"))
     note("deleted")
@@ -214,30 +217,29 @@ def pixel(place: tuple[float, float]) -> QPoint:
     return QPoint(round(at.x()), round(at.y()))
 
 
-def click(place: tuple[float, float], button: Qt.MouseButton = Qt.LeftButton) -> None:
+def click(
+    place: tuple[float, float], button: Qt.MouseButton = Qt.LeftButton, modifier: Qt.KeyboardModifier = Qt.NoModifier
+) -> None:
     """Click on a place of the unrolled plane."""
-    QTest.mouseClick(iface.mapCanvas().viewport(), button, Qt.NoModifier, pixel(place))
+    QTest.mouseClick(iface.mapCanvas().viewport(), button, modifier, pixel(place))
 
 
 def move(place: tuple[float, float]) -> None:
     QTest.mouseMove(iface.mapCanvas().viewport(), pixel(place))
 
 
-def drag(start: tuple[float, float], end: tuple[float, float]) -> None:
-    canvas = iface.mapCanvas().viewport()
-    QTest.mousePress(canvas, Qt.LeftButton, Qt.NoModifier, pixel(start))
-    QTest.mouseMove(canvas, pixel(end))
-    QTest.mouseRelease(canvas, Qt.LeftButton, Qt.NoModifier, pixel(end))
-
-
-def draw(corners: tuple[tuple[float, float], ...], values: dict[str, str]) -> None:
+def draw(corners: tuple[tuple[float, float], ...], values: dict[str, str]) -> Iterator[None]:
     """Draw a finding and fill in the form that asks for it."""
-    when_asked(lambda form: fill(form, values))
-    for corner in corners:
+    for corner in corners[:-1]:
         move(corner)
         click(corner)
+    move(corners[-1])
     if len(corners) > 1:
-        click(corners[-1], Qt.RightButton)  # returns when the form is closed
+        click(corners[-1])
+        move(corners[-1])
+    when_asked(lambda form: fill(form, values))
+    click(corners[-1], Qt.RightButton if len(corners) > 1 else Qt.LeftButton)
+    yield from asked()
 
 
 waiting: list[Callable[[QWidget], None]] = []
@@ -308,21 +310,25 @@ def texts(box: QComboBox) -> list[str]:
 
 def accept(form: QWidget) -> None:
     box = form.findChild(QDialogButtonBox)
-    QTest.mouseClick(box.button(QDialogButtonBox.Ok) or box.button(QDialogButtonBox.Save), Qt.LeftButton)
+    button = box.button(QDialogButtonBox.Ok) or box.button(QDialogButtonBox.Save)
+    assert button.isEnabled(), "the form does not let itself be accepted"
+    QTest.mouseClick(button, Qt.LeftButton)
 
 
 def photograph(form: QWidget) -> None:
     """Add a photo in the form of a finding."""
-    buttons = {button.objectName(): button for button in form.findChildren(QAbstractButton)}
-    toggle = buttons["mToggleEditingButton"]
+    buttons = {button.toolTip(): button for button in form.findChildren(QAbstractButton)}
+    toggle = buttons["Toggle editing mode for child layer"]
     if not toggle.isChecked():
         QTest.mouseClick(toggle, Qt.LeftButton)
     QTimer.singleShot(300, lambda: _photo(40))
-    QTest.mouseClick(buttons["mAddFeatureButton"], Qt.LeftButton)
-    QTest.mouseClick(buttons["mSaveEditsButton"], Qt.LeftButton)
+    QTest.mouseClick(buttons["Add child feature"], Qt.LeftButton)
+    QTest.mouseClick(buttons["Save child layer edits"], Qt.LeftButton)
     QApplication.processEvents()
     QTest.qWait(300)
-    grab("desk-photo.png")
+    form.resize(form.width(), 640)
+    QTest.qWait(300)
+    grab("desk-thumbnail.png")
     accept(form)
 
 
@@ -342,7 +348,10 @@ def _photo(patience: int) -> None:
         line = path if isinstance(path, QLineEdit) else path.findChild(QLineEdit)
         line.setFocus()
         QTest.keyClicks(line, str(FOLDER / "photo-1.jpg"))
+        QTest.keyClick(line, Qt.Key_Tab)
         enter(form, "caption", "drip at the bolt")
+        QApplication.processEvents()
+        grab("desk-photo.png")
         accept(form)
     except Exception as error:
         errors.append(f"{type(error).__name__}: {error}")

@@ -35,6 +35,9 @@ _DECIMALS = {
     "drop_max": 1, "image_share": 2, "contrast": 1, "confidence": 2,
 }  # fmt: skip
 _MOMENTS = ("reviewed_at", "drawn_at", "created_at", "detected_at", "added_at")
+_SAVED = '"label" IS NOT NULL'
+"""What is just being drawn has no photos and no facts yet."""
+
 _REVIEWS = {"Open": "open", "Confirmed": "confirmed", "Rejected": "rejected"}
 _FACTS = (
     "id", "label", "clock", "state", "area", "length", "origin", "drawn_by", "drawn_at", "reviewed_by", "reviewed_at",
@@ -77,7 +80,9 @@ def finding_form(catalogue: Catalogue, geometry: str, layer: str, tables: Mappin
     """
     shape = SHAPES[geometry]
     asked = ("kind", "severity", *(["width"] if shape == "line" else []), "review", "remark")
-    fits = f'"active" AND array_contains("geometries", \'{shape}\') OR "code" = current_value(\'kind\')'
+    # Of what is not offered any more, the kind that a finding has. By current_value the list would be made anew while it is
+    # being chosen from, at which QGIS 3.22 crashes.
+    fits = f'"active" AND array_contains("geometries", \'{shape}\') OR "code" = attribute(@current_feature, \'kind\')'
     widgets: dict[str, tuple[str, dict[str, object]]] = {
         "kind": _listed(tables[KIND_LIST], "code", fits, nothing=False),
         "severity": _listed(tables[SEVERITIES], "id", "", nothing=True),
@@ -87,21 +92,21 @@ def finding_form(catalogue: Catalogue, geometry: str, layer: str, tables: Mappin
         "review": ("ValueMap", {"map": [{word: code} for word, code in _REVIEWS.items()]}),
     }  # fmt: skip
     form = ET.Element("attributeEditorForm")
-    _group(form, "Finding", asked, 1)
-    photos = _container(form, "Photos", 1)
+    first = _tab(form, "Finding", asked, 1)
+    photos = _container(first, "Photos", 1, box=True, condition=_SAVED)
     shown = ET.SubElement(
         photos, "attributeEditorRelation", name=relation_id(layer), relation=relation_id(layer), label="", showLabel="0",
         forceSuppressFormPopup="0", nmRelationId="", relationWidgetTypeId="relation_editor",
     )  # fmt: skip
     offered = {"buttons": "SaveChildEdits|AddChild|DeleteChild|ToggleEditing", "show_first_feature": True}
     shown.append(_renamed(options(offered), "editor_configuration"))
-    _group(form, "Facts, worked out by the database", _FACTS, 2)
+    _tab(form, "Facts, worked out by the database", _FACTS, 2, _SAVED)
     kinds = catalogue.drawn_as(shape)
     begins = {"survey": survey, "review": "confirmed"} | ({"kind": kinds[0].code} if kinds else {})
     return [
         *_fields(_ALIASES, widgets, (*asked, "survey")),
         defaults(begins),
-        _required("kind"),
+        _constraints(required="kind"),
         _text("editorlayout", "tablayout"),
         form,
         _text("previewExpression", "\"id\" || ' ' || coalesce(\"kind_label\", '') || ' ' || \"label\""),
@@ -119,14 +124,14 @@ def photo_form() -> list[ET.Element]:
     viewer = {
         "DocumentViewer": 1, "DocumentViewerHeight": 150, "DocumentViewerWidth": 220, "FileWidget": True,
         "FileWidgetButton": True, "FileWidgetFilter": "Photos (*.jpg *.jpeg *.png *.webp *.tif *.tiff)", "FullUrl": False,
-        "RelativeStorage": 0, "StorageMode": 0, "UseLink": True,
+        "RelativeStorage": 0, "StorageMode": 0, "UseLink": False,
     }  # fmt: skip
     form = ET.Element("attributeEditorForm")
-    _group(form, "Photo", ("path", "caption", "added_by", "added_at"), 1)
+    _tab(form, "Photo", ("path", "caption", "added_by", "added_at"), 1)
     widgets: dict[str, tuple[str, dict[str, object]]] = {"path": ("ExternalResource", viewer)}
     return [
         *_fields(_PHOTO_ALIASES, widgets, ("path", "caption", "finding_id")),
-        _required("path"),
+        _constraints(required="path"),
         _text("editorlayout", "tablayout"),
         form,
         _text("previewExpression", 'coalesce("caption", file_name("path"))'),
@@ -152,11 +157,14 @@ def demanded(column: str, expression: str, why: str) -> list[ET.Element]:
     return [constraints, said]
 
 
-def _required(column: str) -> ET.Element:
+def _constraints(required: str) -> ET.Element:
+    """A column must be filled in; the key, which the database gives, need not be."""
     constraints = ET.Element("constraints")
-    ET.SubElement(
-        constraints, "constraint", field=column, constraints="1", notnull_strength="1", unique_strength="0", exp_strength="0"
-    )
+    for column, kinds, hard, unique in ((required, "1", "1", "0"), ("id", "3", "2", "2")):
+        ET.SubElement(
+            constraints, "constraint", field=column, constraints=kinds, notnull_strength=hard, unique_strength=unique,
+            exp_strength="0",
+        )  # fmt: skip
     return constraints
 
 
@@ -192,18 +200,20 @@ def _plain(column: str) -> tuple[str, dict[str, object]]:
     return "TextEdit", {"IsMultiline": False, "UseHtml": False}
 
 
-def _container(form: ET.Element, name: str, columns: int) -> ET.Element:
+def _container(form: ET.Element, name: str, columns: int, condition: str = "", *, box: bool = False) -> ET.Element:
+    """A tab, or a box in one; shown where a condition holds."""
     return ET.SubElement(
-        form, "attributeEditorContainer", name=name, columnCount=str(columns), groupBox="1", showLabel="1",
-        visibilityExpressionEnabled="0", visibilityExpression="",
+        form, "attributeEditorContainer", name=name, columnCount=str(columns), groupBox=str(int(box)), showLabel="1",
+        visibilityExpressionEnabled=str(int(bool(condition))), visibilityExpression=condition,
     )  # fmt: skip
 
 
-def _group(form: ET.Element, name: str, columns: tuple[str, ...], wide: int) -> None:
-    box = _container(form, name, wide)
+def _tab(form: ET.Element, name: str, columns: tuple[str, ...], wide: int, condition: str = "") -> ET.Element:
+    tab = _container(form, name, wide, condition)
     names = list(_ALIASES if set(columns) <= set(_ALIASES) else _PHOTO_ALIASES)
     for column in columns:
-        ET.SubElement(box, "attributeEditorField", name=column, index=str(names.index(column)), showLabel="1")
+        ET.SubElement(tab, "attributeEditorField", name=column, index=str(names.index(column)), showLabel="1")
+    return tab
 
 
 def _text(tag: str, value: str) -> ET.Element:

@@ -79,10 +79,10 @@ def _labeling(geometry: str) -> ET.Element:
     )  # fmt: skip
     ET.SubElement(style, "background", shapeDraw="0")
     ET.SubElement(style, "shadow", shadowDraw="0")
-    placement = {"Polygon": "8", "Line": "2", "Point": "6"}[geometry]  # outside; along; by preference
+    placement = {"Polygon": "8", "Line": "2", "Point": "1"}[geometry]  # outside; along; beside
     ET.SubElement(
         settings, "placement", placement=placement, dist="1.2", distUnits="MM", polygonPlacementFlags="3", placementFlags="10",
-        predefinedPositionOrder="R,TR,BR,L,TL,BL", priority="8",
+        quadOffset="5", xOffset="2.6", yOffset="0", offsetUnits="MM", priority="8",
     )  # fmt: skip
     ET.SubElement(
         settings, "rendering", scaleVisibility="1", scaleMin="0", scaleMax="4000", obstacle="1", obstacleFactor="1",

@@ -364,6 +364,9 @@ def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
         "layer-tree-group", name=name, expanded=str(int(name in ("", MAP, UNROLLED, STRUCTURES, UNDERWATER))),
         checked="Qt::Checked" if checked else "Qt::Unchecked",
     )  # fmt: skip
+    for title, part in group.groups.items():
+        if title == FINDINGS:
+            element.append(_group_element(part, title, False))
     for entry in group.entries:
         leaf = ET.SubElement(
             element, "layer-tree-layer", id=entry.id, name=entry.title, expanded="0",
@@ -373,7 +376,8 @@ def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
             shown = ET.SubElement(ET.SubElement(leaf, "customproperties"), "Option", type="Map")
             ET.SubElement(shown, "Option", type="int", name="showFeatureCount", value="1")
     for title, part in group.groups.items():
-        element.append(_group_element(part, title, title in (MAP, STRUCTURES, UNDERWATER)))
+        if title != FINDINGS:
+            element.append(_group_element(part, title, title in (MAP, STRUCTURES, UNDERWATER)))
     return element
 
 
@@ -387,6 +391,13 @@ def _themes(entries: Sequence[_Entry], *, site: bool) -> ET.Element:
         shown = [entry for entry in entries if theme in entry.themes]
         for entry in shown:
             ET.SubElement(preset, "layer", id=entry.id, visible="1", style="default", expanded="1")
+            rules = list(entry.element.iterfind("renderer-v2//rule"))
+            if any(rule.get("checkstate") == "0" for rule in rules):
+                ticked = [rule for rule in rules if rule.get("checkstate") != "0"]
+                for tag, nodes in (("checked", ticked), ("expanded", [rule for rule in rules if len(rule)])):
+                    listed = ET.SubElement(preset, f"{tag}-legend-nodes", id=entry.id)
+                    for rule in nodes:
+                        ET.SubElement(listed, f"{tag}-legend-node", id=rule.get("key", ""))
         for tag in ("checked-group-nodes", "expanded-group-nodes"):
             nodes = ET.SubElement(preset, tag)
             for path in sorted({"/".join(e.group[: d + 1]) for e in shown for d in range(len(e.group))}):
