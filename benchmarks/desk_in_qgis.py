@@ -72,7 +72,9 @@ def day() -> Iterator[None]:
         press(iface.actionAddFeature())
         yield
         for _, label, code, severity, corners in (row for row in DRAWN if row[0] == shape):
-            yield from draw(corners, {"kind": label, "severity": severity, "width": "0.0020" if code == "crack" else "", "remark": "seen"})
+            yield from draw(
+                corners, {"kind": label, "severity": severity, "width": "0.0020" if code == "crack" else "", "remark": "seen"}
+            )
             note("drawn", kind=code)
         press(iface.actionSaveActiveLayerEdits())
         press(iface.actionToggleEditing())

@@ -297,8 +297,8 @@ def test_a_dump_restored_is_a_working_database(example: str, dsn: str, empty_dsn
     subprocess.run([folder["pg_restore"], "--exit-on-error", "--dbname", empty_dsn, str(archive)], check=True)
     with connect(empty_dsn) as restored, connect(dsn) as original:
         for view in (
-            "leak", "leak_map", "segment", "section", "axis", "stage_status", "survey", "point", "lining_finding", "finding_count",
-            "finding_photo", "dry_region", "audit", "km_waterproof", "snti_condition",
+            "leak", "leak_map", "segment", "section", "axis", "stage_status", "survey", "point", "lining_finding",
+            "finding_count", "finding_photo", "dry_region", "audit", "km_waterproof", "snti_condition",
         ):  # fmt: skip
             query = sql.SQL("SELECT * FROM tunnel_api.{} ORDER BY id").format(sql.Identifier(view))
             rows = restored.execute(query).fetchall()

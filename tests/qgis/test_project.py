@@ -376,6 +376,26 @@ def test_a_table_that_is_too_long_says_how_many_leaks_it_lacks(conn: psycopg.Con
     assert "leaks 600, " in pages[1]
 
 
+def test_findings_are_drawn_with_what_the_form_begins_with(conn: psycopg.Connection, project: Path) -> None:
+    conn.execute("UPDATE tunnel_api.finding_kind SET active = false WHERE code = 'spall'")
+    conn.commit()
+    done = act(project, "draw_findings")
+    assert all(one["saved"] for one in done.values()), done
+    rows = conn.execute(
+        "SELECT kind, origin, review, survey, GeometryType(unrolled) FROM tunnel_api.lining_finding WHERE by_hand ORDER BY id"
+    ).fetchall()
+    assert rows == [
+        ("leak", "drawn", "confirmed", "demo-2024", "POLYGON"), ("crack", "drawn", "confirmed", "demo-2024", "LINESTRING"),
+        ("drip", "drawn", "confirmed", "demo-2024", "POINT"), ("leak", "drawn", "confirmed", "demo-2024", "POLYGON"),
+    ]  # fmt: skip
+    for name, shape in (("area", "polygon"), ("line", "line"), ("point", "point")):
+        offered = conn.execute(
+            "SELECT array_agg(code ORDER BY code) FROM tunnel_api.finding_kind WHERE active AND %s = ANY (geometries)", [shape]
+        ).fetchone()
+        assert (done[f"finding_{name}_unrolled"]["kinds"],) == offered
+        assert done[f"finding_{name}_unrolled"]["photos"] == ["Photos (table)"]
+
+
 def test_3d_view_looks_at_the_largest_leak(shared: Path) -> None:
     seen = act(shared, "space")
     assert (seen["name"], seen["crs"]) == ("3D", "EPSG:25830")
