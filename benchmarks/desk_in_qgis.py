@@ -348,7 +348,7 @@ def _photo(patience: int) -> None:
     try:
         path = next(w for w in form.findChildren(QWidget, "path"))
         line = path if isinstance(path, QLineEdit) else path.findChild(QLineEdit)
-        line.setFocus()
+        QTest.mouseClick(line, Qt.LeftButton)  # takes the NULL away that stands there
         QTest.keyClicks(line, str(FOLDER / "photo-1.jpg"))
         QTest.keyClick(line, Qt.Key_Tab)
         enter(form, "caption", "drip at the bolt")

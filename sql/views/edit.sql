@@ -196,12 +196,14 @@ END
 $$;
 
 -- What the audit has of a region.
-CREATE OR REPLACE FUNCTION tunnel_api.region_state(region tunnel.region) RETURNS jsonb
-LANGUAGE sql STABLE PARALLEL SAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
-    SELECT jsonb_strip_nulls(jsonb_build_object('kind', $1.kind, 'reason', $1.reason, 'waits', nullif($1.waits, false),
-        'approved_by', $1.approved_by, 'geom', ST_AsEWKT($1.geom)))
+CREATE OR REPLACE FUNCTION tunnel_api.region_state(id int) RETURNS jsonb
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+    SELECT jsonb_strip_nulls(jsonb_build_object('kind', r.kind, 'reason', r.reason, 'waits', nullif(r.waits, false),
+        'approved_by', r.approved_by, 'geom', ST_AsEWKT(r.geom)))
+      FROM tunnel.region r WHERE r.id = $1
 $$;
-COMMENT ON FUNCTION tunnel_api.region_state(tunnel.region) IS 'What the audit has of a region: kind, reason, outline as EWKT, whether it waits and who put it in force';
+COMMENT ON FUNCTION tunnel_api.region_state(int) IS
+    'What the audit has of a region: kind, reason, outline as EWKT, whether it waits and who put it in force';
 
 -- Adds, changes or deletes a region drawn by hand in the unrolled plane (m). A new one names its survey by survey_id or,
 -- without that, by name.
@@ -209,16 +211,18 @@ CREATE OR REPLACE FUNCTION tunnel_api.edit_region() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
 DECLARE
     was tunnel.region;
-    is_now tunnel.region;
+    before jsonb;
     its tunnel.survey;
     most float8;
 BEGIN
     IF TG_OP = 'DELETE' THEN
+        PERFORM FROM tunnel.region r WHERE r.id = OLD.id FOR UPDATE;
+        before := tunnel_api.region_state(OLD.id);
         DELETE FROM tunnel.region r WHERE r.id = OLD.id RETURNING r.* INTO was;
         IF NOT FOUND THEN
             RETURN NULL;  -- gone meanwhile
         END IF;
-        PERFORM tunnel_api.note_edit(OLD.survey, 'region', OLD.id, tunnel_api.region_state(was), NULL);
+        PERFORM tunnel_api.note_edit(OLD.survey, 'region', OLD.id, before, NULL);
         PERFORM tunnel_api.mark_dry(was.survey_id, was.geom);
         RETURN OLD;
     END IF;
@@ -239,6 +243,7 @@ BEGIN
         IF NOT FOUND THEN
             RETURN NULL;
         END IF;
+        before := tunnel_api.region_state(was.id);
         NEW.kind := CASE WHEN NEW.kind = OLD.kind THEN was.kind ELSE NEW.kind END;
         NEW.geom := CASE WHEN NEW.geom = OLD.geom THEN was.geom ELSE NEW.geom END;
         NEW.reason := CASE WHEN NEW.reason IS NOT DISTINCT FROM OLD.reason THEN was.reason ELSE NEW.reason END;
@@ -281,16 +286,14 @@ BEGIN
     IF TG_OP = 'INSERT' THEN
         INSERT INTO tunnel.region (survey_id, kind, geom, drawn_by, drawn_at, reason, waits)
         VALUES (NEW.survey_id, NEW.kind, NEW.geom, NEW.drawn_by, NEW.drawn_at, NEW.reason, NEW.waits)
-        RETURNING * INTO is_now;
-        NEW.id := is_now.id;
+        RETURNING id INTO NEW.id;
     ELSE
         UPDATE tunnel.region r
            SET kind = NEW.kind, geom = NEW.geom, drawn_by = NEW.drawn_by, drawn_at = NEW.drawn_at, reason = NEW.reason,
                waits = NEW.waits, approved_by = NEW.approved_by, approved_at = NEW.approved_at
-         WHERE r.id = OLD.id RETURNING r.* INTO is_now;
+         WHERE r.id = OLD.id;
     END IF;
-    PERFORM tunnel_api.note_edit(NEW.survey, 'region', NEW.id, CASE TG_OP WHEN 'UPDATE' THEN tunnel_api.region_state(was) END,
-                                 tunnel_api.region_state(is_now));
+    PERFORM tunnel_api.note_edit(NEW.survey, 'region', NEW.id, before, tunnel_api.region_state(NEW.id));
     PERFORM tunnel_api.mark_dry(NEW.survey_id, ST_Collect(was.geom, NEW.geom));
     RETURN NEW;
 END
@@ -305,7 +308,7 @@ CREATE OR REPLACE FUNCTION tunnel_api.dry_region_approve(region_id int) RETURNS 
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
 DECLARE
     was tunnel.region;
-    is_now tunnel.region;
+    before constant jsonb := tunnel_api.region_state(region_id);
 BEGIN
     SELECT r.* INTO was FROM tunnel.region r WHERE r.id = region_id FOR UPDATE;
     IF was.id IS NULL OR NOT was.waits THEN
@@ -314,9 +317,9 @@ BEGIN
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     UPDATE tunnel.region r SET waits = false, approved_by = session_user, approved_at = clock_timestamp()
-     WHERE r.id = region_id RETURNING r.* INTO is_now;
+     WHERE r.id = region_id;
     PERFORM tunnel_api.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = was.survey_id), 'region', region_id,
-                                 tunnel_api.region_state(was), tunnel_api.region_state(is_now));
+                                 before, tunnel_api.region_state(region_id));
     PERFORM tunnel_api.mark_dry(was.survey_id, was.geom);
     RETURN (SELECT d.leaks FROM tunnel_api.dry_region d WHERE d.id = region_id);
 END
