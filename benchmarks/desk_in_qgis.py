@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from qgis.core import QgsPointXY, QgsProject, QgsRectangle, QgsSettings, QgsVectorLayer
-from qgis.gui import QgsMapCanvas
+from qgis.gui import QgsFileWidget, QgsMapCanvas
 from qgis.PyQt.QtCore import QPoint, Qt, QTimer
 from qgis.PyQt.QtTest import QTest
 from qgis.PyQt.QtWidgets import (
@@ -328,7 +328,8 @@ def photograph(form: QWidget) -> None:
     QTest.mouseClick(buttons["Save child layer edits"], Qt.LeftButton)
     QApplication.processEvents()
     QTest.qWait(300)
-    form.resize(form.width(), 640)
+    form.move(300, 60)
+    form.resize(900, 760)
     QTest.qWait(300)
     grab("desk-thumbnail.png")
     accept(form)
@@ -346,9 +347,8 @@ def _photo(patience: int) -> None:
             errors.append("no form of a photo was shown")
         return
     try:
-        path = next(w for w in form.findChildren(QWidget, "path"))
-        line = path if isinstance(path, QLineEdit) else path.findChild(QLineEdit)
-        QTest.mouseClick(line, Qt.LeftButton)  # takes the NULL away that stands there
+        line = next(w.lineEdit() for w in form.findChildren(QgsFileWidget) if w.isVisible())
+        QTest.mouseClick(line, Qt.LeftButton)
         QTest.keyClicks(line, str(FOLDER / "photo-1.jpg"))
         QTest.keyClick(line, Qt.Key_Tab)
         enter(form, "caption", "drip at the bolt")

@@ -127,11 +127,16 @@ def photo_form() -> list[ET.Element]:
         "RelativeStorage": 0, "StorageMode": 0, "UseLink": False,
     }  # fmt: skip
     form = ET.Element("attributeEditorForm")
-    _tab(form, "Photo", ("path", "caption", "added_by", "added_at"), 1)
+    _tab(form, "Photo", ("caption", "path"), 1)
+    above = ET.Element("labelOnTop")  # there is little room beside the list of a finding's photos
+    for column in ("path", "caption"):
+        ET.SubElement(above, "field", name=column, labelOnTop="1")
     widgets: dict[str, tuple[str, dict[str, object]]] = {"path": ("ExternalResource", viewer)}
     return [
         *_fields(_PHOTO_ALIASES, widgets, ("path", "caption", "finding_id")),
-        _constraints(required="path"),
+        defaults({"path": ""}),  # else NULL stands there, and stays before what is typed
+        *demanded("path", "coalesce(\"path\", '') <> ''", "A photo needs a file or a URL."),
+        above,
         _text("editorlayout", "tablayout"),
         form,
         _text("previewExpression", 'coalesce("caption", file_name("path"))'),
