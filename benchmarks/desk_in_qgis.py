@@ -80,6 +80,7 @@ def day() -> Iterator[None]:
         press(iface.actionToggleEditing())
         yield
     iface.messageBar().clearWidgets()
+    press(iface.mainWindow().findChild(QAction, "mActionDraw"))
     yield
     grab("desk-findings.png")
     areas, lines = layers["area"], layers["line"]

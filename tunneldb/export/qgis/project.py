@@ -394,9 +394,9 @@ def _themes(entries: Sequence[_Entry], *, site: bool) -> ET.Element:
             rules = list(entry.element.iterfind("renderer-v2//rule"))
             if any(rule.get("checkstate") == "0" for rule in rules):
                 ticked = [rule for rule in rules if rule.get("checkstate") != "0"]
-                for tag, nodes in (("checked", ticked), ("expanded", [rule for rule in rules if len(rule)])):
+                for tag, listing in (("checked", ticked), ("expanded", [rule for rule in rules if len(rule)])):
                     listed = ET.SubElement(preset, f"{tag}-legend-nodes", id=entry.id)
-                    for rule in nodes:
+                    for rule in listing:
                         ET.SubElement(listed, f"{tag}-legend-node", id=rule.get("key", ""))
         for tag in ("checked-group-nodes", "expanded-group-nodes"):
             nodes = ET.SubElement(preset, tag)
