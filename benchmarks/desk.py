@@ -92,17 +92,18 @@ def screen() -> Iterator[str]:
         server.wait()
 
 
-def day(folder: Path, pictures: Path) -> list[dict[str, Any]]:
-    """Have the inspector's day done in QGIS Desktop; what was done, step by step."""
-    done = folder / "day.json"
+def in_qgis(step: str, folder: Path, pictures: Path) -> list[dict[str, Any]]:
+    """Have the inspector's day done in QGIS Desktop, or look at it after that; what was done, step by step."""
+    done = folder / f"{step}.json"
     done.unlink(missing_ok=True)
     (folder / "profile").mkdir(exist_ok=True)
     with screen() as display:
         environment = {
             "PATH": "/usr/bin:/bin", "HOME": str(folder / "profile"), "DISPLAY": display, "LC_ALL": "C.UTF-8",
-            "DESK_FOLDER": str(folder), "DESK_PICTURES": str(pictures), "PGSERVICEFILE": str(folder / "pg_service.conf"),
+            "DESK_STEP": step, "DESK_FOLDER": str(folder),
+            "DESK_PICTURES": str(pictures), "PGSERVICEFILE": str(folder / "pg_service.conf"),
         }  # fmt: skip
-        command = ["qgis", "--nologo", "--noversioncheck", "--noplugins", "--profiles-path", folder / "profile"]
+        command = ["qgis", "--nologo", "--noversioncheck", "--noplugins", "--profiles-path", str(folder / "profile")]
         ran = subprocess.run(
             [*command, "--project", folder / "desk.qgz", "--code", SCRIPT], env=environment, capture_output=True, text=True,
             timeout=300, check=False,
@@ -172,7 +173,7 @@ def run(folder: Path, pictures: Path) -> int:
         conn.rollback()
         progress("the day in QGIS Desktop")
         start = time.perf_counter()
-        steps = day(folder, pictures)
+        steps = in_qgis("day", folder, pictures)
         took = time.perf_counter() - start
         wrong = wrong_after_the_day(conn, before, steps)
         former = conn.execute(STATE, [SURVEY]).fetchall()
@@ -183,6 +184,7 @@ def run(folder: Path, pictures: Path) -> int:
         progress("all stages again")
         tunneldb("run", SURVEY, "--from", "axis")
         wrong += wrong_after_the_rerun(conn, former, counted)
+        in_qgis("look", folder, pictures)
     print_table("Done", ("step", "times"), sorted(Counter(step["step"] for step in steps).items()))
     print(
         f"\nin QGIS {took:.0f} s; {len(former)} findings that people drew before and after the rerun, {counted} leaks counted"
