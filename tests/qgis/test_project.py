@@ -134,7 +134,8 @@ def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str
         assert layer["error"] == "", name
     for name, kind in FINDINGS.items():
         (count,) = rows.execute(  # type: ignore[misc]
-            "SELECT count(*) FROM tunnel_api.lining_finding WHERE GeometryType(unrolled) = upper(%s) AND (%s OR by_hand AND NOT wet)",
+            "SELECT count(*) FROM tunnel_api.lining_finding"
+            " WHERE GeometryType(unrolled) = upper(%s) AND (%s OR by_hand AND NOT wet)",
             [kind.removesuffix("Z"), not name.endswith("3d")],
         ).fetchone()
         assert (layers[name]["wkb"], layers[name]["features"], layers[name]["error"]) == (kind, count, ""), name
