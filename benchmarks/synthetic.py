@@ -44,12 +44,13 @@ PLACE, PLACE_CHAINAGE = (272039.859, 4765020.741, 644.405), 12345.0
 
 @dataclass(frozen=True)
 class Size:
-    """How much there is to be: kilometres from chainage 0 on, leaks, points, joints and dark spots per leak."""
+    """How much there is to be: kilometres from chainage 0 on, leaks, points, joints and dark spots, findings drawn."""
 
     kilometres: int = 25
     leaks: int = 100_000
     points: int = 60_000_000
     dry: int = 7_500
+    drawn: int = 20_000
 
 
 def make(connection: Connection, survey: str, size: Size) -> int:
@@ -230,6 +231,12 @@ SELECT %(leaks)s + k, CASE k %% 3 WHEN 0 THEN 'joint' ELSE 'dark' END, (k + 0.5)
     CASE k %% 3 WHEN 0 THEN 0 ELSE (random() - 0.5) * %(corner)s END, CASE k %% 3 WHEN 0 THEN 0.04 ELSE 0.3 END,
     CASE k %% 3 WHEN 0 THEN 0.9 * %(corner)s ELSE 0.3 END, random(), random(), random(), random()
 FROM generate_series(0, %(dry)s - 1) AS k
+UNION ALL
+SELECT %(leaks)s + %(dry)s + k,
+    ('{crack,spall,delamination,efflorescence,missing_bolt,damaged_joint,drip,leak}'::text[])[1 + k %% 8],
+    (k + 0.5) * 1000 * %(kilometres)s / %(drawn)s, (k * 0.618 %% 1 - 0.5) * 1.6 * %(corner)s, 0.3, 0.2, random(), random(),
+        random(), random()
+FROM generate_series(0, %(drawn)s - 1) AS k
 """
 
 OUTLINES = """
@@ -270,6 +277,7 @@ SELECT %(id)s, floor((o.chainage_from + o.chainage_to) / 2000), o.chainage_from,
     CASE WHEN s.luck > 0.99 THEN now() - s.day * interval '60 days' ELSE '2024-05-06 06:00Z' END, '2024-05-06 06:00Z'
 FROM outline o JOIN spot s USING (number)
 CROSS JOIN LATERAL (SELECT s.fate < 0.45 AS reviewed, '2024-05-07 07:00Z'::timestamptz + s.day * interval '60 days' AS at) r
+WHERE s.number < %(leaks)s + %(dry)s
 ORDER BY o.chainage_from
 """
 
@@ -291,6 +299,65 @@ INSERT INTO tunnel_audit.entry (at, who, survey, view, row_id, action, before, a
 SELECT m.edited_at, 'hansen', %(survey)s, 'axis_vertex', m.id, 'update', jsonb_build_object('geom', ST_AsEWKT(m.before)),
     jsonb_build_object('geom', ST_AsEWKT(m.after))
 FROM moved m
+"""
+
+# What people drew, eight kinds in turn: lines and points have the outline of a spot about them. A drawn leak stands for the
+# next that was detected; one in fifty waits to be measured.
+DRAWN = """
+INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, area, length, width,
+    severity,
+    drop_mean, drop_max, image_share, contrast, unrolled, map, surface, shape, shape_map, shape_surface, review, reviewed_by,
+    reviewed_at, origin, by_hand, drawn_by, drawn_at, created_at)
+SELECT %(id)s, floor((o.chainage_from + o.chainage_to) / 2000), o.chainage_from, o.chainage_to, o.arc_from, o.arc_to,
+    12 - mod((12 - 6 * s.arc / %(radius)s / pi())::numeric, 12)::float8, s.kind,
+    CASE WHEN q.line THEN 0.002 * 2 * s.along WHEN q.point THEN 0 ELSE ST_Area(o.unrolled) END,
+        CASE WHEN q.line THEN 2 * s.along END,
+    CASE s.kind WHEN 'crack' THEN 0.002 END,
+        CASE WHEN s.fate < 0.02 THEN 4 WHEN s.fate < 0.1 THEN 3 WHEN s.fate < 0.5 THEN 2 ELSE 1 END,
+    m.drop, m.drop, m.drop / 3, m.drop, o.unrolled, o.map, o.surface,
+    g.shapes[1], g.shapes[2], g.shapes[3], CASE WHEN s.luck < 0.03 THEN 'open' ELSE 'confirmed' END, q.who, q.at, 'drawn', true,
+    q.who, q.at, q.at
+FROM outline o JOIN spot s USING (number)
+CROSS JOIN LATERAL (SELECT s.kind IN ('crack', 'damaged_joint') AS line, s.kind IN ('missing_bolt', 'drip') AS point,
+    ('{hansen,iversen,olsen}'::text[])[1 + s.number %% 3] AS who,
+        '2024-07-01 06:00Z'::timestamptz + s.day * interval '60 days' AS at) q
+CROSS JOIN LATERAL (SELECT CASE WHEN s.number %% 50 > 0 THEN 2.5 END AS drop) m
+CROSS JOIN LATERAL (SELECT array_agg(CASE WHEN q.line THEN ST_MakeLine(ST_PointN(r.ring, 1), ST_PointN(r.ring, 9))
+                                          WHEN q.point THEN ST_PointN(r.ring, 1) END ORDER BY r.n) AS shapes
+    FROM (SELECT n, ST_ExteriorRing(x) AS ring FROM unnest(ARRAY[o.unrolled, o.map, o.surface]) WITH ORDINALITY AS t (x,
+        n)) r) g
+WHERE s.number >= %(leaks)s + %(dry)s ORDER BY o.chainage_from
+"""
+
+LINKED = """
+UPDATE tunnel.anomaly d SET same_as = q.other
+FROM (SELECT DISTINCT ON (x.id) x.id, h.id AS other
+      FROM tunnel.anomaly h
+      CROSS JOIN LATERAL (SELECT x.id FROM tunnel.anomaly x WHERE x.survey_id = h.survey_id AND x.origin = 'detected'
+                            AND x.kind = 'leak' AND x.judged IS NULL
+                                AND x.chainage_from >= h.chainage_from ORDER BY x.chainage_from LIMIT 1) x
+      WHERE h.survey_id = %(id)s AND h.by_hand AND h.kind = 'leak' ORDER BY x.id, h.id) q
+WHERE d.id = q.id
+"""
+
+DRAWN_AUDIT = """
+INSERT INTO tunnel_audit.entry (at, who, survey, view, row_id, action, before, after)
+SELECT a.drawn_at, a.drawn_by, %(survey)s, 'anomaly', a.id, CASE s.n WHEN 0 THEN 'insert' ELSE 'update' END,
+    CASE s.n WHEN 1 THEN jsonb_build_object('geom', ST_AsEWKT(a.unrolled)) END, jsonb_build_object('geom',
+        ST_AsEWKT(a.unrolled))
+FROM tunnel.anomaly a CROSS JOIN generate_series(0, 1) AS s (n)
+WHERE a.survey_id = %(id)s AND a.by_hand AND (s.n = 0 OR a.id %% 20 = 0) ORDER BY a.drawn_at
+"""
+
+PHOTOS = """
+INSERT INTO tunnel.photo (anomaly_id, path)
+SELECT a.id, 'photos/' || a.id || '.jpg' FROM tunnel.anomaly a WHERE a.survey_id = %(id)s AND a.by_hand AND a.id %% 4 = 0
+"""
+
+DRY_REGIONS = """
+INSERT INTO tunnel_api.region (survey_id, kind, geom)
+SELECT %(id)s, 'dry', ST_MakeEnvelope(km * 1000 + 500, -1, km * 1000 + 504, 1, 0) FROM generate_series(0,
+    %(kilometres)s - 1) AS km
 """
 
 COVERAGE = """
@@ -348,6 +415,16 @@ STEPS = {
     "segments and sections": (SEGMENTS, COUNTED, SECTIONS),
     "leaks": (SPOTS, "ANALYZE spot", OUTLINES, ANOMALIES),
     "audit": (AUDIT, MOVED),
+    "what people drew": (
+        "ANALYZE outline",
+        DRAWN,
+        "ANALYZE tunnel.anomaly",
+        LINKED,
+        DRAWN_AUDIT,
+        PHOTOS,
+        DRY_REGIONS,
+        "SELECT tunnel_api.pack_sums(%(id)s)",
+    ),
     "coverage and radiometry": (COVERAGE, RADIOMETRY, CURVES),
     "ground, clusters, target spheres": (GROUND, CLUSTERS, SPHERES),
 }

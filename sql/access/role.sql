@@ -83,13 +83,16 @@ BEGIN
         tunnel_api.anomaly, tunnel_api.anomaly_unrolled, tunnel_api.anomaly_map, tunnel_api.anomaly_3d,
         tunnel_api.leak, tunnel_api.leak_unrolled, tunnel_api.leak_map, tunnel_api.leak_3d
         TO tunnel_inspector;
+    GRANT INSERT, DELETE, UPDATE (geom) ON
+        tunnel_api.leak_unrolled, tunnel_api.leak_map, tunnel_api.anomaly_unrolled, tunnel_api.anomaly_map TO tunnel_inspector;
     GRANT UPDATE (review, remark) ON tunnel_api.spot, tunnel_api.spot_face, tunnel_api.spot_map, tunnel_api.spot_3d, tunnel_api.spot_sheet
         TO tunnel_inspector;
     GRANT INSERT, DELETE, UPDATE (kind, geom, reason) ON tunnel_api.region TO tunnel_inspector;
     GRANT INSERT, DELETE, UPDATE (kind, severity, width, review, remark, geom) ON
         tunnel_api.finding_unrolled, tunnel_api.finding_map, tunnel_api.finding_3d TO tunnel_inspector;
     GRANT INSERT, DELETE, UPDATE (path, caption) ON tunnel_api.finding_photo TO tunnel_inspector;
-    GRANT EXECUTE ON FUNCTION tunnel_api.finding_split(bigint, geometry), tunnel_api.finding_merge(bigint[]) TO tunnel_inspector;
+    GRANT EXECUTE ON FUNCTION tunnel_api.finding_split(bigint, geometry), tunnel_api.finding_merge(bigint[]),
+        tunnel_api.finding_undo(bigint) TO tunnel_inspector;
 END
 $$;
 

@@ -13,6 +13,18 @@ $$;
 COMMENT ON FUNCTION tunnel_api.finding_state(bigint) IS
     'What the audit has of a finding: what people can change, geometry in the unrolled plane as EWKT';
 
+-- What was measured of a finding, which goes with its outline.
+CREATE OR REPLACE FUNCTION tunnel_api.finding_measured(id bigint) RETURNS jsonb
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+    SELECT jsonb_build_object(
+        'drop_mean', a.drop_mean, 'drop_max', a.drop_max, 'image_share', a.image_share, 'contrast', a.contrast,
+        'confidence', a.confidence, 'reasons', a.reasons, 'evidence', a.evidence, 'features', a.features,
+        'feature_list_id', a.feature_list_id, 'model', a.model, 'detected', a.detected, 'area', a.area, 'clock', a.clock)
+      FROM tunnel.anomaly a WHERE a.id = $1 AND a.image_share IS NOT NULL
+$$;
+COMMENT ON FUNCTION tunnel_api.finding_measured(bigint) IS
+    'What was measured of a finding''s outline, as the audit keeps it when that changes; NULL of one that was not measured';
+
 -- Which wet findings are the same, about a place of the unrolled plane. One that was detected is the same as what a person drew,
 -- redrew, split or merged when these together cover half of it: the person's outline counts, also where he rejects it. One that a
 -- person drew is the same as a detected one that covers half of it and much more: that one counts, unless it is rejected. Lines
@@ -69,12 +81,12 @@ $$;
 COMMENT ON FUNCTION tunnel_api.link_findings(int, geometry) IS
 'Marks which wet findings of a survey about a place (unrolled plane) are the same, so that each counts once: called after each change of an outline, a kind or a review, and by detection.';
 
--- Detected leaks lie in a dry region when half of them does.
+-- Detected leaks lie in a dry region when half of them does. One that waits for an operator has none.
 CREATE OR REPLACE FUNCTION tunnel_api.mark_dry(survey_id int, place geometry) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
     UPDATE tunnel.anomaly a SET dry_region_id = w.region
       FROM (SELECT x.id, (SELECT r.id FROM tunnel.region r
-                           WHERE r.survey_id = x.survey_id AND r.kind = 'dry' AND r.geom && x.unrolled
+                           WHERE r.survey_id = x.survey_id AND r.kind = 'dry' AND NOT r.waits AND r.geom && x.unrolled
                              AND ST_Area(ST_Intersection(r.geom, x.unrolled)) >= 0.5 * ST_Area(x.unrolled)
                            ORDER BY r.id LIMIT 1) AS region
               FROM tunnel.anomaly x
@@ -83,6 +95,24 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, publi
 $$;
 COMMENT ON FUNCTION tunnel_api.mark_dry(int, geometry) IS
 'Marks the detected leaks of a survey about a place (unrolled plane) that lie in a dry region by half, and takes the mark from the others: called after each change of a region, and by detection.';
+
+-- Each change of findings adds rows to their sums; there need be no more of them than sums. Who does the same meanwhile has the
+-- rows that he has.
+CREATE OR REPLACE FUNCTION tunnel_api.pack_sums(survey_id int) RETURNS void
+LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
+    WITH apart AS (
+        DELETE FROM tunnel.finding_sum f
+         WHERE f.id IN (SELECT o.id FROM tunnel.finding_sum o WHERE o.survey_id = $1 FOR UPDATE SKIP LOCKED)
+        RETURNING f.*
+    )
+    INSERT INTO tunnel.finding_sum (survey_id, kind, wet, origin, severity, state, measured, findings, area, length, extent)
+    SELECT a.survey_id, a.kind, a.wet, a.origin, a.severity, a.state, a.measured, sum(a.findings), sum(a.area), sum(a.length), sum(a.extent)
+      FROM apart a
+     GROUP BY 1, 2, 3, 4, 5, 6, 7
+    HAVING sum(a.findings) <> 0 OR abs(sum(a.area)) + abs(sum(a.length)) + abs(sum(a.extent)) > 1e-9
+$$;
+COMMENT ON FUNCTION tunnel_api.pack_sums(int) IS
+    'Puts the rows together that changes of findings have added to their sums (tunnel.finding_sum); called by detection and imports';
 
 -- Refuses a kind that there is not, is not offered any more, or is not drawn so.
 CREATE OR REPLACE FUNCTION tunnel_api.check_kind(kind text, drawn geometry) RETURNS void
@@ -157,23 +187,23 @@ $$;
 COMMENT ON FUNCTION tunnel_api.redraw(bigint, geometry, float8, text) IS
     'Gives a finding another outline (unrolled plane) and origin, works out its figures and drops what was measured of the old one; for draw_finding, finding_split and finding_merge alone';
 
--- A new finding of a person's, like another or on its own; its id.
+-- A new finding of a person's, like another or on its own; its id, which is given for one that comes back.
 CREATE OR REPLACE FUNCTION tunnel_api.add_finding(
     survey_id int, kind text, drawn geometry, width float8, severity int, review text, remark text, origin text, by_hand boolean,
-    parent_id bigint) RETURNS bigint
+    parent_id bigint, id bigint DEFAULT NULL) RETURNS bigint
 LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, public, pg_temp AS $$
-    INSERT INTO tunnel.anomaly (survey_id, kind, width, severity, review, reviewed_by, reviewed_at, remark, origin, by_hand,
+    INSERT INTO tunnel.anomaly (id, survey_id, kind, width, severity, review, reviewed_by, reviewed_at, remark, origin, by_hand,
         parent_id, drawn_by, drawn_at, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, length, unrolled, map,
-        surface, shape, shape_map, shape_surface, created_at)
-    SELECT $1, $2, $4, $5, $6, CASE WHEN $6 <> 'open' THEN session_user END,
+        surface, shape, shape_map, shape_surface, created_at) OVERRIDING SYSTEM VALUE
+    SELECT coalesce($11, nextval('tunnel.anomaly_id_seq')), $1, $2, $4, $5, $6, CASE WHEN $6 <> 'open' THEN session_user END,
            CASE WHEN $6 <> 'open' THEN clock_timestamp() END, $7, $8, $9, $10, session_user, clock_timestamp(), f.km,
            f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, f.clock, f.area, f.length, f.unrolled, f.map, f.surface, f.shape,
            f.shape_map, f.shape_surface, clock_timestamp()
       FROM tunnel_api.drawn_figures($1, $3, $4) f
     RETURNING id
 $$;
-COMMENT ON FUNCTION tunnel_api.add_finding(int, text, geometry, float8, int, text, text, text, boolean, bigint) IS
-    'A new finding (unrolled plane) with all that follows from its outline; its id. For draw_finding and finding_split alone';
+COMMENT ON FUNCTION tunnel_api.add_finding(int, text, geometry, float8, int, text, text, text, boolean, bigint, bigint) IS
+    'A new finding (unrolled plane) with all that follows from its outline; its id. For draw_finding, finding_split and finding_undo alone';
 
 -- After the surface has changed: outlines in the unrolled plane stay. One that now reaches beyond the lining stays as it was.
 CREATE OR REPLACE FUNCTION tunnel_api.renew_findings(survey_id int, km int) RETURNS void
@@ -226,6 +256,8 @@ DECLARE
     drawn geometry;
     shape_before geometry;
     redrawn boolean;
+    kept jsonb;
+    step bigint;
 BEGIN
     IF TG_OP = 'INSERT' THEN
         SELECT s.* INTO its FROM tunnel.survey s
@@ -260,8 +292,11 @@ BEGIN
             RAISE EXCEPTION 'finding % stands for others that are merged into it: reject it instead', was.id
                 USING ERRCODE = 'feature_not_supported';
         END IF;
+        step := tunnel_api.note_edit(OLD.survey, 'anomaly', was.id, before, NULL, kept => tunnel_api.finding_measured(was.id));
+        PERFORM tunnel_api.note_edit(OLD.survey, 'photo', p.id, to_jsonb(p) - 'id' - 'anomaly_id' || jsonb_build_object('finding_id', was.id),
+                                     NULL, part_of => step)
+           FROM tunnel.photo p WHERE p.anomaly_id = was.id;
         DELETE FROM tunnel.anomaly a WHERE a.id = was.id;
-        PERFORM tunnel_api.note_edit(OLD.survey, 'anomaly', was.id, before, NULL);
         PERFORM tunnel_api.link_findings(was.survey_id, was.unrolled);
         RETURN OLD;
     END IF;
@@ -305,6 +340,7 @@ BEGIN
             PERFORM tunnel_api.check_kind(NEW.kind, CASE WHEN was.by_hand OR redrawn AND NEW.kind <> was.kind THEN drawn END);
         END IF;
         IF redrawn OR (was.shape IS NOT NULL AND new_row -> 'width' <> was_row -> 'width') THEN
+            kept := tunnel_api.finding_measured(was.id);
             PERFORM tunnel_api.redraw(was.id, drawn, NEW.width, CASE was.origin WHEN 'detected' THEN 'redrawn' ELSE was.origin END);
         END IF;
         IF new_row -> 'review' <> was_row -> 'review' OR new_row -> 'remark' <> was_row -> 'remark'
@@ -325,7 +361,7 @@ BEGIN
     END IF;
     SELECT a.* INTO is_now FROM tunnel.anomaly a WHERE a.id = NEW.id;
     PERFORM tunnel_api.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = is_now.survey_id), 'anomaly', is_now.id,
-                                 before, tunnel_api.finding_state(is_now.id));
+                                 before, tunnel_api.finding_state(is_now.id), kept => kept);
     PERFORM tunnel_api.link_findings(is_now.survey_id, ST_Collect(was.unrolled, is_now.unrolled));
     IF TG_OP = 'UPDATE' AND (redrawn OR is_now.wet <> was.wet) THEN
         PERFORM tunnel_api.mark_dry(is_now.survey_id, is_now.unrolled);
@@ -378,6 +414,8 @@ DECLARE
     parts geometry[];
     part geometry;
     ids bigint[];
+    kept jsonb;
+    step bigint;
 BEGIN
     SELECT a.survey_id, s.name INTO survey_key, name
       FROM tunnel.anomaly a JOIN tunnel.survey s ON s.id = a.survey_id WHERE a.id = finding;
@@ -400,14 +438,16 @@ BEGIN
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     before := tunnel_api.finding_state(finding);
+    kept := tunnel_api.finding_measured(finding);
     PERFORM tunnel_api.redraw(finding, parts[1], was.width, 'split');
     ids := ARRAY[finding];
     FOREACH part IN ARRAY parts[2:] LOOP
         ids := ids || tunnel_api.add_finding(survey_key, coalesce(was.judged, was.kind), part, was.width, was.severity, was.review,
                                              was.remark, 'split', was.by_hand, finding);
     END LOOP;
-    FOREACH made IN ARRAY ids LOOP
-        PERFORM tunnel_api.note_edit(name, 'anomaly', made, CASE made WHEN finding THEN before END, tunnel_api.finding_state(made));
+    step := tunnel_api.note_edit(name, 'anomaly', finding, before, tunnel_api.finding_state(finding), kept => kept);
+    FOREACH made IN ARRAY ids[2:] LOOP
+        PERFORM tunnel_api.note_edit(name, 'anomaly', made, NULL, tunnel_api.finding_state(made), part_of => step);
     END LOOP;
     PERFORM tunnel_api.link_findings(survey_key, was.unrolled);
     RETURN ids;
@@ -432,6 +472,8 @@ DECLARE
     a_part geometry;
     rest geometry;
     place geometry;
+    kept jsonb;
+    step bigint;
 BEGIN
     IF cardinality(wanted) < 2 THEN
         RAISE EXCEPTION 'at least two findings are merged' USING ERRCODE = 'invalid_parameter_value';
@@ -479,14 +521,18 @@ BEGIN
                                       ELSE ST_Buffer(ST_ShortestLine(a_part, rest), 0.005) END);
     END LOOP;
     before := tunnel_api.finding_state(oldest.id);
+    kept := tunnel_api.finding_measured(oldest.id);
     PERFORM tunnel_api.redraw(oldest.id, whole, oldest.width, 'merged');
-    PERFORM tunnel_api.note_edit(name, 'anomaly', oldest.id, before, tunnel_api.finding_state(oldest.id));
-    FOR was IN SELECT a.* FROM tunnel.anomaly a WHERE a.id = ANY (wanted) AND a.id <> oldest.id ORDER BY a.id LOOP
+    -- named also where the outline of the oldest is that of all
+    step := tunnel_api.note_edit(name, 'anomaly', oldest.id, before,
+        tunnel_api.finding_state(oldest.id) || jsonb_build_object('merged', array_remove(wanted, oldest.id)), kept => kept);
+    FOR was IN SELECT a.* FROM tunnel.anomaly a
+                WHERE (a.id = ANY (wanted) OR a.merged_into = ANY (wanted)) AND a.id <> oldest.id
+                  AND a.merged_into IS DISTINCT FROM oldest.id ORDER BY a.id FOR UPDATE LOOP
         before := tunnel_api.finding_state(was.id);
         UPDATE tunnel.anomaly a SET merged_into = oldest.id, same_as = NULL WHERE a.id = was.id;
-        PERFORM tunnel_api.note_edit(name, 'anomaly', was.id, before, tunnel_api.finding_state(was.id));
+        PERFORM tunnel_api.note_edit(name, 'anomaly', was.id, before, tunnel_api.finding_state(was.id), part_of => step);
     END LOOP;
-    UPDATE tunnel.anomaly a SET merged_into = oldest.id WHERE a.merged_into = ANY (wanted) AND a.merged_into <> oldest.id;
     PERFORM tunnel_api.link_findings(surveys[1], place);
     RETURN oldest.id;
 END

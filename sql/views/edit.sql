@@ -156,22 +156,73 @@ BEGIN
 END
 $$;
 
+-- What is drawn, redrawn and deleted in a layer of leaks or of what is dark but dry is a finding: TG_ARGV is the place, see
+-- draw_finding, and the kind of one that says none. Runs before the review of the same update.
+CREATE OR REPLACE FUNCTION tunnel_api.draw_anomaly() RETURNS trigger
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+DECLARE
+    view CONSTANT text := 'finding_' || TG_ARGV[0];
+    done bigint;
+BEGIN
+    IF TG_OP = 'INSERT' THEN
+        EXECUTE format('INSERT INTO tunnel_api.%I (survey_id, survey, kind, review, remark, geom)'
+                       ' VALUES ($1, $2, $3, $4, $5, $6) RETURNING id', view)
+           INTO NEW.id USING NEW.survey_id, NEW.survey, coalesce(NEW.kind, TG_ARGV[1]), NEW.review, NEW.remark, NEW.geom;
+        RETURN NEW;
+    ELSIF TG_OP = 'DELETE' THEN
+        EXECUTE format('DELETE FROM tunnel_api.%I WHERE id = $1', view) USING OLD.id;
+        GET DIAGNOSTICS done = ROW_COUNT;
+        RETURN CASE done WHEN 0 THEN NULL ELSE OLD END;
+    ELSIF ST_AsEWKB(NEW.geom) IS DISTINCT FROM ST_AsEWKB(OLD.geom) THEN
+        EXECUTE format('UPDATE tunnel_api.%I SET geom = $1 WHERE id = $2', view) USING NEW.geom, OLD.id;
+    END IF;
+    RETURN NEW;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.draw_anomaly() IS
+    'Trigger of the views of leaks and anomalies with one geometry: draws, redraws and deletes by the view of findings';
+
+DO $$
+DECLARE
+    place text;
+BEGIN
+    FOREACH place IN ARRAY ARRAY['unrolled', 'map', '3d'] LOOP
+        EXECUTE format('CREATE OR REPLACE TRIGGER draw INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.%I FOR EACH ROW'
+                       ' EXECUTE FUNCTION tunnel_api.draw_anomaly(%L, ''leak'')', 'leak_' || place, place);
+        EXECUTE format('CREATE OR REPLACE TRIGGER draw INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.%I FOR EACH ROW'
+                       ' EXECUTE FUNCTION tunnel_api.draw_anomaly(%L, ''dark'')', 'anomaly_' || place, place);
+    END LOOP;
+END
+$$;
+
+-- What the audit has of a region.
+CREATE OR REPLACE FUNCTION tunnel_api.region_state(id int) RETURNS jsonb
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+    SELECT jsonb_strip_nulls(jsonb_build_object('kind', r.kind, 'reason', r.reason, 'waits', nullif(r.waits, false),
+        'approved_by', r.approved_by, 'geom', ST_AsEWKT(r.geom)))
+      FROM tunnel.region r WHERE r.id = $1
+$$;
+COMMENT ON FUNCTION tunnel_api.region_state(int) IS
+    'What the audit has of a region: kind, reason, outline as EWKT, whether it waits and who put it in force';
+
 -- Adds, changes or deletes a region drawn by hand in the unrolled plane (m). A new one names its survey by survey_id or,
 -- without that, by name.
 CREATE OR REPLACE FUNCTION tunnel_api.edit_region() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
 DECLARE
     was tunnel.region;
+    before jsonb;
     its tunnel.survey;
     most float8;
 BEGIN
     IF TG_OP = 'DELETE' THEN
+        PERFORM FROM tunnel.region r WHERE r.id = OLD.id FOR UPDATE;
+        before := tunnel_api.region_state(OLD.id);
         DELETE FROM tunnel.region r WHERE r.id = OLD.id RETURNING r.* INTO was;
         IF NOT FOUND THEN
             RETURN NULL;  -- gone meanwhile
         END IF;
-        PERFORM tunnel_api.note_edit(OLD.survey, 'region', OLD.id,
-                                     jsonb_strip_nulls(jsonb_build_object('kind', was.kind, 'reason', was.reason, 'geom', ST_AsEWKT(was.geom))), NULL);
+        PERFORM tunnel_api.note_edit(OLD.survey, 'region', OLD.id, before, NULL);
         PERFORM tunnel_api.mark_dry(was.survey_id, was.geom);
         RETURN OLD;
     END IF;
@@ -180,8 +231,8 @@ BEGIN
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     IF TG_OP = 'UPDATE' THEN
-        IF (NEW.id, NEW.survey_id, NEW.survey, NEW.drawn_by, NEW.drawn_at) IS DISTINCT FROM
-           (OLD.id, OLD.survey_id, OLD.survey, OLD.drawn_by, OLD.drawn_at) THEN
+        IF (NEW.id, NEW.survey_id, NEW.survey, NEW.drawn_by, NEW.drawn_at, NEW.waits, NEW.approved_by, NEW.approved_at) IS DISTINCT FROM
+           (OLD.id, OLD.survey_id, OLD.survey, OLD.drawn_by, OLD.drawn_at, OLD.waits, OLD.approved_by, OLD.approved_at) THEN
             RAISE EXCEPTION 'of a region only the kind, the reason and the outline (geom) can be edited'
                 USING ERRCODE = 'feature_not_supported';
         END IF;
@@ -192,6 +243,7 @@ BEGIN
         IF NOT FOUND THEN
             RETURN NULL;
         END IF;
+        before := tunnel_api.region_state(was.id);
         NEW.kind := CASE WHEN NEW.kind = OLD.kind THEN was.kind ELSE NEW.kind END;
         NEW.geom := CASE WHEN NEW.geom = OLD.geom THEN was.geom ELSE NEW.geom END;
         NEW.reason := CASE WHEN NEW.reason IS NOT DISTINCT FROM OLD.reason THEN was.reason ELSE NEW.reason END;
@@ -222,18 +274,26 @@ BEGIN
     END IF;
     NEW.drawn_by := session_user;
     NEW.drawn_at := clock_timestamp();
+    IF was.id IS NULL OR NEW.kind <> was.kind OR NOT NEW.geom = was.geom THEN
+        NEW.waits := NEW.kind = 'dry' AND ST_Area(NEW.geom) > most;
+        NEW.approved_by := NULL;
+        NEW.approved_at := NULL;
+    ELSE
+        NEW.waits := was.waits;
+        NEW.approved_by := was.approved_by;
+        NEW.approved_at := was.approved_at;
+    END IF;
     IF TG_OP = 'INSERT' THEN
-        INSERT INTO tunnel.region (survey_id, kind, geom, drawn_by, drawn_at, reason)
-        VALUES (NEW.survey_id, NEW.kind, NEW.geom, NEW.drawn_by, NEW.drawn_at, NEW.reason)
+        INSERT INTO tunnel.region (survey_id, kind, geom, drawn_by, drawn_at, reason, waits)
+        VALUES (NEW.survey_id, NEW.kind, NEW.geom, NEW.drawn_by, NEW.drawn_at, NEW.reason, NEW.waits)
         RETURNING id INTO NEW.id;
     ELSE
-        UPDATE tunnel.region
-           SET kind = NEW.kind, geom = NEW.geom, drawn_by = NEW.drawn_by, drawn_at = NEW.drawn_at, reason = NEW.reason
-         WHERE id = OLD.id;
+        UPDATE tunnel.region r
+           SET kind = NEW.kind, geom = NEW.geom, drawn_by = NEW.drawn_by, drawn_at = NEW.drawn_at, reason = NEW.reason,
+               waits = NEW.waits, approved_by = NEW.approved_by, approved_at = NEW.approved_at
+         WHERE r.id = OLD.id;
     END IF;
-    PERFORM tunnel_api.note_edit(NEW.survey, 'region', NEW.id,
-                                 CASE TG_OP WHEN 'UPDATE' THEN jsonb_strip_nulls(jsonb_build_object('kind', was.kind, 'reason', was.reason, 'geom', ST_AsEWKT(was.geom))) END,
-                                 jsonb_strip_nulls(jsonb_build_object('kind', NEW.kind, 'reason', NEW.reason, 'geom', ST_AsEWKT(NEW.geom))));
+    PERFORM tunnel_api.note_edit(NEW.survey, 'region', NEW.id, before, tunnel_api.region_state(NEW.id));
     PERFORM tunnel_api.mark_dry(NEW.survey_id, ST_Collect(was.geom, NEW.geom));
     RETURN NEW;
 END
@@ -242,3 +302,27 @@ COMMENT ON FUNCTION tunnel_api.edit_region() IS 'Trigger of view region: writes 
 
 CREATE OR REPLACE TRIGGER edit INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.region
     FOR EACH ROW EXECUTE FUNCTION tunnel_api.edit_region();
+
+-- A dry region larger than the tunnel's limit takes nothing away until an operator has looked at it.
+CREATE OR REPLACE FUNCTION tunnel_api.dry_region_approve(region_id int) RETURNS int
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+DECLARE
+    was tunnel.region;
+    before constant jsonb := tunnel_api.region_state(region_id);
+BEGIN
+    SELECT r.* INTO was FROM tunnel.region r WHERE r.id = region_id FOR UPDATE;
+    IF was.id IS NULL OR NOT was.waits THEN
+        RAISE EXCEPTION '%', CASE WHEN was.id IS NULL THEN format('there is no region %s', region_id)
+                                  ELSE format('region %s does not wait: it is in force', region_id) END
+            USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    UPDATE tunnel.region r SET waits = false, approved_by = session_user, approved_at = clock_timestamp()
+     WHERE r.id = region_id;
+    PERFORM tunnel_api.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = was.survey_id), 'region', region_id,
+                                 before, tunnel_api.region_state(region_id));
+    PERFORM tunnel_api.mark_dry(was.survey_id, was.geom);
+    RETURN (SELECT d.leaks FROM tunnel_api.dry_region d WHERE d.id = region_id);
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.dry_region_approve(int) IS
+'Puts a dry region in force that is larger than dry_region_limit of its tunnel; for operators. Returns how many open leaks it took away.';

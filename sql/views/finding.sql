@@ -32,7 +32,10 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.image_share IS NOT NULL AS measured, a.drop_mean, a.drop_max, a.image_share, a.contrast, a.confidence, a.reasons,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.drawn_by, a.drawn_at,
        a.detected, a.created_at, CASE WHEN NOT a.by_hand THEN a.detected_at END AS detected_at,
-       o.ids IS NOT NULL AS also_detected, o.ids AS detected_as,
+       EXISTS (SELECT FROM tunnel.anomaly x
+                WHERE x.same_as = a.id AND x.same_as IS NOT NULL AND NOT x.by_hand AND x.detected) AS also_detected,
+       (SELECT array_agg(x.id ORDER BY x.id) FROM tunnel.anomaly x
+         WHERE x.same_as = a.id AND NOT x.by_hand AND x.detected) AS detected_as,
        a.parent_id, a.merged_into, (SELECT array_agg(x.id ORDER BY x.id) FROM tunnel.anomaly x WHERE x.merged_into = a.id) AS merged,
        a.same_as, a.dry_region_id,
        a.detected AND a.review <> 'rejected' AND NOT a.aside AS counted,
@@ -48,8 +51,6 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
   LEFT JOIN tunnel.finding_kind k ON k.code = coalesce(a.judged, a.kind)
   LEFT JOIN tunnel.severity v ON v.id = a.severity
-  LEFT JOIN LATERAL (SELECT array_agg(x.id ORDER BY x.id) AS ids FROM tunnel.anomaly x
-                      WHERE x.same_as = a.id AND NOT x.by_hand AND x.detected) o ON true
  CROSS JOIN LATERAL (SELECT (a.chainage_from + a.chainage_to) / 2 AS chainage,
                             floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m;
 COMMENT ON VIEW tunnel_api.lining_finding IS
@@ -148,25 +149,29 @@ COMMENT ON COLUMN tunnel_api.finding_photo.caption IS 'What it shows';
 COMMENT ON COLUMN tunnel_api.finding_photo.added_by IS 'Who added it, set by the database';
 COMMENT ON COLUMN tunnel_api.finding_photo.added_at IS 'When it was added, set by the database';
 
--- How many there are of each kind and origin, and what becomes of each: the states are those of lining_finding.
+-- How many there are of each kind and origin, and what becomes of each, from the sums that triggers on tunnel.anomaly keep.
 CREATE OR REPLACE VIEW tunnel_api.finding_count AS
-SELECT min(a.id) AS id, a.survey_id, s.name AS survey, coalesce(a.judged, a.kind) AS kind, a.wet, a.origin,
-       count(*) FILTER (WHERE c.counted) AS counted,
-       count(*) FILTER (WHERE c.counted AND a.review = 'open') AS open,
-       count(*) FILTER (WHERE c.counted AND a.review = 'confirmed') AS confirmed,
-       count(*) FILTER (WHERE a.review = 'rejected' AND a.merged_into IS NULL AND a.same_as IS NULL) AS rejected,
-       count(*) FILTER (WHERE a.merged_into IS NOT NULL) AS merged,
-       count(*) FILTER (WHERE a.merged_into IS NULL AND a.same_as IS NOT NULL) AS same,
-       count(*) FILTER (WHERE a.aside AND a.merged_into IS NULL AND a.same_as IS NULL) AS dry,
-       count(*) FILTER (WHERE NOT a.detected AND NOT a.aside AND a.review <> 'rejected') AS gone,
-       count(*) FILTER (WHERE c.counted AND a.image_share IS NULL) AS to_measure,
+SELECT (a.survey_id::bigint * 100000 + min(k.id)) * 10
+           + array_position('{detected,drawn,redrawn,split,merged}'::text[], a.origin) AS id,
+       a.survey_id, s.name AS survey, a.kind, a.wet, a.origin,
+       coalesce(sum(a.findings) FILTER (WHERE c.counted), 0)::bigint AS counted,
+       coalesce(sum(a.findings) FILTER (WHERE a.state = 'open'), 0)::bigint AS open,
+       coalesce(sum(a.findings) FILTER (WHERE a.state = 'confirmed'), 0)::bigint AS confirmed,
+       coalesce(sum(a.findings) FILTER (WHERE a.state = 'rejected'), 0)::bigint AS rejected,
+       coalesce(sum(a.findings) FILTER (WHERE a.state = 'merged'), 0)::bigint AS merged,
+       coalesce(sum(a.findings) FILTER (WHERE a.state = 'same'), 0)::bigint AS same,
+       coalesce(sum(a.findings) FILTER (WHERE a.state = 'dry'), 0)::bigint AS dry,
+       coalesce(sum(a.findings) FILTER (WHERE a.state = 'gone'), 0)::bigint AS gone,
+       coalesce(sum(a.findings) FILTER (WHERE c.counted AND NOT a.measured), 0)::bigint AS to_measure,
        coalesce(sum(a.area) FILTER (WHERE c.counted), 0) AS area, coalesce(sum(a.length) FILTER (WHERE c.counted), 0) AS length
-  FROM tunnel.anomaly a
+  FROM tunnel.finding_sum a
   JOIN tunnel.survey s ON s.id = a.survey_id
- CROSS JOIN LATERAL (SELECT a.detected AND a.review <> 'rejected' AND NOT a.aside AS counted) c
- GROUP BY a.survey_id, s.name, coalesce(a.judged, a.kind), a.wet, a.origin;
+  JOIN tunnel.finding_kind k ON k.code = a.kind
+ CROSS JOIN LATERAL (SELECT a.state IN ('open', 'confirmed') AS counted) c
+ GROUP BY a.survey_id, s.name, a.kind, a.wet, a.origin
+HAVING sum(a.findings) <> 0;
 COMMENT ON VIEW tunnel_api.finding_count IS 'How many findings of each kind and origin a survey has, and what became of them';
-COMMENT ON COLUMN tunnel_api.finding_count.id IS 'Least id among them: a key';
+COMMENT ON COLUMN tunnel_api.finding_count.id IS 'A key, of survey, kind and origin';
 COMMENT ON COLUMN tunnel_api.finding_count.kind IS 'Code of the kind';
 COMMENT ON COLUMN tunnel_api.finding_count.wet IS 'Whether the kind counts as wet';
 COMMENT ON COLUMN tunnel_api.finding_count.origin IS 'detected, drawn, redrawn, split or merged';
@@ -187,7 +192,7 @@ SELECT r.id, r.survey_id, s.name AS survey, ST_XMin(r.geom) AS chainage_from, ST
        tunnel_api.station_label(s.tunnel_id, ST_XMin(r.geom)) AS label_from,
        tunnel_api.station_label(s.tunnel_id, ST_XMax(r.geom)) AS label_to,
        ST_YMin(r.geom) AS arc_from, ST_YMax(r.geom) AS arc_to, ST_Area(r.geom) AS area, t.dry_region_limit AS area_limit, r.reason,
-       r.drawn_by, r.drawn_at, l.leaks, l.leaks_area, l.ids AS leak_ids, r.geom::public.geometry(Polygon, 0) AS geom
+       r.drawn_by, r.drawn_at, r.waits, r.approved_by, r.approved_at, l.leaks, l.leaks_area, l.ids AS leak_ids, r.geom::public.geometry(Polygon, 0) AS geom
   FROM tunnel.region r
   JOIN tunnel.survey s ON s.id = r.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
@@ -201,8 +206,11 @@ COMMENT ON VIEW tunnel_api.dry_region IS
 COMMENT ON COLUMN tunnel_api.dry_region.arc_from IS 'Least arc, m';
 COMMENT ON COLUMN tunnel_api.dry_region.arc_to IS 'Greatest arc, m';
 COMMENT ON COLUMN tunnel_api.dry_region.area IS 'Its area in the unrolled plane, m²';
-COMMENT ON COLUMN tunnel_api.dry_region.area_limit IS 'Area above which it must say why (tunnel.tunnel.dry_region_limit), m²';
+COMMENT ON COLUMN tunnel_api.dry_region.area_limit IS 'Area above which it must say why, and waits for an operator (tunnel.tunnel.dry_region_limit), m²';
 COMMENT ON COLUMN tunnel_api.dry_region.reason IS 'Why it was drawn';
+COMMENT ON COLUMN tunnel_api.dry_region.waits IS 'Whether it waits for an operator (dry_region_approve): until then it takes nothing away';
+COMMENT ON COLUMN tunnel_api.dry_region.approved_by IS 'Operator who put it in force, where it had to wait';
+COMMENT ON COLUMN tunnel_api.dry_region.approved_at IS 'When';
 COMMENT ON COLUMN tunnel_api.dry_region.leaks IS 'How many open leaks it took away';
 COMMENT ON COLUMN tunnel_api.dry_region.leaks_area IS 'Their area, m²';
 COMMENT ON COLUMN tunnel_api.dry_region.leak_ids IS 'Their ids (lining_finding)';
@@ -229,11 +237,12 @@ SELECT s.id::bigint * 10 + q.n AS id, s.id AS survey_id, s.name AS survey, q.ele
                 (4, 'bolts', 'each', ARRAY['missing_bolt']),
                 (5, 'drips', 'each', ARRAY['drip'])) AS e (n, element, unit, kinds)
           LEFT JOIN (
-                SELECT coalesce(a.judged, a.kind) AS kind, coalesce(a.severity, 2) AS state, count(*)::float8 AS findings,
-                       sum(a.area) AS area, sum(coalesce(a.length, a.chainage_to - a.chainage_from)) AS length
-                  FROM tunnel.anomaly a
-                 WHERE a.survey_id = s.id AND a.detected AND a.review <> 'rejected' AND NOT a.aside
-                 GROUP BY 1, 2) g ON g.kind = ANY (e.kinds)
+                SELECT a.kind, coalesce(a.severity, 2) AS state, sum(a.findings)::float8 AS findings, sum(a.area) AS area,
+                       sum(a.extent) AS length
+                  FROM tunnel.finding_sum a
+                 WHERE a.survey_id = s.id AND a.state IN ('open', 'confirmed')
+                 GROUP BY 1, 2
+                HAVING sum(a.findings) <> 0) g ON g.kind = ANY (e.kinds)
          CROSS JOIN LATERAL (
                 SELECT CASE e.unit WHEN 'm²' THEN g.area WHEN 'each' THEN g.findings ELSE g.length END AS amount) m
          GROUP BY e.n, e.element, e.unit) q;

@@ -7,13 +7,14 @@
 -- table metadata" in its connection) to find type, SRID and Z.
 
 CREATE OR REPLACE VIEW tunnel_api.tunnel AS
-SELECT t.id, t.name, t.srid, t.start_chainage, t.spacing, t.design, t.created_at,
+SELECT t.id, t.name, t.srid, t.start_chainage, t.spacing, t.dry_region_limit, t.design, t.created_at,
        t.alignment IS NULL AS site, t.alignment::public.geometry AS geom
   FROM tunnel.tunnel t;
 COMMENT ON VIEW tunnel_api.tunnel IS 'Tunnels, with the axis as it was given';
 COMMENT ON COLUMN tunnel_api.tunnel.srid IS 'Coordinate reference system of all the tunnel''s geometry on the map; 0: local coordinates, metres of no place on Earth';
 COMMENT ON COLUMN tunnel_api.tunnel.start_chainage IS 'Chainage of the first vertex of the given axis, m';
 COMMENT ON COLUMN tunnel_api.tunnel.spacing IS 'Distance between the vertices of a survey''s axis, m';
+COMMENT ON COLUMN tunnel_api.tunnel.dry_region_limit IS 'Area above which a dry region must say why it is drawn, and waits for an operator, m²';
 COMMENT ON COLUMN tunnel_api.tunnel.design IS 'What the axis was read from or found in: file and alignment, file and layer, or scan; NULL of a table';
 COMMENT ON COLUMN tunnel_api.tunnel.geom IS 'Axis as given, in the tunnel''s SRID; NULL of a site';
 COMMENT ON COLUMN tunnel_api.tunnel.site IS 'Whether it is a site, which has no axis, and so no chainage, sections or unrolled lining';
@@ -140,7 +141,7 @@ COMMENT ON COLUMN tunnel_api.section_unrolled.arc_from IS 'Arc at the left end, 
 COMMENT ON COLUMN tunnel_api.section_unrolled.arc_to IS 'Arc at the right end, straight below the axis, m';
 
 CREATE OR REPLACE VIEW tunnel_api.region AS
-SELECT r.id, r.survey_id, s.name AS survey, r.kind, r.drawn_by, r.drawn_at, r.reason,
+SELECT r.id, r.survey_id, s.name AS survey, r.kind, r.drawn_by, r.drawn_at, r.reason, r.waits, r.approved_by, r.approved_at,
        r.geom::public.geometry(Polygon, 0) AS geom
   FROM tunnel.region r
   JOIN tunnel.survey s ON s.id = r.survey_id;
@@ -148,4 +149,7 @@ COMMENT ON VIEW tunnel_api.region IS
     'Regions of the unrolled plane drawn by hand for the intensity correction; rows may be added, changed and deleted';
 COMMENT ON COLUMN tunnel_api.region.kind IS 'homogeneous (one material: gives the roughness) or dry (dry lining: gives the threshold)';
 COMMENT ON COLUMN tunnel_api.region.reason IS 'Why it is drawn: a dry region larger than the tunnel''s limit (dry_region) needs one';
+COMMENT ON COLUMN tunnel_api.region.waits IS 'Whether it waits for an operator (dry_region_approve), being larger than that limit: until then it is as if it were not there';
+COMMENT ON COLUMN tunnel_api.region.approved_by IS 'Operator who put it in force, where it had to wait';
+COMMENT ON COLUMN tunnel_api.region.approved_at IS 'When';
 COMMENT ON COLUMN tunnel_api.region.geom IS 'Polygon in the unrolled plane (chainage, arc), m';

@@ -265,3 +265,14 @@ def test_what_was_drawn_is_in_the_list_of_leaks_and_in_the_report_without_figure
     done = run("report", NAME, "-o", tmp_path / "report.html")
     assert done.exit_code in (0, 1), done.output
     assert run("export", NAME, "-o", tmp_path / "all.gpkg").exit_code in (0, 1)
+
+
+def test_the_last_change_is_taken_back_or_why_not_is_one_line(conn: psycopg.Connection, tmp_path: Path) -> None:
+    assert import_csv(tmp_path, "kind,chainage,arc\nmissing_bolt,12350,1\n").exit_code == 0
+    (key,) = conn.execute("SELECT max(id) FROM tunnel_api.lining_finding").fetchone()  # type: ignore[misc]
+    conn.rollback()
+    assert run("findings", "undo", key).output == f"finding {key}: what was drawn is taken back\n"
+    assert conn.execute("SELECT count(*) FROM tunnel_api.lining_finding WHERE id = %s", [key]).fetchone() == (0,)
+    refused = run("findings", "undo", key)
+    assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
+    assert f"there is no change of a finding {key} to be taken back" in refused.stderr

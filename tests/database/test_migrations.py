@@ -129,7 +129,9 @@ def test_anomalies_from_before_become_findings_and_sums_stay(empty_dsn: str) -> 
             ("joint", "joint", False, "detected", "rejected"),
         ]
         assert connection.execute("SELECT count(*) FROM tunnel_api.leak WHERE counted").fetchone() == (2,)
-        assert connection.execute("SELECT leaks, reason FROM tunnel_api.dry_region").fetchall() == [(0, None)]
+        assert connection.execute("SELECT leaks, reason, waits FROM tunnel_api.dry_region").fetchall() == [(0, None, False)]
+        counts = connection.execute("SELECT kind, wet, counted, rejected, area FROM tunnel_api.finding_count ORDER BY 1, 2")
+        assert counts.fetchall() == [("joint", False, 1, 1, 1.0), ("leak", True, 2, 0, 2.0)]
         assert connection.execute("SELECT count(*) FROM tunnel_api.finding_kind").fetchone() == (13,)
 
 
@@ -254,6 +256,29 @@ def test_each_sql_file_can_be_run_again_by_psql(dsn: str) -> None:
     assert dump(dsn, "--schema-only") == before
 
 
+def draw_and_take_back(connection: psycopg.Connection) -> None:
+    """Findings drawn, split, merged and taken back, with photos and a dry region."""
+    insert = "INSERT INTO tunnel_api.finding_unrolled (survey, kind, geom) VALUES ('demo-2024', %s, %s::geometry) RETURNING id"
+    keys = [
+        connection.execute(insert, [kind, shape]).fetchone()[0]  # type: ignore[index]
+        for kind, shape in (
+            ("crack", "LINESTRING(12350 1, 12353 1.5)"),
+            ("drip", "POINT(12360 -2)"),
+            ("spall", "POLYGON((12350 0, 12351 0, 12351 1, 12350 0))"),
+        )
+    ]
+    connection.execute("INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (%s, 'a.jpg')", [keys[1]])
+    split = "SELECT tunnel_api.finding_split(%s, 'LINESTRING(12350.5 -1, 12350.5 2)')"
+    connection.execute(split, [keys[2]])
+    connection.execute("SELECT tunnel_api.finding_merge(%s)", [[keys[2], keys[2] + 1]])
+    connection.execute("UPDATE tunnel_api.finding_unrolled SET severity = 3 WHERE id = %s", [keys[0]])
+    connection.execute("SELECT tunnel_api.finding_undo(%s)", [keys[0]])
+    connection.execute(
+        "INSERT INTO tunnel_api.region (survey, kind, geom, reason)"
+        " VALUES ('demo-2024', 'dry', ST_MakeEnvelope(12310, -4, 12330, 4), 'rebuilt')"
+    )
+
+
 def test_a_dump_restored_is_a_working_database(example: str, dsn: str, empty_dsn: str, tmp_path: Path) -> None:
     with connect(dsn) as connection:
         connection.execute(
@@ -265,16 +290,22 @@ def test_a_dump_restored_is_a_working_database(example: str, dsn: str, empty_dsn
               FROM generate_series(1, 100) n
             """
         )
+        draw_and_take_back(connection)
     archive = tmp_path / "dump"
     folder = find_binaries()
     subprocess.run([folder["pg_dump"], "-Fc", "-f", str(archive), "--dbname", dsn], check=True)
     subprocess.run([folder["pg_restore"], "--exit-on-error", "--dbname", empty_dsn, str(archive)], check=True)
     with connect(empty_dsn) as restored, connect(dsn) as original:
-        for view in ("leak", "leak_map", "segment", "section", "axis", "stage_status", "survey", "point"):
+        for view in (
+            "leak", "leak_map", "segment", "section", "axis", "stage_status", "survey", "point", "lining_finding",
+            "finding_count", "finding_photo", "dry_region", "audit", "km_waterproof", "snti_condition",
+        ):  # fmt: skip
             query = sql.SQL("SELECT * FROM tunnel_api.{} ORDER BY id").format(sql.Identifier(view))
             rows = restored.execute(query).fetchall()
             assert rows
             assert rows == original.execute(query).fetchall()
+        (merged,) = restored.execute("SELECT min(id) FROM tunnel_api.finding_map WHERE origin = 'merged'").fetchone()  # type: ignore[misc]
+        assert restored.execute("SELECT tunnel_api.finding_undo(%s)", [merged]).fetchone() == ("merged",)
         restored.execute("UPDATE tunnel_api.leak SET review = 'confirmed' WHERE review = 'open'")
         restored.execute("DELETE FROM tunnel.survey")
         assert restored.execute("SELECT to_regclass('tunnel.point_s1')").fetchone() == (None,)

@@ -122,23 +122,38 @@ def test_reviewed_leaks_do_not_go_without_a_word(survey: psycopg.Connection, sca
     load(survey, scans)
     results(survey, 0)
     results(survey, 1)
+    # one that was drawn, and one that was redrawn
+    survey.execute(
+        "INSERT INTO tunnel.anomaly (survey_id, km, kind, chainage_from, chainage_to, arc_from, arc_to, clock, area, unrolled,"
+        " map, surface, review, origin, by_hand, drawn_by, drawn_at)"
+        " SELECT survey_id, km, 'spall', chainage_from + 3, chainage_to + 3, arc_from, arc_to, clock, area,"
+        " ST_Translate(unrolled, 3, 0), map, surface, 'confirmed', o, o = 'drawn', 'ines', now()"
+        " FROM tunnel.anomaly, unnest('{drawn,redrawn}'::text[]) AS o WHERE km = 1"
+    )
+    survey.commit()
     before = rows(survey)
     asked = CliRunner().invoke(main, ["survey", "remove-file", SURVEY, "b.laz"], input="n\n")
     assert asked.exit_code == 1
     assert "1 leaks and other dark spots go, 1 of them reviewed" in asked.output
+    assert "2 findings that people drew are kept" in asked.output
     assert rows(survey) == before
     said = command("survey", "remove-file", SURVEY, scans[1], "--yes").stderr
     assert "read again: a.laz" in said
     assert "no points are left in kilometre 1" in said
-    assert "1 of them reviewed" in said
-    assert survey.execute("SELECT km FROM tunnel.anomaly").fetchall() == [(0,)]
+    assert "1 of them reviewed; 2 findings that people drew are kept" in said
+    assert survey.execute("SELECT km, origin FROM tunnel.anomaly ORDER BY id").fetchall() == [
+        (0, "detected"), (1, "drawn"), (1, "redrawn"),
+    ]  # fmt: skip
+    assert survey.execute("SELECT count(*) FROM tunnel_api.lining_finding WHERE counted").fetchone() == (3,)
     # what kilometre 0 has rests on points that it has not any more, and on those of its neighbour
     state = survey.execute("SELECT DISTINCT km, stage, reason FROM tunnel_api.stage_status WHERE stale").fetchall()
     assert (0, "axis", "load ran since") in state
     assert {km for km, *_ in state} == {0}
     assert survey.execute("SELECT DISTINCT km FROM tunnel_api.stage_status").fetchall() == [(0,)]
     (remark,) = survey.execute("SELECT remark FROM tunnel_api.remark WHERE km = 1").fetchone()  # type: ignore[misc]
-    assert remark.startswith("no points since b.laz was removed; 1 leaks and other dark spots, 1 of them reviewed")
+    assert remark.startswith(
+        "no points since b.laz was removed; 2 findings that people drew are kept; 1 leaks and other dark spots, 1 of them"
+    )
     survey.rollback()
     shown = command("status", SURVEY).output
     assert "b.laz" in shown

@@ -1,7 +1,7 @@
 """Open a project with real QGIS and say what it sees, as JSON; runs under the Python that has PyQGIS.
 
 Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK [LAYER [KIND]]
-       | draw KIND | add VIEW | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG
+       | draw KIND | draw_findings | add VIEW | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG
        | atlas PDF [LAYOUT] | preview | where CHAINAGE ARC | labels LAYER | space [PNG]
 """
 
@@ -25,6 +25,7 @@ from qgis.core import (
     QgsExpressionContextScope,
     QgsExpressionContextUtils,
     QgsFeature,
+    QgsFeatureRequest,
     QgsGeometry,
     QgsLayoutExporter,
     QgsLayoutItemPage,
@@ -292,6 +293,31 @@ def draw(project: QgsProject, kind: str) -> dict[str, Any]:
     feature = QgsVectorLayerUtils.createFeature(layer, QgsGeometry.fromPolygonXY([square]), attributes)
     assert layer.addFeature(QgsFeature(feature))
     return _commit(layer)
+
+
+def draw_findings(project: QgsProject) -> dict[str, Any]:
+    """Draw one in each layer that takes findings, with the values that the form begins with; what each is offered."""
+    shapes = {
+        "finding_area_unrolled": "POLYGON((12350 1, 12351 1, 12351 2, 12350 1))",
+        "finding_line_unrolled": "LINESTRING(12355 1, 12357 2)",
+        "finding_point_unrolled": "POINT(12360 1)",
+        "leak_unrolled": "POLYGON((12365 1, 12366 1, 12366 2, 12365 1))",
+    }
+    done: dict[str, Any] = {}
+    for layer_id, shape in shapes.items():
+        layer = project.mapLayer(PREFIX + layer_id)
+        assert layer.startEditing(), layer_id
+        feature = QgsVectorLayerUtils.createFeature(layer, QgsGeometry.fromWkt(shape), {})
+        assert layer.addFeature(feature), layer_id
+        done[layer_id] = _commit(layer)
+        if layer_id.startswith("finding"):
+            offered = layer.editorWidgetSetup(layer.fields().indexOf("kind")).config()["FilterExpression"]
+            request = QgsFeatureRequest(QgsExpression(offered.split(" OR ")[0]))
+            catalogue = project.mapLayer(PREFIX + "finding_kind")
+            done[layer_id]["kinds"] = sorted(row["code"] for row in catalogue.getFeatures(request))
+            relations = project.relationManager().referencedRelations(layer)
+            done[layer_id]["photos"] = [relation.referencingLayer().name() for relation in relations]
+    return done
 
 
 def add(project: QgsProject, view: str) -> dict[str, Any]:

@@ -51,6 +51,12 @@ UNROLLED = {
 }  # fmt: skip
 NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet"}
 """Layers of the unrolled plane that its theme does not show."""
+FINDINGS = {
+    f"finding_{name}_{place}": kind + z
+    for place, z in (("map", ""), ("unrolled", ""), ("3d", "Z"))
+    for name, kind in (("point", "Point"), ("line", "LineString"), ("area", "Polygon"))
+}
+LISTS = {"finding_photo", "finding_kind", "severity"}
 STYLED = {*ON_MAP, *UNROLLED} - {"leak_sheet"}
 
 
@@ -113,7 +119,7 @@ def qgs(path: Path) -> str:
 def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str, Any]) -> None:
     layers = seen["layers"]
     assert {name for name, layer in layers.items() if not layer["valid"]} == set()
-    assert set(layers) == {*ON_MAP, *UNROLLED, "remark", *(f"demo-2024-km012-{kind}" for kind in IMAGES)}
+    assert set(layers) == {*ON_MAP, *UNROLLED, *FINDINGS, *LISTS, "remark", *(f"demo-2024-km012-{kind}" for kind in IMAGES)}
     assert seen["crs"] == "EPSG:25830"
     for name, kind in (ON_MAP | UNROLLED).items():
         layer = layers[name]
@@ -126,6 +132,14 @@ def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str
         assert (layer["wkb"], layer["features"]) == (kind, count), name
         assert layer["crs"] == ("EPSG:25830" if name in ON_MAP else ""), name
         assert layer["error"] == "", name
+    for name, kind in FINDINGS.items():
+        (count,) = rows.execute(  # type: ignore[misc]
+            "SELECT count(*) FROM tunnel_api.lining_finding"
+            " WHERE GeometryType(unrolled) = upper(%s) AND (%s OR by_hand AND NOT wet)",
+            [kind.removesuffix("Z"), not name.endswith("3d")],
+        ).fetchone()
+        assert (layers[name]["wkb"], layers[name]["features"], layers[name]["error"]) == (kind, count, ""), name
+        assert layers[name]["crs"] == ("" if name.endswith("unrolled") else "EPSG:25830"), name
     (remarks,) = rows.execute("SELECT count(*) FROM tunnel_api.remark WHERE survey = 'demo-2024'").fetchone()  # type: ignore[misc]
     assert layers["remark"]["counted"] == remarks, "what stands beside its name is no estimate"
     for kind in IMAGES:
@@ -168,15 +182,25 @@ def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
 
 
 def test_themes_and_views(seen: dict[str, Any]) -> None:
-    assert set(seen["themes"]) == {"Map", "Unrolled", "3D", "Inspection sheets"}
+    assert set(seen["themes"]) == {"Map", "Unrolled", "Findings", "Findings on the map", "3D", "Inspection sheets"}
     assert set(seen["themes"]["Inspection sheets"]) == {
         "coverage_gap", "leak_sheet", "demo-2024-km012-corrected", "demo-2024-km012-corrected-filled",
     }  # fmt: skip
     assert set(seen["themes"]["Map"]) == {
         "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster", "outline",
     }  # fmt: skip
-    assert set(seen["themes"]["3D"]) == {"axis", "section", "leak_3d", "target_sphere", "ground"}
+    assert set(seen["themes"]["3D"]) == {
+        *(name for name in FINDINGS if name.endswith("3d")),
+        "axis",
+        "section",
+        "leak_3d",
+        "target_sphere",
+        "ground",
+    }
     images = {"demo-2024-km012-corrected", "demo-2024-km012-corrected-filled"}
+    unrolled = {name for name in FINDINGS if name.endswith("unrolled")}
+    assert set(seen["themes"]["Findings"]) == {*unrolled, "region", "sheet", *images}
+    assert set(seen["themes"]["Findings on the map"]) == {"axis", "outline", *(n for n in FINDINGS if n.endswith("map"))}
     assert set(seen["themes"]["Unrolled"]) == {*UNROLLED, *images} - NOT_AT_FIRST
     assert seen["bookmarks"] == ["Map", "Unrolled", "Unrolled, km 12"]
     # all there is to the map, without the unrolled plane: there a new 3D view begins
@@ -351,6 +375,26 @@ def test_a_table_that_is_too_long_says_how_many_leaks_it_lacks(conn: psycopg.Con
     assert ["more leaks" in page for page in pages] == [False] * 6 + [True] + [False] * 2
     assert f"... and {600 - len(listed)} more leaks: table of the report" in pages[6]
     assert "leaks 600, " in pages[1]
+
+
+def test_findings_are_drawn_with_what_the_form_begins_with(conn: psycopg.Connection, project: Path) -> None:
+    conn.execute("UPDATE tunnel_api.finding_kind SET active = false WHERE code = 'spall'")
+    conn.commit()
+    done = act(project, "draw_findings")
+    assert all(one["saved"] for one in done.values()), done
+    rows = conn.execute(
+        "SELECT kind, origin, review, survey, GeometryType(unrolled) FROM tunnel_api.lining_finding WHERE by_hand ORDER BY id"
+    ).fetchall()
+    assert rows == [
+        ("leak", "drawn", "confirmed", "demo-2024", "POLYGON"), ("crack", "drawn", "confirmed", "demo-2024", "LINESTRING"),
+        ("drip", "drawn", "confirmed", "demo-2024", "POINT"), ("leak", "drawn", "confirmed", "demo-2024", "POLYGON"),
+    ]  # fmt: skip
+    for name, shape in (("area", "polygon"), ("line", "line"), ("point", "point")):
+        offered = conn.execute(
+            "SELECT array_agg(code ORDER BY code) FROM tunnel_api.finding_kind WHERE active AND %s = ANY (geometries)", [shape]
+        ).fetchone()
+        assert (done[f"finding_{name}_unrolled"]["kinds"],) == offered
+        assert done[f"finding_{name}_unrolled"]["photos"] == ["Photos (table)"]
 
 
 def test_3d_view_looks_at_the_largest_leak(shared: Path) -> None:
@@ -563,10 +607,10 @@ def test_project_holds_relative_paths_and_spares_qgis_the_search(shared: Path) -
     assert str(shared.parent) not in text
     assert "<datasource>./demo-images/demo-2024-km012-corrected.tif</datasource>" in text
     sources = re.findall(r"<datasource>([^<]*tunnel_api[^<]*)</datasource>", text)
-    assert len(sources) == len(ON_MAP | UNROLLED) + 1, "and the table of remarks"
+    assert len(sources) == len(ON_MAP | UNROLLED | FINDINGS) + len(LISTS) + 1, "and the table of remarks"
     assert all("checkPrimaryKeyUnicity='0'" in source for source in sources)
     counted = [source for source in sources if "estimatedmetadata=true" not in source]
-    assert ['"tunnel_api"."remark"' in source.replace("&quot;", '"') for source in counted] == [True]
+    assert len(counted) == 1 + len(LISTS), "small tables"
 
 
 def test_project_holds_no_password(conn: psycopg.Connection, dsn: str, example: str, tmp_path: Path) -> None:

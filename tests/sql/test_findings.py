@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import socket
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import psycopg
@@ -251,6 +254,99 @@ def test_a_dry_region_marks_leaks_and_gives_them_back(person: psycopg.Connection
     assert wet(person) == (before[0], pytest.approx(before[1]))
 
 
+def test_a_large_dry_region_waits_for_an_operator(people: None, dsn: str, example: str) -> None:
+    with psycopg.connect(make_conninfo(dsn, user="ines")) as ines, psycopg.connect(make_conninfo(dsn, user="otto")) as otto:
+        before = wet(ines)
+        (region,) = ines.execute(
+            "INSERT INTO tunnel_api.region (survey, kind, geom, reason)"
+            " VALUES (%s, 'dry', ST_MakeEnvelope(12310, -8, 12460, 8), 'new') RETURNING id", [NAME],
+        ).fetchone()  # fmt: skip
+        ines.commit()
+        assert wet(ines) == before
+        stated = "SELECT waits, approved_by, leaks FROM tunnel_api.dry_region WHERE id = %s"
+        assert ines.execute(stated, [region]).fetchone() == (True, None, 0)
+        ines.commit()
+        with pytest.raises(psycopg.errors.InsufficientPrivilege):
+            ines.execute("SELECT tunnel_api.dry_region_approve(%s)", [region])
+        ines.rollback()
+        (taken,) = otto.execute("SELECT tunnel_api.dry_region_approve(%s)", [region]).fetchone()
+        assert taken > 0
+        assert wet(otto)[0] == before[0] - taken
+        assert otto.execute(stated, [region]).fetchone() == (False, "otto", taken)
+        with pytest.raises(psycopg.Error, match="does not wait: it is in force"):
+            otto.execute("SELECT tunnel_api.dry_region_approve(%s)", [region])
+        otto.rollback()
+        otto.execute("SELECT tunnel_api.dry_region_approve(%s)", [region])
+        otto.commit()
+        # who draws it anew needs the word anew; a reason alone does not
+        ines.execute("UPDATE tunnel_api.region SET reason = 'rebuilt' WHERE id = %s", [region])
+        assert ines.execute(stated, [region]).fetchone() == (False, "otto", taken)
+        ines.execute("UPDATE tunnel_api.region SET geom = ST_Translate(geom, 1, 0) WHERE id = %s", [region])
+        assert (wet(ines)[0], ines.execute(stated, [region]).fetchone()) == (before[0], (True, None, 0))
+        said = ines.execute("SELECT after FROM tunnel_api.audit WHERE view = 'region' AND who = 'otto'").fetchone()
+        assert said[0]["approved_by"] == "otto"
+
+
+def test_a_client_that_is_killed_leaves_nothing_half_written(people: None, dsn: str, example: str) -> None:
+    """As QGIS is, in the middle of a save of several edits; nobody waits for what it held."""
+    with psycopg.connect(make_conninfo(dsn, user="otto")) as other:
+        whole = (
+            "SELECT count(*), round(sum(area)::numeric, 6) FROM tunnel_api.lining_finding"
+            " UNION ALL SELECT count(*), 0 FROM tunnel_api.audit"
+        )
+        before = other.execute(whole).fetchall()
+        other.rollback()
+        client = psycopg.connect(make_conninfo(dsn, user="ines"))
+        key = draw(client, FREE, "spall")
+        client.execute("SELECT tunnel_api.finding_split(%s, 'LINESTRING(12350.5 0, 12350.5 2)')", [key])
+        client.execute("UPDATE tunnel_api.finding_map SET remark = 'mine' WHERE id = 1")
+        with socket.socket(fileno=os.dup(client.fileno())) as wire:
+            wire.shutdown(socket.SHUT_RDWR)  # no farewell, as of one that is killed
+        other.execute("SET lock_timeout = '5s'")
+        other.execute("UPDATE tunnel_api.finding_map SET remark = remark WHERE id = 1")
+        assert other.execute(whole).fetchall() == before
+
+
+def test_two_inspectors_at_once_in_one_kilometre(people: None, dsn: str, example: str) -> None:
+    """Each draws, splits and takes back where the other does; sums are those of both."""
+
+    def work(user: str, start: float) -> None:
+        with psycopg.connect(make_conninfo(dsn, user=user)) as own:
+            for n in range(4):
+                key = draw(own, box(start + 2 * n, 0.5, start + 2 * n + 1, 1.5), "leak", remark=user)
+                own.commit()
+                cut = start + 2 * n + 0.3
+                own.execute("SELECT tunnel_api.finding_split(%s, %s::geometry)", [key, f"LINESTRING({cut} 0, {cut} 2)"])
+                own.commit()
+                if n % 2:
+                    undo(own, key)
+                    own.commit()
+
+    with psycopg.connect(dsn) as conn, ThreadPoolExecutor(2) as pool:
+        before = wet(conn)
+        conn.rollback()
+        list(pool.map(work, ("ines", "otto"), (12350.0, 12351.0)))
+        assert wet(conn)[0] == before[0] + 2 * (4 + 2)
+        assert wet(conn)[1] == pytest.approx(before[1] + 8.0, rel=0.02)
+
+
+@INSPECTOR
+def test_in_a_layer_of_leaks_findings_are_drawn(person: psycopg.Connection) -> None:
+    before = wet(person)
+    wkb = shapely.to_wkb(FREE)
+    (key,) = person.execute(
+        "INSERT INTO tunnel_api.leak_unrolled (survey, geom) VALUES (%s, ST_GeomFromWKB(%s, 0)) RETURNING id", [NAME, wkb]
+    ).fetchone()
+    assert row(person, key, "kind, origin, review, drawn_by") == ("leak", "drawn", "confirmed", "ines")
+    person.execute("UPDATE tunnel_api.leak_map SET geom = ST_Buffer(geom, 0.1), remark = 'larger' WHERE id = %s", [key])
+    (area, remark) = row(person, key, "area, remark")
+    assert (area > 2.5, remark) == (True, "larger")
+    person.execute("DELETE FROM tunnel_api.leak_unrolled WHERE id = %s", [key])
+    assert wet(person) == (before[0], pytest.approx(before[1]))
+    with pytest.raises(psycopg.Error, match="was detected: reject it instead"):
+        person.execute("DELETE FROM tunnel_api.leak_map WHERE id = 1")
+
+
 @INSPECTOR
 def test_photos_are_paths_with_captions_and_in_the_audit(person: psycopg.Connection) -> None:
     key = draw(person, FREE)
@@ -281,6 +377,102 @@ def test_operators_extend_the_catalogue_and_wet_follows(person: psycopg.Connecti
     assert row(person, key, "kind_label, wet") == ("Sickerstelle", False)
     with pytest.raises(psycopg.errors.ForeignKeyViolation):
         person.execute("DELETE FROM tunnel_api.finding_kind WHERE code = 'seepage'")
+
+
+def undo(conn: psycopg.Connection, key: int) -> str:
+    return str(conn.execute("SELECT tunnel_api.finding_undo(%s)", [key]).fetchone()[0])
+
+
+def everything(conn: psycopg.Connection) -> list[tuple[Any, ...]]:
+    """All findings and photos, with all that is known of them but when."""
+    return conn.execute(
+        "SELECT to_jsonb(a) - ARRAY['drawn_at', 'reviewed_at', 'created_at', 'detected_at', 'map', 'surface', 'area', 'clock']"
+        " || jsonb_build_object('area', round(a.area::numeric, 5), 'clock', round(a.clock::numeric, 4),"
+        " 'unrolled', ST_AsText(a.unrolled, 6)),"
+        " (SELECT jsonb_agg(to_jsonb(p) - 'added_at') FROM tunnel_api.finding_photo p WHERE p.finding_id = a.id)"
+        " FROM tunnel_api.lining_finding a ORDER BY id"
+    ).fetchall()
+
+
+@INSPECTOR
+def test_each_step_is_taken_back_to_what_was_before(person: psycopg.Connection) -> None:
+    (found,) = person.execute("SELECT min(id) FROM tunnel_api.leak WHERE review = 'confirmed'").fetchone()
+    drawn = draw(person, FREE, "spall", remark="new")
+    person.execute("INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (%s, 'a.jpg')", [drawn])
+    crack = draw(person, LineString([(12360.0, 1.0), (12363.0, 1.5)]), "crack", width=0.002)
+    steps = (
+        (drawn, "redrawn", f"UPDATE tunnel_api.finding_map SET geom = ST_Buffer(geom, -0.1) WHERE id = {drawn}"),
+        (drawn, "reviewed", f"UPDATE tunnel_api.finding_3d SET remark = NULL, severity = 4, kind = 'other' WHERE id = {drawn}"),
+        (drawn, "deleted", f"DELETE FROM tunnel_api.finding_unrolled WHERE id = {drawn}"),
+        (drawn, "split", f"SELECT tunnel_api.finding_split({drawn}, 'LINESTRING(12350.5 0, 12350.5 2)')"),
+        (crack, "reviewed", f"UPDATE tunnel_api.finding_unrolled SET width = 0.01 WHERE id = {crack}"),
+        (crack, "split", f"SELECT tunnel_api.finding_split({crack}, 'LINESTRING(12361.7 0, 12361.7 2)')"),
+        (found, "reviewed", f"UPDATE tunnel_api.leak SET review = 'rejected', remark = NULL, kind = 'dark' WHERE id = {found}"),
+        (found, "redrawn", f"UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, 0.2) WHERE id = {found}"),
+        (found, "split", f"""SELECT tunnel_api.finding_split(id, ST_MakeLine(ST_MakePoint(chainage_from + 0.5, -9),
+            ST_MakePoint(chainage_from + 0.5, 9))) FROM tunnel_api.lining_finding WHERE id = {found}"""),
+    )  # fmt: skip
+    for key, said, statement in steps:
+        before, sums = everything(person), wet(person)
+        person.execute(statement.encode())
+        assert everything(person) != before
+        assert undo(person, key) == said, statement
+        now = everything(person)
+        assert now == before, statement
+        assert wet(person) == (sums[0], pytest.approx(sums[1]))
+    entries = person.execute(
+        "SELECT undoes IS NULL, count(*) FROM tunnel_api.audit WHERE part_of IS NULL GROUP BY 1"
+    ).fetchall()
+    assert dict(entries)[False] == len(steps), "each is in the audit"
+
+
+@INSPECTOR
+def test_a_merge_is_taken_back_whole(person: psycopg.Connection) -> None:
+    first, second, third = (draw(person, box(12350.0 + x, 0.5, 12350.0 + x + 1.0, 1.5), "spall") for x in (0.0, 1.2, 2.4))
+    states = [everything(person)]
+    for ids in ([second, third], [first, second]):
+        person.execute("SELECT tunnel_api.finding_merge(%s)", [ids])
+        states.append(everything(person))
+    assert row(person, third, "merged_into") == (first,)
+    with pytest.raises(
+        psycopg.Error, match=f"finding {second} is not taken back: it was merged into finding {first}: take that back"
+    ):
+        undo(person, second)
+    assert (undo(person, first), everything(person)) == ("merged", states[1])
+    assert (undo(person, second), everything(person)) == ("merged", states[0])
+    # one that holds the other all
+    inner = draw(person, box(12350.2, 0.7, 12350.4, 0.9), "spall")
+    before = everything(person)
+    person.execute("SELECT tunnel_api.finding_merge(%s)", [[first, inner]])
+    assert (undo(person, first), everything(person)) == ("merged", before)
+    assert (undo(person, inner), undo(person, first)) == ("drawn", "drawn")
+
+
+def test_what_rests_on_a_step_or_is_another_s_is_not_taken_back(people: None, dsn: str, example: str) -> None:
+    with psycopg.connect(make_conninfo(dsn, user="ines")) as ines, psycopg.connect(make_conninfo(dsn, user="otto")) as otto:
+        key = draw(ines, FREE, "spall")
+        (ids,) = ines.execute("SELECT tunnel_api.finding_split(%s, 'LINESTRING(12350.5 0, 12350.5 2)')", [key]).fetchone()
+        ines.execute("UPDATE tunnel_api.finding_unrolled SET severity = 2 WHERE id = %s", [ids[1]])
+        photo = "INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (%s, 'a.jpg')"
+        ines.commit()
+        for step, key_, said in (
+            ("", key, f"finding {ids[1]}, a part of it, was changed since: take that back first"),
+            (f"SELECT tunnel_api.finding_undo({ids[1]})", ids[1], f"it was split off finding {key}: take that back"),
+            (photo % ids[1], key, f"finding {ids[1]}, a part of it, has photos"),
+            ("", 10**9, "there is no change of a finding 1000000000"),
+        ):
+            if step:
+                ines.execute(step.encode())
+                ines.commit()
+            with pytest.raises(psycopg.Error, match=said):
+                undo(ines, key_)
+            ines.rollback()
+        otto.execute("UPDATE tunnel_api.finding_unrolled SET remark = 'mine' WHERE id = %s", [key])
+        otto.commit()
+        with pytest.raises(psycopg.Error, match="its last change is of otto: only who made it, or an operator"):
+            undo(ines, key)
+        ines.rollback()
+        assert undo(otto, key) == "reviewed"
 
 
 def test_two_inspectors_at_once_on_one_finding(people: None, dsn: str, example: str) -> None:

@@ -241,6 +241,25 @@ def import_(
     click.echo(f"{survey}: {len(done.ids)} findings imported" + (f": {said}" if said else ""))
 
 
+@findings.command("undo", examples=["tunneldb findings undo 12"])
+@click.argument("number", metavar="ID", type=click.IntRange(min=1))
+@click.pass_obj
+def undo(settings: Settings, number: int) -> None:
+    """Take back the last change of the finding ID: drawn, redrawn, reviewed, split, merged or deleted.
+
+    Called again it takes back the one before. Only who made a change, or an operator, takes it back, and none that a later
+    change rests on. What was split or merged is taken back of the finding that kept its number.
+    """
+    with connect(settings.dsn) as conn:
+        try:
+            row = conn.execute("SELECT tunnel_api.finding_undo(%s)", [number]).fetchone()
+        except (psycopg.errors.FeatureNotSupported, psycopg.errors.InvalidParameterValue) as error:
+            raise UserError(error.diag.message_primary or str(error)) from error
+    assert row is not None
+    tell(finding=number, undone=row[0])
+    click.echo(f"finding {number}: what was {row[0]} is taken back")
+
+
 def _pairs(given: tuple[str, ...], option: str) -> dict[str, str]:
     pairs = {}
     for text in given:

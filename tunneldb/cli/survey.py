@@ -206,7 +206,8 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
     """Withdraw FILES, by their names, from SURVEY, as if they had never been loaded.
 
     Files that overlap them are read again, and their kilometres loaded without them. One that is left without points
-    loses all that was made of it: where somebody has reviewed leaks there, or moved vertices, it asks first. A file that
+    loses all that was made of it: where somebody has reviewed leaks there, or moved vertices, it asks first; findings that
+    people drew, redrew, split or merged are kept. A file that
     a batch could not read is taken off its list. If it is cut off, call it again.
     """
     from tunneldb.pipeline.remove import known_names, remove_files, work_at_stake
@@ -228,7 +229,8 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
             kms = ", ".join(map(str, emptied))
             question = (
                 f"Kilometre {kms} is left without points: {work.anomalies} leaks and other dark spots go, {work.reviewed} of"
-                f" them reviewed, and {work.edited} axis vertices moved by hand. Remove {', '.join(names)}?"
+                f" them reviewed, and {work.edited} axis vertices moved by hand; {work.drawn} findings that people drew are"
+                f" kept. Remove {', '.join(names)}?"
             )
             if not click.confirm(question, err=True):
                 raise click.Abort
@@ -247,6 +249,7 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
         anomalies=removed.lost.anomalies,
         reviewed=removed.lost.reviewed,
         edited=removed.lost.edited,
+        kept=removed.lost.drawn,
         stale=stale[0],
     )
     again = f"; read again: {', '.join(removed.reread)}" if removed.reread else ""
@@ -255,7 +258,8 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
         lost = removed.lost
         click.echo(
             f"{name}: no points are left in kilometre {', '.join(map(str, removed.emptied))}, and all that was made of them is"
-            f" gone: {lost.anomalies} leaks and other dark spots, {lost.reviewed} of them reviewed",
+            f" gone: {lost.anomalies} leaks and other dark spots, {lost.reviewed} of them reviewed; {lost.drawn} findings that"
+            " people drew are kept",
             err=True,
         )
     if stale[0]:

@@ -40,7 +40,8 @@ _OWN = (
     *(("survey", name, "tunnel", name) for name in ("drop_points", "make_images")),
     *((table, name, "tunnel", f"note_{table}") for table in ("anomaly", "coverage") for name in _NOTES),
     *((table, "note_truncate", "tunnel", "forget_waterproof") for table in ("anomaly", "coverage")),
-    ("anomaly", "set_wet", "tunnel", "set_wet"),
+    *(("anomaly", name, "tunnel", name) for name in ("set_wet", "count_insert", "count_update", "count_delete")),
+    ("anomaly", "count_truncate", "tunnel", "forget_findings"),
     ("finding_kind", "wet_of_kind", "tunnel", "wet_of_kind"),
     ("waterproof", "keep", "tunnel_api", "keep_at_commit"),
 )

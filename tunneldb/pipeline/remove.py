@@ -150,7 +150,10 @@ def _reload(conn: psycopg.Connection[Any], survey: Survey, former: Sequence[Reco
                 result.emptied.append(km)
                 so_far = result.lost
                 result.lost = Work(
-                    so_far.anomalies + lost.anomalies, so_far.reviewed + lost.reviewed, so_far.edited + lost.edited
+                    so_far.anomalies + lost.anomalies,
+                    so_far.reviewed + lost.reviewed,
+                    so_far.edited + lost.edited,
+                    so_far.drawn + lost.drawn,
                 )
 
 
@@ -202,6 +205,8 @@ def _spans(files: Sequence[Recorded]) -> set[int]:
 def _farewell(names: Sequence[str], lost: Work) -> str:
     """What is to be known of a kilometre that went with its files."""
     said = f"no points since {', '.join(names)} was removed"
+    if lost.drawn:
+        said += f"; {lost.drawn} findings that people drew are kept"
     if not (lost.anomalies or lost.edited):
         return said
     gone = f", {lost.reviewed} of them reviewed" if lost.reviewed else ""

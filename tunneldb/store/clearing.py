@@ -24,27 +24,32 @@ class Work:
     Attributes
     ----------
     anomalies : int
-        Leaks and other dark spots there.
+        Leaks and other dark spots there, as detected.
     reviewed : int
-        Of them, those that somebody has reviewed or drawn.
+        Of them, those that somebody has reviewed.
     edited : int
         Vertices of the axis that somebody has moved.
+    drawn : int
+        Findings that people drew, redrew, split or merged there, and what is merged into them: these stay.
     """
 
     anomalies: int
     reviewed: int
     edited: int
+    drawn: int = 0
 
 
 def work_in(conn: psycopg.Connection[Any], survey: Survey, kms: list[int]) -> Work:
     """Count what would go with the results of kilometres."""
     row = conn.execute(
         """
-        SELECT (SELECT count(*) FROM tunnel.anomaly l WHERE l.survey_id = %(survey)s AND l.km = ANY (%(kms)s)),
-               (SELECT count(*) FROM tunnel.anomaly l WHERE l.survey_id = %(survey)s AND l.km = ANY (%(kms)s)
-                   AND (l.review <> 'open' OR l.judged IS NOT NULL OR l.origin <> 'detected')),
+        SELECT count(*) FILTER (WHERE NOT q.drawn), count(*) FILTER (WHERE NOT q.drawn AND q.reviewed),
                (SELECT count(*) FROM tunnel.axis_vertex v WHERE v.survey_id = %(survey)s AND v.km = ANY (%(kms)s)
-                   AND v.edited_at IS NOT NULL)
+                   AND v.edited_at IS NOT NULL),
+               count(*) FILTER (WHERE q.drawn)
+          FROM (SELECT l.origin <> 'detected' OR l.merged_into IS NOT NULL AS drawn,
+                       l.review <> 'open' OR l.judged IS NOT NULL AS reviewed
+                  FROM tunnel.anomaly l WHERE l.survey_id = %(survey)s AND l.km = ANY (%(kms)s)) q
         """,
         {"survey": survey.id, "kms": kms},
     ).fetchone()
@@ -63,12 +68,13 @@ def has_results(conn: psycopg.Connection[Any], survey: Survey, km: int) -> bool:
 def clear_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Work:
     """Delete the results of all stages after ``load`` in a kilometre, and that they ran; what a batch wants of it, too.
 
-    That points were loaded, and are gone, stays in the ledger: what the neighbours have is stale by that. What people have
-    changed by hand stays in the audit.
+    That points were loaded, and are gone, stays in the ledger: what the neighbours have is stale by that. Findings that people
+    drew stay where they are, and what they have changed by hand stays in the audit.
     """
     lost = work_in(conn, survey, [km])
     for table in _RESULTS:
-        query = sql.SQL("DELETE FROM {} WHERE survey_id = %s AND km = %s").format(sql.Identifier("tunnel", table))
+        detected = sql.SQL(" AND origin = 'detected' AND merged_into IS NULL" if table == "anomaly" else "")
+        query = sql.SQL("DELETE FROM {} WHERE survey_id = %s AND km = %s{}").format(sql.Identifier("tunnel", table), detected)
         conn.execute(query, [survey.id, km])
     conn.execute("DELETE FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage <> 'load'", [survey.id, km])
     conn.execute(

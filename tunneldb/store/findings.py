@@ -70,3 +70,4 @@ def settle_findings(conn: psycopg.Connection[Any], survey: Survey, km: int) -> N
     for function in ("link_findings", "mark_dry"):
         query = sql.SQL("SELECT {}(%s, public.ST_MakeEnvelope(%s, -1e4, %s, 1e4))")
         conn.execute(query.format(sql.Identifier("tunnel_api", function)), (survey.id, *place))
+    conn.execute("SELECT tunnel_api.pack_sums(%s)", (survey.id,))

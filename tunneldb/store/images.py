@@ -38,9 +38,12 @@ def load_reference(conn: psycopg.Connection[Any], survey: Survey) -> ReferenceCu
 
 
 def load_regions(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: str) -> list[Polygon]:
-    """Read the polygons of a kind (homogeneous or dry) that the user drew in a kilometre, in the unrolled plane."""
+    """Read the polygons of a kind (homogeneous or dry) that the user drew in a kilometre, in the unrolled plane.
+
+    One that waits for an operator is left out.
+    """
     rows = conn.execute(
-        "SELECT public.ST_AsBinary(geom) FROM tunnel.region WHERE survey_id = %s AND kind = %s"
+        "SELECT public.ST_AsBinary(geom) FROM tunnel.region WHERE survey_id = %s AND kind = %s AND NOT waits"
         " AND public.ST_XMax(geom) > %s AND public.ST_XMin(geom) < %s ORDER BY id",
         (survey.id, kind, km * KILOMETRE, (km + 1) * KILOMETRE),
     ).fetchall()

@@ -7,7 +7,7 @@ decibels, seconds, square metres, unless a comment says otherwise.
 from tunneldb.database.models.base import AUDIT_SCHEMA, SCHEMA, Base
 from tunneldb.database.models.catalog import AlignmentElement, Pose, Reference, Station, StationEquation, Survey, Tunnel
 from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
-from tunneldb.database.models.finding import FindingKind, Photo, Severity
+from tunneldb.database.models.finding import FindingKind, FindingSum, Photo, Severity
 from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
 from tunneldb.database.models.ground import Cluster, Ground, Lining, TargetSphere
 from tunneldb.database.models.leak import (
@@ -42,6 +42,7 @@ __all__ = [
     "FeatureList",
     "FileKm",
     "FindingKind",
+    "FindingSum",
     "Goal",
     "Ground",
     "Image",

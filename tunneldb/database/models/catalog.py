@@ -30,7 +30,8 @@ class Tunnel(Base):
         server_default=text("0"), comment="Chainage of the given axis's first vertex, m"
     )
     dry_region_limit: Mapped[float] = mapped_column(
-        server_default=text("50"), comment="Area above which a dry region must say why it is drawn, m²"
+        server_default=text("50"),
+        comment="Area above which a dry region must say why it is drawn, and waits for an operator, m²",
     )
     spacing: Mapped[float] = mapped_column(
         server_default=text("10"), comment="Distance between vertices of the averaged axis, m of chainage"

@@ -8,7 +8,7 @@ from sqlalchemy import BigInteger, CheckConstraint, Identity, Index, SmallIntege
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
-from tunneldb.database.models.base import CLOCK, Base, parent
+from tunneldb.database.models.base import CLOCK, SURVEY, Base, parent
 
 
 class FindingKind(Base):
@@ -45,6 +45,32 @@ class Severity(Base):
     id: Mapped[int] = mapped_column(SmallInteger, primary_key=True, autoincrement=False, comment="1, the least, to 4")
     label: Mapped[str] = mapped_column(comment="Its name, in the owner's words")
     text: Mapped[str | None] = mapped_column(comment="What it means")
+
+
+class FindingSum(Base):
+    """By how much a change of findings changed their sums."""
+
+    __tablename__ = "finding_sum"
+    __table_args__ = (
+        Index(None, "survey_id"),
+        {
+            "comment": "What each change of findings adds to their numbers, areas and lengths: the sums of the rows are those "
+            "of all findings. Rows are put together now and then"
+        },
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    kind: Mapped[str] = mapped_column(comment="Kind, as judged")
+    wet: Mapped[bool] = mapped_column(comment="Whether it counts as wet")
+    origin: Mapped[str] = mapped_column(comment="How their outlines came about")
+    severity: Mapped[int | None] = mapped_column(SmallInteger, comment="Severity")
+    state: Mapped[str] = mapped_column(comment="open or confirmed, which count, rejected, gone, dry, same or merged")
+    measured: Mapped[bool] = mapped_column(comment="Whether they were measured on the image")
+    findings: Mapped[int] = mapped_column(BigInteger, comment="By how many they became more")
+    area: Mapped[float] = mapped_column(comment="By how much their area grew, m²")
+    length: Mapped[float] = mapped_column(comment="By how much the length of lines grew, m")
+    extent: Mapped[float] = mapped_column(comment="The same, with what is no line as long as along the tunnel, m")
 
 
 class Photo(Base):

@@ -130,6 +130,12 @@ class Region(Base):
     drawn_by: Mapped[str] = mapped_column(server_default=text("CURRENT_USER"), comment="Who drew it")
     drawn_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was drawn")
     reason: Mapped[str | None] = mapped_column(comment="Why; a dry region larger than the tunnel's limit needs one")
+    waits: Mapped[bool] = mapped_column(
+        server_default=text("false"),
+        comment="Whether it waits for an operator, being larger than the tunnel's limit: until then it marks nothing",
+    )
+    approved_by: Mapped[str | None] = mapped_column(comment="Operator who put it in force, where it had to wait")
+    approved_at: Mapped[dt.datetime | None] = mapped_column(comment="When")
 
 
 class Image(Base):
@@ -185,7 +191,21 @@ class Anomaly(Review, Base):
         Index("anomaly_kind_idx", "survey_id", text("COALESCE(judged, kind)")),
         Index(None, "survey_id", "severity", postgresql_where=text("severity IS NOT NULL")),
         Index(
-            "anomaly_uncounted_idx", "survey_id", postgresql_where=text("NOT (detected AND review <> 'rejected' AND NOT aside)")
+            "anomaly_uncounted_idx",
+            "survey_id",
+            postgresql_where=text("NOT (detected AND review <> 'rejected' AND NOT aside)"),
+            postgresql_include=[
+                "id",
+                "kind",
+                "judged",
+                "severity",
+                "review",
+                "detected",
+                "aside",
+                "merged_into",
+                "same_as",
+                "dry_region_id",
+            ],
         ),
         Index("anomaly_by_hand_idx", "survey_id", "chainage_from", postgresql_where=text("origin <> 'detected'")),
         Index(None, "feature_list_id"),
@@ -193,7 +213,7 @@ class Anomaly(Review, Base):
         Index(None, "judged"),
         Index(None, "severity"),
         Index(None, "merged_into"),
-        Index(None, "same_as"),
+        Index(None, "same_as", postgresql_where=text("same_as IS NOT NULL")),
         Index(None, "parent_id"),
         Index(None, "dry_region_id"),
         Index(None, "unrolled", postgresql_using="gist"),

@@ -97,6 +97,8 @@ class Audit(Base):
         one_of("action", "insert", "update", "delete"),
         Index(None, "survey", "at"),
         Index(None, "view", "row_id"),
+        Index(None, "undoes", postgresql_where=text("undoes IS NOT NULL")),
+        Index(None, "part_of", postgresql_where=text("part_of IS NOT NULL")),
         {
             "schema": AUDIT_SCHEMA,
             "comment": "What people changed through the views: who, when, before and after; outlives what it speaks of",
@@ -112,3 +114,10 @@ class Audit(Base):
     action: Mapped[str] = mapped_column(comment="insert, update or delete")
     before: Mapped[dict[str, Any] | None] = mapped_column(comment="Columns that changed, as they were; none of an insert")
     after: Mapped[dict[str, Any] | None] = mapped_column(comment="The same as they are now; none of a delete")
+    undoes: Mapped[int | None] = mapped_column(BigInteger, comment="Entry that this one takes back")
+    part_of: Mapped[int | None] = mapped_column(
+        BigInteger, comment="Entry of the step that this one is a part of: a split, a merge or a delete"
+    )
+    kept: Mapped[dict[str, Any] | None] = mapped_column(
+        comment="What had been measured of a finding before its outline changed"
+    )

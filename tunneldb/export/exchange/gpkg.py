@@ -49,6 +49,8 @@ def layers() -> list[VectorLayer]:
     """Layers of the QGIS project that have rows of their own; of those on the same view the first."""
     seen: dict[str, VectorLayer] = {}
     for layer in LAYERS:
+        if layer.shows_findings:  # of three kinds of geometry; "findings -o" writes them
+            continue
         seen.setdefault(layer.view, layer)
     return list(seen.values())
 

@@ -7,6 +7,12 @@ from dataclasses import dataclass
 MAP, UNROLLED, SPACE = "Map", "Unrolled", "3D"
 """Groups of the layer tree, and the map themes of the same names."""
 
+FINDINGS, FINDINGS_MAP = "Findings", "Findings on the map"
+"""Map themes for drawing findings, on the unrolled lining and beside the axis; the first also names the group of the layers."""
+
+LISTS = "Lists"
+"""Group of the tables that forms take from."""
+
 SHEETS = "Inspection sheets"
 """The print layout, and the map theme that it shows."""
 
@@ -47,6 +53,8 @@ class VectorLayer:
         Whether it is for editing; the others are read-only in QGIS.
     where : str
         Condition on the rows that it shows, beside that on the survey.
+    part : str
+        Group within the group that it stands in, if any.
     """
 
     id: str
@@ -59,6 +67,7 @@ class VectorLayer:
     edited: bool = False
     column: str = "geom"
     where: str = ""
+    part: str = ""
 
     @property
     def on_map(self) -> bool:
@@ -68,6 +77,8 @@ class VectorLayer:
     @property
     def path(self) -> tuple[str, ...]:
         """Groups of the layer tree that it stands in, from the outermost."""
+        if self.part:
+            return (self.group, self.part)
         return (STRUCTURES, FACES) if self.group == FACES else (self.group,)
 
     @property
@@ -75,11 +86,29 @@ class VectorLayer:
         """Kind of geometry without dimension, as QGIS names it in a project: Point, Line or Polygon."""
         return {"Point": "Point", "LineString": "Line", "Polygon": "Polygon"}[self.wkb.removesuffix("Z").removeprefix("Multi")]
 
+    @property
+    def shows_findings(self) -> bool:
+        """Whether it shows findings of all kinds: its style and its form are made of the owner's catalogue."""
+        return self.part == FINDINGS
+
 
 _DRY = "\"kind\" <> 'leak'"
 
+
+def _findings(suffix: str, group: str, theme: str, z: str = "", where: str = "") -> tuple[VectorLayer, ...]:
+    """Layers of findings of a view: points over lines over areas."""
+    return tuple(
+        VectorLayer(
+            f"finding_{shape}_{suffix}", f"Findings: {title}", f"finding_{suffix}", wkb + z, "finding", group, (theme,),
+            edited=not z, where=where, part=FINDINGS,
+        )
+        for shape, title, wkb in (("point", "points", "Point"), ("line", "lines", "LineString"), ("area", "areas", "Polygon"))
+    )  # fmt: skip
+
+
 # In drawing order within a group, from the top.
 LAYERS = (
+    *_findings("map", MAP, FINDINGS_MAP),
     VectorLayer("axis_vertex", "Axis vertices (editable)", "axis_vertex", "PointZ", "axis_vertex", MAP, (MAP,), True),
     VectorLayer("leak_map", "Leaks beside the axis, unrolled (review)", "leak_map", "Polygon", "leak", MAP, (MAP,), True),
     VectorLayer(
@@ -87,11 +116,12 @@ LAYERS = (
         where=_DRY,
     ),
     VectorLayer("target_sphere", "Target spheres", "target_sphere", "PointZ", "target_sphere", MAP, (MAP, SPACE)),
-    VectorLayer("axis", "Axis", "axis", "LineStringZ", "axis", MAP, (MAP, SPACE)),
+    VectorLayer("axis", "Axis", "axis", "LineStringZ", "axis", MAP, (MAP, SPACE, FINDINGS_MAP)),
     VectorLayer("segment", "Segments", "segment", "LineStringZ", "segment", MAP, (MAP,)),
     VectorLayer("section", "Sections", "section", "LineStringZ", "section", MAP, (MAP, SPACE)),
-    VectorLayer("outline", "Walls, at their widest", "outline", "LineString", "outline", MAP, (MAP,)),
+    VectorLayer("outline", "Walls, at their widest", "outline", "LineString", "outline", MAP, (MAP, FINDINGS_MAP)),
     VectorLayer("cluster", "Objects, rails, appendages", "cluster", "Polygon", "cluster", MAP, (MAP,)),
+    *_findings("unrolled", UNROLLED, FINDINGS),
     VectorLayer(
         "coverage_gap", "Where leaks could be missed", "coverage_gap", "Polygon", "coverage_gap", UNROLLED, (UNROLLED, SHEETS)
     ),
@@ -100,17 +130,18 @@ LAYERS = (
         "anomaly_unrolled", "Dark but dry (review)", "anomaly_unrolled", "Polygon", "anomaly", UNROLLED, (), True,
         where=_DRY,
     ),
-    VectorLayer("region", "Regions drawn by hand", "region", "Polygon", "region", UNROLLED, (UNROLLED,), True),
+    VectorLayer("region", "Regions drawn by hand", "region", "Polygon", "region", UNROLLED, (UNROLLED, FINDINGS), True),
     VectorLayer(
         "section_unrolled", "Sections, unrolled", "section_unrolled", "LineString", "section_unrolled", UNROLLED,
         (UNROLLED,),
     ),
-    VectorLayer("sheet", "Sheets of 50 m", "sheet", "Polygon", "sheet", UNROLLED, (UNROLLED,)),
+    VectorLayer("sheet", "Sheets of 50 m", "sheet", "Polygon", "sheet", UNROLLED, (UNROLLED, FINDINGS)),
     VectorLayer(
         "leak_sheet", "Leaks, numbered (sheets)", "leak_unrolled", "Polygon", "leak_sheet", UNROLLED, (SHEETS,),
         where="\"review\" <> 'rejected' AND \"detected\"",
     ),
     VectorLayer("leak_3d", "Leaks in space (review)", "leak_3d", "PolygonZ", "leak_3d", SPACE, (SPACE,), True),
+    *_findings("3d", SPACE, SPACE, "Z", '"by_hand" AND NOT "wet"'),
     VectorLayer("ground", "Ground", "ground", "LineStringZ", "ground", SPACE, (SPACE,)),
 )  # fmt: skip
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import psycopg
 
 from tunneldb import __version__
+from tunneldb.export.qgis.catalogue import Catalogue, read_catalogue
 from tunneldb.export.qgis.crs import crs_element, no_crs
 from tunneldb.export.qgis.extent import (
     Extent,
@@ -26,9 +27,24 @@ from tunneldb.export.qgis.extent import (
     sheet_extent,
     unrolled_extents,
 )
+from tunneldb.export.qgis.finding_actions import finding_actions
+from tunneldb.export.qgis.finding_form import (
+    KIND_LIST,
+    PHOTOS,
+    SEVERITIES,
+    defaults,
+    demanded,
+    finding_form,
+    photo_form,
+    relation,
+)
+from tunneldb.export.qgis.finding_style import finding_style
 from tunneldb.export.qgis.layer import (
     FACES,
+    FINDINGS,
+    FINDINGS_MAP,
     LAYERS,
+    LISTS,
     MAP,
     SHEETS,
     SPACE,
@@ -54,6 +70,9 @@ from tunneldb.store.survey import Survey
 
 QGIS_VERSION = "3.22.0-Białowieża"
 """Version whose form of project is written; later ones read it."""
+
+NEW_KINDS = {"leak_map": "leak", "leak_unrolled": "leak", "anomaly_map": "dark", "anomaly_unrolled": "dark"}
+"""Layers of leaks and dark spots in which findings may be drawn, and the kind that such a one begins with."""
 
 _DOCTYPE = "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
 
@@ -162,8 +181,11 @@ def _project(
     entries = [_table(source, survey, "remark", "What is to be known (table)", counted=True)]
     if structures:
         entries.append(_table(source, survey, "member_statistics", "Members (table)"))
-    entries += [_vector(layer, source, survey, crs, in_space=layer.id in filled) for layer in layers]
+    catalogue = None if survey.site else read_catalogue(conn, survey)
+    entries += [_vector(layer, source, survey, crs, catalogue, in_space=layer.id in filled) for layer in layers]
     entries += _rasters(images, folder, crs)
+    if catalogue is not None:
+        entries += _lists(source, survey)
     views = _views(conn, survey, cells)
     root = ET.Element("qgis", version=QGIS_VERSION, projectname=survey.name, saveUser="", saveUserFull="")
     ET.SubElement(root, "homePath", path="")
@@ -179,6 +201,8 @@ def _project(
     shown = [layer_id(layer.id) for layer in layers if layer.id in filled]
     root.append(docks(view, scene(view, views[0].extent, crs, shown)))
     ET.SubElement(root, "projectlayers").extend(entry.element for entry in entries)
+    drawn = [layer_id(layer.id) for layer in layers if layer.shows_findings and layer.edited]
+    ET.SubElement(root, "relations").extend(relation(layer, layer_id(PHOTOS)) for layer in drawn)
     root.append(_themes(entries, site=survey.site))
     root.append(_bookmarks(views, crs))
     root.append(_properties(absolute=folder is None))
@@ -215,7 +239,9 @@ def layer_id(name: str) -> str:
     return f"tunneldb_layer_{name}"
 
 
-def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element, *, in_space: bool) -> _Entry:
+def _vector(
+    layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element, catalogue: Catalogue | None, *, in_space: bool
+) -> _Entry:
     """A layer on a view; a 3D view draws it only if it is in space."""
     element = ET.Element(
         "maplayer", type="vector", geometry=layer.geometry, wkbType=layer.wkb, readOnly=str(int(not layer.edited)),
@@ -227,19 +253,52 @@ def _vector(layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element,
     ET.SubElement(element, "layername").text = layer.title
     ET.SubElement(element, "srs").append(deepcopy(crs) if layer.on_map else no_crs())
     ET.SubElement(element, "provider", encoding="UTF-8").text = "postgres"
-    element.extend(part for part in style_elements(layer.style) if in_space or part.tag != "renderer-3d")
+    if layer.shows_findings and catalogue is not None:
+        element.extend(_findings(layer, catalogue, survey, in_space=in_space))
+    else:
+        element.extend(part for part in style_elements(layer.style) if in_space or part.tag != "renderer-3d")
     if layer.id in RECOMPUTED_FROM:
         element.append(recompute(survey, source))
-    if layer.view == "region":
-        # What is drawn belongs to this survey.
-        defaults = ET.SubElement(element, "defaults")
-        for column, value in (("survey", survey.name), ("kind", "dry")):
-            quoted = value.replace("'", "''")
-            ET.SubElement(defaults, "default", field=column, expression=f"'{quoted}'", applyOnUpdate="0")
+    # What is drawn belongs to this survey.
+    if layer.view == "region" and catalogue is not None:
+        limit = catalogue.dry_region_limit
+        element.append(defaults({"survey": survey.name, "kind": "dry"}))
+        element.extend(
+            demanded(
+                "reason", f"\"kind\" <> 'dry' OR area($geometry) <= {limit} OR trim(coalesce(\"reason\", '')) <> ''",
+                f"A dry region of more than {limit:g} m² must say why; an operator then puts it in force.",
+            )
+        )  # fmt: skip
+    elif layer.id in NEW_KINDS:
+        element.append(defaults({"survey": survey.name, "kind": NEW_KINDS[layer.id], "review": "confirmed"}))
     return _Entry(layer_id(layer.id), layer.title, layer.path, layer.themes, element)
 
 
-def _table(source: Source, survey: Survey, view: str, title: str, *, counted: bool = False) -> _Entry:
+def _findings(layer: VectorLayer, catalogue: Catalogue, survey: Survey, *, in_space: bool) -> list[ET.Element]:
+    """How a layer of findings is drawn, and its form."""
+    tables = {view: layer_id(view) for view in (KIND_LIST, SEVERITIES, PHOTOS)}
+    return [
+        *finding_style(catalogue, layer.geometry, in_space=in_space),
+        *finding_form(catalogue, layer.geometry, layer_id(layer.id), tables, survey.name),
+        *([finding_actions()] if layer.edited else []),
+    ]
+
+
+def _lists(source: Source, survey: Survey) -> list[_Entry]:
+    """The tables that the forms of findings take from, and their photos, which are added and changed there."""
+    photos = _table(source, survey, PHOTOS, "Photos (table)", group=(LISTS,))
+    photos.element.set("readOnly", "0")
+    photos.element.extend(photo_form())
+    return [
+        photos,
+        _table(source, None, KIND_LIST, "Kinds of findings (table)", group=(LISTS,)),
+        _table(source, None, SEVERITIES, "Severities (table)", group=(LISTS,)),
+    ]
+
+
+def _table(
+    source: Source, survey: Survey | None, view: str, title: str, *, counted: bool = False, group: tuple[str, ...] = ()
+) -> _Entry:
     """A table; if counted, how many lines it has stands beside its name."""
     element = ET.Element(
         "maplayer", type="vector", geometry="No geometry", wkbType="NoGeometry", readOnly="1", autoRefreshEnabled="0",
@@ -247,11 +306,11 @@ def _table(source: Source, survey: Survey, view: str, title: str, *, counted: bo
         styleCategories="AllStyleCategories",
     )  # fmt: skip
     ET.SubElement(element, "id").text = layer_id(view)
-    ET.SubElement(element, "datasource").text = source.table(view, survey.name)
+    ET.SubElement(element, "datasource").text = source.table(view, survey.name if survey else None)
     ET.SubElement(element, "layername").text = title
     ET.SubElement(element, "srs").append(no_crs())
     ET.SubElement(element, "provider", encoding="UTF-8").text = "postgres"
-    return _Entry(layer_id(view), title, (), (), element, counted)
+    return _Entry(layer_id(view), title, group, (), element, counted)
 
 
 def _rasters(images: Sequence[Path], folder: Path | None, crs: ET.Element) -> list[_Entry]:
@@ -277,7 +336,7 @@ def _rasters(images: Sequence[Path], folder: Path | None, crs: ET.Element) -> li
             if kind == BED:
                 entries.append(_Entry(layer_id(path.stem), path.stem, (UNDERWATER, title), (MAP,), element))
                 continue
-            themes = (UNROLLED, SHEETS) if kind.removesuffix(FILLED) in shown else ()
+            themes = (UNROLLED, SHEETS, FINDINGS) if kind.removesuffix(FILLED) in shown else ()
             entries.append(_Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))
     return entries
 
@@ -305,6 +364,9 @@ def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
         "layer-tree-group", name=name, expanded=str(int(name in ("", MAP, UNROLLED, STRUCTURES, UNDERWATER))),
         checked="Qt::Checked" if checked else "Qt::Unchecked",
     )  # fmt: skip
+    for title, part in group.groups.items():
+        if title == FINDINGS:
+            element.append(_group_element(part, title, False))
     for entry in group.entries:
         leaf = ET.SubElement(
             element, "layer-tree-layer", id=entry.id, name=entry.title, expanded="0",
@@ -314,7 +376,8 @@ def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
             shown = ET.SubElement(ET.SubElement(leaf, "customproperties"), "Option", type="Map")
             ET.SubElement(shown, "Option", type="int", name="showFeatureCount", value="1")
     for title, part in group.groups.items():
-        element.append(_group_element(part, title, title in (MAP, STRUCTURES, UNDERWATER)))
+        if title != FINDINGS:
+            element.append(_group_element(part, title, title in (MAP, STRUCTURES, UNDERWATER)))
     return element
 
 
@@ -322,11 +385,19 @@ def _themes(entries: Sequence[_Entry], *, site: bool) -> ET.Element:
     """Map themes: which layers are visible, and the groups that must be switched on for it; of a tunnel all of its own."""
     presets = ET.Element("visibility-presets")
     used = {theme for entry in entries for theme in entry.themes} | (set() if site else {MAP, UNROLLED, SPACE, SHEETS})
-    for theme in (theme for theme in (MAP, UNROLLED, SPACE, SHEETS, FACES) if theme in used):
+    known = (MAP, UNROLLED, FINDINGS, FINDINGS_MAP, SPACE, SHEETS, FACES)
+    for theme in (theme for theme in known if theme in used):
         preset = ET.SubElement(presets, "visibility-preset", {"name": theme, "has-expanded-info": "1"})
         shown = [entry for entry in entries if theme in entry.themes]
         for entry in shown:
             ET.SubElement(preset, "layer", id=entry.id, visible="1", style="default", expanded="1")
+            rules = list(entry.element.iterfind("renderer-v2//rule"))
+            if any(rule.get("checkstate") == "0" for rule in rules):
+                ticked = [rule for rule in rules if rule.get("checkstate") != "0"]
+                for tag, listing in (("checked", ticked), ("expanded", [rule for rule in rules if len(rule)])):
+                    listed = ET.SubElement(preset, f"{tag}-legend-nodes", id=entry.id)
+                    for rule in listing:
+                        ET.SubElement(listed, f"{tag}-legend-node", id=rule.get("key", ""))
         for tag in ("checked-group-nodes", "expanded-group-nodes"):
             nodes = ET.SubElement(preset, tag)
             for path in sorted({"/".join(e.group[: d + 1]) for e in shown for d in range(len(e.group))}):

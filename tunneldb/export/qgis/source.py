@@ -73,12 +73,12 @@ class Source:
             f'sql="survey" = {name}{" AND " + layer.where if layer.where else ""}'
         )
 
-    def table(self, view: str, survey: str) -> str:
-        """Return the data source of a view without geometry, restricted to a survey; its rows are counted, not estimated."""
-        name = "'" + survey.replace("'", "''") + "'"
+    def table(self, view: str, survey: str | None) -> str:
+        """Return the data source of a view without geometry, of a survey or of all; its rows are counted, not estimated."""
+        name = "" if survey is None else '"survey" = \'' + survey.replace("'", "''") + "'"
         return (
             f"{self.connection} key='id' estimatedmetadata=false checkPrimaryKeyUnicity='0' "
-            f'table="tunnel_api"."{view}" sql="survey" = {name}'
+            f'table="tunnel_api"."{view}" sql={name}'
         )
 
 

@@ -101,11 +101,13 @@ def filled_layers(conn: psycopg.Connection, survey: str, layers: Sequence[Vector
 
     A single layer that has a 3D style and no rows leaves the whole view blank in QGIS 3.22.
     """
-    query = sql.SQL("SELECT EXISTS (SELECT FROM tunnel_api.{} WHERE survey = %s)")
+    query = sql.SQL("SELECT EXISTS (SELECT FROM tunnel_api.{} WHERE survey = %s AND public.GeometryType({}) = upper(%s){})")
     found = set()
     for layer in layers:
         if SPACE in layer.themes:
-            row = conn.execute(query.format(sql.Identifier(layer.view)), (survey,)).fetchone()
+            condition = sql.SQL(f" AND {layer.where}" if layer.where else "")
+            rows = query.format(sql.Identifier(layer.view), sql.Identifier(layer.column), condition)
+            row = conn.execute(rows, (survey, layer.wkb.removesuffix("Z"))).fetchone()
             found |= {layer.id} if row and row[0] else set()
     return found
 
