@@ -26,7 +26,7 @@ from benchmarks.evidence.painted import paintings
 from benchmarks.evidence.pictures import pictures
 from tunneldb.anomalies import evidence
 
-FAMILIES = ("known", *(f"round_{k:02}" for k in range(1, 8)), "set-1")
+FAMILIES = ("known", *(f"round_{k:02}" for k in range(1, 9)), "set-1")
 PAINTINGS, PAINTED = 320, 0.5
 """How many pictures are painted, and how much their regions count: less than those of scans."""
 

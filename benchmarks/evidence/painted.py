@@ -92,7 +92,7 @@ def blob(art: Painting, s: float, a: float, area: float, elongation: float = 1.0
 
 
 def uneven(art: Painting) -> Array:
-    """Factor by which a patch differs from place to place."""
+    """Factor by which a patch differs from place to place, be it wet or dry: by how much tells neither."""
     field = ndimage.gaussian_filter(art.rng.normal(0, 1, art.drop.shape), art.uniform(4, 20))
     return np.clip(1 + art.uniform(0, 0.4) * field / field.std(), 0.3, 1.6)
 
@@ -134,7 +134,7 @@ def band(art: Painting, s: float, a: float, straight: bool = False) -> None:
     line = [*zip(t, low, strict=True), *zip(t[::-1], high[::-1], strict=True)]
     shape = Polygon([(s + v, a + u) if around else (s + u, a + v) for u, v in line]).buffer(0)
     if straight:
-        art.paint(art.cover(shape), art.log(1.2, 7.0))
+        art.paint(art.cover(shape) * uneven(art), art.log(1.2, 7.0))
     else:
         art.paint(art.cover(shape, art.log(0.006, 0.04)) * uneven(art), art.log(1.5, 8.0), wet=True)
 
@@ -152,12 +152,12 @@ def repair(art: Painting, s: float, a: float) -> None:
     shape = box(s - art.log(0.12, 1.2), a - art.log(0.12, 1.2), s + art.log(0.12, 1.2), a + art.log(0.12, 1.2))
     if art.rng.random() < 0.3:
         shape = affinity.rotate(shape, art.uniform(-25, 25))
-    art.paint(art.cover(shape), art.log(0.6, 4.5))
+    art.paint(art.cover(shape) * uneven(art), art.log(0.6, 4.5))
 
 
 def shade(art: Painting, s: float, a: float) -> None:
     shape = box(s - art.uniform(0.6, 1.4), a - art.uniform(0.6, 1.4), s + art.uniform(0.6, 1.4), a + art.uniform(0.6, 1.4))
-    art.paint(art.cover(shape), art.log(0.5, 2.0))
+    art.paint(art.cover(shape) * uneven(art), art.log(0.5, 2.0))
 
 
 def soot(art: Painting, s: float, a: float) -> None:
@@ -175,7 +175,7 @@ def halo(art: Painting, s: float, a: float) -> None:
 
 def stripe(art: Painting, s: float, a: float) -> None:
     half = art.uniform(0.02, 0.15)
-    art.paint(art.cover(box(s - 1.35, a - half, s + art.uniform(0.3, 1.35), a + half)), art.log(0.8, 5.0))
+    art.paint(art.cover(box(s - 1.35, a - half, s + art.uniform(0.3, 1.35), a + half)) * uneven(art), art.log(0.8, 5.0))
 
 
 def grime(art: Painting, s: float, a: float) -> None:
@@ -191,7 +191,7 @@ def shadow(art: Painting, s: float, a: float) -> None:
     """Beside a pipe, or between two."""
     half, width = art.uniform(0.03, 0.1), art.uniform(0.03, 0.12)
     near = np.abs(art.x - s) < 1.4
-    art.paint(art.cover(box(s - 1.3, a + half, s + 1.3, a + half + width)), art.log(1.5, 7.0))
+    art.paint(art.cover(box(s - 1.3, a + half, s + 1.3, a + half + width)) * uneven(art), art.log(1.5, 7.0))
     art.state[(np.abs(art.y - a) < half) & near] = PixelState.OFF
     if art.rng.random() < 0.5:
         art.state[(np.abs(art.y - a - 2 * half - width) < half) & near] = PixelState.OFF
@@ -202,14 +202,14 @@ def between(art: Painting, s: float, a: float) -> None:
     half, long, frame = art.log(0.05, 0.4), art.log(0.15, 1.2), art.uniform(0.06, 0.2)
     shown = box(s - long, a - half, s + long, a + half)
     art.state[(art.cover(shown.buffer(frame, join_style="mitre")) > 0.5) & (art.cover(shown) < 0.5)] = PixelState.OFF
-    art.paint(art.cover(shown), art.log(1.0, 6.0))
+    art.paint(art.cover(shown) * uneven(art), art.log(1.0, 6.0))
 
 
 def pocket(art: Painting, s: float, a: float) -> None:
     half = art.uniform(0.08, 0.16)
     shape = box(s - half, a - half, s + half, a + half)
     art.state[art.cover(shape) > 0.5] = PixelState.RECESS
-    art.paint(art.cover(shape), art.log(1.0, 6.0))
+    art.paint(art.cover(shape) * uneven(art), art.log(1.0, 6.0))
 
 
 def crossed(art: Painting, s: float, a: float) -> None:
