@@ -215,6 +215,24 @@ def test_digest_tells_another_state(example: str, conn: psycopg.Connection, tmp_
     assert re.search(r"<td class=\"n\">0</td><td class=\"n\">1</td><td class=\"n\">0</td>", text), "and by whom"
 
 
+def test_what_was_rejected_and_not_found_again_counts_alike_everywhere(
+    example: str, conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    conn.execute("UPDATE tunnel_api.leak SET review = CASE id WHEN 2 THEN 'rejected' ELSE 'confirmed' END WHERE id IN (1, 2)")
+    conn.execute("UPDATE tunnel.anomaly SET detected = false WHERE id IN (1, 2)")
+    conn.commit()
+    run("report", example, "-o", tmp_path / "r.html")
+    text = (tmp_path / "r.html").read_text("utf-8")
+    stated = re.findall(r"<dt>Review</dt><dd>(\d+) confirmed, (\d+) rejected, (\d+) open</dd>", text)
+    said = re.findall(r"inspectors confirmed (\d+) and rejected (\d+); (\d+) are not reviewed", text)
+    row = re.findall(r'<tr><td><a href="#kind-leak">.*?</tr>', text)[0]
+    cells = re.findall(r'<td class="n(?: apart)?">(?:<b>)?([^<]*)', row)
+    assert stated == said == [(cells[0], cells[5], cells[1])]
+    assert conn.execute(
+        "SELECT sum(confirmed)::text, sum(rejected)::text, sum(open)::text FROM tunnel_api.finding_count WHERE wet"
+    ).fetchall() == stated  # fmt: skip
+
+
 def test_state_that_does_not_hold_is_warned_of(example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
     conn.execute("UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0.03, 0.04, 0) WHERE n = 1240")
     conn.execute("UPDATE tunnel.anomaly SET detected = false WHERE id = 3")

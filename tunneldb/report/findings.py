@@ -13,7 +13,7 @@ import psycopg
 import shapely
 
 from tunneldb.export.tables.dry_regions import DryRegion
-from tunneldb.export.tables.finding_counts import STATES, KindCount, count_findings, read_kinds, read_severities
+from tunneldb.export.tables.finding_counts import STATES, KindCount, count_findings, read_kinds, read_severities, read_wet_kinds
 from tunneldb.export.tables.findings import COUNTED, Chosen, Finding, read_findings
 from tunneldb.report.drawing import line_path, outline_path
 from tunneldb.report.photos import Thumbnail, make_thumbnails, read_photos
@@ -80,6 +80,8 @@ class FindingsChapter:
         Ids of those that are reported as leaks.
     merged : dict of int to list of int
         Ids of those that are merged into one, by its id.
+    wet : frozenset of str
+        Codes of the kinds that are leaks in the sums.
     """
 
     kinds: list[KindChapter]
@@ -88,11 +90,17 @@ class FindingsChapter:
     by_id: dict[int, Finding]
     leaks: frozenset[int]
     merged: dict[int, list[int]]
+    wet: frozenset[str]
 
     @property
     def states(self) -> dict[str, int]:
         """How many there are in each state."""
-        return {state: sum(kind.count.states[state] for kind in self.kinds) for state in STATES}
+        return _states(self.kinds)
+
+    @property
+    def wet_states(self) -> dict[str, int]:
+        """How many leaks, those of wet kinds, there are in each state."""
+        return _states([kind for kind in self.kinds if kind.count.kind in self.wet])
 
     @property
     def counted(self) -> int:
@@ -130,6 +138,10 @@ class FindingsChapter:
         """Severities of these, from the greatest, with the owner's words; 0 for none."""
         there = {finding.severity or 0 for finding in self.marks}
         return [(severity, self.severities.get(severity, "")) for severity in sorted(there, reverse=True)]
+
+
+def _states(kinds: Sequence[KindChapter]) -> dict[str, int]:
+    return {state: sum(kind.count.states[state] for kind in kinds) for state in STATES}
 
 
 def read_findings_chapter(
@@ -173,7 +185,7 @@ def read_findings_chapter(
         if finding.merged_into is not None:
             merged[finding.merged_into].append(finding.id)
     by_id = {finding.id: finding for finding in found}
-    return FindingsChapter(chapters, read_severities(conn), dict(pictures), by_id, leaks, dict(merged))
+    return FindingsChapter(chapters, read_severities(conn), dict(pictures), by_id, leaks, dict(merged), read_wet_kinds(conn))
 
 
 def _chapter(count: KindCount, findings: Sequence[Finding], tabled: frozenset[int]) -> KindChapter:

@@ -17,7 +17,7 @@ from tunneldb import __version__
 from tunneldb.database import snapshot
 from tunneldb.errors import UserError
 from tunneldb.export.tables.dry_regions import read_dry_regions
-from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES
+from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, STATES
 from tunneldb.export.tables.leaks import clock_label
 from tunneldb.raster.gap_fill import TOLD
 from tunneldb.report import data, text
@@ -233,7 +233,7 @@ class _Report:
             "classes": classes,
             "leaks": self.leaks,
             "counted": counted,
-            "by_review": {name: sum(leak.review == name for leak in self.leaks) for name in ("open", "confirmed", "rejected")},
+            "by_state": self.findings.wet_states if self.findings else dict.fromkeys(STATES, 0),
             "lost": [leak for leak in self.leaks if not leak.detected],
             "others": data.read_others(conn, survey, low, high),
             "search": self.search,
