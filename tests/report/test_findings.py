@@ -199,6 +199,35 @@ def test_each_finding_has_a_row_or_is_in_a_line_that_says_so(drawn: str, report:
     assert row[6:] == ["oil", f"1 ({0.785:.3f} m²): {ids[0]}"] or row[7].endswith(f": {ids[0]}")
 
 
+def test_report_workbook_and_json_say_which_dry_region_waits_and_who_approved(
+    example: str, conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    waiting, approved = (
+        conn.execute(
+            "INSERT INTO tunnel_api.region (survey_id, kind, reason, geom)"
+            " SELECT id, 'dry', 'oil', ST_MakeEnvelope(%s, -4, %s, 4, 0) FROM tunnel.survey RETURNING id",
+            [start, start + 16.0],
+        ).fetchone()[0]
+        for start in (12410.0, 12450.0)
+    )
+    conn.execute("SELECT tunnel_api.dry_region_approve(%s)", [approved])
+    (operator,) = conn.execute("SELECT approved_by FROM tunnel_api.dry_region WHERE id = %s", [approved]).fetchone()
+    conn.commit()
+    dsn = make_conninfo(conn.info.dsn)
+    run(dsn, "report", example, "-o", tmp_path / "r.html")
+    rows = {row[0]: row for row in table(section((tmp_path / "r.html").read_text("utf-8"), "dry"))}
+    assert rows[str(waiting)][7] == "nothing yet: it waits for an operator"
+    assert "approved by" not in rows[str(waiting)][5]
+    assert f"; approved by {operator}, " in rows[str(approved)][5]
+    told = json.loads(run(dsn, "findings", example, "-o", tmp_path / "f.xlsx", "--json").stdout)
+    stated = {region["id"]: (region["waits"], region["approved_by"]) for region in told["dry_regions"]}
+    assert (stated[waiting], stated[approved]) == ((True, None), (False, operator))
+    head, *cells = openpyxl.load_workbook(tmp_path / "f.xlsx")["Dry regions"].iter_rows(values_only=True)
+    sheet = {row["No."]: row for row in (dict(zip(head, row, strict=True)) for row in cells)}
+    assert (sheet[waiting]["Waits for an operator"], sheet[approved]["Approved by"]) == (True, operator)
+    assert sheet[approved]["Approved, UTC"] is not None
+
+
 def test_photos_are_small_and_upright_and_what_is_missing_is_a_line(report: Path, web: str) -> None:
     chapter = section(report.read_text("utf-8"), "kind-crack")
     sizes = [

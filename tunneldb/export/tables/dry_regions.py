@@ -18,7 +18,8 @@ from tunneldb.store.survey import Survey
 class DryRegion:
     """A dry region, as tunnel_api.dry_region has it; lengths in m, areas in m².
 
-    ``leak_ids`` are the open leaks that lie in it by half: they are kept, but not counted.
+    ``leak_ids`` are the open leaks that lie in it by half: they are kept, but not counted. One that ``waits`` for an
+    operator takes nothing away yet; ``approved_by`` is who put in force one that had to.
     """
 
     id: int
@@ -33,6 +34,9 @@ class DryRegion:
     reason: str | None
     drawn_by: str | None
     drawn_at: dt.datetime | None
+    waits: bool
+    approved_by: str | None
+    approved_at: dt.datetime | None
     leaks: int
     leaks_area: float
     leak_ids: list[int] | None

@@ -162,12 +162,14 @@ def _regions(regions: Sequence[DryRegion]) -> Sheet:
         [
             Column("No.", _WHOLE), Column("From"), Column("To"), Column("Arc from, m", _METRES), Column("Arc to, m", _METRES),
             Column("Area, m²", "0.00"), Column("Drawn by"), Column("Drawn, UTC"), Column("Why"),
+            Column("Waits for an operator"), Column("Approved by"), Column("Approved, UTC"),
             Column("Leaks taken away", _WHOLE), Column("Their area, m²", "0.0000"), Column("Their numbers"),
         ],
         [
             [
                 region.id, region.label_from, region.label_to, region.arc_from, region.arc_to, region.area, region.drawn_by,
-                region.drawn_at, region.reason, region.leaks, region.leaks_area, ", ".join(map(str, region.leak_ids or [])),
+                region.drawn_at, region.reason, region.waits, region.approved_by, region.approved_at,
+                region.leaks, region.leaks_area, ", ".join(map(str, region.leak_ids or [])),
             ]
             for region in regions
         ],
