@@ -28,6 +28,7 @@ from support.example_survey import NAME
 from tunneldb.cli.main import main
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.export.tables.finding_counts import UNCOUNTED
 from tunneldb.report import findings
 from tunneldb.report.owner import CHAPTERS, Owner, read_owner
 from tunneldb.report.photos import Photo, make_thumbnails
@@ -167,7 +168,7 @@ def test_report_workbook_json_and_view_count_alike(drawn: str, report: Path, tmp
         of = dict(zip(head, row, strict=True))
         assert (kind["counted"], kind["area"], kind["length"]) == (stated[3], *map(pytest.approx, stated[4:6]))
         assert (of["Counted"], of["Area, m²"], of["Length, m"]) == (stated[3], *map(pytest.approx, stated[4:6]))
-        assert [of[f"Not counted: {state}"] for state in findings.UNCOUNTED] == list(stated[6:])
+        assert [of[f"Not counted: {state}"] for state in UNCOUNTED] == list(stated[6:])
         assert sum(kind["origins"].values()) == sum(kind["severities"].values()) == stated[3]
 
 

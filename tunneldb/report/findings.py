@@ -13,14 +13,19 @@ import psycopg
 import shapely
 
 from tunneldb.export.tables.dry_regions import DryRegion
-from tunneldb.export.tables.finding_counts import STATES, KindCount, count_findings, read_kinds, read_severities, read_wet_kinds
-from tunneldb.export.tables.findings import COUNTED, Chosen, Finding, read_findings
+from tunneldb.export.tables.finding_counts import (
+    STATES,
+    UNCOUNTED,
+    KindCount,
+    count_findings,
+    read_kinds,
+    read_severities,
+    read_wet_kinds,
+)
+from tunneldb.export.tables.findings import Chosen, Finding, read_findings
 from tunneldb.report.drawing import line_path, outline_path
 from tunneldb.report.photos import Thumbnail, make_thumbnails, read_photos
 from tunneldb.store.survey import Survey
-
-UNCOUNTED = tuple(state for state in STATES if state not in COUNTED)
-"""States of what no sum counts."""
 
 MOST = 2000
 """Rows of a kind at most; of more those that count first, then by severity and size, and a line says how many have none."""

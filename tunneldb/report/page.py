@@ -17,12 +17,12 @@ from tunneldb import __version__
 from tunneldb.database import snapshot
 from tunneldb.errors import UserError
 from tunneldb.export.tables.dry_regions import read_dry_regions
-from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, STATES
+from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, STATES, UNCOUNTED
 from tunneldb.export.tables.leaks import clock_label
 from tunneldb.raster.gap_fill import TOLD
 from tunneldb.report import data, text
 from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, without_detection
-from tunneldb.report.findings import STATE_WORDS, UNCOUNTED, digest_findings, read_findings_chapter
+from tunneldb.report.findings import STATE_WORDS, digest_findings, read_findings_chapter
 from tunneldb.report.lining import Form
 from tunneldb.report.owner import CHAPTERS, Owner
 from tunneldb.report.photos import Thumbnail

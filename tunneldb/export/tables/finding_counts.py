@@ -9,11 +9,14 @@ from typing import Any, get_args
 
 import psycopg
 
-from tunneldb.export.tables.findings import Finding, State
+from tunneldb.export.tables.findings import COUNTED, Finding, State
 
 ORIGINS = ("detected", "drawn", "redrawn", "split", "merged")
 STATES: tuple[State, ...] = get_args(State)
-"""Open and confirmed count, and the others do not."""
+"""In the order in which they are told."""
+
+UNCOUNTED: tuple[State, ...] = tuple(state for state in STATES if state not in COUNTED)
+"""States of what no sum counts."""
 
 SEVERITIES = (1, 2, 3, 4, 0)
 """From the least; 0 for those that have none."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tunneldb.export.tables.dry_regions import DryRegion
-from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, STATES, KindCount
+from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, UNCOUNTED, KindCount
 from tunneldb.export.tables.findings import Finding
 from tunneldb.export.tables.leaks import LeakList, clock_label
 from tunneldb.export.tables.workbook import Column, Sheet, write_workbook
@@ -128,19 +128,18 @@ def _cell(name: str, value: Any) -> Any:
 def _counts(counts: Sequence[KindCount], severities: dict[int, str]) -> Sheet:
     """By kind: how many count, by origin and by severity; then those that do not count; then the sum of each column."""
     degrees = [f"Severity {n} {severities.get(n, '')}".rstrip() if n else "No severity" for n in SEVERITIES]
-    uncounted = [state for state in STATES if state not in ("open", "confirmed")]
     heads = [
         "Counted",
         "Open",
         "Confirmed",
         *(f"Counted, {origin}" for origin in ORIGINS),
         *degrees,
-        *(f"Not counted: {s}" for s in uncounted),
+        *(f"Not counted: {s}" for s in UNCOUNTED),
     ]
     rows = [
         [
             count.counted, count.states["open"], count.states["confirmed"], *count.origins.values(), *count.severities.values(),
-            *(count.states[state] for state in uncounted), count.area, count.length,
+            *(count.states[state] for state in UNCOUNTED), count.area, count.length,
         ]
         for count in counts
     ]  # fmt: skip
