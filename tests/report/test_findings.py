@@ -28,6 +28,7 @@ from support.example_survey import NAME
 from tunneldb.cli.main import main
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.export.tables.dry_regions import read_dry_regions
 from tunneldb.export.tables.finding_counts import UNCOUNTED
 from tunneldb.report import findings
 from tunneldb.report.owner import CHAPTERS, Owner, read_owner
@@ -269,6 +270,26 @@ def test_digest_tells_another_finding(drawn: str, tmp_path: Path) -> None:
             digests.append(digest.hexdigest())
         conn.rollback()
     assert digests[0] == digests[1] != digests[2]
+
+
+def test_digest_tells_another_dry_region_and_another_width(example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    survey = get_survey(conn, example)
+    digests = []
+    for change in (
+        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, width, geom)"
+        " VALUES ('demo-2024', 'crack', 0.001, 'LINESTRING(12350 1, 12353 1.5)')",
+        "UPDATE tunnel_api.finding_unrolled SET width = 0.002 WHERE kind = 'crack'",
+        "INSERT INTO tunnel_api.region (survey_id, kind, reason, geom)"
+        " SELECT id, 'dry', 'oil', ST_MakeEnvelope(12410, -4, 12426, 4, 0) FROM tunnel.survey",
+        "UPDATE tunnel_api.region SET reason = 'soot' WHERE reason = 'oil'",
+        "SELECT tunnel_api.dry_region_approve(id) FROM tunnel_api.region WHERE reason = 'soot'",
+    ):
+        conn.execute(change)
+        chapter = findings.read_findings_chapter(conn, survey, (0.0, 1e5), frozenset(), tmp_path, table=True)
+        digest = hashlib.sha256()
+        findings.digest_findings(digest, chapter, read_dry_regions(conn, survey))
+        digests.append(digest.hexdigest())
+    assert len(set(digests)) == len(digests)
 
 
 def test_of_too_many_the_gravest_have_rows(drawn: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

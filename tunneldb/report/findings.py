@@ -220,18 +220,22 @@ def _is_plain(finding: Finding, tabled: frozenset[int]) -> bool:
 
 
 def digest_findings(digest: hashlib._Hash, found: FindingsChapter | None, regions: Sequence[DryRegion]) -> None:
-    """Add what is reported of findings that somebody noted, their photos, and of dry regions that took something away."""
+    """Add what is reported of findings that somebody noted, their photos, and of all dry regions."""
     beyond = [finding for kind in found.kinds for finding in kind.beyond] if found else []
     for finding in [*(found.listed if found else []), *sorted(beyond, key=lambda finding: finding.id)]:
         stated = (
             finding.id, finding.kind, finding.origin, finding.state, finding.severity, finding.drawn_by, finding.reviewed_by,
-            finding.remark, f"{finding.area:.4f}", f"{finding.length or 0:.4f}", finding.geometry.wkb_hex,
+            finding.remark, f"{finding.area:.4f}", f"{finding.length or 0:.4f}", finding.width, finding.geometry.wkb_hex,
             [(photo.photo.path, photo.photo.caption) for photo in (found.photos.get(finding.id, []) if found else [])],
         )  # fmt: skip
         digest.update(repr(stated).encode())
     for region in regions:
-        if region.leaks:
-            digest.update(repr((region.id, f"{region.area:.4f}", region.reason, region.drawn_by, region.leak_ids)).encode())
+        place = [f"{end:.4f}" for end in (region.chainage_from, region.chainage_to, region.arc_from, region.arc_to)]
+        stated_of_region = (
+            region.id, place, f"{region.area:.4f}", region.reason, region.drawn_by, region.waits, region.approved_by,
+            region.leak_ids,
+        )  # fmt: skip
+        digest.update(repr(stated_of_region).encode())
 
 
 @dataclass(frozen=True)
