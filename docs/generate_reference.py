@@ -150,7 +150,8 @@ def database(conn: psycopg.Connection[Any]) -> str:
         "Members of `tunnel_viewer` may read all of them. `axis_vertex` (its geometry), the views of leaks and anomalies "
         "(`review`, `remark` and `kind`), those of spots (`review` and `remark`), `region`, `finding_unrolled`, `finding_map`, "
         "`finding_3d` and `finding_photo` may be changed by members of `tunnel_inspector`; findings are drawn also through the "
-        "unrolled and map views of leaks and anomalies. They may call `finding_split`, `finding_merge` and `finding_undo`, too.",
+        "unrolled and map views of leaks and anomalies. They may call `finding_split`, `finding_merge` and `finding_undo`, "
+        "too.",
     ]
     parts += _views(conn)
     parts += [
