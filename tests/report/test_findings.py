@@ -215,7 +215,7 @@ def test_report_workbook_and_json_say_which_dry_region_waits_and_who_approved(
     conn.execute("SELECT tunnel_api.dry_region_approve(%s)", [approved])
     (operator,) = conn.execute("SELECT approved_by FROM tunnel_api.dry_region WHERE id = %s", [approved]).fetchone()
     conn.commit()
-    dsn = make_conninfo(conn.info.dsn)
+    dsn = conn.info.dsn
     run(dsn, "report", example, "-o", tmp_path / "r.html")
     rows = {row[0]: row for row in table(section((tmp_path / "r.html").read_text("utf-8"), "dry"))}
     assert rows[str(waiting)][7] == "nothing yet: it waits for an operator"
@@ -347,6 +347,18 @@ def test_an_owners_template(drawn: str, folder: Path, tmp_path: Path) -> None:
         browser.close()
 
 
+def test_the_first_page_says_scanner_and_intensity_in_the_owners_language(
+    example: str, conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    conn.execute("UPDATE tunnel.survey SET platform = 'mobile', intensity_kind = 'amplitude', reference = 'measured'")
+    conn.commit()
+    (tmp_path / "owner.toml").write_text('language = "de"\nchapters = ["summary"]', "utf-8")
+    run(conn.info.dsn, "report", example, "-o", tmp_path / "r.html", "--template", tmp_path / "owner.toml")
+    text = section((tmp_path / "r.html").read_text("utf-8"), "summary")
+    assert f"<dd>{example}, mobiler Scanner</dd>" in text
+    assert "<dd>Amplitude, Entfernungskurve gemessen</dd>" in text
+
+
 def test_a_report_without_tables_of_leaks_lists_them_by_kind(drawn: str, tmp_path: Path) -> None:
     (tmp_path / "owner.toml").write_text('language = "sl"\nchapters = ["findings"]', "utf-8")
     run(drawn, "report", NAME, "-o", tmp_path / "r.html", "--template", tmp_path / "owner.toml")
@@ -399,6 +411,17 @@ def test_examples_of_templates_and_a_language_of_ones_own(tmp_path: Path) -> Non
     (tmp_path / "owner.toml").write_text('language = "fr.toml"', "utf-8")
     words = read_owner(tmp_path / "owner.toml").words
     assert (words.language, words("Leaks"), words("Cracks")) == ("fr", "Fuites", "Cracks")
+
+
+@pytest.mark.parametrize("date", ["%Q%", "%d.%m.%Y %H", "100%", "%"])
+def test_a_day_that_cannot_be_written_is_one_line(tmp_path: Path, date: str) -> None:
+    (tmp_path / "fr.toml").write_text(f'date = "{date}"', "utf-8")
+    (tmp_path / "owner.toml").write_text('language = "fr.toml"', "utf-8")
+    with pytest.raises(UserError) as error:
+        read_owner(tmp_path / "owner.toml")
+    assert str(error.value).startswith(f"{tmp_path / 'fr.toml'}: date: ")
+    assert "is no part of a day" in str(error.value)
+    assert "\n" not in str(error.value)
 
 
 def test_catalogues_have_each_text_that_a_report_says(example_catalogue: frozenset[str]) -> None:

@@ -41,6 +41,7 @@ LOGO = 640
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _NAME = re.compile(r"\{\w+\}")
+_DAY_CODE = re.compile(r"%(?:-?[dejmUuVWwGgyY]|[aAbBCDFhx%])")
 _IMAGES = ("PNG", "JPEG", "WEBP", "GIF", "TIFF", "BMP")
 
 
@@ -126,6 +127,14 @@ class _Given:
             self.refuse(key, f"takes a text, not {value!r}")
         return value
 
+    def day_format(self, key: str) -> str | None:
+        """Return how days are written; ``strftime`` prints a code that it does not know as it stands, and that is refused."""
+        value = self.text(key)
+        stray = value and re.search(r"%.?", _DAY_CODE.sub("", value), re.DOTALL)
+        if stray:
+            self.refuse(key, f"{stray.group()!r} in {value!r} is no part of a day as strftime has it, such as %d, %m, %B, %Y")
+        return value
+
     def table(self, key: str) -> dict[str, str]:
         value = self.values.get(key, {})
         if not isinstance(value, dict):
@@ -153,7 +162,7 @@ def _words(given: _Given) -> Words:
         path = given.path.parent / name
         own = _Given(path, _load(path))
         own.refuse_others(("date", "texts"))
-        code, date, texts = path.stem, own.text("date"), own.texts("texts")
+        code, date, texts = path.stem, own.day_format("date"), own.texts("texts")
     elif name in languages():
         catalogue = read_language(name)
         code, date, texts = name, catalogue.get("date"), catalogue["texts"] if name != ENGLISH else {}
