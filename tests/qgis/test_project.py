@@ -406,8 +406,8 @@ def test_a_sheet_lists_findings_by_kind_and_each_in_one_table(conn: psycopg.Conn
     act(project, "atlas", str(tmp_path / "findings.pdf"))
     page = words(tmp_path / "findings.pdf")[1]
     leaks, _, findings = page.partition("Size Severity State Remark")
-    # 1 m of arc is 0.25 of 4 m of radius: 29 minutes; the tunnel bends to the right by 1 / 300 m, so that there lengths are 0.3 %
-    # and, 1.5 m from the crown, areas 0.5 % less than unrolled
+    # 1 m of arc is 0.25 of 4 m of radius: 29 minutes. The tunnel bends to the right by 1 / 300 m: there lengths are 0.3 % less
+    # than unrolled, and areas 1.5 m from the crown 0.5 %.
     listed = [
         f"{crack} Crack 12+382.000 12:29 3.99 m, 2.0 mm confirmed a crack",
         f"{spall} Spall 12+371.000 12:43 1.99 m2 Stufe 3 confirmed a spall",
