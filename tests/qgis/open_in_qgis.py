@@ -322,6 +322,9 @@ def draw_findings(project: QgsProject) -> dict[str, Any]:
             done[layer_id]["kinds"] = sorted(row["code"] for row in catalogue.getFeatures(request))
             relations = project.relationManager().referencedRelations(layer)
             done[layer_id]["photos"] = [relation.referencingLayer().name() for relation in relations]
+    for layer_id, seen in done.items():
+        features = project.mapLayer(PREFIX + layer_id).getFeatures()
+        seen["shapes"] = sorted({QgsWkbTypes.displayString(feature.geometry().wkbType()) for feature in features})
     return done
 
 

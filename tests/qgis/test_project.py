@@ -458,6 +458,8 @@ def test_findings_are_drawn_with_what_the_form_begins_with(conn: psycopg.Connect
         ("leak", "drawn", "confirmed", "demo-2024", "POLYGON"), ("crack", "drawn", "confirmed", "demo-2024", "LINESTRING"),
         ("drip", "drawn", "confirmed", "demo-2024", "POINT"), ("leak", "drawn", "confirmed", "demo-2024", "POLYGON"),
     ]  # fmt: skip
+    shapes = {name: done[f"finding_{name}_unrolled"]["shapes"] for name in ("area", "line", "point")}
+    assert shapes == {"area": ["Polygon"], "line": ["LineString"], "point": ["Point"]}, "each in one layer, labelled once"
     for name, shape in (("area", "polygon"), ("line", "line"), ("point", "point")):
         offered = conn.execute(
             "SELECT array_agg(code ORDER BY code) FROM tunnel_api.finding_kind WHERE active AND %s = ANY (geometries)", [shape]

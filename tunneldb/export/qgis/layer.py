@@ -103,6 +103,11 @@ SHEET_FINDING = "sheet_finding"
 _DRY = "\"kind\" <> 'leak'"
 
 
+def _only(wkb: str) -> str:
+    """Return the condition that rows are of a geometry: QGIS sets it only where it sees others when it opens the layer."""
+    return f"public.geometrytype(\"geom\") = '{wkb.upper()}'"
+
+
 def _findings(suffix: str, group: str, theme: str, z: str = "", where: str = "") -> tuple[VectorLayer, ...]:
     """Layers of findings of a view: points over lines over areas; they are drawn in on the lining and on the map."""
     on_sheet = suffix == "sheet"
@@ -110,7 +115,7 @@ def _findings(suffix: str, group: str, theme: str, z: str = "", where: str = "")
         VectorLayer(
             f"finding_{shape}_{suffix}", f"Findings: {title}{' (sheets)' if on_sheet else ''}",
             SHEET_FINDING if on_sheet else f"finding_{suffix}", wkb + z, "finding", group, (theme,),
-            edited=not (z or on_sheet), where=where, part=SHEETS if on_sheet else FINDINGS,
+            edited=not (z or on_sheet), where=" AND ".join(filter(None, [where, _only(wkb)])), part=SHEETS if on_sheet else FINDINGS,
         )
         for shape, title, wkb in (("point", "points", "Point"), ("line", "lines", "LineString"), ("area", "areas", "Polygon"))
     )  # fmt: skip
