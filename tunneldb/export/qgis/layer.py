@@ -115,7 +115,8 @@ def _findings(suffix: str, group: str, theme: str, z: str = "", where: str = "")
         VectorLayer(
             f"finding_{shape}_{suffix}", f"Findings: {title}{' (sheets)' if on_sheet else ''}",
             SHEET_FINDING if on_sheet else f"finding_{suffix}", wkb + z, "finding", group, (theme,),
-            edited=not (z or on_sheet), where=" AND ".join(filter(None, [where, _only(wkb)])), part=SHEETS if on_sheet else FINDINGS,
+            edited=not (z or on_sheet), where=" AND ".join(filter(None, [where, _only(wkb)])),
+            part=SHEETS if on_sheet else FINDINGS,
         )
         for shape, title, wkb in (("point", "points", "Point"), ("line", "lines", "LineString"), ("area", "areas", "Polygon"))
     )  # fmt: skip
