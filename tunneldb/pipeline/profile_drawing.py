@@ -60,7 +60,7 @@ def read_drawing(path: Path, unit: str | None, layer: str | None) -> DrawnOutlin
     except (OSError, DXFError, ValueError) as error:
         raise UserError(f"{path} cannot be read as DXF: {str(error).strip().splitlines()[0]}") from None
     metres, notes = _unit(path, drawing.header.get("$INSUNITS", 0), unit)
-    entities = [one for one in drawing.modelspace() if one.dxftype() in (*_PLAIN, *_POLYLINES, *_CURVES)]
+    entities: list[Any] = [one for one in drawing.modelspace() if one.dxftype() in (*_PLAIN, *_POLYLINES, *_CURVES)]
     chosen = _layer(path, sorted({one.dxf.layer for one in entities}), layer)
     elements, names = [], []
     for entity in entities:

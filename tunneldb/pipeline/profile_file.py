@@ -184,8 +184,8 @@ def _require_sound(path: Path, elements: Float, where: Callable[[int], str]) -> 
     if (line.min(axis=0) > 0.5 * size).any() or (line.max(axis=0) < -0.5 * size).any():
         low, high = line.min(axis=0), line.max(axis=0)
         raise UserError(
-            f"{path}: the outline lies from {_place(low)} to {_place(high)} m, away from the axis at 0,0; say where the file has "
-            "the axis by --origin RIGHT,UP"
+            f"{path}: the outline lies from {_place(low)} to {_place(high)} m, away from the axis at 0,0; say where the file "
+            "has the axis by --origin RIGHT,UP"
         )
     if (crossed := raw.crossing()) is not None:
         first, second = crossed
