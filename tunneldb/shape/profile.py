@@ -10,6 +10,10 @@ import numpy as np
 from tunneldb.arrays import Float
 from tunneldb.compiled import point_kernel
 from tunneldb.shape.outline import Outline, matched
+from tunneldb.threads import in_blocks
+
+SECTIONS = 100
+"""Sections whose points are held against the design at a time."""
 
 
 @dataclass(frozen=True)
@@ -127,13 +131,18 @@ def deviation(stretch: Stretch, chainage: Float, right: Float, up: Float) -> Dev
     The nearest place of each element is that of the line through it, or of the circle, if it lies within the element, else the
     nearer end. At a vertex the side is that of the bisector.
     """
-    shape = np.shape(right)
-    found = Deviation(*(np.empty(shape) for _ in range(3)))
-    _deviation(
-        stretch.first.elements, stretch.second.elements, stretch.share(chainage), stretch.first.closed,
-        np.ascontiguousarray(right, np.float64), np.ascontiguousarray(up, np.float64),
-        found.distance, found.share, found.curvature,
-    )  # fmt: skip
+    share = stretch.share(chainage)
+    right, up = np.ascontiguousarray(right, np.float64), np.ascontiguousarray(up, np.float64)
+    found = Deviation(*(np.empty(right.shape) for _ in range(3)))
+
+    def block(begin: int, end: int) -> None:
+        part = slice(begin, end)
+        _deviation(
+            stretch.first.elements, stretch.second.elements, share[part], stretch.first.closed, right[part], up[part],
+            found.distance[part], found.share[part], found.curvature[part],
+        )  # fmt: skip
+
+    in_blocks(block, len(right), SECTIONS)
     return found
 
 
