@@ -168,22 +168,35 @@ CREATE OR REPLACE FUNCTION tunnel_api.deviation_stretches(survey text, layer tex
 RETURNS TABLE (chainage_from float8, chainage_to float8, label text, length float8, design_area float8, seen_area float8,
                seen_share float8, overbreak float8, underbreak float8, overbreak_sigma float8, underbreak_sigma float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 250
+SET jit = off
 AS $$
-    SELECT w.low, w.high, tunnel_api.station_label(s.tunnel_id, w.low), v.*
-      FROM tunnel_api.survey s
+    SELECT w.low, w.high, tunnel_api.station_label(s.tunnel_id, w.low), w.length, w.design_area, w.seen_area,
+           w.seen_area / nullif(w.design_area, 0)
+               * least(w.length / nullif(least(w.high, e.chainage_to) - greatest(w.low, e.chainage_from), 0), 1),
+           w.overbreak, w.underbreak, sqrt(w.noise + ($4 * w.over_right) ^ 2 + ($4 * w.over_up) ^ 2),
+           sqrt(w.noise + ($4 * w.under_right) ^ 2 + ($4 * w.under_up) ^ 2)
+      FROM (SELECT v.id, v.tunnel_id FROM tunnel_api.survey v WHERE v.id = tunnel_api.survey_id($1)) s
+     CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
      CROSS JOIN LATERAL (
-        SELECT floor(min(d.chainage_from) / $3) AS first, ceil(max(d.chainage_to) / $3) - 1 AS last
-          FROM tunnel_api.deviation_section d WHERE d.survey_id = s.id AND d.layer = $2) e
-     CROSS JOIN LATERAL generate_series(e.first::int, e.last::int) AS n
-     CROSS JOIN LATERAL (SELECT n * $3 AS low, (n + 1) * $3 AS high) w
-     CROSS JOIN LATERAL tunnel_api.deviation_volume($1, $2, w.low, w.high, $4) v
-     WHERE s.name = $1 AND v.length IS NOT NULL
+        SELECT n * $3 AS low, (n + 1) * $3 AS high, sum(p.long) AS length, sum(p.long * d.design_length) AS design_area,
+               sum(p.long * d.seen_length) AS seen_area, sum(p.long * d.overbreak) AS overbreak,
+               sum(p.long * d.underbreak) AS underbreak, sum((p.long * d.noise_area) ^ 2) AS noise,
+               sum(p.long * d.over_right) AS over_right, sum(p.long * d.over_up) AS over_up,
+               sum(p.long * d.under_right) AS under_right, sum(p.long * d.under_up) AS under_up
+          FROM tunnel_api.deviation_section d
+         CROSS JOIN (VALUES (0), (1)) AS k (further)  -- a section lies in one stretch or two
+         CROSS JOIN LATERAL (SELECT floor(d.chainage_from / $3) + k.further AS n) f
+         CROSS JOIN LATERAL (SELECT least(d.chainage_to, (n + 1) * $3) - greatest(d.chainage_from, n * $3) AS long) p
+         WHERE d.survey_id = s.id AND d.layer = $2 AND $3 >= 1 AND p.long > 0
+         GROUP BY n) w
 $$;
 COMMENT ON FUNCTION tunnel_api.deviation_stretches(text, text, float8, float8) IS
-'deviation_volume of each stretch of so many metres that a survey has, from whole multiples of them on: m³ by 100 m, by default';
+'deviation_volume of each stretch of so many metres, 1 or more, that a survey has, from whole multiples of them on: m³ by 100 m, by default';
 
-CREATE OR REPLACE FUNCTION tunnel_api.deviation_thickness(survey_before text, survey_after text, layer text)
-RETURNS TABLE (chainage_from float8, chainage_to float8, label text, thickness float8, thickness_least float8, compared_share float8)
+CREATE OR REPLACE FUNCTION tunnel_api.deviation_thickness(
+    survey_before text, survey_after text, layer text, chainage_from float8 DEFAULT '-infinity',
+    chainage_to float8 DEFAULT 'infinity')
+RETURNS TABLE (section_from float8, section_to float8, label text, thickness float8, thickness_least float8, compared_share float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 1000
 AS $$
     SELECT b.chainage_from, b.chainage_to, b.label, t.mean, t.low, t.share
@@ -194,7 +207,7 @@ AS $$
         SELECT avg(c.new - c.old) AS mean, min(c.new - c.old) AS low, count(*)::float8 / cardinality(b.deviation) AS share
           FROM unnest(b.deviation, a.deviation) AS c (old, new)
          WHERE c.old <> 'NaN' AND c.new <> 'NaN') t
-     WHERE b.survey_id = tunnel_api.survey_id($1) AND b.layer = $3 AND t.share > 0
+     WHERE b.survey_id = tunnel_api.survey_id($1) AND b.layer = $3 AND b.chainage_from >= $4 AND b.chainage_from < $5 AND t.share > 0
 $$;
-COMMENT ON FUNCTION tunnel_api.deviation_thickness(text, text, text) IS
-'What was put on between two surveys of one tunnel, by section: mean and least thickness (m) at right angles to the profile, of the cells that both saw (compared_share of the profile). Both surveys must have been held against the same profiles';
+COMMENT ON FUNCTION tunnel_api.deviation_thickness(text, text, text, float8, float8) IS
+'What was put on between two surveys of one tunnel, by section that begins between two chainages (m), by default all: mean and least thickness (m) at right angles to the profile, of the cells that both saw (compared_share of the profile). Both surveys must have been held against the same profiles';
