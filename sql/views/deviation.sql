@@ -110,6 +110,11 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
         SELECT DISTINCT ON (r.km, r.parameters ->> 'layer') r.km, r.parameters ->> 'layer' AS layer, r.finished_at, r.parameters
           FROM tunnel.run r WHERE r.survey_id = $1 AND r.stage = 'deviation' AND r.outcome = 'done'
          ORDER BY r.km, r.parameters ->> 'layer', r.started_at DESC, r.id DESC
+    ), place AS (  -- where there is a design, or there was one and what was made by it is still there
+        SELECT k.km, d.layer FROM seen k JOIN design d ON d.low < (k.km + 1) * 1000 AND d.high > k.km * 1000
+         UNION
+        SELECT l.km, l.layer FROM last l
+         WHERE EXISTS (SELECT FROM tunnel.deviation_section o WHERE o.survey_id = $1 AND o.layer = l.layer AND o.km = l.km)
     )
     SELECT k.km, d.layer, l.finished_at,
            CASE WHEN t.reason IS NOT NULL THEN 'detect is stale: ' || t.reason
@@ -118,13 +123,13 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
                 WHEN l.parameters -> 'profiles' IS DISTINCT FROM n.inputs -> 'profiles' THEN 'design profiles changed since'
            END
       FROM seen k
-      JOIN design d ON d.low < (k.km + 1) * 1000 AND d.high > k.km * 1000
+      JOIN place d ON d.km = k.km
      CROSS JOIN LATERAL (SELECT tunnel_api.deviation_inputs($1, k.km, d.layer) AS inputs) n
       LEFT JOIN detect t ON t.km = k.km
       LEFT JOIN last l ON l.km = k.km AND l.layer = d.layer
 $$;
 COMMENT ON FUNCTION tunnel_api.deviation_state(int) IS
-    'How far the deviation of a survey has come: of each kilometre with an offset image and each layer with a profile there, when it was last made, and why it is out of date, if it is';
+    'How far the deviation of a survey has come: of each kilometre with an offset image and each layer with a profile or sections there, when it was last made, and why it is out of date, if it is';
 
 CREATE OR REPLACE VIEW tunnel_api.deviation_status AS
 SELECT ((s.id::bigint * 1000000 + 500000 + t.km) * 10) + CASE t.layer WHEN 'lining' THEN 1 WHEN 'shotcrete' THEN 2 ELSE 3 END AS id,

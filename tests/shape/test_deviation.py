@@ -147,6 +147,7 @@ def test_it_is_stale_after_what_it_rests_on_and_written_as_files(survey: str, co
     assert np.hypot(*np.array(lining.get_points("xy")).T) == pytest.approx(RADIUS, abs=1e-3)
 
     run("profile", "remove", survey, "round")
+    assert reasons() == [(0, "design profiles changed since"), (1, "design profiles changed since")]
     path.write_text(path.read_text().replace("4.05", "4.06"))
     run("profile", "add", survey, "round", path)
     assert reasons() == [(0, "design profiles changed since"), (1, "design profiles changed since")]

@@ -7,7 +7,8 @@ import pytest
 import shapely
 
 from tunneldb.shape.outline import Outline
-from tunneldb.shape.profile import Profile, Stretch, deviation, signed_distance, stretches, strip_area
+from tunneldb.shape.overbreak import section_deviation
+from tunneldb.shape.profile import Deviation, Profile, Stretch, deviation, signed_distance, stretches, strip_area
 
 
 def arc(angle: float) -> float:
@@ -75,6 +76,29 @@ def test_a_shifted_circle_has_the_lune_s_area_within_a_thousandth(by: float) -> 
     lune = 2.0 * radius**2 * np.arcsin(by / 2.0 / radius) + by / 2.0 * np.sqrt(4.0 * radius**2 - by**2)
     assert -(each * np.minimum(area, 0.0)).sum() == pytest.approx(lune, rel=1e-3)
     assert (each * np.maximum(area, 0.0)).sum() == pytest.approx(lune, rel=1e-3)
+
+
+@pytest.mark.parametrize(("off", "pixel"), [(-0.1, 0.02), (0.08, 0.01)])
+def test_a_horseshoe_has_the_over_or_underbreak_of_a_parallel_one(off: float, pixel: float) -> None:
+    """Of a strip of width d along a horseshoe: 4 wall d on the walls, π d (r - d/2) on the arch (r = 5, walls of 2 m)."""
+    shoe = horseshoe()
+    share = np.tile((np.arange(pixel / 2.0, shoe.length, pixel)) / shoe.length, (3, 1))
+    feet, inward = shoe.places(share[0])
+    points = feet + off * inward
+    found = deviation(Stretch("", 0.0, 0.0, shoe, shoe), np.zeros(3), *(np.tile(points[:, k], (3, 1)) for k in (0, 1)))
+    np.testing.assert_allclose(found.distance, off, atol=1e-9)
+    figures = section_deviation(found, shoe, pixel)
+    area = 4.0 * off + np.pi * off * (5.0 - off / 2.0)
+    assert figures.underbreak - figures.overbreak == pytest.approx(area, rel=1e-3)
+    assert min(figures.underbreak, figures.overbreak) == 0.0
+    assert figures.seen_length == pytest.approx(shoe.length, abs=pixel)
+    # Of an axis moved up by t the arch, 10 m wide, has 10 t less overbreak or more underbreak; to the right walls cancel.
+    assert -figures.over_by[1] + figures.under_by[1] == pytest.approx(10.0, rel=1e-3)
+    np.testing.assert_allclose(figures.over_by[0] + figures.under_by[0], 0.0, atol=pixel)
+    hidden = Deviation(np.where(share < 0.5, found.distance, np.nan), found.share, found.curvature)
+    half = section_deviation(hidden, shoe, pixel)
+    assert half.seen_length == pytest.approx(shoe.length / 2.0, abs=pixel)
+    assert half.underbreak - half.overbreak == pytest.approx(area / 2.0, rel=2e-3)  # unseen is not as designed: it is nothing
 
 
 def test_transitions_are_linear_and_outlines_with_other_elements_go_together() -> None:
