@@ -23,10 +23,6 @@ COPIED, COPIES = 12428.0, (14.3, 9.4)
 """Middle of the leak that has others like it near by, and how far up-chainage they are, m."""
 
 
-UNDER, OVER, BULGE = 0.02, 0.5, (12340.0, 12343.0)
-"""Underbreak of the section at 12+300, which grows by as much each metre, and overbreak of all, m²; where 60 mm stand in, m."""
-
-
 def prepare(conn: psycopg.Connection, survey: str) -> None:
     """Add it to a copy of the example survey; to be committed or not by the caller."""
     row = conn.execute("SELECT id FROM tunnel.survey WHERE name = %s", (survey,)).fetchone()
@@ -64,26 +60,6 @@ def prepare(conn: psycopg.Connection, survey: str) -> None:
         (row[0], int(PointClass.NICHE), low, high, row[0], low, left, high, right),
     )
     _points(conn, row[0])
-    _deviation(conn, row[0])
-
-
-def _deviation(conn: psycopg.Connection, survey_id: int) -> None:
-    """A round profile, and sections of 1 m held against it, of which nine tenths were seen."""
-    conn.execute(
-        "INSERT INTO tunnel.design_profile (tunnel_id, name, layer, chainage_from, chainage_to, outline, source)"
-        " SELECT tunnel_id, 'round', 'lining', 12300, 12500, '{0,-4,-1,0,4,-1,0,-4,0}', 'round.csv'"
-        " FROM tunnel.survey WHERE id = %s",
-        (survey_id,),
-    )
-    conn.execute(
-        "INSERT INTO tunnel.deviation_section (survey_id, km, layer, profile, chainage_from, chainage_to, design_length,"
-        " seen_length, overbreak, underbreak, noise_area, over_right, over_up, under_right, under_up, sigma, deviation_mean,"
-        " deviation_least, least_at, deviation_greatest, greatest_at, deviation)"
-        " SELECT %(survey)s, 12, 'lining', 'round', c, c + 1, 25, 22.5, %(over)s, %(under)s * (c - 12299), 0.001, 3, 0, 0, 2,"
-        " 0.003, 0, -0.1, 12.5, CASE WHEN c >= %(low)s AND c < %(high)s THEN 0.06 ELSE 0.04 END, 6.5, '{0,0.04,-0.1,NaN}'"
-        " FROM generate_series(12300, 12499) AS c",
-        {"survey": survey_id, "over": OVER, "under": UNDER, "low": BULGE[0], "high": BULGE[1]},
-    )
 
 
 def _points(conn: psycopg.Connection, survey_id: int) -> None:
