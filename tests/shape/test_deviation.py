@@ -12,12 +12,16 @@ import pytest
 import rasterio
 import shapely
 from click.testing import CliRunner
+from support.curved_lining import block as offset_block
+from support.curved_lining import circle, made
 from support.straight_survey import FIRST, LAST, RADIUS, Scene, make_survey
 
 from tunneldb.cli.main import main
+from tunneldb.pipeline.deviation import Design
 from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.pixel_state import PixelState
+from tunneldb.shape.profile import Profile, stretches
 
 PIXEL = 0.05
 PATCH = (1010.0, 1015.0, 2.0)
@@ -156,3 +160,17 @@ def test_it_is_stale_after_what_it_rests_on_and_written_as_files(survey: str, co
     assert reasons()[1] == (1, "detect is stale: ground ran since")
     done = CliRunner().invoke(main, ["deviation", survey])
     assert (done.exit_code, "kilometre 0: detect is stale" in done.output) == (2, True)
+
+
+@pytest.mark.parametrize(("right", "up"), [(0.0, 0.0), (-0.2, 0.1)])
+def test_on_a_curve_and_a_grade_a_lining_that_is_its_design_has_none(right: float, up: float) -> None:
+    """Wherever the measured axis lies; sections are chords of a degree, which stray from the circle by 0.15 mm at most."""
+    surface, axis = made(4.0, 200.0, right, up)
+    design = Design(surface, axis, stretches([Profile("round", 0.0, 200.0, circle(4.0))]))
+    image = offset_block(surface, 50.0, 0.1, length=20.0)
+    _, found = design.deviation(image, np.ones(image.values.shape, np.bool_))
+    sagitta = 4.0 * (1.0 - np.cos(np.radians(0.5)))
+    assert np.isfinite(found.distance).mean() > 0.99
+    assert found.distance[np.isfinite(found.distance)].min() > -1e-4
+    assert np.nanmax(found.distance) < sagitta + 1e-4
+    assert np.nanmean(found.distance) == pytest.approx(2.0 / 3.0 * sagitta, abs=1e-5)
