@@ -120,3 +120,8 @@ def _deviation_section() -> None:
         schema="tunnel",
         comment="Deviation of the lining from its design profile, in steps of chainage and of length along the profile",
     )  # fmt: skip
+    for column in ("overbreak", "underbreak"):
+        op.create_index(
+            op.f(f"deviation_section_survey_id_layer_{column}_idx"), "deviation_section", ["survey_id", "layer", column],
+            schema="tunnel",
+        )  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 
-from sqlalchemy import BigInteger, CheckConstraint, Identity, UniqueConstraint
+from sqlalchemy import BigInteger, CheckConstraint, Identity, Index, UniqueConstraint
 from sqlalchemy.orm import Mapped, mapped_column
 
 from tunneldb.database.models.base import CLOCK, KM, SURVEY, TUNNEL, Base, Floats, Reals, one_of, parent
@@ -45,6 +45,8 @@ class DeviationSection(Base):
     __tablename__ = "deviation_section"
     __table_args__ = (
         UniqueConstraint("survey_id", "layer", "chainage_from"),
+        Index(None, "survey_id", "layer", "overbreak"),
+        Index(None, "survey_id", "layer", "underbreak"),
         one_of("layer", *LAYERS),
         {"comment": "Deviation of the lining from its design profile, in steps of chainage and of length along the profile"},
     )
