@@ -410,6 +410,23 @@ SELECT %(id)s, floor(c / 1000), i + 1, scan, c, tunnel_api.roll(%(id)s, c, 7.0, 
 FROM generate_series(0, %(kilometres)s * 5 - 1) AS i, generate_series(1, 2) AS scan, LATERAL (SELECT i * 200 + 103.0 AS c) q
 """
 
+PROFILE = """
+INSERT INTO tunnel.design_profile (tunnel_id, name, layer, chainage_from, chainage_to, outline, source)
+SELECT tunnel_id, 'round', 'lining', 0, %(kilometres)s * 1000, '{0,-4,-1,0,4,-1,0,-4,0}', 'round.csv'
+FROM tunnel.survey WHERE id = %(id)s
+"""
+
+# Cells of 0.1 m along the profile, sections of 1 m.
+DEVIATION = """
+INSERT INTO tunnel.deviation_section (survey_id, km, layer, profile, chainage_from, chainage_to, design_length, seen_length,
+    overbreak, underbreak, noise_area, over_right, over_up, under_right, under_up, sigma, deviation_mean, deviation_least,
+    least_at, deviation_greatest, greatest_at, deviation)
+SELECT %(id)s, c / 1000, 'lining', 'round', c, c + 1, 25.1, 20, 0.3 + 0.2 * sin(c / 40.0), 0.3 + 0.2 * cos(c / 30.0), 0.001,
+    3, 1, 2, 1, 0.003, 0, -0.04, 12.5, 0.04 + 0.02 * sin(c / 50.0), 6.5, v.cells
+FROM generate_series(0, %(kilometres)s * 1000 - 1) AS c
+CROSS JOIN LATERAL (SELECT array_agg((0.05 * sin((c + i) / 30.0))::real) AS cells FROM generate_series(1, 251) AS i) v
+"""
+
 STEPS = {
     "files and ledger": (FILES, RUNS),
     "segments and sections": (SEGMENTS, COUNTED, SECTIONS),
@@ -427,6 +444,7 @@ STEPS = {
     ),
     "coverage and radiometry": (COVERAGE, RADIOMETRY, CURVES),
     "ground, clusters, target spheres": (GROUND, CLUSTERS, SPHERES),
+    "deviation": (PROFILE, DEVIATION),
 }
 
 

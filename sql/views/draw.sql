@@ -81,20 +81,21 @@ $$;
 COMMENT ON FUNCTION tunnel_api.link_findings(int, geometry) IS
 'Marks which wet findings of a survey about a place (unrolled plane) are the same, so that each counts once: called after each change of an outline, a kind or a review, and by detection.';
 
--- Detected leaks lie in a dry region when half of them does. One that waits for an operator has none.
+-- Leaks that detection found lie in a dry region when half of them does, redrawn, split and merged ones too. One that waits for
+-- an operator has none. What is no longer a leak lies in none.
 CREATE OR REPLACE FUNCTION tunnel_api.mark_dry(survey_id int, place geometry) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
     UPDATE tunnel.anomaly a SET dry_region_id = w.region
       FROM (SELECT x.id, (SELECT r.id FROM tunnel.region r
-                           WHERE r.survey_id = x.survey_id AND r.kind = 'dry' AND NOT r.waits AND r.geom && x.unrolled
+                           WHERE x.wet AND r.survey_id = x.survey_id AND r.kind = 'dry' AND NOT r.waits AND r.geom && x.unrolled
                              AND ST_Area(ST_Intersection(r.geom, x.unrolled)) >= 0.5 * ST_Area(x.unrolled)
                            ORDER BY r.id LIMIT 1) AS region
               FROM tunnel.anomaly x
-             WHERE x.survey_id = $1 AND x.unrolled && $2 AND x.origin = 'detected' AND x.wet) w
+             WHERE x.survey_id = $1 AND x.unrolled && $2 AND NOT x.by_hand) w
      WHERE a.id = w.id AND a.dry_region_id IS DISTINCT FROM w.region
 $$;
 COMMENT ON FUNCTION tunnel_api.mark_dry(int, geometry) IS
-'Marks the detected leaks of a survey about a place (unrolled plane) that lie in a dry region by half, and takes the mark from the others: called after each change of a region, and by detection.';
+'Marks the leaks of a survey about a place (unrolled plane) that detection found and that lie in a dry region by half, and takes the mark from the others: called after each change of a region or of a finding, and by detection.';
 
 -- Each change of findings adds rows to their sums; there need be no more of them than sums. Who does the same meanwhile has the
 -- rows that he has.
@@ -336,8 +337,10 @@ BEGIN
         ELSE
             drawn := coalesce(was.shape, was.unrolled);
         END IF;
-        IF redrawn OR new_row -> 'kind' <> was_row -> 'kind' THEN
-            PERFORM tunnel_api.check_kind(NEW.kind, CASE WHEN was.by_hand OR redrawn AND NEW.kind <> was.kind THEN drawn END);
+        -- one of a kind that is offered no more may still be redrawn
+        IF new_row -> 'kind' <> was_row -> 'kind'
+           OR (redrawn AND EXISTS (SELECT FROM tunnel.finding_kind k WHERE k.code = NEW.kind AND k.active)) THEN
+            PERFORM tunnel_api.check_kind(NEW.kind, CASE WHEN was.by_hand OR redrawn THEN drawn END);
         END IF;
         IF redrawn OR (was.shape IS NOT NULL AND new_row -> 'width' <> was_row -> 'width') THEN
             kept := tunnel_api.finding_measured(was.id);
@@ -450,6 +453,7 @@ BEGIN
         PERFORM tunnel_api.note_edit(name, 'anomaly', made, NULL, tunnel_api.finding_state(made), part_of => step);
     END LOOP;
     PERFORM tunnel_api.link_findings(survey_key, was.unrolled);
+    PERFORM tunnel_api.mark_dry(survey_key, was.unrolled);
     RETURN ids;
 END
 $$;
@@ -523,6 +527,10 @@ BEGIN
     before := tunnel_api.finding_state(oldest.id);
     kept := tunnel_api.finding_measured(oldest.id);
     PERFORM tunnel_api.redraw(oldest.id, whole, oldest.width, 'merged');
+    UPDATE tunnel.anomaly a SET severity = m.severity, remark = m.remark
+      FROM (SELECT max(x.severity) AS severity, string_agg(DISTINCT x.remark, '; ') AS remark
+              FROM tunnel.anomaly x WHERE x.id = ANY (wanted)) m
+     WHERE a.id = oldest.id;
     -- named also where the outline of the oldest is that of all
     step := tunnel_api.note_edit(name, 'anomaly', oldest.id, before,
         tunnel_api.finding_state(oldest.id) || jsonb_build_object('merged', array_remove(wanted, oldest.id)), kept => kept);
@@ -534,11 +542,12 @@ BEGIN
         PERFORM tunnel_api.note_edit(name, 'anomaly', was.id, before, tunnel_api.finding_state(was.id), part_of => step);
     END LOOP;
     PERFORM tunnel_api.link_findings(surveys[1], place);
+    PERFORM tunnel_api.mark_dry(surveys[1], place);
     RETURN oldest.id;
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.finding_merge(bigint[]) IS
-'Merges findings of one kind (polygons, or lines end to end) that touch or lie within a metre. The oldest keeps its number and review and gets the outline of all; the others stay as merged into it, and are not counted. Returns its id.';
+'Merges findings of one kind (polygons, or lines end to end) that touch or lie within a metre. The oldest keeps its number and review and gets the outline of all, their greatest severity and all their remarks; the others stay as merged into it, and are not counted. Returns its id.';
 
 -- Adds, changes or deletes a photo of a finding: a path or URL, and what it shows.
 CREATE OR REPLACE FUNCTION tunnel_api.edit_photo() RETURNS trigger

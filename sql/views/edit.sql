@@ -99,6 +99,7 @@ BEGIN
     IF TG_ARGV[0] = 'spot' THEN
         SELECT p.review, p.remark, p.kind INTO was FROM tunnel.spot p WHERE p.id = OLD.id FOR UPDATE;
     ELSE
+        PERFORM tunnel_api.lock_findings(a.survey_id) FROM tunnel.anomaly a WHERE a.id = OLD.id;
         SELECT a.review, a.remark, coalesce(a.judged, a.kind) AS kind INTO was
           FROM tunnel.anomaly a WHERE a.id = OLD.id FOR UPDATE;
     END IF;
@@ -130,7 +131,8 @@ BEGIN
                kind = CASE WHEN a.by_hand THEN NEW.kind ELSE a.kind END,
                judged = CASE WHEN a.by_hand THEN NULL WHEN NEW.kind = was.kind THEN a.judged ELSE nullif(NEW.kind, a.kind) END
          WHERE a.id = OLD.id;
-        PERFORM tunnel_api.link_findings(a.survey_id, a.unrolled) FROM tunnel.anomaly a WHERE a.id = OLD.id;
+        PERFORM tunnel_api.link_findings(a.survey_id, a.unrolled), tunnel_api.mark_dry(a.survey_id, a.unrolled)
+           FROM tunnel.anomaly a WHERE a.id = OLD.id;
     END IF;
     PERFORM tunnel_api.note_edit(OLD.survey, TG_ARGV[0], OLD.id, to_jsonb(was),
                                  jsonb_build_object('review', NEW.review, 'remark', NEW.remark, 'kind', NEW.kind));
@@ -272,9 +274,15 @@ BEGIN
         RAISE EXCEPTION 'a dry region of % m² is larger than % m²: its reason must say why',
             round(ST_Area(NEW.geom)::numeric, 1), most USING ERRCODE = 'check_violation';
     END IF;
-    NEW.drawn_by := session_user;
-    NEW.drawn_at := clock_timestamp();
-    IF was.id IS NULL OR NEW.kind <> was.kind OR NOT NEW.geom = was.geom THEN
+    IF was.id IS NULL OR NOT NEW.geom = was.geom THEN
+        NEW.drawn_by := session_user;
+        NEW.drawn_at := clock_timestamp();
+    ELSE
+        NEW.drawn_by := was.drawn_by;
+        NEW.drawn_at := was.drawn_at;
+    END IF;
+    -- what an operator put in force is the region for the reason that it had
+    IF was.id IS NULL OR NEW.kind <> was.kind OR NOT NEW.geom = was.geom OR NEW.reason IS DISTINCT FROM was.reason THEN
         NEW.waits := NEW.kind = 'dry' AND ST_Area(NEW.geom) > most;
         NEW.approved_by := NULL;
         NEW.approved_at := NULL;

@@ -1,6 +1,39 @@
 -- The sheets on which a survey is drawn and printed: 50 m of tunnel each, as the blocks of its images. Needs stationing
 -- (geometry/stationing.sql).
 
+-- Joints and dark spots are found by the hundred: on sheets they stand if people redrew them or gave them a severity. Leaks have
+-- the table of leaks (sheet_leak), and of these people's severities are drawn, and drips as what they are, points.
+CREATE OR REPLACE VIEW tunnel_api.sheet_finding AS
+SELECT f.id, f.survey_id, f.survey, f.km, f.chainage_from, f.chainage_to, f.label, f.arc_from, f.arc_to, f.clock,
+       f.kind, f.kind_label, k.position, f.wet, f.origin, f.by_hand, f.severity, f.severity_label, f.width, f.length, f.area,
+       f.counted, f.state, f.remark, p.shown, p.shown AND NOT f.wet AS listed, f.geom
+  FROM tunnel_api.finding_unrolled f
+  LEFT JOIN tunnel.finding_kind k ON k.code = f.kind
+ CROSS JOIN LATERAL (
+        SELECT f.counted AND (f.origin <> 'detected' OR f.severity IS NOT NULL
+                              OR f.kind NOT IN ('leak', 'joint', 'dark')) AS shown) p;
+COMMENT ON VIEW tunnel_api.sheet_finding IS
+    'Findings as sheets draw and list them: what people drew, judged to be of a kind of their own or gave a severity';
+COMMENT ON COLUMN tunnel_api.sheet_finding.position IS 'Place of its kind in lists';
+COMMENT ON COLUMN tunnel_api.sheet_finding.shown IS 'Whether it is drawn as a finding: it counts, and people had a hand in it';
+COMMENT ON COLUMN tunnel_api.sheet_finding.listed IS 'Whether it is in the table of findings: of these what is not wet';
+COMMENT ON COLUMN tunnel_api.sheet_finding.geom IS 'In the unrolled plane (chainage, arc), m: a polygon, a line or a point';
+
+CREATE OR REPLACE VIEW tunnel_api.sheet_leak AS
+SELECT l.id, l.survey_id, l.survey, l.km, l.chainage_from, l.chainage_to, l.label, l.arc_from, l.arc_to, l.clock, l.kind,
+       l.area, l.drop_mean, l.confidence, l.review, l.remark, l.detected,
+       concat_ws('; ', nullif(concat_ws(', ', CASE WHEN l.kind <> 'leak' THEN k.label END, v.label), ''), nullif(l.remark, ''))
+           AS note,
+       l.geom
+  FROM tunnel_api.leak_unrolled l
+  JOIN tunnel.anomaly a ON a.id = l.id
+  LEFT JOIN tunnel.finding_kind k ON k.code = l.kind
+  LEFT JOIN tunnel.severity v ON v.id = a.severity;
+COMMENT ON VIEW tunnel_api.sheet_leak IS 'Leaks as sheets draw and list them';
+COMMENT ON COLUMN tunnel_api.sheet_leak.note IS
+    'Its kind, if that is not leak, and its severity in the owner''s words, then the remark; empty if there is none';
+COMMENT ON COLUMN tunnel_api.sheet_leak.geom IS 'In the unrolled plane (chainage, arc), m';
+
 -- All sheets of a survey are as high as its widest place, so that they have one scale. Each section is taken for the middle
 -- one of itself and its neighbours: a single one that went astray, say at a portal, must not blow up all sheets.
 -- What is drawn needs no figures, and they are not reckoned then: they are joined so that the planner can leave them out.
@@ -8,7 +41,7 @@ CREATE OR REPLACE VIEW tunnel_api.sheet AS
 SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.name AS survey, n.number, b.km,
        b.chainage_from, b.chainage_to, k.labels[1] AS label_from, k.labels[6] AS label_to, k.labels AS ticks,
        c.lining AS lining_area, c.seen / nullif(c.lining, 0) AS seen_share, l.wet_area, l.leaks,
-       g.said AS gaps, m.said AS remarks,
+       g.said AS gaps, m.said AS remarks, f.findings, f.left_out,
        public.st_makeenvelope(b.chainage_from, a.arc_from, b.chainage_to, a.arc_to, 0)::public.geometry(Polygon, 0) AS geom
   FROM tunnel.survey s
  CROSS JOIN LATERAL (
@@ -65,6 +98,17 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
          WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND x.wet AND NOT x.aside
            AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(b.chainage_from, -1e4, b.chainage_to, 1e4)
            AND x.chainage_to > r.chainage_from AND x.chainage_from < r.chainage_to) l ON true
+  LEFT JOIN LATERAL (
+        SELECT sum(t.findings) FILTER (WHERE t.listed)::bigint AS findings,
+               string_agg(t.findings || ' ' || t.state, ', ' ORDER BY t.state)
+                   FILTER (WHERE t.state IN ('rejected', 'merged', 'same', 'dry')) AS left_out
+          FROM (SELECT q.state, q.listed, count(*) AS findings
+                  FROM tunnel.anomaly x
+                  JOIN tunnel_api.sheet_finding q ON q.id = x.id
+                 WHERE x.survey_id = s.id
+                   AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(b.chainage_from, -1e4, b.chainage_to, 1e4)
+                   AND x.chainage_to > b.chainage_from AND x.chainage_from < b.chainage_to
+                 GROUP BY q.state, q.listed) t) f ON true
  CROSS JOIN LATERAL (SELECT tunnel_api.coverage_statement(s.id, r.chainage_from, r.chainage_to) AS said) g
  CROSS JOIN LATERAL (SELECT tunnel_api.remark_statement(s.id, r.chainage_from, r.chainage_to) AS said) m
  WHERE a.arc_from IS NOT NULL;
@@ -78,4 +122,26 @@ COMMENT ON COLUMN tunnel_api.sheet.wet_area IS 'Area of the leaks within the she
 COMMENT ON COLUMN tunnel_api.sheet.leaks IS 'Leaks on it or over its edges, found last and not rejected; NULL where they were not searched for';
 COMMENT ON COLUMN tunnel_api.sheet.gaps IS 'Where on it leaks were not searched for, or not as they should be (coverage_statement); NULL if nowhere';
 COMMENT ON COLUMN tunnel_api.sheet.remarks IS 'What is to be known of the results there (remark_statement); NULL if nothing';
+COMMENT ON COLUMN tunnel_api.sheet.findings IS 'Findings in its table (sheet_finding, listed), beside leaks; NULL if none';
+COMMENT ON COLUMN tunnel_api.sheet.left_out IS
+    'How many findings on it do not count, leaks among them, and are not drawn: rejected, merged, same, dry; NULL if none';
 COMMENT ON COLUMN tunnel_api.sheet.geom IS 'From edge to edge, as high as the survey''s widest place';
+
+-- The other columns are what they are in the views behind.
+DO $$
+DECLARE
+    bare record;
+BEGIN
+    FOR bare IN
+        SELECT v.relname AS view, a.attname AS name, col_description(t.oid, b.attnum) AS text
+          FROM (VALUES ('sheet_finding', 'finding_unrolled'), ('sheet_leak', 'leak_unrolled')) AS n (view, behind)
+          JOIN pg_class v ON v.relnamespace = 'tunnel_api'::regnamespace AND v.relname = n.view
+          JOIN pg_class t ON t.relnamespace = 'tunnel_api'::regnamespace AND t.relname = n.behind
+          JOIN pg_attribute a ON a.attrelid = v.oid AND a.attnum > 0
+          JOIN pg_attribute b ON b.attrelid = t.oid AND b.attname = a.attname
+         WHERE col_description(v.oid, a.attnum) IS NULL AND col_description(t.oid, b.attnum) IS NOT NULL
+    LOOP
+        EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', bare.view, bare.name, bare.text);
+    END LOOP;
+END
+$$;

@@ -148,7 +148,8 @@ DECLARE
     place geometry;
     done bigint;
 BEGIN
-    survey_key := (SELECT s.id FROM tunnel.survey s WHERE s.name = step.survey);
+    -- not one that was added later under the same name
+    survey_key := (SELECT s.id FROM tunnel.survey s WHERE s.name = step.survey AND s.created_at <= step.at);
     IF survey_key IS NULL THEN
         RAISE EXCEPTION 'there is no change of a finding % to be taken back', finding USING ERRCODE = 'invalid_parameter_value';
     END IF;

@@ -2,13 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy import ndimage
 
-from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.features import NAMES, measure_features, measure_regions
-from tunneldb.anomalies.regions import Region, RegionProperties, find_regions
-from tunneldb.raster.geotiff import NODATA
-from tunneldb.raster.grid import FaceGrid
+from tunneldb.anomalies.regions import Region, RegionProperties
 
 PIXEL = 0.02
 
@@ -62,29 +58,6 @@ def test_softness_and_brightness_of_the_rim_and_what_it_lies_at():
     assert (found["beside"], found["beneath"], found["foot"]) == (0.25, 0.1, 0.05)
     assert (found["recess"], found["recess_rim"]) == (0.1, 0.1)
     assert (found["straight"], found["sharp"]) == (0.75, 0.5)
-
-
-def test_core_is_led_by_the_darkest_tenth_and_not_by_noise():
-    rng = np.random.default_rng(5)
-    even = 4.0 + rng.normal(0.0, 0.5, (60, 100))
-    peaked = np.full(even.shape, 3.0)
-    peaked[25:45, 35:65] = 13.0  # a tenth of it; the mean is 4, too
-    found = {}
-    for name, drop in {"even": even, "peaked": peaked}.items():
-        drop = np.pad(drop, 10)
-        steps = np.rint(100 * drop).astype(np.int16)
-        steps[rng.random(drop.shape) < 0.1] = NODATA
-        wet = np.pad(np.ones(even.shape, bool), 10)
-        grid = FaceGrid(PIXEL, -40, len(drop), 0, drop.shape[1])
-        image = ContrastImage(grid, wet.astype(np.uint8), steps, 1, np.full(drop.shape, 0.5, np.float32))
-        (region,) = find_regions(wet, wet, image, 0.0, None)
-        held = wet & (steps != NODATA)
-        count = ndimage.uniform_filter(held.astype(float), 5, mode="constant")
-        mean = ndimage.uniform_filter(np.where(held, 0.01 * steps, 0.0), 5, mode="constant") / np.maximum(count, 1e-9)
-        assert region.properties.smoothed_power == pytest.approx((mean[held] ** 8).sum())
-        found[name] = dict(zip(NAMES, measure_features(region).tolist(), strict=True))["core"]
-    assert found["even"] == pytest.approx(0.0, abs=0.03)
-    assert found["peaked"] == pytest.approx(np.log(13.0 / 4.0 * 0.1 ** (1 / 8)), abs=0.05)  # its rim is smoothed
 
 
 def test_what_can_not_be_measured_is_unknown():

@@ -1,7 +1,7 @@
 """Open a project with real QGIS and say what it sees, as JSON; runs under the Python that has PyQGIS.
 
 Usage: open_in_qgis.py PROJECT describe | render THEME PNG | move_vertex N DX DZ | review ID STATUS REMARK [LAYER [KIND]]
-       | draw KIND | draw_findings | add VIEW | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG
+       | draw KIND | draw_findings | add VIEW | draw_layer LAYER XMIN,YMIN,XMAX,YMAX PNG | numbers LAYER
        | atlas PDF [LAYOUT] | preview | where CHAINAGE ARC | labels LAYER | space [PNG]
 """
 
@@ -236,6 +236,11 @@ def labels(project: QgsProject, layer_id: str) -> dict[str, Any]:
     return {"texts": texts, "error": expression.evalErrorString()}
 
 
+def numbers(project: QgsProject, layer_id: str) -> dict[str, Any]:
+    """Which findings a layer shows."""
+    return {"numbers": sorted(feature["id"] for feature in project.mapLayer(PREFIX + layer_id).getFeatures())}
+
+
 def _paint(settings: QgsMapSettings, extent: QgsRectangle, path: str) -> dict[str, Any]:
     settings.setExtent(extent)
     settings.setOutputSize(QSize(WIDTH, HEIGHT))
@@ -317,6 +322,9 @@ def draw_findings(project: QgsProject) -> dict[str, Any]:
             done[layer_id]["kinds"] = sorted(row["code"] for row in catalogue.getFeatures(request))
             relations = project.relationManager().referencedRelations(layer)
             done[layer_id]["photos"] = [relation.referencingLayer().name() for relation in relations]
+    for layer_id, seen in done.items():
+        features = project.mapLayer(PREFIX + layer_id).getFeatures()
+        seen["shapes"] = sorted({QgsWkbTypes.displayString(feature.geometry().wkbType()) for feature in features})
     return done
 
 

@@ -17,6 +17,7 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from psycopg.rows import dict_row
 from support.cookbook_survey import CONFIRMED, GONE, MOVED, NICHE, OLD, POINTS, SPARSE, draw_findings, prepare
+from support.example_deviation import BULGE, OVER, UNDER
 from support.example_objects import FLOOR, HALF_FLOOR, SPHERES, THINGS, beside
 from support.example_survey import GIRTH, NAME, SEEN_FROM, WET, example_surface
 
@@ -487,6 +488,39 @@ def before_redrawn(rows: Rows, a: Asked) -> None:
     assert all(row["outline_before"].startswith("POLYGON((") for row in rows)
 
 
+def underbreaks(rows: Rows, a: Asked) -> None:
+    """Of sections n = 1, 2, … it is n times the first one's."""
+    assert [row["label"] for row in rows] == ["12+300.000", "12+400.000"]
+    for row, first in zip(rows, (1, 101), strict=True):
+        close(row, underbreak_m3=UNDER * sum(range(first, first + 100)), overbreak_m3=100 * OVER)
+        close(row, 0, seen_percent=90)
+
+
+def most_inside(rows: Rows, a: Asked) -> None:
+    assert [row["label"] for row in rows] == [label(12499 - n) for n in range(10)]
+    for n, row in enumerate(rows):
+        close(row, 3, underbreak_m2=UNDER * (200 - n))
+
+
+def bulges(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert (row["chainage_from"], row["chainage_to"], row["greatest_mm"]) == (*BULGE, 60)
+
+
+def wrong_axis(rows: Rows, a: Asked) -> None:
+    """150.5 sections, whose areas grow by 2 and 3 m² by metre of axis; half of the last counts."""
+    (row,) = rows
+    close(row, underbreak_m3=UNDER * (sum(range(1, 151)) + 75.5), overbreak_m3=150.5 * OVER)
+    close(row, underbreak_sigma=0.01 * 2 * 150.5, overbreak_sigma=0.01 * 3 * 150.5)
+
+
+def deviation_stale(rows: Rows, a: Asked) -> None:
+    """An edited vertex makes the image stale on which it rests."""
+    (row,) = rows
+    assert (row["km"], row["layer"], row["done_at"]) == (12, "lining", None)
+    assert row["reason"].startswith("detect is stale: ")
+
+
 CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which leaks over 0.2 m² are there between two chainages, and on which segment?": over,
     "Which drip from above?": above,
@@ -526,6 +560,11 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "What stands in the tunnel?": tall,
     "How high is the ground, and how wide?": ground,
     "How well do the scans agree on a target sphere?": spheres,
+    "How many m³ of underbreak are there per 100 m?": underbreaks,
+    "Which ten sections stand most inside the profile?": most_inside,
+    "Over which stretches does lining stand more than 50 mm inside?": bulges,
+    "What would an axis that is wrong by 10 mm change of it?": wrong_axis,
+    "Is the deviation of each kilometre up to date?": deviation_stale,
     "How many findings of each kind are there, and how did they come about?": kinds,
     "Which cracks are longer than a metre, the most severe first?": cracks,
     "Which severe findings have no photo?": without_photo,

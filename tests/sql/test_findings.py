@@ -254,6 +254,58 @@ def test_a_dry_region_marks_leaks_and_gives_them_back(person: psycopg.Connection
     assert wet(person) == (before[0], pytest.approx(before[1]))
 
 
+@INSPECTOR
+def test_only_what_is_a_leak_is_in_a_dry_region_whichever_view_says_so(person: psycopg.Connection) -> None:
+    """And the parts of a leak in it are in it, too."""
+    key, wkb = person.execute(
+        "SELECT id, ST_AsBinary(unrolled) FROM tunnel_api.leak WHERE review = 'open' AND kind = 'leak' ORDER BY id LIMIT 1"
+    ).fetchone()
+    outline = shapely.from_wkb(bytes(wkb))
+    (region,) = person.execute(
+        "INSERT INTO tunnel_api.region (survey, kind, geom) VALUES (%s, 'dry', ST_GeomFromWKB(%s, 0)) RETURNING id",
+        [NAME, shapely.to_wkb(outline.envelope.buffer(0.1, join_style="mitre"))],
+    ).fetchone()
+    state = "state, dry_region_id"
+    for view in ("finding_unrolled", "anomaly"):
+        person.execute("UPDATE tunnel_api.finding_unrolled SET kind = 'dark' WHERE id = %s", [key])
+        assert row(person, key, state) == ("open", None)
+        person.execute(f"UPDATE tunnel_api.{view} SET kind = 'leak' WHERE id = %s".encode(), [key])
+        assert row(person, key, state) == ("dry", region)
+    west, south, east, north = outline.bounds
+    blade = LineString([((west + east) / 2, south - 1), ((west + east) / 2, north + 1)])
+    (parts,) = person.execute(
+        "SELECT tunnel_api.finding_split(%s, ST_GeomFromWKB(%s, 0))", [key, shapely.to_wkb(blade)]
+    ).fetchone()
+    assert [row(person, part, state) for part in parts] == [("dry", region)] * len(parts)
+
+
+@INSPECTOR
+def test_a_detected_leak_is_not_redrawn_as_a_line(person: psycopg.Connection) -> None:
+    (key,) = person.execute("SELECT min(id) FROM tunnel_api.leak WHERE review = 'open'").fetchone()
+    with pytest.raises(psycopg.errors.CheckViolation, match="drawn as polygon, not as line"):
+        person.execute("UPDATE tunnel_api.finding_unrolled SET geom = 'LINESTRING(12350 1, 12352 1)' WHERE id = %s", [key])
+
+
+@INSPECTOR
+def test_what_is_merged_keeps_the_greatest_severity_and_all_remarks(person: psycopg.Connection) -> None:
+    first = draw(person, FREE, "spall", severity=1, remark="old")
+    second = draw(person, shapely.affinity.translate(FREE, 1.5), "spall", severity=4, remark="grave")
+    person.execute("SELECT tunnel_api.finding_merge(%s)", [[first, second]])
+    assert row(person, first, "severity, remark") == (4, "grave; old")
+    person.execute("SELECT tunnel_api.finding_undo(%s)", [first])
+    assert row(person, first, "severity, remark") == (1, "old")
+
+
+def test_a_finding_of_a_survey_that_was_removed_is_not_brought_back_in_another(people: None, dsn: str, example: str) -> None:
+    with psycopg.connect(make_conninfo(dsn, user="ines")) as ines:
+        key = draw(ines, FREE)
+        ines.execute("DELETE FROM tunnel_api.finding_unrolled WHERE id = %s", [key])
+    with psycopg.connect(dsn) as owner:  # as if it had been added now
+        owner.execute("UPDATE tunnel.survey SET created_at = clock_timestamp() WHERE name = %s", [NAME])
+        with pytest.raises(psycopg.Error, match=f"there is no change of a finding {key} to be taken back"):
+            owner.execute("SELECT tunnel_api.finding_undo(%s)", [key])
+
+
 def test_a_large_dry_region_waits_for_an_operator(people: None, dsn: str, example: str) -> None:
     with psycopg.connect(make_conninfo(dsn, user="ines")) as ines, psycopg.connect(make_conninfo(dsn, user="otto")) as otto:
         before = wet(ines)
@@ -278,11 +330,12 @@ def test_a_large_dry_region_waits_for_an_operator(people: None, dsn: str, exampl
         otto.rollback()
         otto.execute("SELECT tunnel_api.dry_region_approve(%s)", [region])
         otto.commit()
-        # who draws it anew needs the word anew; a reason alone does not
-        ines.execute("UPDATE tunnel_api.region SET reason = 'rebuilt' WHERE id = %s", [region])
-        assert ines.execute(stated, [region]).fetchone() == (False, "otto", taken)
-        ines.execute("UPDATE tunnel_api.region SET geom = ST_Translate(geom, 1, 0) WHERE id = %s", [region])
-        assert (wet(ines)[0], ines.execute(stated, [region]).fetchone()) == (before[0], (True, None, 0))
+        # drawn anew, or for another reason, it needs the word anew
+        for change in ("reason = 'rebuilt'", "geom = ST_Translate(geom, 1, 0)"):
+            ines.execute(f"UPDATE tunnel_api.region SET {change} WHERE id = %s".encode(), [region])
+            assert (wet(ines)[0], ines.execute(stated, [region]).fetchone()) == (before[0], (True, None, 0))
+            ines.rollback()
+            assert ines.execute(stated, [region]).fetchone() == (False, "otto", taken)
         said = ines.execute("SELECT after FROM tunnel_api.audit WHERE view = 'region' AND who = 'otto'").fetchone()
         assert said[0]["approved_by"] == "otto"
 

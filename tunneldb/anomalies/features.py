@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from tunneldb.anomalies.degrees import degrees_of, ramp
 from tunneldb.anomalies.region_shape import Shape, measure_shape
-from tunneldb.anomalies.regions import POWER, Region
+from tunneldb.anomalies.regions import Region
 from tunneldb.arrays import Bool, Float
 
 
@@ -57,7 +57,6 @@ FEATURES = (
     Feature("step", "gradual", "drop 6 cm inside less that 6 cm outside, over the mean drop"),
     Feature("far_step", "gradual", "drop 6 cm inside less that 20 cm outside, over the mean drop"),
     Feature("uneven", "gradual", "standard deviation of the drop over its mean"),
-    Feature("core", "gradual", "drop of what is darkest within 5 cm, over the mean drop, as a logarithm"),
     Feature("straight", "rectangular", "share of the sharp sides on four lines along and around the tunnel"),
     Feature("sharp", "rectangular", "share of its sides that are sharp"),
     Feature("box", "rectangular", "share that it fills of its box without what sticks out"),
@@ -149,10 +148,8 @@ def _rim(region: Region, shape: Shape) -> tuple[float, ...]:
     far = _ratio(properties.far_outside, properties.far_steps)
     variance = properties.drop_square / region.filled - region.drop_mean**2
     shown = properties.perimeter - properties.perimeter_off
-    core = (properties.smoothed_power / region.filled) ** (1.0 / POWER)
     return (
         (inside - outside) / mean, (inside - far) / mean, math.sqrt(max(variance, 0.0)) / mean,
-        math.log(core / mean) if core else math.nan,
         _ratio(properties.straight, properties.sharp), _ratio(properties.sharp, shown),
         shape.rectangularity, shape.corners, _turned_box(region.mask),
         math.log(shape.aspect_ratio), shape.deviation_box,

@@ -13,20 +13,13 @@ from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.drips import attach_drips
 from tunneldb.anomalies.region_edges import Edges, Sides
 from tunneldb.anomalies.runs import Components, connected, pixels_of, row_runs
-from tunneldb.arrays import Bool, Float, Int16, Int64, Intp
-from tunneldb.compiled import kernel
+from tunneldb.arrays import Bool, Float, Int64, Intp
 from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import outline
 
 LONG = 0.5
 """Regions that are longer are kept even if they are small, m: joints."""
-
-SMOOTH = 0.05
-"""What is darkest in a region is told from its noise by means over so much to either side, m."""
-
-POWER = 8
-"""Mean of so high a power is led by the darkest tenth, and is summed over the parts of a region as a quantile can't be."""
 
 PIXELS = 1_000_000
 """Pixels whose sums are made at a time, about."""
@@ -61,8 +54,6 @@ class RegionProperties(NamedTuple):
         Of ``steps``, sides outside of which lining is brighter than dry lining is by chance.
     off_above, floor : float
         Sides towards an appendage in the direction of the crown, and those towards the floor.
-    smoothed_power : float
-        Sum of the POWER-th powers of the drop, dB, as the mean over what is dark within SMOOTH of each pixel with points.
     """
 
     sigma: float = 0.0
@@ -82,7 +73,6 @@ class RegionProperties(NamedTuple):
     bright: float = 0.0
     off_above: float = 0.0
     floor: float = 0.0
-    smoothed_power: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -231,7 +221,6 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
     """
     edges, found = Edges(dark, contrast), []
     pixels, recess, steps, squares, sigma, between = (np.zeros(count) for _ in range(6))
-    power, half = np.zeros(count), round(SMOOTH / contrast.grid.pixel)
     most = np.full(count, NODATA, np.int16)
     until = np.cumsum(runs[:, 2] - runs[:, 1])
     for part in np.split(np.arange(len(runs)), np.searchsorted(until, np.arange(PIXELS, until[-1], PIXELS))):
@@ -250,8 +239,6 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
         steps += np.bincount(label, drop, count)
         squares += np.bincount(label, drop.astype(np.float64) ** 2, count)
         np.maximum.at(most, label, drop)
-        smoothed = _smoothed(row, column, contrast.drop, dark, half) * STEP["corrected"]
-        power += np.bincount(label, np.maximum(smoothed, 0.0) ** POWER, count)
         sigma += np.bincount(label, contrast.sigma[row // contrast.tile, column // contrast.tile], count)
     sides = Sides(*map(np.concatenate, zip(*found, strict=True)))
     drop_sum = steps * STEP["corrected"]
@@ -261,24 +248,8 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
     squares *= STEP["corrected"] ** 2
     return np.column_stack(
         [pixels, drop_sum, drop_max, sigma, recess, perimeter[:, :3], about[:, :3], straight, between, squares,
-         about[:, 3:], perimeter[:, 3:], power]
+         about[:, 3:], perimeter[:, 3:]]
     )  # fmt: skip
-
-
-@kernel
-def _smoothed(row: Int64, column: Int64, drop: Int16, dark: Bool, half: int) -> Float:  # pragma: no cover - compiled
-    """Mean drop, in its steps, of the dark pixels with points up to so many pixels about each of some (n,) of them."""
-    rows, columns = drop.shape
-    mean = np.empty(len(row), np.float64)
-    for i in range(len(row)):
-        total, held = 0, 0
-        for m in range(max(row[i] - half, 0), min(row[i] + half + 1, rows)):
-            for n in range(max(column[i] - half, 0), min(column[i] + half + 1, columns)):
-                if dark[m, n] and drop[m, n] != NODATA:
-                    total += drop[m, n]
-                    held += 1
-        mean[i] = total / held  # it holds points itself
-    return mean
 
 
 def merge_regions(parts: Sequence[Region]) -> Region:

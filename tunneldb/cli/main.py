@@ -49,6 +49,11 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "tunneldb.cli.rings:rings",
         "Measure rings from surveyed points: deviation from the design axis, radius, ovality, chords.",
     ),
+    "profile": ("tunneldb.cli.profile:profile", "Add, list or remove the design profiles of a tunnel."),
+    "deviation": (
+        "tunneldb.cli.deviation:deviation",
+        "Hold the lining against its design profiles: deviation, overbreak and underbreak.",
+    ),
     "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),
     "export": (
         "tunneldb.cli.export:export",

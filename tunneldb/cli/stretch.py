@@ -6,17 +6,28 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import click
 import psycopg
 
 from tunneldb.errors import UserError
-from tunneldb.store.survey import Survey
 
 _METRES = re.compile(r"-?\d+(\.\d*)?")
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+class OfTunnel(Protocol):
+    """What has chainages: a survey, or a tunnel by itself."""
+
+    @property
+    def tunnel_id(self) -> int:
+        """Key of the tunnel."""
+
+    @property
+    def tunnel(self) -> str:
+        """Its name."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +51,7 @@ def stretch_options(command: Command) -> Command:
     return click.option("--from", "start", metavar="PLACE", help=help_from)(end(command))
 
 
-def parse_stretch(conn: psycopg.Connection[Any], survey: Survey, start: str | None, end: str | None) -> Stretch:
+def parse_stretch(conn: psycopg.Connection[Any], survey: OfTunnel, start: str | None, end: str | None) -> Stretch:
     """Stretch of a survey's tunnel between two places; where stations run backwards they may be given in either order.
 
     Raises
@@ -57,7 +68,7 @@ def parse_stretch(conn: psycopg.Connection[Any], survey: Survey, start: str | No
     return Stretch(low, high)
 
 
-def _chainage(conn: psycopg.Connection[Any], survey: Survey, option: str, place: str) -> float:
+def _chainage(conn: psycopg.Connection[Any], survey: OfTunnel, option: str, place: str) -> float:
     """A station may be there twice or not at all; a chainage is one place, and may lie beyond the tunnel's ends."""
     if _METRES.fullmatch(place.strip()):
         return float(place)

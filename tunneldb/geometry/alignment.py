@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -10,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from tunneldb.arrays import Float, Int32, Int64
 from tunneldb.compiled import point_kernel
 from tunneldb.errors import UserError
-from tunneldb.geometry.frame import frame_of, locate, nearest_segment, segment_rows, tangents
+from tunneldb.geometry.frame import frame_of, frames_at, locate, nearest_segment, segment_rows, tangents
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.threads import in_blocks
 
@@ -95,7 +96,31 @@ class Alignment:
 
     def locate(self, points: Float) -> tuple[Float, Float]:
         """Chainage and distance from the axis of points (n, 3), both (n,), m; NaN beyond the ends."""
-        segments = segment_rows(self.vertices, tangents(self.vertices))
+        chainage, distance, _ = self._located(points)
+        return chainage, distance
+
+    def across(self, points: Float) -> Float:
+        """Chainage of points (n, 3), and where they lie in the plane across the axis there, right and up: (n, 3), m.
+
+        NaN beyond the ends. Right is level, up is at right angles to it and to the axis.
+        """
+        chainage, _, segment = self._located(points)
+        held = np.flatnonzero(np.isfinite(chainage))
+        k = segment[held].astype(np.int64)
+        frame = frames_at(self._segments, k, chainage[held] / self.spacing - self.number[k])
+        away = points[held] - frame[:, 0]
+        found = np.full((len(points), 3), np.nan)
+        found[held, 0] = chainage[held]
+        found[held, 1:] = np.einsum("ij,ikj->ik", away, frame[:, 2:])
+        return found
+
+    @cached_property
+    def _segments(self) -> Float:
+        return segment_rows(self.vertices, tangents(self.vertices))
+
+    def _located(self, points: Float) -> tuple[Float, Float, Int32]:
+        """Chainage and distance from the axis, m, NaN beyond the ends, and place of the segment, each (n,)."""
+        segments = self._segments
         points = np.ascontiguousarray(points, np.float64)
         start, segment = np.full(len(points), -1, np.int32), np.empty(len(points), np.int32)
         chainage, distance = np.empty(len(points)), np.empty(len(points))
@@ -111,7 +136,7 @@ class Alignment:
         beyond = np.isinf(distance) | (chainage < self.start) | (chainage > self.end)
         chainage[beyond] = np.nan
         distance[beyond] = np.nan
-        return chainage, distance
+        return chainage, distance, segment
 
     def places(self, points: Float) -> tuple[Float, Float]:
         """Chainage of points (n, 3), and their place right of the axis in plan, both (n,), m; NaN beyond the ends."""

@@ -6,14 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.arrays import Float, Int64
+from tunneldb.arrays import Float, Int64, Single
 from tunneldb.geometry.frame import frames_at
-from tunneldb.geometry.unrolling import NODES, sections_about, to_plane, to_space
+from tunneldb.geometry.unrolling import NODES, section_points, sections_about, to_plane, to_space
 from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.threads import in_blocks
 
 BLOCK = 1 << 14
 """Points that are unrolled, or brought back, at a time."""
+
+COLUMNS = 250
+"""Columns of pixels that are placed at a time."""
 
 _ANYWHERE = np.full(3, -np.inf), np.full(3, np.inf)
 
@@ -101,6 +104,27 @@ class Surface:
                 self.segments, which[part], self.ends, self.chainages, self.radius, self.arcs, self.reach, unrolled[part]
             )
         return points
+
+    def section_points(self, chainage: Float, arc: Float, offset: Single) -> tuple[Float, Float]:
+        """Where pixels lie in the planes of their columns: right of the axis and above it, both (columns, rows), m.
+
+        Parameters
+        ----------
+        chainage, arc : (columns,), (rows,) float arrays
+            Of columns and rows, m.
+        offset : (rows, columns) float32 array
+            From the surface, m; NaN where nothing is seen.
+        """
+        right, up = (np.empty((len(chainage), len(arc))) for _ in range(2))
+
+        def block(begin: int, end: int) -> None:
+            section_points(
+                self.chainages, self.radius, self.arcs, self.reach, chainage[begin:end], arc,
+                np.ascontiguousarray(offset[:, begin:end]), right[begin:end], up[begin:end],
+            )  # fmt: skip
+
+        in_blocks(block, len(chainage), COLUMNS)
+        return right, up
 
     def segment_index(self, chainage: Float) -> Int64:
         """Index of the segment at each chainage, -1 where there is none."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tunneldb.arrays import Float, Int64, Intp
+from tunneldb.arrays import Float, Int64, Intp, Single
 from tunneldb.compiled import point_inner, point_kernel
 from tunneldb.geometry.frame import frame_of, frames_at, locate, nearest_segment
 
@@ -269,6 +269,64 @@ def to_plane(
             for axis in range(3):
                 unrolled[i, axis] = normals[i, axis] = np.nan
         i += 1
+
+
+@point_kernel
+def section_points(
+    chainages: Float,
+    radius: Float,
+    arcs: Float,
+    reach: float,
+    chainage: Float,
+    arc: Float,
+    offset: Single,
+    right: Float,
+    up: Float,
+) -> None:  # pragma: no cover - compiled
+    """Where pixels lie in the planes of their columns; the same steps as `to_space`.
+
+    Parameters
+    ----------
+    chainages, radius, arcs, reach
+        The surface, see :class:`tunneldb.geometry.surface.Surface`.
+    chainage : (c,) float array
+        Of the columns, m.
+    arc : (r,) float array
+        Of the rows, m.
+    offset : (r, c) float32 array
+        From the surface, m.
+    right, up : (c, r) float arrays
+        Overwritten: place from the axis, m; NaN without an offset or off the surface.
+    """
+    section, node = np.int64(-1), np.int64(0)
+    for j in range(chainage.shape[0]):
+        a, b, g = _sections_about(chainages, chainage[j], reach, section)
+        section = a
+        for i in range(arc.shape[0]):
+            right[j, i] = up[j, i] = np.nan
+            at = arc[i]
+            if a < 0 or not np.isfinite(offset[i, j]):
+                continue
+            while node > 0 and (1.0 - g) * arcs[a, node] + g * arcs[b, node] > at:
+                node -= 1
+            while node < NODES - 2 and (1.0 - g) * arcs[a, node + 1] + g * arcs[b, node + 1] <= at:
+                node += 1
+            first = (1.0 - g) * arcs[a, node] + g * arcs[b, node]
+            last = (1.0 - g) * arcs[a, node + 1] + g * arcs[b, node + 1]
+            if at < first - 1e-6 or at > last + 1e-6:
+                continue
+            s = (at - first) / (last - first)
+            u0, w0 = _node(radius, a, b, g, node)
+            u1, w1 = _node(radius, a, b, g, node + 1)
+            ub, wb = _node(radius, a, b, g, node - 1)
+            ua, wa = _node(radius, a, b, g, node + 2)
+            length = 1.0 / np.sqrt((u1 - ub) ** 2 + (w1 - wb) ** 2)
+            du, dw = (u1 - ub) * length, (w1 - wb) * length
+            length = 1.0 / np.sqrt((ua - u0) ** 2 + (wa - w0) ** 2)
+            du, dw = du + s * ((ua - u0) * length - du), dw + s * ((wa - w0) * length - dw)
+            length = 1.0 / np.sqrt(du * du + dw * dw)
+            right[j, i] = u0 + s * (u1 - u0) + offset[i, j] * dw * length
+            up[j, i] = w0 + s * (w1 - w0) - offset[i, j] * du * length
 
 
 def to_space(

@@ -20,7 +20,7 @@ KINDS = ("raw", "corrected", "offset")
 STEP = {"raw": 0.01, "corrected": 0.01, "offset": 0.001, "state": 1.0}
 """Value of one step of the stored whole numbers: dB, dB, m, and of the state of pixels itself."""
 
-UNIT = {"raw": "dB", "corrected": "dB", "offset": "m", "state": ""}
+UNIT = {"raw": "dB", "corrected": "dB", "offset": "m", "state": "", "deviation": "m"}
 
 NODATA = -32768
 

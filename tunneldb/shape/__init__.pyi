@@ -1,6 +1,11 @@
 from .ellipse import Ellipse as Ellipse
 from .harmonics import Harmonics as Harmonics
 from .harmonics import fit_harmonics as fit_harmonics
+from .outline import Outline as Outline
+from .profile import Profile as Profile
+from .profile import deviation as deviation
+from .profile import signed_distance as signed_distance
+from .profile import stretches as stretches
 from .rings import Ring as Ring
 from .rings import fit_ring as fit_ring
 from .rings import fit_rings as fit_rings

@@ -13,14 +13,14 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.store.survey import Survey
 
 
-def load_alignment(conn: psycopg.Connection[Any], survey: Survey) -> Alignment:
-    """Given axis of a survey's tunnel, which is no site."""
+def load_alignment(conn: psycopg.Connection[Any], survey: Survey, spacing: float | None = None) -> Alignment:
+    """Given axis of a survey's tunnel, which is no site, with stations so far apart, m; None: as its vertices are."""
     vertices = conn.execute(
         "SELECT ST_X(d.geom), ST_Y(d.geom), ST_Z(d.geom)"
         " FROM tunnel.tunnel t, ST_DumpPoints(t.alignment) d WHERE t.id = %s ORDER BY d.path",
         [survey.tunnel_id],
     ).fetchall()
-    return Alignment.from_polyline(np.array(vertices), survey.start_chainage, survey.spacing)
+    return Alignment.from_polyline(np.array(vertices), survey.start_chainage, spacing or survey.spacing)
 
 
 def load_surface(conn: psycopg.Connection[Any], survey: Survey, first: float = -np.inf, last: float = np.inf) -> Surface:

@@ -22,6 +22,7 @@ from tunneldb.database.models.leak import (
     Region,
     Waterproof,
 )
+from tunneldb.database.models.shape import DesignProfile, DeviationSection
 from tunneldb.database.models.sonar import Bed, Ladder, RegistrationResidual, SonarPoint, SonarScan
 from tunneldb.database.models.structures import Face, Member, Spot
 from tunneldb.database.models.work import Audit, Goal, Run, Stage, Worker
@@ -38,6 +39,8 @@ __all__ = [
     "Bed",
     "Cluster",
     "Coverage",
+    "DesignProfile",
+    "DeviationSection",
     "Face",
     "FeatureList",
     "FileKm",

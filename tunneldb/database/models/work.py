@@ -71,7 +71,9 @@ class Run(Base):
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     km: Mapped[int | None] = mapped_column(comment="Kilometre; none for the whole survey")
-    stage: Mapped[str] = mapped_column(comment="read, load, axis, segments, sections, ground, detect; spheres, members")
+    stage: Mapped[str] = mapped_column(
+        comment="read, load, axis, segments, sections, ground, detect; spheres, members, deviation"
+    )
     parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Parameters that it ran with")
     versions: Mapped[dict[str, Any]] = mapped_column(
         server_default=text("'{}'"), comment="Versions of the program and of its libraries"

@@ -11,6 +11,9 @@ from tunneldb.export.qgis.catalogue import HALOS, SHAPES, Catalogue, Look
 COUNTS = 'coalesce("counted", true)'
 """What is shown: also what was just drawn and is not saved yet."""
 
+DRY = 'NOT "wet"'
+"""What has no outline and no number as a leak."""
+
 _DRY = ("joint", "dark")
 """Kinds that detection finds by the hundred: switched off at first."""
 
@@ -20,13 +23,18 @@ Layer = tuple[str, dict[str, str]]
 """A layer of a symbol: its class and its properties."""
 
 
-def finding_style(catalogue: Catalogue, geometry: str, *, in_space: bool) -> list[ET.Element]:
-    """Return what says how a layer of findings is drawn, if wanted in a 3D view, too."""
+def finding_style(catalogue: Catalogue, geometry: str, *, in_space: bool, on_sheet: bool = False) -> list[ET.Element]:
+    """Return what says how a layer of findings is drawn, if wanted in a 3D view, too.
+
+    On sheets leaks have outlines and numbers of their own: of these only what is severe is drawn, and drips as points.
+    """
+    if on_sheet:
+        return [_renderer(catalogue, geometry, on_sheet=True), _labeling(geometry, DRY)]
     drawn = [_renderer(catalogue, geometry), _labeling(geometry)]
     return [*drawn, _renderer_3d(catalogue, geometry)] if in_space else drawn
 
 
-def _renderer(catalogue: Catalogue, geometry: str) -> ET.Element:
+def _renderer(catalogue: Catalogue, geometry: str, *, on_sheet: bool = False) -> ET.Element:
     """Return the element ``renderer-v2`` of a layer of findings.
 
     Parameters
@@ -35,6 +43,8 @@ def _renderer(catalogue: Catalogue, geometry: str) -> ET.Element:
         The owner's kinds and severities.
     geometry : str
         Point, Line or Polygon.
+    on_sheet : bool
+        Whether it is a layer of the sheets, which has what is shown and no more.
     """
     root = ET.Element("renderer-v2", type="RuleRenderer", forceraster="0", enableorderby="0", symbollevels="0")
     rules = ET.SubElement(root, "rules", key=_key("root", geometry))
@@ -53,20 +63,24 @@ def _renderer(catalogue: Catalogue, geometry: str) -> ET.Element:
     for degree, colour in HALOS.items():
         rule(severe, f"{degree}, {catalogue.severities[degree]}", f'"severity" = {degree}', [_halo(geometry, colour)])
     kinds = ET.SubElement(rules, "rule", key=_key("Kind", geometry), label="Kind", filter=COUNTS)
+    if on_sheet and geometry != "Point":
+        kinds.set("filter", f"{COUNTS} AND {DRY}")
     for kind in catalogue.drawn_as(SHAPES[geometry]):
         quoted = kind.code.replace("'", "''")
         condition, layers = f"\"kind\" = '{quoted}'", _layers(geometry, kind.look)
-        if kind.code in _DRY:
+        if kind.code in _DRY and not on_sheet:
             rule(kinds, f"{kind.label}, as detected", f'{condition} AND NOT "by_hand"', layers, shown=False)
         else:
             rule(kinds, kind.label, condition, layers)
     rule(kinds, "Of another kind", "ELSE", _layers(geometry, _UNKNOWN))
+    if on_sheet:
+        return root
     rule(rules, "Does not count (rejected, merged …)", f"NOT {COUNTS}", [_pale(geometry)], shown=False)
     return root
 
 
-def _labeling(geometry: str) -> ET.Element:
-    """Return the element ``labeling``: the number, from 1:4000 on, of what counts."""
+def _labeling(geometry: str, condition: str = COUNTS) -> ET.Element:
+    """Return the element ``labeling``: the number, from 1:4000 on, of what counts, or of what fulfils a condition."""
     root = ET.Element("labeling", type="simple")
     settings = ET.SubElement(root, "settings", calloutType="simple")
     style = ET.SubElement(
@@ -89,7 +103,7 @@ def _labeling(geometry: str) -> ET.Element:
         displayAll="0", drawLabels="1", upsidedownLabels="0", fontLimitPixelSize="0", mergeLines="0", limitNumLabels="0",
         minFeatureSize="0",
     )  # fmt: skip
-    shown = {"name": "", "properties": {"Show": {"active": True, "expression": COUNTS, "type": 3}}, "type": "collection"}
+    shown = {"name": "", "properties": {"Show": {"active": True, "expression": condition, "type": 3}}, "type": "collection"}
     ET.SubElement(settings, "dd_properties").append(options(shown))
     return root
 

@@ -89,18 +89,34 @@ class VectorLayer:
     @property
     def shows_findings(self) -> bool:
         """Whether it shows findings of all kinds: its style and its form are made of the owner's catalogue."""
-        return self.part == FINDINGS
+        return self.style == "finding"
 
+    @property
+    def on_sheet(self) -> bool:
+        """Whether it is drawn on the inspection sheets alone."""
+        return self.themes == (SHEETS,)
+
+
+SHEET_FINDING = "sheet_finding"
+"""View of the findings of the inspection sheets, and the table that these list."""
 
 _DRY = "\"kind\" <> 'leak'"
 
 
+def _only(wkb: str) -> str:
+    """Return the condition that rows are of a geometry: QGIS sets it only where it sees others when it opens the layer."""
+    return f"public.geometrytype(\"geom\") = '{wkb.upper()}'"
+
+
 def _findings(suffix: str, group: str, theme: str, z: str = "", where: str = "") -> tuple[VectorLayer, ...]:
-    """Layers of findings of a view: points over lines over areas."""
+    """Layers of findings of a view: points over lines over areas; they are drawn in on the lining and on the map."""
+    on_sheet = suffix == "sheet"
     return tuple(
         VectorLayer(
-            f"finding_{shape}_{suffix}", f"Findings: {title}", f"finding_{suffix}", wkb + z, "finding", group, (theme,),
-            edited=not z, where=where, part=FINDINGS,
+            f"finding_{shape}_{suffix}", f"Findings: {title}{' (sheets)' if on_sheet else ''}",
+            SHEET_FINDING if on_sheet else f"finding_{suffix}", wkb + z, "finding", group, (theme,),
+            edited=not (z or on_sheet), where=" AND ".join(filter(None, [where, _only(wkb)])),
+            part=SHEETS if on_sheet else FINDINGS,
         )
         for shape, title, wkb in (("point", "points", "Point"), ("line", "lines", "LineString"), ("area", "areas", "Polygon"))
     )  # fmt: skip
@@ -136,8 +152,9 @@ LAYERS = (
         (UNROLLED,),
     ),
     VectorLayer("sheet", "Sheets of 50 m", "sheet", "Polygon", "sheet", UNROLLED, (UNROLLED, FINDINGS)),
+    *_findings("sheet", UNROLLED, SHEETS, where='"shown"'),
     VectorLayer(
-        "leak_sheet", "Leaks, numbered (sheets)", "leak_unrolled", "Polygon", "leak_sheet", UNROLLED, (SHEETS,),
+        "leak_sheet", "Leaks, numbered (sheets)", "sheet_leak", "Polygon", "leak_sheet", UNROLLED, (SHEETS,),
         where="\"review\" <> 'rejected' AND \"detected\"",
     ),
     VectorLayer("leak_3d", "Leaks in space (review)", "leak_3d", "PolygonZ", "leak_3d", SPACE, (SPACE,), True),

@@ -60,29 +60,15 @@ def item(layout: str, kind: int, name: str, box: Box, page: int = 0, **more: str
 
 def label(
     layout: str, name: str, text: str, box: Box, size: float, *, page: int = 0, bold: bool = False,
-    align: str = "left",
+    align: str = "left", colour: str = "20,20,20",
 ) -> ET.Element:  # fmt: skip
-    """Return a text with expressions between ``[%`` and ``%]``; size in points."""
+    """Return a text with expressions between ``[%`` and ``%]``; size in points, colour red, green and blue, 0 to 255."""
     element = item(
         layout, LABEL, name, box, page, labelText=text, htmlState="0", marginX="0", marginY="0",
         halign={"left": "1", "right": "2"}[align], valign="128",
     )  # fmt: skip
     ET.SubElement(element, "LabelFont", description=f"{FONT},{size:g},-1,5,{75 if bold else 50},0,0,0,0,0", style="")
-    ET.SubElement(element, "FontColor", red="20", green="20", blue="20", alpha="255")
-    return element
-
-
-def unless(condition: str) -> ET.Element:
-    """Return what keeps an item from being printed where the expression is true."""
-    element = ET.Element("LayoutObject")
-    options = ET.SubElement(ET.SubElement(element, "dataDefinedProperties"), "Option", type="Map")
-    ET.SubElement(options, "Option", type="QString", name="name", value="")
-    properties = ET.SubElement(options, "Option", type="Map", name="properties")
-    one = ET.SubElement(properties, "Option", type="Map", name="dataDefinedExcludeExports")
-    ET.SubElement(one, "Option", type="bool", name="active", value="true")
-    ET.SubElement(one, "Option", type="QString", name="expression", value=condition)
-    ET.SubElement(one, "Option", type="int", name="type", value="3")
-    ET.SubElement(options, "Option", type="QString", name="type", value="collection")
+    ET.SubElement(element, "FontColor", dict(zip(("red", "green", "blue"), colour.split(","), strict=True)), alpha="255")
     return element
 
 
@@ -97,6 +83,7 @@ def table(
     *,
     name: str,
     touching: bool = False,
+    own: str = "table",
 ) -> ET.Element:
     """Return the table that goes on from frame to frame.
 
@@ -105,7 +92,7 @@ def table(
     layout : str
         Name of the layout.
     frames : sequence of Element
-        Its frames, whose key is that of the layout's ``table``.
+        Its frames, whose key is the table's.
     source : (str, str)
         Id and data source of the layer whose rows it lists.
     columns : sequence of Column
@@ -119,10 +106,12 @@ def table(
         What the layer is called.
     touching : bool
         Whether only rows whose geometry touches that of the page are meant.
+    own : str
+        Name of the table in the layout, of which its key is made.
     """
-    own = key(layout, "table")
+    own_key = key(layout, own)
     element = ET.Element(
-        "LayoutMultiFrame", type=str(TABLE), uuid=own, templateUuid=own, source="0", vectorLayer=source[0],
+        "LayoutMultiFrame", type=str(TABLE), uuid=own_key, templateUuid=own_key, source="0", vectorLayer=source[0],
         vectorLayerName=name, vectorLayerSource=source[1], vectorLayerProvider="postgres", maxFeatures=str(rows),
         filterToAtlasIntersection=str(int(touching)), filterFeatures="true", featureFilter=condition, resizeMode="0",
         headerMode="1",

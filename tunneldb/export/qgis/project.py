@@ -46,6 +46,7 @@ from tunneldb.export.qgis.layer import (
     LAYERS,
     LISTS,
     MAP,
+    SHEET_FINDING,
     SHEETS,
     SPACE,
     STRUCTURE_LAYERS,
@@ -209,8 +210,9 @@ def _project(
     known = {layer.id: (layer_id(layer.id), source.layer(layer, survey.name, survey.srid)) for layer in layers}
     layouts = ET.Element("Layouts")
     sheet = sheet_extent(conn, survey.name)
-    if sheet is not None:
-        layouts.append(sheet_layout(survey, sheet, known["sheet"], known["leak_sheet"]))
+    if sheet is not None and catalogue is not None:
+        findings = layer_id(SHEET_FINDING), source.table(SHEET_FINDING, survey.name)
+        layouts.append(sheet_layout(survey, sheet, catalogue, known["sheet"], known["leak_sheet"], findings))
     if cells is not None:
         layouts.append(member_layout(survey, known["member_sheet"], known["spot_sheet"]))
     if len(layouts):
@@ -253,7 +255,9 @@ def _vector(
     ET.SubElement(element, "layername").text = layer.title
     ET.SubElement(element, "srs").append(deepcopy(crs) if layer.on_map else no_crs())
     ET.SubElement(element, "provider", encoding="UTF-8").text = "postgres"
-    if layer.shows_findings and catalogue is not None:
+    if layer.on_sheet and layer.shows_findings and catalogue is not None:
+        element.extend(finding_style(catalogue, layer.geometry, in_space=False, on_sheet=True))
+    elif layer.shows_findings and catalogue is not None:
         element.extend(_findings(layer, catalogue, survey, in_space=in_space))
     else:
         element.extend(part for part in style_elements(layer.style) if in_space or part.tag != "renderer-3d")
@@ -293,6 +297,7 @@ def _lists(source: Source, survey: Survey) -> list[_Entry]:
         photos,
         _table(source, None, KIND_LIST, "Kinds of findings (table)", group=(LISTS,)),
         _table(source, None, SEVERITIES, "Severities (table)", group=(LISTS,)),
+        _table(source, survey, SHEET_FINDING, "Findings of the sheets (table)", group=(LISTS,)),
     ]
 
 

@@ -3,48 +3,37 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 
 from tunneldb import __version__
+from tunneldb.export.qgis.catalogue import HALOS, Catalogue
 from tunneldb.export.qgis.extent import Extent
 from tunneldb.export.qgis.layer import SHEETS
-from tunneldb.export.qgis.layout_items import (
-    CELL_MARGIN,
-    FRAME,
-    MAP_ITEM,
-    PAGE,
-    PAGE_ITEM,
-    ROW,
-    SCALE_BAR,
-    cut,
-    item,
-    key,
-    label,
-    table,
-    text_style,
-    unless,
-)  # fmt: skip
+from tunneldb.export.qgis.layout_items import MAP_ITEM, PAGE, PAGE_ITEM, SCALE_BAR, cut, item, key, label, text_style
+from tunneldb.export.qgis.sheet_tables import (
+    FINDING_PAGES,
+    FINDINGS,
+    FOOT,
+    LEAK_PAGES,
+    LEAKS,
+    MARGIN,
+    ON_PAGE,
+    TOP,
+    Frames,
+    sheet_table,
+    table_width,
+)
 from tunneldb.raster.gap_fill import TOLD
 from tunneldb.store.survey import Survey
 
 LENGTH = 50.0
 """Length of tunnel on a sheet, m, as in the view."""
 
-PAGES = 6
-"""The sheet itself, and those that its table goes on to if it is long."""
-
 _SCALES = (200, 250, 300, 400, 500, 750, 1000)
-_MARGIN = 10.0
-_TOP = 24.0  # where the strip begins, mm
-_TABLE_LEAST = 40.0  # what is kept for the table, mm
-_FOOT = 196.0  # where the foot begins, mm
+_TABLE_LEAST = 36.5  # what is kept for the tables, mm
+_BELOW = 11.5  # between the strip and the tables: ticks, colours, what does not count, mm
+_LINE = 3.5  # height of a line, mm
 
-CLOCK = (
-    "with_variable('minutes', round(\"clock\" * 60) % 720, to_string(if(@minutes < 60, 12, floor(@minutes / 60))) || ':' "
-    "|| lpad(to_string(@minutes % 60), 2, '0'))"
-)
-"""A clock position as `tunneldb.export.tables.leaks.clock_label` writes it, which QGIS can't call; the styles have it too."""
-
-_SHEET = "attribute(@atlas_feature, '{}')"
 _TICK = "(@grid_number - attribute(@atlas_feature, 'chainage_from')) / 10"
 # Stations are the tunnel's own and may jump: they come with the sheet, a label each 10 m.
 _CHAINAGE_LABEL = (
@@ -54,37 +43,21 @@ _CHAINAGE_LABEL = (
 _ARC_LABEL = "if(@grid_axis = 'y', to_string(round(@grid_number)), '')"
 
 
-# Heading, expression, width in mm, alignment (1 left, 2 right), what rows are sorted by.
-_COLUMNS = (
-    ("Leak", 'to_string("id")', 11, 2),
-    ("Chainage", '"label"', 19, 2),
-    ("Arc, m", 'format_number(("arc_from" + "arc_to") / 2, 1)', 10, 2),
-    ("Clock", CLOCK, 9, 2),
-    ("Area, m²", 'format_number("area", 2)', 12.5, 2),
-    ("Drop, dB", 'format_number("drop_mean", 1)', 12.5, 2),
-    ("Sure", "coalesce(round(100 * \"confidence\") || ' %', '')", 9, 2),
-    ("Review", '"review"', 15, 1),
-    ("Remark", cut('"remark"', "{0}"), 23, 1),
-)
-# As the sheet's sums count them: one that only touches its edge is not on it.
-_ON_SHEET = f'"chainage_to" > {_SHEET.format("chainage_from")} and "chainage_from" < {_SHEET.format("chainage_to")}'
-_LINE_LEAST, _LINE = 10, 12  # letters that a line of a remark holds at the least, and of several, which break between words
-_TABLE_WIDTH = sum(column[2] + 2 * CELL_MARGIN for column in _COLUMNS)
-
-
-def strip_scale(extent: Extent, *, table: bool) -> int:
-    """Return the number of the scale at which a sheet's strip leaves room for its table, if it has one."""
-    room = _FOOT - _TOP - (_TABLE_LEAST if table else 0.0) - 8.0
+def strip_scale(extent: Extent) -> int:
+    """Return the number of the scale at which a sheet's strip leaves room for its tables."""
+    room = FOOT - TOP - _TABLE_LEAST - _BELOW
     height = extent.ymax - extent.ymin
     return next((scale for scale in _SCALES if height * 1000.0 / scale <= room), _SCALES[-1])
 
 
-def table_rows(top: float) -> int:
-    """Return how many rows of one line a sheet's table has room for, which begins on its first page at ``top``, mm."""
-    return sum(2 * (int((_FOOT - 1 - y) / ROW) - 1) for y in (top, *(PAGES - 1) * [_TOP]))
-
-
-def sheet_layout(survey: Survey, extent: Extent, coverage: tuple[str, str], leaks: tuple[str, str]) -> ET.Element:
+def sheet_layout(
+    survey: Survey,
+    extent: Extent,
+    catalogue: Catalogue,
+    coverage: tuple[str, str],
+    leaks: tuple[str, str],
+    findings: tuple[str, str],
+) -> ET.Element:
     """Return the element ``Layout`` of the inspection sheets.
 
     Parameters
@@ -93,24 +66,29 @@ def sheet_layout(survey: Survey, extent: Extent, coverage: tuple[str, str], leak
         The survey.
     extent : Extent
         One of the sheets, m; all are of this height.
-    coverage, leaks : (str, str)
-        Id and data source of the layer of the sheets, and of the layer whose rows their tables list.
+    catalogue : Catalogue
+        The owner's kinds and severities.
+    coverage, leaks, findings : (str, str)
+        Id and data source of the layer of the sheets, and of the layers whose rows their tables list.
     """
-    sought = survey.intensity_kind != "none"  # else no leaks were, and there is no table of them
-    pages = PAGES if sought else 1
+    scale = strip_scale(extent)
+    below = TOP + (extent.ymax - extent.ymin) * 1000.0 / scale  # the strip's lower edge, mm
+    leak_pages = LEAK_PAGES if survey.intensity_kind != "none" else 0  # else no leaks were sought: there is no table of them
+    goes_on = [*leak_pages * ["leaks"], *FINDING_PAGES * ["findings"]]
     layout = ET.Element("Layout", name=SHEETS, units="mm", printResolution="300")
     collection = ET.SubElement(layout, "PageCollection")
-    for page in range(pages):
+    for page in range(1 + len(goes_on)):
         collection.append(item(SHEETS, PAGE_ITEM, f"page {page + 1}", (0.0, 0.0, *PAGE), page, background="true"))
-    scale = strip_scale(extent, table=sought)
     strip = _strip(scale, extent)
-    top = _TOP + (extent.ymax - extent.ymin) * 1000.0 / scale + 8.0  # of the table
     layout.append(strip)
-    layout.extend(_texts(survey, scale, pages))
+    layout.extend(_texts(survey, scale, goes_on))
+    layout.extend(_colours(catalogue, below + _BELOW - 2 * _LINE - 0.3))
+    layout.append(_left_out(below + _BELOW - _LINE - 0.3))
     layout.append(_scale_bar(strip.attrib["uuid"]))
-    if sought:
-        layout.extend(_table(leaks, top))
-        layout.append(_more(table_rows(top)))
+    if leak_pages:
+        layout.extend(sheet_table(LEAKS, leaks, Frames.on([0], range(1, 1 + leak_pages), below + _BELOW)))
+    further = range(1 + leak_pages, 1 + len(goes_on))
+    layout.extend(sheet_table(FINDINGS, findings, Frames.on([1] if leak_pages else [0, 1], further, below + _BELOW)))
     ET.SubElement(
         layout, "Atlas", enabled="1", coverageLayer=coverage[0], coverageLayerSource=coverage[1],
         coverageLayerProvider="postgres", coverageLayerName=SHEETS, hideCoverage="1", sortFeatures="1", sortAscending="1",
@@ -127,7 +105,7 @@ def _strip(scale: int, extent: Extent) -> ET.Element:
     """The unrolled lining of the sheet, from edge to edge as its table, under a grid of 10 m by 2 m."""
     width, height = LENGTH * 1000.0 / scale, (extent.ymax - extent.ymin) * 1000.0 / scale
     element = item(
-        SHEETS, MAP_ITEM, "strip", ((PAGE[0] - width) / 2 + 4, _TOP, width, height), frame="true", background="true",
+        SHEETS, MAP_ITEM, "strip", ((PAGE[0] - width) / 2 + 4, TOP, width, height), frame="true", background="true",
         followPreset="true",
         followPresetName=SHEETS, mapRotation="0", drawCanvasItems="false", labelMargin="0,mm", keepLayerSet="false",
     )  # fmt: skip
@@ -162,14 +140,14 @@ def _grid(name: str, x: str, y: str, label: str, *, bottom: bool) -> ET.Element:
     return element
 
 
-def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
-    """Head and foot of the sheet, and heads of the pages on which its table goes on."""
-    stretch = "[% {} %] – [% {} %]".format(_SHEET.format("label_from"), _SHEET.format("label_to"))
+def _texts(survey: Survey, scale: int, goes_on: Sequence[str]) -> list[ET.Element]:
+    """Head and foot of the sheet, and heads of the pages on which each of its tables goes on."""
+    stretch = "[% {} %] – [% {} %]".format(ON_PAGE.format("label_from"), ON_PAGE.format("label_to"))
     number = "[% @atlas_featurenumber %] of [% @atlas_totalfeatures %]"
-    left, right, wide = _MARGIN, PAGE[0] - _MARGIN, PAGE[0] - 2 * _MARGIN
+    left, right, wide = MARGIN, PAGE[0] - MARGIN, PAGE[0] - 2 * MARGIN
     what = f"Tunnel {survey.tunnel}, survey {survey.name} of {survey.date:%Y-%m-%d}"
     lining, seen, leaks, wet, gaps = (
-        _SHEET.format(name) for name in ("lining_area", "seen_share", "leaks", "wet_area", "gaps")
+        ON_PAGE.format(name) for name in ("lining_area", "seen_share", "leaks", "wet_area", "gaps")
     )
     sums = (
         f"Lining [% coalesce(format_number({lining}, 0) || ' m², ' || format_number(100 * {seen}, 1) || ' % of it seen',"
@@ -180,30 +158,31 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
         sums = "No intensity: leaks were not sought"
         how += "Red: inwards, blue: outwards."
     else:
-        how += "Orange: open, blue: confirmed, with the leak's number; purple: leaks could be missed."
+        how += "Orange: leaks open, blue: confirmed; purple: leaks could be missed."
+    sums += f"; other findings [% coalesce({ON_PAGE.format('findings')}, 0) %]"
     texts = [
         label(SHEETS, "stretch", stretch, (left, 5, 150, 8), 15, bold=True),
         label(SHEETS, "number", f"Inspection sheet {number}", (right - 110, 5, 110, 8), 10, align="right"),
         label(SHEETS, "what", what, (left, 12.5, 140, 5), 8),
         label(SHEETS, "sums", sums, (right - 140, 12.5, 140, 5), 8, align="right"),
-        label(SHEETS, "how", how, (left + 60, _FOOT + 1, wide - 60, 4), 6.5, align="right"),
+        label(SHEETS, "how", how, (left + 60, FOOT + 1, wide - 60, 4), 6.5, align="right"),
         label(
             SHEETS, "signature", "Inspected by ______________________________   on ____________________",
-            (left + 55, _FOOT + 6, wide - 55 - 60, 5), 8,
+            (left + 55, FOOT + 6, wide - 55 - 60, 5), 8,
         ),
         label(
             SHEETS, "made", f"tunneldb {__version__}, [% format_date(now(), 'yyyy-MM-dd') %]",
-            (right - 60, _FOOT + 6, 60, 5), 6.5, align="right",
+            (right - 60, FOOT + 6, 60, 5), 6.5, align="right",
         ),
     ]  # fmt: skip
     if survey.intensity_kind != "none":
         texts.append(label(SHEETS, "gaps", f"[% {cut(gaps, 170, ' (all: report)')} %]", (left, 17, wide, 3.5), 7, bold=True))
     texts.append(
-        label(SHEETS, "remarks", f"[% {cut(_SHEET.format('remarks'), 205, ' (all: report)')} %]", (left, 20.5, wide, 3.5), 6.5)
+        label(SHEETS, "remarks", f"[% {cut(ON_PAGE.format('remarks'), 205, ' (all: report)')} %]", (left, 20.5, wide, 3.5), 6.5)
     )
-    for page in range(1, pages):
+    for page, rows in enumerate(goes_on, start=1):
         texts += [
-            label(SHEETS, f"stretch {page + 1}", f"{stretch}, leaks continued", (left, 7, 150, 8), 12, page=page, bold=True),
+            label(SHEETS, f"stretch {page + 1}", f"{stretch}, {rows} continued", (left, 7, 150, 8), 12, page=page, bold=True),
             label(
                 SHEETS,
                 f"number {page + 1}",
@@ -218,52 +197,33 @@ def _texts(survey: Survey, scale: int, pages: int) -> list[ET.Element]:
     return texts
 
 
-def _fits(layer: str, rows: int) -> str:
-    """Return the expression that a sheet's leaks surely need no more rows; lines broken between words are half full."""
-    lines = f"1 + floor(length(coalesce(\"remark\", '')) / {_LINE // 2})"
-    needed = f"aggregate(layer:='{layer}', aggregate:='sum', expression:={lines}, filter:={_ON_SHEET})"
-    return f"coalesce({needed}, 0) <= {rows}"
+def _colours(catalogue: Catalogue, y: float) -> list[ET.Element]:
+    """A line with the colours of the kinds and of the halos, as many as there is room for; leaks have their own."""
+    named = [(f"■ {kind.label}", kind.look.colour) for kind in catalogue.kinds if kind.code not in ("leak", "joint", "dark")]
+    named = [(f"○ {catalogue.severities[degree]}", colour) for degree, colour in HALOS.items()] + named
+    texts, x = [], MARGIN
+    for text, colour in named:
+        width = 1.35 * len(text) + 3.0
+        if x + width > PAGE[0] - MARGIN:
+            break
+        texts.append(label(SHEETS, f"colour {text}", text, (x, y, width, _LINE), 6.5, colour=colour))
+        x += width
+    return texts
 
 
-def _more(rows: int) -> ET.Element:
-    """What the last page says where there are more leaks than rows."""
-    count = _SHEET.format("leaks")
-    text = f"[% if({count} > {rows}, '… and ' || ({count} - {rows}) || ' more leaks: table of the report', '') %]"
-    return label(SHEETS, "more", text, (_MARGIN, _FOOT + 1, 150, 6), 11, page=PAGES - 1, bold=True)
+def _left_out(y: float) -> ET.Element:
+    """The line of findings that do not count."""
+    width, said = table_width(FINDINGS), ON_PAGE.format("left_out")
+    box = (PAGE[0] - MARGIN - width, y, width, _LINE)
+    return label(SHEETS, "left out", f"[% coalesce('Not counted and not drawn: ' || {said}, '') %]", box, 7)
 
 
 def _scale_bar(strip: str) -> ET.Element:
     element = item(
-        SHEETS, SCALE_BAR, "scale bar", (_MARGIN, _FOOT, 50, 10), style="Line Ticks Up", mapUuid=strip, unitType="meters",
+        SHEETS, SCALE_BAR, "scale bar", (MARGIN, FOOT, 50, 10), style="Line Ticks Up", mapUuid=strip, unitType="meters",
         unitLabel="m", numUnitsPerSegment="5", numSegments="2", numSegmentsLeft="0", numMapUnitsPerScaleBarUnit="1",
         segmentSizeMode="0", height="1.5", labelBarSpace="1", boxContentSpace="1", outlineWidth="0.2", alignment="0",
         numSubdivisions="1", minBarWidth="10", maxBarWidth="100", lineJoinStyle="miter", lineCapStyle="square",
     )  # fmt: skip
     element.append(text_style(7.0))
     return element
-
-
-def _table(leaks: tuple[str, str], top: float) -> list[ET.Element]:
-    """The table of leaks and its frames, two abreast on each page; what is empty is not printed, but for the first frame.
-
-    The more leaks there are on a sheet, the less there is room for of their remarks; what is left out of one is marked.
-    """
-    rows = table_rows(top)
-    lines = f"floor({rows} / max({_SHEET.format('leaks')}, 1))"
-    letters = f"if({lines} > 1, {_LINE} * {lines}, {_LINE_LEAST})"
-    own = key(SHEETS, "table")
-    frames = []
-    for page in range(PAGES):
-        y = top if page == 0 else _TOP
-        for half in range(2):
-            x = _MARGIN + half * (PAGE[0] - 2 * _MARGIN - _TABLE_WIDTH)
-            frames.append(
-                item(
-                    SHEETS, FRAME, f"leaks {2 * page + half + 1}", (x, y, _TABLE_WIDTH, _FOOT - 1 - y), page, multiFrame=own,
-                    multiFrameTemplateUuid=own, hidePageIfEmpty=str(int(page > 0 and half == 0)), hideBackgroundIfEmpty="0",
-                )
-            )  # fmt: skip
-    frames[1].append(unless(_fits(leaks[0], int((_FOOT - 1 - top) / ROW) - 1)))
-    columns = [(heading, expression.format(letters), width, align) for heading, expression, width, align in _COLUMNS]
-    order = '"chainage_from" + "chainage_to"'
-    return [*frames, table(SHEETS, frames, leaks, columns, order, rows, _ON_SHEET, name="Leaks", touching=True)]

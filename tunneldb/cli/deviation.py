@@ -1,0 +1,141 @@
+"""The verb ``deviation``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import psycopg
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.profile import layer_option
+from tunneldb.cli.progress import bar, step
+from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect
+from tunneldb.errors import UserError
+from tunneldb.files import replacing, told_to_end
+from tunneldb.store.survey import Survey, get_survey
+
+if TYPE_CHECKING:
+    from tunneldb.export.tables.deviation import Row
+
+_FILES = (".csv", ".tif", ".dxf")
+
+
+@verb(
+    examples=[
+        "tunneldb deviation ringo-2024",
+        "tunneldb deviation ringo-2024 --layer excavation --from 511+200 --to 511+400 --axis-sigma 0.01",
+        "tunneldb deviation ringo-2024 -o sections.csv",
+        "tunneldb deviation ringo-2024 -o sections.dxf --every 5",
+    ]
+)
+@click.argument("survey")
+@layer_option
+@stretch_options
+@click.option(
+    "--every", type=click.FloatRange(1.0), default=100.0, show_default="100; of a .dxf 10", metavar="M",
+    help="Length of the stretches that are listed; distance of the sections of a .dxf, m.",
+)  # fmt: skip
+@click.option(
+    "--axis-sigma", type=click.FloatRange(0.0, 1.0), metavar="M",
+    help="What the axis and the scan's place are good for, standard deviation, m: goes into the errors of volumes.",
+)  # fmt: skip
+@click.option(
+    "-o", "--output", type=click.Path(dir_okay=False, path_type=Path),
+    help="File to write: .csv of sections, .dxf of sections with the design, .tif of each pixel, one a kilometre.",
+)  # fmt: skip
+@click.pass_obj
+@click.pass_context
+def deviation(
+    context: click.Context,
+    settings: Settings,
+    survey: str,
+    layer: str,
+    start: str | None,
+    end: str | None,
+    every: float,
+    axis_sigma: float | None,
+    output: Path | None,
+) -> None:
+    """Hold the lining of SURVEY against the design profiles of its tunnel, and state over- and underbreak.
+
+    What is missing or out of date is made first, kilometre by kilometre, from the offset image: the distance of each pixel of
+    lining from the lines and arcs of the profile, positive inside. Areas are of sections of 1 m, volumes of stretches, both of
+    what was seen; what was not is stated as unseen, and is in none of them. tunneldb profile add gives the profiles;
+    docs/howto-shape.md says what the columns mean.
+    """
+    from tunneldb.export.tables.deviation import section_rows, sections_csv, stretch_rows, volume
+    from tunneldb.pipeline.deviation import measure_deviation
+
+    if output is not None and output.suffix.lower() not in _FILES:
+        raise UserError(f"{output}: deviation is written as {', '.join(_FILES[:-1])} or {_FILES[-1]}")
+    with connect(settings.dsn) as conn:
+        found = get_survey(conn, survey)
+        part = parse_stretch(conn, found, start, end)
+        conn.rollback()
+        with told_to_end(), bar("km") as progress:
+            made = measure_deviation(conn, found, layer, part.low, part.high, step(progress))
+        whole = volume(conn, found, layer, part.low, part.high, axis_sigma or 0.0)
+        if whole is None:
+            raise UserError(f"survey {survey} has nothing to hold against layer {layer} there")
+        rows = stretch_rows(conn, found, layer, part.low, part.high, every, axis_sigma or 0.0)
+        tell(survey=survey, layer=layer, made=made, axis_sigma=axis_sigma, volume=whole, stretches=rows)
+        files: list[Path] = []
+        if output is None:
+            tell(sections=section_rows(conn, found, layer, part.low, part.high))
+        elif output.suffix.lower() == ".csv":
+            text = sections_csv(section_rows(conn, found, layer, part.low, part.high))
+            with replacing(output) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+            files = [output]
+        else:
+            given = context.get_parameter_source("every") is not click.core.ParameterSource.DEFAULT
+            files = _write(conn, found, layer, part, every if given else 10.0, output)
+    tell(files=files)
+    _print(rows, whole, layer, axis_sigma)
+    for file in files:
+        click.echo(f"written to {file}", err=True)
+
+
+def _write(conn: psycopg.Connection[Any], survey: Survey, layer: str, part: Stretch, every: float, output: Path) -> list[Path]:
+    if output.suffix.lower() == ".dxf":
+        from tunneldb.export.exchange.deviation_dxf import write_sections
+
+        with replacing(output) as temporary:
+            write_sections(conn, survey, layer, part.low, part.high, every, temporary)
+        return [output]
+    from tunneldb.export.images.deviation import write_deviation
+    from tunneldb.geometry.stationing import KILOMETRE
+    from tunneldb.store.deviation import stale_kilometres
+
+    there = [
+        km for km in stale_kilometres(conn, survey, layer) if km * KILOMETRE < part.high and (km + 1) * KILOMETRE > part.low
+    ]
+    paths = [output if len(there) == 1 else output.with_name(f"{output.stem}-km{km:03d}{output.suffix}") for km in there]
+    written = (write_deviation(conn, survey, km, layer, path) for km, path in zip(there, paths, strict=True))
+    return [path for path in written if path is not None]
+
+
+def _print(rows: list[Row], whole: Row, layer: str, axis_sigma: float | None) -> None:
+    def cells(row: Row) -> tuple[str, ...]:
+        return (
+            f"{row['length']:.1f}", f"{100.0 * row['seen_share']:.1f}", f"{row['overbreak']:.3f}",
+            f"{row['overbreak_sigma']:.3f}", f"{row['underbreak']:.3f}", f"{row['underbreak_sigma']:.3f}",
+        )  # fmt: skip
+
+    table = [(row["label"], *cells(row)) for row in rows]
+    print_table(
+        ["from", "length m", "seen %", "overbreak m³", "±", "underbreak m³", "±"],
+        [*table, ("all", *cells(whole))],
+        right=(1, 2, 3, 4, 5, 6),
+    )
+    axis = (
+        "taken to be right: --axis-sigma says what it is good for"
+        if axis_sigma is None
+        else f"good for {1e3 * axis_sigma:g} mm"
+    )
+    click.echo(f"against {layer}; of the lining seen; ± is one standard deviation, the axis {axis}")

@@ -1,0 +1,163 @@
+"""The outline of a DXF drawing: LINE, ARC, CIRCLE and polylines with bulges, joined end to end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tunneldb.arrays import Float
+from tunneldb.errors import UserError
+
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
+"""Metres in a unit."""
+
+NEAR = 0.001
+"""Ends that lie nearer than this are joined, m."""
+
+_PLAIN = ("LINE", "ARC", "CIRCLE")
+_POLYLINES = ("LWPOLYLINE", "POLYLINE")
+_CURVES = ("SPLINE", "ELLIPSE")
+
+
+@dataclass(frozen=True)
+class DrawnOutline:
+    """An outline as it is drawn.
+
+    Attributes
+    ----------
+    elements : (m, 5) float array
+        Begin, end, m, and bulge, each beginning where the one before ends.
+    names : list of str
+        Kind and handle of the entity that each is from.
+    metres : float
+        In a unit of the drawing.
+    notes : tuple of str
+    """
+
+    elements: Float
+    names: list[str]
+    metres: float
+    notes: tuple[str, ...]
+
+
+def read_drawing(path: Path, unit: str | None, layer: str | None) -> DrawnOutline:
+    """Read the outline in the model space of a drawing.
+
+    Raises
+    ------
+    UserError
+        If it can't be read, states no unit and none is given, or another; has several layers of lines and none is chosen; has
+        curves that are no arcs; or leaves a gap.
+    """
+    from ezdxf import filemanagement
+    from ezdxf.lldxf.const import DXFError
+
+    try:
+        drawing = filemanagement.readfile(str(path))
+    except (OSError, DXFError, ValueError) as error:
+        raise UserError(f"{path} cannot be read as DXF: {str(error).strip().splitlines()[0]}") from None
+    metres, notes = _unit(path, drawing.header.get("$INSUNITS", 0), unit)
+    entities: list[Any] = [one for one in drawing.modelspace() if one.dxftype() in (*_PLAIN, *_POLYLINES, *_CURVES)]
+    chosen = _layer(path, sorted({one.dxf.layer for one in entities}), layer)
+    elements, names = [], []
+    for entity in entities:
+        if entity.dxf.layer != chosen:
+            continue
+        name = f"{entity.dxftype()} {entity.dxf.handle}"
+        if entity.dxftype() in _CURVES:
+            raise UserError(f"{path}, {name}: a profile is lines and arcs, which a {entity.dxftype()} is not")
+        parts = entity.virtual_entities() if entity.dxftype() in _POLYLINES else [entity]
+        for part in parts:
+            for element in _elements(part):
+                if np.hypot(element[2] - element[0], element[3] - element[1]) * metres > 1e-6:
+                    elements.append(element)
+                    names.append(name)
+    if not elements:
+        raise UserError(f"{path}: layer {chosen!r} holds no line with a length")
+    scaled = np.array(elements)
+    scaled[:, :4] *= metres
+    return DrawnOutline(*_joined(path, scaled, names), metres, notes)
+
+
+def _unit(path: Path, code: int, unit: str | None) -> tuple[float, tuple[str, ...]]:
+    """Metres in a unit of the drawing, and what is to be said of it: never guessed."""
+    from ezdxf import units
+
+    stated = {units.M: "m", units.CM: "cm", units.MM: "mm", units.FT: "ft", units.IN: "in"}.get(code)
+    if unit is None:
+        if stated is None:
+            says = f"its unit is {units.decode(code)}" if code else "it states no unit"
+            raise UserError(f"{path}: {says} ($INSUNITS {code}); say what its lengths are by --unit {'|'.join(METRES)}")
+        return METRES[stated], ()
+    if stated is not None and stated != unit:
+        raise UserError(f"{path}: it states {stated} ($INSUNITS {code}), --unit says {unit}; leave one out")
+    return METRES[unit], ()
+
+
+def _layer(path: Path, names: list[str], wanted: str | None) -> str:
+    listed = ", ".join(map(repr, names)) or "none"
+    if wanted is not None and wanted not in names:
+        raise UserError(f"{path} has no layer {wanted!r} of lines; it has {listed}")
+    if wanted is None and len(names) != 1:
+        mend = "; choose one by --drawing-layer NAME" if names else ""
+        raise UserError(f"{path} holds {len(names)} layers of lines: {listed}{mend}")
+    return wanted or names[0]
+
+
+def _elements(entity: Any) -> list[list[float]]:
+    """Begin, end and bulge of a LINE, of an ARC, or of both halves of a CIRCLE, in the drawing's unit."""
+    if entity.dxftype() == "LINE":
+        begin, end = entity.dxf.start, entity.dxf.end
+        return [[begin.x, begin.y, end.x, end.y, 0.0]]
+    side = -1.0 if entity.dxf.extrusion.z < 0.0 else 1.0  # drawn from behind, an arc turns the other way
+    if entity.dxftype() == "CIRCLE":
+        first, second = entity.vertices([0.0, 180.0])
+        return [[first.x, first.y, second.x, second.y, side], [second.x, second.y, first.x, first.y, side]]
+    begin, end = entity.start_point, entity.end_point
+    turn = (entity.dxf.end_angle - entity.dxf.start_angle) % 360.0
+    return [[begin.x, begin.y, end.x, end.y, side * np.tan(np.radians(turn) / 4.0)]]
+
+
+def _joined(path: Path, elements: Float, names: list[str]) -> tuple[Float, list[str]]:
+    """Put elements one after the other, turned round where they are drawn the other way."""
+    chain, order, left = [elements[0]], [0], list(range(1, len(elements)))
+
+    def nearest(x: float, y: float) -> tuple[float, int, bool]:
+        """Distance of the nearest free end, whose it is, and whether it is an end and no beginning."""
+        away = [
+            (float(np.hypot(elements[k, i] - x, elements[k, i + 1] - y)), k, i == 2) for k in left for i in (0, 2)
+        ]  # fmt: skip
+        return min(away)
+
+    while left:
+        ahead, behind = nearest(*chain[-1][2:4]), nearest(*chain[0][:2])
+        away, k, at_end = min(ahead, behind)
+        if away > NEAR:
+            x, y = chain[-1][2:4] if away == ahead[0] else chain[0][:2]
+            beside = order[-1] if away == ahead[0] else order[0]
+            raise UserError(
+                f"{path}, {names[beside]}: a gap of {1e3 * away:.1f} mm between its end at {x:.4f},{y:.4f} m and the nearest "
+                f"other, of {names[k]}"
+            )
+        forwards = (away, k, at_end) == ahead
+        element = elements[k] if at_end is not forwards else _turned(elements[k])
+        element = element.copy()
+        if forwards:
+            element[:2] = chain[-1][2:4]
+            chain.append(element)
+            order.append(k)
+        else:
+            element[2:4] = chain[0][:2]
+            chain.insert(0, element)
+            order.insert(0, k)
+        left.remove(k)
+    if len(chain) > 1 and np.hypot(*(chain[-1][2:4] - chain[0][:2])) <= NEAR:
+        chain[-1][2:4] = chain[0][:2]
+    return np.array(chain), [names[k] for k in order]
+
+
+def _turned(element: Float) -> Float:
+    return np.array([*element[2:4], *element[:2], -element[4]])

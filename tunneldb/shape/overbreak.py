@@ -1,0 +1,161 @@
+"""Overbreak and underbreak of steps of chainage, from the deviation of pixels, in cells along the profile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.shape.outline import Outline
+from tunneldb.shape.profile import Deviation, strip_area
+
+CELL = 0.1
+"""Length of a cell along the profile, m, where pixels are a third of it or less."""
+
+LEAST_PIXELS = 3
+"""A cell with fewer pixels counts as unseen."""
+
+_SEEN_FOR_SHIFT = 0.4
+"""Less of a profile seen tells nothing of how the lining lies as a whole, share."""
+
+
+@dataclass(frozen=True)
+class SectionDeviation:
+    """The lining of a step of chainage against its design.
+
+    Attributes
+    ----------
+    design_length, seen_length : float
+        Length of the profile, and what of it is seen, m.
+    overbreak, underbreak : float
+        Area of the lining outside and inside the profile, of what is seen, m².
+    noise_area : float
+        Standard deviation of underbreak less overbreak by the scatter of pixels, m².
+    over_by, under_by : (2,) float arrays
+        By how much overbreak and underbreak grow when the axis moves to the right, and up, m²/m.
+    sigma : float
+        Scatter of pixels within cells, m; NaN where nothing is seen.
+    shift : (2,) float array
+        How far the lining as a whole lies right of the profile and above it, m; NaN where too little is seen.
+    deviation : (n,) float array
+        Mean of each cell, m, positive inside; NaN where unseen.
+    """
+
+    design_length: float
+    seen_length: float
+    overbreak: float
+    underbreak: float
+    noise_area: float
+    over_by: Float
+    under_by: Float
+    sigma: float
+    shift: Float
+    deviation: Float
+
+    @property
+    def mean(self) -> float:
+        """Mean of the cells, m; NaN where nothing is seen."""
+        seen = self.deviation[np.isfinite(self.deviation)]
+        return float(seen.mean()) if len(seen) else np.nan
+
+    def extreme(self, sign: float) -> tuple[float, float]:
+        """Greatest (1) or least (-1) mean of a cell, m, and how far along the profile its middle is, m; NaN without any."""
+        seen = np.flatnonzero(np.isfinite(self.deviation))
+        if not len(seen):
+            return np.nan, np.nan
+        k = int(seen[np.argmax(sign * self.deviation[seen])])
+        return float(self.deviation[k]), (k + 0.5) * self.design_length / len(self.deviation)
+
+
+def cell_length(pixel: float) -> float:
+    """Length of a cell, m, that holds three pixels or more of a side, m."""
+    return max(CELL, 3.0 * pixel)
+
+
+def section_deviation(found: Deviation, outline: Outline, pixel: float) -> SectionDeviation:
+    """Sum up the pixels of a step of chainage.
+
+    Parameters
+    ----------
+    found : Deviation
+        Of pixels of the lining; others are NaN.
+    outline : Outline
+        The design in the middle of the step.
+    pixel : float
+        Side of a pixel, m.
+
+    Notes
+    -----
+    The area of a cell is the mean, over its pixels, of d (1 - κ d / 2), times its length; one with fewer than LEAST_PIXELS
+    pixels is unseen. Towards an unseen neighbour a cell ends with its last pixel. Of each pixel what is outside and what is
+    inside are kept apart, so that they don't cancel within a cell.
+    """
+    length = outline.length
+    count = max(int(np.ceil(length / cell_length(pixel) - 1e-9)), 1)
+    each = length / count
+    held = np.isfinite(found.distance)
+    distance = found.distance[held]
+    place = found.share[held] * count
+    cell = np.minimum(place.astype(np.int64), count - 1)
+    area = strip_area(distance, found.curvature[held])
+
+    def summed(weights: Float | None = None) -> Float:
+        return np.bincount(cell, weights, count).astype(np.float64)
+
+    pixels, total = summed(), summed(distance)
+    seen = pixels >= LEAST_PIXELS
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = np.where(seen, total / pixels, np.nan)
+        over, under = (np.where(seen, summed(part) / pixels, 0.0) for part in (-np.minimum(area, 0.0), np.maximum(area, 0.0)))
+        outside = np.where(seen, summed((distance < 0.0).astype(np.float64)) / pixels, 0.0)
+        square = summed((distance - np.nan_to_num(mean)[cell]) ** 2)
+        sigma = float(np.sqrt(square[seen].sum() / (pixels[seen] - 1.0).sum())) if seen.any() else np.nan
+    long = each * _seen_parts(place - cell, cell, seen, pixel / each / 2.0, outline.closed)
+    _, inward = outline.places((np.arange(count) + 0.5) / count)
+    return SectionDeviation(
+        design_length=length,
+        seen_length=float(long.sum()),
+        overbreak=float(long @ over),
+        underbreak=float(long @ under),
+        noise_area=float(sigma * np.sqrt((long[seen] ** 2 / pixels[seen]).sum())) if seen.any() else 0.0,
+        over_by=(long * outside) @ inward,
+        under_by=-(long * (seen - outside)) @ inward,
+        sigma=sigma,
+        shift=_shift(mean, inward),
+        deviation=mean,
+    )
+
+
+def _seen_parts(within: Float, cell: Int64, seen: Bool, half: float, closed: bool) -> Float:
+    """What of each cell (n,) is seen, 0 to 1: all of it between seen neighbours, else up to its last pixel.
+
+    Parameters
+    ----------
+    within, cell : (p,) arrays
+        Where in its cell each pixel is, 0 to 1, and in which.
+    seen : (n,) bool array
+    half : float
+        Half a pixel, in cells.
+    closed : bool
+        Whether the first cell follows the last.
+    """
+    low, high = np.ones(len(seen)), np.zeros(len(seen))
+    np.minimum.at(low, cell, within)
+    np.maximum.at(high, cell, within)
+    before, after = np.roll(seen, 1), np.roll(seen, -1)
+    if not closed:
+        before[0] = after[-1] = False
+    begin = np.where(before, 0.0, np.maximum(low - half, 0.0))
+    end = np.where(after, 1.0, np.minimum(high + half, 1.0))
+    return np.where(seen, end - begin, 0.0)
+
+
+def _shift(mean: Float, inward: Float) -> Float:
+    """How far the lining lies right of the profile and above it, by least squares of its cells, with a size of its own."""
+    seen = np.isfinite(mean)
+    if seen.mean() < _SEEN_FOR_SHIFT:
+        return np.full(2, np.nan)
+    design = np.column_stack([inward[seen], np.ones(int(seen.sum()))])
+    solved, _, rank, _ = np.linalg.lstsq(design, mean[seen], rcond=1e-3)
+    return np.asarray(solved[:2]) if rank == 3 else np.full(2, np.nan)

@@ -1,0 +1,136 @@
+"""Design profiles of a tunnel, to and from the database."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import psycopg
+
+from tunneldb.arrays import Float
+from tunneldb.errors import UserError
+from tunneldb.geometry.alignment import Alignment
+from tunneldb.shape.outline import Outline
+from tunneldb.shape.profile import Profile, Stretch, stretches
+
+
+@dataclass(frozen=True)
+class DesignTunnel:
+    """A tunnel with what profiles are placed by.
+
+    Attributes
+    ----------
+    tunnel_id, tunnel
+        Its key and name.
+    start, end
+        Chainage of its given axis' ends, m.
+    """
+
+    tunnel_id: int
+    tunnel: str
+    start: float
+    end: float
+
+
+def get_design_tunnel(conn: psycopg.Connection[Any], tunnel_id: int, name: str) -> DesignTunnel:
+    """Return a tunnel with the ends of its axis.
+
+    Raises
+    ------
+    UserError
+        If it is a site.
+    """
+    rows = conn.execute(
+        "SELECT ST_X(d.geom), ST_Y(d.geom), ST_Z(d.geom), t.start_chainage, t.spacing"
+        " FROM tunnel.tunnel t, ST_DumpPoints(t.alignment) d WHERE t.id = %s ORDER BY d.path",
+        [tunnel_id],
+    ).fetchall()
+    if not rows:
+        raise UserError(f"{name} is a site: without an axis there are no profiles about it")
+    line = Alignment.from_polyline(np.array([row[:3] for row in rows]), rows[0][3], rows[0][4])
+    return DesignTunnel(tunnel_id, name, line.start, line.end)
+
+
+def save_profile(conn: psycopg.Connection[Any], tunnel: DesignTunnel, profile: Profile, layer: str, source: str) -> None:
+    """Add a profile to a layer of a tunnel.
+
+    Raises
+    ------
+    UserError
+        If its name is taken, it overlaps another of the layer, or can't go over into the one before or after.
+    """
+    there = load_profiles(conn, tunnel.tunnel_id, layer)
+    if profile.name in (other.name for other in there):
+        raise UserError(
+            f"tunnel {tunnel.tunnel} has a profile {profile.name!r} of layer {layer}: "
+            f"tunneldb profile remove {tunnel.tunnel} {profile.name} --layer {layer}"
+        )
+    _stretches(tunnel.tunnel, layer, [*there, profile])
+    conn.execute(
+        "INSERT INTO tunnel.design_profile (tunnel_id, name, layer, chainage_from, chainage_to, outline, source)"
+        " VALUES (%s, %s, %s, %s, %s, %s, %s)",
+        [
+            tunnel.tunnel_id, profile.name, layer, profile.chainage_from, profile.chainage_to,
+            _vertices(profile.outline).ravel().tolist(), source,
+        ],
+    )  # fmt: skip
+
+
+def remove_profile(conn: psycopg.Connection[Any], tunnel_id: int, tunnel: str, name: str, layer: str) -> None:
+    """Remove a profile; what was made by it becomes stale."""
+    done = conn.execute(
+        "DELETE FROM tunnel.design_profile WHERE tunnel_id = %s AND name = %s AND layer = %s", [tunnel_id, name, layer]
+    )
+    if done.rowcount == 0:
+        raise UserError(f"tunnel {tunnel} has no profile {name!r} of layer {layer}: tunneldb profile list {tunnel}")
+
+
+def load_profiles(conn: psycopg.Connection[Any], tunnel_id: int, layer: str) -> list[Profile]:
+    """Profiles of a layer, in order of chainage."""
+    rows = conn.execute(
+        "SELECT name, chainage_from, chainage_to, outline FROM tunnel.design_profile"
+        " WHERE tunnel_id = %s AND layer = %s ORDER BY chainage_from",
+        [tunnel_id, layer],
+    ).fetchall()
+    return [Profile(name, low, high, _outline(np.array(numbers))) for name, low, high, numbers in rows]
+
+
+def load_design(conn: psycopg.Connection[Any], tunnel_id: int, tunnel: str, layer: str) -> list[Stretch]:
+    """Profiles of a layer and the transitions between them, in order of chainage.
+
+    Raises
+    ------
+    UserError
+        If the layer has none.
+    """
+    profiles = load_profiles(conn, tunnel_id, layer)
+    if not profiles:
+        rows = conn.execute("SELECT DISTINCT layer FROM tunnel.design_profile WHERE tunnel_id = %s ORDER BY 1", [tunnel_id])
+        others = ", ".join(row[0] for row in rows)
+        raise UserError(
+            f"tunnel {tunnel} has no design profile of layer {layer}{f', but of {others}' if others else ''}: "
+            f"tunneldb profile add {tunnel} profile.csv --layer {layer}"
+        )
+    return _stretches(tunnel, layer, profiles)
+
+
+def _stretches(tunnel: str, layer: str, profiles: Sequence[Profile]) -> list[Stretch]:
+    try:
+        return stretches(profiles)
+    except ValueError as error:
+        raise UserError(
+            f"profiles of layer {layer} of tunnel {tunnel}: {error}; say where each holds by --from and --to"
+        ) from None
+
+
+def _vertices(outline: Outline) -> Float:
+    """Rows of right, up and bulge; the last one's bulge is 0."""
+    elements = outline.elements
+    return np.vstack([elements[:, [0, 1, 4]], [[*elements[-1, 2:4], 0.0]]])
+
+
+def _outline(numbers: Float) -> Outline:
+    rows = numbers.reshape(-1, 3)
+    return Outline(np.column_stack([rows[:-1, :2], rows[1:, :2], rows[:-1, 2]]))

@@ -1,0 +1,88 @@
+"""Deviation of a survey's lining from its design, to and from the database."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import psycopg
+
+from tunneldb.arrays import Bool
+from tunneldb.raster.geotiff import Raster, decode
+from tunneldb.raster.pixel_state import PixelState
+from tunneldb.shape.overbreak import SectionDeviation
+from tunneldb.store.survey import Survey
+
+STEP = 1.0
+"""Length of a step of chainage, m; steps begin at whole metres."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of chainage with its figures."""
+
+    profile: str
+    low: float
+    high: float
+    figures: SectionDeviation
+
+
+def load_offsets(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Iterator[tuple[Raster, Bool | None]]:
+    """Blocks of a kilometre's offset image, in order, with which pixels (rows, columns) show lining; None if not stored."""
+    blocks = conn.execute(
+        "SELECT block FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = 'offset' ORDER BY block", [survey.id, km]
+    ).fetchall()
+    for (block,) in blocks:
+        rows = dict(
+            conn.execute(
+                "SELECT kind, tiff FROM tunnel.image"
+                " WHERE survey_id = %s AND km = %s AND block = %s AND kind IN ('offset', 'state')",
+                [survey.id, km, block],
+                binary=True,
+            ).fetchall()
+        )
+        lining = None
+        if "state" in rows:
+            state = decode(rows["state"]).values
+            lining = (state == PixelState.LINING) | (state == PixelState.DARK)
+        yield decode(rows["offset"]), lining
+
+
+def stale_kilometres(conn: psycopg.Connection[Any], survey: Survey, layer: str) -> dict[int, str | None]:
+    """Kilometres with an offset image in which the layer has a design, and why what is stored is not what it would be."""
+    rows = conn.execute(
+        "SELECT km, reason FROM tunnel_api.deviation_state(%s) WHERE layer = %s ORDER BY km", [survey.id, layer]
+    ).fetchall()
+    return dict(rows)
+
+
+def deviation_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> dict[str, Any]:
+    """What the deviation of a kilometre is made from, as the ledger keeps it."""
+    row = conn.execute("SELECT tunnel_api.deviation_inputs(%s, %s, %s)", [survey.id, km, layer]).fetchone()
+    assert row is not None
+    return {"layer": layer, **row[0]}
+
+
+def save_steps(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str, steps: Sequence[Step]) -> None:
+    """Replace the steps of a layer in a kilometre."""
+    conn.execute("DELETE FROM tunnel.deviation_section WHERE survey_id = %s AND km = %s AND layer = %s", [survey.id, km, layer])
+    query = (
+        "COPY tunnel.deviation_section (survey_id, km, layer, profile, chainage_from, chainage_to, design_length, seen_length,"
+        " overbreak, underbreak, noise_area, over_right, over_up, under_right, under_up, sigma, shift_right, shift_up,"
+        " deviation_mean, deviation_least, least_at, deviation_greatest, greatest_at, deviation) FROM STDIN"
+    )
+    with conn.cursor() as cursor, cursor.copy(query) as copy:
+        for step in steps:
+            one = step.figures
+            copy.write_row(
+                (
+                    survey.id, km, layer, step.profile, step.low, step.high, one.design_length, one.seen_length, one.overbreak,
+                    one.underbreak, one.noise_area, *one.over_by.tolist(), *one.under_by.tolist(),
+                    *(float(value) if np.isfinite(value) else None for value in (
+                        one.sigma, *one.shift, one.mean, *one.extreme(-1.0), *one.extreme(1.0)
+                    )),
+                    one.deviation.tolist(),
+                )
+            )  # fmt: skip
