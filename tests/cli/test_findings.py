@@ -206,11 +206,14 @@ def test_each_bad_row_is_one_line_and_nothing_is_half_written(conn: psycopg.Conn
     assert conn.execute("SELECT count(*) FROM tunnel_api.lining_finding WHERE by_hand").fetchone() == (0,)
 
 
+@pytest.mark.parametrize("ending", ["gpkg", "csv"])
 @pytest.mark.parametrize("geometry", ["unrolled", "3d"])
-def test_what_was_exported_is_imported_as_it_was(conn: psycopg.Connection, tmp_path: Path, geometry: str) -> None:
+def test_what_was_exported_is_imported_as_it_was(
+    conn: psycopg.Connection, tmp_path: Path, geometry: str, ending: str
+) -> None:
     conn.execute(DRAWN)
     conn.commit()
-    path = tmp_path / "drawn.gpkg"
+    path = tmp_path / f"drawn.{ending}"
     assert run("findings", NAME, "--origin", "drawn", "--geometry", geometry, "-o", path).exit_code == 0
     done = run("findings", "import", NAME, path)
     assert done.exit_code == 0, done.output

@@ -73,8 +73,8 @@ def import_findings(
     conn, survey
         Where to. The connection must not be in autocommit.
     path : Path
-        The file. A CSV says where each lies by ``wkt`` (chainage and arc), by ``chainage_from``, ``chainage_to``, ``arc_from``
-        and ``arc_to`` (a rectangle), by ``chainage`` and ``arc``, or by ``x``, ``y``, ``z`` (points). Shapes of other files lie
+        The file. A CSV says where each lies by ``wkt`` or ``geometry`` (WKT: chainage and arc; with heights in
+        space), by ``chainage_from``, ``chainage_to``, ``arc_from`` and ``arc_to`` (a rectangle), by ``chainage`` and ``arc``, or by ``x``, ``y``, ``z`` (points). Shapes of other files lie
         in the unrolled plane if they have no coordinate system, else in space, in the tunnel's.
     kinds : mapping
         Our kind by theirs; what is not in it is ours.
@@ -165,7 +165,7 @@ def _read_csv(path: Path, columns: Mapping[str, str]) -> Iterator[Row]:
     ways = [way for way in _WAYS if all(name in texts for name in way)]
     if not ways:
         raise UserError(
-            f"{path} does not say where the findings lie: it needs columns wkt; chainage_from, chainage_to, arc_from"
+            f"{path} does not say where the findings lie: it needs columns wkt or geometry; chainage_from, chainage_to, arc_from"
             f" and arc_to; chainage and arc; or x, y and z (--column OURS=THEIRS); its header is {','.join(header)!r}"
         )
     lines = _line_numbers(path)
@@ -174,8 +174,9 @@ def _read_csv(path: Path, columns: Mapping[str, str]) -> Iterator[Row]:
         yield _row(lines[k], values, next((way for way in ways if all(name in values for name in way)), None))
 
 
-_WAYS = (("wkt",), ("chainage_from", "chainage_to", "arc_from", "arc_to"), ("chainage", "arc"), ("x", "y", "z"))
-"""Columns that say where a finding lies; of several the first that a row has."""
+_WAYS = (("wkt",), ("geometry",), ("chainage_from", "chainage_to", "arc_from", "arc_to"), ("chainage", "arc"), ("x", "y", "z"))
+"""Columns that say where a finding lies; of several the first that a row has. ``geometry`` is WKT, too: lists are written so,
+with the box about each beside it, which says less."""
 
 _PLACES = tuple(name for way in _WAYS for name in way)
 
@@ -192,11 +193,12 @@ def _row(number: int, values: Mapping[str, str], way: tuple[str, ...] | None) ->
     """A row of a CSV; one whose place cannot be read has none that is of use."""
     if way is None:
         return Row(number, values, None, "unrolled")
-    if way == ("wkt",):
+    if len(way) == 1:
         try:
-            return Row(number, values, shapely.from_wkt(values["wkt"]), "unrolled")
+            shape = shapely.from_wkt(values[way[0]])
         except shapely.errors.GEOSException:
             return Row(number, values, None, "unrolled")
+        return Row(number, values, shape, "3d" if shape.has_z else "unrolled")
     try:
         place = [float(values[name].replace(",", ".")) for name in way]
     except ValueError:
