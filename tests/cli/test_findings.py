@@ -200,17 +200,35 @@ def test_each_bad_row_is_one_line_and_nothing_is_half_written(conn: psycopg.Conn
     assert [line.split("row ")[1].split(":")[0] for line in lines[:-1]] == ["3", "4", "5", "6", "7", "8"]
     assert lines[-1].endswith("6 rows are wrong, so nothing was imported")
     for line, said in zip(
-        lines, ("not ghost", "beyond the lining", "no place", "1 to 4", "'big'", "not as point"), strict=False
+        lines, ("not ghost", "beyond the lining", "chainage is 'here'", "1 to 4", "'big'", "not as point"), strict=False
     ):
         assert said in line
     assert conn.execute("SELECT count(*) FROM tunnel_api.lining_finding WHERE by_hand").fetchone() == (0,)
 
 
+def test_stations_are_read_and_what_is_no_place_is_told(conn: psycopg.Connection, tmp_path: Path) -> None:
+    assert import_csv(tmp_path, "kind,chainage,arc\nmissing_bolt,12+308.5,1\n").exit_code == 0
+    (place,) = conn.execute("SELECT (chainage_from + chainage_to) / 2 FROM tunnel_api.lining_finding WHERE by_hand").fetchone()
+    conn.rollback()
+    assert place == pytest.approx(12308.5)
+    text = (
+        "kind,wkt,chainage,arc\ncrack,LINESTRING(1 2,,,\nmissing_bolt,,12308.5,\nmissing_bolt,,99+000,1\n"
+        "missing_bolt,,12+3,1\nmissing_bolt,,,\nmissing_bolt,,12308.5,up\n"
+    ).replace("LINESTRING(1 2,", '"LINESTRING(1 2,"')
+    done = import_csv(tmp_path, text)
+    assert (done.exit_code, done.stderr.count("\n")) == (2, 7)
+    for line, said in zip(
+        done.stderr.splitlines(),
+        ("wkt is 'LINESTRING(1 2,', which is no WKT", "arc is empty", "chainage is 99+000: tunnel demo has no such station",
+         "chainage is '12+3'", "all columns of it are empty", "arc is 'up', not a number"),
+        strict=False,
+    ):  # fmt: skip
+        assert said in line
+
+
 @pytest.mark.parametrize("ending", ["gpkg", "csv"])
 @pytest.mark.parametrize("geometry", ["unrolled", "3d"])
-def test_what_was_exported_is_imported_as_it_was(
-    conn: psycopg.Connection, tmp_path: Path, geometry: str, ending: str
-) -> None:
+def test_what_was_exported_is_imported_as_it_was(conn: psycopg.Connection, tmp_path: Path, geometry: str, ending: str) -> None:
     conn.execute(DRAWN)
     conn.commit()
     path = tmp_path / f"drawn.{ending}"

@@ -225,9 +225,9 @@ def import_(
 
     FILE is CSV, GeoPackage or GeoJSON. It says of each its kind, and may say severity (1 to 4), width (m), review, remark and
     photo (path or URL). Polygons, lines and points of a layer without a coordinate system are in chainage and arc, m; in the
-    tunnel's they must be 3D, on the lining. A CSV says where each lies by wkt or geometry (WKT: chainage and arc, or
-    3D), by chainage_from, chainage_to, arc_from and arc_to, by chainage and arc, or by x, y and z. What is wrong is told row by row; then nothing is
-    imported.
+    tunnel's they must be 3D, on the lining. A CSV says where each lies by wkt or geometry (WKT: chainage and arc, or 3D), by
+    chainage_from, chainage_to, arc_from and arc_to, by chainage and arc, or by x, y and z; a chainage may be a station, as
+    12+345.678. What is wrong is told row by row; then nothing is imported.
     """
     theirs, ours = _pairs(kinds, "--map"), _pairs(columns, "--column")
     with connect(settings.dsn) as conn:
