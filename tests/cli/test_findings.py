@@ -64,6 +64,11 @@ def test_the_list_is_what_counts_and_is_filtered(conn: psycopg.Connection) -> No
     assert listed.count("\n") == len(counted) + 1
     assert "missing_bolt" in listed
     assert "kind" in run("findings", NAME, "--count").stdout
+    told = json.loads(run("findings", NAME, "--count", "--state", "all", "--kind", "crack", "--json").stdout)
+    assert [(row["kind"], row["origin"]) for row in told["counts"]] == [("crack", "drawn")]
+    refused = run("findings", NAME, "--count", "--from", "12+349", "-o", "counts.csv")
+    assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
+    assert "leave out --from, -o" in refused.stderr
     wrong = run("findings", NAME, "--kind", "ghost")
     assert wrong.exit_code == 2
     assert wrong.stderr.count("\n") == 1
