@@ -278,6 +278,21 @@ def test_a_layer_in_another_system_is_refused(conn: psycopg.Connection, tmp_path
     assert f"3D in EPSG:{SRID}" in done.stderr
 
 
+def test_a_workbook_is_refused_and_of_several_layers_one_is_asked_for(conn: psycopg.Connection, tmp_path: Path) -> None:
+    (tmp_path / "f.xlsx").write_bytes(b"PK")
+    path = tmp_path / "two.gpkg"
+    for name in ("cracks", "spalls"):
+        pyogrio.raw.write(
+            str(path), shapely.to_wkb(np.array([shapely.Point(12350, 1)], object)), [np.array(["missing_bolt"], object)],
+            np.array(["kind"]), geometry_type="Point", crs=None, driver="GPKG", layer=name,
+        )  # fmt: skip
+    for file, said in ((tmp_path / "f.xlsx", ".csv, .txt, .gpkg, .geojson, .json"), (path, "--layer: cracks, spalls")):
+        done = run("findings", "import", NAME, file)
+        assert (done.exit_code, done.stderr.count("\n")) == (2, 1)
+        assert said in done.stderr
+    assert run("findings", "import", NAME, path, "--layer", "spalls").exit_code == 0
+
+
 def test_what_was_drawn_is_in_the_list_of_leaks_and_in_the_report_without_figures_that_nobody_measured(
     conn: psycopg.Connection, tmp_path: Path
 ) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import psycopg
+import pyogrio
 import pyogrio.raw
 import shapely
 from psycopg import sql
@@ -26,6 +27,11 @@ from tunneldb.store.survey import Survey
 
 COLUMNS = ("kind", "severity", "width", "review", "remark", "photo")
 """What is read of each row beside its place; all but the kind may be missing."""
+
+
+_TEXT = (".csv", ".txt")
+_LAYERED = (".gpkg", ".geojson", ".json")
+"""Endings of files that are imported: tables, and layers."""
 
 
 @dataclass(frozen=True)
@@ -93,11 +99,7 @@ def import_findings(
     UserError
         If the file cannot be read, or lacks a column.
     """
-    rows = (
-        _read_csv(conn, survey, path, columns)
-        if path.suffix.lower() in (".csv", ".txt")
-        else _read_layer(path, survey, columns, layer)
-    )
+    rows = _read_csv(conn, survey, path, columns) if path.suffix.lower() in _TEXT else _read_layer(path, survey, columns, layer)
     ids, wrong = [], []
     made: Counter[str] = Counter()
     for row in rows:
@@ -260,9 +262,16 @@ def _chainage(conn: psycopg.Connection[Any], survey: Survey, name: str, text: st
 
 
 def _read_layer(path: Path, survey: Survey, columns: Mapping[str, str], layer: str | None) -> Iterator[Row]:
+    if path.suffix.lower() not in _LAYERED:
+        raise UserError(f"{path}: findings are imported from {', '.join((*_TEXT, *_LAYERED))}; save a workbook as CSV")
     if not path.is_file():
         raise UserError(f"{path}: there is no such file")
     try:
+        there = [name for name, geometry in pyogrio.list_layers(path).tolist() if geometry is not None]
+        if layer is None and len(there) > 1:
+            raise UserError(f"{path} has {len(there)} layers: say which by --layer: {', '.join(there)}")
+        if layer is None and there:
+            layer = there[0]
         meta, _, shapes, found = pyogrio.raw.read(str(path), layer=layer)
     except (DataSourceError, DataLayerError, RuntimeError, ValueError) as error:
         raise UserError(f"{path}: cannot be read: {str(error).strip().splitlines()[0]}") from None
