@@ -306,7 +306,9 @@ def test_what_was_drawn_is_in_the_list_of_leaks_and_in_the_report_without_figure
     assert (drawn["properties"]["drop_mean"], drawn["properties"]["counted"]) == (None, True)
     done = run("report", NAME, "-o", tmp_path / "report.html")
     assert done.exit_code in (0, 1), done.output
-    assert run("export", NAME, "-o", tmp_path / "all.gpkg").exit_code in (0, 1)
+    written = run("export", NAME, "-o", tmp_path / "all.gpkg")
+    assert written.exit_code in (0, 1)
+    assert "does not hold 2 findings that are no water, such as cracks: tunneldb findings demo-2024 -o" in written.stderr
 
 
 def test_the_last_change_is_taken_back_or_why_not_is_one_line(conn: psycopg.Connection, tmp_path: Path) -> None:
