@@ -96,13 +96,20 @@ def read_texts(path: Path, name: str) -> list[str]:
     Raises
     ------
     UserError
-        When the file cannot be read or has no such column.
+        When the file cannot be read or has no such column, or a row is longer or shorter than the header; names file and line.
     """
     with _opened(path) as file:
         rows, _ = _rows(file)
         header = [cell.strip() for cell in next(rows, [])]
         index = _indices(path, header, [name], {}, {})[name]
-        return [row[index].strip() for row in rows if any(cell.strip() for cell in row)]
+        texts = []
+        for row in rows:
+            if not any(cell.strip() for cell in row):
+                continue
+            if len(row) != len(header):
+                raise _uneven(path, rows.line_num, row, header)
+            texts.append(row[index].strip())
+        return texts
 
 
 def read_csv(
@@ -174,11 +181,16 @@ def _read_rows(
         if not any(cell.strip() for cell in row):
             continue
         if len(row) != len(header):
-            raise UserError(f"{path}, line {reader.line_num}: {len(row)} values under a header of {len(header)} columns")
+            raise _uneven(path, reader.line_num, row, header)
         numbers = {name: _number(path, reader.line_num, name, row[index], decimal_comma) for name, index in indices.items()}
         rows.append([numbers[name] if name in numbers else default[name] for name in names])
         lines.append(reader.line_num)
     return rows, lines
+
+
+def _uneven(path: Path, line: int, row: Sequence[str], header: Sequence[str]) -> UserError:
+    """An error about a row that has other columns than the header."""
+    return UserError(f"{path}, line {line}: {len(row)} values under a header of {len(header)} columns")
 
 
 def _indices(

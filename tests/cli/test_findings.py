@@ -64,6 +64,11 @@ def test_the_list_is_what_counts_and_is_filtered(conn: psycopg.Connection) -> No
     assert listed.count("\n") == len(counted) + 1
     assert "missing_bolt" in listed
     assert "kind" in run("findings", NAME, "--count").stdout
+    told = json.loads(run("findings", NAME, "--count", "--state", "all", "--kind", "crack", "--json").stdout)
+    assert [(row["kind"], row["origin"]) for row in told["counts"]] == [("crack", "drawn")]
+    refused = run("findings", NAME, "--count", "--from", "12+349", "-o", "counts.csv")
+    assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
+    assert "leave out --from, -o" in refused.stderr
     wrong = run("findings", NAME, "--kind", "ghost")
     assert wrong.exit_code == 2
     assert wrong.stderr.count("\n") == 1
@@ -200,17 +205,38 @@ def test_each_bad_row_is_one_line_and_nothing_is_half_written(conn: psycopg.Conn
     assert [line.split("row ")[1].split(":")[0] for line in lines[:-1]] == ["3", "4", "5", "6", "7", "8"]
     assert lines[-1].endswith("6 rows are wrong, so nothing was imported")
     for line, said in zip(
-        lines, ("not ghost", "beyond the lining", "no place", "1 to 4", "'big'", "not as point"), strict=False
+        lines, ("not ghost", "beyond the lining", "chainage is 'here'", "1 to 4", "'big'", "not as point"), strict=False
     ):
         assert said in line
     assert conn.execute("SELECT count(*) FROM tunnel_api.lining_finding WHERE by_hand").fetchone() == (0,)
 
 
+def test_stations_are_read_and_what_is_no_place_is_told(conn: psycopg.Connection, tmp_path: Path) -> None:
+    assert import_csv(tmp_path, "kind,chainage,arc\nmissing_bolt,12+308.5,1\n").exit_code == 0
+    (place,) = conn.execute("SELECT (chainage_from + chainage_to) / 2 FROM tunnel_api.lining_finding WHERE by_hand").fetchone()
+    conn.rollback()
+    assert place == pytest.approx(12308.5)
+    text = (
+        "kind,wkt,chainage,arc\ncrack,LINESTRING(1 2,,,\nmissing_bolt,,12308.5,\nmissing_bolt,,99+000,1\n"
+        "missing_bolt,,12+3,1\nmissing_bolt,,,\nmissing_bolt,,12308.5,up\n"
+    ).replace("LINESTRING(1 2,", '"LINESTRING(1 2,"')
+    done = import_csv(tmp_path, text)
+    assert (done.exit_code, done.stderr.count("\n")) == (2, 7)
+    for line, said in zip(
+        done.stderr.splitlines(),
+        ("wkt is 'LINESTRING(1 2,', which is no WKT", "arc is empty", "chainage is 99+000: tunnel demo has no such station",
+         "chainage is '12+3'", "all columns of it are empty", "arc is 'up', not a number"),
+        strict=False,
+    ):  # fmt: skip
+        assert said in line
+
+
+@pytest.mark.parametrize("ending", ["gpkg", "csv"])
 @pytest.mark.parametrize("geometry", ["unrolled", "3d"])
-def test_what_was_exported_is_imported_as_it_was(conn: psycopg.Connection, tmp_path: Path, geometry: str) -> None:
+def test_what_was_exported_is_imported_as_it_was(conn: psycopg.Connection, tmp_path: Path, geometry: str, ending: str) -> None:
     conn.execute(DRAWN)
     conn.commit()
-    path = tmp_path / "drawn.gpkg"
+    path = tmp_path / f"drawn.{ending}"
     assert run("findings", NAME, "--origin", "drawn", "--geometry", geometry, "-o", path).exit_code == 0
     done = run("findings", "import", NAME, path)
     assert done.exit_code == 0, done.output
@@ -227,6 +253,7 @@ def test_what_was_exported_is_imported_as_it_was(conn: psycopg.Connection, tmp_p
         ("art,chainage,arc\n", (), "has no column kind"),
         ("kind,a,b\nleak,1,2\n", (), "does not say where the findings lie"),
         ("kind,chainage,arc\n", ("--column", "arc=Offset"), "has no column Offset"),
+        ("kind,chainage,arc\ncrack,12350,0\n\ncrack,12351\n", (), "line 4: 2 values under a header of 3 columns"),
         ("kind,chainage,arc\n", ("--map", "Riss"), "two names with = between"),
     ],
 )
@@ -251,6 +278,21 @@ def test_a_layer_in_another_system_is_refused(conn: psycopg.Connection, tmp_path
     assert f"3D in EPSG:{SRID}" in done.stderr
 
 
+def test_a_workbook_is_refused_and_of_several_layers_one_is_asked_for(conn: psycopg.Connection, tmp_path: Path) -> None:
+    (tmp_path / "f.xlsx").write_bytes(b"PK")
+    path = tmp_path / "two.gpkg"
+    for name in ("cracks", "spalls"):
+        pyogrio.raw.write(
+            str(path), shapely.to_wkb(np.array([shapely.Point(12350, 1)], object)), [np.array(["missing_bolt"], object)],
+            np.array(["kind"]), geometry_type="Point", crs=None, driver="GPKG", layer=name,
+        )  # fmt: skip
+    for file, said in ((tmp_path / "f.xlsx", ".csv, .txt, .gpkg, .geojson, .json"), (path, "--layer: cracks, spalls")):
+        done = run("findings", "import", NAME, file)
+        assert (done.exit_code, done.stderr.count("\n")) == (2, 1)
+        assert said in done.stderr
+    assert run("findings", "import", NAME, path, "--layer", "spalls").exit_code == 0
+
+
 def test_what_was_drawn_is_in_the_list_of_leaks_and_in_the_report_without_figures_that_nobody_measured(
     conn: psycopg.Connection, tmp_path: Path
 ) -> None:
@@ -264,7 +306,9 @@ def test_what_was_drawn_is_in_the_list_of_leaks_and_in_the_report_without_figure
     assert (drawn["properties"]["drop_mean"], drawn["properties"]["counted"]) == (None, True)
     done = run("report", NAME, "-o", tmp_path / "report.html")
     assert done.exit_code in (0, 1), done.output
-    assert run("export", NAME, "-o", tmp_path / "all.gpkg").exit_code in (0, 1)
+    written = run("export", NAME, "-o", tmp_path / "all.gpkg")
+    assert written.exit_code in (0, 1)
+    assert "does not hold 2 findings that are no water, such as cracks: tunneldb findings demo-2024 -o" in written.stderr
 
 
 def test_the_last_change_is_taken_back_or_why_not_is_one_line(conn: psycopg.Connection, tmp_path: Path) -> None:

@@ -431,3 +431,23 @@ def test_a_survey_without_sections_says_so(dsn: str, example: str, conn: psycopg
     conn.commit()
     assert "has no sections yet" in run("export", example, "-o", tmp_path / "x.gpkg", code=2)
     assert not list(tmp_path.iterdir())
+
+
+def test_each_kind_of_finding_has_its_layers(example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    """Drips, a wet kind of the owner's, and a leak that was judged to be of another kind."""
+    conn.execute(
+        "INSERT INTO tunnel_api.finding_kind (code, label, geometries, wet, position, active)"
+        " VALUES ('seep', 'Seepage', '{polygon,line}', true, 65, true)"
+    )
+    conn.execute(
+        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, geom) VALUES ('demo-2024', 'drip', 'POINT(12360 -2)'),"
+        " ('demo-2024', 'seep', 'LINESTRING(12350 1, 12353 1.5)')"
+    )
+    conn.execute("UPDATE tunnel_api.finding_unrolled SET kind = 'other' WHERE id = 2")
+    conn.commit()
+    run("export", example, "-o", tmp_path / "x.dxf")
+    document = ezdxf.readfile(tmp_path / "x.dxf")
+    count = Counter(entity.dxf.layer for entity in document.modelspace())
+    for place in ("MAP", "3D", "UNROLLED"):
+        assert [count[f"{kind}_{place}"] for kind in ("DRIP", "SEEP", "OTHER")] == [1, 1, 1]
+    assert document.layers.get("SEEP_MAP").description == "Seepage beside the axis, on the map"

@@ -61,6 +61,8 @@ def export(
     In both the layer of coverage gaps tells where leaks could be missed: what was not searched for them, is out of date or was
     hardly seen; and the table or layer of remarks what else is to be known of the results.
 
+    Neither holds findings that are no water, such as cracks; how many there are is said. tunneldb findings -o writes them.
+
     With --classified the scan files are written again, as LAZ 1.4 with the class of each point. The classes are those of
     stage ground, which must have run and be up to date in every kilometre that a file touches: 2 ground, 64 lining, 65
     niche, 66 appendage, 67 rail, 68 object, 69 target sphere, 70 noise, 1 outside of the surveyed tunnel. All else stays as
@@ -90,7 +92,24 @@ def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, st
     tell(survey=survey.name, file=output, layers=counts)
     say_coverage(coverage, survey)
     say_remarks(read_remarks(conn, survey, stretch.low, stretch.high), survey)
+    _say_left_out(conn, survey, output, stretch)
     click.echo(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count), err=True)
+
+
+def _say_left_out(conn: psycopg.Connection[Any], survey: Survey, output: Path, stretch: Stretch) -> None:
+    """Say how many findings that are no water the file doesn't hold: cracks, spalls, bolts."""
+    (left_out,) = conn.execute(
+        "SELECT count(*) FROM tunnel_api.lining_finding f WHERE survey_id = %s AND counted AND chainage_to >= %s"
+        " AND chainage_from <= %s AND NOT EXISTS (SELECT FROM tunnel_api.anomaly a WHERE a.id = f.id)",
+        [survey.id, stretch.low, stretch.high],
+    ).fetchone() or (0,)
+    tell(findings_left_out=left_out)
+    if left_out:
+        click.echo(
+            f"{output} does not hold {left_out} finding{'s' if left_out > 1 else ''} that {'are' if left_out > 1 else 'is'} no"
+            f" water, such as cracks: tunneldb findings {survey.name} -o FILE.gpkg",
+            err=True,
+        )
 
 
 def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Path, km: str | None) -> None:

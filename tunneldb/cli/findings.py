@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import cast, get_args
 
@@ -106,17 +107,31 @@ def list_findings(
 
     The word list may be left out: tunneldb findings SURVEY.
     """
+    if count:
+        _refuse_with_count(
+            {
+                "--state": bool(states) and "all" not in states,  # it has a column for each state
+                "--min-severity": min_severity is not None,
+                "--min-area": min_area > 0,
+                "--from": start is not None,
+                "--to": end is not None,
+                "--clock": clock is not None,
+                "--geometry": geometry != "unrolled",
+                "--format": form not in (None, "table"),
+                "-o": output is not None,
+            }
+        )
     form = table_format(form, output, "findings", ("csv", "geojson", "gpkg", "xlsx"))
     hours = parse_clock(clock) if clock else None
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
-        if count:
-            _print_counts(conn, found)
-            return
         if unknown := set(kinds) - {code for (code,) in conn.execute("SELECT code FROM tunnel_api.finding_kind")}:
             raise UserError(
                 f"there is no kind {', '.join(sorted(unknown))} of findings: SELECT code FROM tunnel_api.finding_kind"
             )
+        if count:
+            _print_counts(conn, found, kinds, origins)
+            return
         stretch = parse_stretch(conn, found, start, end)
         wanted = () if "all" in states else states or COUNTED
         chosen = Chosen(kinds, origins, (), stretch.low, stretch.high, hours, min_area, min_severity or 0)
@@ -178,7 +193,16 @@ def _state(row: Finding) -> str:
     return row.state if other is None else f"{row.state} as {other}" if row.state == "same" else f"{row.state} into {other}"
 
 
-def _print_counts(conn: psycopg.Connection, survey: Survey) -> None:
+def _refuse_with_count(given: dict[str, bool]) -> None:
+    """Refuse options that the sums of the whole survey know nothing of, rather than pass them over."""
+    if refused := [option for option, is_given in given.items() if is_given]:
+        raise UserError(
+            f"--count sums up a whole survey, by --kind and --origin at most: leave out {', '.join(refused)}; sums of what is"
+            " chosen are in kinds of --json and in a workbook (-o FILE.xlsx)"
+        )
+
+
+def _print_counts(conn: psycopg.Connection, survey: Survey, kinds: Sequence[str], origins: Sequence[str]) -> None:
     names = [
         "kind",
         "origin",
@@ -196,8 +220,9 @@ def _print_counts(conn: psycopg.Connection, survey: Survey) -> None:
     rows = conn.execute(
         "SELECT c.kind, c.origin, counted, open, confirmed, rejected, merged, same, dry, gone, to_measure, area"
         " FROM tunnel_api.finding_count c JOIN tunnel_api.finding_kind k ON k.code = c.kind"
-        " WHERE survey_id = %s ORDER BY k.position, c.kind, c.origin",
-        [survey.id],
+        " WHERE survey_id = %s AND (%s::text[] = '{}' OR c.kind = ANY (%s)) AND (%s::text[] = '{}' OR c.origin = ANY (%s))"
+        " ORDER BY k.position, c.kind, c.origin",
+        [survey.id, list(kinds), list(kinds), list(origins), list(origins)],
     ).fetchall()
     tell(survey=survey.name, counts=records(names, rows))
     print_table([*names[:-2], "to measure", "area m²"], [[*row[:-1], f"{row[-1]:.3f}"] for row in rows], right=range(2, 12))
@@ -225,9 +250,9 @@ def import_(
 
     FILE is CSV, GeoPackage or GeoJSON. It says of each its kind, and may say severity (1 to 4), width (m), review, remark and
     photo (path or URL). Polygons, lines and points of a layer without a coordinate system are in chainage and arc, m; in the
-    tunnel's they must be 3D, on the lining. A CSV says where each lies by wkt (chainage and arc), by chainage_from,
-    chainage_to, arc_from and arc_to, by chainage and arc, or by x, y and z. What is wrong is told row by row; then nothing is
-    imported.
+    tunnel's they must be 3D, on the lining. A CSV says where each lies by wkt or geometry (WKT: chainage and arc, or 3D), by
+    chainage_from, chainage_to, arc_from and arc_to, by chainage and arc, or by x, y and z; a chainage may be a station, as
+    12+345.678. What is wrong is told row by row; then nothing is imported.
     """
     theirs, ours = _pairs(kinds, "--map"), _pairs(columns, "--column")
     with connect(settings.dsn) as conn:

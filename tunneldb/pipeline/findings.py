@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import textwrap
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import psycopg
+import pyogrio
 import pyogrio.raw
 import shapely
 from psycopg import sql
@@ -27,6 +29,11 @@ COLUMNS = ("kind", "severity", "width", "review", "remark", "photo")
 """What is read of each row beside its place; all but the kind may be missing."""
 
 
+_TEXT = (".csv", ".txt")
+_LAYERED = (".gpkg", ".geojson", ".json")
+"""Endings of files that are imported: tables, and layers."""
+
+
 @dataclass(frozen=True)
 class Row:
     """A row of a file.
@@ -41,12 +48,15 @@ class Row:
         Where it lies.
     view : {'unrolled', '3d'}
         In which coordinates.
+    wrong : str
+        Why it has no shape, if it is known.
     """
 
     number: int
     values: Mapping[str, str]
     shape: BaseGeometry | None
     view: str
+    wrong: str = ""
 
 
 @dataclass(frozen=True)
@@ -73,9 +83,10 @@ def import_findings(
     conn, survey
         Where to. The connection must not be in autocommit.
     path : Path
-        The file. A CSV says where each lies by ``wkt`` (chainage and arc), by ``chainage_from``, ``chainage_to``, ``arc_from``
-        and ``arc_to`` (a rectangle), by ``chainage`` and ``arc``, or by ``x``, ``y``, ``z`` (points). Shapes of other files lie
-        in the unrolled plane if they have no coordinate system, else in space, in the tunnel's.
+        The file. A CSV says where each lies by ``wkt`` or ``geometry`` (WKT: chainage and arc; with heights in space), by
+        ``chainage_from``, ``chainage_to``, ``arc_from`` and ``arc_to`` (a rectangle), by ``chainage`` and ``arc``, or by ``x``,
+        ``y``, ``z`` (points); a chainage may be a station of the tunnel. Shapes of other files lie in the unrolled plane if
+        they have no coordinate system, else in space, in the tunnel's.
     kinds : mapping
         Our kind by theirs; what is not in it is ours.
     columns : mapping
@@ -88,7 +99,7 @@ def import_findings(
     UserError
         If the file cannot be read, or lacks a column.
     """
-    rows = _read_csv(path, columns) if path.suffix.lower() in (".csv", ".txt") else _read_layer(path, survey, columns, layer)
+    rows = _read_csv(conn, survey, path, columns) if path.suffix.lower() in _TEXT else _read_layer(path, survey, columns, layer)
     ids, wrong = [], []
     made: Counter[str] = Counter()
     for row in rows:
@@ -111,7 +122,7 @@ def import_findings(
 
 def _insert(conn: psycopg.Connection[Any], survey: Survey, row: Row, kind: str) -> int:
     if row.shape is None:
-        raise ValueError("it has no place")
+        raise ValueError(row.wrong or "it has no place")
     query = sql.SQL(
         "INSERT INTO tunnel_api.{} (survey_id, kind, severity, width, review, remark, geom)"
         " VALUES (%s, %s, %s, %s, %s, %s, public.ST_GeomFromWKB(%s, %s)) RETURNING id"
@@ -148,7 +159,7 @@ def _number(row: Row, name: str, kind: type[int] | type[float]) -> float | None:
     return kind(value)
 
 
-def _read_csv(path: Path, columns: Mapping[str, str]) -> Iterator[Row]:
+def _read_csv(conn: psycopg.Connection[Any], survey: Survey, path: Path, columns: Mapping[str, str]) -> Iterator[Row]:
     header = read_header(path)
 
     def column(name: str) -> list[str] | None:
@@ -165,17 +176,18 @@ def _read_csv(path: Path, columns: Mapping[str, str]) -> Iterator[Row]:
     ways = [way for way in _WAYS if all(name in texts for name in way)]
     if not ways:
         raise UserError(
-            f"{path} does not say where the findings lie: it needs columns wkt; chainage_from, chainage_to, arc_from"
-            f" and arc_to; chainage and arc; or x, y and z (--column OURS=THEIRS); its header is {','.join(header)!r}"
+            f"{path} does not say where the findings lie: it needs columns wkt or geometry; chainage_from, chainage_to,"
+            f" arc_from and arc_to; chainage and arc; or x, y and z (--column OURS=THEIRS); its header is {','.join(header)!r}"
         )
     lines = _line_numbers(path)
     for k in range(len(texts["kind"])):
         values = {name: found[k] for name, found in texts.items() if found[k]}
-        yield _row(lines[k], values, next((way for way in ways if all(name in values for name in way)), None))
+        yield _row(conn, survey, lines[k], values, next((way for way in ways if all(name in values for name in way)), None))
 
 
-_WAYS = (("wkt",), ("chainage_from", "chainage_to", "arc_from", "arc_to"), ("chainage", "arc"), ("x", "y", "z"))
-"""Columns that say where a finding lies; of several the first that a row has."""
+_WAYS = (("wkt",), ("geometry",), ("chainage_from", "chainage_to", "arc_from", "arc_to"), ("chainage", "arc"), ("x", "y", "z"))
+"""Columns that say where a finding lies; of several the first that a row has. ``geometry`` is WKT, too: lists are written so,
+with the box about each beside it, which says less."""
 
 _PLACES = tuple(name for way in _WAYS for name in way)
 
@@ -188,28 +200,78 @@ def _line_numbers(path: Path) -> list[int]:
         return [reader.line_num for row in reader if any(cell.strip() for cell in row)]
 
 
-def _row(number: int, values: Mapping[str, str], way: tuple[str, ...] | None) -> Row:
-    """A row of a CSV; one whose place cannot be read has none that is of use."""
-    if way is None:
-        return Row(number, values, None, "unrolled")
-    if way == ("wkt",):
-        try:
-            return Row(number, values, shapely.from_wkt(values["wkt"]), "unrolled")
-        except shapely.errors.GEOSException:
-            return Row(number, values, None, "unrolled")
+def _row(
+    conn: psycopg.Connection[Any], survey: Survey, number: int, values: Mapping[str, str], way: tuple[str, ...] | None
+) -> Row:
+    """A row of a CSV; one whose place cannot be read bears why."""
     try:
-        place = [float(values[name].replace(",", ".")) for name in way]
+        shape = _shape(conn, survey, values, way)
+    except ValueError as error:
+        return Row(number, values, None, "unrolled", str(error))
+    return Row(number, values, shape, "3d" if shape.has_z else "unrolled")
+
+
+def _shape(
+    conn: psycopg.Connection[Any], survey: Survey, values: Mapping[str, str], way: tuple[str, ...] | None
+) -> BaseGeometry:
+    if way is None:
+        begun = next((one for one in _WAYS if any(name in values for name in one)), ())
+        lacking = ", ".join(name for name in begun if name not in values)
+        raise ValueError(f"it has no place: {lacking} is empty" if lacking else "it has no place: all columns of it are empty")
+    if len(way) == 1:
+        try:
+            return shapely.from_wkt(values[way[0]])
+        except shapely.errors.GEOSException as error:
+            why = str(error).splitlines()[0]
+            raise ValueError(f"{way[0]} is {textwrap.shorten(values[way[0]], 60)!r}, which is no WKT: {why}") from None
+    place = [
+        _chainage(conn, survey, name, values[name]) if name.startswith("chainage") else _float(name, values[name])
+        for name in way
+    ]
+    return shapely.box(place[0], place[2], place[1], place[3]) if len(place) == 4 else shapely.Point(place)
+
+
+def _float(name: str, text: str, said: str = "a number") -> float:
+    try:
+        value = float(text.replace(",", "."))
     except ValueError:
-        return Row(number, values, None, "unrolled")
-    if len(place) == 4:
-        return Row(number, values, shapely.box(place[0], place[2], place[1], place[3]), "unrolled")
-    return Row(number, values, shapely.Point(place), "3d" if len(place) == 3 else "unrolled")
+        raise ValueError(f"{name} is {text!r}, not {said}") from None
+    if not math.isfinite(value):
+        raise ValueError(f"{name} is {text}, not {said}")
+    return value
+
+
+def _chainage(conn: psycopg.Connection[Any], survey: Survey, name: str, text: str) -> float:
+    """A chainage in metres, or that of a station of the tunnel, which may be there twice or not at all."""
+    text = text.replace(",", ".")
+    if "+" not in text[1:]:
+        return _float(name, text, "a chainage in metres or a station, as 12+345.678")
+    try:
+        with conn.transaction():
+            rows = conn.execute(
+                "SELECT chainage FROM tunnel_api.station_chainages(%s, %s) AS chainage ORDER BY 1", [survey.tunnel_id, text]
+            ).fetchall()
+    except psycopg.errors.InvalidTextRepresentation:
+        raise ValueError(f"{name} is {text!r}, not a station, as 12+345.678, nor a chainage in metres") from None
+    if not rows:
+        raise ValueError(f"{name} is {text}: tunnel {survey.tunnel} has no such station")
+    if len(rows) > 1:
+        where = " and ".join(f"{row[0]:.3f}" for row in rows)
+        raise ValueError(f"{name} is {text}: tunnel {survey.tunnel} has that station at chainages {where} m; give one of these")
+    return float(rows[0][0])
 
 
 def _read_layer(path: Path, survey: Survey, columns: Mapping[str, str], layer: str | None) -> Iterator[Row]:
+    if path.suffix.lower() not in _LAYERED:
+        raise UserError(f"{path}: findings are imported from {', '.join((*_TEXT, *_LAYERED))}; save a workbook as CSV")
     if not path.is_file():
         raise UserError(f"{path}: there is no such file")
     try:
+        there = [name for name, geometry in pyogrio.list_layers(path).tolist() if geometry is not None]
+        if layer is None and len(there) > 1:
+            raise UserError(f"{path} has {len(there)} layers: say which by --layer: {', '.join(there)}")
+        if layer is None and there:
+            layer = there[0]
         meta, _, shapes, found = pyogrio.raw.read(str(path), layer=layer)
     except (DataSourceError, DataLayerError, RuntimeError, ValueError) as error:
         raise UserError(f"{path}: cannot be read: {str(error).strip().splitlines()[0]}") from None

@@ -54,6 +54,13 @@ FEW = 20
 
 _BLACK, _RED, _GREEN, _CYAN, _BLUE, _MAGENTA, _GREY = 7, 1, 94, 4, 150, 6, 8
 
+_PLACES = {
+    "MAP": "beside the axis, on the map",
+    "3D": "on the lining, in space",
+    "UNROLLED": "in the unrolled lining",
+}
+"""Where each finding is drawn: end of the layer's name, and what its description says."""
+
 LAYERS = {
     "AXIS": (_RED, "Axis through the middle of the tunnel, 3D"),
     "AXIS_VERTEX": (_RED, "Vertices of the axis, 3D"),
@@ -65,9 +72,7 @@ LAYERS = {
         for kind, colour, text in (
             ("LEAK", _BLUE, "Leaks"), ("JOINT", _GREEN, "Joints"), ("DARK", _MAGENTA, "Dark but dry"),
         )
-        for place, where in (
-            ("MAP", "beside the axis, on the map"), ("3D", "on the lining, in space"), ("UNROLLED", "in the unrolled lining"),
-        )
+        for place, where in _PLACES.items()
     },
     "LEAK_TEXT": (_BLUE, "Number and area of leaks"),
     "LEAK_PROFILE": (_BLUE, "Leaks on the profiles"),
@@ -79,7 +84,10 @@ LAYERS = {
     "PROFILE_AXIS": (_RED, "Profiles: the axis, level and plumb"),
     "PROFILE_TEXT": (_BLACK, "Profiles: station, width and height, m"),
 }  # fmt: skip
-"""Colour (ACI) and description of each layer."""
+"""Colour (ACI) and description of each layer that is always there; kinds of findings beside these get theirs as they occur."""
+
+_OTHER_KIND = _CYAN
+"""Colour of kinds of findings that have none of their own."""
 
 
 def write_survey_dxf(
@@ -119,10 +127,13 @@ def write_survey_dxf(
     box = _draw_map(conn, survey, surface, parts, space)
     progress(1)
     for place, view in (("MAP", "anomaly_map"), ("3D", "anomaly_3d")):
-        for spot in read_spots(conn, survey, view, low, high):
+        spots = read_spots(conn, survey, view, low, high)
+        _add_kinds(conn, document, spots)
+        for spot in spots:
             draw_spot(space, spot, place)
         progress(1)
     unrolled = read_spots(conn, survey, "anomaly_unrolled", low, high)
+    _add_kinds(conn, document, unrolled)
     sides = [side for side in (edges(surface, part) for part in parts) if len(side[0]) > 1]
     ticked = tick_chainages(surface, low, high)
     stations = list(zip(ticked.tolist(), labels(conn, survey, ticked), strict=True))
@@ -148,7 +159,7 @@ def write_survey_dxf(
     document.header["$EXTMIN"], document.header["$EXTMAX"] = (*whole[:2], 0.0), (*whole[2:], 0.0)
     document.saveas(path)
     progress(1)
-    counts = dict.fromkeys(LAYERS, 0)
+    counts = {layer.dxf.name: 0 for layer in document.layers if layer.description}  # not what each drawing has: 0, Defpoints
     for entity in space:
         counts[entity.dxf.layer] += 1
     return counts
@@ -206,6 +217,16 @@ def _document(conn: psycopg.Connection[Any], survey: Survey, coverage: Coverage,
     for name, (colour, text) in LAYERS.items():
         document.layers.add(name, color=colour).description = text
     return document
+
+
+def _add_kinds(conn: psycopg.Connection[Any], document: Any, spots: Sequence[Spot]) -> None:
+    """Make layers for kinds of findings that occur and have none yet: the catalogue is the owner's, and grows."""
+    named = dict(conn.execute("SELECT code, label FROM tunnel_api.finding_kind").fetchall())
+    for kind in sorted({spot.kind for spot in spots}):
+        for place, where in _PLACES.items():
+            name = f"{kind.upper()}_{place}"
+            if not document.layers.has_entry(name):
+                document.layers.add(name, color=_OTHER_KIND).description = f"{named.get(kind) or kind} {where}"
 
 
 def _draw_map(
