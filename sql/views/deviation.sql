@@ -45,7 +45,7 @@ COMMENT ON COLUMN tunnel_api.design_profile_element.length IS 'Length, m';
 
 CREATE OR REPLACE VIEW tunnel_api.deviation_section AS
 SELECT d.id, d.survey_id, s.name AS survey, d.km, d.layer, d.profile, d.chainage_from, d.chainage_to,
-       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, d.chainage_from) l) AS label,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (d.chainage_from + d.chainage_to) / 2) l) AS label,
        d.design_length, d.seen_length, d.seen_length / d.design_length AS seen_share, d.overbreak, d.underbreak,
        d.noise_area, d.over_right, d.over_up, d.under_right, d.under_up, d.sigma, d.deviation_mean, d.deviation_least, d.least_at, d.deviation_greatest,
        d.greatest_at, d.shift_right, d.shift_up, d.deviation
@@ -55,7 +55,7 @@ COMMENT ON VIEW tunnel_api.deviation_section IS
     'Lining against its design profile, in steps of 1 m of chainage; what is not seen is in no area, and in seen_share';
 COMMENT ON COLUMN tunnel_api.deviation_section.layer IS 'Layer of the profile';
 COMMENT ON COLUMN tunnel_api.deviation_section.profile IS 'Its name; of a transition both';
-COMMENT ON COLUMN tunnel_api.deviation_section.label IS 'Station of its beginning, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.deviation_section.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.deviation_section.design_length IS 'Length of the profile, m';
 COMMENT ON COLUMN tunnel_api.deviation_section.seen_length IS 'What of that was seen, m';
 COMMENT ON COLUMN tunnel_api.deviation_section.seen_share IS 'The same as a share, 0 to 1';

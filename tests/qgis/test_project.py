@@ -678,7 +678,7 @@ def test_project_holds_relative_paths_and_spares_qgis_the_search(shared: Path) -
     assert str(shared.parent) not in text
     assert "<datasource>./demo-images/demo-2024-km012-corrected.tif</datasource>" in text
     sources = re.findall(r"<datasource>([^<]*tunnel_api[^<]*)</datasource>", text)
-    assert len(sources) == len(ON_MAP | UNROLLED | FINDINGS) + len(LISTS) + 1, "and the table of remarks"
+    assert len(sources) == len(ON_MAP | UNROLLED | FINDINGS | ON_SHEETS) + len(LISTS) + 1, "and the table of remarks"
     assert all("checkPrimaryKeyUnicity='0'" in source for source in sources)
     counted = [source for source in sources if "estimatedmetadata=true" not in source]
     assert len(counted) == 1 + len(LISTS), "small tables"

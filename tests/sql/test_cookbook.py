@@ -497,7 +497,7 @@ def underbreaks(rows: Rows, a: Asked) -> None:
 
 
 def most_inside(rows: Rows, a: Asked) -> None:
-    assert [row["label"] for row in rows] == [label(12499 - n) for n in range(10)]
+    assert [row["label"] for row in rows] == [label(12499.5 - n) for n in range(10)]
     for n, row in enumerate(rows):
         close(row, 3, underbreak_m2=UNDER * (200 - n))
 

@@ -49,7 +49,8 @@ def layers() -> list[VectorLayer]:
     """Layers of the QGIS project that have rows of their own; of those on the same view the first."""
     seen: dict[str, VectorLayer] = {}
     for layer in LAYERS:
-        if layer.shows_findings:  # of three kinds of geometry; "findings -o" writes them
+        # Findings are of three kinds of geometry, "findings -o" writes them; leaks are there, and on sheets once more.
+        if layer.shows_findings or layer.view == "sheet_leak":
             continue
         seen.setdefault(layer.view, layer)
     return list(seen.values())
