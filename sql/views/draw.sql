@@ -79,7 +79,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.link_findings(int, geometry) IS
-'Marks which wet findings of a survey about a place (unrolled plane) are the same, so that each counts once: called after each change of an outline, a kind or a review, and by detection.';
+'Marks which wet findings of a survey about a place (unrolled plane) are the same, so that each counts once: see settle_findings.';
 
 -- Leaks that detection found lie in a dry region when half of them does, redrawn, split and merged ones too. One that waits for
 -- an operator has none. What is no longer a leak lies in none.
@@ -95,7 +95,18 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, publi
      WHERE a.id = w.id AND a.dry_region_id IS DISTINCT FROM w.region
 $$;
 COMMENT ON FUNCTION tunnel_api.mark_dry(int, geometry) IS
-'Marks the leaks of a survey about a place (unrolled plane) that detection found and that lie in a dry region by half, and takes the mark from the others: called after each change of a region or of a finding, and by detection.';
+'Marks the leaks of a survey about a place (unrolled plane) that detection found and that lie in a dry region by half, and takes the mark from the others: called after each change of a region, and by settle_findings.';
+
+-- What follows for other findings from a change of some.
+CREATE OR REPLACE FUNCTION tunnel_api.settle_findings(survey_id int, place geometry) RETURNS void
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
+BEGIN
+    PERFORM tunnel_api.link_findings(survey_id, place);
+    PERFORM tunnel_api.mark_dry(survey_id, place);
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.settle_findings(int, geometry) IS
+'Brings the findings of a survey about a place (unrolled plane) together, as link_findings and mark_dry do: called after each change of an outline, a kind or a review, and by detection.';
 
 -- Each change of findings adds rows to their sums; there need be no more of them than sums. Who does the same meanwhile has the
 -- rows that he has.
@@ -298,7 +309,7 @@ BEGIN
                                      NULL, part_of => step)
            FROM tunnel.photo p WHERE p.anomaly_id = was.id;
         DELETE FROM tunnel.anomaly a WHERE a.id = was.id;
-        PERFORM tunnel_api.link_findings(was.survey_id, was.unrolled);
+        PERFORM tunnel_api.settle_findings(was.survey_id, was.unrolled);
         RETURN OLD;
     END IF;
     IF TG_OP = 'UPDATE' THEN
@@ -365,10 +376,7 @@ BEGIN
     SELECT a.* INTO is_now FROM tunnel.anomaly a WHERE a.id = NEW.id;
     PERFORM tunnel_api.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = is_now.survey_id), 'anomaly', is_now.id,
                                  before, tunnel_api.finding_state(is_now.id), kept => kept);
-    PERFORM tunnel_api.link_findings(is_now.survey_id, ST_Collect(was.unrolled, is_now.unrolled));
-    IF TG_OP = 'UPDATE' AND (redrawn OR is_now.wet <> was.wet) THEN
-        PERFORM tunnel_api.mark_dry(is_now.survey_id, is_now.unrolled);
-    END IF;
+    PERFORM tunnel_api.settle_findings(is_now.survey_id, ST_Collect(was.unrolled, is_now.unrolled));
     RETURN NEW;
 END
 $$;
@@ -452,8 +460,7 @@ BEGIN
     FOREACH made IN ARRAY ids[2:] LOOP
         PERFORM tunnel_api.note_edit(name, 'anomaly', made, NULL, tunnel_api.finding_state(made), part_of => step);
     END LOOP;
-    PERFORM tunnel_api.link_findings(survey_key, was.unrolled);
-    PERFORM tunnel_api.mark_dry(survey_key, was.unrolled);
+    PERFORM tunnel_api.settle_findings(survey_key, was.unrolled);
     RETURN ids;
 END
 $$;
@@ -541,8 +548,7 @@ BEGIN
         UPDATE tunnel.anomaly a SET merged_into = oldest.id, same_as = NULL WHERE a.id = was.id;
         PERFORM tunnel_api.note_edit(name, 'anomaly', was.id, before, tunnel_api.finding_state(was.id), part_of => step);
     END LOOP;
-    PERFORM tunnel_api.link_findings(surveys[1], place);
-    PERFORM tunnel_api.mark_dry(surveys[1], place);
+    PERFORM tunnel_api.settle_findings(surveys[1], place);
     RETURN oldest.id;
 END
 $$;

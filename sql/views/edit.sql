@@ -131,8 +131,7 @@ BEGIN
                kind = CASE WHEN a.by_hand THEN NEW.kind ELSE a.kind END,
                judged = CASE WHEN a.by_hand THEN NULL WHEN NEW.kind = was.kind THEN a.judged ELSE nullif(NEW.kind, a.kind) END
          WHERE a.id = OLD.id;
-        PERFORM tunnel_api.link_findings(a.survey_id, a.unrolled), tunnel_api.mark_dry(a.survey_id, a.unrolled)
-           FROM tunnel.anomaly a WHERE a.id = OLD.id;
+        PERFORM tunnel_api.settle_findings(a.survey_id, a.unrolled) FROM tunnel.anomaly a WHERE a.id = OLD.id;
     END IF;
     PERFORM tunnel_api.note_edit(OLD.survey, TG_ARGV[0], OLD.id, to_jsonb(was),
                                  jsonb_build_object('review', NEW.review, 'remark', NEW.remark, 'kind', NEW.kind));

@@ -187,8 +187,7 @@ BEGIN
                                      undoes => part.id, part_of => done);
     END LOOP;
     place := ST_Collect(place, (SELECT a.unrolled FROM tunnel.anomaly a WHERE a.id = finding));
-    PERFORM tunnel_api.link_findings(survey_key, place);
-    PERFORM tunnel_api.mark_dry(survey_key, place);
+    PERFORM tunnel_api.settle_findings(survey_key, place);
     RETURN CASE WHEN step.action = 'insert' THEN 'drawn' WHEN step.action = 'delete' THEN 'deleted'
                 WHEN step.after ? 'merged' THEN 'merged'
                 WHEN EXISTS (SELECT FROM tunnel_audit.entry e WHERE e.part_of = step.id) THEN 'split'

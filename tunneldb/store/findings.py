@@ -9,7 +9,6 @@ from typing import Any
 
 import psycopg
 import shapely
-from psycopg import sql
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.measure import Measurement
@@ -67,7 +66,5 @@ def settle_findings(conn: psycopg.Connection[Any], survey: Survey, km: int) -> N
     """
     place = (km * KILOMETRE, (km + 1) * KILOMETRE)
     conn.execute("SELECT tunnel_api.renew_findings(%s, %s)", (survey.id, km))
-    for function in ("link_findings", "mark_dry"):
-        query = sql.SQL("SELECT {}(%s, public.ST_MakeEnvelope(%s, -1e4, %s, 1e4))")
-        conn.execute(query.format(sql.Identifier("tunnel_api", function)), (survey.id, *place))
+    conn.execute("SELECT tunnel_api.settle_findings(%s, public.ST_MakeEnvelope(%s, -1e4, %s, 1e4))", (survey.id, *place))
     conn.execute("SELECT tunnel_api.pack_sums(%s)", (survey.id,))
