@@ -72,24 +72,23 @@ def _chainage(conn: psycopg.Connection[Any], survey: OfTunnel, option: str, plac
     """A station may be there twice or not at all; a chainage is one place, and may lie beyond the tunnel's ends."""
     if _METRES.fullmatch(place.strip()):
         return float(place)
+    from tunneldb.store.alignment import station_chainages
+
     try:
-        with conn.transaction():
-            rows = conn.execute(
-                "SELECT chainage FROM tunnel_api.station_chainages(%s, %s) AS chainage ORDER BY 1", [survey.tunnel_id, place]
-            ).fetchall()
-    except psycopg.errors.InvalidTextRepresentation:
+        chainages = station_chainages(conn, survey.tunnel_id, place)
+    except ValueError:
         raise UserError(
             f"{option} takes a station as 12+345.678 (three digits after the +, 0+010, and a decimal point), or a chainage in"
             f" metres, as 345.678, not {place!r}"
         ) from None
-    if not rows:
+    if not chainages:
         raise UserError(
             f"{option} {place}: tunnel {survey.tunnel} has no such station: tunneldb tunnel stationing {survey.tunnel} --show"
         )
-    if len(rows) > 1:
-        where = " and ".join(f"{row[0]:.3f}" for row in rows)
+    if len(chainages) > 1:
+        where = " and ".join(f"{chainage:.3f}" for chainage in chainages)
         raise UserError(
-            f"{option} {place}: tunnel {survey.tunnel} has that station {len(rows)} times, at chainages {where} m; "
-            f"give one of these, as {option} {rows[0][0]:.3f}"
+            f"{option} {place}: tunnel {survey.tunnel} has that station {len(chainages)} times, at chainages {where} m; "
+            f"give one of these, as {option} {chainages[0]:.3f}"
         )
-    return float(rows[0][0])
+    return chainages[0]

@@ -23,6 +23,7 @@ from shapely.geometry.base import BaseGeometry
 from tunneldb.csvfile import read_header, read_texts
 from tunneldb.errors import UserError
 from tunneldb.geometry.crs import fits_srid, is_local, srid_name
+from tunneldb.store.alignment import station_chainages
 from tunneldb.store.survey import Survey
 
 COLUMNS = ("kind", "severity", "width", "review", "remark", "photo")
@@ -247,18 +248,15 @@ def _chainage(conn: psycopg.Connection[Any], survey: Survey, name: str, text: st
     if "+" not in text[1:]:
         return _float(name, text, "a chainage in metres or a station, as 12+345.678")
     try:
-        with conn.transaction():
-            rows = conn.execute(
-                "SELECT chainage FROM tunnel_api.station_chainages(%s, %s) AS chainage ORDER BY 1", [survey.tunnel_id, text]
-            ).fetchall()
-    except psycopg.errors.InvalidTextRepresentation:
+        chainages = station_chainages(conn, survey.tunnel_id, text)
+    except ValueError:
         raise ValueError(f"{name} is {text!r}, not a station, as 12+345.678, nor a chainage in metres") from None
-    if not rows:
+    if not chainages:
         raise ValueError(f"{name} is {text}: tunnel {survey.tunnel} has no such station")
-    if len(rows) > 1:
-        where = " and ".join(f"{row[0]:.3f}" for row in rows)
+    if len(chainages) > 1:
+        where = " and ".join(f"{chainage:.3f}" for chainage in chainages)
         raise ValueError(f"{name} is {text}: tunnel {survey.tunnel} has that station at chainages {where} m; give one of these")
-    return float(rows[0][0])
+    return chainages[0]
 
 
 def _read_layer(path: Path, survey: Survey, columns: Mapping[str, str], layer: str | None) -> Iterator[Row]:

@@ -38,6 +38,24 @@ def read_equations(path: Path) -> list[Equation]:
     return [Equation(chainage, station, int(direction)) for chainage, station, direction in table.values.tolist()]
 
 
+def station_chainages(connection: psycopg.Connection[Any], tunnel_id: int, station: str) -> list[float]:
+    """Chainages, m, at which a tunnel has a station as 12+345.678, in order: none, one or, where stations repeat, several.
+
+    Raises
+    ------
+    ValueError
+        If it is not written as a station.
+    """
+    try:
+        with connection.transaction():
+            rows = connection.execute(
+                "SELECT chainage FROM tunnel_api.station_chainages(%s, %s) AS chainage ORDER BY 1", [tunnel_id, station]
+            ).fetchall()
+    except psycopg.errors.InvalidTextRepresentation:
+        raise ValueError(f"{station!r} is no station") from None
+    return [float(chainage) for (chainage,) in rows]
+
+
 def save_equations(connection: psycopg.Connection[Any], tunnel_id: int, equations: Sequence[Equation]) -> None:
     """Give a tunnel these station equations in place of those that it had; without any its stations are its chainages.
 
