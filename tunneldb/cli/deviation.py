@@ -109,12 +109,9 @@ def _write(conn: psycopg.Connection[Any], survey: Survey, layer: str, part: Stre
             write_sections(conn, survey, layer, part.low, part.high, every, temporary)
         return [output]
     from tunneldb.export.images.deviation import write_deviation
-    from tunneldb.geometry.stationing import KILOMETRE
     from tunneldb.store.deviation import stale_kilometres
 
-    there = [
-        km for km in stale_kilometres(conn, survey, layer) if km * KILOMETRE < part.high and (km + 1) * KILOMETRE > part.low
-    ]
+    there = stale_kilometres(conn, survey, layer, part.low, part.high)
     paths = [output if len(there) == 1 else output.with_name(f"{output.stem}-km{km:03d}{output.suffix}") for km in there]
     written = (write_deviation(conn, survey, km, layer, path) for km, path in zip(there, paths, strict=True))
     return [path for path in written if path is not None]

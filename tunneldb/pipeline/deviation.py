@@ -101,16 +101,15 @@ def measure_deviation(
         If the layer has no profile, or the survey no offset image where it has one.
     """
     load_design(conn, survey.tunnel_id, survey.tunnel, layer)
-    there = stale_kilometres(conn, survey, layer)
+    there = stale_kilometres(conn, survey, layer, low, high)
     conn.rollback()
-    wanted = [km for km in there if km * KILOMETRE < high and (km + 1) * KILOMETRE > low]
-    if not wanted:
+    if not there:
         raise nothing_yet(conn, survey, f"has no offset image where layer {layer} has a profile")
-    blocked = {km: why for km in wanted if (why := there[km]) is not None and why.startswith("detect is stale")}
+    blocked = {km: why for km, why in there.items() if why is not None and why.startswith("detect is stale")}
     if blocked:
         km, why = next(iter(blocked.items()))
         raise UserError(f"kilometre {km}: {why}; tunneldb run {survey.name} --stale, then deviation")
-    wanted = [km for km in wanted if there[km] is not None]
+    wanted = [km for km, why in there.items() if why is not None]
     advance = begin(f"deviation of {survey.name}", len(wanted))
     for km in wanted:
         inputs = deviation_inputs(conn, survey, km, layer)

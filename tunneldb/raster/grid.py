@@ -142,7 +142,13 @@ class Grid(PixelGrid):
 
     @classmethod
     def covering(
-        cls, km: int, pixel: float, arc_min: float, arc_max: float, halo: int = 0, chainages: tuple[float, float] | None = None
+        cls,
+        km: int,
+        pixel: float,
+        arc_min: float,
+        arc_max: float,
+        halo: int = 0,
+        chainages: tuple[float, float] = (-np.inf, np.inf),
     ) -> Grid:
         """Make the grid that covers the given arcs, m, a halo, pixels, and the blocks between two chainages, m; all by default.
 
@@ -154,8 +160,6 @@ class Grid(PixelGrid):
         if not pixel >= 0.002 or abs(BLOCK / pixel - round(BLOCK / pixel)) > 1e-6:
             raise UserError(f"image.pixel must be at least 0.002 m and divide 50 m: {pixel:g} m does not")
         bottom, top = int(np.floor(arc_min / pixel)), int(np.ceil(arc_max / pixel))
-        if chainages is None:
-            return cls(km, pixel, bottom, top - bottom, halo)
         west, east = np.array(chainages) / BLOCK - km * BLOCKS
         first = int(np.clip(np.floor(west), 0, BLOCKS - 1))
         return cls(km, pixel, bottom, top - bottom, halo, (first, int(np.clip(np.ceil(east), first + 1, BLOCKS))))

@@ -11,9 +11,9 @@ import psycopg
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.geometry.alignment import Alignment
 from tunneldb.shape.outline import Outline
 from tunneldb.shape.profile import Profile, Stretch, stretches
+from tunneldb.store.surface import alignment_of
 
 
 @dataclass(frozen=True)
@@ -42,14 +42,9 @@ def get_design_tunnel(conn: psycopg.Connection[Any], tunnel_id: int, name: str) 
     UserError
         If it is a site.
     """
-    rows = conn.execute(
-        "SELECT ST_X(d.geom), ST_Y(d.geom), ST_Z(d.geom), t.start_chainage, t.spacing"
-        " FROM tunnel.tunnel t, ST_DumpPoints(t.alignment) d WHERE t.id = %s ORDER BY d.path",
-        [tunnel_id],
-    ).fetchall()
-    if not rows:
+    line = alignment_of(conn, tunnel_id)
+    if line is None:
         raise UserError(f"{name} is a site: without an axis there are no profiles about it")
-    line = Alignment.from_polyline(np.array([row[:3] for row in rows]), rows[0][3], rows[0][4])
     return DesignTunnel(tunnel_id, name, line.start, line.end)
 
 

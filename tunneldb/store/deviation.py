@@ -10,6 +10,7 @@ import numpy as np
 import psycopg
 
 from tunneldb.arrays import Bool
+from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.raster.geotiff import Raster, decode
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.shape.overbreak import SectionDeviation
@@ -50,10 +51,14 @@ def load_offsets(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Iter
         yield decode(rows["offset"]), lining
 
 
-def stale_kilometres(conn: psycopg.Connection[Any], survey: Survey, layer: str) -> dict[int, str | None]:
-    """Kilometres with an offset image in which the layer has a design, and why what is stored is not what it would be."""
+def stale_kilometres(
+    conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float
+) -> dict[int, str | None]:
+    """Kilometres of a stretch with an offset image in which the layer has a design, and why what is stored is out of date."""
     rows = conn.execute(
-        "SELECT km, reason FROM tunnel_api.deviation_state(%s) WHERE layer = %s ORDER BY km", [survey.id, layer]
+        "SELECT km, reason FROM tunnel_api.deviation_state(%s)"
+        " WHERE layer = %s AND (km + 1) * %s::float8 > %s AND km * %s::float8 < %s ORDER BY km",
+        [survey.id, layer, KILOMETRE, low, KILOMETRE, high],
     ).fetchall()
     return dict(rows)
 

@@ -15,12 +15,21 @@ from tunneldb.store.survey import Survey
 
 def load_alignment(conn: psycopg.Connection[Any], survey: Survey, spacing: float | None = None) -> Alignment:
     """Given axis of a survey's tunnel, which is no site, with stations so far apart, m; None: as its vertices are."""
-    vertices = conn.execute(
-        "SELECT ST_X(d.geom), ST_Y(d.geom), ST_Z(d.geom)"
+    alignment = alignment_of(conn, survey.tunnel_id, spacing)
+    assert alignment is not None
+    return alignment
+
+
+def alignment_of(conn: psycopg.Connection[Any], tunnel_id: int, spacing: float | None = None) -> Alignment | None:
+    """Given axis of a tunnel, with stations so far apart, m; None: as its vertices are. None where it is a site."""
+    rows = conn.execute(
+        "SELECT ST_X(d.geom), ST_Y(d.geom), ST_Z(d.geom), t.start_chainage, t.spacing"
         " FROM tunnel.tunnel t, ST_DumpPoints(t.alignment) d WHERE t.id = %s ORDER BY d.path",
-        [survey.tunnel_id],
+        [tunnel_id],
     ).fetchall()
-    return Alignment.from_polyline(np.array(vertices), survey.start_chainage, spacing or survey.spacing)
+    if not rows:
+        return None
+    return Alignment.from_polyline(np.array([row[:3] for row in rows]), rows[0][3], spacing or rows[0][4])
 
 
 def load_surface(conn: psycopg.Connection[Any], survey: Survey, first: float = -np.inf, last: float = np.inf) -> Surface:

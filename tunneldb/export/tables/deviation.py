@@ -7,6 +7,7 @@ import io
 from typing import Any
 
 import psycopg
+from psycopg import sql
 from psycopg.rows import dict_row
 
 from tunneldb.store.survey import Survey
@@ -19,25 +20,18 @@ COLUMNS = (
 )  # fmt: skip
 """Of a section; m and m²."""
 
-VOLUME = (
-    "length", "design_area", "seen_area", "seen_share", "overbreak", "underbreak", "overbreak_sigma", "underbreak_sigma",
-)  # fmt: skip
-"""Of a stretch; m, m² and m³."""
-
 _DECIMALS = 5
 
 
 def section_rows(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float) -> list[Row]:
     """Sections that lie in a stretch, whole or in part, in order of chainage."""
     with conn.cursor(row_factory=dict_row) as cursor:
-        rows = cursor.execute(
-            "SELECT chainage_from, chainage_to, label, profile, design_length, seen_length, overbreak, underbreak,"
-            " deviation_mean, deviation_least, least_at, deviation_greatest, greatest_at, sigma, shift_right, shift_up"
-            " FROM tunnel_api.deviation_section"
-            " WHERE survey_id = %s AND layer = %s AND chainage_to > %s AND chainage_from < %s ORDER BY chainage_from",
-            [survey.id, layer, low, high],
-        ).fetchall()
-    return [{name: _rounded(row[name]) for name in COLUMNS} for row in rows]
+        query = sql.SQL(
+            "SELECT {} FROM tunnel_api.deviation_section"
+            " WHERE survey_id = %s AND layer = %s AND chainage_to > %s AND chainage_from < %s ORDER BY chainage_from"
+        ).format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)))
+        rows = cursor.execute(query, [survey.id, layer, low, high]).fetchall()
+    return [{name: _rounded(value) for name, value in row.items()} for row in rows]
 
 
 def stretch_rows(
