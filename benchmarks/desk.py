@@ -20,8 +20,6 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -74,40 +72,22 @@ def photographs(folder: Path) -> None:
         picture.save(folder / name)
 
 
-@contextmanager
-def screen() -> Iterator[str]:
-    """Start an X server without a screen; yield its display."""
-    read, write = os.pipe()
-    server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", SCREEN, "-nolisten", "tcp"], pass_fds=[write],
-        stderr=subprocess.DEVNULL,
-    )  # fmt: skip
-    os.close(write)
-    with os.fdopen(read) as answer:
-        display = answer.readline().strip()
-    try:
-        yield f":{display}"
-    finally:
-        server.terminate()
-        server.wait()
-
-
 def in_qgis(step: str, folder: Path, pictures: Path) -> list[dict[str, Any]]:
     """Have the inspector's day done in QGIS Desktop, or look at it after that; what was done, step by step."""
     done = folder / f"{step}.json"
     done.unlink(missing_ok=True)
     (folder / "profile").mkdir(exist_ok=True)
-    with screen() as display:
-        environment = {
-            "PATH": "/usr/bin:/bin", "HOME": str(folder / "profile"), "DISPLAY": display, "LC_ALL": "C.UTF-8",
-            "DESK_STEP": step, "DESK_FOLDER": str(folder),
-            "DESK_PICTURES": str(pictures), "PGSERVICEFILE": str(folder / "pg_service.conf"),
-        }  # fmt: skip
-        command = ["qgis", "--nologo", "--noversioncheck", "--noplugins", "--profiles-path", str(folder / "profile")]
-        ran = subprocess.run(
-            [*command, "--project", folder / "desk.qgz", "--code", SCRIPT], env=environment, capture_output=True, text=True,
-            timeout=300, check=False,
-        )  # fmt: skip
+    environment = {
+        "PATH": "/usr/bin:/bin", "HOME": str(folder / "profile"), "LC_ALL": "C.UTF-8",
+        "DESK_STEP": step, "DESK_FOLDER": str(folder),
+        "DESK_PICTURES": str(pictures), "PGSERVICEFILE": str(folder / "pg_service.conf"),
+    }  # fmt: skip
+    screen = ["xvfb-run", "--auto-servernum", f"--server-args=-screen 0 {SCREEN} -nolisten tcp"]
+    command = ["qgis", "--nologo", "--noversioncheck", "--noplugins", "--profiles-path", str(folder / "profile")]
+    ran = subprocess.run(
+        [*screen, *command, "--project", folder / "desk.qgz", "--code", SCRIPT], env=environment, capture_output=True,
+        text=True, timeout=300, check=False,
+    )  # fmt: skip
     if ran.returncode or not done.exists():
         raise SystemExit(f"QGIS ended with {ran.returncode}:\n{ran.stderr[-4000:]}")
     steps: list[dict[str, Any]] = json.loads(done.read_text())
