@@ -1,5 +1,5 @@
--- Comments of the views' columns that have none of their own, for psql, QGIS and the reference: what a name means in every view,
--- else what the column of the same name in the table behind the view is said to be. Needs all views.
+-- Comments of the views' columns that have none of their own, for psql, QGIS and the reference: what the view behind it says, else
+-- what a name means in every view, else what the column of the same name in the table behind it is said to be. Needs all views.
 
 COMMENT ON COLUMN tunnel_api.axis.geom IS 'The axis, tunnel''s SRID';
 COMMENT ON COLUMN tunnel_api.section_unrolled.geom IS 'From its left to its right end, in the unrolled plane';
@@ -9,7 +9,7 @@ DECLARE
     bare record;
 BEGIN
     FOR bare IN
-        SELECT v.oid::regclass AS view, a.attname AS name, coalesce(m.text, col_description(t.oid, b.attnum), g.text) AS text
+        SELECT v.oid::regclass AS view, a.attname AS name, coalesce(w.text, m.text, col_description(t.oid, b.attnum), g.text) AS text
           FROM pg_class v
           JOIN pg_attribute a ON a.attrelid = v.oid AND a.attnum > 0
           LEFT JOIN (VALUES
@@ -51,12 +51,14 @@ BEGIN
                 ('_3d', 'On the lining in space, tunnel''s SRID')) AS g (place, text)
                  ON a.attname = 'geom' AND v.relname ~ ('^(leak|anomaly)' || g.place || '$')
           LEFT JOIN pg_class t
-                 ON t.relnamespace = 'tunnel'::regnamespace AND t.relkind IN ('r', 'p')
-                AND t.relname = CASE WHEN v.relname = 'file' THEN 'scan_file'
-                                     WHEN v.relname = 'stage_status' THEN 'run'
-                                     WHEN v.relname ~ '^(leak|anomaly)(_|$)' THEN 'anomaly'
-                                     ELSE v.relname END
+                 ON t.oid = to_regclass(CASE WHEN v.relname = 'file' THEN 'tunnel.scan_file'
+                                             WHEN v.relname = 'stage_status' THEN 'tunnel.run'
+                                             WHEN v.relname = 'sheet_finding' THEN 'tunnel_api.finding_unrolled'
+                                             WHEN v.relname = 'sheet_leak' THEN 'tunnel_api.leak_unrolled'
+                                             WHEN v.relname ~ '^(leak|anomaly)(_|$)' THEN 'tunnel.anomaly'
+                                             ELSE format('tunnel.%I', v.relname) END)
           LEFT JOIN pg_attribute b ON b.attrelid = t.oid AND b.attname = a.attname
+          LEFT JOIN LATERAL (SELECT col_description(t.oid, b.attnum) AS text WHERE t.relkind = 'v') w ON true
          WHERE v.relnamespace = 'tunnel_api'::regnamespace AND v.relkind = 'v'
            AND col_description(v.oid, a.attnum) IS NULL
     LOOP

@@ -126,22 +126,3 @@ COMMENT ON COLUMN tunnel_api.sheet.findings IS 'Findings in its table (sheet_fin
 COMMENT ON COLUMN tunnel_api.sheet.left_out IS
     'How many findings on it do not count, leaks among them, and are not drawn: rejected, merged, same, dry; NULL if none';
 COMMENT ON COLUMN tunnel_api.sheet.geom IS 'From edge to edge, as high as the survey''s widest place';
-
--- The other columns are what they are in the views behind.
-DO $$
-DECLARE
-    bare record;
-BEGIN
-    FOR bare IN
-        SELECT v.relname AS view, a.attname AS name, col_description(t.oid, b.attnum) AS text
-          FROM (VALUES ('sheet_finding', 'finding_unrolled'), ('sheet_leak', 'leak_unrolled')) AS n (view, behind)
-          JOIN pg_class v ON v.relnamespace = 'tunnel_api'::regnamespace AND v.relname = n.view
-          JOIN pg_class t ON t.relnamespace = 'tunnel_api'::regnamespace AND t.relname = n.behind
-          JOIN pg_attribute a ON a.attrelid = v.oid AND a.attnum > 0
-          JOIN pg_attribute b ON b.attrelid = t.oid AND b.attname = a.attname
-         WHERE col_description(v.oid, a.attnum) IS NULL AND col_description(t.oid, b.attnum) IS NOT NULL
-    LOOP
-        EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', bare.view, bare.name, bare.text);
-    END LOOP;
-END
-$$;
