@@ -16,6 +16,20 @@ from tunneldb.errors import UserError
 _PLAIN = re.compile(r"[^A-Za-z0-9_]+")
 
 
+def require_regular(path: Path) -> None:
+    """Refuse a path at which there is something other than a file or a folder: a device, a pipe, a socket.
+
+    Raises
+    ------
+    UserError
+        Which says what it is.
+    """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        kinds = {"a pipe": path.is_fifo(), "a socket": path.is_socket()}
+        kind = next((name for name, held in kinds.items() if held), "a device")
+        raise UserError(f"{path} is {kind}, not a file")
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary path beside ``path`` to write to; it takes the place of ``path`` when the block succeeds.
@@ -25,8 +39,9 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises
     ------
     UserError
-        If the folder doesn't exist or can't be written to, or the disk is full.
+        If the folder doesn't exist or can't be written to, the disk is full, or there is something that is no file.
     """
+    require_regular(path)
     try:
         with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as folder:
             temporary = Path(folder) / path.name

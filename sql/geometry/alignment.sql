@@ -7,20 +7,20 @@ CREATE OR REPLACE FUNCTION tunnel_api.axis_deviation(survey_id int)
 RETURNS TABLE (n int, chainage float8, source text, to_right float8, up float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 ROWS 1000
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
     SELECT d.n, d.n * t.spacing, d.source, q.x * d.ux + q.y * d.uy, q.x * d.wx + q.y * d.wy + q.z * d.wz
-    FROM (SELECT t.spacing, t.start_chainage AS low, t.start_chainage + ST_Length(t.alignment) AS high
+    FROM (SELECT t.spacing, t.start_chainage AS low, t.start_chainage + public.ST_Length(t.alignment) AS high
           FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = $1
           OFFSET 0) t  -- a fence: the length is reckoned once
-    CROSS JOIN (SELECT array_agg(v.n ORDER BY v.n) AS n, array_agg(ST_X(v.given) ORDER BY v.n) AS x,
-                    array_agg(ST_Y(v.given) ORDER BY v.n) AS y, array_agg(ST_Z(v.given) ORDER BY v.n) AS z,
+    CROSS JOIN (SELECT array_agg(v.n ORDER BY v.n) AS n, array_agg(public.ST_X(v.given) ORDER BY v.n) AS x,
+                    array_agg(public.ST_Y(v.given) ORDER BY v.n) AS y, array_agg(public.ST_Z(v.given) ORDER BY v.n) AS z,
                     array_agg(v.geom ORDER BY v.n) AS geom, array_agg(v.source ORDER BY v.n) AS source
                 FROM tunnel.axis_vertex v WHERE v.survey_id = $1) v
     -- side by side, both in the order of n: the planner would join them by comparing each with every other
     CROSS JOIN LATERAL ROWS FROM (tunnel_api.axis_frame(v.n, v.x, v.y, v.z), unnest(v.geom), unnest(v.source))
         AS d (n, x, y, z, tx, ty, tz, ux, uy, wx, wy, wz, geom, source)
-    CROSS JOIN LATERAL (SELECT ST_X(d.geom) - d.x AS x, ST_Y(d.geom) - d.y AS y, ST_Z(d.geom) - d.z AS z OFFSET 0) q
+    CROSS JOIN LATERAL (SELECT public.ST_X(d.geom) - d.x AS x, public.ST_Y(d.geom) - d.y AS y, public.ST_Z(d.geom) - d.z AS z OFFSET 0) q
     WHERE d.n * t.spacing BETWEEN t.low - 0.001 AND t.high + 0.001
     ORDER BY d.n
 $$;

@@ -80,7 +80,7 @@ BEGIN
     RETURN QUERY EXECUTE format($query$
         WITH profile AS (
             SELECT f.n, q.u, q.w
-            FROM (SELECT round(p.chainage / $3)::int AS n, ST_X(p.geom) AS x, ST_Y(p.geom) AS y, ST_Z(p.geom) AS z,
+            FROM (SELECT round(p.chainage / $3)::int AS n, public.ST_X(p.geom) AS x, public.ST_Y(p.geom) AS y, public.ST_Z(p.geom) AS z,
                       clock_timestamp()  -- a fence that lets the scan be parallel: the coordinates are taken out once
                   FROM %s p
                   WHERE p.chainage BETWEEN $1 AND $2
@@ -222,8 +222,8 @@ BEGIN
     SELECT t.spacing INTO STRICT spacing
     FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = axis_refine.survey_id;
 
-    SELECT array_agg(a.n ORDER BY a.n), array_agg(ST_X(a.start) ORDER BY a.n), array_agg(ST_Y(a.start) ORDER BY a.n),
-        array_agg(ST_Z(a.start) ORDER BY a.n), array_agg(a.source = 'edited' ORDER BY a.n)
+    SELECT array_agg(a.n ORDER BY a.n), array_agg(public.ST_X(a.start) ORDER BY a.n), array_agg(public.ST_Y(a.start) ORDER BY a.n),
+        array_agg(public.ST_Z(a.start) ORDER BY a.n), array_agg(a.source = 'edited' ORDER BY a.n)
     INTO vn, vx, vy, vz, fixed
     FROM (SELECT v.n, v.source, CASE WHEN v.source = 'edited' THEN v.geom ELSE v.given END AS start
           FROM tunnel.axis_vertex v
@@ -314,7 +314,7 @@ BEGIN
     END LOOP;
 
     UPDATE tunnel.axis_vertex v
-    SET geom = ST_SetSRID(ST_MakePoint(p.x, p.y, p.z), ST_SRID(v.given)),
+    SET geom = public.ST_SetSRID(public.ST_MakePoint(p.x, p.y, p.z), public.ST_SRID(v.given)),
         points = p.points,
         source = CASE WHEN p.points > 0 THEN 'measured' ELSE 'interpolated' END,
         remark = p.why

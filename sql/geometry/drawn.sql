@@ -10,8 +10,8 @@ LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 AS $$
 DECLARE
     at float8 := near;
-    axis geometry;
-    beside geometry;
+    axis public.geometry;
+    beside public.geometry;
     right_x float8;
     right_y float8;
     along float8;
@@ -22,11 +22,11 @@ BEGIN
         IF axis IS NULL THEN
             RETURN NULL;
         END IF;
-        right_x := ST_X(beside) - ST_X(axis);
-        right_y := ST_Y(beside) - ST_Y(axis);
-        along := (ST_Y(point) - ST_Y(axis)) * right_x - (ST_X(point) - ST_X(axis)) * right_y;
+        right_x := public.ST_X(beside) - public.ST_X(axis);
+        right_y := public.ST_Y(beside) - public.ST_Y(axis);
+        along := (public.ST_Y(point) - public.ST_Y(axis)) * right_x - (public.ST_X(point) - public.ST_X(axis)) * right_y;
         IF abs(along) < 1e-7 THEN
-            RETURN ST_MakePoint(at, (ST_X(point) - ST_X(axis)) * right_x + (ST_Y(point) - ST_Y(axis)) * right_y);
+            RETURN public.ST_MakePoint(at, (public.ST_X(point) - public.ST_X(axis)) * right_x + (public.ST_Y(point) - public.ST_Y(axis)) * right_y);
         END IF;
         at := at + along;
     END LOOP;
@@ -40,36 +40,36 @@ COMMENT ON FUNCTION tunnel_api.unmap_point(int, geometry, float8) IS
 CREATE OR REPLACE FUNCTION tunnel_api.unmap_strip(survey_id int, shape geometry)
 RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
 DECLARE
     survey_key constant int := survey_id;
-    kind constant text := GeometryType(shape);
-    middle constant geometry := ST_Force2D(ST_PointOnSurface(shape));
+    kind constant text := public.GeometryType(shape);
+    middle constant public.geometry := public.ST_Force2D(public.ST_PointOnSurface(shape));
     near float8;
-    rings geometry[];
+    rings public.geometry[];
 BEGIN
     IF kind NOT IN ('POINT', 'LINESTRING', 'POLYGON') THEN
         RAISE EXCEPTION 'a point, a line or a polygon is needed, not a %', kind USING HINT = 'Use ST_Dump for the parts.';
     END IF;
-    SELECT g.chainage_from + ST_LineLocatePoint(ST_Force2D(g.geom), middle) * (g.chainage_to - g.chainage_from) INTO near
-      FROM tunnel.segment g WHERE g.survey_id = survey_key ORDER BY ST_Distance(ST_Force2D(g.geom), middle) LIMIT 1;
+    SELECT g.chainage_from + public.ST_LineLocatePoint(public.ST_Force2D(g.geom), middle) * (g.chainage_to - g.chainage_from) INTO near
+      FROM tunnel.segment g WHERE g.survey_id = survey_key ORDER BY public.ST_Distance(public.ST_Force2D(g.geom), middle) LIMIT 1;
     SELECT array_agg(q.ring ORDER BY q.i) INTO rings
     FROM (SELECT r.i, CASE WHEN bool_or(p.carried IS NULL) THEN NULL
                            WHEN kind = 'POINT' THEN (array_agg(p.carried))[1]
-                           ELSE ST_MakeLine(p.carried ORDER BY p.j) END AS ring
-          FROM (SELECT d.path[1] AS i, ST_Segmentize(ST_ExteriorRing(d.geom), 1.0) AS line
-                FROM ST_DumpRings(CASE WHEN kind = 'POLYGON' THEN ST_Force2D(shape) END) d
+                           ELSE public.ST_MakeLine(p.carried ORDER BY p.j) END AS ring
+          FROM (SELECT d.path[1] AS i, public.ST_Segmentize(public.ST_ExteriorRing(d.geom), 1.0) AS line
+                FROM public.ST_DumpRings(CASE WHEN kind = 'POLYGON' THEN public.ST_Force2D(shape) END) d
                 UNION ALL
-                SELECT 0, ST_Segmentize(ST_Force2D(shape), 1.0) WHERE kind <> 'POLYGON') r
+                SELECT 0, public.ST_Segmentize(public.ST_Force2D(shape), 1.0) WHERE kind <> 'POLYGON') r
           CROSS JOIN LATERAL (
               SELECT coalesce(v.path[1], 1) AS j, tunnel_api.unmap_point(survey_key, v.geom, near) AS carried
-              FROM ST_DumpPoints(r.line) v) p
+              FROM public.ST_DumpPoints(r.line) v) p
           GROUP BY r.i) q;
     IF rings IS NULL OR array_position(rings, NULL) IS NOT NULL THEN
         RETURN NULL;
     ELSIF kind = 'POLYGON' THEN
-        RETURN ST_MakePolygon(rings[1], rings[2:]);
+        RETURN public.ST_MakePolygon(rings[1], rings[2:]);
     END IF;
     RETURN rings[1];
 END
@@ -82,10 +82,10 @@ COMMENT ON FUNCTION tunnel_api.unmap_strip(int, geometry) IS
 CREATE OR REPLACE FUNCTION tunnel_api.clock_at(survey_id int, chainage float8, arc float8)
 RETURNS float8
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
 DECLARE
-    place constant geometry := tunnel_api.roll(survey_id, chainage, arc, 0);
+    place constant public.geometry := tunnel_api.roll(survey_id, chainage, arc, 0);
     s tunnel.segment;
     frame float8[];
     hours float8;
@@ -98,8 +98,8 @@ BEGIN
     frame := tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to,
         (chainage - s.chainage_from) / (s.chainage_to - s.chainage_from));
     hours := degrees(atan2(
-        (ST_X(place) - frame[1]) * frame[7] + (ST_Y(place) - frame[2]) * frame[8] + (ST_Z(place) - frame[3]) * frame[9],
-        (ST_X(place) - frame[1]) * frame[10] + (ST_Y(place) - frame[2]) * frame[11] + (ST_Z(place) - frame[3]) * frame[12])) / 30;
+        (public.ST_X(place) - frame[1]) * frame[7] + (public.ST_Y(place) - frame[2]) * frame[8] + (public.ST_Z(place) - frame[3]) * frame[9],
+        (public.ST_X(place) - frame[1]) * frame[10] + (public.ST_Y(place) - frame[2]) * frame[11] + (public.ST_Z(place) - frame[3]) * frame[12])) / 30;
     RETURN CASE WHEN hours > 0 THEN hours ELSE hours + 12 END;
 END
 $$;
@@ -116,67 +116,72 @@ CREATE OR REPLACE FUNCTION tunnel_api.drawn_figures(
     OUT area float8, OUT length float8, OUT unrolled geometry, OUT map geometry, OUT surface geometry,
     OUT shape geometry, OUT shape_map geometry, OUT shape_surface geometry)
 LANGUAGE plpgsql STABLE PARALLEL SAFE CALLED ON NULL INPUT
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
 #variable_conflict use_variable
 DECLARE
-    given constant geometry := ST_SetSRID(ST_Force2D(
-        CASE WHEN ST_NumGeometries(drawn) = 1 THEN ST_GeometryN(drawn, 1) ELSE drawn END), 0);
-    kind constant text := GeometryType(given);
+    given constant public.geometry := public.ST_SetSRID(public.ST_Force2D(
+        CASE WHEN public.ST_NumGeometries(drawn) = 1 THEN public.ST_GeometryN(drawn, 1) ELSE drawn END), 0);
+    kind constant text := public.GeometryType(given);
     step constant float8 := 0.01;
-    middle geometry;
+    middle public.geometry;
 BEGIN
-    IF given IS NULL OR ST_IsEmpty(given) THEN
+    IF given IS NULL OR public.ST_IsEmpty(given) THEN
         RAISE EXCEPTION 'a finding needs a place: a polygon, a line or a point' USING ERRCODE = 'null_value_not_allowed';
     ELSIF kind NOT IN ('POINT', 'LINESTRING', 'POLYGON') THEN
         RAISE EXCEPTION 'a finding is one polygon, line or point, not a %', lower(kind) USING ERRCODE = 'invalid_parameter_value';
-    ELSIF NOT (ST_XMin(given) > '-Infinity' AND ST_XMax(given) < 'Infinity' AND ST_YMin(given) > '-Infinity'
-               AND ST_YMax(given) < 'Infinity') THEN
+    ELSIF NOT (public.ST_XMin(given) > '-Infinity' AND public.ST_XMax(given) < 'Infinity' AND public.ST_YMin(given) > '-Infinity'
+               AND public.ST_YMax(given) < 'Infinity') THEN
         RAISE EXCEPTION 'the drawing has a coordinate that is no finite number' USING ERRCODE = 'invalid_parameter_value';
-    ELSIF kind = 'POLYGON' AND NOT ST_IsValid(given) OR kind = 'LINESTRING' AND ST_Length(given) = 0 THEN
-        RAISE EXCEPTION 'the drawing is not valid: %', CASE kind WHEN 'POLYGON' THEN ST_IsValidReason(given) ELSE 'no length' END
+    ELSIF kind = 'POLYGON' AND NOT public.ST_IsValid(given) OR kind = 'LINESTRING' AND public.ST_Length(given) = 0 THEN
+        RAISE EXCEPTION 'the drawing is not valid: %', CASE kind WHEN 'POLYGON' THEN public.ST_IsValidReason(given) ELSE 'no length' END
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     unrolled := CASE kind WHEN 'POLYGON' THEN given
-                          WHEN 'LINESTRING' THEN ST_Buffer(given, greatest(width, 0.01) / 2, 'endcap=flat join=mitre')
-                          ELSE ST_Buffer(given, 0.05, 'quad_segs=4') END;
+                          WHEN 'LINESTRING' THEN public.ST_Buffer(given, greatest(width, 0.01) / 2, 'endcap=flat join=mitre')
+                          ELSE public.ST_Buffer(given, 0.05, 'quad_segs=4') END;
     surface := tunnel_api.roll(survey_id, unrolled);
     IF surface IS NULL AND kind <> 'POLYGON' THEN  -- at the very edge of the lining
-        unrolled := ST_Buffer(given, 1e-4, 'endcap=flat join=mitre');
+        unrolled := public.ST_Buffer(given, 1e-4, 'endcap=flat join=mitre');
         surface := tunnel_api.roll(survey_id, unrolled);
     END IF;
     map := tunnel_api.map_strip(survey_id, unrolled);
     IF surface IS NULL OR map IS NULL THEN
         RAISE EXCEPTION 'the drawing reaches beyond the lining: it lies between chainage % and % m, arc % and % m',
-            round(ST_XMin(given)::numeric, 2), round(ST_XMax(given)::numeric, 2), round(ST_YMin(given)::numeric, 2),
-            round(ST_YMax(given)::numeric, 2) USING ERRCODE = 'invalid_parameter_value';
+            round(public.ST_XMin(given)::numeric, 2), round(public.ST_XMax(given)::numeric, 2), round(public.ST_YMin(given)::numeric, 2),
+            round(public.ST_YMax(given)::numeric, 2) USING ERRCODE = 'invalid_parameter_value';
     END IF;
-    middle := CASE kind WHEN 'POLYGON' THEN CASE WHEN ST_Contains(given, ST_Centroid(given)) THEN ST_Centroid(given)
-                                                   ELSE ST_PointOnSurface(given) END WHEN 'POINT' THEN given
-                        ELSE ST_LineInterpolatePoint(given, 0.5) END;
+    middle := CASE kind WHEN 'POLYGON' THEN CASE WHEN public.ST_Contains(given, public.ST_Centroid(given)) THEN public.ST_Centroid(given)
+                                                   ELSE public.ST_PointOnSurface(given) END WHEN 'POINT' THEN given
+                        ELSE public.ST_LineInterpolatePoint(given, 0.5) END;
     IF kind = 'POLYGON' THEN
-        SELECT ST_Area(given) * coalesce(avg(sqrt(
-                   ((ST_Y(l.p) - ST_Y(h.p)) * (ST_Z(c.p) - ST_Z(h.p)) - (ST_Z(l.p) - ST_Z(h.p)) * (ST_Y(c.p) - ST_Y(h.p))) ^ 2
-                   + ((ST_Z(l.p) - ST_Z(h.p)) * (ST_X(c.p) - ST_X(h.p)) - (ST_X(l.p) - ST_X(h.p)) * (ST_Z(c.p) - ST_Z(h.p))) ^ 2
-                   + ((ST_X(l.p) - ST_X(h.p)) * (ST_Y(c.p) - ST_Y(h.p)) - (ST_Y(l.p) - ST_Y(h.p)) * (ST_X(c.p) - ST_X(h.p))) ^ 2)
-                   / step ^ 2), 1) INTO area
-          FROM ST_Dump(ST_GeneratePoints(given, 16, 1)) d
-         CROSS JOIN LATERAL (SELECT tunnel_api.roll(survey_id, ST_X(d.geom), ST_Y(d.geom)) AS p) h
-         CROSS JOIN LATERAL (SELECT tunnel_api.roll(survey_id, ST_X(d.geom) + step, ST_Y(d.geom)) AS p) l
-         CROSS JOIN LATERAL (SELECT tunnel_api.roll(survey_id, ST_X(d.geom), ST_Y(d.geom) + step) AS p) c;
+        SELECT public.ST_Area(given)
+               * coalesce(avg(sqrt((l.y * c.z - l.z * c.y) ^ 2 + (l.z * c.x - l.x * c.z) ^ 2 + (l.x * c.y - l.y * c.x) ^ 2)), 1)
+          INTO area
+          FROM public.ST_Dump(public.ST_GeneratePoints(given, 16, 1)) d
+         CROSS JOIN LATERAL (
+            SELECT tunnel_api.roll(survey_id, public.ST_X(d.geom), public.ST_Y(d.geom)) AS here,
+                   tunnel_api.roll(survey_id, public.ST_X(d.geom) + step, public.ST_Y(d.geom)) AS along,
+                   tunnel_api.roll(survey_id, public.ST_X(d.geom), public.ST_Y(d.geom) + step) AS across) p
+         CROSS JOIN LATERAL (
+            SELECT (public.ST_X(p.along) - public.ST_X(p.here)) / step AS x, (public.ST_Y(p.along) - public.ST_Y(p.here)) / step AS y,
+                   (public.ST_Z(p.along) - public.ST_Z(p.here)) / step AS z) l
+         CROSS JOIN LATERAL (
+            SELECT (public.ST_X(p.across) - public.ST_X(p.here)) / step AS x, (public.ST_Y(p.across) - public.ST_Y(p.here)) / step AS y,
+                   (public.ST_Z(p.across) - public.ST_Z(p.here)) / step AS z) c;
     ELSE
         shape := given;
         shape_map := tunnel_api.map_strip(survey_id, given);
         shape_surface := tunnel_api.roll(survey_id, given);
-        length := CASE kind WHEN 'LINESTRING' THEN ST_3DLength(shape_surface) END;
+        length := CASE kind WHEN 'LINESTRING' THEN public.ST_3DLength(shape_surface) END;
         area := coalesce(length * width, 0);
     END IF;
-    chainage_from := ST_XMin(unrolled);
-    chainage_to := ST_XMax(unrolled);
-    arc_from := ST_YMin(unrolled);
-    arc_to := ST_YMax(unrolled);
+    chainage_from := public.ST_XMin(unrolled);
+    chainage_to := public.ST_XMax(unrolled);
+    arc_from := public.ST_YMin(unrolled);
+    arc_to := public.ST_YMax(unrolled);
     km := floor((chainage_from + chainage_to) / 2000);
-    clock := tunnel_api.clock_at(survey_id, ST_X(middle), ST_Y(middle));
+    clock := tunnel_api.clock_at(survey_id, public.ST_X(middle), public.ST_Y(middle));
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.drawn_figures(int, geometry, float8) IS

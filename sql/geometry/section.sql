@@ -38,14 +38,14 @@ BEGIN
     RETURN QUERY EXECUTE format($query$
         SELECT d.x * $1[7] + d.y * $1[8], d.x * $1[10] + d.y * $1[11] + d.z * $1[12]
         FROM %s p
-        CROSS JOIN LATERAL (SELECT ST_X(p.geom) - $1[1] AS x, ST_Y(p.geom) - $1[2] AS y, ST_Z(p.geom) - $1[3] AS z) d
+        CROSS JOIN LATERAL (SELECT public.ST_X(p.geom) - $1[1] AS x, public.ST_Y(p.geom) - $1[2] AS y, public.ST_Z(p.geom) - $1[3] AS z) d
         WHERE p.chainage BETWEEN $2 AND $3%s
     $query$, tunnel_api.partition_source(section_slab.survey_id, km_from, km_to), CASE WHEN water IS NOT NULL THEN
-        ' AND ST_Z(p.geom) >= $4 + 0.1'
+        ' AND public.ST_Z(p.geom) >= $4 + 0.1'
         ' UNION ALL '
         'SELECT d.x * $1[7] + d.y * $1[8], d.x * $1[10] + d.y * $1[11] + d.z * $1[12]'
         ' FROM tunnel.sonar_point p'
-        ' CROSS JOIN LATERAL (SELECT ST_X(p.geom) - $1[1] AS x, ST_Y(p.geom) - $1[2] AS y, ST_Z(p.geom) - $1[3] AS z) d'
+        ' CROSS JOIN LATERAL (SELECT public.ST_X(p.geom) - $1[1] AS x, public.ST_Y(p.geom) - $1[2] AS y, public.ST_Z(p.geom) - $1[3] AS z) d'
         ' WHERE p.survey_id = $5 AND p.classification IN (40, 42) AND p.chainage BETWEEN $2 AND $3' END)
     USING frame, section_slab.chainage - half_width, section_slab.chainage + half_width, water, section_slab.survey_id;
 END

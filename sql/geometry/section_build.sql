@@ -209,7 +209,7 @@ BEGIN
             points, interpolated)
         SELECT section_build.survey_id, section_build.km, c.segment, c.half, c.chainage, c.width, section_build.angle_step,
             c.node_radius, c.node_arc,
-            (SELECT ST_MakeLine(array_agg(ST_SetSRID(ST_MakePoint(
+            (SELECT public.ST_MakeLine(array_agg(public.ST_SetSRID(public.ST_MakePoint(
                 c.frame[1] + g.u * c.frame[7] + g.w * c.frame[10],
                 c.frame[2] + g.u * c.frame[8] + g.w * c.frame[11],
                 c.frame[3] + g.w * c.frame[12]), t.srid) ORDER BY g.i))

@@ -62,8 +62,8 @@ AS $$
         FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
         WHERE s.id = segment_plan.survey_id
     ), vertex AS (
-        SELECT array_agg(v.n ORDER BY v.n) AS n, array_agg(ST_X(v.geom) ORDER BY v.n) AS x,
-            array_agg(ST_Y(v.geom) ORDER BY v.n) AS y, array_agg(ST_Z(v.geom) ORDER BY v.n) AS z
+        SELECT array_agg(v.n ORDER BY v.n) AS n, array_agg(public.ST_X(v.geom) ORDER BY v.n) AS x,
+            array_agg(public.ST_Y(v.geom) ORDER BY v.n) AS y, array_agg(public.ST_Z(v.geom) ORDER BY v.n) AS z
         FROM tunnel.axis_vertex v, setting s
         WHERE v.survey_id = segment_plan.survey_id AND v.n BETWEEN s.first - 2 AND s.last + 2
     ), frame AS (
@@ -135,7 +135,7 @@ BEGIN
         vertex_from, vertex_to, tangent_from, tangent_to, geom, points)
     SELECT segment_build.survey_id, p.n, segment_build.km, p.chainage_from, p.chainage_to,
         p.line[1:3], p.line[4:6], p.line[7:9], p.line[10:12],
-        (SELECT ST_MakeLine(array_agg(ST_SetSRID(ST_MakePoint(f.frame[1], f.frame[2], f.frame[3]), t.srid) ORDER BY i))
+        (SELECT public.ST_MakeLine(array_agg(public.ST_SetSRID(public.ST_MakePoint(f.frame[1], f.frame[2], f.frame[3]), t.srid) ORDER BY i))
          FROM generate_series(0, 4) AS i, LATERAL (SELECT tunnel_api.segment_frame(p.line, i / 4.0) AS frame) f),
         0
     FROM tunnel_api.segment_plan(segment_build.survey_id, segment_build.km) p,
@@ -191,7 +191,7 @@ BEGIN
                   WHEN p.x * s.px + p.y * s.py + p.z * s.pz < s.pl THEN -1
                   WHEN p.x * s.qx + p.y * s.qy + p.z * s.qz >= s.ql THEN 1
                   ELSE 0 END AS number
-              FROM (SELECT p.*, ST_X(p.geom) AS x, ST_Y(p.geom) AS y, ST_Z(p.geom) AS z,
+              FROM (SELECT p.*, public.ST_X(p.geom) AS x, public.ST_Y(p.geom) AS y, public.ST_Z(p.geom) AS z,
                         clock_timestamp()  -- a fence that lets the scan be parallel: the coordinates are taken out once
                     -- the partition by its name: no lock on its parent, whose partitions others may be swapping
                     FROM tunnel.%I p

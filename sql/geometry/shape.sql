@@ -4,7 +4,7 @@
 CREATE OR REPLACE FUNCTION tunnel_api.survey_id(survey text)
 RETURNS int
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
 DECLARE
     found int;
@@ -27,8 +27,8 @@ RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 AS $$
 DECLARE
-    kind constant text := GeometryType(shape);
-    rings geometry[];
+    kind constant text := public.GeometryType(shape);
+    rings public.geometry[];
 BEGIN
     IF kind NOT IN ('POINT', 'LINESTRING', 'POLYGON') THEN
         RAISE EXCEPTION 'a point, a line or a polygon is needed, not a %', kind USING HINT = 'Use ST_Dump for the parts.';
@@ -36,24 +36,24 @@ BEGIN
     SELECT array_agg(q.ring ORDER BY q.i) INTO rings
     FROM (SELECT r.i, CASE WHEN bool_or(p.carried IS NULL) THEN NULL
                            WHEN kind = 'POINT' THEN (array_agg(p.carried))[1]
-                           ELSE ST_MakeLine(p.carried ORDER BY p.j) END AS ring
-          FROM (SELECT d.path[1] AS i, ST_Segmentize(ST_ExteriorRing(d.geom), step) AS line
-                FROM ST_DumpRings(CASE WHEN kind = 'POLYGON' THEN shape END) d
+                           ELSE public.ST_MakeLine(p.carried ORDER BY p.j) END AS ring
+          FROM (SELECT d.path[1] AS i, public.ST_Segmentize(public.ST_ExteriorRing(d.geom), step) AS line
+                FROM public.ST_DumpRings(CASE WHEN kind = 'POLYGON' THEN shape END) d
                 UNION ALL
-                SELECT 0, ST_Segmentize(shape, step) WHERE kind <> 'POLYGON') r
+                SELECT 0, public.ST_Segmentize(shape, step) WHERE kind <> 'POLYGON') r
           CROSS JOIN LATERAL (
               SELECT coalesce(v.path[1], 1) AS j,
                   CASE way
-                      WHEN 'roll' THEN tunnel_api.roll(survey_id, ST_X(v.geom), ST_Y(v.geom))
-                      WHEN 'map' THEN tunnel_api.map_point(survey_id, ST_X(v.geom), ST_Y(v.geom))
-                      WHEN 'unroll' THEN (SELECT ST_MakePoint(u.chainage, u.arc) FROM tunnel_api.unroll(survey_id, v.geom) u)
+                      WHEN 'roll' THEN tunnel_api.roll(survey_id, public.ST_X(v.geom), public.ST_Y(v.geom))
+                      WHEN 'map' THEN tunnel_api.map_point(survey_id, public.ST_X(v.geom), public.ST_Y(v.geom))
+                      WHEN 'unroll' THEN (SELECT public.ST_MakePoint(u.chainage, u.arc) FROM tunnel_api.unroll(survey_id, v.geom) u)
                   END AS carried
-              FROM ST_DumpPoints(r.line) v) p
+              FROM public.ST_DumpPoints(r.line) v) p
           GROUP BY r.i) q;
     IF array_position(rings, NULL) IS NOT NULL THEN
         RETURN NULL;
     ELSIF kind = 'POLYGON' THEN
-        RETURN ST_MakePolygon(rings[1], rings[2:]);
+        RETURN public.ST_MakePolygon(rings[1], rings[2:]);
     END IF;
     RETURN rings[1];
 END

@@ -90,10 +90,10 @@ RETURNS TABLE (n int, chainage_from float8, chainage_to float8, station_from flo
                label_from text, label_to text)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 ROWS 5
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
     WITH tunnel AS (
-        SELECT t.start_chainage AS low, t.start_chainage + ST_Length(t.alignment) AS high FROM tunnel.tunnel t WHERE t.id = $1
+        SELECT t.start_chainage AS low, t.start_chainage + public.ST_Length(t.alignment) AS high FROM tunnel.tunnel t WHERE t.id = $1
     ), equation AS (
         SELECT e.chainage, e.station, e.direction FROM tunnel.station_equation e WHERE e.tunnel_id = $1
         UNION ALL
@@ -124,7 +124,7 @@ CREATE OR REPLACE FUNCTION tunnel_api.station_chainages(tunnel_id int, station t
 RETURNS SETOF float8
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 ROWS 1
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
     WITH place AS (
         SELECT p.chainage_from AS low, p.chainage_to AS high,

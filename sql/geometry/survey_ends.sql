@@ -31,7 +31,7 @@ COMMENT ON VIEW tunnel_api.km_ends IS
 CREATE OR REPLACE FUNCTION tunnel_api.survey_ends(survey_id int, OUT chainage_from float8, OUT chainage_to float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 COST 5000  -- once a survey, not once a kilometre
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$ SELECT min(k.chainage_from), max(k.chainage_to) FROM tunnel_api.km_ends k WHERE k.survey_id = $1 $$;
 COMMENT ON FUNCTION tunnel_api.survey_ends(int) IS
 'Least and greatest chainage (m) of what a survey scanned: its first and last point, within its segments. NULL before it has any.';

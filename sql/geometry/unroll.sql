@@ -4,7 +4,7 @@
 -- Two sections bound a stretch when at most one vertex spacing apart; beyond the last one it goes on for half of that.
 CREATE OR REPLACE FUNCTION tunnel_api.section_at(survey_id int, chainage float8, OUT radius float8[], OUT arc float8[])
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
 DECLARE
     reach float8;
@@ -64,13 +64,13 @@ COMMENT ON FUNCTION tunnel_api.section_node(float8[], int) IS
 CREATE OR REPLACE FUNCTION tunnel_api.unroll(
     survey_id int, point geometry, OUT chainage float8, OUT arc float8, OUT "offset" float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
 DECLARE
     max_outside constant float8 := 3.0;
-    x constant float8 := ST_X(point);
-    y constant float8 := ST_Y(point);
-    z constant float8 := ST_Z(point);
+    x constant float8 := public.ST_X(point);
+    y constant float8 := public.ST_Y(point);
+    z constant float8 := public.ST_Z(point);
     srid int;
     s tunnel.segment;
     number int;
@@ -89,12 +89,12 @@ BEGIN
     SELECT q.srid INTO srid FROM tunnel.survey v JOIN tunnel.tunnel q ON q.id = v.tunnel_id WHERE v.id = unroll.survey_id;
     IF srid IS NULL THEN
         RAISE EXCEPTION 'there is no survey %', survey_id;
-    ELSIF ST_SRID(point) NOT IN (0, srid) THEN
-        RAISE EXCEPTION 'the point has SRID %, the tunnel %: use ST_Transform(point, %)', ST_SRID(point), srid, srid;
+    ELSIF public.ST_SRID(point) NOT IN (0, srid) THEN
+        RAISE EXCEPTION 'the point has SRID %, the tunnel %: use ST_Transform(point, %)', public.ST_SRID(point), srid, srid;
     END IF;
 
     SELECT q.* INTO s FROM tunnel.segment q
-    WHERE q.survey_id = unroll.survey_id ORDER BY q.geom <-> ST_SetSRID(point, srid) LIMIT 1;
+    WHERE q.survey_id = unroll.survey_id ORDER BY q.geom OPERATOR(public.<->) public.ST_SetSRID(point, srid) LIMIT 1;
     LOOP
         IF s.n IS NULL THEN
             RETURN;
@@ -184,7 +184,7 @@ COMMENT ON FUNCTION tunnel_api.unroll(int, geometry) IS
 CREATE OR REPLACE FUNCTION tunnel_api.roll(survey_id int, chainage float8, arc float8, "offset" float8 DEFAULT 0)
 RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
 DECLARE
     s tunnel.segment;
@@ -226,7 +226,7 @@ BEGIN
     frame := tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to,
         (chainage - s.chainage_from) / (s.chainage_to - s.chainage_from));
     SELECT q.srid INTO srid FROM tunnel.survey v JOIN tunnel.tunnel q ON q.id = v.tunnel_id WHERE v.id = roll.survey_id;
-    RETURN ST_SetSRID(ST_MakePoint(
+    RETURN public.ST_SetSRID(public.ST_MakePoint(
         frame[1] + u * frame[7] + w * frame[10],
         frame[2] + u * frame[8] + w * frame[11],
         frame[3] + w * frame[12]), srid);
@@ -241,7 +241,7 @@ COMMENT ON FUNCTION tunnel_api.roll(int, float8, float8, float8) IS
 CREATE OR REPLACE FUNCTION tunnel_api.map_point(survey_id int, chainage float8, arc float8)
 RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
 DECLARE
     s tunnel.segment;
@@ -254,7 +254,7 @@ BEGIN
     END IF;
     frame := tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to,
         (chainage - s.chainage_from) / (s.chainage_to - s.chainage_from));
-    RETURN ST_SetSRID(ST_MakePoint(frame[1] + arc * frame[7], frame[2] + arc * frame[8]), ST_SRID(s.geom));
+    RETURN public.ST_SetSRID(public.ST_MakePoint(frame[1] + arc * frame[7], frame[2] + arc * frame[8]), public.ST_SRID(s.geom));
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.map_point(int, float8, float8) IS

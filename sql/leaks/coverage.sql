@@ -38,7 +38,7 @@ CREATE OR REPLACE FUNCTION tunnel_api.coverage_at(survey_id int, places float8[]
 RETURNS TABLE (n int, chainage float8, length float8, lining float8, seen float8, wet float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 100
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 SET jit = off
 SET enable_nestloop = off  -- how few or many places there are is not known when it is planned
 SET enable_mergejoin = off  -- it would sort rows with sums of a kilometre in them

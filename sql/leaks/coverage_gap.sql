@@ -10,7 +10,7 @@ CREATE OR REPLACE FUNCTION tunnel_api.coverage_gaps(
 RETURNS TABLE (chainage_from float8, chainage_to float8, state text, reason text, searched boolean, seen_share float8)
 LANGUAGE plpgsql STABLE STRICT PARALLEL RESTRICTED
 ROWS 10
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 SET jit = off
 AS $$
 #variable_conflict use_column
@@ -65,7 +65,7 @@ BEGIN
         LEFT JOIN stage d ON d.km = k.km AND d.stage = 'detect'
     ), unread AS (  -- what a file that was not read would have filled, as far as its header tells
         SELECT greatest(coalesce(i.km_from * 1000::float8, '-Infinity'), t.start_chainage) AS low,
-            least(coalesce((i.km_to + 1) * 1000::float8, 'Infinity'), t.start_chainage + ST_Length(t.alignment)) AS high,
+            least(coalesce((i.km_to + 1) * 1000::float8, 'Infinity'), t.start_chainage + public.ST_Length(t.alignment)) AS high,
             CASE WHEN i.failed_at IS NULL THEN i.name || ' waits to be read'
                  ELSE i.name || ' was not read: ' || split_part(i.message, E'\n', 1) END AS reason
         FROM tunnel.incoming i
@@ -77,7 +77,7 @@ BEGIN
         UNION ALL
         SELECT max(k.high), last_place FROM kilometre k HAVING count(*) > 0
         UNION ALL
-        SELECT greatest(first_place, t.start_chainage), least(last_place, t.start_chainage + ST_Length(t.alignment))
+        SELECT greatest(first_place, t.start_chainage), least(last_place, t.start_chainage + public.ST_Length(t.alignment))
         FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
         WHERE s.id = survey_key AND NOT EXISTS (SELECT FROM kilometre)
     ), place AS (
@@ -151,7 +151,7 @@ CREATE OR REPLACE FUNCTION tunnel_api.coverage_statement(
     survey_id int, chainage_from float8 DEFAULT '-Infinity', chainage_to float8 DEFAULT 'Infinity')
 RETURNS text
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
     SELECT string_agg(k.said, '; ' ORDER BY k.searched, k.n)
     FROM (

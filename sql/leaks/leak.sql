@@ -6,16 +6,16 @@ CREATE OR REPLACE FUNCTION tunnel_api.nearest_leaks(survey_id int, point geometr
 RETURNS TABLE (id bigint, label text, chainage_from float8, chainage_to float8, clock float8, area float8, distance float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 ROWS 5
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
     SELECT l.id, l.label, l.chainage_from, l.chainage_to, l.clock, l.area, l.distance
     FROM tunnel_api.unroll($1, $2) u
-    CROSS JOIN LATERAL (SELECT ST_MakePoint(u.chainage, u.arc) AS place) p
+    CROSS JOIN LATERAL (SELECT public.ST_MakePoint(u.chainage, u.arc) AS place) p
     CROSS JOIN LATERAL (
-        SELECT a.id, a.label, a.chainage_from, a.chainage_to, a.clock, a.area, a.unrolled <-> p.place AS distance
+        SELECT a.id, a.label, a.chainage_from, a.chainage_to, a.clock, a.area, a.unrolled OPERATOR(public.<->) p.place AS distance
         FROM tunnel_api.leak a
         WHERE a.survey_id = $1 AND a.detected AND a.review <> 'rejected'
-        ORDER BY a.unrolled <-> p.place
+        ORDER BY a.unrolled OPERATOR(public.<->) p.place
         LIMIT $3) l
     WHERE u.chainage IS NOT NULL
     ORDER BY l.distance
@@ -30,7 +30,7 @@ COMMENT ON FUNCTION tunnel_api.nearest_leaks(int, geometry, int) IS
 CREATE OR REPLACE FUNCTION tunnel_api.wet_area(survey text, chainage_from float8, chainage_to float8)
 RETURNS float8
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER
-SET search_path = pg_catalog, public, pg_temp
+SET search_path = pg_catalog, pg_temp
 AS $$
     WITH given AS MATERIALIZED (
         SELECT s.id, greatest($2, e.chainage_from) AS low, least($3, e.chainage_to) AS high,

@@ -115,7 +115,7 @@ RETURNS TABLE (
     searched_share float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 100
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 SET jit = off
 SET enable_nestloop = off  -- how few or many rows there are is not known when it is planned
 SET enable_mergejoin = off  -- it would sort rows with sums of a kilometre in them
@@ -265,7 +265,7 @@ CREATE OR REPLACE FUNCTION tunnel_api.waterproof_class(survey text, chainage_fro
 RETURNS TABLE (class int, holds boolean, breaks text[], leaks bigint[], seen_share float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 4
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 SET jit = off
 SET plan_cache_mode = force_generic_plan  -- planning takes longer than a short stretch
 AS $$

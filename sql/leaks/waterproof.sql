@@ -46,7 +46,7 @@ COMMENT ON COLUMN tunnel_api.km_waterproof.class IS 'Best class that the lining 
 -- refuse the change that brought it about. One that has no segments, or whose segments reach beyond the kilometre's ends (leaks
 -- out there are noted elsewhere), is not kept: a row of no stretch stands for it (NaN is nobody's end), in place of its notes.
 CREATE OR REPLACE FUNCTION tunnel_api.keep_waterproof(survey_id int, km int) RETURNS void
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
 #variable_conflict use_column
 DECLARE
@@ -85,7 +85,7 @@ COMMENT ON FUNCTION tunnel_api.keep_waterproof(int, int) IS
 -- At the end of a transaction, once a kilometre: the first call takes the notes of the others away. Under a stricter isolation
 -- than read committed it would make transactions fail that only look at each other's kilometres, so there nothing is kept.
 CREATE OR REPLACE FUNCTION tunnel_api.keep_at_commit() RETURNS trigger
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
 BEGIN
     IF current_setting('transaction_isolation') = 'read committed'

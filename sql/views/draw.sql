@@ -3,11 +3,11 @@
 
 -- What the audit has of a finding.
 CREATE OR REPLACE FUNCTION tunnel_api.finding_state(id bigint) RETURNS jsonb
-LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_strip_nulls(jsonb_build_object(
         'kind', coalesce(a.judged, a.kind), 'severity', a.severity, 'width', a.width, 'review', a.review, 'remark', a.remark,
         'origin', a.origin, 'parent_id', a.parent_id, 'merged_into', a.merged_into,
-        'geom', ST_AsEWKT(coalesce(a.shape, a.unrolled))))
+        'geom', public.ST_AsEWKT(coalesce(a.shape, a.unrolled))))
       FROM tunnel.anomaly a WHERE a.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_api.finding_state(bigint) IS
@@ -15,7 +15,7 @@ COMMENT ON FUNCTION tunnel_api.finding_state(bigint) IS
 
 -- What was measured of a finding, which goes with its outline.
 CREATE OR REPLACE FUNCTION tunnel_api.finding_measured(id bigint) RETURNS jsonb
-LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
         'drop_mean', a.drop_mean, 'drop_max', a.drop_max, 'image_share', a.image_share, 'contrast', a.contrast,
         'confidence', a.confidence, 'reasons', a.reasons, 'evidence', a.evidence, 'features', a.features,
@@ -30,11 +30,11 @@ COMMENT ON FUNCTION tunnel_api.finding_measured(bigint) IS
 -- person drew is the same as a detected one that covers half of it and much more: that one counts, unless it is rejected. Lines
 -- and points are none, for they have no area of their own.
 CREATE OR REPLACE FUNCTION tunnel_api.link_findings(survey_id int, place geometry) RETURNS void
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
 #variable_conflict use_column
 DECLARE
     survey_key constant int := survey_id;
-    about constant geometry := ST_Expand(place, 0.01);
+    about constant public.geometry := public.ST_Expand(place, 0.01);
     changed record;
 BEGIN
     FOR changed IN
@@ -42,18 +42,21 @@ BEGIN
         SELECT a.id, a.origin <> 'detected' AS by_person, a.review, a.same_as, a.unrolled, a.wet AND a.detected
                AND a.merged_into IS NULL AND a.shape IS NULL AS apt
           FROM tunnel.anomaly a
-         WHERE a.survey_id = survey_key AND a.unrolled && about
+         WHERE a.survey_id = survey_key AND a.unrolled OPERATOR(public.&&) about
     ), pair AS MATERIALIZED (
-        SELECT d.id AS found, h.id AS drawn, d.review, ST_Area(ST_Intersection(d.unrolled, h.unrolled)) AS shared,
-               ST_Area(d.unrolled) AS found_area, ST_Area(h.unrolled) AS drawn_area
+        SELECT d.id AS found, h.id AS drawn, d.review, public.ST_Area(public.ST_Intersection(d.unrolled, h.unrolled)) AS shared,
+               public.ST_Area(d.unrolled) AS found_area, public.ST_Area(h.unrolled) AS drawn_area
           FROM near d
-          JOIN tunnel.anomaly h ON h.survey_id = survey_key AND h.unrolled && d.unrolled AND h.origin <> 'detected' AND h.wet
+          JOIN tunnel.anomaly h ON h.survey_id = survey_key AND h.unrolled OPERATOR(public.&&) d.unrolled
+           AND h.origin <> 'detected' AND h.wet
                AND h.merged_into IS NULL AND h.shape IS NULL
          WHERE d.apt AND NOT d.by_person
          UNION
-        SELECT d.id, h.id, d.review, ST_Area(ST_Intersection(d.unrolled, h.unrolled)), ST_Area(d.unrolled), ST_Area(h.unrolled)
+        SELECT d.id, h.id, d.review, public.ST_Area(public.ST_Intersection(d.unrolled, h.unrolled)),
+               public.ST_Area(d.unrolled), public.ST_Area(h.unrolled)
           FROM near h
-          JOIN tunnel.anomaly d ON d.survey_id = survey_key AND d.unrolled && h.unrolled AND d.origin = 'detected' AND d.wet AND d.detected
+          JOIN tunnel.anomaly d ON d.survey_id = survey_key AND d.unrolled OPERATOR(public.&&) h.unrolled
+           AND d.origin = 'detected' AND d.wet AND d.detected
                AND d.merged_into IS NULL AND d.shape IS NULL
          WHERE h.apt AND h.by_person
     ), covered AS (
@@ -84,14 +87,15 @@ COMMENT ON FUNCTION tunnel_api.link_findings(int, geometry) IS
 -- Leaks that detection found lie in a dry region when half of them does, redrawn, split and merged ones too. One that waits for
 -- an operator has none. What is no longer a leak lies in none.
 CREATE OR REPLACE FUNCTION tunnel_api.mark_dry(survey_id int, place geometry) RETURNS void
-LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
     UPDATE tunnel.anomaly a SET dry_region_id = w.region
       FROM (SELECT x.id, (SELECT r.id FROM tunnel.region r
-                           WHERE x.wet AND r.survey_id = x.survey_id AND r.kind = 'dry' AND NOT r.waits AND r.geom && x.unrolled
-                             AND ST_Area(ST_Intersection(r.geom, x.unrolled)) >= 0.5 * ST_Area(x.unrolled)
+                           WHERE x.wet AND r.survey_id = x.survey_id AND r.kind = 'dry' AND NOT r.waits
+                             AND r.geom OPERATOR(public.&&) x.unrolled
+                             AND public.ST_Area(public.ST_Intersection(r.geom, x.unrolled)) >= 0.5 * public.ST_Area(x.unrolled)
                            ORDER BY r.id LIMIT 1) AS region
               FROM tunnel.anomaly x
-             WHERE x.survey_id = $1 AND x.unrolled && $2 AND NOT x.by_hand) w
+             WHERE x.survey_id = $1 AND x.unrolled OPERATOR(public.&&) $2 AND NOT x.by_hand) w
      WHERE a.id = w.id AND a.dry_region_id IS DISTINCT FROM w.region
 $$;
 COMMENT ON FUNCTION tunnel_api.mark_dry(int, geometry) IS
@@ -99,7 +103,7 @@ COMMENT ON FUNCTION tunnel_api.mark_dry(int, geometry) IS
 
 -- What follows for other findings from a change of some.
 CREATE OR REPLACE FUNCTION tunnel_api.settle_findings(survey_id int, place geometry) RETURNS void
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
 BEGIN
     PERFORM tunnel_api.link_findings(survey_id, place);
     PERFORM tunnel_api.mark_dry(survey_id, place);
@@ -128,10 +132,10 @@ COMMENT ON FUNCTION tunnel_api.pack_sums(int) IS
 
 -- Refuses a kind that there is not, is not offered any more, or is not drawn so.
 CREATE OR REPLACE FUNCTION tunnel_api.check_kind(kind text, drawn geometry) RETURNS void
-LANGUAGE plpgsql STABLE PARALLEL SAFE CALLED ON NULL INPUT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql STABLE PARALLEL SAFE CALLED ON NULL INPUT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 #variable_conflict use_variable
 DECLARE
-    way constant text := CASE ST_Dimension(drawn) WHEN 0 THEN 'point' WHEN 1 THEN 'line' WHEN 2 THEN 'polygon' END;
+    way constant text := CASE public.ST_Dimension(drawn) WHEN 0 THEN 'point' WHEN 1 THEN 'line' WHEN 2 THEN 'polygon' END;
     its tunnel.finding_kind;
 BEGIN
     SELECT k.* INTO its FROM tunnel.finding_kind k WHERE k.code = kind AND k.active;
@@ -151,28 +155,29 @@ COMMENT ON FUNCTION tunnel_api.check_kind(text, geometry) IS
 -- What was drawn in a view, in the unrolled plane: of view finding_unrolled it lies there, of finding_map on the strip beside the
 -- axis, of finding_3d in space.
 CREATE OR REPLACE FUNCTION tunnel_api.drawn_in(survey_id int, place text, geom geometry) RETURNS geometry
-LANGUAGE plpgsql STABLE PARALLEL SAFE CALLED ON NULL INPUT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql STABLE PARALLEL SAFE CALLED ON NULL INPUT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 #variable_conflict use_variable
 DECLARE
-    given constant geometry := CASE WHEN ST_NumGeometries(geom) = 1 THEN ST_GeometryN(geom, 1) ELSE geom END;
+    given constant public.geometry := CASE WHEN public.ST_NumGeometries(geom) = 1 THEN public.ST_GeometryN(geom, 1) ELSE geom END;
     srid constant int := CASE place WHEN 'unrolled' THEN 0
         ELSE (SELECT t.srid FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = survey_id) END;
-    unrolled geometry;
+    unrolled public.geometry;
 BEGIN
-    IF given IS NULL OR ST_IsEmpty(given) OR ST_NumGeometries(given) > 1 THEN
+    IF given IS NULL OR public.ST_IsEmpty(given) OR public.ST_NumGeometries(given) > 1 THEN
         RETURN given;  -- drawn_figures says so
-    ELSIF ST_SRID(given) NOT IN (srid, 0) THEN
-        RAISE EXCEPTION 'the drawing is in SRID %, the view in SRID %', ST_SRID(given), srid
+    ELSIF public.ST_SRID(given) NOT IN (srid, 0) THEN
+        RAISE EXCEPTION 'the drawing is in SRID %, the view in SRID %', public.ST_SRID(given), srid
             USING ERRCODE = 'invalid_parameter_value', HINT = 'Transform it first (ST_Transform).';
-    ELSIF place = '3d' AND ST_NDims(given) < 3 THEN
+    ELSIF place = '3d' AND public.ST_NDims(given) < 3 THEN
         RAISE EXCEPTION 'a drawing in space needs heights' USING ERRCODE = 'invalid_parameter_value';
     END IF;
     unrolled := CASE place WHEN 'unrolled' THEN given
-                           WHEN 'map' THEN tunnel_api.unmap_strip(survey_id, ST_SetSRID(given, srid))
-                           ELSE tunnel_api.unroll_shape(survey_id, ST_SetSRID(given, srid)) END;
+                           WHEN 'map' THEN tunnel_api.unmap_strip(survey_id, public.ST_SetSRID(given, srid))
+                           ELSE tunnel_api.unroll_shape(survey_id, public.ST_SetSRID(given, srid)) END;
     IF unrolled IS NULL THEN
         RAISE EXCEPTION 'the drawing reaches beyond the lining: it lies between % and %',
-            ST_AsText(ST_MakePoint(ST_XMin(given), ST_YMin(given)), 1), ST_AsText(ST_MakePoint(ST_XMax(given), ST_YMax(given)), 1)
+            public.ST_AsText(public.ST_MakePoint(public.ST_XMin(given), public.ST_YMin(given)), 1),
+            public.ST_AsText(public.ST_MakePoint(public.ST_XMax(given), public.ST_YMax(given)), 1)
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     RETURN unrolled;
@@ -184,7 +189,7 @@ COMMENT ON FUNCTION tunnel_api.drawn_in(int, text, geometry) IS
 -- Gives a finding an outline of a person's: all that follows is worked out, what was measured of the old one goes until the next
 -- detection measures the new one.
 CREATE OR REPLACE FUNCTION tunnel_api.redraw(id bigint, drawn geometry, width float8, origin text) RETURNS void
-LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
     UPDATE tunnel.anomaly a
        SET km = f.km, chainage_from = f.chainage_from, chainage_to = f.chainage_to, arc_from = f.arc_from, arc_to = f.arc_to,
            clock = f.clock, area = f.area, length = f.length, width = $3, unrolled = f.unrolled, map = f.map, surface = f.surface,
@@ -203,7 +208,7 @@ COMMENT ON FUNCTION tunnel_api.redraw(bigint, geometry, float8, text) IS
 CREATE OR REPLACE FUNCTION tunnel_api.add_finding(
     survey_id int, kind text, drawn geometry, width float8, severity int, review text, remark text, origin text, by_hand boolean,
     parent_id bigint, id bigint DEFAULT NULL) RETURNS bigint
-LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
     INSERT INTO tunnel.anomaly (id, survey_id, kind, width, severity, review, reviewed_by, reviewed_at, remark, origin, by_hand,
         parent_id, drawn_by, drawn_at, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, length, unrolled, map,
         surface, shape, shape_map, shape_surface, created_at) OVERRIDING SYSTEM VALUE
@@ -219,7 +224,7 @@ COMMENT ON FUNCTION tunnel_api.add_finding(int, text, geometry, float8, int, tex
 
 -- After the surface has changed: outlines in the unrolled plane stay. One that now reaches beyond the lining stays as it was.
 CREATE OR REPLACE FUNCTION tunnel_api.renew_findings(survey_id int, km int) RETURNS void
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
 #variable_conflict use_column
 DECLARE
     survey_key constant int := survey_id;
@@ -233,7 +238,7 @@ BEGIN
                SET clock = f.clock, area = f.area, length = f.length, map = f.map, surface = f.surface, shape_map = f.shape_map,
                    shape_surface = f.shape_surface
               FROM tunnel_api.drawn_figures(survey_key, coalesce(was.shape, was.unrolled), was.width) f
-             WHERE a.id = was.id AND NOT (f.surface = was.surface AND f.map = was.map);
+             WHERE a.id = was.id AND NOT (f.surface OPERATOR(public.=) was.surface AND f.map OPERATOR(public.=) was.map);
         EXCEPTION WHEN invalid_parameter_value THEN
             NULL;
         END;
@@ -253,7 +258,7 @@ COMMENT ON FUNCTION tunnel_api.lock_findings(int) IS
     'Keeps detection from writing the findings of a survey, or waits for it, until the transaction ends';
 
 CREATE OR REPLACE FUNCTION tunnel_api.draw_finding() RETURNS trigger
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     place CONSTANT text := TG_ARGV[0];
     editable CONSTANT text[] := ARRAY['kind', 'severity', 'width', 'review', 'remark'];
@@ -265,8 +270,8 @@ DECLARE
     old_row jsonb;
     new_row jsonb;
     was_row jsonb;
-    drawn geometry;
-    shape_before geometry;
+    drawn public.geometry;
+    shape_before public.geometry;
     redrawn boolean;
     kept jsonb;
     step bigint;
@@ -323,8 +328,8 @@ BEGIN
                                       'review', was.review, 'remark', was.remark);
         shape_before := CASE place WHEN 'unrolled' THEN coalesce(was.shape, was.unrolled) WHEN 'map' THEN coalesce(was.shape_map, was.map)
                                    ELSE coalesce(was.shape_surface, was.surface) END;
-        redrawn := ST_AsEWKB(NEW.geom) IS DISTINCT FROM ST_AsEWKB(OLD.geom)
-            AND ST_AsEWKB(NEW.geom) IS DISTINCT FROM ST_AsEWKB(shape_before);
+        redrawn := public.ST_AsEWKB(NEW.geom) IS DISTINCT FROM public.ST_AsEWKB(OLD.geom)
+            AND public.ST_AsEWKB(NEW.geom) IS DISTINCT FROM public.ST_AsEWKB(shape_before);
         FOREACH key IN ARRAY editable LOOP
             IF new_row -> key = old_row -> key THEN
                 new_row := jsonb_set(new_row, ARRAY[key], was_row -> key);
@@ -333,7 +338,7 @@ BEGIN
                     USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
             END IF;
         END LOOP;
-        IF redrawn AND ST_AsEWKB(shape_before) IS DISTINCT FROM ST_AsEWKB(OLD.geom) THEN
+        IF redrawn AND public.ST_AsEWKB(shape_before) IS DISTINCT FROM public.ST_AsEWKB(OLD.geom) THEN
             RAISE EXCEPTION 'finding % was redrawn meanwhile', was.id
                 USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
         END IF;
@@ -376,7 +381,7 @@ BEGIN
     SELECT a.* INTO is_now FROM tunnel.anomaly a WHERE a.id = NEW.id;
     PERFORM tunnel_api.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = is_now.survey_id), 'anomaly', is_now.id,
                                  before, tunnel_api.finding_state(is_now.id), kept => kept);
-    PERFORM tunnel_api.settle_findings(is_now.survey_id, ST_Collect(was.unrolled, is_now.unrolled));
+    PERFORM tunnel_api.settle_findings(is_now.survey_id, public.ST_Collect(was.unrolled, is_now.unrolled));
     RETURN NEW;
 END
 $$;
@@ -412,7 +417,7 @@ $$;
 
 -- Splits a polygon or a line along a line of the unrolled plane or, in the tunnel's SRID, of the map strip.
 CREATE OR REPLACE FUNCTION tunnel_api.finding_split(id bigint, line geometry) RETURNS bigint[]
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 #variable_conflict use_column
 DECLARE
     finding constant bigint := id;
@@ -421,9 +426,9 @@ DECLARE
     before jsonb;
     name text;
     survey_key int;
-    blade geometry;
-    parts geometry[];
-    part geometry;
+    blade public.geometry;
+    parts public.geometry[];
+    part public.geometry;
     ids bigint[];
     kept jsonb;
     step bigint;
@@ -438,12 +443,12 @@ BEGIN
     IF was.id IS NULL OR was.merged_into IS NOT NULL THEN
         RAISE EXCEPTION 'finding % is %', finding, coalesce('merged into ' || was.merged_into || ', which stands for it', 'gone')
             USING ERRCODE = 'feature_not_supported';
-    ELSIF GeometryType(line) <> 'LINESTRING' OR GeometryType(was.shape) = 'POINT' THEN
+    ELSIF public.GeometryType(line) <> 'LINESTRING' OR public.GeometryType(was.shape) = 'POINT' THEN
         RAISE EXCEPTION 'a polygon or a line is split, by one line' USING ERRCODE = 'invalid_parameter_value';
     END IF;
-    blade := ST_Force2D(tunnel_api.drawn_in(survey_key, CASE ST_SRID(line) WHEN 0 THEN 'unrolled' ELSE 'map' END, line));
-    SELECT array_agg(d.geom ORDER BY ST_Area(d.geom) DESC, ST_Length(d.geom) DESC, d.path) INTO parts
-      FROM ST_Dump(ST_Split(coalesce(was.shape, was.unrolled), blade)) d;
+    blade := public.ST_Force2D(tunnel_api.drawn_in(survey_key, CASE public.ST_SRID(line) WHEN 0 THEN 'unrolled' ELSE 'map' END, line));
+    SELECT array_agg(d.geom ORDER BY public.ST_Area(d.geom) DESC, public.ST_Length(d.geom) DESC, d.path) INTO parts
+      FROM public.ST_Dump(public.ST_Split(coalesce(was.shape, was.unrolled), blade)) d;
     IF coalesce(cardinality(parts), 0) < 2 THEN
         RAISE EXCEPTION 'the line does not split finding %: it must cross it from side to side', finding
             USING ERRCODE = 'invalid_parameter_value';
@@ -469,7 +474,7 @@ COMMENT ON FUNCTION tunnel_api.finding_split(bigint, geometry) IS
 
 -- What lies apart by less than a metre is joined by a strip of a centimetre.
 CREATE OR REPLACE FUNCTION tunnel_api.finding_merge(ids bigint[]) RETURNS bigint
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 #variable_conflict use_column
 DECLARE
     wanted constant bigint[] := ARRAY(SELECT DISTINCT i FROM unnest(ids) i ORDER BY i);
@@ -479,10 +484,10 @@ DECLARE
     oldest tunnel.anomaly;
     was tunnel.anomaly;
     before jsonb;
-    whole geometry;
-    a_part geometry;
-    rest geometry;
-    place geometry;
+    whole public.geometry;
+    a_part public.geometry;
+    rest public.geometry;
+    place public.geometry;
     kept jsonb;
     step bigint;
 BEGIN
@@ -501,8 +506,8 @@ BEGIN
     SELECT a.* INTO was FROM tunnel.anomaly a
      WHERE a.id = ANY (wanted) AND (a.merged_into IS NOT NULL OR a.review = 'rejected'
            OR coalesce(a.judged, a.kind) <> coalesce(oldest.judged, oldest.kind)
-           OR ST_Dimension(coalesce(a.shape, a.unrolled)) <> ST_Dimension(coalesce(oldest.shape, oldest.unrolled))
-           OR GeometryType(a.shape) = 'POINT')
+           OR public.ST_Dimension(coalesce(a.shape, a.unrolled)) <> public.ST_Dimension(coalesce(oldest.shape, oldest.unrolled))
+           OR public.GeometryType(a.shape) = 'POINT')
      ORDER BY a.id LIMIT 1;
     IF FOUND THEN
         RAISE EXCEPTION 'finding % cannot be merged: %', was.id,
@@ -513,23 +518,23 @@ BEGIN
                  ELSE 'polygons are merged with polygons, lines with lines, and points not' END
             USING ERRCODE = 'feature_not_supported';
     END IF;
-    SELECT ST_Union(coalesce(a.shape, a.unrolled)), ST_Collect(a.unrolled) INTO whole, place
+    SELECT public.ST_Union(coalesce(a.shape, a.unrolled)), public.ST_Collect(a.unrolled) INTO whole, place
       FROM tunnel.anomaly a WHERE a.id = ANY (wanted);
-    WHILE ST_NumGeometries(whole) > 1 LOOP
-        IF ST_Dimension(whole) = 1 THEN
-            whole := ST_LineMerge(whole);
-            EXIT WHEN ST_NumGeometries(whole) = 1;
+    WHILE public.ST_NumGeometries(whole) > 1 LOOP
+        IF public.ST_Dimension(whole) = 1 THEN
+            whole := public.ST_LineMerge(whole);
+            EXIT WHEN public.ST_NumGeometries(whole) = 1;
         END IF;
-        a_part := ST_GeometryN(whole, 1);
-        rest := (SELECT ST_Collect(d.geom) FROM ST_Dump(whole) d WHERE d.path[1] > 1);
-        IF ST_Distance(a_part, rest) > gap OR (ST_Dimension(whole) = 1 AND ST_Distance(a_part, rest) = 0) THEN
+        a_part := public.ST_GeometryN(whole, 1);
+        rest := (SELECT public.ST_Collect(d.geom) FROM public.ST_Dump(whole) d WHERE d.path[1] > 1);
+        IF public.ST_Distance(a_part, rest) > gap OR (public.ST_Dimension(whole) = 1 AND public.ST_Distance(a_part, rest) = 0) THEN
             RAISE EXCEPTION 'findings % do not make one: %', array_to_string(wanted, ', '),
-                CASE WHEN ST_Distance(a_part, rest) = 0 THEN 'the lines cross or branch'
-                     ELSE format('they lie %s m apart, more than %s m', round(ST_Distance(a_part, rest)::numeric, 2), gap) END
+                CASE WHEN public.ST_Distance(a_part, rest) = 0 THEN 'the lines cross or branch'
+                     ELSE format('they lie %s m apart, more than %s m', round(public.ST_Distance(a_part, rest)::numeric, 2), gap) END
                 USING ERRCODE = 'invalid_parameter_value';
         END IF;
-        whole := ST_Union(whole, CASE ST_Dimension(whole) WHEN 1 THEN ST_ShortestLine(a_part, rest)
-                                      ELSE ST_Buffer(ST_ShortestLine(a_part, rest), 0.005) END);
+        whole := public.ST_Union(whole, CASE public.ST_Dimension(whole) WHEN 1 THEN public.ST_ShortestLine(a_part, rest)
+                                      ELSE public.ST_Buffer(public.ST_ShortestLine(a_part, rest), 0.005) END);
     END LOOP;
     before := tunnel_api.finding_state(oldest.id);
     kept := tunnel_api.finding_measured(oldest.id);
@@ -557,7 +562,7 @@ COMMENT ON FUNCTION tunnel_api.finding_merge(bigint[]) IS
 
 -- Adds, changes or deletes a photo of a finding: a path or URL, and what it shows.
 CREATE OR REPLACE FUNCTION tunnel_api.edit_photo() RETURNS trigger
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     name text;
 BEGIN

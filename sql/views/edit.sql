@@ -6,7 +6,7 @@
 
 -- Moves an axis vertex. Frame and unit: the tunnel's SRID, m.
 CREATE OR REPLACE FUNCTION tunnel_api.edit_axis_vertex() RETURNS trigger
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     was tunnel.axis_vertex;
 BEGIN
@@ -17,32 +17,32 @@ BEGIN
         RAISE EXCEPTION 'of an axis vertex only the position (geom) can be edited'
             USING ERRCODE = 'feature_not_supported';
     END IF;
-    IF NEW.geom IS NULL OR ST_IsEmpty(NEW.geom) THEN
+    IF NEW.geom IS NULL OR public.ST_IsEmpty(NEW.geom) THEN
         RAISE EXCEPTION 'axis vertex % at chainage % cannot be without a position', OLD.n, OLD.label
             USING ERRCODE = 'null_value_not_allowed';
     END IF;
-    IF ST_SRID(NEW.geom) <> ST_SRID(OLD.geom) THEN
+    IF public.ST_SRID(NEW.geom) <> public.ST_SRID(OLD.geom) THEN
         RAISE EXCEPTION 'axis vertex % is in SRID %, its new position in SRID %',
-            OLD.n, ST_SRID(OLD.geom), ST_SRID(NEW.geom)
+            OLD.n, public.ST_SRID(OLD.geom), public.ST_SRID(NEW.geom)
             USING ERRCODE = 'invalid_parameter_value', HINT = 'Transform the position first (ST_Transform).';
     END IF;
-    IF ST_X(NEW.geom) IN ('NaN', 'Infinity', '-Infinity') OR ST_Y(NEW.geom) IN ('NaN', 'Infinity', '-Infinity')
-       OR coalesce(ST_Z(NEW.geom), 'NaN') IN ('NaN', 'Infinity', '-Infinity') THEN
+    IF public.ST_X(NEW.geom) IN ('NaN', 'Infinity', '-Infinity') OR public.ST_Y(NEW.geom) IN ('NaN', 'Infinity', '-Infinity')
+       OR coalesce(public.ST_Z(NEW.geom), 'NaN') IN ('NaN', 'Infinity', '-Infinity') THEN
         RAISE EXCEPTION 'the new position of axis vertex % needs three finite coordinates, got %',
-            OLD.n, ST_AsText(NEW.geom)
+            OLD.n, public.ST_AsText(NEW.geom)
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
-    IF NEW.geom = OLD.geom THEN
+    IF NEW.geom OPERATOR(public.=) OLD.geom THEN
         RETURN NEW;
     END IF;
     SELECT v.* INTO was FROM tunnel.axis_vertex v WHERE v.id = OLD.id FOR UPDATE;
     IF NOT FOUND THEN
         RETURN NULL;  -- gone meanwhile
     END IF;
-    IF was.geom = NEW.geom THEN
+    IF was.geom OPERATOR(public.=) NEW.geom THEN
         RETURN NEW;
     END IF;
-    IF NOT was.geom = OLD.geom THEN
+    IF NOT was.geom OPERATOR(public.=) OLD.geom THEN
         RAISE EXCEPTION 'axis vertex % at chainage % was moved meanwhile', OLD.n, OLD.label
             USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
     END IF;
@@ -54,8 +54,8 @@ BEGIN
        SET geom = NEW.geom, source = NEW.source, edited_by = NEW.edited_by, edited_at = NEW.edited_at, remark = NEW.remark
      WHERE id = OLD.id;
     PERFORM tunnel_api.note_edit(OLD.survey, 'axis_vertex', OLD.id,
-                                 jsonb_build_object('geom', ST_AsEWKT(was.geom), 'source', was.source),
-                                 jsonb_build_object('geom', ST_AsEWKT(NEW.geom), 'source', NEW.source));
+                                 jsonb_build_object('geom', public.ST_AsEWKT(was.geom), 'source', was.source),
+                                 jsonb_build_object('geom', public.ST_AsEWKT(NEW.geom), 'source', NEW.source));
     RETURN NEW;
 END
 $$;
@@ -69,7 +69,7 @@ CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.axis_vertex
 -- was found is noted as judged; the one that was found takes that back. Geometries, whose columns differ between the views, are
 -- never written back.
 CREATE OR REPLACE FUNCTION tunnel_api.review_finding() RETURNS trigger
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     kinds CONSTANT text[] := TG_ARGV[2:];
     judging CONSTANT boolean := cardinality(kinds) > 0;
@@ -160,7 +160,7 @@ $$;
 -- What is drawn, redrawn and deleted in a layer of leaks or of what is dark but dry is a finding: TG_ARGV is the place, see
 -- draw_finding, and the kind of one that says none. Runs before the review of the same update.
 CREATE OR REPLACE FUNCTION tunnel_api.draw_anomaly() RETURNS trigger
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     view CONSTANT text := 'finding_' || TG_ARGV[0];
     done bigint;
@@ -174,7 +174,7 @@ BEGIN
         EXECUTE format('DELETE FROM tunnel_api.%I WHERE id = $1', view) USING OLD.id;
         GET DIAGNOSTICS done = ROW_COUNT;
         RETURN CASE done WHEN 0 THEN NULL ELSE OLD END;
-    ELSIF ST_AsEWKB(NEW.geom) IS DISTINCT FROM ST_AsEWKB(OLD.geom) THEN
+    ELSIF public.ST_AsEWKB(NEW.geom) IS DISTINCT FROM public.ST_AsEWKB(OLD.geom) THEN
         EXECUTE format('UPDATE tunnel_api.%I SET geom = $1 WHERE id = $2', view) USING NEW.geom, OLD.id;
     END IF;
     RETURN NEW;
@@ -198,9 +198,9 @@ $$;
 
 -- What the audit has of a region.
 CREATE OR REPLACE FUNCTION tunnel_api.region_state(id int) RETURNS jsonb
-LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_strip_nulls(jsonb_build_object('kind', r.kind, 'reason', r.reason, 'waits', nullif(r.waits, false),
-        'approved_by', r.approved_by, 'geom', ST_AsEWKT(r.geom)))
+        'approved_by', r.approved_by, 'geom', public.ST_AsEWKT(r.geom)))
       FROM tunnel.region r WHERE r.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_api.region_state(int) IS
@@ -209,7 +209,7 @@ COMMENT ON FUNCTION tunnel_api.region_state(int) IS
 -- Adds, changes or deletes a region drawn by hand in the unrolled plane (m). A new one names its survey by survey_id or,
 -- without that, by name.
 CREATE OR REPLACE FUNCTION tunnel_api.edit_region() RETURNS trigger
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     was tunnel.region;
     before jsonb;
@@ -227,8 +227,8 @@ BEGIN
         PERFORM tunnel_api.mark_dry(was.survey_id, was.geom);
         RETURN OLD;
     END IF;
-    IF NOT coalesce(ST_IsValid(NEW.geom), false) THEN
-        RAISE EXCEPTION 'a region must be a valid polygon: %', coalesce(ST_IsValidReason(NEW.geom), 'it is empty')
+    IF NOT coalesce(public.ST_IsValid(NEW.geom), false) THEN
+        RAISE EXCEPTION 'a region must be a valid polygon: %', coalesce(public.ST_IsValidReason(NEW.geom), 'it is empty')
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     IF TG_OP = 'UPDATE' THEN
@@ -237,7 +237,7 @@ BEGIN
             RAISE EXCEPTION 'of a region only the kind, the reason and the outline (geom) can be edited'
                 USING ERRCODE = 'feature_not_supported';
         END IF;
-        IF (NEW.kind, NEW.reason) IS NOT DISTINCT FROM (OLD.kind, OLD.reason) AND NEW.geom = OLD.geom THEN
+        IF (NEW.kind, NEW.reason) IS NOT DISTINCT FROM (OLD.kind, OLD.reason) AND NEW.geom OPERATOR(public.=) OLD.geom THEN
             RETURN NEW;
         END IF;
         SELECT r.* INTO was FROM tunnel.region r WHERE r.id = OLD.id FOR UPDATE;
@@ -246,12 +246,12 @@ BEGIN
         END IF;
         before := tunnel_api.region_state(was.id);
         NEW.kind := CASE WHEN NEW.kind = OLD.kind THEN was.kind ELSE NEW.kind END;
-        NEW.geom := CASE WHEN NEW.geom = OLD.geom THEN was.geom ELSE NEW.geom END;
+        NEW.geom := CASE WHEN NEW.geom OPERATOR(public.=) OLD.geom THEN was.geom ELSE NEW.geom END;
         NEW.reason := CASE WHEN NEW.reason IS NOT DISTINCT FROM OLD.reason THEN was.reason ELSE NEW.reason END;
-        IF (NEW.kind, NEW.reason) IS NOT DISTINCT FROM (was.kind, was.reason) AND NEW.geom = was.geom THEN
+        IF (NEW.kind, NEW.reason) IS NOT DISTINCT FROM (was.kind, was.reason) AND NEW.geom OPERATOR(public.=) was.geom THEN
             RETURN NEW;
         END IF;
-        IF was.kind NOT IN (OLD.kind, NEW.kind) OR NOT (was.geom = OLD.geom OR was.geom = NEW.geom)
+        IF was.kind NOT IN (OLD.kind, NEW.kind) OR NOT (was.geom OPERATOR(public.=) OLD.geom OR was.geom OPERATOR(public.=) NEW.geom)
            OR (was.reason IS DISTINCT FROM OLD.reason AND was.reason IS DISTINCT FROM NEW.reason) THEN
             RAISE EXCEPTION 'region % was changed meanwhile', OLD.id
                 USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
@@ -269,11 +269,11 @@ BEGIN
     END IF;
     SELECT t.dry_region_limit INTO most
       FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = NEW.survey_id;
-    IF NEW.kind = 'dry' AND ST_Area(NEW.geom) > most AND coalesce(trim(NEW.reason), '') = '' THEN
+    IF NEW.kind = 'dry' AND public.ST_Area(NEW.geom) > most AND coalesce(trim(NEW.reason), '') = '' THEN
         RAISE EXCEPTION 'a dry region of % m² is larger than % m²: its reason must say why',
-            round(ST_Area(NEW.geom)::numeric, 1), most USING ERRCODE = 'check_violation';
+            round(public.ST_Area(NEW.geom)::numeric, 1), most USING ERRCODE = 'check_violation';
     END IF;
-    IF was.id IS NULL OR NOT NEW.geom = was.geom THEN
+    IF was.id IS NULL OR NOT NEW.geom OPERATOR(public.=) was.geom THEN
         NEW.drawn_by := session_user;
         NEW.drawn_at := clock_timestamp();
     ELSE
@@ -281,8 +281,8 @@ BEGIN
         NEW.drawn_at := was.drawn_at;
     END IF;
     -- what an operator put in force is the region for the reason that it had
-    IF was.id IS NULL OR NEW.kind <> was.kind OR NOT NEW.geom = was.geom OR NEW.reason IS DISTINCT FROM was.reason THEN
-        NEW.waits := NEW.kind = 'dry' AND ST_Area(NEW.geom) > most;
+    IF was.id IS NULL OR NEW.kind <> was.kind OR NOT NEW.geom OPERATOR(public.=) was.geom OR NEW.reason IS DISTINCT FROM was.reason THEN
+        NEW.waits := NEW.kind = 'dry' AND public.ST_Area(NEW.geom) > most;
         NEW.approved_by := NULL;
         NEW.approved_at := NULL;
     ELSE
@@ -301,7 +301,7 @@ BEGIN
          WHERE r.id = OLD.id;
     END IF;
     PERFORM tunnel_api.note_edit(NEW.survey, 'region', NEW.id, before, tunnel_api.region_state(NEW.id));
-    PERFORM tunnel_api.mark_dry(NEW.survey_id, ST_Collect(was.geom, NEW.geom));
+    PERFORM tunnel_api.mark_dry(NEW.survey_id, public.ST_Collect(was.geom, NEW.geom));
     RETURN NEW;
 END
 $$;
@@ -312,7 +312,7 @@ CREATE OR REPLACE TRIGGER edit INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_a
 
 -- A dry region larger than the tunnel's limit takes nothing away until an operator has looked at it.
 CREATE OR REPLACE FUNCTION tunnel_api.dry_region_approve(region_id int) RETURNS int
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     was tunnel.region;
     before constant jsonb := tunnel_api.region_state(region_id);

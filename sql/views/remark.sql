@@ -66,7 +66,7 @@ CREATE OR REPLACE FUNCTION tunnel_api.remarks(
 RETURNS TABLE (file text, stage text, kilometres int[], remark text, said text)
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
 ROWS 5
-SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
     WITH here AS (
         SELECT r.file, r.stage, r.km, r.remark

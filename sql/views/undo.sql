@@ -14,7 +14,7 @@ COMMENT ON FUNCTION tunnel_api.last_step(bigint) IS
 
 -- Refuses to take a step back that is not the caller's, or that something later rests on.
 CREATE OR REPLACE FUNCTION tunnel_api.check_undo(finding_id bigint, step tunnel_audit.entry) RETURNS void
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     is_now constant jsonb := tunnel_api.finding_state(finding_id);
     part tunnel_audit.entry;
@@ -82,7 +82,7 @@ COMMENT ON FUNCTION tunnel_api.stamp_finding(bigint, tunnel_audit.entry) IS
 
 -- Gives a finding the columns that it had before a step.
 CREATE OR REPLACE FUNCTION tunnel_api.restore_finding(finding_id bigint, step tunnel_audit.entry) RETURNS void
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     changed constant jsonb := step.after || coalesce(step.before, '{}');
     becomes jsonb := tunnel_api.finding_state(finding_id) - ARRAY(SELECT jsonb_object_keys(changed)) || coalesce(step.before, '{}');
@@ -94,7 +94,7 @@ BEGIN
             SELECT FROM tunnel.anomaly x WHERE x.same_as = finding_id AND x.origin = 'detected' AND x.created_at > step.at) THEN
             becomes := becomes || '{"origin": "redrawn"}';
         END IF;
-        PERFORM tunnel_api.redraw(finding_id, ST_GeomFromEWKT(becomes ->> 'geom'), (becomes ->> 'width')::float8, becomes ->> 'origin');
+        PERFORM tunnel_api.redraw(finding_id, public.ST_GeomFromEWKT(becomes ->> 'geom'), (becomes ->> 'width')::float8, becomes ->> 'origin');
         UPDATE tunnel.anomaly a
            SET drop_mean = k.drop_mean, drop_max = k.drop_max, image_share = k.image_share, contrast = k.contrast,
                confidence = k.confidence, reasons = k.reasons, evidence = k.evidence, features = k.features,
@@ -116,12 +116,12 @@ COMMENT ON FUNCTION tunnel_api.restore_finding(bigint, tunnel_audit.entry) IS
 
 -- Brings a finding back that was deleted, with its photos.
 CREATE OR REPLACE FUNCTION tunnel_api.revive_finding(survey_id int, step tunnel_audit.entry) RETURNS void
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     had constant jsonb := step.before;
 BEGIN
     PERFORM tunnel_api.add_finding(
-        survey_id, had ->> 'kind', ST_GeomFromEWKT(had ->> 'geom'), (had ->> 'width')::float8, (had ->> 'severity')::int,
+        survey_id, had ->> 'kind', public.ST_GeomFromEWKT(had ->> 'geom'), (had ->> 'width')::float8, (had ->> 'severity')::int,
         had ->> 'review', had ->> 'remark', had ->> 'origin', true,
         (SELECT a.id FROM tunnel.anomaly a WHERE a.id = (had ->> 'parent_id')::bigint), step.row_id);
     UPDATE tunnel.anomaly a SET drop_mean = k.drop_mean, drop_max = k.drop_max, image_share = k.image_share, contrast = k.contrast
@@ -137,7 +137,7 @@ COMMENT ON FUNCTION tunnel_api.revive_finding(int, tunnel_audit.entry) IS
     'Brings a deleted finding back under its number, with its photos; for finding_undo alone';
 
 CREATE OR REPLACE FUNCTION tunnel_api.finding_undo(id bigint) RETURNS text
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, public, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 #variable_conflict use_column
 DECLARE
     finding constant bigint := id;
@@ -145,7 +145,7 @@ DECLARE
     part tunnel_audit.entry;
     survey_key int;
     before jsonb;
-    place geometry;
+    place public.geometry;
     done bigint;
 BEGIN
     -- not one that was added later under the same name
@@ -186,7 +186,7 @@ BEGIN
         PERFORM tunnel_api.note_edit(step.survey, 'anomaly', part.row_id, before, tunnel_api.finding_state(part.row_id),
                                      undoes => part.id, part_of => done);
     END LOOP;
-    place := ST_Collect(place, (SELECT a.unrolled FROM tunnel.anomaly a WHERE a.id = finding));
+    place := public.ST_Collect(place, (SELECT a.unrolled FROM tunnel.anomaly a WHERE a.id = finding));
     PERFORM tunnel_api.settle_findings(survey_key, place);
     RETURN CASE WHEN step.action = 'insert' THEN 'drawn' WHEN step.action = 'delete' THEN 'deleted'
                 WHEN step.after ? 'merged' THEN 'merged'

@@ -277,6 +277,19 @@ def test_security_definers_fix_their_search_path(conn: psycopg.Connection) -> No
     )
 
 
+def test_functions_name_postgis_by_its_schema(conn: psycopg.Connection) -> None:
+    """So that they run under a search path that holds nothing which others may write."""
+    assert (
+        conn.execute(
+            "SELECT p.oid::regprocedure::text, m[1]"
+            "  FROM pg_proc p, regexp_matches(p.prosrc, '(?<![.[:alnum:]_])(st_\\w+)\\(', 'gi') m"
+            " WHERE p.pronamespace = 'tunnel_api'::regnamespace AND m[1] NOT IN ('ST_Transform', 'ST_Dump')"  # in hints
+        ).fetchall()
+        == []
+    )
+    assert conn.execute("SELECT FROM pg_proc, unnest(proconfig) c WHERE c LIKE 'search_path=%public%'").fetchall() == []
+
+
 def test_roles_need_a_superuser_where_the_owner_may_not_make_them(server_dsn: str) -> None:
     """An owner without CREATEROLE can install; what is missing is said as a warning."""
     with psycopg.connect(server_dsn, autocommit=True) as connection:

@@ -8,6 +8,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -17,9 +18,7 @@ from tunneldb.store.survey import get_survey
 @verb(examples=["tunneldb axis ringo-2024", "tunneldb axis ringo-2024 --from 511+700 -o axis.svg"])
 @click.argument("survey")
 @stretch_options
-@click.option(
-    "-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write: .png, .pdf, .svg, or .csv."
-)
+@click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write: .png, .pdf, .svg, or .csv.")
 @click.pass_obj
 def axis(settings: Settings, survey: str, start: str | None, end: str | None, output: Path | None) -> None:
     """Show how far the axis of SURVEY lies from the axis given.

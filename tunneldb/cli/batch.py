@@ -15,6 +15,7 @@ from rich.console import Console
 from tunneldb.cli.load import density_of, say_notes
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb, wants_json
+from tunneldb.cli.param_types import FilePath
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.pipeline.parameters import PARAMETERS, settings
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     wrong="something failed; of --preview: the disk is too small",
 )
 @click.argument("survey")
-@click.argument("files", nargs=-1, type=click.Path(path_type=Path), metavar="[FILES...]")
+@click.argument("files", nargs=-1, type=FilePath(), metavar="[FILES...]")
 @click.option("--workers", type=click.IntRange(1, 1000), metavar="N", help="Worker processes to start; one a core by default.")
 @click.option("--km", metavar="A[-B]", help="Only these kilometres, 511 or 511-512.")
 @click.option(

@@ -10,6 +10,7 @@ import psycopg
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.profile import layer_option
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
@@ -37,15 +38,15 @@ _FILES = (".csv", ".tif", ".dxf")
 @layer_option
 @stretch_options
 @click.option(
-    "--every", type=click.FloatRange(1.0), default=100.0, show_default="100; of a .dxf 10", metavar="M",
+    "--every", type=FiniteRange(1.0), default=100.0, show_default="100; of a .dxf 10", metavar="M",
     help="Length of the stretches that are listed; distance of the sections of a .dxf, m.",
 )  # fmt: skip
 @click.option(
-    "--axis-sigma", type=click.FloatRange(0.0, 1.0), metavar="M",
+    "--axis-sigma", type=FiniteRange(0.0, 1.0), metavar="M",
     help="What the axis and the scan's place are good for, standard deviation, m: goes into the errors of volumes.",
 )  # fmt: skip
 @click.option(
-    "-o", "--output", type=click.Path(dir_okay=False, path_type=Path),
+    "-o", "--output", type=FilePath(dir_okay=False),
     help="File to write: .csv of sections, .dxf of sections with the design, .tif of each pixel, one a kilometre.",
 )  # fmt: skip
 @click.pass_obj

@@ -9,6 +9,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -36,7 +37,7 @@ MIN_LEAK, MIN_SPOT = 0.1, 0.01  # m²
     ]
 )
 @click.argument("survey")
-@click.argument("truth", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("truth", type=FilePath(dir_okay=False))
 @click.option(
     "--layer", metavar="NAME", help="Layer of the file that holds the true ones [the only one, or leak; of spots spot]."
 )
@@ -44,13 +45,11 @@ MIN_LEAK, MIN_SPOT = 0.1, 0.01  # m²
 @click.option("--spots", is_flag=True, help="Spots of structures, not leaks; always so of a site.")
 @click.option(
     "--min-area",
-    type=click.FloatRange(min=0),
+    type=FiniteRange(min=0),
     metavar="M2",
     help=f"Smaller true ones are neither demanded nor do they harm, m² [{MIN_LEAK}; of spots {MIN_SPOT}].",
 )
-@click.option(
-    "-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write: .json (all) or .csv (figures)."
-)
+@click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write: .json (all) or .csv (figures).")
 @click.pass_obj
 def evaluate(
     settings: Settings,

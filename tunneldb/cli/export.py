@@ -12,6 +12,7 @@ import psycopg
 from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.cli.tables import print_classes
@@ -38,7 +39,7 @@ _PLAIN = (".gpkg", ".dxf")
     "-o",
     "--output",
     required=True,
-    type=click.Path(path_type=Path),
+    type=FilePath(),
     help="File to write, .gpkg or .dxf; with --classified a folder, made if it isn't there.",
 )
 @stretch_options

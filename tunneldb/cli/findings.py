@@ -12,6 +12,7 @@ import psycopg
 from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
+from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
@@ -65,7 +66,7 @@ def findings() -> None:
     help="Only in this state, or all; as often as needed. Default: open and confirmed, which count.",
 )  # fmt: skip
 @click.option("--min-severity", type=click.IntRange(1, 4), help="Only of at least this severity.")
-@click.option("--min-area", type=click.FloatRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
+@click.option("--min-area", type=FiniteRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
 @stretch_options
 @click.option("--clock", metavar="A-B", help="Only those between these hours, clockwise; 12 is the crown: 10-2 or 10:30-1:30.")
 @click.option(
@@ -78,7 +79,7 @@ def findings() -> None:
     type=click.Choice(["table", "csv", "geojson", "gpkg", "xlsx"]),
     help="Default: by the ending of -o, else a table.",
 )
-@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write.")
+@click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write.")
 @click.option("--count", is_flag=True, help="How many there are of each kind and origin instead, and what became of them.")
 @click.pass_obj
 def list_findings(
@@ -236,7 +237,7 @@ def _print_counts(conn: psycopg.Connection, survey: Survey, kinds: Sequence[str]
     ],
 )
 @click.argument("survey")
-@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("file", type=FilePath(dir_okay=False))
 @click.option("--map", "kinds", multiple=True, metavar="THEIRS=OURS", help="Their name of a kind and ours; as often as needed.")
 @click.option(
     "--column", "columns", multiple=True, metavar="OURS=THEIRS", help="Our name of a column and theirs; as often as needed."

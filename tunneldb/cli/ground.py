@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.run import parameter_table
 from tunneldb.cli.tables import print_classes
@@ -22,10 +23,8 @@ _NAMES = [name for name in PARAMETERS if name.startswith(_PREFIXES)]
     epilog="\b\nParameters for --set, with their defaults:\n" + parameter_table(_NAMES),
     examples=["tunneldb ground scan.laz -o classed.laz"],
 )
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--output", required=True, type=click.Path(dir_okay=False, path_type=Path), help="File to write, .laz; not FILE."
-)
+@click.argument("file", type=FilePath())
+@click.option("-o", "--output", required=True, type=FilePath(dir_okay=False), help="File to write, .laz; not FILE.")
 @click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see below. May be repeated.")
 def ground(file: Path, output: Path, assignments: tuple[str, ...]) -> None:
     """Class the points of FILE by itself: ground, lining and what stands or hangs before it; needs no database.

@@ -8,6 +8,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.database import connect
 from tunneldb.export.images.image import export_kilometre, image_kilometres
@@ -21,7 +22,7 @@ from tunneldb.store.survey import get_survey
 @click.option(
     "-o",
     "--output",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=FilePath(file_okay=False),
     default=Path(),
     help="Folder to write to; made if it isn't there. [default: the current one]",
 )

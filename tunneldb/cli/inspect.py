@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.errors import UserError
@@ -24,7 +25,7 @@ _MOST_SCANS = 8
     examples=["tunneldb inspect scan.laz", "tunneldb inspect scans/*.e57"],
     wrong="a file can't be read; the others were looked at",
 )
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILES...")
+@click.argument("files", nargs=-1, required=True, type=FilePath(), metavar="FILES...")
 def inspect(files: tuple[Path, ...]) -> None:
     """Tell what scan FILES hold, what is missing, and what to type next; needs no database.
 

@@ -9,6 +9,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -29,12 +30,12 @@ _FILES = (".las", ".laz", ".e57")
 )
 @click.argument("survey", metavar="SURVEY|FILE")
 @click.option("--km", metavar="A-B", help="Only these kilometres of the survey: 12 or 12-14.")
-@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="Figure to write: .png, .pdf or .svg.")
+@click.option("-o", "--output", type=FilePath(dir_okay=False), help="Figure to write: .png, .pdf or .svg.")
 @click.option("--intensity", metavar="DIMENSION", help="Of a file: dimension that holds the intensity.")
 @click.option("--intensity-kind", type=click.Choice(get_args(Kind)), help="Of a file: what it is; as for tunneldb survey add.")
 @click.option(
     "--scanner",
-    type=(float, float, float),
+    type=(FINITE, FINITE, FINITE),
     metavar="X Y Z",
     help="Of a file: where the scanner stood, in the file's coordinates; an E57 or PTX file says it by its poses.",
 )

@@ -15,6 +15,7 @@ from rich.console import Console
 from tunneldb.cli.coverage import say_coverage, say_no_crs, say_remarks
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import records, tell, verb
+from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
@@ -66,14 +67,14 @@ _CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
     type=click.Choice(["table", "csv", "geojson", "gpkg", "xlsx"]),
     help="Default: by the ending of -o, else a table.",
 )
-@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write.")
+@click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write.")
 @click.option("--km", metavar="A-B", help="Only these kilometres: 12 or 12-14.")
 @stretch_options
 @click.option("--clock", metavar="A-B", help="Only those between these hours, clockwise; 12 is the crown: 10-2 or 10:30-1:30.")
-@click.option("--min-area", type=click.FloatRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
+@click.option("--min-area", type=FiniteRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
 @click.option(
     "--min-confidence",
-    type=click.FloatRange(0, 1),
+    type=FiniteRange(0, 1),
     default=0.0,
     metavar="SHARE",
     help="Only those that detection is at least so sure of, 0 to 1; none without a confidence.",

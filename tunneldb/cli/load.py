@@ -11,6 +11,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -34,7 +35,7 @@ MOST_NAMED = 5  # files of which the same is said
     ]
 )
 @click.argument("survey")
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILES...")
+@click.argument("files", nargs=-1, required=True, type=FilePath(), metavar="FILES...")
 @click.option(
     "--density",
     default="100",
@@ -50,7 +51,7 @@ MOST_NAMED = 5  # files of which the same is said
 )
 @click.option(
     "--noise-diameter",
-    type=click.FloatRange(0.001, 1.0),
+    type=FiniteRange(0.001, 1.0),
     default=0.05,
     show_default=True,
     metavar="M",
@@ -58,7 +59,7 @@ MOST_NAMED = 5  # files of which the same is said
 )
 @click.option(
     "--max-distance",
-    type=click.FloatRange(0.5, 1000.0),
+    type=FiniteRange(0.5, 1000.0),
     default=25.0,
     show_default=True,
     metavar="M",
@@ -66,7 +67,7 @@ MOST_NAMED = 5  # files of which the same is said
 )
 @click.option(
     "--max-left-out",
-    type=click.FloatRange(0.0, 100.0),
+    type=FiniteRange(0.0, 100.0),
     default=5.0,
     show_default=True,
     metavar="PERCENT",
@@ -79,7 +80,7 @@ MOST_NAMED = 5  # files of which the same is said
     show_default=True,
     help="water: FILES are soundings that lie in the tunnel's system already. Registered sonar scans need no word.",
 )
-@click.option("--water-level", type=float, metavar="M", help="Height of the water, of soundings, m.")
+@click.option("--water-level", type=FINITE, metavar="M", help="Height of the water, of soundings, m.")
 @click.pass_obj
 def load(
     settings: Settings,

@@ -9,6 +9,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -36,7 +37,7 @@ _MOST = 20  # rows of a table that are printed
 @click.option(
     "--stations",
     multiple=True,
-    type=click.Path(path_type=Path),
+    type=FilePath(),
     metavar="FILE",
     help="Where the scanner stood: CSV with scan_id,x,y,z. An E57 or PTX file says it by its poses. May be repeated.",
 )
@@ -47,7 +48,7 @@ _MOST = 20  # rows of a table that are printed
     metavar="CSV|auto",
     help="Curve of a reference target by which range is corrected; auto finds one from the faces.",
 )
-@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write: .laz or .gpkg; not FILE.")
+@click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write: .laz or .gpkg; not FILE.")
 @click.option(
     "--geometry",
     type=click.Choice(["face", "map", "3d"]),

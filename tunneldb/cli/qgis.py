@@ -10,6 +10,7 @@ import psycopg
 from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.database import connect
 from tunneldb.errors import UserError
@@ -31,7 +32,7 @@ from tunneldb.store.survey import Survey, get_survey
 )
 @click.argument("survey")
 @click.option(
-    "-o", "--output", type=click.Path(dir_okay=False, path_type=Path),
+    "-o", "--output", type=FilePath(dir_okay=False),
     help="Project to write, .qgz or .qgs; its images go into a folder beside it.",
 )  # fmt: skip
 @click.option(
@@ -39,7 +40,7 @@ from tunneldb.store.survey import Survey, get_survey
     help="Put the project into the database, under this name or the survey's; in QGIS: Project, Open From, PostgreSQL.",
 )  # fmt: skip
 @click.option(
-    "--images", "folder", type=click.Path(file_okay=False, path_type=Path),
+    "--images", "folder", type=FilePath(file_okay=False),
     help="Folder of the images, one that all who open the project can reach; else FILE-images, or SURVEY-images here.",
 )  # fmt: skip
 @click.option("--service", metavar="NAME", help="Let the project connect by this entry of pg_service.conf (never a password).")

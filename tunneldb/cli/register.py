@@ -9,6 +9,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -30,19 +31,19 @@ UP = {"+z": 1, "-z": -1}
     wrong="some scan's pose is weak or undetermined: the table and --json name the directions",
 )
 @click.argument("survey")
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILES...")
+@click.argument("files", nargs=-1, required=True, type=FilePath(), metavar="FILES...")
 @click.option(
     "--ladders",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FilePath(dir_okay=False),
     required=True,
     metavar="CSV",
     help="Ladders that stand in the water: ladder,rung,height,stile_gap,diameter, m; a row for each rung.",
 )
 @click.option("--up", type=click.Choice(list(UP)), required=True, help="Whether z of the sonar's files points up or down.")
-@click.option("--water-level", type=float, required=True, metavar="M", help="Height of the water in the tunnel's system, m.")
+@click.option("--water-level", type=FINITE, required=True, metavar="M", help="Height of the water in the tunnel's system, m.")
 @click.option(
     "--start",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FilePath(dir_okay=False),
     metavar="CSV",
     help="Where sonars stood, roughly: file,x,y,within, m. A scan is then sought no farther from x, y; others anywhere.",
 )
@@ -51,7 +52,7 @@ UP = {"+z": 1, "-z": -1}
     metavar="ASSUMED=MEASURED",
     help="Speed of sound that the sonar was set to, and that of the water, m/s; needed where they differ by more than 3 %.",
 )
-@click.option("--report", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE", help="Report to write, as Markdown.")
+@click.option("--report", type=FilePath(dir_okay=False), metavar="FILE", help="Report to write, as Markdown.")
 @click.pass_context
 def register(
     ctx: click.Context,

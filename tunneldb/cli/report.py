@@ -12,6 +12,7 @@ import psycopg
 from tunneldb.cli.coverage import say_coverage
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import connect
@@ -39,19 +40,19 @@ _PRINTING = 1.2  # time in which it prints a page as a multiple of that in which
 )
 @click.argument("survey")
 @click.option(
-    "-o", "--output", required=True, type=click.Path(dir_okay=False, path_type=Path),
+    "-o", "--output", required=True, type=FilePath(dir_okay=False),
     help="File to write: .html, or .pdf, which needs Chromium or Chrome.",
 )  # fmt: skip
 @stretch_options
 @click.option(
     "--template",
-    type=click.Path(path_type=Path),
+    type=FilePath(),
     metavar="FILE",
     help="Owner's template, TOML: logo, client, project, standard, language of the headings, chapters, colours.",
 )
 @click.option(
     "--photos",
-    type=click.Path(path_type=Path),
+    type=FilePath(),
     metavar="FOLDER",
     help="Where relative paths of photos begin. Default: the current folder.",
 )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.tables import print_table
 from tunneldb.errors import UserError
 
@@ -29,24 +30,22 @@ _CHORD = re.compile(f"{_END}-{_END}")
 )
 @click.option(
     "--points",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FilePath(dir_okay=False),
     required=True,
     metavar="CSV",
     help="Surveyed points: ring,point,x,y,z, m, and perhaps offset, how far the prism stands before the lining, m.",
 )
 @click.option(
     "--axis",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FilePath(dir_okay=False),
     required=True,
     metavar="CSV",
     help="Design axis: chainage,x,y,z, m, in growing chainage.",
 )
-@click.option(
-    "--diameter", type=click.FloatRange(0.5, 50.0), required=True, metavar="M", help="Inner diameter of the design, m."
-)
+@click.option("--diameter", type=FiniteRange(0.5, 50.0), required=True, metavar="M", help="Inner diameter of the design, m.")
 @click.option(
     "--sigma",
-    type=click.FloatRange(0.0, 0.1, min_open=True),
+    type=FiniteRange(0.0, 0.1, min_open=True),
     metavar="M",
     help="What a point is good for, its standard deviation, m. By default all rings together say it.",
 )
@@ -65,9 +64,7 @@ _CHORD = re.compile(f"{_END}-{_END}")
     metavar="FROM-TO",
     help="Chord between two clock positions, in degrees or as on a clock: 300-60, 9:00-3:00. May be repeated.",
 )
-@click.option(
-    "-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write, CSV; else standard output."
-)
+@click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write, CSV; else standard output.")
 def rings(
     points: Path,
     axis: Path,

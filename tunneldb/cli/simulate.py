@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import click
 
 from tunneldb.cli.output import Verb, tell, verb
+from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.simulate import PRESETS, Parameters, Simulation, write
 from tunneldb.simulate.parameters import CHOICES
@@ -21,7 +22,7 @@ class _Option(NamedTuple):
     field: str
     metavar: str
     help: str
-    type: Any = float
+    type: Any = FINITE
     nargs: int = 1
 
 
@@ -35,7 +36,7 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("slope_end", "%", "Slope at the end; a parabola over the middle half leads to it [as --slope]."),
         _Option("start_chainage", "M", "Chainage of the start."),
         _Option("azimuth", "DEG", "Direction of the start, from north, clockwise."),
-        _Option("origin", "E N Z", "Coordinates of the axis at the start.", float, 3),
+        _Option("origin", "E N Z", "Coordinates of the axis at the start.", FINITE, 3),
         _Option("srid", "EPSG", "Coordinate system, projected in metres.", int),
     ],
     "Section": [
@@ -98,8 +99,8 @@ _GROUPS: dict[str, list[_Option]] = {
         ),
         _Option("ghosts", "SHARE", "Share of the floor's echoes that come from the wall by way of the floor, below ground."),
         _Option("leaks", "N", "Number of leaks [one every 12 m].", int),
-        _Option("leak_area", "MIN MAX", "Area of leaks, m².", float, 2),
-        _Option("leak_drop", "MIN MAX", "How much darker than dry lining leaks are, dB.", float, 2),
+        _Option("leak_area", "MIN MAX", "Area of leaks, m².", FINITE, 2),
+        _Option("leak_drop", "MIN MAX", "How much darker than dry lining leaks are, dB.", FINITE, 2),
         _Option("leak_edge", "M", "Width over which a leak goes from dry to wet; its outline lies in the middle."),
         _Option("joint_leaks", "N", "Leaks along joints, bands 0.1 to 0.4 m wide; with --lining cast or segments.", int),
         _Option("niche_leaks", "N", "Leaks on the back walls of niches.", int),
@@ -109,7 +110,7 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("pocket_leaks", "N", "Weeping bolt pockets, each with a streak; with --lining segments.", int),
         _Option("ring_leaks", "N", "Whole wet rings from foot to foot, across what hangs there.", int),
         _Option("panel_leaks", "N", "Wet panels with straight edges: a segment, or a rectangle.", int),
-        _Option("drip_gap", "MIN MAX", "Limits of the distance between a leak and its --drips, m.", float, 2),
+        _Option("drip_gap", "MIN MAX", "Limits of the distance between a leak and its --drips, m.", FINITE, 2),
         _Option("salt_fringe", "M", "Width of the bright salts round each leak."),
     ],
     "Make and looks of the lining": [
@@ -126,10 +127,10 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("soot", "DB", "Darkening of the crown."),
         _Option("grime", "DB", "Darkening beneath cables and trays."),
         _Option("patches", "N", "Repaired rectangles.", int),
-        _Option("patch_level", "MIN MAX", "How much brighter they are, dB; negative: darker.", float, 2),
+        _Option("patch_level", "MIN MAX", "How much brighter they are, dB; negative: darker.", FINITE, 2),
         _Option("patch_turn", "DEG", "By how much they are turned, either way."),
         _Option("paint", "N", "Painted numbers and stripes in turn, 4 dB darker to 4 dB brighter.", int),
-        _Option("stripe_width", "MIN MAX", "Width of the stripes, m.", float, 2),
+        _Option("stripe_width", "MIN MAX", "Width of the stripes, m.", FINITE, 2),
         _Option("salts", "%", "Share of the lining that is white with salts."),
         _Option("salt_level", "DB", "How much brighter salts are."),
         _Option("halos", "N", "Spots of grime shaped as leaks, which fade over 0.25 m.", int),
@@ -231,7 +232,7 @@ def _options(command: Callable[..., None]) -> Callable[..., None]:
         "tunneldb simulate out --name km --length 25000 --radius 4000 --scanner profiler --density 100 --no-truth",
     ],
 )
-@click.argument("out", type=click.Path(file_okay=False, path_type=Path))
+@click.argument("out", type=FilePath(file_okay=False))
 @click.option(
     "--preset",
     type=click.Choice(list(PRESETS)),

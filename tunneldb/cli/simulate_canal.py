@@ -8,11 +8,12 @@ from typing import Any
 import click
 
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import say
 from tunneldb.simulate.canal import CanalParameters, simulate, write
 
 
-def _option(name: str, metavar: str, text: str, kind: Any = float) -> Any:
+def _option(name: str, metavar: str, text: str, kind: Any = FINITE) -> Any:
     """Option that sets a field of the parameters; its default is taken from there."""
     default = getattr(CanalParameters(), name)
     shown = f"{default:.10g}" if isinstance(default, float) else default
@@ -27,7 +28,7 @@ def _option(name: str, metavar: str, text: str, kind: Any = float) -> Any:
         "tunneldb simulate-canal out --sonar-stations 1 --ladders 1 --sonar-step 0.18",
     ],
 )
-@click.argument("out", type=click.Path(file_okay=False, path_type=Path))
+@click.argument("out", type=FilePath(file_okay=False))
 @_option("length", "M", "Length of the canal.")
 @_option("radius", "M", "Of the axis: positive curves to the left, 0 is straight.")
 @_option("width", "M", "Of the canal at the water.")

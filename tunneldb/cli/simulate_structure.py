@@ -8,11 +8,12 @@ from typing import Any
 import click
 
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.simulate.structure import StructureParameters, StructureScan, write_structure
 
 
-def _option(name: str, metavar: str, text: str, kind: Any = float, nargs: int = 1) -> Any:
+def _option(name: str, metavar: str, text: str, kind: Any = FINITE, nargs: int = 1) -> Any:
     """Option that sets a field of the parameters; its default is taken from there."""
     default = getattr(StructureParameters(), name)
     shown = " ".join(f"{v:.10g}" if isinstance(v, float) else str(v) for v in (default if nargs > 1 else [default]))
@@ -29,7 +30,7 @@ def _option(name: str, metavar: str, text: str, kind: Any = float, nargs: int = 
         "tunneldb simulate-structure out --name night --night",
     ],
 )
-@click.argument("out", type=click.Path(file_okay=False, path_type=Path))
+@click.argument("out", type=FilePath(file_okay=False))
 @_option("stations", "N", "Scanner positions, 1 to 4.", int)
 @_option("distance", "M", "From the stations to the structure's front.")
 @_option("width", "M", "Width of the structure.")
@@ -40,7 +41,7 @@ def _option(name: str, metavar: str, text: str, kind: Any = float, nargs: int = 
 @_option("misregistration", "M", "Standard deviation of each station's shift along each axis.")
 @_option("gain", "DB", "Standard deviation of each station's level.")
 @_option("anomalies", "N", "Rust, stains, cracks and bright flakes; 0 makes a clean scene.", int)
-@_option("contrast", "MIN MAX", "By how much they differ, dB.", float, 2)
+@_option("contrast", "MIN MAX", "By how much they differ, dB.", FINITE, 2)
 @_option("fronts", "N", "Objects in front that split what is behind.", int)
 @click.option("--night", is_flag=True, help="No colours, and other noise; structure and anomalies stay.")
 @_option("srid", "EPSG", "Coordinate system, projected in metres.", int)

@@ -8,6 +8,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -24,14 +25,14 @@ from tunneldb.store.survey import get_survey
 @click.argument("survey")
 @click.option(
     "--radius",
-    type=click.FloatRange(0.02, 0.5),
+    type=FiniteRange(0.02, 0.5),
     required=True,
     metavar="M",
     help="Radius of the spheres, m, 0.0725 for example.",
 )
 @click.option(
     "--tolerance",
-    type=click.FloatRange(0.0005, 0.05),
+    type=FiniteRange(0.0005, 0.05),
     default=0.005,
     show_default=True,
     metavar="M",
@@ -39,19 +40,19 @@ from tunneldb.store.survey import get_survey
 )
 @click.option(
     "--control",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FilePath(dir_okay=False),
     metavar="CSV",
     help="Control points, id,x,y,z, in the tunnel's system or another one.",
 )
 @click.option(
     "--within",
-    type=click.FloatRange(0.001, 10.0),
+    type=FiniteRange(0.001, 10.0),
     default=0.1,
     show_default=True,
     metavar="M",
     help="A control point belongs to the sphere within this distance, m.",
 )
-@click.option("--report", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE", help="Report to write, as Markdown.")
+@click.option("--report", type=FilePath(dir_okay=False), metavar="FILE", help="Report to write, as Markdown.")
 @click.pass_obj
 def spheres(
     settings: Settings,

@@ -10,6 +10,7 @@ import click
 from tunneldb.cli.coverage import say_no_crs
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
 from tunneldb.files import replacing
@@ -43,11 +44,11 @@ if TYPE_CHECKING:
     type=click.Choice(["table", "csv", "geojson", "gpkg"]),
     help="Default: by the ending of -o, else a table.",
 )
-@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write.")
-@click.option("--min-area", type=click.FloatRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
+@click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write.")
+@click.option("--min-area", type=FiniteRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
 @click.option(
     "--min-confidence",
-    type=click.FloatRange(0, 1),
+    type=FiniteRange(0, 1),
     default=0.0,
     metavar="SHARE",
     help="Only those that detection is at least so sure of, 0 to 1.",

@@ -12,6 +12,7 @@ from rich.console import Console
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import records, tell, verb, wants_json
+from tunneldb.cli.param_types import FiniteRange
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
@@ -25,7 +26,7 @@ from tunneldb.store.survey import get_survey
 @click.option("--watch", is_flag=True, help="Look again and again until nothing is left to do, or Ctrl-C.")
 @click.option(
     "--interval",
-    type=click.FloatRange(0.1, 3600.0),
+    type=FiniteRange(0.1, 3600.0),
     default=2.0,
     show_default=True,
     metavar="S",

@@ -10,13 +10,14 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
+from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.store.survey import UNPOSED, get_survey
 
-FILE = click.Path(path_type=Path)
+FILE = FilePath()
 
 
 @click.group(cls=VerbGroup)

@@ -10,6 +10,7 @@ import click
 from tunneldb.alignment.units import UNITS
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
+from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -59,7 +60,7 @@ def tunnel() -> None:
     ]
 )
 @click.argument("name")
-@click.argument("scans", metavar="[SCAN...]", nargs=-1, type=click.Path(path_type=Path))
+@click.argument("scans", metavar="[SCAN...]", nargs=-1, type=FilePath())
 @click.option(
     "--srid",
     type=Srid(),
@@ -89,23 +90,23 @@ def tunnel() -> None:
 @click.option("--reverse", is_flag=True, help="Let chainage grow the other way; not of a design alignment.")
 @click.option(
     "--start-chainage",
-    type=float,
+    type=FINITE,
     metavar="M",
     help="Chainage of the axis's beginning. [default: that of the alignment; else 0]",
 )
 @click.option(
-    "--spacing", type=float, default=10.0, show_default=True, metavar="M", help="Distance between the axis's vertices."
+    "--spacing", type=FINITE, default=10.0, show_default=True, metavar="M", help="Distance between the axis's vertices."
 )
 @click.option(
     "--stationing",
     "equations",
-    type=click.Path(path_type=Path),
+    type=FilePath(),
     metavar="FILE",
     help="The tunnel's own stationing, see tunneldb tunnel stationing. [default: that of the alignment]",
 )
 @click.option(
     "--axis-out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FilePath(dir_okay=False),
     metavar="FILE",
     help="Where an axis found in SCAN files is kept, .csv, with its picture, .png, beside it. [default: NAME.found-axis.csv]",
 )
@@ -218,16 +219,16 @@ def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None
     "find-axis",
     examples=["tunneldb tunnel find-axis ringo.laz", "tunneldb tunnel find-axis ringo-1.laz ringo-2.laz -o ringo.axis.csv"],
 )
-@click.argument("scans", metavar="SCAN...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("scans", metavar="SCAN...", nargs=-1, required=True, type=FilePath())
 @click.option(
     "-o",
     "--output",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FilePath(dir_okay=False),
     help="Axis to write, .csv with x,y,z. [default: NAME.found-axis.csv, NAME being what the SCAN files are called]",
 )
 @click.option(
     "--picture",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FilePath(dir_okay=False),
     metavar="FILE",
     help="Picture to write, .png. [default: beside the axis, of its name]",
 )
@@ -273,7 +274,7 @@ def _keep(found: FoundAxis, path: Path, picture: Path | None, start: float, titl
 
 @tunnel.command(examples=["tunneldb tunnel stationing ringo equations.csv", "tunneldb tunnel stationing ringo --show"])
 @click.argument("name")
-@click.argument("file", type=click.Path(path_type=Path), required=False)
+@click.argument("file", type=FilePath(), required=False)
 @click.option("--show", is_flag=True, help="Print the pieces of the stationing.")
 @click.option("--clear", is_flag=True, help="Take the tunnel's own stationing away: stations are chainages again.")
 @click.pass_obj

@@ -11,6 +11,7 @@ import numpy as np
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import records, tell, verb
+from tunneldb.cli.param_types import FilePath
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.store.survey import get_survey
@@ -21,8 +22,8 @@ _PLANE = ("chainage", "arc", "offset")
 
 @verb(examples=["tunneldb unroll ringo-2024 points.csv -o unrolled.csv", "tunneldb unroll ringo-2024 niches.csv --inverse"])
 @click.argument("survey")
-@click.argument("points", type=click.Path(dir_okay=False, path_type=Path))
-@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write, else standard output.")
+@click.argument("points", type=FilePath(dir_okay=False))
+@click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write, else standard output.")
 @click.option("--inverse", is_flag=True, help="From chainage,arc,offset to x,y,z.")
 @click.pass_obj
 def unroll(settings: Settings, survey: str, points: Path, output: Path | None, inverse: bool) -> None:

@@ -2,6 +2,7 @@
 
 Operators own the tables. A trigger, a rule, a policy, a view in a table's place, or a function in a check, a default, a
 generated column or an index runs with the rights of whoever writes: the database owner's behind the views and in his own runs.
+A function or an operator in schema public that fits a call better than that of PostgreSQL or PostGIS runs in its place.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Any
 
 import psycopg
 
-SUBJECTS = ("triggers", "expressions")
+SUBJECTS = ("triggers", "expressions", "functions")
 """What is looked at; rules and policies go with the expressions."""
 
 # Roles whose functions may run with the owner's rights: they have those anyway.
@@ -135,18 +136,49 @@ SELECT format('%s of %s is not tunneldb''s: it runs %s', c.what, c.relation::reg
   FROM called c GROUP BY c.relation, c.what, c.mend ORDER BY 1
 """
 
+# Functions and operators in everybody's search path that share their name with one of PostgreSQL or of an extension.
+_OVERLOADS = f"""
+WITH trusted AS ({_TRUSTED}),
+routine (oid, name, catalog, namespace, owner, what, mend) AS (
+    SELECT p.oid, p.proname, 'pg_proc'::regclass, p.pronamespace, p.proowner, 'function ' || p.oid::regprocedure,
+           'DROP ROUTINE ' || p.oid::regprocedure || ' CASCADE;'
+      FROM pg_proc p
+    UNION ALL
+    SELECT o.oid, o.oprname, 'pg_operator'::regclass, o.oprnamespace, o.oprowner, 'operator ' || o.oid::regoperator,
+           'DROP OPERATOR ' || o.oid::regoperator || ' CASCADE;'
+      FROM pg_operator o
+),
+given (name, catalog) AS (
+    SELECT r.name, r.catalog FROM routine r
+     WHERE r.namespace = 'pg_catalog'::regnamespace OR {_OF_EXTENSION.format("r.catalog", "r.oid")}
+)
+SELECT r.what || ' in schema public is not tunneldb''s: it runs in the place of what a call means,'
+       || ' with the rights of whoever calls', r.mend
+  FROM routine r
+ WHERE r.namespace = 'public'::regnamespace AND r.owner NOT IN (SELECT oid FROM trusted)
+   AND NOT {_OF_EXTENSION.format("r.catalog", "r.oid")} AND (r.name, r.catalog) IN (SELECT g.name, g.catalog FROM given g)
+ ORDER BY 1
+"""
+
 
 def foreign_objects(connection: psycopg.Connection[Any]) -> Iterator[tuple[str, str, str]]:
-    """Yield what on the tables of schema tunnel is not tunneldb's and may run code with the rights of whoever writes there.
+    """Yield what is not tunneldb's and may run code with the rights of others: on tables of schema tunnel, in schema public.
 
     Yields
     ------
     (str, str, str)
-        One of SUBJECTS; what is where, to be followed by with whose rights it runs; the statement that takes it away.
+        One of SUBJECTS; what is where, and with whose rights it runs; the statement that takes it away.
     """
     for subject, query in (("triggers", _TRIGGERS), ("expressions", _RULES), ("expressions", _EXPRESSIONS)):
         for text, mend in connection.execute(query.encode()).fetchall():
-            yield subject, text, mend
+            yield subject, f"{text} with the rights of whoever writes there", mend
+    for text, mend in overloads(connection):
+        yield "functions", text, mend
+
+
+def overloads(connection: psycopg.Connection[Any]) -> list[tuple[str, str]]:
+    """Return which functions and operators in schema public may run in the place of others, each with what takes it away."""
+    return connection.execute(_OVERLOADS.encode()).fetchall()
 
 
 def silent_triggers(connection: psycopg.Connection[Any]) -> list[tuple[str, str]]:

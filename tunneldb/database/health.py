@@ -71,6 +71,7 @@ def examine(dsn: str | None) -> Iterator[Finding]:
         if installed_api_version(connection) is None:
             return
         yield from _roles(connection)
+        yield _public(connection)
         yield _audit(connection)
         yield from _foreign(connection)
         yield from _settings(connection, embedded=dsn is None)
@@ -133,6 +134,24 @@ def _roles(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
         yield Finding("ok", "roles", ", ".join(ROLES))
 
 
+def _public(connection: psycopg.Connection[Any]) -> Finding:
+    """Who may create in the schema of PostGIS, which is in everybody's search path."""
+    rows = connection.execute(
+        """
+        SELECT CASE a.grantee WHEN 0 THEN 'PUBLIC' ELSE quote_ident(pg_get_userbyid(a.grantee)) END
+          FROM pg_namespace n CROSS JOIN LATERAL aclexplode(n.nspacl) a
+         WHERE n.nspname = 'public' AND a.privilege_type = 'CREATE'
+           AND (a.grantee = 0 OR pg_get_userbyid(a.grantee) = ANY(%s)) ORDER BY 1
+        """,
+        [list(ROLES)],
+    ).fetchall()
+    if not rows:
+        return Finding("ok", "schema public", "only its owner may create in it")
+    names = ", ".join(name for (name,) in rows)
+    text = f"{names} may create functions in it, which run in the place of PostgreSQL's with the rights of whoever calls them"
+    return Finding("wrong", "schema public", text, f"as a superuser: REVOKE CREATE ON SCHEMA public FROM {names};")
+
+
 def _audit(connection: psycopg.Connection[Any]) -> Finding:
     """Whether what people change by hand is kept: the table's own trigger is on, and operators don't own the table."""
     row = connection.execute(
@@ -157,10 +176,9 @@ def _audit(connection: psycopg.Connection[Any]) -> Finding:
 
 
 def _foreign(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
-    """What is not the project's own on the tables, and triggers of its own that do not fire."""
-    rights = "with the rights of whoever writes there"
+    """What is not the project's own on the tables and in schema public, and triggers of its own that do not fire."""
     found = [("triggers", text, mend) for text, mend in silent_triggers(connection)]
-    found += [(subject, f"{text} {rights}", mend) for subject, text, mend in foreign_objects(connection)]
+    found += foreign_objects(connection)
     for subject, text, mend in found:
         yield Finding("wrong", subject, text, mend)
     for subject in SUBJECTS:

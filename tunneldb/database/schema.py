@@ -12,6 +12,7 @@ from psycopg import sql
 
 from tunneldb import __version__
 from tunneldb.database.connection import MINIMUM_POSTGIS, engine_on
+from tunneldb.database.foreign import overloads
 from tunneldb.database.resources import resource_dir
 from tunneldb.errors import UserError
 
@@ -77,12 +78,31 @@ def _install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) ->
         connection.execute(sql.SQL("SET LOCAL lock_timeout = {}").format(_PATIENCE))
         connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
         _require_postgis(connection, create=True)
+        _close_public(connection)
         present = schema_revision(connection)
         if present is not None and present not in revisions():
             raise UserError(_newer(present))
         command.upgrade(alembic_config(session), "head")
         _fill_stages(connection, stages)
         install_api(connection)
+
+
+def _close_public(connection: psycopg.Connection[Any]) -> None:
+    """Let nobody but its owner create in the schema of PostGIS, and refuse to go on with what was planted there.
+
+    It is in everybody's search path: a function there that fits a call better than PostgreSQL's own of that name runs in its
+    place, with the rights of whoever calls. Before PostgreSQL 15 everybody might create there.
+    """
+    try:
+        with connection.transaction():
+            connection.execute("REVOKE CREATE ON SCHEMA public FROM PUBLIC")
+    except psycopg.errors.InsufficientPrivilege:
+        pass  # its owner's to do: tunneldb check says so
+    planted = overloads(connection)
+    if planted:
+        text, mend = planted[0]
+        more = f", and {len(planted) - 1} more: tunneldb check" if len(planted) > 1 else ""
+        raise UserError(f"{text}: {mend}{more}")
 
 
 def _fill_stages(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> None:

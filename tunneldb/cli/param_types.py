@@ -1,0 +1,54 @@
+"""Types of the command line's values: files and folders, numbers."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tunneldb.errors import UserError
+from tunneldb.files import require_regular
+
+LARGEST = 1e12
+"""Greatest size of a number: no length, area, level or share that is meant comes near it."""
+
+
+class FilePath(click.Path):
+    """A file or a folder, to be read or to be written, as a `Path`.
+
+    Refused is what is neither, such as a pipe, which would be waited for, or a device, in whose place a file would be put, and
+    a name that cannot be printed on one line.
+    """
+
+    def __init__(self, *, file_okay: bool = True, dir_okay: bool = True) -> None:
+        super().__init__(file_okay=file_okay, dir_okay=dir_okay, path_type=Path)
+
+    def convert(
+        self, value: str | os.PathLike[str], param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | bytes | os.PathLike[str]:
+        """Return the path."""
+        text = os.fspath(value)
+        if not text.isprintable():  # bytes that are no UTF-8 are surrogates, which are not
+            raise UserError(f"the name {text!a} has bytes that are no UTF-8, or a newline or the like; rename it")
+        path = super().convert(value, param, ctx)
+        require_regular(Path(os.fsdecode(path)))
+        return path
+
+
+class FiniteRange(click.FloatRange):
+    """A number in a range; neither infinite nor NaN, which is in every range."""
+
+    name = "float range"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number) or abs(number) > LARGEST:
+            self.fail(f"{value} is no number that can be meant.", param, ctx)
+        return number
+
+
+FINITE = FiniteRange()
