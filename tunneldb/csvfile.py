@@ -1,13 +1,13 @@
-"""Reading the small CSV files of the interface: axis, stations, trajectory, reference, control points.
+"""The CSV files of the interface: reading small ones, such as axis, stations, control points, and writing lists.
 
-Columns are separated by commas, or, as programs of the user write them, by semicolons, tabs or spaces: whichever the header
-shows. Where commas do not separate, they may stand for the decimal point.
+In those that are read, columns are separated by commas, or, as programs of the user write them, by semicolons, tabs or spaces:
+whichever the header shows. Where commas do not separate, they may stand for the decimal point.
 """
 
 from __future__ import annotations
 
 import csv
-import math
+import io
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -24,8 +24,13 @@ from tunneldb.errors import UserError
 if TYPE_CHECKING:
     import _csv
 
+LARGEST = 1e12
+"""Greatest size of a number that something was measured to be: seconds since 1970 are less, and so is any coordinate."""
+
 _SEPARATORS = (";", "\t", ",", " ")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d*(?:[eE][+-]?\d+)?")
+_FORMULA = re.compile(r"'*(?:[=@\t\r]|[+-](?![\d.+-]*$))")  # guarded ones, too: what is taken away was then put there
+_GUARD = "'"
 
 
 @dataclass(frozen=True)
@@ -75,6 +80,28 @@ class CsvTable:
             raise self.error(row, f"{name} {column[row]:.15g} {how} that of the row before; sort by {name}, each once")
 
 
+def write_csv(names: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
+    """Return rows as CSV under a header; what is None is empty.
+
+    Text that a spreadsheet would take for a formula gets an apostrophe before it, by which spreadsheets know text; `read_texts`
+    takes it away again.
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([_guarded(value) for value in row] for row in rows)
+    return out.getvalue()
+
+
+def _guarded(value: object) -> object:
+    return _GUARD + value if isinstance(value, str) and _FORMULA.match(value) else value
+
+
+def _bare(text: str) -> str:
+    """A cell as it was before `write_csv` guarded it."""
+    return text[1:] if text.startswith(_GUARD) and _FORMULA.match(text[1:]) else text
+
+
 def read_header(path: Path) -> list[str]:
     """Names of the columns of a CSV file with any separator, as they stand in its first line.
 
@@ -108,7 +135,7 @@ def read_texts(path: Path, name: str) -> list[str]:
                 continue
             if len(row) != len(header):
                 raise _uneven(path, rows.line_num, row, header)
-            texts.append(row[index].strip())
+            texts.append(_bare(row[index].strip()))
         return texts
 
 
@@ -213,6 +240,6 @@ def _number(path: Path, line: int, name: str, text: str, decimal_comma: bool) ->
         value = float(text.replace(",", ".") if comma else text)
     except ValueError:
         raise UserError(f"{path}, line {line}: {name} is {text.strip()!r}, not a number") from None
-    if not math.isfinite(value):
+    if not abs(value) <= LARGEST:  # NaN is not, either
         raise UserError(f"{path}, line {line}: {name} is {text.strip()}, which is no measurement; remove the line")
     return value

@@ -24,7 +24,11 @@ def require_regular(path: Path) -> None:
     UserError
         Which says what it is.
     """
-    if path.exists() and not path.is_file() and not path.is_dir():
+    try:
+        there = path.exists()
+    except OSError as error:  # its name is too long, its folder closed
+        raise UserError(f"{path.name[:40]}{'…' if len(path.name) > 40 else ''}: {error.strerror}") from None
+    if there and not path.is_file() and not path.is_dir():
         kinds = {"a pipe": path.is_fifo(), "a socket": path.is_socket()}
         kind = next((name for name, held in kinds.items() if held), "a device")
         raise UserError(f"{path} is {kind}, not a file")

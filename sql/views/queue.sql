@@ -12,12 +12,13 @@ COMMENT ON COLUMN tunnel_api.goal.retry_after IS 'Stages that failed before this
 
 CREATE OR REPLACE VIEW tunnel_api.incoming AS
 SELECT ('x' || left(md5(i.survey_id || '/' || i.name), 13))::bit(52)::bigint AS id, i.survey_id, s.name AS survey, i.name,
-       i.path, i.bytes, i.points, i.km_from, i.km_to,
+       tunnel_api.for_operators(i.path) AS path, i.bytes, i.points, i.km_from, i.km_to,
        CASE WHEN i.failed_at IS NULL THEN 'waiting' ELSE 'failed' END AS state, i.requested_at, i.failed_at, i.message
   FROM tunnel.incoming i
   JOIN tunnel.survey s ON s.id = i.survey_id;
 COMMENT ON VIEW tunnel_api.incoming IS 'Files that a batch is to read: waiting, or failed and why. A file that was read is in tunnel_api.file';
 COMMENT ON COLUMN tunnel_api.incoming.id IS 'Made from survey and name, for programs that need a key';
+COMMENT ON COLUMN tunnel_api.incoming.path IS 'Where it lies; shown to operators alone';
 COMMENT ON COLUMN tunnel_api.incoming.points IS 'Points that its header announces; 0 if it is unreadable';
 COMMENT ON COLUMN tunnel_api.incoming.km_from IS 'First kilometre that it may touch, by its header; NULL if that is unreadable';
 COMMENT ON COLUMN tunnel_api.incoming.state IS 'waiting to be read, or failed';

@@ -34,11 +34,12 @@ COMMENT ON COLUMN tunnel_api.survey.reference IS
     'Range curve of the intensity: none, measured on a target, or auto, from the lining of each kilometre (tunnel_api.range_curve)';
 
 CREATE OR REPLACE VIEW tunnel_api.file AS
-SELECT f.id, f.survey_id, s.name AS survey, f.name, f.path, f.checksum, f.bytes, f.points, f.noise, f.outside, f.thinned,
+SELECT f.id, f.survey_id, s.name AS survey, f.name, tunnel_api.for_operators(f.path) AS path, f.checksum, f.bytes, f.points, f.noise, f.outside, f.thinned,
        f.kept, f.chainage_from, f.chainage_to, f.extent, f.srid, f.loaded_at, f.invalid, f.unposed
   FROM tunnel.scan_file f
   JOIN tunnel.survey s ON s.id = f.survey_id;
 COMMENT ON VIEW tunnel_api.file IS 'Scan files loaded, with what was dropped of each';
+COMMENT ON COLUMN tunnel_api.file.path IS 'Where it lies; shown to operators alone';
 COMMENT ON COLUMN tunnel_api.file.checksum IS 'SHA-256 of the file';
 COMMENT ON COLUMN tunnel_api.file.points IS 'Points in the file = invalid + outside + unposed + noise + thinned + kept';
 COMMENT ON COLUMN tunnel_api.file.noise IS 'Points dropped as isolated (Xu et al., 2018, section II-D)';

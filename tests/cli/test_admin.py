@@ -264,3 +264,13 @@ def test_the_wheel_brings_both_folders() -> None:
                 assert str(packed) in files
                 assert Path(str(installed.locate_file(packed))).read_bytes() == path.read_bytes()
     assert not [file for file in files if file.startswith(("tests/", "benchmarks/"))]
+
+
+def test_a_password_on_the_command_line_is_warned_of(dsn: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    secret = make_conninfo(dsn, password="swordfish")
+    said = run("--dsn", secret, "status").stderr
+    assert "everybody on this machine can read the password in --dsn" in said
+    assert "swordfish" not in said
+    assert "password" not in run("--dsn", dsn, "status").stderr
+    monkeypatch.setenv("TUNNELDB_DSN", secret)
+    assert "password" not in run("status").stderr

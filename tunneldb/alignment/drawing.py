@@ -76,13 +76,7 @@ def read_dxf(path: Path, layer: str | None, unit: float | None) -> Drawn:
     UserError
         If it can't be read, holds no lines, several layers to choose from, or states a unit that isn't the metre.
     """
-    from ezdxf import filemanagement
-    from ezdxf.lldxf.const import DXFError
-
-    try:
-        drawing = filemanagement.readfile(str(path))
-    except (OSError, DXFError, ValueError) as error:
-        raise UserError(f"{path} cannot be read as DXF: {str(error).strip().splitlines()[0]}") from None
+    drawing = open_drawing(path)
     entities = [entity for entity in drawing.modelspace() if entity.dxftype() in _ENTITIES and not _is_mesh(entity)]
     names = sorted({entity.dxf.layer for entity in entities})
     chosen = choose_layer(path, names, layer)
@@ -92,6 +86,23 @@ def read_dxf(path: Path, layer: str | None, unit: float | None) -> Drawn:
     pieces = [scale * _vertices(part, CHORD_ERROR / scale) for part in parts]
     lines = [_densified(line) if curved else line for line in join_pieces(pieces)]
     return _drawn(path, lines, chosen, (note,) if note else ())
+
+
+def open_drawing(path: Path) -> Any:
+    """Open a DXF file.
+
+    Raises
+    ------
+    UserError
+        If it can't be read.
+    """
+    from ezdxf import filemanagement
+
+    try:
+        return filemanagement.readfile(str(path))
+    except Exception as error:  # of a damaged file ezdxf raises StopIteration, OverflowError, whatever comes
+        said = str(error).strip().splitlines() or [f"it is damaged ({type(error).__name__})"]
+        raise UserError(f"{path} cannot be read as DXF: {said[0]}") from None
 
 
 def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
@@ -121,7 +132,7 @@ def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
         raise UserError(f"{path} cannot be read: {str(error).strip().splitlines()[0]}") from None
     notes = _check_crs(path, meta["crs"], srid)
     try:
-        geometries = shapely.get_parts(shapely.get_parts(shapely.from_wkb(wkb)))
+        geometries = shapely.get_parts(shapely.get_parts(shapely.from_wkb(wkb, on_invalid="ignore")))
     except shapely.errors.GEOSException as error:
         raise UserError(
             f"{path}: a geometry of layer {chosen!r} is damaged ({str(error).strip().splitlines()[0]}); mend it (in QGIS: Fix "

@@ -18,6 +18,12 @@ from tunneldb.csvfile import read_csv, read_header
 from tunneldb.errors import UserError
 
 XYZ = ("x", "y", "z")
+LONGEST_STEP = 1e5
+"""Greatest distance between two vertices of a given axis, m: longer than any tunnel."""
+
+STEEPEST = 2.0
+"""Steepest grade of a given axis, m in height for 1 m in plan, beyond a first such metre: chainage is length in plan."""
+
 TRAJECTORY_STEP = 5.0
 """Least way between two points of a trajectory that become vertices of the axis, m."""
 
@@ -246,8 +252,16 @@ def _thinned(xyz: Float) -> np.ndarray:
 
 
 def _require_forward(xyz: Float, error: Callable[[int, str], UserError]) -> None:
-    """Raise the error of a row at which a line stands still or turns back in plan."""
+    """Raise the error of a row at which a line stands still or turns back in plan, or leaps as none does."""
     steps = np.diff(xyz[:, :2], axis=0)
+    plan = np.hypot(*steps.T)
+    if np.any(far := ~(plan <= LONGEST_STEP)):
+        row = int(np.argmax(far))
+        raise error(row + 1, f"it lies {plan[row] / 1000.0:.6g} km from the point before; is a decimal point missing?")
+    rise = np.abs(np.diff(xyz[:, 2]))
+    if np.any(steep := rise > STEEPEST * plan + STEEPEST):
+        row = int(np.argmax(steep))
+        raise error(row + 1, f"{plan[row]:.6g} m on from the point before its z differs by {rise[row]:.6g} m; is it right?")
     standing = np.flatnonzero(~steps.any(axis=1))
     if len(standing):
         raise error(int(standing[0]) + 1, "the same x,y as the point before; remove one of them")

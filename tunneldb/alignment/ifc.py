@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,18 @@ class Ifc:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._file = _open(path)
+        with self._whole():
+            self._look()
+
+    @contextmanager
+    def _whole(self) -> Iterator[None]:
+        """Say that an entity lacks what it must have: ifcopenshell hands out None for it, and checks no types."""
+        try:
+            yield
+        except (AttributeError, TypeError, ValueError, IndexError, OverflowError, RuntimeError) as error:
+            raise UserError(f"{self._path} is damaged, an entity of an alignment lacks what it needs: {error}") from error
+
+    def _look(self) -> None:
         from ifcopenshell.util.unit import calculate_unit_scale
 
         self._unit = float(calculate_unit_scale(self._file))
@@ -66,6 +79,10 @@ class Ifc:
 
     def design(self, number: int, profile: int) -> Design:
         """Return an alignment with one of its profiles, both counted from 0."""
+        with self._whole():
+            return self._design(number, profile)
+
+    def _design(self, number: int, profile: int) -> Design:
         alignment = self._alignments[number]
         frame = self._frame(alignment)
         horizontal = _nested(alignment, "IfcAlignmentHorizontal")[0]
@@ -222,12 +239,12 @@ def _schema(path: Path) -> tuple[str, str]:
 
 def _nested(entity: Any, kind: str) -> list[Any]:
     """Parts of an entity, of a class, in order."""
-    return [part for nest in entity.IsNestedBy for part in nest.RelatedObjects if part.is_a(kind)]
+    return [part for nest in entity.IsNestedBy for part in nest.RelatedObjects or () if part.is_a(kind)]
 
 
 def _verticals(alignment: Any) -> list[Any]:
     """Profiles of an alignment: its own, or those of its child alignments, which share its plan."""
-    children = [part for whole in alignment.IsDecomposedBy for part in whole.RelatedObjects if part.is_a("IfcAlignment")]
+    children = [part for whole in alignment.IsDecomposedBy for part in whole.RelatedObjects or () if part.is_a("IfcAlignment")]
     return [vertical for owner in (alignment, *children) for vertical in _nested(owner, "IfcAlignmentVertical")]
 
 

@@ -88,11 +88,14 @@ def _diagnose_file(
 def _diagnose_survey(settings: Settings, name: str, km: str | None) -> Diagnosis:
     from tunneldb.pipeline.intensity_diagnosis import diagnose_survey
     from tunneldb.pipeline.parameters import settings as defaults
-    from tunneldb.pipeline.run import loaded_kilometres, parse_km
+    from tunneldb.pipeline.run import loaded_kilometres, nothing_yet, parse_km
 
     with connect(settings.dsn) as conn:
         survey = get_survey(conn, name)
-        kilometres = parse_km(km, loaded_kilometres(conn, survey))
+        there = loaded_kilometres(conn, survey)
+        if not there:
+            raise nothing_yet(conn, survey, "has no ground")
+        kilometres = parse_km(km, there)
         with bar("km") as progress:
             return diagnose_survey(conn, survey, kilometres, defaults(), step(progress)("intensity", len(kilometres)))
 

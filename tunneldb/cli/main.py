@@ -130,6 +130,8 @@ class LazyGroup(click.Group):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Note whether JSON is asked for: what is wrong with the rest of the line is to be said in it, too."""
+        if strange := next((word for word in args if any("\ud800" <= c <= "\udfff" for c in word)), None):
+            ctx.fail(f"{strange!a} has bytes that are no UTF-8.")
         ctx.meta[AS_JSON] = JSON in args and next((word for word in args if word in COMMANDS), None) != "psql"
         return super().parse_args(ctx, args)
 
@@ -200,4 +202,22 @@ def _first_line(error: Exception) -> str:
 @click.pass_context
 def main(ctx: click.Context, dsn: str | None) -> None:
     """From laser scans of tunnels to water leaks, in PostGIS and QGIS."""
+    if dsn and ctx.get_parameter_source("dsn") is click.core.ParameterSource.COMMANDLINE:
+        _warn_of_password(dsn)
     ctx.obj = Settings(dsn=dsn or None)
+
+
+def _warn_of_password(dsn: str) -> None:
+    """Say so where a password stands on the command line, which all users of the machine can read."""
+    import psycopg
+
+    try:
+        told = psycopg.conninfo.conninfo_to_dict(dsn)
+    except psycopg.ProgrammingError:
+        return  # said when the connection is opened
+    if told.get("password"):
+        click.echo(
+            "everybody on this machine can read the password in --dsn (ps); put it into ~/.pgpass, or a service into"
+            " ~/.pg_service.conf and --dsn service=NAME",
+            err=True,
+        )

@@ -9,11 +9,9 @@ from typing import Any
 
 import click
 
+from tunneldb.csvfile import LARGEST
 from tunneldb.errors import UserError
 from tunneldb.files import require_regular
-
-LARGEST = 1e12
-"""Greatest size of a number: no length, area, level or share that is meant comes near it."""
 
 
 class FilePath(click.Path):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Sequence
@@ -14,6 +12,7 @@ import numpy as np
 import shapely
 
 from tunneldb.arrays import Float
+from tunneldb.csvfile import write_csv
 from tunneldb.evaluate.measure import HALF, Comparison, Figures, figures
 
 DISTANCES = (5.0, 10.0)
@@ -275,11 +274,8 @@ def as_json(report: Report, about: dict[str, Any]) -> str:
 
 def as_csv(report: Report) -> str:
     """Write the figures as CSV, a row for each group; what can't be told is empty."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["group", *(field.name for field in fields(Figures))])
-    writer.writerows([name, *_plain(of).values()] for name, of in report.groups.items())
-    return out.getvalue()
+    names = ["group", *(field.name for field in fields(Figures))]
+    return write_csv(names, ([name, *_plain(of).values()] for name, of in report.groups.items()))
 
 
 def _plain_item(item: Item) -> dict[str, Any]:

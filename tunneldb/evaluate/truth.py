@@ -147,7 +147,7 @@ def _polygons(wkb: NDArray[np.object_], ids: list[str], where: str, noun: str) -
     shapes = []
     for key, data in zip(ids, wkb, strict=True):
         try:
-            shape = None if data is None else shapely.from_wkb(data)
+            shape = None if data is None else shapely.from_wkb(data, on_invalid="ignore")
         except shapely.errors.GEOSException as error:
             raise UserError(f"{where}, {noun} {key} is no valid polygon ({_line(error)}): mend it, and try again") from None
         if not isinstance(shape, Polygon | MultiPolygon) or shape.is_empty:

@@ -283,7 +283,7 @@ def _read_layer(path: Path, survey: Survey, columns: Mapping[str, str], layer: s
     held = {ours: found[names.index(theirs)] for ours, theirs in wanted.items() if theirs in names}
     for k, data in enumerate([] if shapes is None else shapes):
         values = {ours: str(column[k]) for ours, column in held.items() if not _empty(column[k])}
-        yield Row(k + 1, values, None if data is None else shapely.from_wkb(data), view)
+        yield Row(k + 1, values, None if data is None else shapely.from_wkb(data, on_invalid="ignore"), view)
 
 
 def _empty(value: Any) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tunneldb.alignment.drawing import open_drawing
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 
@@ -52,13 +53,7 @@ def read_drawing(path: Path, unit: str | None, layer: str | None) -> DrawnOutlin
         If it can't be read, states no unit and none is given, or another; has several layers of lines and none is chosen; has
         curves that are no arcs; or leaves a gap.
     """
-    from ezdxf import filemanagement
-    from ezdxf.lldxf.const import DXFError
-
-    try:
-        drawing = filemanagement.readfile(str(path))
-    except (OSError, DXFError, ValueError) as error:
-        raise UserError(f"{path} cannot be read as DXF: {str(error).strip().splitlines()[0]}") from None
+    drawing = open_drawing(path)
     metres, notes = _unit(path, drawing.header.get("$INSUNITS", 0), unit)
     entities: list[Any] = [one for one in drawing.modelspace() if one.dxftype() in (*_PLAIN, *_POLYLINES, *_CURVES)]
     chosen = _layer(path, sorted({one.dxf.layer for one in entities}), layer)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tunneldb.arrays import Float, Int64
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.formats.table import format_of
-from tunneldb.pointcloud.points import CHUNK, Raw
+from tunneldb.pointcloud.points import CHUNK, Raw, on_earth
 
 SAMPLE = 400_000  # points, up to twice as many
 PLACES, RUN = 20, 50_000  # runs of points of which values are looked at, and points of each: a chunk of LAZ
@@ -39,7 +39,7 @@ class UniformSample:
         chance = self._random.random(len(raw))
         chosen = np.flatnonzero(chance < self.share)
         xyz = np.column_stack([np.asarray(stored)[chosen] for stored in (raw.x, raw.y, raw.z)]) * raw.scales + raw.offsets
-        good = np.isfinite(xyz).all(axis=1)
+        good = on_earth(xyz).all(axis=1)
         self._kept.append((chance[chosen][good], xyz[good], chosen[good] + first))
         self._count += int(good.sum())
         while self._count > 2 * self.most:
@@ -117,11 +117,14 @@ def read_contents(path: Path, progress: Callable[[int], None] = lambda count: No
     for raw in format_of(path).read(path, None, CHUNK, None):
         sample.add(raw, points)
         points += len(raw)
-        stored = [np.asarray(values) for values in (raw.x, raw.y, raw.z)]
-        wrong = ~np.logical_and.reduce([np.isfinite(values) for values in stored])
-        misplaced += int(wrong.sum())
-        low = np.fmin(low, np.array([_least(values) for values in stored]) * raw.scales + raw.offsets)
-        high = np.fmax(high, np.array([-_least(-values.astype(np.float64)) for values in stored]) * raw.scales + raw.offsets)
+        placed = [
+            np.asarray(values) * scale + offset
+            for values, scale, offset in zip((raw.x, raw.y, raw.z), raw.scales, raw.offsets, strict=True)
+        ]
+        right = np.logical_and.reduce([on_earth(values) for values in placed])
+        misplaced += len(raw) - int(right.sum())
+        low = np.fmin(low, [_least(values[right]) for values in placed])
+        high = np.fmax(high, [-_least(-values[right]) for values in placed])
         numbers, counts = np.unique(np.asarray(raw.scan_id), return_counts=True)
         for number, count in zip(numbers.tolist(), counts.tolist(), strict=True):
             scans[number] = scans.get(number, 0) + count
@@ -181,4 +184,4 @@ def read_near(path: Path, contents: Contents, near: NDArray[np.bool_]) -> Float:
         for raw in format_of(path).read(path, None, CHUNK, ranges)
     ]
     xyz = np.concatenate([np.empty((0, 3)), *parts])
-    return np.asarray(xyz[np.isfinite(xyz).all(axis=1)])
+    return np.asarray(xyz[on_earth(xyz).all(axis=1)])

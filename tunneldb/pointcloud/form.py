@@ -54,7 +54,10 @@ def tunnel_form(xyz: Float) -> TunnelForm | None:
     along, across = line.place(even)
     first, last = np.percentile(along, [0.1, 99.9])
     sizes = []
-    edges = np.linspace(first, last, max(1, round((last - first) / _SLICE)) + 1)
+    count = max(1, round((last - first) / _SLICE))
+    if count > len(even):
+        return None
+    edges = np.linspace(first, last, count + 1)
     slices = np.searchsorted(edges, along) - 1
     for number in range(len(edges) - 1):
         inside = slices == number

@@ -19,6 +19,15 @@ Ranges = Sequence[tuple[int, int]]
 """Half-open ranges of point numbers, from 0, in the order in which they are to be read."""
 
 
+FARTHEST = 1e9
+"""Greatest coordinate of a point, m: no projected system has one, and what is computed from it would be lost in rounding."""
+
+
+def on_earth(values: Float) -> Bool:
+    """Which coordinates are finite, and such as a coordinate system has."""
+    return np.asarray(np.abs(values) <= FARTHEST)
+
+
 @dataclass(frozen=True)
 class Raw:
     """A chunk of points as the file stores them, mostly as views of its records.
@@ -112,14 +121,16 @@ class Points:
         )  # fmt: skip
 
     def finite(self, *, time: bool, intensity: bool) -> Bool | None:
-        """Which points have finite coordinates, and a finite time and intensity where these are asked for; None if all have."""
+        """Which points have coordinates on earth, and a finite time and intensity where asked for; None if all have."""
         wanted: list[Float | Single] = [self.xyz]
         wanted += [self.time] if time else []
         wanted += [self.intensity] if intensity else []
         with np.errstate(over="ignore", invalid="ignore"):
-            if all(np.isfinite(values.sum()) for values in wanted):
+            if -FARTHEST <= self.xyz.min(initial=0.0) <= self.xyz.max(initial=0.0) <= FARTHEST and all(
+                np.isfinite(values.sum()) for values in wanted
+            ):
                 return None
-        finite = np.ones(len(self), np.bool_)
+        finite: Bool = np.asarray(on_earth(self.xyz).all(axis=1))
         for values in wanted:
             finite &= np.isfinite(values).reshape(len(self), -1).all(axis=1)
         return None if finite.all() else finite

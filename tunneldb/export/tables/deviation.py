@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from typing import Any
 
 import psycopg
 from psycopg import sql
 from psycopg.rows import dict_row
 
+from tunneldb.csvfile import write_csv
 from tunneldb.store.survey import Survey
 
 Row = dict[str, Any]
@@ -58,11 +57,7 @@ def volume(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float
 
 def sections_csv(rows: list[Row]) -> str:
     """Sections as CSV, with a header; what could not be told is empty."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
+    return write_csv(COLUMNS, ([row[name] for name in COLUMNS] for row in rows))
 
 
 def _rounded(value: Any) -> Any:

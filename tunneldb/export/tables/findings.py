@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import datetime as dt
-import io
 import json
 import math
 import warnings
@@ -21,6 +19,7 @@ from psycopg import sql
 from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
+from tunneldb.csvfile import write_csv
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
 from tunneldb.export.tables.leaks import Geometry
 from tunneldb.geometry.crs import LOCAL
@@ -159,13 +158,13 @@ def read_findings(
 
 def as_csv(findings: Sequence[Finding]) -> str:
     """Write findings as CSV with a header; the last column, ``geometry``, is WKT."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*COLUMNS, "geometry"])
-    for finding in findings:
-        shape = shapely.to_wkt(finding.geometry, rounding_precision=DECIMALS)
-        writer.writerow([*(_plain(getattr(finding, name)) for name in COLUMNS), shape])
-    return out.getvalue()
+    return write_csv(
+        [*COLUMNS, "geometry"],
+        (
+            [*(_plain(getattr(one, name)) for name in COLUMNS), shapely.to_wkt(one.geometry, rounding_precision=DECIMALS)]
+            for one in findings
+        ),
+    )
 
 
 def as_geojson(findings: Sequence[Finding], geometry: Geometry, srid: int) -> str:

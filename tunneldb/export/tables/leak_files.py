@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import datetime as dt
-import io
 import json
 import warnings
 from collections.abc import Sequence
@@ -18,6 +16,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry import mapping
 
+from tunneldb.csvfile import write_csv
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN, write_gaps, write_remarks
 from tunneldb.export.tables.leaks import COLUMNS, Anomaly, Geometry, Kind, LeakList
 from tunneldb.geometry.crs import LOCAL
@@ -32,18 +31,16 @@ def as_csv(leaks: LeakList) -> str:
     First come the stretches for which they can't be vouched for: their ``kind`` is the state of the stretch, ``reasons`` says
     why, and ``counted`` is False. Then what else is to be known, of the kind ``remark``, in ``reasons``.
     """
-    out = io.StringIO()
-    writer = csv.DictWriter(out, [*COLUMNS, "geometry"], lineterminator="\n")
-    writer.writeheader()
+    rows: list[dict[str, Any]] = []
     for gap in leaks.coverage.gaps:
         place = {"chainage_from": _plain(gap.chainage_from), "chainage_to": _plain(gap.chainage_to), "label": gap.label_from}
-        writer.writerow({**place, "kind": gap.state, "reasons": gap.reason, "counted": False})
-    for remark in leaks.remarks:
-        writer.writerow({"kind": "remark", "reasons": remark.said, "counted": False})
+        rows.append({**place, "kind": gap.state, "reasons": gap.reason, "counted": False})
+    rows += [{"kind": "remark", "reasons": remark.said, "counted": False} for remark in leaks.remarks]
     for leak in leaks.rows:
         wkt = shapely.to_wkt(leak.geometry, rounding_precision=DECIMALS)
-        writer.writerow({**{name: _plain(getattr(leak, name)) for name in COLUMNS}, "geometry": wkt})
-    return out.getvalue()
+        rows.append({**{name: _plain(getattr(leak, name)) for name in COLUMNS}, "geometry": wkt})
+    names = [*COLUMNS, "geometry"]
+    return write_csv(names, ([row.get(name) for name in names] for row in rows))
 
 
 def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:

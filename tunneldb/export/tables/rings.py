@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import TextIO
 
 import numpy as np
 
+from tunneldb.csvfile import write_csv
 from tunneldb.pipeline.rings import RingRow, SurveyedRings
 
 Chord = tuple[str, float, float]
@@ -24,19 +22,10 @@ _METRES, _SMALL, _DEGREES, _TURN, _PERMILLE = 4, 5, 2, 3, 3  # decimals; small i
 SUMMARY = ("rings", "median", "95 % below", "greatest", "ring")
 
 
-def write_rings(stream: TextIO, surveyed: SurveyedRings, orders: int, chords: Sequence[Chord] = ()) -> None:
-    """Write the table of rings as CSV; what is not known is empty."""
-    writer = csv.writer(stream, lineterminator="\n")
-    records = ring_records(surveyed, orders, chords)
-    writer.writerow(records[0])
-    writer.writerows(["" if value is None else value for value in record.values()] for record in records)
-
-
 def rings_csv(surveyed: SurveyedRings, orders: int, chords: Sequence[Chord] = ()) -> str:
-    """Return the table of rings as CSV."""
-    text = io.StringIO()
-    write_rings(text, surveyed, orders, chords)
-    return text.getvalue()
+    """Return the table of rings as CSV; what is not known is empty."""
+    records = ring_records(surveyed, orders, chords)
+    return write_csv(list(records[0]), (record.values() for record in records))
 
 
 def ring_records(surveyed: SurveyedRings, orders: int, chords: Sequence[Chord] = ()) -> list[dict[str, Value]]:

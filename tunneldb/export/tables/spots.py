@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import datetime as dt
-import io
 import json
 import warnings
 from dataclasses import dataclass, fields
@@ -18,6 +16,7 @@ import shapely
 from psycopg import sql
 from shapely.geometry import Polygon, mapping
 
+from tunneldb.csvfile import write_csv
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
 from tunneldb.export.tables.leak_files import DECIMALS
 from tunneldb.geometry.crs import LOCAL
@@ -197,15 +196,14 @@ def as_csv(spots: SpotList) -> str:
 
     Where the list can't be vouched for, its first row says so: ``kind`` is unseen, ``remark`` says why, ``counted`` is False.
     """
-    out = io.StringIO()
-    writer = csv.DictWriter(out, [*COLUMNS, "geometry"], lineterminator="\n")
-    writer.writeheader()
+    rows: list[dict[str, Any]] = []
     if spots.statement:
-        writer.writerow({"kind": "unseen", "remark": spots.statement, "counted": False})
+        rows.append({"kind": "unseen", "remark": spots.statement, "counted": False})
     for spot in spots.rows:
         wkt = shapely.to_wkt(spot.geometry, rounding_precision=DECIMALS)
-        writer.writerow({**{name: _plain(getattr(spot, name)) for name in COLUMNS}, "geometry": wkt})
-    return out.getvalue()
+        rows.append({**{name: _plain(getattr(spot, name)) for name in COLUMNS}, "geometry": wkt})
+    names = [*COLUMNS, "geometry"]
+    return write_csv(names, ([row.get(name) for name in names] for row in rows))
 
 
 def as_geojson(spots: SpotList, geometry: Geometry, srid: int) -> str:
