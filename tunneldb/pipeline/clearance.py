@@ -50,7 +50,7 @@ _EDGE = 2.0  # m beyond them from which points may belong to it: its ends are th
 class Options:
     """What a clearance depends on beside points and outline; ``radius`` and ``cant`` replace what the track says, m."""
 
-    gauge: float = GAUGE
+    track_gauge: float = GAUGE
     widening: Widening = field(default_factory=Widening)
     radius: float | None = None
     cant: float | None = None
@@ -165,7 +165,7 @@ def _kilometre(
 ) -> dict[str, Any]:  # fmt: skip
     first, stop = km * KILOMETRE, (km + 1) * KILOMETRE
     first, stop = max(first, np.floor(ends[0])), min(stop, np.ceil(ends[1]))
-    track = tracks.given or _fitted(conn, survey, km, axis, tracks.rough[name], options.gauge)
+    track = tracks.given or _fitted(conn, survey, km, axis, tracks.rough[name], options.track_gauge)
     begins = np.arange(first, stop, STEP)
     held = np.isfinite(track.at(begins + STEP / 2.0)[:, 0]) if len(track.chainage) > 1 else np.zeros(len(begins), np.bool_)
     seen = _share_seen(track, begins, held)

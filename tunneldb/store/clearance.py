@@ -56,13 +56,11 @@ def load_classed(
         Only points of rails and other bars along the ground.
     """
     parts = []
-    limit = sql.SQL("FROM {} WHERE chainage >= %(begin)s AND chainage < %(end)s")
-    if rails:
-        limit += sql.SQL(" AND class = %(rail)s")
+    limit = sql.SQL("FROM {} WHERE chainage >= %(begin)s AND chainage < %(end)s AND (class = %(rail)s OR NOT %(rails)s)")
     for part in (km - 1, km, km + 1):
         if begin < (part + 1) * 1000 and end > part * 1000 and partition_exists(conn, survey, part):
             source = limit.format(partition(survey, part))
-            values = {"begin": begin, "end": end, "rail": int(PointClass.RAIL)}
+            values = {"begin": begin, "end": end, "rail": int(PointClass.RAIL), "rails": rails}
             parts.append(fetch_array(conn, [*_XYZ, _CLASS], source, values))
     if not parts:
         return np.empty((0, 3)), np.empty(0, np.uint8)
