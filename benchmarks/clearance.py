@@ -10,7 +10,6 @@ import argparse
 import resource
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,7 @@ from benchmarks.common import print_table, save, scratch_database
 from benchmarks.synthetic import Size, make
 from tunneldb.classification.classes import PointClass
 from tunneldb.database import connect
-from tunneldb.pipeline.clearance import Options, read_track, measure_clearance
+from tunneldb.pipeline.clearance import Options, measure_kilometre, read_track
 from tunneldb.shape.clearance import clearance
 from tunneldb.shape.gauge import Widening, overthrow, widened
 from tunneldb.shape.outline import Outline
@@ -74,23 +73,22 @@ def timed(kilometres: int, points: int, folder: Path) -> list[tuple[object, ...]
     lane = folder / "lane.csv"
     lane.write_text(f"chainage,right,up\n0,0.1,-2.3\n{1000 * kilometres},0.1,-2.3\n")
 
-    def quiet(_: str, __: float) -> Callable[[float], None]:
-        return lambda _: None
-
     with scratch_database(None) as dsn, connect(dsn) as conn:
         make(conn, "demo-2024", Size(kilometres, 100, points, 10, 10))
         conn.commit()
         survey = get_survey(conn, "demo-2024")
-        conn.execute("DELETE FROM tunnel.run WHERE started_at > '2024-05-20'")  # the file that was read again
-        tracks = read_track(lane, load_alignment(conn, survey, 1.0))
+        axis = load_alignment(conn, survey, 1.0)
+        tracks = read_track(lane, axis)
         save_gauge(conn, survey, "example", BOX, "example")
         began = time.perf_counter()
-        made = measure_clearance(
-            conn, survey, tracks, "given", "example", BOX, Options(widening=Widening(14.0, 4.0)), -np.inf, np.inf, quiet
-        )  # fmt: skip
+        for km in range(kilometres):
+            measure_kilometre(
+                conn, survey, km, axis, tracks, "given", "example", BOX, Options(widening=Widening(14.0, 4.0)), (0.0, 1e9)
+            )  # fmt: skip
+            conn.commit()
         taken = time.perf_counter() - began
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    return [(len(made), round(points / 1e6, 1), round(taken, 1), round(memory))]
+    return [(kilometres, round(points / 1e6, 1), round(taken, 1), round(memory))]
 
 
 def main() -> None:
@@ -99,8 +97,15 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=0)
     options = parser.parse_args()
     results = {"margins": margins(), "tracks": tracks()}
-    print_table("margins against shapely's", ("radius m", "inside mm", "outside mm", "greatest difference µm"), results["margins"])
-    header = ("cant mm", "bend 1/m", "seen %", *(f"{k} {n}" for k in ("rms", "most", "stated") for n in ("right", "up", "cant")))
+    print_table(
+        "margins against shapely's", ("radius m", "inside mm", "outside mm", "greatest difference µm"), results["margins"]
+    )
+    header = (
+        "cant mm",
+        "bend 1/m",
+        "seen %",
+        *(f"{k} {n}" for k in ("rms", "most", "stated") for n in ("right", "up", "cant")),
+    )
     print_table("tracks against known rails, mm", header, results["tracks"])
     if options.km:
         import tempfile

@@ -43,7 +43,9 @@ _LENGTH = click.FloatRange(0.0)
     "--track-axis", type=click.Path(dir_okay=False, path_type=Path),
     help="Axis of the track or lane, instead of the rails': chainage,right,up[,cant] about the given axis, or x,y,z[,cant]; m.",
 )  # fmt: skip
-@click.option("--track-gauge", type=_LENGTH, default=1.435, show_default=True, metavar="M", help="Between the rails' inner faces.")
+@click.option(
+    "--track-gauge", type=_LENGTH, default=1.435, show_default=True, metavar="M", help="Between the rails' inner faces."
+)
 @click.option("--bogie-distance", type=_LENGTH, default=0.0, metavar="M", help="Of the vehicle, between its bogies' middles.")
 @click.option("--overhang", type=_LENGTH, default=0.0, metavar="M", help="Of the vehicle, from a bogie's middle to its end.")
 @click.option(
@@ -51,7 +53,9 @@ _LENGTH = click.FloatRange(0.0)
     help="Wider by these over the radius, m², instead of a vehicle.",
 )  # fmt: skip
 @click.option("--radius", type=float, metavar="M", help="Of the curve, positive to the right, instead of the track's own.")
-@click.option("--cant", type=float, metavar="M", help="How much higher the left rail lies, for roll, instead of the track's own.")
+@click.option(
+    "--cant", type=float, metavar="M", help="How much higher the left rail lies, for roll, instead of the track's own."
+)
 @click.option("--speed", type=_LENGTH, default=0.0, metavar="KM/H", help="For roll by too little or too much cant.")
 @click.option("--flexibility", type=_LENGTH, default=0.0, help="Roll of the vehicle over the angle of missing cant.")
 @click.option("--roll-height", type=float, default=0.5, show_default=True, metavar="M", help="About which it rolls.")
@@ -59,7 +63,9 @@ _LENGTH = click.FloatRange(0.0)
 @click.option("--group-points", type=click.IntRange(1), default=3, show_default=True, help="Fewer points are no obstacle, …")
 @click.option("--group-radius", type=_LENGTH, default=0.3, show_default=True, metavar="M", help="… within this radius.")
 @stretch_options
-@click.option("--every", type=click.FloatRange(1.0), default=10.0, show_default=True, metavar="M", help="Of sections of a .dxf.")
+@click.option(
+    "--every", type=click.FloatRange(1.0), default=10.0, show_default=True, metavar="M", help="Of sections of a .dxf."
+)
 @click.option(
     "-o", "--output", type=click.Path(dir_okay=False, path_type=Path),
     help="File to write: .csv of all metres and directions, .dxf of sections with outline and points.",

@@ -154,20 +154,21 @@ def measure_clearance(
     conn.rollback()
     for km, inputs in wanted:
         with stage_run(conn, survey.id, km, "clearance", inputs) as run:
-            run.counts.update(_kilometre(conn, survey, km, axis, tracks, track, gauge, outline, options, ends))
+            run.counts.update(measure_kilometre(conn, survey, km, axis, tracks, track, gauge, outline, options, ends))
         advance(1)
     return [km for km, _ in wanted]
 
 
-def _kilometre(
+def measure_kilometre(
     conn: psycopg.Connection[Any], survey: Survey, km: int, axis: Alignment, tracks: Tracks, name: str, gauge: str,
     outline: Outline, options: Options, ends: tuple[float, float],
 ) -> dict[str, Any]:  # fmt: skip
+    """Measure the clearance of a track in a kilometre between the survey's ends and save it; counts for the ledger."""
     first, stop = km * KILOMETRE, (km + 1) * KILOMETRE
     first, stop = max(first, np.floor(ends[0])), min(stop, np.ceil(ends[1]))
     track = tracks.given or _fitted(conn, survey, km, axis, tracks.rough[name], options.track_gauge)
     begins = np.arange(first, stop, STEP)
-    held = np.isfinite(track.at(begins + STEP / 2.0)[:, 0]) if len(track.chainage) > 1 else np.zeros(len(begins), np.bool_)
+    held = np.isfinite(track.at(begins + STEP / 2.0)[:, 0]) if len(track.chainage) else np.zeros(len(begins), np.bool_)
     seen = _share_seen(track, begins, held)
     counts: dict[str, Any] = {"metres": len(begins), "track_metres": int(held.sum()), "track_seen": round(seen, 4)}
     begins = begins[held]
@@ -196,7 +197,9 @@ def _kilometre(
     sections = []
     for k, s in enumerate(found.sections):
         there = s.index >= 0
-        error = float(np.hypot(np.hypot(at[k, 3], at[k, 4]), _arm(places, s.index) * at[k, 5] / track.spacing)) if there else None
+        error = (
+            float(np.hypot(np.hypot(at[k, 3], at[k, 4]), _arm(places, s.index) * at[k, 5] / track.spacing)) if there else None
+        )
         sections.append(SavedSection((
             s.chainage, s.chainage + STEP, *(float(v) for v in (at[k, 0], at[k, 1], cant[k], bend[k], left[k], right[k])),
             float(wide.roll[k]), s.margin if there else None, error, s.clock if there else None,

@@ -92,7 +92,10 @@ class Track:
     def at(self, chainage: Float) -> Float:
         """Right, up, cant, right_se, up_se, cant_se at chainages (n,): (n, 6), m; NaN where there is no track."""
         columns = (self.right, self.up, self.cant, self.right_se, self.up_se, self.cant_se)
-        found = np.column_stack([np.interp(chainage, self.chainage, column) for column in columns])
+        found = np.column_stack([_linear(chainage, self.chainage, column) for column in columns])
+        if len(self.chainage) < 2:
+            found[np.abs(chainage - self.chainage[0]) > self.reach + 1e-6] = np.nan
+            return found
         after = np.clip(np.searchsorted(self.chainage, chainage), 1, len(self.chainage) - 1)
         away = np.minimum(np.abs(chainage - self.chainage[after - 1]), np.abs(chainage - self.chainage[after]))
         found[away > self.reach + 1e-6] = np.nan
@@ -242,6 +245,15 @@ def curvature(chainage: Float, xy: Float, window: float = 50.0) -> Float:
     return np.asarray(-(dx * ddy - dy * ddx) / np.hypot(dx, dy) ** 3)
 
 
+def _linear(at: Float, along: Float, values: Float) -> Float:
+    """Values (n,) at growing places interpolated linearly, and before the first and after the last of them continued so."""
+    if len(along) < 2:
+        return np.full(len(at), values[0])
+    k = np.clip(np.searchsorted(along, at), 1, len(along) - 1)
+    share = (at - along[k - 1]) / (along[k] - along[k - 1])
+    return np.asarray(values[k - 1] + share * (values[k] - values[k - 1]))
+
+
 def _runs(number: Float) -> list[tuple[int, int]]:
     """First and one after the last of each run of equal numbers."""
     bounds = np.flatnonzero(np.diff(number, prepend=number[:1] - 1, append=number[-1:] + 1)) if len(number) else []
@@ -275,8 +287,7 @@ def _continued(pairs: Pairs, track: list[int], chainage: float) -> float:
 
 def _measured(points: Float, stations: Float, head: Float, top: Float) -> Float:
     """Middle and top of a rail at stations, (n, 2), m, NaN where it is not seen; ``head`` and ``top`` are what it is near."""
-    expected = np.interp(points[:, 0], stations, head)
-    level = np.interp(points[:, 0], stations, top)
+    expected, level = _linear(points[:, 0], stations, head), _linear(points[:, 0], stations, top)
     aside, above = points[:, 1] - expected, points[:, 2] - level
     near = np.flatnonzero((np.abs(aside) <= HEAD / 2.0 + 0.04) & (np.abs(above) <= 2.0 * _TOP))
     number = np.floor(points[near, 0] / STATION).astype(np.int64) - int(np.floor(stations[0] / STATION))

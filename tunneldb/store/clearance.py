@@ -71,7 +71,8 @@ def load_classed(
 def classed_kilometres(conn: psycopg.Connection[Any], survey: Survey) -> list[int]:
     """Kilometres whose points have classes, in order."""
     rows = conn.execute(
-        "SELECT DISTINCT km FROM tunnel.run WHERE survey_id = %s AND stage = 'ground' AND outcome = 'done' ORDER BY km", [survey.id]
+        "SELECT DISTINCT km FROM tunnel.run WHERE survey_id = %s AND stage = 'ground' AND outcome = 'done' ORDER BY km",
+        [survey.id],
     ).fetchall()
     return [km for (km,) in rows]
 
@@ -125,7 +126,9 @@ def made_of(conn: psycopg.Connection[Any], survey: Survey, km: int, gauge: str, 
 
 def ground_reason(conn: psycopg.Connection[Any], survey: Survey, km: int) -> str | None:
     """Why stage ground is out of date in a kilometre; None if it is not."""
-    row = conn.execute("SELECT reason FROM tunnel_api.stage_state(%s) WHERE stage = 'ground' AND km = %s", [survey.id, km]).fetchone()
+    row = conn.execute(
+        "SELECT reason FROM tunnel_api.stage_state(%s) WHERE stage = 'ground' AND km = %s", [survey.id, km]
+    ).fetchone()
     return None if row is None else row[0]
 
 

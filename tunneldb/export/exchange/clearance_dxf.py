@@ -64,7 +64,9 @@ def write_clearance(
                 space.add_circle(point, 0.1, dxfattribs={"layer": "NEAREST"})
         for arm in ((_CROSS, 0.0), (0.0, _CROSS)):
             space.add_line(at - arm, at + arm, dxfattribs={"layer": "TRACK"})
-        said = f"{label}  " + ("nothing seen" if margin is None else f"{margin:.3f} m, {klass}") + f", seen {100.0 * seen:.0f} %"
+        said = (
+            f"{label}  " + ("nothing seen" if margin is None else f"{margin:.3f} m, {klass}") + f", seen {100.0 * seen:.0f} %"
+        )
         write(space, said, (at[0] - 3.0, at[1] - 2.0), _TEXT, "TEXT")
     document.saveas(path)
     return len(rows)

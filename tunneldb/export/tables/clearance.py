@@ -33,7 +33,9 @@ def section_rows(conn: psycopg.Connection[Any], survey: Survey, gauge: str, trac
         ).fetchall()
 
 
-def infringement_rows(conn: psycopg.Connection[Any], survey: Survey, gauge: str, track: str, low: float, high: float) -> list[Row]:
+def infringement_rows(
+    conn: psycopg.Connection[Any], survey: Survey, gauge: str, track: str, low: float, high: float
+) -> list[Row]:
     """Infringements of a stretch, deepest first."""
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(
