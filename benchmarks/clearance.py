@@ -22,7 +22,6 @@ from tunneldb.database import connect
 from tunneldb.pipeline.clearance import Options, measure_kilometre, read_track
 from tunneldb.shape.clearance import clearance
 from tunneldb.shape.gauge import Widening, overthrow, widened
-from tunneldb.shape.outline import Outline
 from tunneldb.shape.track import fit_track, follow, rail_pairs
 from tunneldb.store.clearance import save_gauge
 from tunneldb.store.surface import load_alignment

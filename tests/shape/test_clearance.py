@@ -43,7 +43,8 @@ def test_two_tracks_are_found_with_their_cant_among_other_bars() -> None:
         track = fit_track(points, coarse, 0.0, 200.0)
         true = middle + track.chainage**2 / 4e4
         assert track.seen.mean() > 0.9
-        assert np.median(np.abs(track.right - true)) < 0.0015 and np.abs(track.right - true).max() < 0.005
+        assert np.median(np.abs(track.right - true)) < 0.0015
+        assert np.abs(track.right - true).max() < 0.005
         assert np.abs(track.up + 2.5).max() < 0.002
         assert np.abs(track.cant - cant).max() < 0.003
         assert 0.1 < np.std(track.right - true) / track.right_se.mean() < 10.0
@@ -108,13 +109,18 @@ def test_noise_and_people_do_not_infringe_but_a_box_does() -> None:
     classes = np.repeat([int(k) for k in kinds], [len(wall), 4, 12, 1, 5]).astype(np.uint8)
     found = clearance(places, classes, np.arange(3.0), [BOX] * 3)
     first, second, third = found.sections
-    assert first.margin == pytest.approx(0.4) and first.passing == 12 and first.inside == 0
-    assert second.margin == pytest.approx(-0.05) and second.inside == 4
+    assert first.margin == pytest.approx(0.4)
+    assert first.passing == 12
+    assert first.inside == 0
+    assert second.margin == pytest.approx(-0.05)
+    assert second.inside == 4
     assert second.clock == pytest.approx(clock(np.array([[1.55, 2.0]]), np.array([0.0, 2.3]))[0], abs=4.0)
-    assert third.margin == pytest.approx(0.4) and third.stray == 6
-    assert [(one.klass, len(one.points)) for one in found.infringements] == [(PointClass.OBJECT, 12), (PointClass.APPENDAGE, 4)]
+    assert third.margin == pytest.approx(0.4)
+    assert third.stray == 6
+    found_inside = [(one.klass, len(one.points)) for one in found.infringements]
+    assert found_inside == [(PointClass.OBJECT, 12), (PointClass.APPENDAGE, 4)]
     assert found.infringements[1].depth == pytest.approx(0.05)
-    assert third.seen < 0.9  # nothing below and little above
+    assert third.seen < 0.9  # nothing below, little above
 
 
 def test_curvature_of_a_circle() -> None:

@@ -81,13 +81,15 @@ def test_walls_a_box_and_a_person_about_a_track_found_by_its_rails(
     gauge = tmp_path / "example.csv"
     gauge.write_text(GAUGE_CSV)
     said = run("clearance", survey, "--gauge", gauge)
-    assert said["made"] == [0, 1] and said["track"] == "single"
+    assert said["made"] == [0, 1]
+    assert said["track"] == "single"
     assert [row["run"]["track_seen"] for row in said["kilometres"]] == [1.0, 1.0]
     assert {one["class"]: one["counts"] for one in said["infringements"]} == {"object": False, "appendage": True}
     rows = {row["chainage_from"]: row for row in said["sections"]}
     assert len(rows) == LAST - FIRST
     assert rows[990.0]["margin"] == pytest.approx(-0.1, abs=0.004)
-    assert rows[1010.0]["passing"] == 8 and rows[1010.0]["margin"] > 0
+    assert rows[1010.0]["passing"] == 8
+    assert rows[1010.0]["margin"] > 0
     # Nearest to the wall is the corner at the upper right.
     corner = RADIUS - np.hypot(TRACK[0] + 1.5, TRACK[1] + 4.0)
     lower = RADIUS - np.hypot(TRACK[0] + 1.5, TRACK[1] + 0.3)
@@ -119,5 +121,6 @@ def test_rails_that_cannot_be_told_are_one_line(
     gauge = tmp_path / "example.csv"
     gauge.write_text(GAUGE_CSV)
     done = CliRunner().invoke(main, ["clearance", survey, "--gauge", str(gauge), "--track-gauge", "1.0"])
-    assert done.exit_code == 2 and "no two rails 1 m apart" in done.output
+    assert done.exit_code == 2
+    assert "no two rails 1 m apart" in done.output
     assert conn.execute("SELECT count(*) FROM tunnel.gauge").fetchone() == (0,)

@@ -35,13 +35,13 @@ _LENGTH = click.FloatRange(0.0)
 @click.argument("survey")
 @click.option(
     "--gauge", "outline", required=True, type=click.Path(dir_okay=False, path_type=Path),
-    help="Outline that is to be clear, .csv or .dxf as of profile add: about the middle of the track on its running surface, m.",
+    help="Outline that is to be clear, .csv or .dxf as of profile add: about the track's middle on its running surface, m.",
 )  # fmt: skip
 @click.option("--name", help="Name under which the outline is kept; by default that of its file.")
 @click.option("--track", help="left or right, or the number from the left of more than two; needed if there are several.")
 @click.option(
     "--track-axis", type=click.Path(dir_okay=False, path_type=Path),
-    help="Axis of the track or lane, instead of the rails': chainage,right,up[,cant] about the given axis, or x,y,z[,cant]; m.",
+    help="Axis of the track or lane, instead of by rails: chainage,right,up[,cant] about the given axis, or x,y,z[,cant]; m.",
 )  # fmt: skip
 @click.option(
     "--track-gauge", type=_LENGTH, default=1.435, show_default=True, metavar="M", help="Between the rails' inner faces."
@@ -71,7 +71,7 @@ _LENGTH = click.FloatRange(0.0)
     help="File to write: .csv of all metres and directions, .dxf of sections with outline and points.",
 )  # fmt: skip
 @click.pass_obj
-def clearance(settings: Settings, survey: str, outline: Path, name: str | None, output: Path | None, **asked: Any) -> None:
+def clearance(settings: Settings, /, survey: str, outline: Path, name: str | None, output: Path | None, **asked: Any) -> None:
     """Hold what stands in SURVEY against an outline about a track, and state margins and infringements.
 
     The track is found by its rails, or given. Points of survey density of any class count but ground, rails and noise; objects
@@ -131,13 +131,14 @@ def clearance(settings: Settings, survey: str, outline: Path, name: str | None, 
 def _widening(asked: dict[str, Any]) -> Widening:
     from tunneldb.shape.gauge import Widening
 
+    inside, outside = asked["curve_widening"]
     vehicle = asked["bogie_distance"] > 0.0 or asked["overhang"] > 0.0
-    if vehicle and any(asked["curve_widening"]):
+    if vehicle and max(inside, outside) > 0.0:
         raise UserError("--curve-widening stands for --bogie-distance and --overhang: leave one out")
     if asked["flexibility"] > 0.0 and asked["speed"] == 0.0:
         raise UserError("--flexibility needs --speed")
     return Widening(
-        asked["bogie_distance"], asked["overhang"], *asked["curve_widening"], asked["speed"] / 3.6, asked["flexibility"],
+        asked["bogie_distance"], asked["overhang"], inside, outside, asked["speed"] / 3.6, asked["flexibility"],
         asked["roll_height"], asked["allowance"],
     )  # fmt: skip
 
@@ -156,11 +157,14 @@ def _print(kilometres: list[Row], rows: list[Row], inside: list[Row], track: str
         return "" if value is None else f"{value:.3f}"
 
     print_table(
-        ["km", "metres", "track seen %", "axis ± mm", "cant ± mm", "least margin m", "metres inside", "seen %", "stray", "passing", "ground"],
+        [
+            "km", "metres", "track seen %", "axis ± mm", "cant ± mm", "least margin m", "metres inside", "seen %", "stray",
+            "passing", "ground",
+        ],
         [
             (row["km"], f"{row['metres']} of {row['run']['metres']}", f"{100 * row['run']['track_seen']:.1f}",
-             f"{1e3 * row['run'].get('axis_se', 0.0):.1f}", f"{1e3 * row['run'].get('cant_se', 0.0):.1f}", metres(row["margin"]),
-             row["metres_inside"], f"{100 * row['seen_share']:.1f}", row["stray"], row["passing"], row["ground"])
+             f"{1e3 * row['run'].get('axis_se', 0.0):.1f}", f"{1e3 * row['run'].get('cant_se', 0.0):.1f}",
+             metres(row["margin"]), row["metres_inside"], f"{100 * row['seen_share']:.1f}", row["stray"], row["passing"], row["ground"])
             for row in kilometres
         ],
         right=range(1, 11),
@@ -169,8 +173,8 @@ def _print(kilometres: list[Row], rows: list[Row], inside: list[Row], track: str
     print_table(
         ["tightest at", "margin m", "±", "clock °", "by", "cluster", "radius m", "wider left mm", "right mm", "roll mrad"],
         [
-            (row["label"], metres(row["margin"]), metres(row["margin_se"]), f"{row['clock']:.0f}", row["class"], row["cluster_id"],
-             "" if row["radius"] is None else f"{row['radius']:.0f}", f"{1e3 * row['widened_left']:.1f}",
+            (row["label"], metres(row["margin"]), metres(row["margin_se"]), f"{row['clock']:.0f}", row["class"],
+             row["cluster_id"], "" if row["radius"] is None else f"{row['radius']:.0f}", f"{1e3 * row['widened_left']:.1f}",
              f"{1e3 * row['widened_right']:.1f}", f"{1e3 * row['roll']:.1f}")
             for row in tightest
         ],
@@ -178,6 +182,6 @@ def _print(kilometres: list[Row], rows: list[Row], inside: list[Row], track: str
     )  # fmt: skip
     count = sum(row["counts"] for row in inside)
     click.echo(
-        f"{gauge} about track {track}: {count} infringements, and {len(inside) - count} by objects, which may be gone; stray, passing,"
-        " ground: points inside that do not count; what was not seen is not clear"
+        f"{gauge} about track {track}: {count} infringements, and {len(inside) - count} by objects, which may be gone; stray,"
+        " passing, ground: points inside that do not count; what was not seen is not clear"
     )

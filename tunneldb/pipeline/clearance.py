@@ -1,4 +1,4 @@
-"""Clearance of a survey's tracks, kilometre by kilometre: tracks from rails or a file, distances from the outline, infringements."""
+"""Clearance of a survey's tracks, kilometre by kilometre: tracks from rails or a file, distances from an outline."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 import psycopg
 import shapely
 
-from tunneldb.arrays import Float
+from tunneldb.arrays import Bool, Float
 from tunneldb.classification.classes import PointClass
 from tunneldb.classification.objects.spacing import Spacing
 from tunneldb.csvfile import read_csv, read_header
@@ -95,8 +95,8 @@ def find_tracks(conn: psycopg.Connection[Any], survey: Survey, gauge: float = GA
         raise UserError(f"survey {survey.name}: {error}; give the track by --track-axis") from None
     if not found:
         raise UserError(
-            f"survey {survey.name}: no two rails {gauge:g} m apart were told along 25 m or more; give the track by --track-axis,"
-            " or its --track-gauge"
+            f"survey {survey.name}: no two rails {gauge:g} m apart were told along 25 m or more; give the track by"
+            " --track-axis, or its --track-gauge"
         )
     names = {1: ["single"], 2: ["left", "right"]}.get(len(found)) or [str(k + 1) for k in range(len(found))]
     return Tracks(dict(zip(names, found, strict=True)))
@@ -122,7 +122,8 @@ def read_track(path: Path, axis: Alignment) -> Tracks:
         raise UserError(f"{path}: a track takes two rows or more, in growing chainage")
     zero = np.zeros(len(table))
     reach = float(np.diff(places[:, 0]).max()) / 2.0
-    track = Track(*places.T, table["cant"], zero, zero, zero, np.ones(len(table), np.bool_), reach=reach)
+    chainage, right, up = places.T
+    track = Track(chainage, right, up, table["cant"], zero, zero, zero, np.ones(len(table), np.bool_), reach=reach)
     return Tracks({}, track, hashlib.md5(path.read_bytes(), usedforsecurity=False).hexdigest())
 
 
@@ -229,7 +230,7 @@ def _fitted(conn: psycopg.Connection[Any], survey: Survey, km: int, axis: Alignm
     return fit_track(points[np.isfinite(points[:, 0])], rough, low, high, gauge)
 
 
-def _share_seen(track: Track, begins: Float, held: Float) -> float:
+def _share_seen(track: Track, begins: Float, held: Bool) -> float:
     """Share of the metres whose nearest station saw both rails; 0 where there is no track."""
     if not held.any():
         return 0.0

@@ -56,8 +56,8 @@ class Terms:
 def overthrow(bogie_distance: float, overhang: float, curvature: Float) -> tuple[Float, Float]:
     """How far a vehicle's middle lies inside of the track's axis, and its ends outside, (n,), m.
 
-    The bogies' middles stand on a circle of radius R: their chord lies h = √(R² − a²/4) from its centre, so that the middle lies
-    R − h inside, and what lies x from it √(h² + x²) − R outside. This is geometry, of a point vehicle axles under its pivots.
+    The bogies' middles stand on a circle of radius R: their chord lies h = √(R² − a²/4) from its centre, so that the middle
+    lies R − h inside, and what lies x from it √(h² + x²) − R outside. This is geometry; bogies are taken to be points.
     """
     half = bogie_distance / 2.0
     bend = np.abs(curvature)

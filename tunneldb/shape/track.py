@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from tunneldb.arrays import Bool, Float
+from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.robust import MAD_TO_SIGMA
 
 GAUGE = 1.435
@@ -171,12 +172,11 @@ def follow(pairs: Pairs) -> list[Pairs]:
     long = [t for t in long if pairs.chainage[t[-1]] - pairs.chainage[t[0]] + STATION >= LEAST_TRACK]
     found = [Pairs(pairs.chainage[t], pairs.right[t], pairs.up[t]) for t in long]
     found.sort(key=lambda track: float(np.median(track.middle)))
-    for one, two in zip(found, found[1:], strict=False):
+    for one, two in pairwise(found):
         shared = np.intersect1d(one.chainage, two.chainage)
         if len(shared) and abs(float(np.median(two.middle)) - float(np.median(one.middle))) < GAUGE:
-            raise ValueError(
-                f"near chainage {shared[0]:.0f} two tracks would lie {np.median(two.middle) - np.median(one.middle):.2f} m apart"
-            )
+            apart = float(np.median(two.middle) - np.median(one.middle))
+            raise ValueError(f"near chainage {shared[0]:.0f} two tracks would lie {apart:.2f} m apart")
     return found
 
 
@@ -204,18 +204,18 @@ def fit_track(points: Float, coarse: Pairs, low: float, high: float, gauge: floa
     """
     low, high = max(low, coarse.chainage[0] - STATION / 2.0), min(high, coarse.chainage[-1] + STATION / 2.0)
     first, last = int(np.floor(low / STATION)), int(np.ceil(high / STATION))
-    stations = (np.arange(first, max(last, first + 1)) + 0.5) * STATION
+    stations = (np.arange(first, max(last, first + 1)) + 0.5) * np.float64(STATION)
     heads = np.stack([
         np.interp(stations, coarse.chainage, column) for column in (*coarse.right.T, *coarse.up.T)
     ])  # fmt: skip
     width = gauge + HEAD
-    seen = np.zeros(len(stations), np.bool_)
+    seen: Bool = np.zeros(len(stations), np.bool_)
     smooth = np.zeros((3, len(stations)))
     errors = np.zeros((3, len(stations)))
     found = seen
     for _ in range(3):
         measured = [_measured(points, stations, heads[k], heads[k + 2]) for k in (0, 1)]
-        seen = found = np.isfinite(measured[0]).all(axis=1) & np.isfinite(measured[1]).all(axis=1)
+        seen = found = np.isfinite(np.hstack(measured)).all(axis=1)
         if seen.sum() < 4:
             break
         (left, left_up), (right, right_up) = measured[0].T, measured[1].T
@@ -227,7 +227,9 @@ def fit_track(points: Float, coarse: Pairs, low: float, high: float, gauge: floa
         heads = np.stack([smooth[0] - half, smooth[0] + half, smooth[1] + smooth[2] / 2.0, smooth[1] - smooth[2] / 2.0])
         seen = used
     kept = ~_far_from_seen(stations, seen) & (found | ~_contradicted(stations, heads, coarse))
-    return Track(stations[kept], *(row[kept] for row in smooth), *(row[kept] for row in errors), seen[kept], width)
+    right, up, cant = smooth[:, kept]
+    right_se, up_se, cant_se = errors[:, kept]
+    return Track(stations[kept], right, up, cant, right_se, up_se, cant_se, seen[kept], width)
 
 
 def curvature(chainage: Float, xy: Float, window: float = 50.0) -> Float:
@@ -254,10 +256,12 @@ def _linear(at: Float, along: Float, values: Float) -> Float:
     return np.asarray(values[k - 1] + share * (values[k] - values[k - 1]))
 
 
-def _runs(number: Float) -> list[tuple[int, int]]:
+def _runs(number: Int64) -> list[tuple[int, int]]:
     """First and one after the last of each run of equal numbers."""
-    bounds = np.flatnonzero(np.diff(number, prepend=number[:1] - 1, append=number[-1:] + 1)) if len(number) else []
-    return list(zip(bounds[:-1], bounds[1:], strict=True))
+    if not len(number):
+        return []
+    bounds = np.flatnonzero(np.diff(number, prepend=number[0] - 1, append=number[-1] + 1))
+    return list(pairwise(bounds.tolist()))
 
 
 def _heads(points: Float) -> Float:

@@ -147,14 +147,14 @@ def save_clearance(
     head = (survey.id, km, gauge, track)
     with conn.cursor() as cursor, cursor.copy(
         "COPY tunnel.clearance_section (survey_id, km, gauge, track, chainage_from, chainage_to, track_right, track_up, cant,"
-        " curvature, widened_left, widened_right, roll, margin, margin_se, clock, class, cluster_id, margins, seen_share, points,"
-        " inside, stray, passing, ground, outline, geom) FROM STDIN"
+        " curvature, widened_left, widened_right, roll, margin, margin_se, clock, class, cluster_id, margins, seen_share,"
+        " points, inside, stray, passing, ground, outline, geom) FROM STDIN"
     ) as copy:  # fmt: skip
         for row in sections:
             copy.write_row((*head, *row.values, None if row.point is None else _ewkb(shapely.Point(row.point), survey.srid)))
     with conn.cursor() as cursor, cursor.copy(
-        "COPY tunnel.clearance_infringement (survey_id, km, gauge, track, chainage_from, chainage_to, depth, clock, class, counts,"
-        " cluster_id, points, unrolled, geom) FROM STDIN"
+        "COPY tunnel.clearance_infringement (survey_id, km, gauge, track, chainage_from, chainage_to, depth, clock, class,"
+        " counts, cluster_id, points, unrolled, geom) FROM STDIN"
     ) as copy:  # fmt: skip
         for one in infringements:
             plane = None if one.unrolled is None else _ewkb(one.unrolled, 0)

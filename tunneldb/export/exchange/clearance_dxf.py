@@ -35,10 +35,10 @@ _TEXT, _CROSS, _GAP, _FAR = 0.25, 0.5, 3.0, 8.0  # m
 def write_clearance(
     conn: psycopg.Connection[Any], survey: Survey, gauge: str, track: str, low: float, high: float, every: float, path: Path
 ) -> int:
-    """Write a section every so many metres of a stretch, the tightest of each, side by side in rows; return how many."""
+    """Write the tightest section of every so many metres of a stretch, side by side in rows; return how many."""
     rows = conn.execute(
-        "SELECT DISTINCT ON (floor(chainage_from / %(every)s)) km, chainage_from, label, margin, class, seen_share, track_right,"
-        " track_up, cant, outline, public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom) FROM tunnel_api.clearance_section"
+        "SELECT DISTINCT ON (floor(chainage_from / %(every)s)) km, chainage_from, label, margin, class, seen_share,"
+        " track_right, track_up, cant, outline, public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom) FROM tunnel_api.clearance_section"
         " WHERE survey_id = %(survey)s AND gauge = %(gauge)s AND track = %(track)s AND chainage_to > %(low)s"
         " AND chainage_from < %(high)s ORDER BY floor(chainage_from / %(every)s), margin NULLS LAST",
         {"every": every, "survey": survey.id, "gauge": gauge, "track": track, "low": low, "high": high},
@@ -51,7 +51,8 @@ def write_clearance(
     for number, (km, begin, label, margin, klass, seen, right, up, cant, outline, *nearest) in enumerate(rows):
         at = np.array([(number % ROW) * (2.0 * _FAR + _GAP), -(number // ROW) * (2.0 * _FAR + _GAP)])
         same = np.array([begin, begin + 1.0])
-        here = Track(same, *(np.full(2, value) for value in (right, up, cant, 0.0, 0.0, 0.0)), np.ones(2, np.bool_), reach=1.0)
+        none = np.zeros(2)
+        here = Track(same, none + right, none + up, none + cant, none, none, none, np.ones(2, np.bool_), reach=1.0)
         vertices = np.reshape(outline, (-1, 3))
         flat = [(*(vertex[:2] + at), vertex[2]) for vertex in vertices]
         space.add_lwpolyline(flat, format="xyb", dxfattribs={"layer": "OUTLINE"})

@@ -55,8 +55,8 @@ def summary(conn: psycopg.Connection[Any], survey: Survey, gauge: str, track: st
             " sum(c.ground)::int AS ground, (SELECT r.counts FROM tunnel.run r WHERE r.survey_id = %(survey)s AND r.km = c.km"
             " AND r.stage = 'clearance' AND r.outcome = 'done' AND r.parameters ->> 'gauge' = %(gauge)s"
             " AND r.parameters ->> 'track' = %(track)s ORDER BY r.started_at DESC LIMIT 1) AS run"
-            " FROM tunnel_api.clearance_section c WHERE c.survey_id = %(survey)s AND c.gauge = %(gauge)s AND c.track = %(track)s"
-            " AND c.chainage_to > %(low)s AND c.chainage_from < %(high)s GROUP BY c.km ORDER BY c.km",
+            " FROM tunnel_api.clearance_section c WHERE c.survey_id = %(survey)s AND c.gauge = %(gauge)s"
+            " AND c.track = %(track)s AND c.chainage_to > %(low)s AND c.chainage_from < %(high)s GROUP BY c.km ORDER BY c.km",
             {"survey": survey.id, "gauge": gauge, "track": track, "low": low, "high": high},
         ).fetchall()
 
