@@ -21,7 +21,7 @@ from tunneldb.classification.classes import PointClass
 from tunneldb.database import connect
 from tunneldb.pipeline.clearance import Options, measure_kilometre, read_track
 from tunneldb.shape.clearance import clearance
-from tunneldb.shape.gauge import Widening, overthrow, widened
+from tunneldb.shape.gauge import Widening, halved, overthrow, widened
 from tunneldb.shape.track import fit_track, follow, rail_pairs
 from tunneldb.store.clearance import save_gauge
 from tunneldb.store.surface import load_alignment
@@ -45,7 +45,7 @@ def margins() -> list[tuple[object, ...]]:
         polygon = shapely.Polygon(ends)
         points = np.column_stack([rng.uniform(0.0, 10.0, 20000), rng.uniform(-3, 3, 20000), rng.uniform(-0.5, 6.0, 20000)])
         found = clearance(
-            points, np.full(20000, PointClass.LINING, np.uint8), np.arange(10.0), [widened(BOX, outward, inward)] * 10
+            points, np.full(20000, PointClass.LINING, np.uint8), np.arange(10.0), [widened(halved(BOX), outward, inward)] * 10
         ).margin  # fmt: skip
         away = shapely.distance(polygon.exterior, shapely.points(points[:, 1:]))
         away = np.where(shapely.contains_xy(polygon, *points[:, 1:].T), -away, away)

@@ -8,7 +8,7 @@ import shapely
 
 from tunneldb.classification.classes import PointClass
 from tunneldb.shape.clearance import clearance, clock
-from tunneldb.shape.gauge import Widening, closed, overthrow, terms, widened
+from tunneldb.shape.gauge import Widening, closed, halved, overthrow, terms, widened
 from tunneldb.shape.outline import Outline
 from tunneldb.shape.track import GAUGE, HEAD, Track, curvature, fit_track, follow, rail_pairs
 
@@ -85,7 +85,7 @@ def test_margins_are_those_of_shapely_in_a_canted_track_on_a_curve() -> None:
     assert places == pytest.approx(np.column_stack([x, y]), abs=1e-9)
     assert track.about_axis(s, x, y) == pytest.approx(about, abs=1e-9)
     inward, outward = overthrow(14.0, 4.0, np.array([1 / radius]))
-    outline = widened(BOX, outward[0], inward[0])
+    outline = widened(halved(BOX), outward[0], inward[0])
     ends = np.array([[-1.6, 0.3], [-1.6, 3.0], [-1.0, 4.3], [1.0, 4.3], [1.6, 3.0], [1.6, 0.3]])
     ends[:3, 0] -= outward[0]
     ends[3:, 0] += inward[0]

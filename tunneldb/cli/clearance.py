@@ -164,7 +164,8 @@ def _print(kilometres: list[Row], rows: list[Row], inside: list[Row], track: str
         [
             (row["km"], f"{row['metres']} of {row['run']['metres']}", f"{100 * row['run']['track_seen']:.1f}",
              f"{1e3 * row['run'].get('axis_se', 0.0):.1f}", f"{1e3 * row['run'].get('cant_se', 0.0):.1f}",
-             metres(row["margin"]), row["metres_inside"], f"{100 * row['seen_share']:.1f}", row["stray"], row["passing"], row["ground"])
+             metres(row["margin"]), row["metres_inside"], f"{100 * row['seen_share']:.1f}",
+             row["stray"], row["passing"], row["ground"])
             for row in kilometres
         ],
         right=range(1, 11),

@@ -22,7 +22,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.run import nothing_yet
 from tunneldb.shape.clearance import PASSING, STEP, Clearance, Grouping, clearance, clock
-from tunneldb.shape.gauge import Widening, terms, widened
+from tunneldb.shape.gauge import Widening, halved, terms, widened
 from tunneldb.shape.outline import Outline
 from tunneldb.shape.track import GAUGE, HEAD, Pairs, Track, curvature, fit_track, follow, rail_pairs
 from tunneldb.store.clearance import (
@@ -186,7 +186,8 @@ def measure_kilometre(
     left = np.where(to_right, wide.outward, wide.inward) + allowance
     right = np.where(to_right, wide.inward, wide.outward) + allowance
     about = options.widening.roll_height
-    outlines = [widened(outline, a, b, r, about) for a, b, r in zip(left, right, wide.roll, strict=True)]
+    halves = halved(outline)
+    outlines = [widened(halves, a, b, r, about) for a, b, r in zip(left, right, wide.roll, strict=True)]
     xyz, classes = load_classed(conn, survey, km, first - _EDGE, stop + _EDGE)
     about_axis = axis.across(xyz)
     places = np.column_stack([about_axis[:, 0], track.places(*about_axis.T)])

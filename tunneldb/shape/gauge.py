@@ -102,9 +102,9 @@ def widened(outline: Outline, left: float, right: float, roll: float = 0.0, abou
     """Outline whose left part is shifted to the left and its right part to the right, m, and then by roll.
 
     Roll shifts each vertex sideways by the angle times its height over ``about``, to the side to which it rolls, and only that
-    side: the other one stands as it did. Elements that cross the middle are cut there.
+    side: the other one stands as it did. The outline must be that of `halved`.
     """
-    elements = _cut_in_the_middle(outline)
+    elements = outline.elements
     moved = elements.copy()
     middle = (elements[:, 0] + elements[:, 2]) / 2.0
     bulged = middle + 0.5 * elements[:, 4] * (elements[:, 3] - elements[:, 1])
@@ -121,8 +121,8 @@ def widened(outline: Outline, left: float, right: float, roll: float = 0.0, abou
     return Outline(np.array(parts))
 
 
-def _cut_in_the_middle(outline: Outline) -> Float:
-    """Elements (m, 5) none of which crosses the track's middle."""
+def halved(outline: Outline) -> Outline:
+    """Cut the elements that cross the track's middle there."""
     line_ends = np.concatenate([[0.0], np.cumsum(outline.lengths)]) / outline.length
     dense = np.unique(np.concatenate([np.linspace(0.0, 1.0, 4001), line_ends]))
     x = outline.places(dense)[0][:, 0]
@@ -134,7 +134,7 @@ def _cut_in_the_middle(outline: Outline) -> Float:
             same = np.sign(outline.places(np.array([share]))[0][0, 0]) == np.sign(x[k])
             low, high = (share, high) if same else (low, share)
         shares.append((low + high) / 2.0)
-    return outline.cut(np.array(shares)).elements if shares else outline.elements
+    return outline.cut(np.array(shares)) if shares else outline
 
 
 def closed(outline: Outline) -> Outline:

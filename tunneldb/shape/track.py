@@ -215,7 +215,7 @@ def fit_track(points: Float, coarse: Pairs, low: float, high: float, gauge: floa
     found = seen
     for _ in range(3):
         measured = [_measured(points, stations, heads[k], heads[k + 2]) for k in (0, 1)]
-        seen = found = np.isfinite(np.hstack(measured)).all(axis=1)
+        seen = found = np.asarray(np.isfinite(np.hstack(measured)).all(axis=1))
         if seen.sum() < 4:
             break
         (left, left_up), (right, right_up) = measured[0].T, measured[1].T

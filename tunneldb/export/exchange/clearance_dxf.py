@@ -38,7 +38,8 @@ def write_clearance(
     """Write the tightest section of every so many metres of a stretch, side by side in rows; return how many."""
     rows = conn.execute(
         "SELECT DISTINCT ON (floor(chainage_from / %(every)s)) km, chainage_from, label, margin, class, seen_share,"
-        " track_right, track_up, cant, outline, public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom) FROM tunnel_api.clearance_section"
+        " track_right, track_up, cant, outline,"
+        " public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom) FROM tunnel_api.clearance_section"
         " WHERE survey_id = %(survey)s AND gauge = %(gauge)s AND track = %(track)s AND chainage_to > %(low)s"
         " AND chainage_from < %(high)s ORDER BY floor(chainage_from / %(every)s), margin NULLS LAST",
         {"every": every, "survey": survey.id, "gauge": gauge, "track": track, "low": low, "high": high},
