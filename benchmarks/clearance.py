@@ -2,14 +2,18 @@
 
 python -m benchmarks.clearance                       # seconds
 python -m benchmarks.clearance --km 25 --points 60000000   # and a synthetic tunnel, minutes
+python -m benchmarks.clearance --survey demo-2024 --truth scan/demo.json   # and a simulated survey
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import resource
 import sys
+import tempfile
 import time
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +23,12 @@ from benchmarks.common import print_table, save, scratch_database
 from benchmarks.synthetic import Size, make
 from tunneldb.classification.classes import PointClass
 from tunneldb.database import connect
-from tunneldb.pipeline.clearance import Options, measure_kilometre, read_track
+from tunneldb.pipeline.clearance import Options, find_tracks, measure_kilometre, read_track
 from tunneldb.shape.clearance import clearance
 from tunneldb.shape.gauge import Widening, halved, overthrow, widened
 from tunneldb.shape.track import fit_track, follow, rail_pairs
-from tunneldb.store.clearance import save_gauge
+from tunneldb.simulate.parameters import Parameters
+from tunneldb.store.clearance import load_classed, save_gauge
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import get_survey
 
@@ -67,6 +72,31 @@ def tracks() -> list[tuple[object, ...]]:
     return rows
 
 
+def simulated(name: str, truth: Path) -> list[tuple[object, ...]]:
+    """Errors of the track found in a simulated survey, mm, against the rails of the simulation."""
+    told = json.loads(truth.read_text("utf-8"))["parameters"]
+    known = {field.name for field in fields(Parameters)}
+    line = Parameters(**{key: value for key, value in told.items() if key in known}).tunnel().line
+    with connect(None) as conn:
+        survey = get_survey(conn, name)
+        axis = load_alignment(conn, survey, 1.0)
+        rough = next(iter(find_tracks(conn, survey).rough.values()))
+        km = int(rough.chainage[0] // 1000)
+        xyz, _ = load_classed(conn, survey, km, -np.inf, np.inf, rails=True)
+    points = axis.across(xyz)
+    track = fit_track(points[np.isfinite(points[:, 0])], rough, -np.inf, np.inf)
+    base = axis.plan_points(track.chainage, track.right)
+    frame = line.frame(track.chainage)
+    for _ in range(3):  # the true place beside the one found
+        along = ((base - frame.position[:, :2]) * frame.t[:, :2]).sum(axis=1)
+        frame = line.frame(track.chainage + along)
+    right = ((base - frame.position[:, :2]) * frame.u[:, :2]).sum(axis=1)
+    errors = np.stack([right, track.cant])
+    rms, most = 1e3 * np.sqrt((errors**2).mean(axis=1)), 1e3 * np.abs(errors).max(axis=1)
+    stated = 1e3 * np.array([track.right_se.mean(), track.cant_se.mean()])
+    return [(name, len(errors[0]), round(100 * float(track.seen.mean())), *np.round([*rms, *most, *stated], 2).tolist())]
+
+
 def timed(kilometres: int, points: int, folder: Path) -> list[tuple[object, ...]]:
     """Seconds and most memory of a synthetic tunnel whose track is given."""
     lane = folder / "lane.csv"
@@ -94,6 +124,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--km", type=int, default=0, help="length of the synthetic tunnel")
     parser.add_argument("--points", type=int, default=0)
+    parser.add_argument("--survey", help="a simulated survey with its stages run")
+    parser.add_argument("--truth", type=Path, help="its .json")
     options = parser.parse_args()
     results = {"margins": margins(), "tracks": tracks()}
     print_table(
@@ -106,9 +138,11 @@ def main() -> None:
         *(f"{k} {n}" for k in ("rms", "most", "stated") for n in ("right", "up", "cant")),
     )
     print_table("tracks against known rails, mm", header, results["tracks"])
+    if options.survey:
+        results["simulated"] = simulated(options.survey, options.truth)
+        header = ("survey", "stations", "seen %", *(f"{k} {n}" for k in ("rms", "most", "stated") for n in ("right", "cant")))
+        print_table("a simulated survey's track, mm", header, results["simulated"])
     if options.km:
-        import tempfile
-
         with tempfile.TemporaryDirectory() as folder:
             results["timed"] = timed(options.km, options.points, Path(folder))
         print_table("a tunnel", ("km", "million points", "seconds", "most memory MB"), results["timed"])
