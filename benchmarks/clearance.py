@@ -33,7 +33,7 @@ from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import get_survey
 
 sys.path.append(str(Path(__file__).parent.parent / "tests"))
-from shape.test_clearance import BOX, rails
+from support.rails import BOX, rails
 
 CORNERS = np.array([[-1.6, 0.3], [-1.6, 3.0], [-1.0, 4.3], [1.0, 4.3], [1.6, 3.0], [1.6, 0.3]])
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import ezdxf
 import numpy as np
 import psycopg
+import pyogrio
 import pytest
 from click.testing import CliRunner
 from psycopg import sql
@@ -110,6 +111,10 @@ def test_walls_a_box_and_a_person_about_a_track_found_by_its_rails(
     assert moved["track"] == "given"
     drawn = ezdxf.readfile(tmp_path / "s.dxf").modelspace()
     assert len(drawn.query('LWPOLYLINE[layer=="OUTLINE"]')) == 12
+    run("clearance", survey, "--gauge", gauge, "-o", tmp_path / "m.gpkg")
+    file = tmp_path / "m.gpkg"
+    layers = {name: pyogrio.read_info(file, layer=name)["features"] for name, _ in pyogrio.list_layers(file)}
+    assert layers == {"clearance_section": LAST - FIRST, "clearance_infringement": 2, "clearance_infringement_unrolled": 1}
     run("clearance", survey, "--gauge", gauge, "-o", tmp_path / "m.csv")
     assert len((tmp_path / "m.csv").read_text().splitlines()) == 1 + LAST - FIRST
 

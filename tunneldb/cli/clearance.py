@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tunneldb.export.tables.clearance import Row
     from tunneldb.shape.gauge import Widening
 
-_FILES = (".csv", ".dxf")
+_FILES = (".csv", ".dxf", ".gpkg")
 _LENGTH = click.FloatRange(0.0)
 
 
@@ -68,7 +68,7 @@ _LENGTH = click.FloatRange(0.0)
 )
 @click.option(
     "-o", "--output", type=click.Path(dir_okay=False, path_type=Path),
-    help="File to write: .csv of all metres and directions, .dxf of sections with outline and points.",
+    help="File to write: .csv of all metres and directions, .dxf of sections with outline and points, .gpkg.",
 )  # fmt: skip
 @click.pass_obj
 def clearance(settings: Settings, /, survey: str, outline: Path, name: str | None, output: Path | None, **asked: Any) -> None:
@@ -86,7 +86,7 @@ def clearance(settings: Settings, /, survey: str, outline: Path, name: str | Non
     from tunneldb.store.surface import load_alignment
 
     if output is not None and output.suffix.lower() not in _FILES:
-        raise UserError(f"{output}: clearance is written as {' or '.join(_FILES)}")
+        raise UserError(f"{output}: clearance is written as {', '.join(_FILES[:-1])} or {_FILES[-1]}")
     options = Options(
         asked["track_gauge"], _widening(asked), asked["radius"] or None, asked["cant"], asked["group_points"],
         asked["group_radius"],
@@ -117,6 +117,11 @@ def clearance(settings: Settings, /, survey: str, outline: Path, name: str | Non
         elif output.suffix.lower() == ".csv":
             with replacing(output) as temporary:
                 temporary.write_text(sections_csv(rows), encoding="utf-8")
+        elif output.suffix.lower() == ".gpkg":
+            from tunneldb.export.exchange import clearance_gpkg
+
+            with replacing(output) as temporary:
+                clearance_gpkg.write_clearance(conn, found, gauge, track, part.low, part.high, temporary)
         else:
             from tunneldb.export.exchange.clearance_dxf import write_clearance
 
