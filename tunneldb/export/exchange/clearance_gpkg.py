@@ -54,7 +54,8 @@ def write_clearance(
             warnings.filterwarnings("ignore", "'crs' was not provided")  # the unrolled plane has none
             pyogrio.raw.write(
                 str(path), np.array([bytes(shape) for shape in shapes], dtype=object),
-                [np.array(part, dtype=form) for part, form in zip(values, fields.values(), strict=True)], np.array(list(fields)),
+                [np.array(part, dtype=form) for part, form in zip(values, fields.values(), strict=True)],
+                np.array(list(fields)),
                 geometry_type=kind, crs=None if plane else crs, driver="GPKG", layer=layer, append=written,
                 **(UNDEFINED_CARTESIAN if plane or crs is None else {}),
             )  # fmt: skip
