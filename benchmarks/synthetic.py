@@ -427,6 +427,25 @@ FROM generate_series(0, %(kilometres)s * 1000 - 1) AS c
 CROSS JOIN LATERAL (SELECT array_agg((0.05 * sin((c + i) / 30.0))::real) AS cells FROM generate_series(1, 251) AS i) v
 """
 
+# Margins of two tracks in 72 directions, and what stands inside every 500 m.
+CLEARANCE = """
+INSERT INTO tunnel.clearance_section (survey_id, km, gauge, track, chainage_from, chainage_to, track_right, track_up, cant,
+    curvature, widened_left, widened_right, roll, margin, margin_se, clock, class, margins, seen_share, points, inside, stray,
+    passing, ground, outline)
+SELECT %(id)s, c / 1000, 'example', t, c, c + 1, 0, -2, 0, 0, 0, 0, 0, 0.3 + 0.32 * sin(c / 77.0), 0.002, 90,
+    CASE WHEN c %% 7 = 0 THEN 66 ELSE 64 END, v.margins, 0.95, 2000, 0, 0, 0, 0, '{0,0,0,1,0,0,1,1,0,0,0,0}'
+FROM generate_series(0, %(kilometres)s * 1000 - 1) AS c CROSS JOIN unnest('{left,right}'::text[]) AS t
+CROSS JOIN LATERAL (SELECT array_agg((0.5 + 0.2 * sin((c + i) / 30.0))::real) AS margins FROM generate_series(1, 72) AS i) v
+"""
+
+INFRINGEMENTS = """
+INSERT INTO tunnel.clearance_infringement (survey_id, km, gauge, track, chainage_from, chainage_to, depth, clock, class, counts,
+    points, geom)
+SELECT %(id)s, c / 1000, 'example', 'left', c, c + 1, 0.1 + 0.05 * sin(c), 90, 66, c %% 1000 > 0, 12,
+    ST_Multi(tunnel_api.roll(%(id)s, c + 0.5, 2.0, 0.5))
+FROM generate_series(100, %(kilometres)s * 1000 - 100, 500) AS c
+"""
+
 STEPS = {
     "files and ledger": (FILES, RUNS),
     "segments and sections": (SEGMENTS, COUNTED, SECTIONS),
@@ -445,6 +464,7 @@ STEPS = {
     "coverage and radiometry": (COVERAGE, RADIOMETRY, CURVES),
     "ground, clusters, target spheres": (GROUND, CLUSTERS, SPHERES),
     "deviation": (PROFILE, DEVIATION),
+    "clearance": (CLEARANCE, INFRINGEMENTS),
 }
 
 

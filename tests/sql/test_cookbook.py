@@ -17,6 +17,7 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from psycopg.rows import dict_row
 from support.cookbook_survey import CONFIRMED, GONE, MOVED, NICHE, OLD, POINTS, SPARSE, draw_findings, prepare
+from support.example_clearance import TIGHT
 from support.example_deviation import BULGE, OVER, UNDER
 from support.example_objects import FLOOR, HALF_FLOOR, SPHERES, THINGS, beside
 from support.example_survey import GIRTH, NAME, SEEN_FROM, WET, example_surface
@@ -488,6 +489,25 @@ def before_redrawn(rows: Rows, a: Asked) -> None:
     assert all(row["outline_before"].startswith("POLYGON((") for row in rows)
 
 
+def gauge_fails(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert (row["class"], row["depth_mm"], row["clock"], row["points"]) == ("appendage", 50, 90, 7)
+    assert row["label"].startswith("12+350")
+
+
+def least_margins(rows: Rows, a: Asked) -> None:
+    first, second = rows
+    assert (first["chainage_from"], second["metres"]) == (12300, 100)
+    close(first, margin_m=-0.05, seen_percent=90)
+    close(second, margin_m=0.2)
+
+
+def tightest(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert (row["class"], row["metres"]) == ("appendage", 1)
+    assert 12300 < TIGHT < 12400
+
+
 def underbreaks(rows: Rows, a: Asked) -> None:
     """Of sections n = 1, 2, … it is n times the first one's."""
     assert [row["label"] for row in rows] == ["12+300.000", "12+400.000"]
@@ -560,6 +580,9 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "What stands in the tunnel?": tall,
     "How high is the ground, and how wide?": ground,
     "How well do the scans agree on a target sphere?": spheres,
+    "Where does a loading gauge fail?": gauge_fails,
+    "What is the least margin of each 100 m?": least_margins,
+    "What causes the tightest places?": tightest,
     "How many m³ of underbreak are there per 100 m?": underbreaks,
     "Which ten sections stand most inside the profile?": most_inside,
     "Over which stretches does lining stand more than 50 mm inside?": bulges,

@@ -54,6 +54,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "tunneldb.cli.deviation:deviation",
         "Hold the lining against its design profiles: deviation, overbreak and underbreak.",
     ),
+    "clearance": (
+        "tunneldb.cli.clearance:clearance",
+        "Hold what stands in a tunnel against an outline about a track: margins and infringements.",
+    ),
     "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),
     "export": (
         "tunneldb.cli.export:export",

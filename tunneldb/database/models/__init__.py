@@ -6,6 +6,7 @@ decibels, seconds, square metres, unless a comment says otherwise.
 
 from tunneldb.database.models.base import AUDIT_SCHEMA, SCHEMA, Base
 from tunneldb.database.models.catalog import AlignmentElement, Pose, Reference, Station, StationEquation, Survey, Tunnel
+from tunneldb.database.models.clearance import ClearanceInfringement, ClearanceSection, Gauge
 from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
 from tunneldb.database.models.finding import FindingKind, FindingSum, Photo, Severity
 from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
@@ -37,6 +38,8 @@ __all__ = [
     "AxisVertex",
     "Base",
     "Bed",
+    "ClearanceInfringement",
+    "ClearanceSection",
     "Cluster",
     "Coverage",
     "DesignProfile",
@@ -46,6 +49,7 @@ __all__ = [
     "FileKm",
     "FindingKind",
     "FindingSum",
+    "Gauge",
     "Goal",
     "Ground",
     "Image",

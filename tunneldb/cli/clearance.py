@@ -1,0 +1,192 @@
+"""The verb ``clearance``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
+from tunneldb.cli.progress import bar, step
+from tunneldb.cli.stretch import parse_stretch, stretch_options
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect
+from tunneldb.errors import UserError
+from tunneldb.files import replacing, told_to_end
+from tunneldb.store.survey import get_survey
+
+if TYPE_CHECKING:
+    from tunneldb.export.tables.clearance import Row
+    from tunneldb.shape.gauge import Widening
+
+_FILES = (".csv", ".dxf", ".gpkg")
+_LENGTH = FiniteRange(0.0)
+
+
+@verb(
+    examples=[
+        "tunneldb clearance ringo-2024 --gauge freight.csv --track left",
+        "tunneldb clearance ringo-2024 --gauge freight.csv --track right --bogie-distance 14 --overhang 4 -o margins.csv",
+        "tunneldb clearance demo-2024 --gauge lane.dxf --track-axis lane.csv -o sections.dxf --every 5",
+    ]
+)
+@click.argument("survey")
+@click.option(
+    "--gauge", "outline", required=True, type=FilePath(dir_okay=False),
+    help="Outline that is to be clear, .csv or .dxf as of profile add: about the track's middle on its running surface, m.",
+)  # fmt: skip
+@click.option("--name", help="Name under which the outline is kept; by default that of its file.")
+@click.option("--track", help="left or right, or the number from the left of more than two; needed if there are several.")
+@click.option(
+    "--track-axis", type=FilePath(dir_okay=False),
+    help="Axis of the track or lane, instead of by rails: chainage,right,up[,cant] about the given axis, or x,y,z[,cant]; m.",
+)  # fmt: skip
+@click.option(
+    "--track-gauge", type=_LENGTH, default=1.435, show_default=True, metavar="M", help="Between the rails' inner faces."
+)
+@click.option("--bogie-distance", type=_LENGTH, default=0.0, metavar="M", help="Of the vehicle, between its bogies' middles.")
+@click.option("--overhang", type=_LENGTH, default=0.0, metavar="M", help="Of the vehicle, from a bogie's middle to its end.")
+@click.option(
+    "--curve-widening", nargs=2, type=_LENGTH, default=(0.0, 0.0), metavar="INSIDE OUTSIDE",
+    help="Wider by these over the radius, m², instead of a vehicle.",
+)  # fmt: skip
+@click.option("--radius", type=FINITE, metavar="M", help="Of the curve, positive to the right, instead of the track's own.")
+@click.option(
+    "--cant", type=FINITE, metavar="M", help="How much higher the left rail lies, for roll, instead of the track's own."
+)
+@click.option("--speed", type=_LENGTH, default=0.0, metavar="KM/H", help="For roll by too little or too much cant.")
+@click.option("--flexibility", type=_LENGTH, default=0.0, help="Roll of the vehicle over the angle of missing cant.")
+@click.option("--roll-height", type=FINITE, default=0.5, show_default=True, metavar="M", help="About which it rolls.")
+@click.option("--allowance", type=_LENGTH, default=0.0, metavar="M", help="For all else, to each side.")
+@click.option("--group-points", type=click.IntRange(1), default=3, show_default=True, help="Fewer points are no obstacle, …")
+@click.option("--group-radius", type=_LENGTH, default=0.3, show_default=True, metavar="M", help="… within this radius.")
+@stretch_options
+@click.option("--every", type=FiniteRange(1.0), default=10.0, show_default=True, metavar="M", help="Of sections of a .dxf.")
+@click.option(
+    "-o", "--output", type=FilePath(dir_okay=False),
+    help="File to write: .csv of all metres and directions, .dxf of sections with outline and points, .gpkg.",
+)  # fmt: skip
+@click.pass_obj
+def clearance(settings: Settings, /, survey: str, outline: Path, name: str | None, output: Path | None, **asked: Any) -> None:
+    """Hold what stands in SURVEY against an outline about a track, and state margins and infringements.
+
+    The track is found by its rails, or given. Points of survey density of any class count but ground, rails and noise; objects
+    and spheres, which may be gone, are stated and do not count. What was not seen is stated, and is never clear. No norm's
+    outline or values come with tunneldb; docs/howto-clearance.md says how the outline is widened.
+    """
+    from tunneldb.export.tables.clearance import infringement_rows, section_rows, sections_csv, summary
+    from tunneldb.pipeline.clearance import Options, find_tracks, measure_clearance, read_track
+    from tunneldb.pipeline.profile_file import read_profile
+    from tunneldb.shape.gauge import closed
+    from tunneldb.store.clearance import save_gauge
+    from tunneldb.store.surface import load_alignment
+
+    if output is not None and output.suffix.lower() not in _FILES:
+        raise UserError(f"{output}: clearance is written as {', '.join(_FILES[:-1])} or {_FILES[-1]}")
+    options = Options(
+        asked["track_gauge"], _widening(asked), asked["radius"] or None, asked["cant"], asked["group_points"],
+        asked["group_radius"],
+    )  # fmt: skip
+    read = closed(read_profile(outline).outline)
+    gauge = name or outline.stem
+    with connect(settings.dsn) as conn:
+        found = get_survey(conn, survey)
+        part = parse_stretch(conn, found, asked["start"], asked["end"])
+        if asked["track_axis"] is not None:
+            tracks = read_track(asked["track_axis"], load_alignment(conn, found, 1.0))
+        else:
+            tracks = find_tracks(conn, found, options.track_gauge)
+        track = _chosen(survey, tracks.names, asked["track"])
+        save_gauge(conn, found, gauge, read, str(outline))
+        with told_to_end(), bar("km") as progress:
+            made = measure_clearance(
+                conn, found, tracks, track, gauge, read, options, part.low, part.high, step(progress)
+            )  # fmt: skip
+        kilometres = summary(conn, found, gauge, track, part.low, part.high)
+        if not kilometres:
+            raise UserError(f"survey {survey}: track {track} was not seen there; nothing was measured, and nothing is clear")
+        inside = infringement_rows(conn, found, gauge, track, part.low, part.high)
+        rows = section_rows(conn, found, gauge, track, part.low, part.high)
+        tell(survey=survey, gauge=gauge, track=track, made=made, kilometres=kilometres, infringements=inside)
+        if output is None:
+            tell(sections=[row | {"margins": [None if m != m else m for m in row["margins"]]} for row in rows])
+        elif output.suffix.lower() == ".csv":
+            with replacing(output) as temporary:
+                temporary.write_text(sections_csv(rows), encoding="utf-8")
+        elif output.suffix.lower() == ".gpkg":
+            from tunneldb.export.exchange import clearance_gpkg
+
+            with replacing(output) as temporary:
+                clearance_gpkg.write_clearance(conn, found, gauge, track, part.low, part.high, temporary)
+        else:
+            from tunneldb.export.exchange.clearance_dxf import write_clearance
+
+            with replacing(output) as temporary:
+                write_clearance(conn, found, gauge, track, part.low, part.high, asked["every"], temporary)
+    tell(files=[output] if output else [])
+    _print(kilometres, rows, inside, track, gauge)
+    if output:
+        click.echo(f"written to {output}", err=True)
+
+
+def _widening(asked: dict[str, Any]) -> Widening:
+    from tunneldb.shape.gauge import Widening
+
+    inside, outside = asked["curve_widening"]
+    vehicle = asked["bogie_distance"] > 0.0 or asked["overhang"] > 0.0
+    if vehicle and max(inside, outside) > 0.0:
+        raise UserError("--curve-widening stands for --bogie-distance and --overhang: leave one out")
+    if asked["flexibility"] > 0.0 and asked["speed"] == 0.0:
+        raise UserError("--flexibility needs --speed")
+    return Widening(
+        asked["bogie_distance"], asked["overhang"], inside, outside, asked["speed"] / 3.6, asked["flexibility"],
+        asked["roll_height"], asked["allowance"],
+    )  # fmt: skip
+
+
+def _chosen(survey: str, names: list[str], wanted: str | None) -> str:
+    if wanted is None and len(names) == 1:
+        return names[0]
+    if wanted not in names:
+        says = "choose one by --track" if wanted is None else f"it has no track {wanted}"
+        raise UserError(f"survey {survey} has the tracks {', '.join(names)}: {says}")
+    return wanted
+
+
+def _print(kilometres: list[Row], rows: list[Row], inside: list[Row], track: str, gauge: str) -> None:
+    def metres(value: float | None) -> str:
+        return "" if value is None else f"{value:.3f}"
+
+    print_table(
+        [
+            "km", "metres", "track seen %", "axis ± mm", "cant ± mm", "least margin m", "metres inside", "seen %", "stray",
+            "passing", "ground",
+        ],
+        [
+            (row["km"], f"{row['metres']} of {row['run']['metres']}", f"{100 * row['run']['track_seen']:.1f}",
+             f"{1e3 * row['run'].get('axis_se', 0.0):.1f}", f"{1e3 * row['run'].get('cant_se', 0.0):.1f}",
+             metres(row["margin"]), row["metres_inside"], f"{100 * row['seen_share']:.1f}",
+             row["stray"], row["passing"], row["ground"])
+            for row in kilometres
+        ],
+        right=range(1, 11),
+    )  # fmt: skip
+    tightest = sorted((row for row in rows if row["margin"] is not None), key=lambda row: float(row["margin"]))[:10]
+    print_table(
+        ["tightest at", "margin m", "±", "clock °", "by", "cluster", "radius m", "wider left mm", "right mm", "roll mrad"],
+        [
+            (row["label"], metres(row["margin"]), metres(row["margin_se"]), f"{row['clock']:.0f}", row["class"],
+             row["cluster_id"], "" if row["radius"] is None else f"{row['radius']:.0f}", f"{1e3 * row['widened_left']:.1f}",
+             f"{1e3 * row['widened_right']:.1f}", f"{1e3 * row['roll']:.1f}")
+            for row in tightest
+        ],
+        right=(1, 2, 3, 5, 6, 7, 8, 9),
+    )  # fmt: skip
+    count = sum(row["counts"] for row in inside)
+    click.echo(
+        f"{gauge} about track {track}: {count} infringements, and {len(inside) - count} by objects, which may be gone; stray,"
+        " passing, ground: points inside that do not count; what was not seen is not clear"
+    )

@@ -1,0 +1,366 @@
+"""Tracks from points of their rails: heads, pairs of heads a gauge apart, and a smooth axis with cant through them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.robust import MAD_TO_SIGMA
+
+GAUGE = 1.435
+"""Distance of the inner faces of the two heads, m: standard gauge."""
+
+HEAD = 0.072
+"""Width of a rail's head, m: that of the profile 60E1; heads of other rails differ by a few mm."""
+
+STATION = 5.0
+"""Rails are located once in a stretch so long, m: at a point spacing of 0.1 to 0.2 m it holds dozens of points of a head."""
+
+LEAST_TRACK = 25.0
+"""What two rails do not show along so many metres is no track."""
+
+_TOP = 0.02  # m: points so far below the top of a rail are of its head
+_APART = 0.12  # m to the side without a point part two rails
+_WIDEST = 0.35  # m: wider ones are no rail
+_FEWEST = 4  # points of a head
+_SPACING = 0.06  # m by which the distance of two heads may differ: widened gauge, wear, few points
+_CANT = 0.25  # m: rails of a track differ in height by less
+_STRAY = 0.15  # m by which a track may leave the straight continuation from one station to the next
+_REACH = 30.0  # m without rails over which a track is followed, and interpolated
+_SIGMA = 0.003  # m: no station's head is told better, by dozens of points spread over 0.07 m
+_OFF = 0.05  # m: what a head of a single station may lie off the smooth track; few points see its edges only
+_EDGE = 0.05  # of the points of a head that lie beyond what is taken for its two edges
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Pairs of heads that may be a track: (n,) arrays; heads are (n, 2), left and right, about the given axis, m."""
+
+    chainage: Float
+    right: Float
+    up: Float
+
+    @property
+    def middle(self) -> Float:
+        """Middle between the two heads, (n,), m right of the axis."""
+        return np.asarray(self.right.mean(axis=1))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Pairs]) -> Pairs:
+        """Put those of several stretches together."""
+        if not parts:
+            return cls(np.empty(0), np.empty((0, 2)), np.empty((0, 2)))
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("chainage", "right", "up")))
+
+
+@dataclass(frozen=True)
+class Track:
+    """Axis and cant of a track at stations along the given axis; (n,) arrays.
+
+    Attributes
+    ----------
+    chainage : float array
+        Along the given axis, m, growing.
+    right, up : float array
+        Middle of the track on the plane of the running surface, about the given axis, m.
+    cant : float array
+        How much higher the left head lies than the right one, m.
+    right_se, up_se, cant_se : float array
+        Standard errors, m; 0 of a given track.
+    seen : bool array
+        Whether both rails were seen there; elsewhere it is interpolated.
+    spacing : float
+        Distance of the heads' middles, m, over which the cant is.
+    reach : float
+        Places farther than this from the nearest station have no track, m.
+    """
+
+    chainage: Float
+    right: Float
+    up: Float
+    cant: Float
+    right_se: Float
+    up_se: Float
+    cant_se: Float
+    seen: Bool
+    spacing: float = GAUGE + HEAD
+    reach: float = STATION / 2.0
+
+    def at(self, chainage: Float) -> Float:
+        """Right, up, cant, right_se, up_se, cant_se at chainages (n,): (n, 6), m; NaN where there is no track."""
+        columns = (self.right, self.up, self.cant, self.right_se, self.up_se, self.cant_se)
+        found = np.column_stack([_linear(chainage, self.chainage, column) for column in columns])
+        if len(self.chainage) < 2:
+            found[np.abs(chainage - self.chainage[0]) > self.reach + 1e-6] = np.nan
+            return found
+        after = np.clip(np.searchsorted(self.chainage, chainage), 1, len(self.chainage) - 1)
+        away = np.minimum(np.abs(chainage - self.chainage[after - 1]), np.abs(chainage - self.chainage[after]))
+        found[away > self.reach + 1e-6] = np.nan
+        return found
+
+    def places(self, chainage: Float, right: Float, up: Float) -> Float:
+        """Points about the given axis (n,) in the frame of the track: right of its middle and above it, (n, 2), m."""
+        found = self.at(chainage)
+        sine = np.clip(found[:, 2] / self.spacing, -1.0, 1.0)
+        cosine = np.sqrt(1.0 - sine**2)
+        x, y = right - found[:, 0], up - found[:, 1]
+        return np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
+
+    def about_axis(self, chainage: Float, right: Float, up: Float) -> Float:
+        """Points in the track's frame (n,) about the given axis, right and up, (n, 2), m: the inverse of `places`."""
+        found = self.at(chainage)
+        sine = np.clip(found[:, 2] / self.spacing, -1.0, 1.0)
+        cosine = np.sqrt(1.0 - sine**2)
+        return np.column_stack([found[:, 0] + cosine * right + sine * up, found[:, 1] - sine * right + cosine * up])
+
+
+def rail_pairs(points: Float, gauge: float = GAUGE) -> Pairs:
+    """Pairs of heads a gauge apart in stretches of `STATION`.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        Points of bars along the ground: chainage, right of the given axis, above it, m.
+    gauge : float
+        m.
+    """
+    number = np.floor(points[:, 0] / STATION).astype(np.int64)
+    order = np.argsort(number, kind="stable")
+    points, number = points[order], number[order]
+    found: list[Pairs] = []
+    for first, stop in _runs(number):
+        heads = _heads(points[first:stop])
+        if len(heads) < 2:
+            continue
+        left, right = np.triu_indices(len(heads), k=1)
+        held = np.abs(heads[right, 0] - heads[left, 0] - gauge - HEAD) <= _SPACING
+        held &= np.abs(heads[right, 1] - heads[left, 1]) <= _CANT
+        both = np.stack([heads[left[held]], heads[right[held]]], axis=1)
+        middle = np.full(len(both), (number[first] + 0.5) * STATION)
+        found.append(Pairs(middle, both[:, :, 0], both[:, :, 1]))
+    return Pairs.joined(found)
+
+
+def follow(pairs: Pairs) -> list[Pairs]:
+    """Sort pairs into tracks, from left to right: each goes on straight from station to station, or nearly so.
+
+    Raises
+    ------
+    ValueError
+        If two tracks share a rail, so that which of them is one cannot be told.
+    """
+    tracks: list[list[int]] = []
+    order = np.argsort(pairs.chainage, kind="stable")
+    for k in order.tolist():
+        best, nearest = None, np.inf
+        for track in tracks:
+            gap = pairs.chainage[k] - pairs.chainage[track[-1]]
+            if not 0.0 < gap <= _REACH:
+                continue
+            off = abs(pairs.middle[k] - _continued(pairs, track, pairs.chainage[k]))
+            if off < min(nearest, _STRAY * max(gap / STATION, 1.0) ** 0.5):
+                best, nearest = track, off
+        if best is None:
+            tracks.append([k])
+        else:
+            best.append(k)
+    long = [t for t in tracks if (len(t) - 1) * STATION >= LEAST_TRACK / 2.0]
+    long = [t for t in long if pairs.chainage[t[-1]] - pairs.chainage[t[0]] + STATION >= LEAST_TRACK]
+    found = [Pairs(pairs.chainage[t], pairs.right[t], pairs.up[t]) for t in long]
+    found.sort(key=lambda track: float(np.median(track.middle)))
+    for one, two in pairwise(found):
+        shared = np.intersect1d(one.chainage, two.chainage)
+        if len(shared) and abs(float(np.median(two.middle)) - float(np.median(one.middle))) < GAUGE:
+            apart = float(np.median(two.middle) - np.median(one.middle))
+            raise ValueError(f"near chainage {shared[0]:.0f} two tracks would lie {apart:.2f} m apart")
+    return found
+
+
+def fit_track(points: Float, coarse: Pairs, low: float, high: float, gauge: float = GAUGE) -> Track:
+    """Axis and cant of a track through points of its rails.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        Points of bars along the ground: chainage, right of the given axis, above it, m.
+    coarse : Pairs
+        One of the tracks of `follow`.
+    low, high : float
+        Stretch of it, m; stations lie within, and where the coarse track does.
+    gauge : float
+        m.
+
+    Notes
+    -----
+    Each head lies in the middle of its edges, between which all but a twentieth of its points lie; its top is the median of
+    the middle of its points. Both are taken of deviations from the track so far, so that a curve does not smear them, three
+    times over. The two heads' means and difference are then smoothed along the track: least squares with a penalty on the
+    third difference, which a circular curve and a constant cant do not feel, as strong as generalised cross validation finds.
+    A station that the smooth track contradicts has none: it is not interpolated over what was measured otherwise.
+    """
+    low, high = max(low, coarse.chainage[0] - STATION / 2.0), min(high, coarse.chainage[-1] + STATION / 2.0)
+    first, last = int(np.floor(low / STATION)), int(np.ceil(high / STATION))
+    stations = (np.arange(first, max(last, first + 1)) + 0.5) * np.float64(STATION)
+    heads = np.stack([
+        np.interp(stations, coarse.chainage, column) for column in (*coarse.right.T, *coarse.up.T)
+    ])  # fmt: skip
+    width = gauge + HEAD
+    seen: Bool = np.zeros(len(stations), np.bool_)
+    smooth = np.zeros((3, len(stations)))
+    errors = np.zeros((3, len(stations)))
+    found = seen
+    for _ in range(3):
+        measured = [_measured(points, stations, heads[k], heads[k + 2]) for k in (0, 1)]
+        seen = found = np.asarray(np.isfinite(np.hstack(measured)).all(axis=1))
+        if seen.sum() < 4:
+            break
+        (left, left_up), (right, right_up) = measured[0].T, measured[1].T
+        used = seen.copy()
+        for row, value in enumerate(((left + right) / 2.0, (left_up + right_up) / 2.0, left_up - right_up)):
+            smooth[row], errors[row], held = _smoothed(value, seen)
+            used &= held
+        half = width / 2.0 * np.sqrt(1.0 - np.clip(smooth[2] / width, -1.0, 1.0) ** 2)
+        heads = np.stack([smooth[0] - half, smooth[0] + half, smooth[1] + smooth[2] / 2.0, smooth[1] - smooth[2] / 2.0])
+        seen = used
+    kept = ~_far_from_seen(stations, seen) & (found | ~_contradicted(stations, heads, coarse))
+    right, up, cant = smooth[:, kept]
+    right_se, up_se, cant_se = errors[:, kept]
+    return Track(stations[kept], right, up, cant, right_se, up_se, cant_se, seen[kept], width)
+
+
+def curvature(chainage: Float, xy: Float, window: float = 50.0) -> Float:
+    """Curvature (n,), 1/m, positive to the right, of a track in plan at evenly spaced places xy (n, 2), m.
+
+    Of each place it is that of the parabola through the places of a window about it (Savitzky and Golay, 1964).
+    """
+    from scipy.signal import savgol_filter
+
+    step = float(np.median(np.diff(chainage))) if len(chainage) > 1 else 1.0
+    count = min(2 * round(window / step / 2.0) + 1, len(chainage) - (1 - len(chainage) % 2))
+    if count < 5:
+        return np.zeros(len(chainage))
+    (dx, dy), (ddx, ddy) = (savgol_filter(xy, count, 2, deriv=k, delta=step, axis=0, mode="interp").T for k in (1, 2))
+    return np.asarray(-(dx * ddy - dy * ddx) / np.hypot(dx, dy) ** 3)
+
+
+def _linear(at: Float, along: Float, values: Float) -> Float:
+    """Values (n,) at growing places interpolated linearly, and before the first and after the last of them continued so."""
+    if len(along) < 2:
+        return np.full(len(at), values[0])
+    k = np.clip(np.searchsorted(along, at), 1, len(along) - 1)
+    share = (at - along[k - 1]) / (along[k] - along[k - 1])
+    return np.asarray(values[k - 1] + share * (values[k] - values[k - 1]))
+
+
+def _runs(number: Int64) -> list[tuple[int, int]]:
+    """First and one after the last of each run of equal numbers."""
+    if not len(number):
+        return []
+    bounds = np.flatnonzero(np.diff(number, prepend=number[0] - 1, append=number[-1] + 1))
+    return list(pairwise(bounds.tolist()))
+
+
+def _heads(points: Float) -> Float:
+    """Middle and top of each rail in points of a stretch, (k, 2), from left to right, m."""
+    order = np.argsort(points[:, 1])
+    right, up = points[order, 1], points[order, 2]
+    label = np.cumsum(np.diff(right, prepend=right[0]) > _APART)
+    found = []
+    for first, stop in _runs(label):
+        if stop - first < _FEWEST or right[stop - 1] - right[first] > _WIDEST:
+            continue
+        part = up[first:stop]
+        top = np.partition(part, -2)[-2]  # the highest may be a stray
+        held = part > top - _TOP
+        found.append((float(np.median(right[first:stop][held])), float(top)))
+    return np.array(found).reshape(-1, 2)
+
+
+def _continued(pairs: Pairs, track: list[int], chainage: float) -> float:
+    """Where a track would go on to, by its last stations, m to the right."""
+    recent = np.array(track[-6:])
+    if len(recent) < 4:
+        return float(pairs.middle[recent[-1]])
+    line = np.polynomial.Polynomial.fit(pairs.chainage[recent], pairs.middle[recent], 1)
+    return float(line(chainage))
+
+
+def _measured(points: Float, stations: Float, head: Float, top: Float) -> Float:
+    """Middle and top of a rail at stations, (n, 2), m, NaN where it is not seen; ``head`` and ``top`` are what it is near."""
+    expected, level = _linear(points[:, 0], stations, head), _linear(points[:, 0], stations, top)
+    aside, above = points[:, 1] - expected, points[:, 2] - level
+    near = np.flatnonzero((np.abs(aside) <= HEAD / 2.0 + 0.04) & (np.abs(above) <= 2.0 * _TOP))
+    number = np.floor(points[near, 0] / STATION).astype(np.int64) - int(np.floor(stations[0] / STATION))
+    near, number = near[(number >= 0) & (number < len(stations))], number[(number >= 0) & (number < len(stations))]
+    order = np.argsort(number, kind="stable")
+    near, number = near[order], number[order]
+    found = np.full((len(stations), 2), np.nan)
+    for first, stop in _runs(number):
+        x, y = aside[near[first:stop]], above[near[first:stop]]
+        if len(x) < _FEWEST:
+            continue
+        crown = np.abs(y - np.quantile(y, 0.7)) <= _TOP / 2.0 + 0.005
+        x, y = x[crown], y[crown]
+        if len(x) < _FEWEST:
+            continue
+        middle = np.quantile(x, [_EDGE, 1.0 - _EDGE]).mean()
+        inner = np.abs(x - middle) <= 0.4 * HEAD
+        if inner.any():
+            k = int(number[first])
+            found[k] = head[k] + middle, top[k] + np.median(y[inner])
+    return found
+
+
+def _smoothed(value: Float, seen: Bool) -> tuple[Float, Float, Bool]:
+    """Values (n,) smoothed and interpolated, their standard errors, and which were used, by robust penalised least squares."""
+    n = len(value)
+    filled = np.where(seen, value, 0.0)
+    penalty = np.diff(np.eye(n), 3, axis=0)
+    penalty = penalty.T @ penalty
+    weight = seen.astype(np.float64)
+    fitted, errors = filled, np.zeros(n)
+    for _ in range(4):
+        best = np.inf
+        for strength in 10.0 ** np.arange(-1.0, 8.5, 0.5):
+            hat = np.linalg.solve(np.diag(weight) + strength * penalty + 1e-12 * np.eye(n), np.diag(weight))
+            guess = hat @ filled
+            freedom = weight.sum() - np.trace(hat)
+            if freedom <= 1.0:
+                continue
+            score = weight.sum() * (weight * (filled - guess) ** 2).sum() / freedom**2
+            if score < best:
+                best, fitted = score, guess
+                sigma = np.sqrt((weight * (filled - guess) ** 2).sum() / freedom)
+                errors = sigma * np.sqrt((hat**2 / np.where(weight > 0.0, weight, np.inf)).sum(axis=1))
+        residual = (filled - fitted)[seen]
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(residual - np.median(residual)))), _SIGMA)
+        weight[seen] = np.clip(1.0 - (residual / (4.685 * scale)) ** 2, 0.0, None) ** 2
+        if weight.sum() < 4.0:
+            weight = seen.astype(np.float64)
+    return fitted, errors, weight > 0.0
+
+
+def _contradicted(stations: Float, heads: Float, coarse: Pairs) -> Bool:
+    """Stations at which heads (4, n) lie elsewhere than those of the coarse track do."""
+    k = np.searchsorted(coarse.chainage, stations)
+    k = np.clip(k, 0, len(coarse.chainage) - 1)
+    there = np.abs(coarse.chainage[k] - stations) < 0.5
+    rough = np.stack([*coarse.right[k].T, *coarse.up[k].T])
+    return np.asarray(there & (np.abs(heads - rough).max(axis=0) > _OFF))
+
+
+def _far_from_seen(stations: Float, seen: Bool) -> Bool:
+    """Which stations lie in a gap without rails that is too long to be interpolated, or beyond the last rails."""
+    if not seen.any():
+        return np.ones(len(stations), np.bool_)
+    there = stations[seen]
+    k = np.clip(np.searchsorted(there, stations), 0, len(there) - 1)
+    before = there[np.clip(k - 1, 0, None)]
+    after = there[k]
+    inside = (stations >= there[0]) & (stations <= there[-1])
+    gap = np.where(seen, 0.0, np.where(inside, after - before, np.inf))
+    return np.asarray(gap > _REACH)
