@@ -4,6 +4,7 @@
 # make quick  those of the tests that need no server and are over soon
 # make test   lint, types and all tests, against the wheel as a user would install it
 # make faults 100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
+# make fuzz   10,000 malformed files and hostile words for all verbs; CASES=… and SEED=… for others
 # make docs   the documentation as a site, in ./site
 # make bench  the main figures of docs/figures.md
 # Each installs what it lacks: PostgreSQL with PostGIS by apt, and a virtual environment in .venv.
@@ -13,7 +14,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find tunneldb sql migrations -type f -not -name '*.py[co]' -not -name '*.nb[ic]') pyproject.toml README.md LICENSE
 
-.PHONY: install demo demo-structure demo-canal quick test tests faults docs bench lint clean
+.PHONY: install demo demo-structure demo-canal quick test tests faults fuzz docs bench lint clean
 .DELETE_ON_ERROR:
 
 install: $(VENV)/wheel
@@ -73,6 +74,9 @@ test: $(VENV)/wheel $(VENV)/tests
 
 faults: install $(VENV)/tests $(VENV)/compiled
 	KILLS=$${KILLS:-100} $(BIN)/pytest -n 0 -s tests/faults/test_kills.py
+
+fuzz: install $(VENV)/tests $(VENV)/compiled
+	CASES=$${CASES:-10000} SECONDS=inf $(BIN)/pytest -n 0 -s tests/cli/test_fuzz.py
 
 docs: $(VENV)/dependencies
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
