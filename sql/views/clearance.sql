@@ -81,17 +81,17 @@ COMMENT ON FUNCTION tunnel_api.clearance_inputs(int, int, text) IS
     'What the clearance of a survey''s kilometre is made from: the last run of stage ground there and beside, and a checksum of the outline. The run of stage clearance holds the same in its parameters';
 
 CREATE OR REPLACE FUNCTION tunnel_api.clearance_state(survey_id int)
-RETURNS TABLE (km int, gauge text, track text, done_at timestamptz, reason text)
+RETURNS TABLE (run_id bigint, km int, gauge text, track text, done_at timestamptz, reason text)
 LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
     WITH last AS (
         SELECT DISTINCT ON (r.km, r.parameters ->> 'gauge', r.parameters ->> 'track')
-               r.km, r.parameters ->> 'gauge' AS gauge, r.parameters ->> 'track' AS track, r.finished_at, r.parameters
+               r.id, r.km, r.parameters ->> 'gauge' AS gauge, r.parameters ->> 'track' AS track, r.finished_at, r.parameters
           FROM tunnel.run r WHERE r.survey_id = $1 AND r.stage = 'clearance' AND r.outcome = 'done'
          ORDER BY r.km, r.parameters ->> 'gauge', r.parameters ->> 'track', r.started_at DESC, r.id DESC
     ), ground AS MATERIALIZED (
         SELECT t.km, t.reason FROM tunnel_api.stage_state($1) t WHERE t.stage = 'ground'
     )
-    SELECT l.km, l.gauge, l.track, l.finished_at,
+    SELECT l.id::bigint, l.km, l.gauge, l.track, l.finished_at,
            CASE WHEN t.reason IS NOT NULL THEN 'ground is stale: ' || t.reason
                 WHEN l.parameters -> 'ground' IS DISTINCT FROM n.inputs -> 'ground' THEN 'ground ran since'
                 WHEN l.parameters -> 'outline' IS DISTINCT FROM n.inputs -> 'outline' THEN 'outline changed since'
@@ -104,7 +104,7 @@ COMMENT ON FUNCTION tunnel_api.clearance_state(int) IS
     'How far the clearance of a survey has come: of each kilometre, outline and track that was measured, when, and why it is out of date, if it is';
 
 CREATE OR REPLACE VIEW tunnel_api.clearance_status AS
-SELECT row_number() OVER (ORDER BY s.id, t.km, t.gauge, t.track) AS id, s.id AS survey_id, s.name AS survey, t.km, t.gauge, t.track,
+SELECT t.run_id AS id, s.id AS survey_id, s.name AS survey, t.km, t.gauge, t.track,
        t.done_at, t.reason IS NOT NULL AS stale, t.reason
   FROM tunnel.survey s
  CROSS JOIN LATERAL tunnel_api.clearance_state(s.id) t;

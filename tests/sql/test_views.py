@@ -11,6 +11,7 @@ import psycopg
 import pytest
 import shapely
 from psycopg import sql
+from support.example_clearance import add_clearance_run
 from support.example_sonar import save_example_registration
 from support.example_structures import save_example_structures
 from support.queue_rows import add_file, add_goal, add_job, add_worker
@@ -107,6 +108,7 @@ def test_every_view_begins_with_a_stable_integer_key(
     conn.execute("INSERT INTO tunnel.photo (anomaly_id, path) SELECT min(id), 'p.jpg' FROM tunnel.anomaly")
     save_example_structures(conn, "demo-2024")
     save_example_registration(conn, "demo-2024")
+    add_clearance_run(conn, "demo-2024")
     for view in views(conn):
         with conn.cursor() as cursor:
             cursor.execute(sql.SQL("SELECT * FROM tunnel_api.{}").format(sql.Identifier(view)))

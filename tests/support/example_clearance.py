@@ -30,3 +30,18 @@ def add_clearance(conn: psycopg.Connection, survey_id: int) -> None:
         " tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = %(survey)s",
         {"survey": survey_id, "tight": TIGHT},
     )
+    conn.execute(
+        "INSERT INTO tunnel.gauge (tunnel_id, name, outline, source, checksum)"
+        " SELECT tunnel_id, 'example', '{-1,0,0,0,4,0,1,0,0,-1,0,0}', 'example.csv', '0' FROM tunnel.survey WHERE id = %s",
+        (survey_id,),
+    )
+
+
+def add_clearance_run(conn: psycopg.Connection, survey: str) -> None:
+    """The run of the ledger that made it."""
+    conn.execute(
+        "INSERT INTO tunnel.run (survey_id, km, stage, parameters, versions, counts, started_at, finished_at, outcome)"
+        " SELECT id, 12, 'clearance', '{\"gauge\": \"example\", \"track\": \"single\"}', '{}', '{}', now(), now(), 'done'"
+        " FROM tunnel.survey WHERE name = %s",
+        (survey,),
+    )
