@@ -339,8 +339,8 @@ def test_readers_leave_the_queue_alone(person: psycopg.Connection) -> None:
 @pytest.mark.parametrize("person", ["vera", "ines", "otto"], indirect=True)
 def test_where_files_lie_is_for_operators(conn: psycopg.Connection, person: psycopg.Connection) -> None:
     conn.execute(
-        "INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points)"
-        " SELECT id, 'a.laz', '/home/otto/scans/a.laz', '', 1, 1 FROM tunnel.survey"
+        "INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, thinned, kept)"
+        " SELECT id, 'a.laz', '/home/otto/scans/a.laz', '', 1, 1, 0, 0, 0, 1 FROM tunnel.survey"
     )
     conn.commit()
     (path,) = person.execute("SELECT path FROM tunnel_api.file WHERE name = 'a.laz'").fetchone()

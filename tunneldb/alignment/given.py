@@ -258,13 +258,13 @@ def _require_forward(xyz: Float, error: Callable[[int, str], UserError]) -> None
     if np.any(far := ~(plan <= LONGEST_STEP)):
         row = int(np.argmax(far))
         raise error(row + 1, f"it lies {plan[row] / 1000.0:.6g} km from the point before; is a decimal point missing?")
+    standing = np.flatnonzero(~steps.any(axis=1))
+    if len(standing):
+        raise error(int(standing[0]) + 1, "the same x,y as the point before; remove one of them")
     rise = np.abs(np.diff(xyz[:, 2]))
     if np.any(steep := rise > STEEPEST * plan + STEEPEST):
         row = int(np.argmax(steep))
         raise error(row + 1, f"{plan[row]:.6g} m on from the point before its z differs by {rise[row]:.6g} m; is it right?")
-    standing = np.flatnonzero(~steps.any(axis=1))
-    if len(standing):
-        raise error(int(standing[0]) + 1, "the same x,y as the point before; remove one of them")
     turns = np.flatnonzero(np.einsum("ij,ij->i", steps[1:], steps[:-1]) <= 0)
     if len(turns):
         raise error(int(turns[0]) + 2, "the axis turns back here; its points must be in growing chainage")

@@ -45,7 +45,8 @@ class FiniteRange(click.FloatRange):
         """Return the number."""
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number) or abs(number) > LARGEST:
-            self.fail(f"{value} is no number that can be meant.", param, ctx)
+            name = "" if param is None else f"{param.opts[0]} "
+            raise UserError(f"{name}{value}: that is no number which can be meant")
         return number
 
 
