@@ -155,7 +155,8 @@ def test_disk_full_during_copy(survey: psycopg.Connection, dsn: str, tmp_path: P
     result = CliRunner().invoke(main, ["--dsn", dsn, "load", SURVEY, str(path)])
     assert result.exit_code == 2
     assert result.stderr.splitlines() == [
-        'tunneldb: the database\'s disk is full, nothing was changed: could not extend file "base/1/2": No space left on device'
+        "tunneldb: the database's disk is full, what was under way is undone:"
+        ' could not extend file "base/1/2": No space left on device'
     ]
     assert (rows(survey), files(survey)) == before
     survey.execute("DROP EVENT TRIGGER watch")

@@ -12,7 +12,8 @@ OTHERWISE = {"point", "fragment", "goal", "run", "waterproof"} | {"bed", "sonar_
 
 def test_every_table_of_results_by_kilometre_is_cleared(conn: psycopg.Connection) -> None:
     tables = conn.execute(
-        "SELECT c.table_name FROM information_schema.columns c JOIN information_schema.tables t USING (table_schema, table_name)"
+        "SELECT c.table_name"
+        "  FROM information_schema.columns c JOIN information_schema.tables t USING (table_schema, table_name)"
         " WHERE c.table_schema = 'tunnel' AND t.table_type = 'BASE TABLE' AND c.column_name IN ('survey_id', 'km')"
         " GROUP BY 1 HAVING count(*) = 2"
     ).fetchall()

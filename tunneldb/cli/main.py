@@ -167,31 +167,11 @@ def _describe(error: Exception) -> str | None:
             "what is compiled can be kept nowhere: neither where tunneldb is installed nor in ~/.cache may be written;"
             " set NUMBA_CACHE_DIR to a folder of your own"
         )
-    return str(error) if isinstance(error, UserError) else _describe_database_error(error)
+    if isinstance(error, UserError):
+        return str(error)
+    from tunneldb.database.failures import describe_failure
 
-
-def _describe_database_error(error: Exception) -> str | None:
-    """Return one line for what may befall a healthy program's connection, None for a bug."""
-    import psycopg
-
-    if isinstance(error, psycopg.errors.DiskFull):
-        return f"the database's disk is full, nothing was changed: {_first_line(error)}"
-    if isinstance(error, psycopg.errors.OutOfMemory):
-        mend = "; raise the server's max_locks_per_transaction" if "shared memory" in str(error) else ""
-        return f"the database's memory is full, nothing was changed: {_first_line(error)}{mend}"
-    if isinstance(error, psycopg.errors.InsufficientPrivilege):
-        return f"the database refused: {_first_line(error)}; ask its owner for the role tunnel_operator"
-    if isinstance(error, (psycopg.errors.QueryCanceled, psycopg.errors.LockNotAvailable)):
-        return f"the database stopped the work, nothing was changed: {_first_line(error)}"
-    if isinstance(error, (psycopg.errors.DeadlockDetected, psycopg.errors.SerializationFailure)):
-        return f"another program was at the same rows, nothing was changed: {_first_line(error)}; run it again"
-    if isinstance(error, psycopg.OperationalError):
-        return f"the connection to the database broke, what was under way is undone: {_first_line(error)}"
-    return None
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().split("\n", 1)[0]
+    return describe_failure(error)
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import psycopg
 
 from tunneldb.database.binaries import MINIMUM_POSTGRESQL
+from tunneldb.database.failures import first_line
 from tunneldb.database.server import Server
 from tunneldb.errors import UserError
 
@@ -39,9 +40,9 @@ def open_connection(dsn: str | None) -> psycopg.Connection[Any]:
             prepare_threshold=None,
         )
     except psycopg.ProgrammingError as error:
-        raise UserError(f"the DSN is not one that libpq understands: {_first_line(error)}") from None
+        raise UserError(f"the DSN is not one that libpq understands: {first_line(error)}") from None
     except psycopg.OperationalError as error:
-        raise UserError(f"cannot connect to the database: {_first_line(error)}") from None
+        raise UserError(f"cannot connect to the database: {first_line(error)}") from None
     major = connection.info.server_version // 10000
     if major < MINIMUM_POSTGRESQL:
         connection.close()
@@ -66,7 +67,3 @@ def engine_on(connection: psycopg.Connection[Any]) -> sqlalchemy.Engine:
     return sqlalchemy.create_engine(
         "postgresql+psycopg://", creator=lambda: connection, poolclass=StaticPool, pool_reset_on_return=None
     )
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().split("\n", 1)[0]

@@ -16,6 +16,7 @@ import psycopg
 from psycopg.types.json import Jsonb
 
 from tunneldb import __version__
+from tunneldb.database.failures import describe_failure, first_line
 from tunneldb.errors import UserError
 
 _LIBRARIES = ("numpy", "scipy", "numba", "laspy", "lazrs", "shapely", "rasterio", "psycopg")
@@ -223,7 +224,11 @@ def retry_at(error: BaseException, attempts: int) -> dt.timedelta | None:
 
 def describe(error: BaseException) -> str:
     """One line: the message of what the user can mend; of anything else also its type."""
-    text = " ".join(str(error).split())
+    if isinstance(error, psycopg.Error):
+        known = describe_failure(error)
+        if known is not None:
+            return known
+    text = " ".join((first_line(error) if isinstance(error, psycopg.Error) else str(error)).split())
     if isinstance(error, UserError):
         return text
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
