@@ -55,6 +55,8 @@ BEGIN
                                              WHEN v.relname = 'stage_status' THEN 'tunnel.run'
                                              WHEN v.relname = 'sheet_finding' THEN 'tunnel_api.finding_unrolled'
                                              WHEN v.relname = 'sheet_leak' THEN 'tunnel_api.leak_unrolled'
+                                             WHEN v.relname ~ '^clearance_(map|unrolled)$' THEN 'tunnel_api.clearance_section'
+                                             WHEN v.relname ~ '^clearance_infringement_' THEN 'tunnel_api.clearance_infringement'
                                              WHEN v.relname ~ '^(leak|anomaly)(_|$)' THEN 'tunnel.anomaly'
                                              ELSE format('tunnel.%I', v.relname) END)
           LEFT JOIN pg_attribute b ON b.attrelid = t.oid AND b.attname = a.attname

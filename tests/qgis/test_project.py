@@ -43,11 +43,14 @@ ON_MAP = {
     "outline": "LineString",
     "ground": "LineStringZ",
     "leak_3d": "PolygonZ",
+    "clearance_map": "LineString",
+    "clearance_infringement_3d": "MultiPointZ",
 }
 IMAGES = ("raw", "corrected", "corrected-filled", "offset", "state", "class")
 UNROLLED = {
     "leak_unrolled": "Polygon", "anomaly_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon",
-    "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon",
+    "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon", "clearance_unrolled": "Polygon",
+    "clearance_infringement_unrolled": "MultiPolygon",
 }  # fmt: skip
 NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet"}
 """Layers of the unrolled plane that its theme does not show."""
@@ -194,6 +197,7 @@ def test_themes_and_views(seen: dict[str, Any]) -> None:
     }  # fmt: skip
     assert set(seen["themes"]["Map"]) == {
         "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster", "outline",
+        "clearance_map", "clearance_infringement_3d",
     }  # fmt: skip
     assert set(seen["themes"]["3D"]) == {
         *(name for name in FINDINGS if name.endswith("3d")),
@@ -202,6 +206,7 @@ def test_themes_and_views(seen: dict[str, Any]) -> None:
         "leak_3d",
         "target_sphere",
         "ground",
+        "clearance_infringement_3d",
     }
     images = {"demo-2024-km012-corrected", "demo-2024-km012-corrected-filled"}
     unrolled = {name for name in FINDINGS if name.endswith("unrolled")}

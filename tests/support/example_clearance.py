@@ -17,22 +17,24 @@ def add_clearance(conn: psycopg.Connection, survey_id: int) -> None:
         " stray, passing, ground, outline)"
         " SELECT %(survey)s, 12, 'example', 'single', c, c + 1, 0, -2, 0, 0, 0, 0, 0,"
         " CASE WHEN c = %(tight)s THEN -0.05 ELSE 0.2 END, 0.002, 90, CASE WHEN c = %(tight)s THEN 66 ELSE 64 END,"
-        " '{0.2,NaN}', 0.9, 1000, 0, 0, 0, 0, '{0,0,0,1,0,0,1,1,0}'"
+        " '{0.2,NaN}', 0.9, 1000, 0, 0, 0, 0, '{-1,0,0,-1,4,0,1,4,0,1,0,0,-1,0,0}'"
         " FROM generate_series(12300, 12499) AS c",
         {"survey": survey_id, "tight": TIGHT},
     )
     conn.execute(
         "INSERT INTO tunnel.clearance_infringement (survey_id, km, gauge, track, chainage_from, chainage_to, depth, clock,"
-        " class, counts, points, geom) SELECT %(survey)s, 12, 'example', 'single', %(tight)s,"
+        " class, counts, points, unrolled, geom) SELECT %(survey)s, 12, 'example', 'single', %(tight)s,"
         " %(tight)s + 0.5, d.depth, 90, d.class,"
-        " d.counts, 7, public.ST_SetSRID('MULTIPOINT Z ((0 0 0))'::public.geometry, t.srid)"
-        " FROM (VALUES (0.05, 66, true), (0.5, 68, false)) AS d (depth, class, counts),"
+        " d.counts, 7, d.unrolled::public.geometry, (SELECT public.ST_Multi(v.geom) FROM tunnel.axis_vertex v"
+        " WHERE v.survey_id = %(survey)s AND v.n = floor(%(tight)s / t.spacing))"
+        " FROM (VALUES (0.05, 66, true, 'MULTIPOLYGON (((12350 4, 12350.5 4, 12350.5 4.5, 12350 4)))'),"
+        " (0.5, 68, false, NULL)) AS d (depth, class, counts, unrolled),"
         " tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = %(survey)s",
         {"survey": survey_id, "tight": TIGHT},
     )
     conn.execute(
         "INSERT INTO tunnel.gauge (tunnel_id, name, outline, source, checksum)"
-        " SELECT tunnel_id, 'example', '{-1,0,0,0,4,0,1,0,0,-1,0,0}', 'example.csv', '0' FROM tunnel.survey WHERE id = %s",
+        " SELECT tunnel_id, 'example', '{-1,0,0,-1,4,0,1,4,0,1,0,0,-1,0,0}', 'example.csv', '0' FROM tunnel.survey WHERE id = %s",
         (survey_id,),
     )
 

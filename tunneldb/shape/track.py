@@ -118,6 +118,17 @@ class Track:
         return np.column_stack([found[:, 0] + cosine * right + sine * up, found[:, 1] - sine * right + cosine * up])
 
 
+def metre_places(about: Float, begin: float, right: float, up: float, cant: float) -> tuple[Float, Bool]:
+    """Points of a metre in the frame of its track, (k, 2), m, and which of those about the given axis (n, 3) these are.
+
+    The track's middle lies right of the given axis and above it, m; cant is how much higher its left rail lies.
+    """
+    held = np.asarray((about[:, 0] >= begin) & (about[:, 0] < begin + 1.0))
+    same, none = np.array([begin, begin + 1.0]), np.zeros(2)
+    here = Track(same, none + right, none + up, none + cant, none, none, none, np.ones(2, np.bool_), reach=1.0)
+    return here.places(*about[held].T), held
+
+
 def rail_pairs(points: Float, gauge: float = GAUGE) -> Pairs:
     """Pairs of heads a gauge apart in stretches of `STATION`.
 

@@ -12,7 +12,7 @@ from ezdxf.units import M
 
 from tunneldb.export.exchange.entity import write
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.shape.track import Track
+from tunneldb.shape.track import metre_places
 from tunneldb.store.clearance import load_classed
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
@@ -51,18 +51,16 @@ def write_clearance(
     space = document.modelspace()
     for number, (km, begin, label, margin, klass, seen, right, up, cant, outline, *nearest) in enumerate(rows):
         at = np.array([(number % ROW) * (2.0 * _FAR + _GAP), -(number // ROW) * (2.0 * _FAR + _GAP)])
-        same = np.array([begin, begin + 1.0])
-        none = np.zeros(2)
-        here = Track(same, none + right, none + up, none + cant, none, none, none, np.ones(2, np.bool_), reach=1.0)
+        frame = (begin, right, up, cant)
         vertices = np.reshape(outline, (-1, 3))
         flat = [(*(vertex[:2] + at), vertex[2]) for vertex in vertices]
         space.add_lwpolyline(flat, format="xyb", dxfattribs={"layer": "OUTLINE"})
         xyz, _ = load_classed(conn, survey, km, max(begin - 1.0, (km - 1) * KILOMETRE), begin + 2.0)
-        places = _places(axis.across(xyz), here)
+        places, _ = metre_places(axis.across(xyz), *frame)
         for point in places[np.abs(places).max(axis=1) < _FAR] + at:
             space.add_point(point, dxfattribs={"layer": "POINTS"})
         if nearest[0] is not None:
-            for point in _places(axis.across(np.array([nearest])), here) + at:
+            for point in metre_places(axis.across(np.array([nearest])), *frame)[0] + at:
                 space.add_circle(point, 0.1, dxfattribs={"layer": "NEAREST"})
         for arm in ((_CROSS, 0.0), (0.0, _CROSS)):
             space.add_line(at - arm, at + arm, dxfattribs={"layer": "TRACK"})
@@ -72,9 +70,3 @@ def write_clearance(
         write(space, said, (at[0] - 3.0, at[1] - 2.0), _TEXT, "TEXT")
     document.saveas(path)
     return len(rows)
-
-
-def _places(about: Any, track: Track) -> Any:
-    """Points about the given axis (n, 3) in the track's frame, of those that lie in its metre."""
-    held = (about[:, 0] >= track.chainage[0]) & (about[:, 0] < track.chainage[1])
-    return track.places(*about[held].T)

@@ -23,6 +23,9 @@ STRUCTURES, FACES = "Structures", "Faces"
 UNDERWATER = "Under water"
 """Group of the layers of sonar scans, with the raster of the bed."""
 
+CLEARANCE = "Clearance"
+"""Group of the layers of clearance, but for those on the unrolled plane."""
+
 MEMBERS = "Members"
 """The print layout with a page for each member."""
 
@@ -188,3 +191,20 @@ UNDERWATER_LAYERS = (
     ),
 )  # fmt: skip
 """The same of a survey of a canal tunnel for which sonar scans were registered."""
+
+CLEARANCE_LAYERS = (
+    VectorLayer(
+        "clearance_infringement_3d", "Infringements of the clearance", "clearance_infringement_3d", "MultiPointZ",
+        "clearance_infringement_3d", CLEARANCE, (MAP, SPACE),
+    ),
+    VectorLayer("clearance_map", "Margins along the track", "clearance_map", "LineString", "clearance_map", CLEARANCE, (MAP,)),
+    VectorLayer(
+        "clearance_infringement_unrolled", "Infringements of the clearance, on the lining", "clearance_infringement_unrolled",
+        "MultiPolygon", "clearance_infringement_unrolled", UNROLLED, (UNROLLED,),
+    ),
+    VectorLayer(
+        "clearance_unrolled", "Margins along the track, by outline and track", "clearance_unrolled", "Polygon",
+        "clearance_unrolled", UNROLLED, (UNROLLED,),
+    ),
+)  # fmt: skip
+"""The same of a survey whose clearance was measured; each only where it has rows."""

@@ -40,6 +40,8 @@ from tunneldb.export.qgis.finding_form import (
 )
 from tunneldb.export.qgis.finding_style import finding_style
 from tunneldb.export.qgis.layer import (
+    CLEARANCE,
+    CLEARANCE_LAYERS,
     FACES,
     FINDINGS,
     FINDINGS_MAP,
@@ -60,7 +62,7 @@ from tunneldb.export.qgis.member_sheet import member_layout
 from tunneldb.export.qgis.raster import BED, FILLED, KINDS, SUBMERGED, image_kind, pipe
 from tunneldb.export.qgis.sheet import sheet_layout
 from tunneldb.export.qgis.source import RECOMPUTED_FROM, Source, recompute
-from tunneldb.export.qgis.space import docks, filled_layers, scene, site_viewpoint, viewpoint
+from tunneldb.export.qgis.space import docks, filled_layers, has_rows, scene, site_viewpoint, viewpoint
 from tunneldb.export.qgis.styles import require_table, style_elements
 from tunneldb.export.tables.spots import read_spots
 from tunneldb.files import replacing
@@ -177,6 +179,7 @@ def _project(
         *(() if survey.site else LAYERS),
         *(STRUCTURE_LAYERS if structures else ()),
         *(UNDERWATER_LAYERS if has_sonar(conn, survey) else ()),
+        *(layer for layer in CLEARANCE_LAYERS if has_rows(conn, survey.name, layer)),
     )
     filled = filled_layers(conn, survey.name, layers)
     entries = [_table(source, survey, "remark", "What is to be known (table)", counted=True)]
@@ -366,7 +369,7 @@ def _tree(entries: Iterable[_Entry]) -> ET.Element:
 
 def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
     element = ET.Element(
-        "layer-tree-group", name=name, expanded=str(int(name in ("", MAP, UNROLLED, STRUCTURES, UNDERWATER))),
+        "layer-tree-group", name=name, expanded=str(int(name in ("", MAP, UNROLLED, STRUCTURES, UNDERWATER, CLEARANCE))),
         checked="Qt::Checked" if checked else "Qt::Unchecked",
     )  # fmt: skip
     for title, part in group.groups.items():
@@ -382,7 +385,7 @@ def _group_element(group: _Group, name: str, checked: bool) -> ET.Element:
             ET.SubElement(shown, "Option", type="int", name="showFeatureCount", value="1")
     for title, part in group.groups.items():
         if title != FINDINGS:
-            element.append(_group_element(part, title, title in (MAP, STRUCTURES, UNDERWATER)))
+            element.append(_group_element(part, title, title in (MAP, STRUCTURES, UNDERWATER, CLEARANCE)))
     return element
 
 

@@ -101,15 +101,16 @@ def filled_layers(conn: psycopg.Connection, survey: str, layers: Sequence[Vector
 
     A single layer that has a 3D style and no rows leaves the whole view blank in QGIS 3.22.
     """
+    return {layer.id for layer in layers if SPACE in layer.themes and has_rows(conn, survey, layer)}
+
+
+def has_rows(conn: psycopg.Connection, survey: str, layer: VectorLayer) -> bool:
+    """Whether a layer has rows of its geometry."""
     query = sql.SQL("SELECT EXISTS (SELECT FROM tunnel_api.{} WHERE survey = %s AND public.GeometryType({}) = upper(%s){})")
-    found = set()
-    for layer in layers:
-        if SPACE in layer.themes:
-            condition = sql.SQL(f" AND {layer.where}" if layer.where else "")
-            rows = query.format(sql.Identifier(layer.view), sql.Identifier(layer.column), condition)
-            row = conn.execute(rows, (survey, layer.wkb.removesuffix("Z"))).fetchone()
-            found |= {layer.id} if row and row[0] else set()
-    return found
+    condition = sql.SQL(f" AND {layer.where}" if layer.where else "")
+    rows = query.format(sql.Identifier(layer.view), sql.Identifier(layer.column), condition)
+    row = conn.execute(rows, (survey, layer.wkb.removesuffix("Z"))).fetchone()
+    return row is not None and bool(row[0])
 
 
 def scene(view: Viewpoint, extent: Extent, crs: ET.Element, layers: Sequence[str]) -> ET.Element:
