@@ -20,7 +20,7 @@ from tunneldb.shape.tukey import CUT, weights
 MARGIN = 0.05
 """What is nearer to a joint than that is not looked at: chamfer, sealing, mortar, m."""
 
-REACH = 0.6
+REACH = 1.0
 """Length on either side over which planes are fitted, m, but no more than a ring has."""
 
 CELL_ROWS = 5

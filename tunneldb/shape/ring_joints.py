@@ -76,7 +76,7 @@ class Joints:
 
 
 def column_signals(level: Single | None, offset: Single, pixel: float) -> Float:
-    """How much each column looks like a joint, (kinds, columns): line of intensity, groove, step; NaN without lining.
+    """How much each column looks like a joint: dark and bright line, groove and ridge, step, (5, columns); NaN without lining.
 
     Parameters
     ----------
@@ -87,26 +87,26 @@ def column_signals(level: Single | None, offset: Single, pixel: float) -> Float:
     pixel : float
         Side of a pixel, m.
     """
-    none = np.full(offset.shape[1], np.nan)
-    return np.stack(
-        [none if level is None else np.abs(_line(level, pixel)), np.abs(_line(offset, pixel)), _step(offset, pixel)]
-    )
+    none = np.full((2, offset.shape[1]), np.nan)
+    return np.vstack([none if level is None else _lines(level, pixel), _lines(offset, pixel), _step(offset, pixel)])
 
 
-def _line(values: Single, pixel: float) -> Float:
-    """Mean difference of each column from those beside it; what differs by much counts as what differs by some."""
+def _lines(values: Single, pixel: float) -> Float:
+    """How much less, and how much more, each column has than those on both sides of it, (2, columns)."""
     k = max(round(BESIDE / pixel), 1)
-    off = np.full(values.shape, np.nan, np.float32)
-    off[:, k:-k] = values[:, k:-k] - 0.5 * (values[:, : -2 * k] + values[:, 2 * k :])
-    return _clipped_mean(off)
+    before, behind = (np.full(values.shape, np.nan, np.float32) for _ in range(2))
+    before[:, k:-k] = values[:, : -2 * k] - values[:, k:-k]
+    behind[:, k:-k] = values[:, 2 * k :] - values[:, k:-k]
+    return np.stack([_clipped_mean(np.minimum(before, behind)), _clipped_mean(np.minimum(-before, -behind))])
 
 
 def _clipped_mean(off: Single) -> Float:
     seen = np.isfinite(off)
     if not seen.any():
         return np.full(off.shape[1], np.nan)
-    limit = 2.0 * MAD_TO_SIGMA * float(np.median(np.abs(off[seen])))
-    total = np.where(seen, np.clip(off, -limit, limit), 0.0).sum(axis=0, dtype=np.float64)
+    middle = float(np.median(off[seen]))
+    limit = 3.0 * MAD_TO_SIGMA * float(np.median(np.abs(off[seen] - middle)))
+    total = np.where(seen, np.clip(off - middle, -limit, limit), 0.0).sum(axis=0, dtype=np.float64)
     count = seen.sum(axis=0)
     return np.where(count >= LEAST_ROWS, total / np.maximum(count, 1) * np.sqrt(count), np.nan)
 
