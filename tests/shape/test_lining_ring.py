@@ -31,7 +31,9 @@ def test_shape_chord_and_seen_share_are_those_of_the_ellipse() -> None:
     assert found.ring is not None
     assert found.ring.is_ellipse
     ellipse = found.ring.adjustment.ellipse
-    np.testing.assert_allclose(ellipse.parameters[:3], [*CENTRE, RADIUS], atol=5 * np.sqrt(np.diag(ellipse.covariance)[:3].max()))
+    np.testing.assert_allclose(
+        ellipse.parameters[:3], [*CENTRE, RADIUS], atol=5 * np.sqrt(np.diag(ellipse.covariance)[:3].max())
+    )
     assert ellipse.radius == pytest.approx(RADIUS, abs=0.0005)
     assert 4.0 * ellipse.flattening / (2.0 * RADIUS) == pytest.approx(4.0 * 0.008 / (2.0 * RADIUS), abs=0.0005)
     assert ellipse.direction == pytest.approx(np.degrees(0.4), abs=2.0)

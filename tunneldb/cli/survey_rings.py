@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from tunneldb.export.tables.survey_rings import Row
 
-_FILES = (".csv", ".xlsx", ".gpkg")
+_FILES = (".csv", ".xlsx")
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def survey_rings(
 
     definition.require_one()
     if output is not None and output.suffix.lower() not in _FILES:
-        raise UserError(f"{output}: rings of a survey are written as {', '.join(_FILES[:-1])} or {_FILES[-1]}")
+        raise UserError(f"{output}: rings of a survey are written as {' or '.join(_FILES)}")
     options = RingOptions(diameter, chords) if diameter is not None or chords else None
     with connect(settings.dsn) as conn:
         survey = get_survey(conn, name)
@@ -78,7 +78,7 @@ def survey_rings(
             tell(rows=rows)
         else:
             with replacing(output) as temporary:
-                write_rings(rows, temporary, output.suffix.lower(), conn, survey)
+                write_rings(rows, temporary, output.suffix.lower(), f"Rings of {name}")
     _print(rows, output)
 
 

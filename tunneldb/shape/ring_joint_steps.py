@@ -26,7 +26,7 @@ REACH = 1.0
 CELL_ROWS = 5
 """Rows of patches in a cell of arc."""
 
-LEAST_PATCHES = 0.4
+LEAST_PATCHES = 0.6
 """Share of the patches of a cell that must be seen on either side."""
 
 SHORTEST = 0.25
@@ -64,7 +64,7 @@ class Steps:
         told = np.isfinite(self.step)
         if not told.any():
             return None
-        good = told & (self.se <= 3.0 * np.median(self.se[told]))
+        good = told & (self.se <= 2.0 * np.median(self.se[told]))
         k = int(np.argmax(np.where(good, np.abs(self.step), -1.0)))
         return float(self.step[k]), float(self.se[k]), float(self.arc[k])
 

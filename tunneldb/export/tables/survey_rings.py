@@ -47,11 +47,16 @@ def _flat(row: Row) -> Row:
     return flat
 
 
-def write_rings(rows: list[Row], path: Path, ending: str, conn: psycopg.Connection[Any], survey: Survey) -> None:
-    """Write rings as .csv, .xlsx or .gpkg; what could not be told is empty."""
+def write_rings(rows: list[Row], path: Path, ending: str, title: str) -> None:
+    """Write rings as .csv or .xlsx; what could not be told is empty."""
     header = list(dict.fromkeys(name for row in rows for name in row))
-    if ending == ".csv":
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, header, restval="", lineterminator="\n")
-            writer.writeheader()
-            writer.writerows({k: "" if v is None else v for k, v in row.items()} for row in rows)
+    if ending == ".xlsx":
+        from tunneldb.export.tables.workbook import Column, Sheet, write_workbook
+
+        cells = [[row.get(name) for name in header] for row in rows]
+        write_workbook(path, [Sheet("rings", [Column(name) for name in header], cells)], title)
+        return
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, header, restval="", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
