@@ -27,6 +27,7 @@ CHAPTERS = {
     "dry": "Dry regions",
     "structures": "Structures",
     "underwater": "Under water",
+    "rings": "Rings",
     "methods": "Methods",
     "reviews": "Reviews",
     "signatures": "Signatures",

@@ -26,6 +26,7 @@ from tunneldb.report.findings import STATE_WORDS, digest_findings, read_findings
 from tunneldb.report.lining import Form
 from tunneldb.report.owner import CHAPTERS, Owner
 from tunneldb.report.photos import Thumbnail
+from tunneldb.report.rings import read_rings
 from tunneldb.report.strip import LETTERS, Progress, Strips
 from tunneldb.report.structures import StructuresChapter, read_structures
 from tunneldb.report.underwater import read_underwater
@@ -196,6 +197,7 @@ class _Report:
         table = "leaks" in owner.chapters and survey.intensity_kind != "none"
         self.findings = read_findings_chapter(conn, survey, (low, high), ids, photos, table=table)
         self.underwater = read_underwater(conn, survey, low, high)
+        self.rings = read_rings(conn, survey, low, high)
         self.regions = read_dry_regions(conn, survey, low, high)
         marks = self.findings.marks if self.findings else []
         self.strips = Strips(conn, survey, low, high, self.leaks, marks, self.coverage, pictured, form, progress, owner.words)
@@ -250,6 +252,7 @@ class _Report:
             "people": text.reviewers(self.findings.by_id.values() if self.findings else []),
             "structures": self.structures,
             "underwater": self.underwater,
+            "rings": self.rings,
             "edits": [text.edit(edit, numbers) for edit in edits],
             "edits_in_all": edits_in_all,
             "part": self.part,
@@ -273,7 +276,10 @@ class _Report:
         """Whether a chapter has anything to say."""
         if chapter in _OF_LEAKS:
             return self.survey.intensity_kind != "none"
-        there = {"findings": self.findings, "dry": self.regions, "structures": self.structures, "underwater": self.underwater}
+        there = {
+            "findings": self.findings, "dry": self.regions, "structures": self.structures, "underwater": self.underwater,
+            "rings": self.rings,
+        }  # fmt: skip
         return chapter not in there or bool(there[chapter])
 
     def _labels(self, chainages: list[float]) -> list[str]:
