@@ -146,7 +146,7 @@ def _curve(name: str, lines: Sequence[tuple[str, Float, Float]], unit: str, star
         known = np.isfinite(y)
         pieces = np.split(np.arange(len(y)), np.flatnonzero(np.diff(known.astype(int))) + 1)
         paths.append((kind, "".join(line_path(points[piece], 1) for piece in pieces if known[piece[0]] and len(piece) > 1)))
-    raw = (high - low) / 4.0
+    raw = (high - low) / 6.0
     scale = 10.0 ** np.floor(np.log10(raw))
     step = float(scale * next(m for m in (1.0, 2.0, 5.0, 10.0) if m * scale >= raw))
     levels = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)

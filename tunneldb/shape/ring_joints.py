@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import median_filter
+from scipy.stats import gamma
 
 from tunneldb.arrays import Bool, Float, Int64, Single
 from tunneldb.robust import MAD_TO_SIGMA
@@ -37,7 +38,7 @@ SHORTEST, LONGEST = 0.8, 2.5
 STRETCH = 50.0
 """Length over which rings are taken to repeat evenly, m."""
 
-BY_CHANCE = 1e-6
+BY_CHANCE = 1e-3
 """Peaks that lie anywhere repeat as evenly in so small a share of surveys (Rayleigh's test over all lengths)."""
 
 AS_GOOD = 0.6
@@ -184,8 +185,8 @@ def ring_length(places: Float, weight: Float) -> float:
         turned = np.exp(2j * np.pi * np.outer(per_metre, places[first:stop] - places[first])) @ weight[first:stop]
         power += np.abs(turned) ** 2 / (weight[first:stop] ** 2).sum()
         parts += 1
-    # Each stretch adds an exponential of mean 1 where peaks lie anywhere: their sum is about normal, or of one part exponential.
-    limit = parts + np.log(len(per_metre) / BY_CHANCE) + np.sqrt(2.0 * parts * np.log(len(per_metre) / BY_CHANCE))
+    # Where peaks lie anywhere, each stretch adds an exponential of mean 1 (Rayleigh's test): their sum has a gamma distribution.
+    limit = gamma.isf(BY_CHANCE / len(per_metre), max(parts, 1))
     if not parts or power.max() < limit:
         raise NoRingsError("what looks like joints does not repeat evenly")
     top = (power >= AS_GOOD * power.max()) & (power >= np.maximum(np.roll(power, 1), np.roll(power, -1)))
