@@ -135,3 +135,60 @@ COMMENT ON COLUMN tunnel_api.ring_status.rings IS 'How many rings have their mid
 COMMENT ON COLUMN tunnel_api.ring_status.done_at IS 'When they were last measured; NULL: never';
 COMMENT ON COLUMN tunnel_api.ring_status.stale IS 'True when they were never measured, or what that rests on has changed since';
 COMMENT ON COLUMN tunnel_api.ring_status.reason IS 'Why it is stale';
+
+-- Between the ends of the section that is nearest behind the ring's beginning, or before it.
+CREATE OR REPLACE VIEW tunnel_api.ring_unrolled AS
+SELECT r.id, r.survey_id, r.survey, r.km, r.number, r.label, r.chainage_from, r.chainage_to, r.joint, r.seen_share, r.radius,
+       1000 * r.ovality AS ovality, 1000 * r.ovality_se AS ovality_se, 1000 * r.centre_right AS centre_right,
+       1000 * r.centre_up AS centre_up, 1000 * r.step_greatest AS step_greatest, 1000 * r.lip AS lip, r.remark,
+       public.st_makeenvelope(r.chainage_from, e.low, r.chainage_to, e.high, 0)::public.geometry(Polygon, 0) AS geom
+  FROM tunnel_api.ring r
+ CROSS JOIN LATERAL (
+        SELECT q.low, q.high
+          FROM ((SELECT t.chainage, t.arc[1] AS low, t.arc[361] AS high FROM tunnel.section t
+                  WHERE t.survey_id = r.survey_id AND t.chainage >= r.chainage_from ORDER BY t.chainage LIMIT 1)
+                 UNION ALL
+                (SELECT t.chainage, t.arc[1], t.arc[361] FROM tunnel.section t
+                  WHERE t.survey_id = r.survey_id AND t.chainage < r.chainage_from ORDER BY t.chainage DESC LIMIT 1)) q
+         ORDER BY abs(q.chainage - r.chainage_from) LIMIT 1) e;
+COMMENT ON VIEW tunnel_api.ring_unrolled IS 'Rings on the unrolled plane, with what QGIS shows of them';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.number IS 'Number of the ring';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.label IS 'Station of its middle, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.joint IS 'Joint at its beginning: given, seen, or missing';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.seen_share IS 'Share of its circumference that is seen; NULL: not measured';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.radius IS 'Mean radius, m';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.ovality IS 'Largest less smallest diameter over the design diameter, per mille';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.ovality_se IS 'Standard error, per mille';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.centre_right IS 'How far its centre lies right of the given axis, mm';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.centre_up IS 'How far its centre lies above the given axis, mm';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.step_greatest IS 'Greatest step at its beginning, mm, positive where it stands in';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.lip IS 'Greatest step between its segments, mm';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.remark IS 'What is to be known of it';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.geom IS 'Chainage and arc, m';
+
+CREATE OR REPLACE VIEW tunnel_api.ring_map AS
+SELECT r.id, r.survey_id, r.survey, r.km, r.number, r.label, r.chainage_from, r.chainage_to, r.joint, r.seen_share, r.radius,
+       r.ovality, r.ovality_se, r.centre_right, r.centre_up, r.step_greatest, r.lip, r.remark,
+       public.st_makepolygon(public.st_makeline(ARRAY[c.a, c.b, c.c, c.d, c.a]))::public.geometry(Polygon) AS geom
+  FROM tunnel_api.ring_unrolled r
+ CROSS JOIN LATERAL (SELECT public.st_ymin(r.geom) AS low, public.st_ymax(r.geom) AS high) e
+ CROSS JOIN LATERAL (
+        SELECT tunnel_api.map_point(r.survey_id, r.chainage_from, e.low) AS a,
+               tunnel_api.map_point(r.survey_id, r.chainage_to, e.low) AS b,
+               tunnel_api.map_point(r.survey_id, r.chainage_to, e.high) AS c,
+               tunnel_api.map_point(r.survey_id, r.chainage_from, e.high) AS d) c
+ WHERE c.a IS NOT NULL AND c.b IS NOT NULL;
+COMMENT ON VIEW tunnel_api.ring_map IS 'Rings laid on the map beside the axis, with what QGIS shows of them';
+COMMENT ON COLUMN tunnel_api.ring_map.number IS 'Number of the ring';
+COMMENT ON COLUMN tunnel_api.ring_map.label IS 'Station of its middle, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.ring_map.joint IS 'Joint at its beginning: given, seen, or missing';
+COMMENT ON COLUMN tunnel_api.ring_map.seen_share IS 'Share of its circumference that is seen; NULL: not measured';
+COMMENT ON COLUMN tunnel_api.ring_map.radius IS 'Mean radius, m';
+COMMENT ON COLUMN tunnel_api.ring_map.ovality IS 'Largest less smallest diameter over the design diameter, per mille';
+COMMENT ON COLUMN tunnel_api.ring_map.ovality_se IS 'Standard error, per mille';
+COMMENT ON COLUMN tunnel_api.ring_map.centre_right IS 'How far its centre lies right of the given axis, mm';
+COMMENT ON COLUMN tunnel_api.ring_map.centre_up IS 'How far its centre lies above the given axis, mm';
+COMMENT ON COLUMN tunnel_api.ring_map.step_greatest IS 'Greatest step at its beginning, mm, positive where it stands in';
+COMMENT ON COLUMN tunnel_api.ring_map.lip IS 'Greatest step between its segments, mm';
+COMMENT ON COLUMN tunnel_api.ring_map.remark IS 'What is to be known of it';
+COMMENT ON COLUMN tunnel_api.ring_map.geom IS 'On the map, tunnel''s SRID';

@@ -43,13 +43,14 @@ ON_MAP = {
     "outline": "LineString",
     "ground": "LineStringZ",
     "leak_3d": "PolygonZ",
+    "ring_map": "Polygon",
 }
 IMAGES = ("raw", "corrected", "corrected-filled", "offset", "state", "class")
 UNROLLED = {
     "leak_unrolled": "Polygon", "anomaly_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon",
-    "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon",
+    "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon", "ring_unrolled": "Polygon",
 }  # fmt: skip
-NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet"}
+NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet", "ring_unrolled"}
 """Layers of the unrolled plane that its theme does not show."""
 FINDINGS = {
     f"finding_{name}_{place}": kind + z

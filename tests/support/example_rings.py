@@ -15,9 +15,9 @@ def add_rings(conn: psycopg.Connection, survey_id: int) -> None:
         "INSERT INTO tunnel.ring (survey_id, km, number, chainage_from, chainage_to, origin, joint, seen_share, shape, radius,"
         " radius_se, ovality, ovality_se, design_diameter, diameter_from, step, step_se, step_arc, step_greatest,"
         " step_greatest_se, step_greatest_arc)"
-        " SELECT %(survey)s, 12, n, 12300 + (n - 1) * %(length)s, 12300 + n * %(length)s, 'length', 'given', 0.75, 'ellipse', 4,"
-        " 0.0001, n * %(oval)s, 0.0001, 8, 'option', ARRAY[0, s.size, 'NaN']::real[], '{0.0004,0.0004,NaN}', '{-3,0,3}',"
-        " s.size, 0.0004, 0"
+        " SELECT %(survey)s, 12, n, 12300 + (n - 1) * %(length)s, 12300 + n * %(length)s, 'length', 'given', 0.75,"
+        " 'ellipse', 4, 0.0001, n * %(oval)s, 0.0001, 8, 'option', ARRAY[0, s.size, 'NaN']::real[],"
+        " '{0.0004,0.0004,NaN}', '{-3,0,3}', s.size, 0.0004, 0"
         " FROM generate_series(1, %(count)s) AS n CROSS JOIN LATERAL (SELECT n * %(step)s * (2 * (n %% 2) - 1) AS size) s",
         {"survey": survey_id, "length": LENGTH, "count": COUNT, "oval": OVALITY, "step": STEP},
     )

@@ -92,7 +92,8 @@ def _define(conn: psycopg.Connection[Any], survey: Survey, definition: Definitio
         missing = int((~joints.seen).sum())
         tell(pitch=joints.pitch, pitch_se=joints.pitch_se, joints=len(joints.seen), joints_missing=missing)
         click.echo(
-            f"rings of {joints.pitch:.4f} m (± {1e3 * joints.pitch_se:.1f} mm); {len(joints.seen)} joints, {missing} of them not seen",
+            f"rings of {joints.pitch:.4f} m (± {1e3 * joints.pitch_se:.1f} mm);"
+            f" {len(joints.seen)} joints, {missing} of them not seen",
             err=True,
         )
     elif definition.length is not None:
@@ -118,7 +119,8 @@ def _print(rows: list[Row], output: Path | None) -> None:
         (
             row["number"], row["label"], number(row["seen_share"], 100.0, 0), number(row["centre_right"], 1e3, 1),
             number(row["centre_up"], 1e3, 1), number(row["radius"], 1.0, 4), number(row["ovality"], 1e3, 2),
-            number(row["ovality_se"], 1e3, 2), number(row["step_greatest"], 1e3, 1), number(row["lip"], 1e3, 1), row["remark"] or "",
+            number(row["ovality_se"], 1e3, 2), number(row["step_greatest"], 1e3, 1), number(row["lip"], 1e3, 1),
+            row["remark"] or "",
         )
         for row in shown
     ]  # fmt: skip

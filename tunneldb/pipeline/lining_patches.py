@@ -17,8 +17,8 @@ from tunneldb.raster.geotiff import Raster, decode
 from tunneldb.raster.grid import BLOCK
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.shape.patches import PATCH, Patches, average, join
-from tunneldb.store.survey import Survey
 from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey
 
 _BESIDE = 100.0
 """Rings reach over a kilometre's ends by less, m."""

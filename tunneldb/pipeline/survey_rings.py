@@ -15,7 +15,7 @@ from tunneldb.csvfile import read_csv
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.deviation import STATIONS
-from tunneldb.pipeline.lining_patches import LiningPatches, image_blocks, load_block, pixel_places, shown_lining
+from tunneldb.pipeline.lining_patches import LiningPatches, image_blocks, load_block, shown_lining
 from tunneldb.pipeline.run import nothing_yet
 from tunneldb.shape.circle import taubin
 from tunneldb.shape.lining_ring import LiningRing, measure_ring

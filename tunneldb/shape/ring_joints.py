@@ -185,7 +185,7 @@ def ring_length(places: Float, weight: Float) -> float:
         turned = np.exp(2j * np.pi * np.outer(per_metre, places[first:stop] - places[first])) @ weight[first:stop]
         power += np.abs(turned) ** 2 / (weight[first:stop] ** 2).sum()
         parts += 1
-    # Where peaks lie anywhere, each stretch adds an exponential of mean 1 (Rayleigh's test): their sum has a gamma distribution.
+    # Where peaks lie anywhere, each stretch adds an exponential of mean 1 (Rayleigh's test): the sum has a gamma distribution.
     limit = gamma.isf(BY_CHANCE / len(per_metre), max(parts, 1))
     if not parts or power.max() < limit:
         raise NoRingsError("what looks like joints does not repeat evenly")

@@ -59,7 +59,8 @@ def save_definition(conn: psycopg.Connection[Any], survey: Survey, rings: Sequen
             copy.write_row((ring.number, round(ring.low, 4), round(ring.high, 4), ring.joint))
     conn.execute(
         "DELETE FROM tunnel.ring r WHERE r.survey_id = %s AND (r.origin <> %s OR NOT EXISTS ("
-        "SELECT FROM ring_given g WHERE (g.number, g.low, g.high, g.joint) = (r.number, r.chainage_from, r.chainage_to, r.joint)))",
+        "SELECT FROM ring_given g"
+        " WHERE (g.number, g.low, g.high, g.joint) = (r.number, r.chainage_from, r.chainage_to, r.joint)))",
         [survey.id, origin],
     )
     made = conn.execute(
@@ -72,10 +73,17 @@ def save_definition(conn: psycopg.Connection[Any], survey: Survey, rings: Sequen
     return made
 
 
+def has_rings(conn: psycopg.Connection[Any], survey: Survey) -> bool:
+    """Whether rings of a survey are defined."""
+    row = conn.execute("SELECT EXISTS (SELECT FROM tunnel.ring WHERE survey_id = %s)", [survey.id]).fetchone()
+    return row is not None and bool(row[0])
+
+
 def load_bounds(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[RingBounds]:
     """Rings that have their middle in a kilometre, in order."""
     rows = conn.execute(
-        "SELECT number, chainage_from, chainage_to, joint FROM tunnel.ring WHERE survey_id = %s AND km = %s ORDER BY chainage_from",
+        "SELECT number, chainage_from, chainage_to, joint FROM tunnel.ring"
+        " WHERE survey_id = %s AND km = %s ORDER BY chainage_from",
         [survey.id, km],
     ).fetchall()
     return [RingBounds(*row) for row in rows]
@@ -153,7 +161,8 @@ _SHAPE = (
 )  # fmt: skip
 _ELLIPSE = (
     "diameter_largest", "diameter_largest_se", "diameter_smallest", "diameter_smallest_se", "largest_clock",
-    "largest_clock_se", "ovality", "ovality_se", "design_diameter", "diameter_from", "harmonic", "harmonic_se", "harmonic_clock",
+    "largest_clock_se", "ovality", "ovality_se", "design_diameter", "diameter_from",
+    "harmonic", "harmonic_se", "harmonic_clock",
 )  # fmt: skip
 
 

@@ -188,3 +188,9 @@ UNDERWATER_LAYERS = (
     ),
 )  # fmt: skip
 """The same of a survey of a canal tunnel for which sonar scans were registered."""
+
+RING_LAYERS = (
+    VectorLayer("ring_map", "Rings beside the axis, by ovality", "ring_map", "Polygon", "ring", MAP, ()),
+    VectorLayer("ring_unrolled", "Rings, by ovality", "ring_unrolled", "Polygon", "ring", UNROLLED, ()),
+)
+"""The same of a survey whose lining has rings."""
