@@ -98,7 +98,8 @@ def main() -> None:
     with scratch_database(options.dsn) as dsn, tempfile.TemporaryDirectory() as folder:
         found = [scanned(dsn, kind, options.rings, Path(folder)) for kind in options.kinds]
     header = (
-        "lining", "rings", "pitch m", "found less true mm", "joints mm", "radius mm", "ovality %", "steps mm", "within 1.96 se %",
+        "lining", "rings", "pitch m", "found less true mm", "joints mm", "radius mm", "ovality %", "steps mm",
+        "within 1.96 se %",
         "s",
     )  # fmt: skip
     rows = [

@@ -87,7 +87,8 @@ def pixel_places(image: Raster) -> tuple[Float, Float]:
     """Chainage of an image's columns and arc of its rows, middles, m."""
     rows, columns = image.values.shape
     place = image.transform
-    return place.c + (np.arange(columns) + 0.5) * place.a, place.f + (np.arange(rows) + 0.5) * place.e
+    chainage = np.asarray(place.c + (np.arange(columns) + 0.5) * place.a, dtype=np.float64)
+    return chainage, np.asarray(place.f + (np.arange(rows) + 0.5) * place.e, dtype=np.float64)
 
 
 def load_block(conn: psycopg.Connection[Any], survey: Survey, block: int, kinds: tuple[str, ...]) -> dict[str, Raster]:

@@ -71,7 +71,7 @@ def rings_by_length(conn: psycopg.Connection[Any], survey: Survey, length: float
     """Whole rings of one length between the ends of a survey; a joint is at ``start``, else at its beginning."""
     low, high = _ends(conn, survey)
     first = low if start is None else start + length * np.ceil((low - start) / length - 1e-9)
-    joints = first + length * np.arange(int((high - first) / length + 1e-9) + 1)
+    joints = np.asarray(first + length * np.arange(int((high - first) / length + 1e-9) + 1), dtype=np.float64)
     return _between(joints, survey)
 
 
@@ -92,7 +92,7 @@ def rings_of_file(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> 
     values, counts = np.unique(numbers, return_counts=True)
     if (counts > 1).any():
         raise UserError(f"{path}: ring {values[np.argmax(counts)]:.0f} is there more than once")
-    rings = [RingBounds(int(numbers[k]), *(float(table[name][k]) for name in ("chainage_from", "chainage_to"))) for k in order]
+    rings = [RingBounds(int(numbers[k]), float(table["chainage_from"][k]), float(table["chainage_to"][k])) for k in order]
     if not any(ring.high > low and ring.low < high for ring in rings):
         raise UserError(f"{path}: no ring lies within survey {survey.name}, {low:.1f} to {high:.1f} m")
     return rings
@@ -130,7 +130,8 @@ def _signals(
     conn: psycopg.Connection[Any], survey: Survey, blocks: Sequence[int], advance: Callable[[float], None]
 ) -> tuple[Float, float, float]:
     """Signals of the columns of blocks that follow each other, chainage of the first one's beginning, and pixel, m."""
-    parts, start, pixel = [], 0.0, 0.0
+    parts: list[Float] = []
+    start, pixel = 0.0, 0.0
     for block in blocks:
         images = load_block(conn, survey, block, ("offset", "corrected", "state"))
         offset, level = images["offset"], images.get("corrected")
