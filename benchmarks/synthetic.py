@@ -446,6 +446,23 @@ SELECT %(id)s, c / 1000, 'example', 'left', c, c + 1, 0.1 + 0.05 * sin(c), 90, 6
 FROM generate_series(100, %(kilometres)s * 1000 - 100, 500) AS c
 """
 
+# Rings of 1.5 m with steps in cells of 0.3 m, and a chord each.
+RINGS = """
+INSERT INTO tunnel.ring (survey_id, km, number, chainage_from, chainage_to, origin, joint, seen_share, shape, centre_right,
+    centre_up, radius, ovality, ovality_se, design_diameter, diameter_from, step, step_se, step_arc, step_greatest,
+    step_greatest_se, step_greatest_arc)
+SELECT %(id)s, floor((n + 0.5) * 1.5 / 1000), n + 1, n * 1.5, (n + 1) * 1.5, 'length', 'given', 0.75, 'ellipse', 0.01, 0, 4,
+    0.003 + 0.0025 * sin(n / 60.0), 0.0001, 8, 'option', v.steps, v.errors, v.arcs, 0.005 * sin(n / 3.0), 0.0004, 0
+FROM generate_series(0, (%(kilometres)s * 1000 / 1.5)::int - 1) AS n
+CROSS JOIN LATERAL (
+    SELECT array_agg((0.005 * sin((n + i) / 3.0))::real) AS steps, array_agg(0.0004::real) AS errors,
+           array_agg((0.3 * i - 9)::real) AS arcs FROM generate_series(1, 60) AS i) v
+"""
+RING_CHORDS = """
+INSERT INTO tunnel.ring_chord (ring_id, clock_from, clock_to, length, length_se)
+SELECT id, 270, 90, 8 + 0.005 * sin(number / 50.0), 0.0005 FROM tunnel.ring WHERE survey_id = %(id)s
+"""
+
 STEPS = {
     "files and ledger": (FILES, RUNS),
     "segments and sections": (SEGMENTS, COUNTED, SECTIONS),
@@ -465,6 +482,7 @@ STEPS = {
     "ground, clusters, target spheres": (GROUND, CLUSTERS, SPHERES),
     "deviation": (PROFILE, DEVIATION),
     "clearance": (CLEARANCE, INFRINGEMENTS),
+    "rings": (RINGS, RING_CHORDS),
 }
 
 

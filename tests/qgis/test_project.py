@@ -45,14 +45,16 @@ ON_MAP = {
     "leak_3d": "PolygonZ",
     "clearance_map": "LineString",
     "clearance_infringement_3d": "MultiPointZ",
+    "ring_map": "Polygon",
 }
 IMAGES = ("raw", "corrected", "corrected-filled", "offset", "state", "class")
 UNROLLED = {
     "leak_unrolled": "Polygon", "anomaly_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon",
     "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon", "clearance_unrolled": "Polygon",
     "clearance_infringement_unrolled": "MultiPolygon",
+    "ring_unrolled": "Polygon",
 }  # fmt: skip
-NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet"}
+NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet", "ring_unrolled"}
 """Layers of the unrolled plane that its theme does not show."""
 FINDINGS = {
     f"finding_{name}_{place}": kind + z

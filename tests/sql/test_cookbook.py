@@ -20,6 +20,7 @@ from support.cookbook_survey import CONFIRMED, GONE, MOVED, NICHE, OLD, POINTS, 
 from support.example_clearance import TIGHT
 from support.example_deviation import BULGE, OVER, UNDER
 from support.example_objects import FLOOR, HALF_FLOOR, SPHERES, THINGS, beside
+from support.example_rings import COUNT, OVALITY, STEP
 from support.example_survey import GIRTH, NAME, SEEN_FROM, WET, example_surface
 
 from tunneldb.classification.classes import PointClass
@@ -541,6 +542,22 @@ def deviation_stale(rows: Rows, a: Asked) -> None:
     assert row["reason"].startswith("detect is stale: ")
 
 
+def oval(rows: Rows, a: Asked) -> None:
+    assert [row["number"] for row in rows] == list(range(COUNT, 50, -1))
+    close(rows[0], ovality=1000 * COUNT * OVALITY, design_diameter=8)
+
+
+def great_steps(rows: Rows, a: Asked) -> None:
+    assert [row["number"] for row in rows] == list(range(COUNT, COUNT - 10, -1))
+    close(rows[0], step_mm=-1000 * COUNT * STEP, se_mm=0.4, arc=0)
+
+
+def converged(rows: Rows, a: Asked) -> None:
+    """Held against itself, no chord has changed."""
+    assert len(rows) == 20
+    close(rows[0], convergence_mm=0, se_mm=0.7)
+
+
 CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which leaks over 0.2 m² are there between two chainages, and on which segment?": over,
     "Which drip from above?": above,
@@ -588,6 +605,9 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Over which stretches does lining stand more than 50 mm inside?": bulges,
     "What would an axis that is wrong by 10 mm change of it?": wrong_axis,
     "Is the deviation of each kilometre up to date?": deviation_stale,
+    "Which rings are oval by more than 5 ‰?": oval,
+    "Which are the ten greatest steps between rings?": great_steps,
+    "How has a chord changed since another survey?": converged,
     "How many findings of each kind are there, and how did they come about?": kinds,
     "Which cracks are longer than a metre, the most severe first?": cracks,
     "Which severe findings have no photo?": without_photo,

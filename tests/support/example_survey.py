@@ -15,6 +15,7 @@ from shapely.geometry import Polygon, box
 from support.example_clearance import add_clearance
 from support.example_deviation import add_deviation
 from support.example_objects import CORNER, HALF_FLOOR, SPHERES, THINGS, beside, boxed, relief
+from support.example_rings import add_rings
 from tunneldb.anomalies.geometries import anomaly_geometries
 from tunneldb.database import install, open_connection
 from tunneldb.geometry.frame import frames_at, segment_rows, tangents
@@ -129,6 +130,7 @@ def _fill(conn: psycopg.Connection) -> None:
     _things(conn, survey_id, surface)
     add_deviation(conn, survey_id)
     add_clearance(conn, survey_id)
+    add_rings(conn, survey_id)
     conn.execute(  # through the view, so that the audit has a row
         "INSERT INTO tunnel_api.region (survey_id, kind, geom) VALUES (%s, 'dry', ST_MakeEnvelope(12410, -3, 12414, 0, 0))",
         (survey_id,),

@@ -47,7 +47,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "axis": ("tunneldb.cli.axis:axis", "Show how far the measured axis lies from the one given, by element of its design."),
     "rings": (
         "tunneldb.cli.rings:rings",
-        "Measure rings from surveyed points: deviation from the design axis, radius, ovality, chords.",
+        "Measure the rings of a lining, scanned or surveyed: deviation from the axis, radius, ovality, steps, chords.",
     ),
     "profile": ("tunneldb.cli.profile:profile", "Add, list or remove the design profiles of a tunnel."),
     "deviation": (

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.param_types import FilePath, FiniteRange
+from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
+from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.errors import UserError
 
@@ -23,26 +25,39 @@ _CHORD = re.compile(f"{_END}-{_END}")
 
 @verb(
     examples=[
+        "tunneldb rings demo-2024 --find",
+        "tunneldb rings demo-2024 --length 1.5 --diameter 8 --chord 9:00-3:00 -o rings.csv",
+        "tunneldb rings demo-2024 --from 12+310.000 --to 12+340.000 --json",
         "tunneldb rings --points points.csv --axis axis.csv --diameter 5.8 -o rings.csv",
         "tunneldb rings --points points.csv --axis axis.csv --diameter 5.8 --chord 9:00-3:00 --chord 300-60 -o rings.csv",
         "tunneldb rings --points points.csv --axis axis.csv --diameter 5.8 --sigma 0.002 --json",
     ]
 )
+@click.argument("survey", required=False)
+@click.option(
+    "--length", type=FiniteRange(0.3, 20.0), metavar="M",
+    help="Of SURVEY: its rings are whole ones of that length, from its beginning or --start on, m.",
+)  # fmt: skip
+@click.option("--start", "joint_at", type=FINITE, metavar="CHAINAGE", help="With --length: a joint lies there, m.")
+@click.option(
+    "--rings", "rings_file", type=FilePath(dir_okay=False), metavar="CSV",
+    help="Of SURVEY: its rings are those of a file: number,chainage_from,chainage_to, m.",
+)  # fmt: skip
+@click.option("--find", is_flag=True, help="Of SURVEY: its rings lie between the joints that its images show.")
+@stretch_options
 @click.option(
     "--points",
     type=FilePath(dir_okay=False),
-    required=True,
     metavar="CSV",
     help="Surveyed points: ring,point,x,y,z, m, and perhaps offset, how far the prism stands before the lining, m.",
 )
 @click.option(
     "--axis",
     type=FilePath(dir_okay=False),
-    required=True,
     metavar="CSV",
-    help="Design axis: chainage,x,y,z, m, in growing chainage.",
+    help="Of --points: design axis: chainage,x,y,z, m, in growing chainage.",
 )
-@click.option("--diameter", type=FiniteRange(0.5, 50.0), required=True, metavar="M", help="Inner diameter of the design, m.")
+@click.option("--diameter", type=FiniteRange(0.5, 50.0), metavar="M", help="Inner diameter of the design, m.")
 @click.option(
     "--sigma",
     type=FiniteRange(0.0, 0.1, min_open=True),
@@ -55,7 +70,7 @@ _CHORD = re.compile(f"{_END}-{_END}")
     default=3,
     show_default=True,
     metavar="N",
-    help="Orders of the radius's harmonics.",
+    help="Of --points: orders of the radius's harmonics.",
 )
 @click.option(
     "--chord",
@@ -64,27 +79,55 @@ _CHORD = re.compile(f"{_END}-{_END}")
     metavar="FROM-TO",
     help="Chord between two clock positions, in degrees or as on a clock: 300-60, 9:00-3:00. May be repeated.",
 )
-@click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write, CSV; else standard output.")
+@click.option(
+    "-o", "--output", type=FilePath(dir_okay=False), help="File to write, .csv, of a survey .xlsx, too; else standard output."
+)
+@click.pass_obj
+@click.pass_context
 def rings(
-    points: Path,
-    axis: Path,
-    diameter: float,
+    context: click.Context,
+    settings: Settings,
+    survey: str | None,
+    length: float | None,
+    start: str | None,
+    rings_file: Path | None,
+    find: bool,
+    end: str | None,
+    points: Path | None,
+    axis: Path | None,
+    diameter: float | None,
     sigma: float | None,
     harmonics: int,
     chords: tuple[str, ...],
     output: Path | None,
+    joint_at: float | None,
 ) -> None:
-    """Measure rings: centre, deviation from the design axis, radius, ovality, harmonics, chords; needs no database.
+    """Measure rings: centre, deviation from the design axis, radius, ovality, harmonics, chords, steps.
 
+    Those of SURVEY are measured from the offset image, kilometre by kilometre, and stored; --length, --rings or --find says
+    where they lie, and need be given once only. Ovality is a share of --diameter, else of a design profile that is a circle,
+    else of the ring's own mean diameter.
+
+    With --points rings are measured from points of a total station, which needs no database.
     A ring needs 5 points, its ellipse 6. Each value has its standard error. A point that cannot belong to its ring is left out,
     and named in the column remark; so is what could not be told. Clock positions are degrees from the crown to the right,
     looking up-chainage. docs/howto-shape.md says what each column means.
     """
+    _require_one_kind(context, survey, points)
+    lines = _chords(chords)
+    if survey is not None:
+        from tunneldb.cli.survey_rings import Definition, survey_rings
+
+        definition = Definition(length, joint_at, rings_file, find)
+        ends = tuple(chord[1:] for chord in lines)
+        survey_rings(settings, survey, definition, (start, end), diameter, ends, output)
+        return
+    if points is None or axis is None or diameter is None:
+        raise UserError("rings of points need --points, --axis and --diameter; rings of a survey its name")
     from tunneldb.export.tables.rings import SUMMARY, ring_records, rings_csv, summary
     from tunneldb.files import replacing
     from tunneldb.pipeline.rings import measure_rings
 
-    lines = _chords(chords)
     if output is not None:
         _require_writable(output, (points, axis))
     found = measure_rings(points, axis, diameter, sigma, harmonics)
@@ -100,6 +143,29 @@ def rings(
         click.echo(_said(found))
     for note in found.notes:
         click.echo(note, err=True)
+
+
+_OF_SURVEY = {
+    "length": "--length",
+    "joint_at": "--start",
+    "rings_file": "--rings",
+    "find": "--find",
+    "start": "--from",
+    "end": "--to",
+}
+_OF_POINTS = {"axis": "--axis", "sigma": "--sigma", "harmonics": "--harmonics"}
+
+
+def _require_one_kind(context: click.Context, survey: str | None, points: Path | None) -> None:
+    """Refuse a survey and points together, neither, and options of the one with the other."""
+    if survey is not None and points is not None:
+        raise UserError("rings are of a survey or of --points, not of both")
+    if survey is None and points is None:
+        raise UserError("rings of what? Give a survey, or --points with --axis and --diameter")
+    for name, option in (_OF_POINTS if points is None else _OF_SURVEY).items():
+        if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
+            kind = "of --points" if points is None else "of a survey"
+            raise UserError(f"{option} is for rings {kind}")
 
 
 def _require_writable(output: Path, inputs: tuple[Path, ...]) -> None:

@@ -28,6 +28,7 @@ CHAPTERS = {
     "structures": "Structures",
     "underwater": "Under water",
     "clearance": "Clearance",
+    "rings": "Rings",
     "methods": "Methods",
     "reviews": "Reviews",
     "signatures": "Signatures",

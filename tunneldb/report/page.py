@@ -27,6 +27,7 @@ from tunneldb.report.findings import STATE_WORDS, digest_findings, read_findings
 from tunneldb.report.lining import Form
 from tunneldb.report.owner import CHAPTERS, Owner
 from tunneldb.report.photos import Thumbnail
+from tunneldb.report.rings import read_rings
 from tunneldb.report.strip import LETTERS, Progress, Strips
 from tunneldb.report.structures import StructuresChapter, read_structures
 from tunneldb.report.underwater import read_underwater
@@ -198,6 +199,7 @@ class _Report:
         self.findings = read_findings_chapter(conn, survey, (low, high), ids, photos, table=table)
         self.underwater = read_underwater(conn, survey, low, high)
         self.clearance = read_clearance(conn, survey, low, high)
+        self.rings = read_rings(conn, survey, low, high)
         self.regions = read_dry_regions(conn, survey, low, high)
         marks = self.findings.marks if self.findings else []
         self.strips = Strips(conn, survey, low, high, self.leaks, marks, self.coverage, pictured, form, progress, owner.words)
@@ -253,6 +255,7 @@ class _Report:
             "structures": self.structures,
             "underwater": self.underwater,
             "clearance": self.clearance,
+            "rings": self.rings,
             "edits": [text.edit(edit, numbers) for edit in edits],
             "edits_in_all": edits_in_all,
             "part": self.part,
@@ -278,7 +281,7 @@ class _Report:
             return self.survey.intensity_kind != "none"
         there: dict[str, object] = {
             "findings": self.findings, "dry": self.regions, "structures": self.structures, "underwater": self.underwater,
-            "clearance": self.clearance,
+            "clearance": self.clearance, "rings": self.rings,
         }  # fmt: skip
         return chapter not in there or bool(there[chapter])
 

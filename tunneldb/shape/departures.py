@@ -13,8 +13,8 @@ from tunneldb.shape.ellipse import distances
 SECTOR = 2.0
 """Of many points the median of each sector of so many degrees is taken: the greatest of thousands is noise."""
 
-MANY = 360
-"""From so many points on that is done."""
+MANY = 1800
+"""From so many points on that is done: twice as many as all sectors together need."""
 
 LEAST = 5
 """Points that a sector needs."""

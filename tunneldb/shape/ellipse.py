@@ -19,13 +19,14 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from tunneldb.arrays import Float
-from tunneldb.shape.tukey import loss
+from tunneldb.shape.tukey import weights
 
 CIRCLE, ELLIPSE = 3, 5
 """Parameters that are free: centre and radius; and p, q."""
 
 _NEWTON = 12
 _TINY = 1e-12
+_REWEIGHTED, _STILL = 50, 1e-8  # m
 
 
 @dataclass(frozen=True)
@@ -163,6 +164,8 @@ def solve(xy: Float, start: Float, free: int, limit: float | None = None, beside
         Parameters, and by how much of each column the points lie outside.
     """
     more = np.empty((len(xy), 0)) if beside is None else beside
+    if limit is not None:
+        return _reweighted(xy, start, free, limit, more)
 
     def whole(x: Float) -> Float:
         return np.concatenate([x[:free], start[free:]])
@@ -173,7 +176,22 @@ def solve(xy: Float, start: Float, free: int, limit: float | None = None, beside
     def slopes(x: Float) -> Float:
         return np.hstack([distances(whole(x), xy)[1][:, :free], -more])
 
-    robust = {} if limit is None else {"loss": loss, "f_scale": limit}
     begun = np.concatenate([start[:free], np.zeros(more.shape[1])])
-    found = least_squares(residuals, begun, slopes, method="trf", xtol=1e-10, ftol=1e-12, gtol=1e-12, **robust)
+    found = least_squares(residuals, begun, slopes, method="trf", xtol=1e-10, ftol=1e-12, gtol=1e-12)
     return np.concatenate([whole(found.x), found.x[free:]])
+
+
+def _reweighted(xy: Float, start: Float, free: int, limit: float, more: Float) -> Float:
+    """Ellipse of the least of Tukey's losses, by least squares that are reweighted until nothing moves (Huber, 1981, 7.8)."""
+    parameters, beside = start.copy(), np.zeros(more.shape[1])
+    for _ in range(_REWEIGHTED):
+        distance, slope = distances(parameters, xy)
+        slopes = np.hstack([slope[:, :free], -more])
+        off = distance - more @ beside
+        weight = weights(off / limit)[:, None]
+        step = np.linalg.lstsq(slopes.T @ (weight * slopes), -(weight * slopes).T @ off, rcond=1e-12)[0]
+        parameters[:free] += step[:free]
+        beside += step[free:]
+        if np.abs(step).max() < _STILL:
+            break
+    return np.concatenate([parameters, beside])

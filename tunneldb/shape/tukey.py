@@ -15,12 +15,6 @@ def weights(u: Float) -> Float:
     return np.clip(1.0 - u**2, 0.0, None) ** 2
 
 
-def loss(z: Float) -> Float:
-    """Loss and its first two derivatives, (3, n), by squared residuals (n,) in units of the limit, as scipy asks for."""
-    left = np.clip(1.0 - z, 0.0, None)
-    return np.stack([(1.0 - left**3) / 3.0, left**2, -2.0 * left])
-
-
 def rate(u: Float) -> Float:
     """Derivative (n,) of weight times residual by the residual, of residuals (n,) in units of the limit."""
     inside = np.clip(1.0 - u**2, 0.0, None)

@@ -98,6 +98,8 @@ class Simulation:
     appendages, niches, leaks, marks, blotches : list
         What is in it.
     rings : Rings
+    ring_steps : (n,) float array
+        How far each ring of the lining stands out, m.
         How the lining is put together.
     masonry : Masonry
         Its bricks or stones.
@@ -143,6 +145,7 @@ class Simulation:
             parameters, self.tunnel, self.rings, self.masonry, self.appendages, self.marks, self.blotches, coated
         )
         self._relief = lining_relief(parameters, self.tunnel, self.rings, self.masonry, moved)
+        self.ring_steps = np.zeros(self.rings.level.size) if self._relief is None else self._relief.step
         self._mesh = hang_mesh(parameters, self._relief.high if self._relief is not None else 0.0, meshed)
         self._radiometry = parameters.radiometry()
         self.reference = reference_curve(parameters.max_range, np.random.default_rng(reference), self._radiometry.near_loss)

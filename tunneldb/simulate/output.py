@@ -197,6 +197,11 @@ def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
             "half_perimeter": section.half_perimeter,
             "floor_below_axis": -section.floor,
         },
+        "rings": {
+            "first": simulation.rings.first,
+            "length": simulation.rings.length,
+            "step": simulation.ring_steps.tolist(),
+        },
         "classes": {
             "lining": 0,
             "floor": 1,

@@ -23,6 +23,7 @@ from tunneldb.database.models.leak import (
     Region,
     Waterproof,
 )
+from tunneldb.database.models.ring import Ring, RingChord
 from tunneldb.database.models.shape import DesignProfile, DeviationSection
 from tunneldb.database.models.sonar import Bed, Ladder, RegistrationResidual, SonarPoint, SonarScan
 from tunneldb.database.models.structures import Face, Member, Spot
@@ -66,6 +67,8 @@ __all__ = [
     "Reference",
     "Region",
     "RegistrationResidual",
+    "Ring",
+    "RingChord",
     "Run",
     "ScanFile",
     "Section",

@@ -208,3 +208,8 @@ CLEARANCE_LAYERS = (
     ),
 )  # fmt: skip
 """The same of a survey whose clearance was measured; each only where it has rows."""
+RING_LAYERS = (
+    VectorLayer("ring_map", "Rings beside the axis, by ovality", "ring_map", "Polygon", "ring", MAP, ()),
+    VectorLayer("ring_unrolled", "Rings, by ovality", "ring_unrolled", "Polygon", "ring", UNROLLED, ()),
+)
+"""The same of a survey whose lining has rings."""

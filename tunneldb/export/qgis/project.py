@@ -48,6 +48,7 @@ from tunneldb.export.qgis.layer import (
     LAYERS,
     LISTS,
     MAP,
+    RING_LAYERS,
     SHEET_FINDING,
     SHEETS,
     SPACE,
@@ -68,6 +69,7 @@ from tunneldb.export.tables.spots import read_spots
 from tunneldb.files import replacing
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
+from tunneldb.store.rings import has_rings
 from tunneldb.store.sonar import has_sonar
 from tunneldb.store.survey import Survey
 
@@ -180,6 +182,7 @@ def _project(
         *(STRUCTURE_LAYERS if structures else ()),
         *(UNDERWATER_LAYERS if has_sonar(conn, survey) else ()),
         *(layer for layer in CLEARANCE_LAYERS if has_rows(conn, survey.name, layer)),
+        *(RING_LAYERS if has_rings(conn, survey) else ()),
     )
     filled = filled_layers(conn, survey.name, layers)
     entries = [_table(source, survey, "remark", "What is to be known (table)", counted=True)]

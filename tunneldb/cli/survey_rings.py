@@ -1,0 +1,144 @@
+"""Rings of a survey, as the verb ``rings`` does them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import psycopg
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell
+from tunneldb.cli.progress import bar, step
+from tunneldb.cli.stretch import parse_stretch
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect
+from tunneldb.errors import UserError
+from tunneldb.files import replacing, told_to_end
+from tunneldb.store.survey import Survey, get_survey
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from tunneldb.export.tables.survey_rings import Row
+
+_FILES = (".csv", ".xlsx")
+
+
+@dataclass(frozen=True)
+class Definition:
+    """What was said of where rings lie: their length and a joint (m), a file, or that they are to be found."""
+
+    length: float | None
+    start: float | None
+    file: Path | None
+    find: bool
+
+    def require_one(self) -> None:
+        """Refuse more than one of them."""
+        said = [self.length is not None, self.file is not None, self.find]
+        if sum(said) > 1:
+            raise UserError("rings are given by one of --length, --rings and --find")
+        if self.start is not None and self.length is None:
+            raise UserError("--start is a joint of rings of one length: give --length, too")
+
+
+def survey_rings(
+    settings: Settings,
+    name: str,
+    definition: Definition,
+    ends: tuple[str | None, str | None],
+    diameter: float | None,
+    chords: tuple[tuple[float, float], ...],
+    output: Path | None,
+) -> None:
+    """Define the rings of a survey if that was said, measure what is out of date, and list them."""
+    from tunneldb.export.tables.survey_rings import ring_rows, write_rings
+    from tunneldb.pipeline.survey_rings import RingOptions, measure_survey_rings
+
+    definition.require_one()
+    if output is not None and output.suffix.lower() not in _FILES:
+        raise UserError(f"{output}: rings of a survey are written as {' or '.join(_FILES)}")
+    options = RingOptions(diameter, chords) if diameter is not None or chords else None
+    with connect(settings.dsn) as conn:
+        survey = get_survey(conn, name)
+        part = parse_stretch(conn, survey, *ends)
+        conn.rollback()
+        with told_to_end(), bar("blocks") as progress:
+            _define(conn, survey, definition, progress)
+        with told_to_end(), bar("km") as progress:
+            made = measure_survey_rings(conn, survey, part.low, part.high, options, step(progress))
+        rows = ring_rows(conn, survey, part.low, part.high)
+        if not rows:
+            raise UserError(f"survey {name} has no rings there: say where they lie, by --length, --rings or --find")
+        tell(survey=name, made=made, rings=len(rows), file=output)
+        if output is None:
+            tell(rows=rows)
+        else:
+            with replacing(output) as temporary:
+                write_rings(rows, temporary, output.suffix.lower(), f"Rings of {name}")
+    _print(rows, output)
+
+
+def _define(conn: psycopg.Connection[Any], survey: Survey, definition: Definition, progress: Progress) -> None:
+    from tunneldb.pipeline.survey_rings import define_rings, find_rings, rings_by_length, rings_of_file
+
+    if definition.find:
+        rings, joints = find_rings(conn, survey, step(progress))
+        conn.rollback()
+        define_rings(conn, survey, rings, "found")
+        missing = int((~joints.seen).sum())
+        tell(pitch=joints.pitch, pitch_se=joints.pitch_se, joints=len(joints.seen), joints_missing=missing)
+        click.echo(
+            f"rings of {joints.pitch:.4f} m (± {1e3 * joints.pitch_se:.1f} mm);"
+            f" {len(joints.seen)} joints, {missing} of them not seen",
+            err=True,
+        )
+    elif definition.length is not None:
+        rings = rings_by_length(conn, survey, definition.length, definition.start)
+        conn.rollback()
+        define_rings(conn, survey, rings, "length")
+    elif definition.file is not None:
+        rings = rings_of_file(conn, survey, definition.file)
+        conn.rollback()
+        define_rings(conn, survey, rings, "file")
+
+
+_SHOWN = 20
+
+
+def _print(rows: list[Row], output: Path | None) -> None:
+    def number(value: float | None, factor: float, decimals: int) -> str:
+        return "" if value is None else f"{factor * value:.{decimals}f}"
+
+    told = sorted((row for row in rows if row["ovality"] is not None), key=lambda row: -row["ovality"])
+    shown = told[:_SHOWN] if len(rows) > _SHOWN else rows
+    table = [
+        (
+            row["number"], row["label"], number(row["seen_share"], 100.0, 0), number(row["centre_right"], 1e3, 1),
+            number(row["centre_up"], 1e3, 1), number(row["radius"], 1.0, 4), number(row["ovality"], 1e3, 2),
+            number(row["ovality_se"], 1e3, 2), number(row["step_greatest"], 1e3, 1), number(row["lip"], 1e3, 1),
+            row["remark"] or "",
+        )
+        for row in shown
+    ]  # fmt: skip
+    header = ["ring", "middle", "seen %", "right mm", "up mm", "radius m", "ovality ‰", "±", "step mm", "lip mm", "remark"]
+    print_table(header, table, right=tuple(range(2, 10)))
+    steps = [abs(row["step_greatest"]) for row in rows if row["step_greatest"] is not None]
+    said = f"{len(rows)} rings, {len(told)} with an ellipse"
+    if len(rows) > len(shown):
+        said += f", the {len(shown)} of most ovality shown"
+    if steps:
+        said += f"; greatest step {1e3 * max(steps):.1f} mm"
+    unseen = sum(not row["seen_share"] for row in rows)
+    if unseen:
+        said += f"; of {unseen} nothing is seen"
+    click.echo(said)
+    if told:
+        whence = {"option": "--diameter", "profile": "the design profile", "ring": "each ring's own mean"}
+        kinds = sorted({whence[row["diameter_from"]] for row in told})
+        click.echo(f"ovality is a share of the diameter of {' and '.join(kinds)}")
+    if output is not None:
+        click.echo(f"written to {output}", err=True)

@@ -1,0 +1,129 @@
+"""Pixels of the lining averaged into patches of a few centimetres, by which rings are measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunneldb.arrays import Float, Int64, Single
+
+PATCH = 0.06
+"""Side of a patch, in whole pixels, m: 3 mm of noise become less than 1 mm, and what bends within is less."""
+
+LEAST_SEEN = 0.3
+"""Share of its pixels that a patch needs."""
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Patches about the given axis.
+
+    Attributes
+    ----------
+    chainage : (c,) float array
+        Of their middles, m, growing.
+    arc : (r,) float array
+        Of their middles, m, growing.
+    right, up : (c, r) float arrays
+        Where they lie about the given axis, m; NaN unseen.
+    """
+
+    chainage: Float
+    arc: Float
+    right: Float
+    up: Float
+
+    def between(self, low: float, high: float) -> Patches:
+        """Those whose middles lie between two chainages, m."""
+        first, stop = np.searchsorted(self.chainage, [low, high])
+        return Patches(self.chainage[first:stop], self.arc, self.right[first:stop], self.up[first:stop])
+
+
+def average(values: Single, chainage: Float, arc: Float, side: float) -> tuple[Float, Float, Single]:
+    """Average an image into patches that lie at whole multiples of their side.
+
+    Parameters
+    ----------
+    values : (rows, columns) float32 array
+        Offset of lining, m; NaN elsewhere.
+    chainage, arc : (columns,), (rows,) float arrays
+        Middles of the pixels, m.
+    side : float
+        Of a patch, m.
+
+    Returns
+    -------
+    chainage, arc : (c,), (r,) float arrays
+        Middles of the patches, growing, m.
+    mean : (r, c) float32 array
+        NaN where less than `LEAST_SEEN` of the pixels is seen.
+    """
+    if arc[0] > arc[-1]:
+        values, arc = values[::-1], arc[::-1]
+    (row, rows), (column, columns) = _bins(arc, side), _bins(chainage, side)
+    seen = np.isfinite(values)
+    count, total = (
+        np.add.reduceat(np.add.reduceat(part, row, axis=0), column, axis=1)
+        for part in (seen.astype(np.float32), np.where(seen, values, np.float32(0.0)))
+    )
+    pixels = np.outer(np.diff(row, append=len(arc)), np.diff(column, append=len(chainage)))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(count >= np.maximum(LEAST_SEEN * pixels, 1.0), total / count, np.float32(np.nan))
+    return (columns + 0.5) * side, (rows + 0.5) * side, mean.astype(np.float32)
+
+
+def _bins(places: Float, side: float) -> tuple[Int64, Float]:
+    """First of the growing places (n,) in each bin, and the bins' numbers."""
+    number = np.floor(places / side + 1e-9)
+    first = np.flatnonzero(np.diff(number, prepend=number[0] - 1.0))
+    return first, number[first]
+
+
+def join(parts: Sequence[Patches]) -> Patches:
+    """Patches one behind the other, over all arcs that any of them has."""
+    if len(parts) == 1:
+        return parts[0]
+    side = min((float(np.diff(part.arc).min()) for part in parts if len(part.arc) > 1), default=PATCH)
+    low, high = min(part.arc[0] for part in parts), max(part.arc[-1] for part in parts)
+    arc = low + side * np.arange(round((high - low) / side) + 1)
+    chainage = np.concatenate([part.chainage for part in parts])
+    out = [np.full((len(chainage), len(arc)), np.nan) for _ in range(2)]
+    begin = 0
+    for part in parts:
+        rows = np.rint((part.arc - low) / side).astype(np.int64)
+        stop = begin + len(part.chainage)
+        out[0][begin:stop, rows], out[1][begin:stop, rows] = part.right, part.up
+        begin = stop
+    return Patches(chainage, arc, *out)
+
+
+def row_medians(patches: Patches, least: float = 0.25) -> Float:
+    """Place of each row of arc (r, 2), right and up, m: medians along the ring; NaN where fewer than that share is seen."""
+    count = np.isfinite(patches.right).sum(axis=0)
+    out = np.full((len(patches.arc), 2), np.nan)
+    held = np.flatnonzero(count >= max(least * len(patches.chainage), 1.0))
+    for k, values in enumerate((patches.right, patches.up)):
+        ordered = np.sort(values[:, held], axis=0)  # NaN last
+        low, high = (count[held] - 1) // 2, count[held] // 2
+        across = np.arange(len(held))
+        out[held, k] = 0.5 * (ordered[low, across] + ordered[high, across])
+    return out
+
+
+def inward_normals(places: Float) -> Float:
+    """Unit vectors (r, 2) into the tunnel, across the rows of places (r, 2), which lie clockwise; NaN without neighbours."""
+    filled = places.copy()
+    seen = np.flatnonzero(np.isfinite(places[:, 0]))
+    if len(seen) < 3:
+        return np.full(places.shape, np.nan)
+    index = np.arange(len(places))
+    for k in range(2):
+        filled[:, k] = np.interp(index, seen, places[seen, k])
+    wide = 3
+    padded = np.pad(filled, ((wide, wide), (0, 0)), mode="edge")
+    along = padded[2 * wide :] - padded[: -2 * wide]
+    length = np.hypot(along[:, 0], along[:, 1])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.column_stack([along[:, 1], -along[:, 0]]) / length[:, None]

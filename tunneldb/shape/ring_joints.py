@@ -1,0 +1,269 @@
+"""Joints between rings, found from the unrolled images: where columns of pixels differ all around, and how evenly that repeats.
+
+A joint shows as a narrow dark or bright line of intensity, as a groove, or as a step of the offset. Each is taken column by
+column, from many rows of which none has much to say; what repeats along the tunnel is the ring's length. Joints are then
+followed one by one: rings of curved tunnels are tapered, and one may be of other length, or its joint be hidden.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.stats import gamma
+
+from tunneldb.arrays import Bool, Float, Int64, Single
+from tunneldb.robust import MAD_TO_SIGMA
+
+BESIDE = 0.06
+"""A line is held against what lies so far before and behind it, m: joints are narrower, with beam and pixels."""
+
+ACROSS = 0.12
+"""A step is the difference of means over so much before and behind, m."""
+
+SECTORS = 8
+"""Parts of the section in which steps are told one by one: a ring that is shifted steps in here and out there."""
+
+LEAST_ROWS = 20
+"""Rows that a column needs in a sector."""
+
+STRONG = 5.0
+"""A peak is one that stands out by so many standard deviations of what columns scatter anyway."""
+
+SHORTEST, LONGEST = 0.8, 2.5
+"""Lengths of rings that are looked for, m."""
+
+STRETCH = 50.0
+"""Length over which rings are taken to repeat evenly, m."""
+
+BY_CHANCE = 1e-3
+"""Peaks that lie anywhere repeat as evenly in so small a share of surveys (Rayleigh's test over all lengths)."""
+
+AS_GOOD = 0.6
+"""A longer length is the ring's if it repeats at least so well: half the length repeats as well as the whole."""
+
+_USUAL = 2.0  # m over which the usual strength of columns is taken
+_TOLERANCE = 0.012  # m, standard deviation of a ring's length about what those beside it have
+_OTHER = 9.0  # squared deviations: a ring of other length costs as much as one of three
+_OTHER_COST = 2.0 * STRONG
+_GAP = 4.0  # cost of each joint that is not seen
+_MOST_GAPS = 6
+
+
+class NoRingsError(ValueError):
+    """No ring length can be told; the message says why."""
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Joints as they were found.
+
+    Attributes
+    ----------
+    chainage : (n,) float array
+        Growing, m.
+    seen : (n,) bool array
+        False where a joint is put in between those beside it.
+    pitch, pitch_se : float
+        Mean length of the rings between seen joints, and its standard error, m.
+    """
+
+    chainage: Float
+    seen: Bool
+    pitch: float
+    pitch_se: float
+
+
+def column_signals(level: Single | None, offset: Single, pixel: float) -> Float:
+    """How much each column looks like a joint: dark and bright line, groove and ridge, step, (5, columns); NaN without lining.
+
+    Parameters
+    ----------
+    level : (rows, columns) float32 array or None
+        Corrected intensity of lining, dB; NaN elsewhere.
+    offset : (rows, columns) float32 array
+        The same of the offset, m.
+    pixel : float
+        Side of a pixel, m.
+    """
+    none = np.full((2, offset.shape[1]), np.nan)
+    return np.vstack([none if level is None else _lines(level, pixel), _lines(offset, pixel), _step(offset, pixel)])
+
+
+def _lines(values: Single, pixel: float) -> Float:
+    """How much less, and how much more, each column has than those on both sides of it, (2, columns)."""
+    k = max(round(BESIDE / pixel), 1)
+    before, behind = (np.full(values.shape, np.nan, np.float32) for _ in range(2))
+    before[:, k:-k] = values[:, : -2 * k] - values[:, k:-k]
+    behind[:, k:-k] = values[:, 2 * k :] - values[:, k:-k]
+    return np.stack([_clipped_mean(np.minimum(before, behind)), _clipped_mean(np.minimum(-before, -behind))])
+
+
+def _clipped_mean(off: Single) -> Float:
+    seen = np.isfinite(off)
+    if not seen.any():
+        return np.full(off.shape[1], np.nan)
+    middle = float(np.median(off[seen]))
+    limit = 3.0 * MAD_TO_SIGMA * float(np.median(np.abs(off[seen] - middle)))
+    total = np.where(seen, np.clip(off - middle, -limit, limit), 0.0).sum(axis=0, dtype=np.float64)
+    count = seen.sum(axis=0)
+    return np.where(count >= LEAST_ROWS, total / np.maximum(count, 1) * np.sqrt(count), np.nan)
+
+
+def _step(offset: Single, pixel: float) -> Float:
+    """Root of the mean square, over the sectors, of the mean difference behind and before each column."""
+    k = max(round(ACROSS / pixel), 2)
+    seen = np.isfinite(offset)
+    sums = [np.cumsum(np.pad(part, ((0, 0), (1, 0))), axis=1, dtype=np.float64) for part in (np.where(seen, offset, 0.0), seen)]
+    columns = offset.shape[1]
+    total, count = ([one[:, j : columns - 2 * k + j + 1] for j in (0, k, 2 * k)] for one in sums)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean_before = (total[1] - total[0]) / (count[1] - count[0])
+        mean_behind = (total[2] - total[1]) / (count[2] - count[1])
+    change = (mean_behind - mean_before).astype(np.float32)
+    parts = np.stack([_clipped_mean(part) for part in np.array_split(change, SECTORS, axis=0)])
+    told = np.isfinite(parts)
+    out = np.full(columns, np.nan)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        # The difference at edge j + k lies between two columns: the one behind it takes it.
+        out[k : columns - k + 1] = np.sqrt(np.where(told, parts**2, 0.0).sum(axis=0) / told.sum(axis=0))
+    return out
+
+
+def strength(signals: Float, pixel: float) -> Float:
+    """Strength (columns,) of all kinds together: standard deviations by which a column stands out; 0 where nothing is seen."""
+    total = np.zeros(signals.shape[1])
+    window = 2 * round(_USUAL / pixel / 2.0) + 1
+    for signal in signals:
+        seen = np.isfinite(signal)
+        if seen.sum() < window:
+            continue
+        filled = np.where(seen, signal, np.median(signal[seen]))
+        out = filled - median_filter(filled, window, mode="nearest")
+        spread = MAD_TO_SIGMA * float(np.median(np.abs(out[seen])))
+        if spread > 0.0:
+            total += np.where(seen, np.clip(out / spread, 0.0, 40.0), 0.0) ** 2
+    return np.sqrt(total)
+
+
+def peaks(strong: Float, pixel: float) -> tuple[Float, Float]:
+    """Places of peaks, in columns, to parts of one, and their strength, (n,) each."""
+    half = max(round(0.12 / pixel), 2)
+    padded = np.pad(strong, half)
+    highest = np.array([padded[half + k : len(padded) - half + k] for k in range(-half, half + 1)]).max(axis=0)
+    at = np.flatnonzero((strong >= STRONG) & (strong == highest))
+    at = at[np.diff(at, prepend=-half - 1) > half]
+    near = at[:, None] + np.arange(-2, 3)
+    weight = np.take(strong, near, mode="clip") ** 2
+    return (weight * near).sum(axis=1) / weight.sum(axis=1), strong[at]
+
+
+def ring_length(places: Float, weight: Float) -> float:
+    """Length with which peaks repeat, m.
+
+    Parameters
+    ----------
+    places, weight : (n,) float arrays
+        Chainage, m, and strength.
+
+    Raises
+    ------
+    NoRingsError
+        If they repeat no better than places that lie anywhere.
+    """
+    if len(places) < 5:
+        raise NoRingsError(f"only {len(places)} places look like joints all around")
+    per_metre = np.arange(1.0 / LONGEST, 1.0 / SHORTEST, 0.1 / STRETCH)
+    power, parts = np.zeros(len(per_metre)), 0
+    weight = np.minimum(weight, 4.0 * np.median(weight))
+    number = np.floor(places / STRETCH).astype(np.int64)
+    for first, stop in _runs(number):
+        if stop - first < 4:
+            continue
+        turned = np.exp(2j * np.pi * np.outer(per_metre, places[first:stop] - places[first])) @ weight[first:stop]
+        power += np.abs(turned) ** 2 / (weight[first:stop] ** 2).sum()
+        parts += 1
+    # Where peaks lie anywhere, each stretch adds an exponential of mean 1 (Rayleigh's test): the sum has a gamma distribution.
+    limit = gamma.isf(BY_CHANCE / len(per_metre), max(parts, 1))
+    if not parts or power.max() < limit:
+        raise NoRingsError("what looks like joints does not repeat evenly")
+    top = (power >= AS_GOOD * power.max()) & (power >= np.maximum(np.roll(power, 1), np.roll(power, -1)))
+    return float(1.0 / per_metre[np.flatnonzero(top)[0]])
+
+
+def _runs(number: Int64) -> Sequence[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(number, prepend=number[0] - 1, append=number[-1] + 1))
+    return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
+
+
+def follow(places: Float, weight: Float, pitch: float) -> Joints:
+    """Follow joints along the tunnel: the chain of peaks that is strongest and most even.
+
+    Parameters
+    ----------
+    places, weight : (n,) float arrays
+        Chainage of peaks, growing, m, and strength.
+    pitch : float
+        Length of a ring to begin with, m.
+
+    Notes
+    -----
+    The dearest chain by dynamic programming (Bellman, 1954): each peak on it gains by its strength, and costs as far as it lies
+    from a whole number of rings behind the one before, up to a limit, so that one ring of other length does not break it. It is
+    done twice, the second time with the lengths that rings have there (tapered rings make up curves).
+    """
+    local = np.full(len(places), pitch)
+    chain = _chain(places, weight, local)
+    if len(chain) >= 8:
+        gaps = np.diff(places[chain])
+        rings = np.maximum(np.rint(gaps / pitch), 1.0)
+        each = median_filter(gaps / rings, min(21, len(gaps) // 2 * 2 - 1), mode="nearest")
+        local = np.interp(places, places[chain[1:]], each)
+        chain = _chain(places, weight, local)
+    return _filled(places[chain], local[chain], pitch)
+
+
+def _chain(places: Float, weight: Float, local: Float) -> Int64:
+    """Indices of the peaks on the best chain."""
+    gain = np.minimum(weight, 3.0 * STRONG)
+    best, back, leader = gain.copy(), np.full(len(places), -1), np.zeros(len(places), np.int64)
+    for k in range(1, len(places)):
+        first = int(np.searchsorted(places, places[k] - (_MOST_GAPS + 0.5) * local[k]))
+        gaps = places[k] - places[first:k]
+        held = np.flatnonzero(gaps >= 0.4 * local[k])
+        gaps = gaps[held]
+        rings = np.maximum(np.rint(gaps / local[k]), 1.0)
+        off = np.minimum((gaps - rings * local[k]) ** 2 / (_TOLERANCE**2 * rings), _OTHER)
+        total = best[first + held] - off * _OTHER_COST / _OTHER - _GAP * (rings - 1.0)
+        source = first + held
+        if first:  # where nothing is seen for long, the chain goes on with what came before
+            total = np.append(total, best[leader[first - 1]] - _OTHER_COST - _GAP * _MOST_GAPS)
+            source = np.append(source, leader[first - 1])
+        if len(total) and total.max() > 0.0:
+            most = int(np.argmax(total))
+            best[k], back[k] = gain[k] + total[most], source[most]
+        leader[k] = k if best[k] > best[leader[k - 1]] else leader[k - 1]
+    chain = [int(np.argmax(best))]
+    while back[chain[-1]] >= 0:
+        chain.append(int(back[chain[-1]]))
+    return np.array(chain[::-1])
+
+
+def _filled(seen: Float, local: Float, pitch: float) -> Joints:
+    """Joints with those between that are not seen, evenly."""
+    if len(seen) < 4:
+        raise NoRingsError("what looks like joints makes no row")
+    gaps = np.diff(seen)
+    rings = np.maximum(np.rint(gaps / local[1:]), 1.0).astype(np.int64)
+    number = np.concatenate([[0], np.cumsum(rings)])
+    whole = np.arange(number[-1] + 1)
+    chainage = np.interp(whole, number, seen)
+    one = rings == 1
+    lengths = gaps / rings
+    middle = float(np.median(lengths))
+    usual = np.abs(lengths - middle) < 0.1 * pitch  # a ring of other length is not one of the row
+    mean = float(gaps[usual].sum() / rings[usual].sum()) if usual.any() else middle
+    spread = float(np.std(lengths[usual & one])) if (usual & one).sum() > 2 else _TOLERANCE
+    return Joints(chainage, np.isin(whole, number), mean, spread / np.sqrt(max(int(usual.sum()), 1)))
