@@ -54,6 +54,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "tunneldb.cli.deviation:deviation",
         "Hold the lining against its design profiles: deviation, overbreak and underbreak.",
     ),
+    "compare": (
+        "tunneldb.cli.compare:compare",
+        "Compare two surveys of a tunnel: leaks new, grown, dry again, and where the lining changed.",
+    ),
     "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),
     "export": (
         "tunneldb.cli.export:export",

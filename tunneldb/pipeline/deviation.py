@@ -144,7 +144,7 @@ def deviation_blocks(
     classes: Callable[[Raster], Bool] | None = None
     for offset, lining in load_offsets(conn, survey, km):
         if lining is None:
-            classes = classes or _by_class(conn, survey, km, design.surface)
+            classes = classes or lining_by_class(conn, survey, km, design.surface)
             lining = classes(offset)
         yield offset, *design.deviation(offset, lining)
 
@@ -193,7 +193,7 @@ def _places(begin: float, pixel: float, count: int) -> Float:
     return np.asarray(begin + (np.arange(count) + 0.5) * pixel, dtype=np.float64)
 
 
-def _by_class(conn: psycopg.Connection[Any], survey: Survey, km: int, surface: Surface) -> Callable[[Raster], Bool]:
+def lining_by_class(conn: psycopg.Connection[Any], survey: Survey, km: int, surface: Surface) -> Callable[[Raster], Bool]:
     """What of an offset image is lining, by the classes of stage ``ground``: where no state of pixels is stored."""
     scene = load_scene(conn, survey, km, km)
 

@@ -11,6 +11,7 @@ from psycopg import sql
 from tunneldb.store.survey import Survey
 
 _RESULTS = (
+    "change_section", "change_image", "change_region", "leak_change",
     "deviation_section", "anomaly_part", "anomaly", "coverage", "image", "radiometry", "range_curve", "target_sphere",
     "cluster", "lining", "ground", "section", "segment", "axis_vertex",
 )  # fmt: skip

@@ -6,6 +6,7 @@ decibels, seconds, square metres, unless a comment says otherwise.
 
 from tunneldb.database.models.base import AUDIT_SCHEMA, SCHEMA, Base
 from tunneldb.database.models.catalog import AlignmentElement, Pose, Reference, Station, StationEquation, Survey, Tunnel
+from tunneldb.database.models.change import ChangeImage, ChangeRegion, ChangeSection, LeakChange
 from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
 from tunneldb.database.models.finding import FindingKind, FindingSum, Photo, Severity
 from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
@@ -37,6 +38,9 @@ __all__ = [
     "AxisVertex",
     "Base",
     "Bed",
+    "ChangeImage",
+    "ChangeRegion",
+    "ChangeSection",
     "Cluster",
     "Coverage",
     "DesignProfile",
@@ -51,6 +55,7 @@ __all__ = [
     "Image",
     "Incoming",
     "Ladder",
+    "LeakChange",
     "LearnedModel",
     "Lining",
     "Member",
