@@ -18,8 +18,9 @@ not show, may be off."""
 SEEN = 0.5
 """A place of which a survey saw less is not told: neither new nor dry."""
 
-EDGE = 2.0
-"""Width of the edge of a leak in the image, in pixels: half of the drop is reached within a pixel to each side at best."""
+EDGE = 4.0
+"""Width of the edge of a leak in the image, in pixels: with it the differences between two scans of leaks that did not change are
+as large as their standard errors (docs/figures.md)."""
 
 CONFIDENT = 1.96
 """Standard deviations within which 95 % of normal errors lie."""
@@ -78,7 +79,7 @@ def wet_area(leaks: Sequence[Leak], pixel: float) -> tuple[float, float]:
 
     Resolution: each of the P / p pixels that the outline passes is wet by a share that is not known, with standard deviation
     p² / √12; together p √(P p / 12). Threshold: one standard deviation of dry lining more or less moves the whole outline by
-    the width of its edge over the leak's contrast, P · 2 p / c. P perimeter, p pixel, c contrast.
+    the width of its edge over the leak's contrast, P · 4 p / c. P perimeter, p pixel, c contrast.
     """
     area = variance = 0.0
     for leak in leaks:

@@ -24,7 +24,7 @@ from tunneldb.pipeline.deviation import lining_by_class
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.shape import change as shape_change
-from tunneldb.shape.epoch_cells import LEAST_SIDE, CellGrid, Cells, CellSums
+from tunneldb.shape.epoch_cells import LEAST_SIDE, SEEN_SHARE, CellGrid, Cells, CellSums, without_edges
 from tunneldb.shape.rigid_motion import Motion, motion_columns, rigid_motion
 from tunneldb.store.change import (
     Section,
@@ -148,8 +148,8 @@ def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int,
     sums = _old_sums(conn, old, km, surface, cell)
     if sums is None:  # it was there when it was asked for
         return {"sections": 0}
-    first = sums.cells()
-    second = _new_sums(conn, new, km, other, surface, sums.grid, sums.pixel).cells()
+    first = without_edges(sums.cells())
+    second = without_edges(_new_sums(conn, new, km, other, surface, sums.grid, sums.pixel).cells())
     found = measure_change(surface, sums.grid, first, second, length)
     grid = found.grid
     transform = Affine(cell, 0.0, grid.west, 0.0, -cell, grid.south + grid.rows * cell)
@@ -184,7 +184,7 @@ def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, len
     sections = []
     for begin, end in pairwise(edges):
         row, column = np.nonzero(np.isfinite(difference[:, begin:end]))
-        shown = _columns(surface, grid, (row, column + begin), slice(begin, end), old)
+        shown = _columns(surface, grid, (row, column + begin), old)
         known = np.isfinite(shown).all(axis=1)  # beyond the last plane there is no surface
         difference[row[~known], column[~known] + begin] = np.nan
         at = row[known], column[known] + begin
@@ -202,14 +202,14 @@ def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, len
     return Change(grid, old, new, difference, variance, removed_error, lod, scatter, sections)
 
 
-def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], columns: slice, old: Cells) -> Float:
-    """What the motions of a section do to its cells, (n, 6)."""
+def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells) -> Float:
+    """What the motions of a section do to its cells, (n, 6), about its middle: the middle of what is seen of it."""
     chainage, arc = grid.chainage[at[1]], grid.arc[at[0]]
     points = surface.to_space(chainage, arc, old.offset[at].astype(np.float64))
     normals = np.full_like(points, np.nan)
     held = np.isfinite(points[:, 0])
     normals[held] = surface.unroll(points[held]).normal
-    middle = grid.west + (columns.start + columns.stop) / 2.0 * grid.cell
+    middle = float(np.median(chainage)) if len(chainage) else np.nan
     return motion_columns(points, normals, surface.frames(np.array([middle]))[0])
 
 
@@ -405,7 +405,7 @@ def _seen_share(outline: shapely.Geometry, cells: Cells, grid: CellGrid) -> floa
     chainage, arc = np.meshgrid(grid.chainage[column], grid.arc[row])
     boxes = shapely.box(chainage - grid.cell / 2.0, arc - grid.cell / 2.0, chainage + grid.cell / 2.0, arc + grid.cell / 2.0)
     shares = shapely.area(shapely.intersection(boxes, outline))
-    return float(np.sum(shares * cells.share[np.ix_(row, column)]) / max(float(outline.area), 1e-9))
+    return float(np.sum(shares * (cells.share[np.ix_(row, column)] >= SEEN_SHARE)) / max(float(outline.area), 1e-9))
 
 
 def _median(values: Single) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy import ndimage
 
 from tunneldb.arrays import Bool, Float, Single
 
@@ -16,6 +17,9 @@ SEEN_SHARE = 1.0 / 3.0
 
 LEAST_SIDE = 3
 """Side of a cell, in pixels, at least: a plane takes three pixels, and a scatter by few says little."""
+
+EDGE = 2
+"""Cells so near to a wide stretch of what is not seen are not compared."""
 
 _SUMS = 11
 _LEAST = 8  # pixels
@@ -130,6 +134,18 @@ class CellSums:
 
         variance = scatter * lever + rounding_variance(scatter)
         return Cells(shown(offset), shown(variance), np.minimum(looked / pixels, 1.0).astype(np.float32).reshape(shape))
+
+
+def without_edges(cells: Cells) -> Cells:
+    """Cells without those beside what is not seen, as far as that is no less than 3 by 3 cells.
+
+    At the foot of a wall, and beside what hangs on it, cells hold mixed pixels, and others in each epoch; what is
+    smoothed in the state of pixels reaches a cell further.
+    """
+    unseen = ndimage.binary_opening(np.isnan(cells.offset), np.ones((3, 3)))
+    beside = ndimage.binary_dilation(unseen, np.ones((3, 3)), iterations=EDGE)
+    offset, variance = (np.where(beside, np.float32(np.nan), values) for values in (cells.offset, cells.variance))
+    return Cells(offset, variance, cells.share)
 
 
 def rounding_variance(scatter: Float) -> Float:

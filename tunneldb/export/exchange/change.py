@@ -21,10 +21,10 @@ from tunneldb.store.survey import Survey
 _LAYERS = (
     ("change_region_map", "change_region", "map", "Polygon", "Lining that changed significantly, on the map strip"),
     ("change_region_unrolled", "change_region", "unrolled", "Polygon", "Lining that changed significantly (chainage, arc)"),
-    ("change_region_3d", "change_region", "surface", "PolygonZ", "Lining that changed significantly, in space"),
+    ("change_region_3d", "change_region", "surface", "Polygon Z", "Lining that changed significantly, in space"),
     ("leak_change_map", "leak_change", "map", "MultiPolygon", "What became of leaks, on the map strip beside the axis"),
     ("leak_change_unrolled", "leak_change", "unrolled", "MultiPolygon", "What became of leaks (chainage, arc)"),
-    ("leak_change_3d", "leak_change", "surface", "MultiPolygonZ", "What became of leaks, in space"),
+    ("leak_change_3d", "leak_change", "surface", "MultiPolygon Z", "What became of leaks, in space"),
     ("change_section", "change_section", None, None, "Rigid motion of sections, and what remains of their change"),
 )  # fmt: skip
 """Layers: name, view, geometry, its kind, what they hold."""
