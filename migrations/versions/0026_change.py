@@ -89,6 +89,13 @@ def _change_section() -> None:
             comment="Lining that both saw: what was compared, m²",
         ),
         sa.Column(
+            "shift",
+            sa.Double(),
+            sa.Computed("sqrt(shift_right * shift_right + shift_up * shift_up)", persisted=True),
+            nullable=True,
+            comment="Shift at right angles to the axis, m",
+        ),
+        sa.Column(
             "shift_right",
             sa.Double(),
             nullable=True,
@@ -217,6 +224,19 @@ def _change_section() -> None:
         comment="Rigid motion of sections of lining between two surveys, and what remains of their change without it",
     )
     op.create_index(op.f("change_section_old_survey_id_idx"), "change_section", ["old_survey_id"], schema="tunnel")
+    op.create_index(
+        "change_section_sums_idx",
+        "change_section",
+        ["survey_id", "old_survey_id", "chainage_from"],
+        schema="tunnel",
+        postgresql_include=["chainage_to", "seen_old", "seen_both", "shift"],
+    )
+    op.create_index(
+        op.f("change_section_survey_id_old_survey_id_shift_idx"),
+        "change_section",
+        ["survey_id", "old_survey_id", "shift"],
+        schema="tunnel",
+    )
 
 
 def _change_image() -> None:
@@ -539,6 +559,7 @@ def _leak_change() -> None:
         "leak_change",
         ["survey_id", "old_survey_id", "chainage_from"],
         schema="tunnel",
+        postgresql_include=["chainage_to", "area_old", "area_new"],
     )
     op.create_index(
         op.f("leak_change_survey_id_old_survey_id_state_idx"),

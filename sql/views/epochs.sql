@@ -5,7 +5,7 @@ CREATE OR REPLACE VIEW tunnel_api.change_section AS
 SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_survey, c.km, c.chainage_from, c.chainage_to,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (c.chainage_from + c.chainage_to) / 2) l) AS label,
        c.seen_old, c.seen_new, c.seen_both, c.seen_old - c.seen_both AS unseen,
-       sqrt(c.shift_right ^ 2 + c.shift_up ^ 2) AS shift, c.shift_right, c.shift_right_se, c.shift_up, c.shift_up_se,
+       c.shift, c.shift_right, c.shift_right_se, c.shift_up, c.shift_up_se,
        c.shift_along, c.shift_along_se, c.roll, c.roll_se, c.yaw, c.yaw_se, c.pitch, c.pitch_se,
        c.change_rms, c.change_least, c.change_greatest, c.lod, c.cell, c.arc_from, c.change
   FROM tunnel.change_section c
@@ -16,7 +16,6 @@ COMMENT ON VIEW tunnel_api.change_section IS
 COMMENT ON COLUMN tunnel_api.change_section.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.change_section.old_survey IS 'Name of the survey that it is compared with';
 COMMENT ON COLUMN tunnel_api.change_section.unseen IS 'Lining that the older survey saw and the newer one did not, m²: nothing is known of its change';
-COMMENT ON COLUMN tunnel_api.change_section.shift IS 'Shift at right angles to the axis, m';
 
 CREATE OR REPLACE VIEW tunnel_api.change_region AS
 SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_survey, c.km, c.chainage_from, c.chainage_to,
@@ -78,18 +77,14 @@ BEGIN
                            CASE base WHEN 'change_region' THEN 'Lining that changed significantly, ' ELSE 'What became of leaks, ' END
                            || shown.text);
             FOR bare IN
-                SELECT a.attname AS name, coalesce(col_description(v.oid, b.attnum), col_description(t.oid, c.attnum)) AS text
-                  FROM pg_class v
-                  JOIN pg_attribute b ON b.attrelid = v.oid AND b.attnum > 0
-                  JOIN pg_attribute a ON a.attrelid = format('tunnel_api.%I', base || '_' || shown.suffix)::regclass
-                   AND a.attname = CASE b.attname WHEN shown.geometry THEN 'geom' ELSE b.attname END
-                  LEFT JOIN pg_class t ON t.oid = format('tunnel.%I', base)::regclass
-                  LEFT JOIN pg_attribute c ON c.attrelid = t.oid AND c.attname = b.attname
-                 WHERE v.oid = format('tunnel_api.%I', base)::regclass
+                SELECT a.attname AS name, t.text FROM (VALUES
+                    ('old_survey', 'Name of the survey that it is compared with'),
+                    ('area_change', 'Wet area in the newer survey less that in the older, m²'),
+                    ('area_change_se', 'Its standard error by resolution and threshold, m²')) AS t (name, text)
+                  JOIN pg_attribute a ON a.attname = t.name
+                   AND a.attrelid = format('tunnel_api.%I', base || '_' || shown.suffix)::regclass
             LOOP
-                IF bare.text IS NOT NULL THEN
-                    EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', base || '_' || shown.suffix, bare.name, bare.text);
-                END IF;
+                EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', base || '_' || shown.suffix, bare.name, bare.text);
             END LOOP;
         END LOOP;
     END LOOP;
@@ -189,7 +184,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 250 SECURITY DEFINER SET search_pa
          WHERE n.id = tunnel_api.survey_id($2) AND o.id = tunnel_api.survey_id($1) AND $3 > 0
     ), section AS (  -- a section counts where its middle lies
         SELECT floor((c.chainage_from + c.chainage_to) / 2 / $3) AS k, sum(c.seen_both) AS compared,
-               sum(c.seen_old - c.seen_both) AS unseen, max(sqrt(c.shift_right ^ 2 + c.shift_up ^ 2)) AS shift
+               sum(c.seen_old - c.seen_both) AS unseen, max(c.shift) AS shift
           FROM pair p JOIN tunnel.change_section c ON c.survey_id = p.new AND c.old_survey_id = p.old
          GROUP BY 1
     ), region AS (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from geoalchemy2 import WKBElement
-from sqlalchemy import BigInteger, CheckConstraint, Identity, Index, UniqueConstraint
+from sqlalchemy import BigInteger, CheckConstraint, Computed, Identity, Index, UniqueConstraint
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
@@ -20,6 +20,14 @@ class ChangeSection(Base):
     __tablename__ = "change_section"
     __table_args__ = (
         UniqueConstraint("survey_id", "old_survey_id", "chainage_from"),
+        Index(None, "survey_id", "old_survey_id", "shift"),
+        Index(
+            "change_section_sums_idx",
+            "survey_id",
+            "old_survey_id",
+            "chainage_from",
+            postgresql_include=["chainage_to", "seen_old", "seen_both", "shift"],
+        ),
         Index(None, "old_survey_id"),
         {"comment": "Rigid motion of sections of lining between two surveys, and what remains of their change without it"},
     )
@@ -33,6 +41,10 @@ class ChangeSection(Base):
     seen_old: Mapped[float] = mapped_column(comment="Lining that the older survey saw, m²")
     seen_new: Mapped[float] = mapped_column(comment="Lining that the newer survey saw, m²")
     seen_both: Mapped[float] = mapped_column(comment="Lining that both saw: what was compared, m²")
+    shift: Mapped[float | None] = mapped_column(
+        Computed("sqrt(shift_right * shift_right + shift_up * shift_up)", persisted=True),
+        comment="Shift at right angles to the axis, m",
+    )
     shift_right: Mapped[float | None] = mapped_column(comment="Shift of the whole to the right, m; NULL: not determined")
     shift_right_se: Mapped[float | None] = mapped_column(comment="Its standard error, m")
     shift_up: Mapped[float | None] = mapped_column(comment="Shift up, m; NULL: not determined")
@@ -116,7 +128,7 @@ class LeakChange(Base):
     __table_args__ = (
         one_of("state", *STATES),
         CheckConstraint("cardinality(old_ids) + cardinality(new_ids) > 0", name="ids"),
-        Index(None, "survey_id", "old_survey_id", "chainage_from"),
+        Index(None, "survey_id", "old_survey_id", "chainage_from", postgresql_include=["chainage_to", "area_old", "area_new"]),
         Index(None, "survey_id", "old_survey_id", "state"),
         Index(None, "old_survey_id"),
         Index(None, "unrolled", postgresql_using="gist"),
