@@ -1,11 +1,11 @@
-"""Change between two scans of a round lining on a curve and a grade, by tunneldb compare and by M3C2 (py4dgeo) on the same points.
+"""Change between two scans of a round lining on a curve and a grade, by compare and by M3C2 (py4dgeo) on the same points.
 
 python -m benchmarks.epochs          # two minutes on two cores
 python -m benchmarks.epochs --m3c2   # with the peer: pip install py4dgeo
 
-Pixels of 2 cm hold a point each, of 3 mm noise; the second scan has patches of 1 m² that moved by 3 mm, and a pose that is off by
-20 mm and 0.02°. M3C2 gets the points with the true pose, and with the one that is off: it takes nothing out. Its core points are
-the middles of the cells, its cylinders have the area of a cell, its normals are found within 0.5 m.
+Pixels of 2 cm hold a point each, of 3 mm noise; the second scan has patches of 1 m² that moved by 3 mm, and a pose that is off
+by 20 mm and 0.02°. M3C2 gets the points with the true pose, and with the one that is off: it takes nothing out. Its core points
+are the middles of the cells, its cylinders have the area of a cell, its normals are found within 0.5 m.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def cells(surface: Surface, grid: CellGrid, points: Float) -> Cells:
 
 
 def judge(significant: Bool, truth: Float, compared: Bool, holds: float, seconds: float) -> tuple[object, ...]:
-    """Row of the table: share of unchanged cells where the level of detection holds, patches found, false regions by 1000 m²."""
+    """Row of the table: unchanged cells where the level of detection holds, patches found, false regions by 1000 m²."""
     labels, count = ndimage.label(significant)
     sizes = ndimage.sum_labels(significant, labels, np.arange(1, count + 1))
     regions = [labels == k + 1 for k in np.flatnonzero(sizes >= WINDOW**2)]

@@ -447,7 +447,8 @@ WHERE n.name = 'demo-2026'
 CHANGE_REGIONS = """
 INSERT INTO tunnel.change_region (survey_id, old_survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area,
     change_mean, lod, change_extreme, unrolled, map, surface)
-SELECT n.id, %(id)s, floor(c / 1000), c, c + 1, 0, 1, 1, 1, 0.004 * sin(k), 0.001, 0.006 * sin(k), b.box, b.box, ST_Force3D(b.box)
+SELECT n.id, %(id)s, floor(c / 1000), c, c + 1, 0, 1, 1, 1, 0.004 * sin(k), 0.001, 0.006 * sin(k), b.box, b.box,
+    ST_Force3D(b.box)
 FROM tunnel.survey n, generate_series(0, %(kilometres)s * 20 - 1) AS k
 CROSS JOIN LATERAL (SELECT k * 50.0 + 20 AS c) q
 CROSS JOIN LATERAL (SELECT ST_MakeEnvelope(c, 0, c + 1, 1, 0) AS box) b

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import psycopg
-from support.example_change import add_change
 
+from support.example_change import add_change
 from tunneldb.classification.classes import PointClass
 
 NICHE = (12399.0, 12401.0, 3.3, 4.3)

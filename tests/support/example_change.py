@@ -28,9 +28,11 @@ def add_change(conn: psycopg.Connection, survey: str) -> None:
     ).fetchone()
     given = {"new": new, "old": old, "area": SECTION * GIRTH, "low": UNSEEN[0], "high": UNSEEN[1], "length": SECTION}
     conn.execute(
-        "INSERT INTO tunnel.change_section (survey_id, old_survey_id, km, chainage_from, chainage_to, seen_old, seen_new, seen_both,"
+        "INSERT INTO tunnel.change_section (survey_id, old_survey_id, km, chainage_from, chainage_to,"
+        " seen_old, seen_new, seen_both,"
         " shift_right, shift_right_se, shift_up, shift_up_se, change_rms, lod, cell, arc_from, change)"
-        " SELECT %(new)s, %(old)s, 12, c, c + %(length)s, %(area)s, v.seen, v.seen, 0.00001 * n, 0.0001, 0, 0.0001, 0.00002 * n,"
+        " SELECT %(new)s, %(old)s, 12, c, c + %(length)s, %(area)s, v.seen, v.seen, 0.00001 * n, 0.0001, 0,"
+        " 0.0001, 0.00002 * n,"
         " 0.002, 0.1, -10, '{0.001,NaN}' FROM generate_series(0, 99) AS n, LATERAL (SELECT 12300 + %(length)s * n AS c) q,"
         " LATERAL (SELECT CASE WHEN c >= %(low)s AND c < %(high)s THEN 0 ELSE %(area)s END AS seen) v",
         given,
@@ -38,16 +40,21 @@ def add_change(conn: psycopg.Connection, survey: str) -> None:
     box = "ST_MakeEnvelope(%(at)s, 0, %(at)s + 1, %(area)s, 0)"
     for at, area, mean in REGIONS:
         conn.execute(
-            "INSERT INTO tunnel.change_region (survey_id, old_survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock,"
-            " area, change_mean, lod, change_extreme, unrolled, map, surface) VALUES (%(new)s, %(old)s, 12, %(at)s, %(at)s + 1, 0,"
+            "INSERT INTO tunnel.change_region (survey_id, old_survey_id, km, chainage_from, chainage_to,"
+            " arc_from, arc_to, clock,"
+            " area, change_mean, lod, change_extreme, unrolled, map, surface) VALUES (%(new)s, %(old)s, 12,"
+            " %(at)s, %(at)s + 1, 0,"
             f" %(area)s, 1, %(area)s, %(mean)s, 0.001, %(mean)s, {box}, {box}, ST_Force3D({box}))",
             given | {"at": at, "area": area, "mean": mean},
         )
     for n, (state, (before, after)) in enumerate(LEAKS.items()):
         conn.execute(
-            "INSERT INTO tunnel.leak_change (survey_id, old_survey_id, km, state, old_ids, new_ids, old_kinds, new_kinds, area_old,"
-            " area_old_se, area_new, area_new_se, seen_old, seen_new, chainage_from, chainage_to, clock, unrolled, map, surface)"
-            " VALUES (%(new)s, %(old)s, 12, %(state)s, %(ids)s, '{}', '{}', '{}', %(before)s, 0.03, %(after)s, 0.04, 1, 1, %(at)s,"
+            "INSERT INTO tunnel.leak_change (survey_id, old_survey_id, km, state, old_ids, new_ids, old_kinds,"
+            " new_kinds, area_old,"
+            " area_old_se, area_new, area_new_se, seen_old, seen_new, chainage_from, chainage_to, clock,"
+            " unrolled, map, surface)"
+            " VALUES (%(new)s, %(old)s, 12, %(state)s, %(ids)s, '{}', '{}', '{}', %(before)s, 0.03, %(after)s,"
+            " 0.04, 1, 1, %(at)s,"
             f" %(at)s + 1, 1, ST_Multi({box}), ST_Multi({box}), ST_Force3D(ST_Multi({box})))",
             given | {"at": 12310 + 20 * n, "area": 1, "state": state, "before": before, "after": after, "ids": [n]},
         )
