@@ -19,8 +19,8 @@ SEEN = 0.5
 """A place of which a survey saw less is not told: neither new nor dry."""
 
 EDGE = 4.0
-"""Width of the edge of a leak in the image, in pixels: with it the differences between two scans of leaks that did not change
-are as large as their standard errors (docs/figures.md)."""
+"""Width of the edge of a leak in the image, in pixels: with half of it, two of 15 leaks that had not changed between two scans
+would be said to have shrunk (docs/figures.md)."""
 
 CONFIDENT = 1.96
 """Standard deviations within which 95 % of normal errors lie."""

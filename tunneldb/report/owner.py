@@ -27,6 +27,7 @@ CHAPTERS = {
     "dry": "Dry regions",
     "structures": "Structures",
     "underwater": "Under water",
+    "change": "What changed",
     "methods": "Methods",
     "reviews": "Reviews",
     "signatures": "Signatures",
