@@ -463,6 +463,43 @@ INSERT INTO tunnel.ring_chord (ring_id, clock_from, clock_to, length, length_se)
 SELECT id, 270, 90, 8 + 0.005 * sin(number / 50.0), 0.0005 FROM tunnel.ring WHERE survey_id = %(id)s
 """
 
+# A later survey that was compared with it: sections of 1.5 m, a region every 50 m, and what became of a leak in 25.
+LATER = """
+INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)
+SELECT tunnel_id, 'demo-2026', '2026-05-04', 'none', 'mobile' FROM tunnel.survey WHERE id = %(id)s
+"""
+
+CHANGE_SECTIONS = """
+INSERT INTO tunnel.change_section (survey_id, old_survey_id, km, chainage_from, chainage_to, seen_old, seen_new, seen_both,
+    shift_right, shift_right_se, shift_up, shift_up_se, change_rms, change_least, change_greatest, lod, cell, arc_from, change)
+SELECT n.id, %(id)s, floor(c / 1000), c, c + 1.5, 30, 30, CASE WHEN k %% 50 = 0 THEN 10 ELSE 29 END, 0.01 * sin(c / 90), 0.0001,
+    0.01 * cos(c / 70), 0.0001, 0.001 + 0.001 * sin(c / 30), -0.003, 0.003, 0.002, 0.1, -10, v.cells
+FROM tunnel.survey n, generate_series(0, %(kilometres)s * 1000 * 2 / 3 - 1) AS k
+CROSS JOIN LATERAL (SELECT k * 1.5 AS c) q
+CROSS JOIN LATERAL (SELECT array_agg((0.001 * sin((k + i) / 30.0))::real) AS cells FROM generate_series(1, 201) AS i) v
+WHERE n.name = 'demo-2026'
+"""
+
+CHANGE_REGIONS = """
+INSERT INTO tunnel.change_region (survey_id, old_survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area,
+    change_mean, lod, change_extreme, unrolled, map, surface)
+SELECT n.id, %(id)s, floor(c / 1000), c, c + 1, 0, 1, 1, 1, 0.004 * sin(k), 0.001, 0.006 * sin(k), b.box, b.box,
+    ST_Force3D(b.box)
+FROM tunnel.survey n, generate_series(0, %(kilometres)s * 20 - 1) AS k
+CROSS JOIN LATERAL (SELECT k * 50.0 + 20 AS c) q
+CROSS JOIN LATERAL (SELECT ST_MakeEnvelope(c, 0, c + 1, 1, 0) AS box) b
+WHERE n.name = 'demo-2026'
+"""
+
+LEAK_CHANGES = """
+INSERT INTO tunnel.leak_change (survey_id, old_survey_id, km, state, old_ids, new_ids, old_kinds, new_kinds, area_old,
+    area_old_se, area_new, area_new_se, seen_old, seen_new, chainage_from, chainage_to, clock, unrolled, map, surface)
+SELECT n.id, %(id)s, a.km, CASE a.id %% 25 WHEN 0 THEN 'grown' WHEN 1 THEN 'dry' ELSE 'same' END, ARRAY[a.id], ARRAY[a.id],
+    '{leak}', '{leak}', a.area, 0.02, a.area * (1 + (a.id %% 25 = 0)::int), 0.02, 1, 1, a.chainage_from, a.chainage_to, a.clock,
+    ST_Multi(a.unrolled), ST_Multi(a.map), ST_Multi(a.surface)
+FROM tunnel.survey n, tunnel.anomaly a WHERE n.name = 'demo-2026' AND a.survey_id = %(id)s AND a.wet
+"""
+
 STEPS = {
     "files and ledger": (FILES, RUNS),
     "segments and sections": (SEGMENTS, COUNTED, SECTIONS),
@@ -483,6 +520,7 @@ STEPS = {
     "deviation": (PROFILE, DEVIATION),
     "clearance": (CLEARANCE, INFRINGEMENTS),
     "rings": (RINGS, RING_CHORDS),
+    "change until a later survey": (LATER, CHANGE_SECTIONS, CHANGE_REGIONS, LEAK_CHANGES, "ANALYZE tunnel.leak_change"),
 }
 
 

@@ -49,7 +49,7 @@ BEGIN
                 ('_unrolled', 'In the unrolled plane'),
                 ('_map', 'On the map strip beside the axis, tunnel''s SRID'),
                 ('_3d', 'On the lining in space, tunnel''s SRID')) AS g (place, text)
-                 ON a.attname = 'geom' AND v.relname ~ ('^(leak|anomaly)' || g.place || '$')
+                 ON a.attname = 'geom' AND v.relname ~ ('^(leak|anomaly|change_region|leak_change)' || g.place || '$')
           LEFT JOIN pg_class t
                  ON t.oid = to_regclass(CASE WHEN v.relname = 'file' THEN 'tunnel.scan_file'
                                              WHEN v.relname = 'stage_status' THEN 'tunnel.run'
@@ -57,6 +57,8 @@ BEGIN
                                              WHEN v.relname = 'sheet_leak' THEN 'tunnel_api.leak_unrolled'
                                              WHEN v.relname ~ '^clearance_(map|unrolled)$' THEN 'tunnel_api.clearance_section'
                                              WHEN v.relname ~ '^clearance_infringement_' THEN 'tunnel_api.clearance_infringement'
+                                             WHEN v.relname ~ '^(change_region|leak_change)(_|$)'
+                                             THEN 'tunnel.' || substring(v.relname FROM '^(change_region|leak_change)')
                                              WHEN v.relname ~ '^(leak|anomaly)(_|$)' THEN 'tunnel.anomaly'
                                              ELSE format('tunnel.%I', v.relname) END)
           LEFT JOIN pg_attribute b ON b.attrelid = t.oid AND b.attname = a.attname

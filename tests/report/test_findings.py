@@ -31,6 +31,7 @@ from tunneldb.errors import UserError
 from tunneldb.export.tables.dry_regions import read_dry_regions
 from tunneldb.export.tables.finding_counts import UNCOUNTED
 from tunneldb.report import findings
+from tunneldb.report.change import CHANGE_WORDS
 from tunneldb.report.owner import CHAPTERS, Owner, read_owner
 from tunneldb.report.photos import Photo, make_thumbnails
 from tunneldb.report.words import languages, read_language
@@ -440,7 +441,7 @@ def example_catalogue() -> frozenset[str]:
     """Texts of templates and scripts, and those that are put together: states, origins, kinds, …"""
     package = Path(findings.__file__).parent
     texts = set(CHAPTERS.values()) | set(findings.STATE_WORDS.values()) | {"detected", "redrawn", "split", "merged"}
-    texts |= {"Chainage", "Station", "o’clock", "m²", "Client", "Project", "Standard"}
+    texts |= set(CHANGE_WORDS.values()) | {"Chainage", "Station", "o’clock", "m²", "Client", "Project", "Standard"}
     texts |= {"Prepared by", "Checked by", "Accepted by", "Name", "Position", "Date", "Signature"}
     source = (package / "photos.py").read_text("utf-8")
     texts |= {said for said in re.findall(r'_NotHadError\("([^"]+)"\)', source) if "fetched" not in said}

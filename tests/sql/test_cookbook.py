@@ -16,6 +16,7 @@ import shapely
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from psycopg.rows import dict_row
+from support import example_change
 from support.cookbook_survey import CONFIRMED, GONE, MOVED, NICHE, OLD, POINTS, SPARSE, draw_findings, prepare
 from support.example_clearance import TIGHT
 from support.example_deviation import BULGE, OVER, UNDER
@@ -558,6 +559,36 @@ def converged(rows: Rows, a: Asked) -> None:
     close(rows[0], convergence_mm=0, se_mm=0.7)
 
 
+def new_leaks(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert row["label"] == label(12330.5)
+    close(row, area_m2=example_change.LEAKS["new"][1], area_se=0.04, seen_before_percent=100)
+
+
+def grown_leaks(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    close(row, before_m2=1.0, after_m2=3.0, growth_m2=2.0, growth_se=0.05)
+
+
+def moved_sections(rows: Rows, a: Asked) -> None:
+    assert [row["label"] for row in rows] == [label(12300 + 1.5 * n + 0.75) for n in range(99, 89, -1)]
+    close(rows[0], shift_mm=0.99, shape_mm=1.98)
+
+
+def changed_area(rows: Rows, a: Asked) -> None:
+    low, high = example_change.UNSEEN
+    girth = example_change.GIRTH
+    close(rows[0], changed_m2=2.0, inwards_m2=2.0, compared_m2=girth * (100.5 - high + low), wet_more_m2=2.0 + 0.4 - 0.3 + 0.02)
+    close(rows[1], changed_m2=5.0, inwards_m2=0.0, compared_m2=girth * 49.5, wet_more_m2=0.0)
+    assert [row["regions"] for row in rows] == [1, 1]
+
+
+def not_seen(rows: Rows, a: Asked) -> None:
+    (row,) = rows
+    assert (row["chainage_from"], row["chainage_to"]) == example_change.UNSEEN
+    close(row, 1, unseen_m2=example_change.GIRTH * (example_change.UNSEEN[1] - example_change.UNSEEN[0]))
+
+
 CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which leaks over 0.2 m² are there between two chainages, and on which segment?": over,
     "Which drip from above?": above,
@@ -608,6 +639,11 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which rings are oval by more than 5 ‰?": oval,
     "Which are the ten greatest steps between rings?": great_steps,
     "How has a chord changed since another survey?": converged,
+    "What is new since a survey?": new_leaks,
+    "Which leaks grew most?": grown_leaks,
+    "Which ten sections moved most, and which changed their shape most?": moved_sections,
+    "How much of the lining changed, per 100 m?": changed_area,
+    "What did the newer survey not see?": not_seen,
     "How many findings of each kind are there, and how did they come about?": kinds,
     "Which cracks are longer than a metre, the most severe first?": cracks,
     "Which severe findings have no photo?": without_photo,

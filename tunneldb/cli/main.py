@@ -58,6 +58,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "tunneldb.cli.clearance:clearance",
         "Hold what stands in a tunnel against an outline about a track: margins and infringements.",
     ),
+    "compare": (
+        "tunneldb.cli.compare:compare",
+        "Compare two surveys of a tunnel: leaks new, grown, dry again, and where the lining changed.",
+    ),
     "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),
     "export": (
         "tunneldb.cli.export:export",

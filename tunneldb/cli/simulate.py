@@ -169,6 +169,18 @@ _GROUPS: dict[str, list[_Option]] = {
         ),
         _Option("carriageway", "M", "Height of a second carriageway on the right."),
     ],
+    "A later scan of the same tunnel": [
+        _Option("epoch", "N", "Number of the scan, with noise of its own; 0 is the first.", int),
+        _Option("grown_leaks", "N", "Leaks, the largest, that have twice the area.", int),
+        _Option("dried_leaks", "N", "Leaks, the smallest, that are dry.", int),
+        _Option("new_leaks", "N", "Leaks more.", int),
+        _Option("moved_wall", "M", "By how much a part of the right wall moved inwards."),
+        _Option("squeezed_ring", "M", "By how much a ring became narrower, and as much higher."),
+        _Option("bulges", "N", "Squares of 1 m² that moved inwards.", int),
+        _Option("bulge", "M", "By how much they moved."),
+        _Option("pose_error", "M", "Error of the poses across the axis, which wanders along the tunnel."),
+        _Option("pose_turn", "DEG", "By how much the poses are turned, about the axis and at most across it."),
+    ],
     "Other": [
         _Option("name", "NAME", "First part of the file names.", str),
         _Option("seed", "N", "Seed; the same seed gives the same points.", int),
@@ -262,7 +274,8 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
     OUT/NAME.truth.geojson   leaks as polygons in the plane (chainage, arc), with drips as multipolygons
     OUT/NAME.truth.gpkg      the same as layer leak; layer dry: what is dark but dry (joint, pocket, patch, paint,
                              stripe, soot, grime, halo, chamfer, shade); layer bright, if any: what is brighter
-                             (salts, fringe, patch, paint, stripe, shade), its drop negative
+                             (salts, fringe, patch, paint, stripe, shade), its drop negative; layer deformation,
+                             of a later scan: what moved (wall, ring, bulge), m inwards
     OUT/NAME.spheres.csv     id,x,y,z,radius,kind of the target spheres, if any; id is their number among the things
     OUT/NAME.json            all parameters, appendages, niches, things that stand free
 

@@ -17,10 +17,10 @@ from tunneldb.compiled import kernel
 KINDS = ("raw", "corrected", "offset")
 """What the images of a kilometre show: raw and corrected intensity (dB), offset from the surface (m)."""
 
-STEP = {"raw": 0.01, "corrected": 0.01, "offset": 0.001, "state": 1.0}
+STEP = {"raw": 0.01, "corrected": 0.01, "offset": 0.001, "state": 1.0, "change": 1e-4, "lod": 1e-4}
 """Value of one step of the stored whole numbers: dB, dB, m, and of the state of pixels itself."""
 
-UNIT = {"raw": "dB", "corrected": "dB", "offset": "m", "state": "", "deviation": "m"}
+UNIT = {"raw": "dB", "corrected": "dB", "offset": "m", "state": "", "deviation": "m", "change": "m", "lod": "m"}
 
 NODATA = -32768
 

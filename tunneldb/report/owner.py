@@ -29,6 +29,7 @@ CHAPTERS = {
     "underwater": "Under water",
     "clearance": "Clearance",
     "rings": "Rings",
+    "change": "What changed",
     "methods": "Methods",
     "reviews": "Reviews",
     "signatures": "Signatures",

@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from tunneldb.arrays import Float, Int32, Int64, Single, UInt8, UInt16
+from tunneldb.simulate.epoch import epoch, leaks_since
 from tunneldb.simulate.floor_profile import slabs
 from tunneldb.simulate.instrument import Instrument, noise_scale
 from tunneldb.simulate.lining import ballast as ground
@@ -113,6 +114,8 @@ class Simulation:
         Poses.
     instrument : Instrument
         Its own part in the intensity.
+    epoch : Epoch or None
+        What became of the lining until a later scan; its offsets hold it, its chainages and arcs are those of the first.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -154,6 +157,10 @@ class Simulation:
         standing, spheres = stand(parameters, self.tunnel, self.scanner, self.appendages, self.niches, free)
         self.spheres: list[TargetSphere] = spheres
         self.things: list[Primitive] = standing + overhead(parameters, self.tunnel, loose, len(standing) + 1)
+        self.epoch = epoch(parameters, self.tunnel)
+        if self.epoch is not None:
+            self.leaks = leaks_since(parameters, self.tunnel, room, self.leaks)
+            self._seed = np.random.SeedSequence(self._seed.entropy, spawn_key=(*self._seed.spawn_key, parameters.epoch, 1))
         self._scene = scene(
             self.tunnel,
             self.appendages,
@@ -219,8 +226,11 @@ class Simulation:
         full = radiometry.amplitude(found.range, reflectance)
         amplitude = self.instrument.capped(full)
         reflectance -= full - amplitude
+        xyz, offset = found.xyz, found.offset
+        if self.epoch is not None:
+            xyz, offset = self.epoch.moved(xyz, found.chainage, found.arc, offset)
         return Cloud(
-            xyz=found.xyz + self.tunnel.line.origin,
+            xyz=xyz + self.tunnel.line.origin,
             time=rays.time[found.ray],
             scan_id=rays.scan_id[found.ray],
             amplitude=amplitude.astype(np.float32),
@@ -228,7 +238,7 @@ class Simulation:
             intensity=counts(amplitude, radiometry.near_loss),
             chainage=found.chainage,
             arc=found.arc.astype(np.float32),
-            offset=found.offset.astype(np.float32),
+            offset=offset.astype(np.float32),
             klass=found.klass.astype(np.uint8),
             leak=np.where(found.leak >= 0, found.leak + 1, -1).astype(np.int32),
             thing=found.thing.astype(np.uint16),

@@ -84,6 +84,16 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "camber": (0.0, 10.0, "%"),
     "walkway": (0.0, 0.6, "m"),
     "carriageway": (0.0, 0.6, "m"),
+    "epoch": (0, 1000, "(number)"),
+    "grown_leaks": (0, 100_000, "leaks"),
+    "dried_leaks": (0, 100_000, "leaks"),
+    "new_leaks": (0, 100_000, "leaks"),
+    "moved_wall": (-0.1, 0.1, "m"),
+    "squeezed_ring": (-0.1, 0.1, "m"),
+    "bulges": (0, 100_000, "bulges"),
+    "bulge": (-0.1, 0.1, "m"),
+    "pose_error": (0.0, 0.5, "m"),
+    "pose_turn": (0.0, 1.0, "degrees"),
 }
 
 
@@ -211,6 +221,17 @@ class Parameters:
     walkway: float = 0.0
     carriageway: float = 0.0
 
+    epoch: int = 0
+    grown_leaks: int = 0
+    dried_leaks: int = 0
+    new_leaks: int = 0
+    moved_wall: float = 0.0
+    squeezed_ring: float = 0.0
+    bulges: int = 0
+    bulge: float = 0.003
+    pose_error: float = 0.0
+    pose_turn: float = 0.0
+
     def __post_init__(self) -> None:
         for name, (low, high, unit) in LIMITS.items():
             value = getattr(self, name)
@@ -243,6 +264,9 @@ class Parameters:
                 raise UserError(f"{text}: use lining cast or segments")
         if self.pocket_leaks and self.lining != "segments":
             raise UserError(f"pocket leaks need bolt pockets, and lining {self.lining} has none: use lining segments")
+        later = ("grown_leaks", "dried_leaks", "new_leaks", "moved_wall", "squeezed_ring", "bulges", "pose_error", "pose_turn")
+        if not self.epoch and (asked := next((name for name in later if getattr(self, name)), None)):
+            raise UserError(f"--{asked.replace('_', '-')} is of a later scan of the same tunnel: give --epoch 1, too")
         if 0.0 < self.mesh < 0.02:
             raise UserError(f"mesh is {self.mesh:g} m: give 0 for none, or 0.02 m and more between wires")
         if self.banding and self.density is not None:

@@ -143,7 +143,8 @@ def bright_features(simulation: Simulation) -> list[Dry]:
 def write_truth(simulation: Simulation, path: Path) -> None:
     """Write leaks and what is dark but dry as layers ``leak`` and ``dry`` of a GeoPackage, in the unrolled plane as built.
 
-    What is bright comes in a layer ``bright`` of the same columns, where there is any.
+    What is bright comes in a layer ``bright`` of the same columns, where there is any; lining that moved since the first scan
+    in a layer ``deformation``.
     """
     lay, leaks = as_built(simulation), leaks_as_built(simulation)
     dry, bright = ([d._replace(outline=lay(d.outline)) for d in f(simulation)] for f in (dry_features, bright_features))
@@ -161,6 +162,13 @@ def write_truth(simulation: Simulation, path: Path) -> None:
         }
         if features or layer == "dry":
             _write_layer(path, layer, [d.outline for d in features], columns, append=True)
+    if simulation.epoch is not None and simulation.epoch.deformations:
+        moved = simulation.epoch.deformations
+        columns = {
+            "kind": np.array([d.kind for d in moved], dtype=object),
+            "change": np.array([d.change for d in moved], dtype=np.float64),
+        }
+        _write_layer(path, "deformation", [d.outline for d in moved], columns, append=True)
 
 
 def _write_layer(path: Path, layer: str, outlines: list[BaseGeometry], columns: dict[str, NDArray], append: bool) -> None:  # type: ignore[type-arg]

@@ -11,8 +11,9 @@ from psycopg import sql
 from tunneldb.store.survey import Survey
 
 _RESULTS = (
-    "clearance_infringement", "clearance_section", "ring", "deviation_section", "anomaly_part", "anomaly", "coverage",
-    "image", "radiometry", "range_curve", "target_sphere", "cluster", "lining", "ground", "section", "segment", "axis_vertex",
+    "change_section", "change_image", "change_region", "leak_change", "clearance_infringement", "clearance_section", "ring",
+    "deviation_section", "anomaly_part", "anomaly", "coverage", "image", "radiometry", "range_curve", "target_sphere",
+    "cluster", "lining", "ground", "section", "segment", "axis_vertex",
 )  # fmt: skip
 """Tables of schema tunnel whose rows are the results of stages in a kilometre."""
 

@@ -6,6 +6,7 @@ decibels, seconds, square metres, unless a comment says otherwise.
 
 from tunneldb.database.models.base import AUDIT_SCHEMA, SCHEMA, Base
 from tunneldb.database.models.catalog import AlignmentElement, Pose, Reference, Station, StationEquation, Survey, Tunnel
+from tunneldb.database.models.change import ChangeImage, ChangeRegion, ChangeSection, LeakChange
 from tunneldb.database.models.clearance import ClearanceInfringement, ClearanceSection, Gauge
 from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
 from tunneldb.database.models.finding import FindingKind, FindingSum, Photo, Severity
@@ -39,6 +40,9 @@ __all__ = [
     "AxisVertex",
     "Base",
     "Bed",
+    "ChangeImage",
+    "ChangeRegion",
+    "ChangeSection",
     "ClearanceInfringement",
     "ClearanceSection",
     "Cluster",
@@ -56,6 +60,7 @@ __all__ = [
     "Image",
     "Incoming",
     "Ladder",
+    "LeakChange",
     "LearnedModel",
     "Lining",
     "Member",

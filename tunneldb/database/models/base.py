@@ -34,6 +34,7 @@ class Base(DeclarativeBase):
         float: Double,
         int: Integer,
         list[float]: ARRAY(Double),
+        list[str]: ARRAY(Text),
         dt.datetime: DateTime(timezone=True),
         dict[str, Any]: JSONB,
         bytes: LargeBinary,

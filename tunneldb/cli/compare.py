@@ -1,0 +1,165 @@
+"""The verb ``compare``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import psycopg
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath, FiniteRange
+from tunneldb.cli.progress import bar, step
+from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect
+from tunneldb.errors import UserError
+from tunneldb.files import replacing, told_to_end
+from tunneldb.store.survey import Survey, get_survey
+
+if TYPE_CHECKING:
+    from tunneldb.export.tables.change import Row
+
+_FILES = (".csv", ".gpkg", ".xlsx", ".tif")
+_WORDS = {
+    "new": "new", "grown": "grown", "shrunk": "shrunk", "same": "the same", "dry": "dry again", "kind": "of another kind",
+    "unseen": "unseen",
+}  # fmt: skip
+
+
+@verb(
+    examples=[
+        "tunneldb compare demo-2024 demo-2026",
+        "tunneldb compare demo-2024 demo-2026 --from 12+300 --to 12+400 -o leaks.csv",
+        "tunneldb compare demo-2024 demo-2026 -o change.gpkg",
+        "tunneldb compare demo-2024 demo-2026 -o change.tif",
+    ]
+)
+@click.argument("old")
+@click.argument("new")
+@stretch_options
+@click.option(
+    "--cell", type=FiniteRange(0.05, 1.0), default=0.1, show_default=True, metavar="M", help="Side of the cells, m.",
+)  # fmt: skip
+@click.option(
+    "--length", type=FiniteRange(0.5, 50.0), default=1.5, show_default=True, metavar="M",
+    help="Length of the sections of which the rigid motion is taken out, m.",
+)  # fmt: skip
+@click.option(
+    "-o", "--output", type=FilePath(dir_okay=False),
+    help="File to write: .csv of what became of leaks; .gpkg or .xlsx of leaks, regions and sections; .tif of the change of "
+    "each cell, one a kilometre.",
+)  # fmt: skip
+@click.pass_obj
+def compare(
+    settings: Settings,
+    old: str,
+    new: str,
+    start: str | None,
+    end: str | None,
+    cell: float,
+    length: float,
+    output: Path | None,
+) -> None:
+    """Compare two surveys of a tunnel: what became of the leaks of OLD, and where the lining of NEW is another.
+
+    What is missing or out of date is made first, kilometre by kilometre. Of each section of the lining the rigid motion is
+    taken out and stated: it is the error of the registration or a movement of the tunnel, and which, only control points tell.
+    What remains is stated with its level of detection, and where it is significant as regions. What one survey did not see is
+    unseen: it is neither changed nor unchanged, and its leaks are neither new nor dry. docs/howto-compare.md says more.
+    """
+    from tunneldb.export.tables.change import change_rows, summary
+    from tunneldb.pipeline.change import compare as bring_up_to_date
+
+    if output is not None and output.suffix.lower() not in _FILES:
+        raise UserError(f"{output}: compare is written as {', '.join(_FILES[:-1])} or {_FILES[-1]}")
+    with connect(settings.dsn) as conn:
+        first, second = get_survey(conn, old), get_survey(conn, new)
+        part = parse_stretch(conn, first, start, end)
+        conn.rollback()
+        with told_to_end(), bar("km") as progress:
+            made = bring_up_to_date(conn, first, second, part.low, part.high, cell, length, step(progress))
+        rows = {
+            view: change_rows(conn, view, first, second, part.low, part.high)
+            for view in ("change_section", "change_region", "leak_change")
+        }
+        whole = summary(rows["change_section"], rows["change_region"], rows["leak_change"])
+        files = [] if output is None else _write(conn, first, second, part, rows, output)
+    tell(
+        old=old, new=new, made=made, summary=whole, sections=rows["change_section"], regions=rows["change_region"],
+        leaks=rows["leak_change"], files=files,
+    )  # fmt: skip
+    _print(rows, whole)
+    for file in files:
+        click.echo(f"written to {file}", err=True)
+
+
+def _write(
+    conn: psycopg.Connection[Any], old: Survey, new: Survey, part: Stretch, rows: dict[str, list[Row]], output: Path
+) -> list[Path]:
+    if output.suffix.lower() == ".csv":
+        from tunneldb.export.tables.change import change_csv
+
+        with replacing(output) as temporary:
+            temporary.write_text(change_csv(rows["leak_change"], "leak_change"), encoding="utf-8")
+        return [output]
+    if output.suffix.lower() == ".tif":
+        from tunneldb.export.images.change import write_change
+        from tunneldb.store.change import stale_kilometres
+
+        there = stale_kilometres(conn, old, new, part.low, part.high)
+        paths = [output if len(there) == 1 else output.with_name(f"{output.stem}-km{km:03d}{output.suffix}") for km in there]
+        written = (write_change(conn, old, new, km, path) for km, path in zip(there, paths, strict=True))
+        return [path for path in written if path is not None]
+    from tunneldb.export.exchange.change import write_change_gpkg, write_change_xlsx
+
+    with replacing(output) as temporary:
+        if output.suffix.lower() == ".gpkg":
+            write_change_gpkg(conn, old, new, part.low, part.high, temporary)
+        else:
+            write_change_xlsx(rows, temporary)
+    return [output]
+
+
+def _print(rows: dict[str, list[Row]], whole: Row) -> None:
+    leaks = [row for row in rows["leak_change"] if row["state"] != "same"]
+    print_table(
+        ["leak", "at", "clock", "before m²", "±", "after m²", "±", "seen %"],
+        [
+            (
+                _WORDS[row["state"]], row["label"], f"{row['clock']:.1f}",
+                f"{row['area_old']:.3f}", f"{row['area_old_se']:.3f}",
+                f"{row['area_new']:.3f}", f"{row['area_new_se']:.3f}",
+                f"{100.0 * min(row['seen_old'], row['seen_new']):.0f}",
+            )
+            for row in leaks
+        ],
+        right=(2, 3, 4, 5, 6, 7),
+    )  # fmt: skip
+    print_table(
+        ["changed", "at", "clock", "area m²", "mean mm", "detected from mm", "greatest mm"],
+        [
+            (
+                "inwards" if row["change_mean"] > 0.0 else "outwards", row["label"], f"{row['clock']:.1f}",
+                f"{row['area']:.2f}",
+                *(f"{1e3 * row[name]:.1f}" for name in ("change_mean", "lod", "change_extreme")),
+            )
+            for row in rows["change_region"]
+        ],
+        right=(2, 3, 4, 5, 6),
+    )  # fmt: skip
+    told = ", ".join(f"{count} {_WORDS[state]}" for state, count in sorted(whole["leaks"].items())) or "none"
+    click.echo(f"leaks: {told}")
+    click.echo(
+        f"lining: {whole['compared']:.1f} m² compared, {whole['changed']:.2f} m² of it changed in {whole['regions']} regions;"
+        f" {whole['unseen']:.1f} m² that the older survey saw were not seen by the newer: of these nothing is known"
+    )
+    if whole["shift_greatest"] is not None:
+        click.echo(
+            f"sections were shifted as a whole by up to {1e3 * whole['shift_greatest']:.1f} mm, which is taken out: the error"
+            " of the registration or a movement of the tunnel; which, cannot be told without control points"
+        )
+    if whole["sections_without_motion"]:
+        click.echo(f"in {whole['sections_without_motion']} sections too little was seen by both to tell how they moved")

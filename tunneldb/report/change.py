@@ -1,0 +1,121 @@
+"""The chapter on what changed since an older survey: leaks, regions of lining, sections that moved, and series over surveys."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import psycopg
+from psycopg.rows import dict_row
+
+from tunneldb.export.tables.change import Row, change_rows, summary
+from tunneldb.report.drawing import step_for, ticks
+from tunneldb.store.survey import Survey, get_survey
+
+WIDTH, HEIGHT = 1000.0, 120.0
+"""Of the drawing of sections, in its own unit."""
+
+LISTED = 40
+"""So many regions are listed at most, the largest."""
+
+
+CHANGE_WORDS = {
+    "new": "new", "grown": "grown", "shrunk": "shrunk", "same": "the same", "dry": "dry again", "kind": "of another kind",
+    "unseen": "unseen",
+}  # fmt: skip
+"""States of leaks in words."""
+
+
+@dataclass(frozen=True)
+class ChangeChapter:
+    """What the chapter states.
+
+    Attributes
+    ----------
+    old : Survey
+        That it is compared with: of those that it was, the last before it.
+    summary : dict
+        Sums, as `tunneldb compare` tells them.
+    leaks, regions : list of dict
+        Leaks that are not the same, and the largest regions.
+    more : int
+        Regions that are not listed.
+    shift, shape, unseen : str, str, list
+        Paths of the shift of sections and of the change of their shape; where nothing was compared.
+    most : float
+        Top of the drawing, m.
+    ticks : list of (float, str)
+        Places along it, with chainages.
+    series : list of dict
+        Wet area of each survey of the tunnel in the stretch.
+    stale : list of int
+        Kilometres whose comparison is out of date.
+    """
+
+    old: Survey
+    summary: Row
+    leaks: list[Row]
+    regions: list[Row]
+    more: int
+    shift: str
+    shape: str
+    unseen: list[tuple[float, float]]
+    most: float
+    ticks: list[tuple[float, str]]
+    series: list[Row]
+    stale: list[int]
+
+
+def read_change(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> ChangeChapter | None:
+    """Read what changed in a stretch; None where the survey was compared with no older one there."""
+    row = conn.execute(
+        "SELECT o.name FROM tunnel.change_section c JOIN tunnel.survey o ON o.id = c.old_survey_id"
+        " WHERE c.survey_id = %s AND c.chainage_to > %s AND c.chainage_from < %s AND o.date <= %s"
+        " ORDER BY o.date DESC, o.name LIMIT 1",
+        [survey.id, low, high, survey.date],
+    ).fetchone()
+    if row is None:
+        return None
+    old = get_survey(conn, row[0])
+    sections = change_rows(conn, "change_section", old, survey, low, high)
+    regions = change_rows(conn, "change_region", old, survey, low, high)
+    leaks = change_rows(conn, "leak_change", old, survey, low, high)
+    largest = sorted(regions, key=lambda region: -region["area"])[:LISTED]
+    most = max([row[name] for row in sections for name in ("shift", "change_rms") if row[name] is not None], default=0.0)
+    scale = WIDTH / (high - low)
+    stale = conn.execute(
+        "SELECT km FROM tunnel_api.change_state(%s, %s) WHERE reason IS NOT NULL AND done_at IS NOT NULL ORDER BY km",
+        [survey.id, old.id],
+    ).fetchall()
+    return ChangeChapter(
+        old, summary(sections, regions, leaks), [leak for leak in leaks if leak["state"] != "same"],
+        sorted(largest, key=lambda region: region["chainage_from"]), len(regions) - len(largest),
+        _path(sections, "shift", low, scale, most), _path(sections, "change_rms", low, scale, most),
+        [((one["chainage_from"] - low) * scale, (one["chainage_to"] - one["chainage_from"]) * scale)
+         for one in sections if not one["seen_both"]],
+        most, [((x - low) * scale, f"{x:.0f}") for x in ticks(low, high, step_for(high - low, 10))],
+        _series(conn, survey, low, high), [km for (km,) in stale],
+    )  # fmt: skip
+
+
+def _path(sections: list[Row], name: str, low: float, scale: float, most: float) -> str:
+    """Steps of the sections; a gap where nothing is known."""
+    parts, before = [], None
+    for one in sections:
+        if one[name] is None:
+            before = None
+            continue
+        y = HEIGHT * (1.0 - one[name] / max(most, 1e-9))
+        start, end = ((one[end] - low) * scale for end in ("chainage_from", "chainage_to"))
+        parts.append(f"{'L' if before == one['chainage_from'] else 'M'}{start:.1f} {y:.1f}H{end:.1f}")
+        before = one["chainage_to"]
+    return "".join(parts)
+
+
+def _series(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
+    with conn.cursor(row_factory=dict_row) as cursor:
+        return cursor.execute(
+            "SELECT name AS survey, date, tunnel_api.wet_area(name, %s, %s) AS area FROM tunnel.survey"
+            " WHERE tunnel_id = %s AND intensity_kind <> 'none' ORDER BY date, name",
+            [low, high, survey.tunnel_id],
+        ).fetchall()

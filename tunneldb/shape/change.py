@@ -1,0 +1,198 @@
+"""What of the difference of two epochs is change: level of detection of cells, and regions of significant change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+from scipy.stats import norm
+
+from tunneldb.arrays import Bool, Float, Single
+from tunneldb.robust import MAD_TO_SIGMA
+
+CONFIDENT = 1.96
+"""Standard deviations within which 95 % of normal errors lie."""
+
+FALSE_SHARE = 0.05
+"""Share of false windows among those taken for change in a kilometre, at most on average (Benjamini & Hochberg, 1995)."""
+
+WINDOW = 3
+"""Side of the windows that are tested, in cells."""
+
+SCALES = (1, 2, 4, 8, 16)
+"""Sides of the squares, in cells, of whose means the scatter is measured."""
+
+_FILLED = 0.75  # of a square's cells: with fewer it says nothing on the scatter of such squares
+_PAIRS = 30  # of neighbouring squares: of fewer the scatter is not known well enough
+LEAST = 5
+"""Cells of a window: with fewer it is not tested."""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """By how much means of squares of cells scatter more than if cells were independent with the variance they state.
+
+    Attributes
+    ----------
+    sides : (k,) float array
+        Of the squares, in cells.
+    factors : (k,) float array
+        On the standard deviation of the mean, growing.
+    """
+
+    sides: Float
+    factors: Float
+
+    def at(self, cells: Float | float) -> Float:
+        """Factor for a mean of so many cells; linear in the logarithm of the side."""
+        side = np.maximum(np.sqrt(np.asarray(cells, dtype=np.float64)), 1.0)
+        return np.asarray(np.interp(np.log(side), np.log(self.sides), self.factors))
+
+
+@dataclass(frozen=True)
+class Region:
+    """Cells next to each other that changed the same way, and together by more than their level of detection.
+
+    Attributes
+    ----------
+    rows, columns : (n,) int arrays
+        Its cells.
+    mean, lod : float
+        Mean change and its level of detection, 95 %, m.
+    greatest : float
+        Greatest mean of a window in it, with its sign, m.
+    """
+
+    rows: Float
+    columns: Float
+    mean: float
+    lod: float
+    greatest: float
+
+
+def measure_scatter(difference: Single, variance: Single) -> Scatter:
+    """Scatter of squares of growing side, from the differences between neighbours, as Allan's variance is (Allan, 1966).
+
+    Whole stretches that moved do not enter but at their edges, and these the median leaves out.
+
+    Parameters
+    ----------
+    difference, variance : (rows, columns) float32 arrays
+        Change of cells, m, and its variance as if all pixels were independent, m²; NaN unseen.
+    """
+    sides, factors = [1.0], [1.0]
+    for side in SCALES:
+        mean, expected = _squares(difference, variance, side)
+        apart = []
+        for axis in (0, 1):
+            step = np.diff(mean, axis=axis)
+            first, second = (np.take(expected, range(k, expected.shape[axis] - 1 + k), axis=axis) for k in (0, 1))
+            apart.append((step / np.sqrt(first + second)).ravel())
+        ratio = np.concatenate(apart)
+        ratio = ratio[np.isfinite(ratio)]
+        if len(ratio) < _PAIRS:
+            break
+        factor = MAD_TO_SIGMA * float(np.median(np.abs(ratio)))
+        if side == 1:
+            factors[0] = factor
+        else:
+            sides.append(float(side))
+            factors.append(max(factor, factors[-1]))
+    return Scatter(np.array(sides), np.array(factors))
+
+
+def _squares(difference: Single, variance: Single, side: int) -> tuple[Float, Float]:
+    """Means of squares, NaN where too few cells are seen, and their variance."""
+    rows, columns = (size // side for size in difference.shape)
+    shape = rows, side, columns, side
+    cut = (slice(rows * side), slice(columns * side))
+    seen = np.isfinite(difference[cut]).reshape(shape)
+    count = seen.sum(axis=(1, 3))
+    held = count >= _FILLED * side * side
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = np.nansum(difference[cut].reshape(shape), axis=(1, 3), dtype=np.float64) / count
+        expected = np.nansum(variance[cut].reshape(shape), axis=(1, 3), dtype=np.float64) / count.astype(np.float64) ** 2
+    return np.where(held, mean, np.nan), np.where(held, expected, np.nan)
+
+
+def detection_level(variance: Single, removed_error: Single, scatter: Scatter) -> Single:
+    """Level of detection of cells at 95 %, m, after M3C2 (Lague et al., 2013, eq. 1).
+
+    Parameters
+    ----------
+    variance : float32 array
+        σ₁²/n₁ + σ₂²/n₂ of cells, m².
+    removed_error : float32 array
+        Standard error of the motion that was removed there, m: ``reg``.
+    scatter : Scatter
+        What the data say of the first.
+    """
+    return np.asarray(CONFIDENT * (np.sqrt(variance) * scatter.factors[0] + removed_error), dtype=np.float32)
+
+
+def change_regions(difference: Single, variance: Single, removed_error: Single, scatter: Scatter) -> list[Region]:
+    """Regions of significant change.
+
+    Each window of 3 by 3 cells is tested by its mean; of all windows those are taken for change among which the share of
+    false ones is FALSE_SHARE at most on average. Neighbours that changed the same way make a region, which must be no
+    smaller than a window, and on average differ by more than its own level of detection.
+    """
+    mean, expected, number = window_means(difference, variance, removed_error, scatter)
+    with np.errstate(invalid="ignore"):
+        ratio = np.where(number >= LEAST, mean / expected, np.nan)
+    taken = significant(2.0 * norm.sf(np.abs(ratio)))
+    taken &= np.isfinite(difference)
+    return [region for sign in (1.0, -1.0) for region in _regions(taken & (mean * sign > 0.0), mean, difference, variance,
+                                                                  removed_error, scatter)]  # fmt: skip
+
+
+def significant(probability: Float) -> Bool:
+    """Which probabilities of chance stand out, by Benjamini & Hochberg's step-up; NaN never."""
+    tested = np.sort(probability[np.isfinite(probability)])
+    below = np.flatnonzero(tested <= FALSE_SHARE * (np.arange(len(tested)) + 1) / max(len(tested), 1))
+    if not len(below):
+        return np.zeros(probability.shape, np.bool_)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(probability <= tested[below[-1]])
+
+
+def window_means(difference: Single, variance: Single, removed_error: Single, scatter: Scatter) -> tuple[Float, Float, Float]:
+    """Mean about each cell, its standard deviation, and the number of cells seen there."""
+    seen = np.isfinite(difference)
+
+    def total(values: Single) -> Float:
+        filled = np.where(seen, values, 0.0).astype(np.float64)
+        return np.asarray(ndimage.uniform_filter(filled, WINDOW, mode="constant") * WINDOW**2)
+
+    number = np.rint(total(np.ones_like(difference)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = total(difference) / number
+        noise = np.sqrt(np.maximum(total(variance), 0.0)) / number * scatter.at(WINDOW**2)
+        registered = total(removed_error) / number
+    return mean, np.hypot(noise, registered), number
+
+
+def _regions(
+    taken: Bool, mean: Float, difference: Single, variance: Single, removed_error: Single, scatter: Scatter
+) -> Iterator[Region]:
+    # A window half on a region has half of its change: there the region ends.
+    labels, count = ndimage.label(taken)
+    if not count:
+        return
+    half = 0.5 * np.abs(ndimage.median(mean, labels, np.arange(count + 1)))
+    labels, _ = ndimage.label(taken & (np.abs(mean) >= half[labels]))
+    for k, place in enumerate(ndimage.find_objects(labels), start=1):
+        rows, columns = np.nonzero(labels[place] == k)
+        cells = len(rows)
+        if cells < WINDOW**2:
+            continue
+        rows, columns = rows + place[0].start, columns + place[1].start
+        at = rows, columns
+        pooled = float(difference[at].mean(dtype=np.float64))
+        noise = float(np.sqrt(variance[at].sum(dtype=np.float64))) / cells * float(scatter.at(cells))
+        lod = CONFIDENT * (noise + float(removed_error[at].mean(dtype=np.float64)))
+        if abs(pooled) > lod:
+            windows = mean[at]
+            yield Region(rows, columns, pooled, lod, float(windows[np.abs(windows).argmax()]))

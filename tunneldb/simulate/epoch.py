@@ -1,0 +1,128 @@
+"""A later scan of the same tunnel: other noise, leaks grown, dried and new, lining that moved, and an error of the poses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from shapely import affinity
+from shapely.geometry import MultiPolygon, Polygon, box
+
+from tunneldb.arrays import Float
+from tunneldb.simulate.lining.leaks import Leak, Room, place
+from tunneldb.simulate.tunnel.tunnel import Tunnel
+
+if TYPE_CHECKING:
+    from tunneldb.simulate.parameters import Parameters
+
+GROWN = 2.0
+"""Area of a leak that grew, over what it was."""
+
+WALL = (0.55, 0.7), (0.35, 0.75)
+"""Where the wall moves: shares of the length, and of the arc from the crown to the floor on the right."""
+
+RING = 0.3
+"""Where the ring is squeezed: share of the length at which it begins; it is as long as the rings, or 1.5 m."""
+
+BULGE = 1.0
+"""Side of a bulge, m."""
+
+_RING = 1.5  # m
+_APART = 0.5  # m between the faces of the lining and what hangs on it and moves with it
+_DEGREES = 2.0  # order of an ovalisation
+
+
+@dataclass(frozen=True)
+class Deformation:
+    """Lining that moved: outline in the unrolled plane (m), kind (wall, ring, bulge), and its greatest change, m inwards."""
+
+    outline: Polygon
+    kind: str
+    change: float
+
+
+@dataclass(frozen=True)
+class Epoch:
+    """What became of a tunnel until a later scan."""
+
+    parameters: Parameters
+    tunnel: Tunnel
+    deformations: list[Deformation]
+
+    def moved(self, xyz: Float, chainage: Float, arc: Float, offset: Float) -> tuple[Float, Float]:
+        """Points (n, 3) as they lie now and as the scan places them, in the tunnel's local frame, and their offset now."""
+        p, tunnel = self.parameters, self.tunnel
+        change = np.where(np.abs(offset) < _APART, self.change(chainage, arc), 0.0)
+        frame = tunnel.line.frame(chainage)
+        normal = np.asarray(tunnel.section.point(arc)[1])  # right and up, into the tunnel
+        xyz = xyz + change[:, None] * (normal[:, :1] * frame.u + normal[:, 1:] * frame.w)
+        if p.pose_error or p.pose_turn:
+            # A shift that wanders about the true place, and turns the scan by no more than asked; and a turn about the axis.
+            turn = math.radians(p.pose_turn)
+            phase = (chainage - tunnel.line.start) * (turn / p.pose_error if p.pose_error else 0.0)
+            away = xyz - (frame.position - tunnel.line.origin)
+            up = np.einsum("ij,ij->i", away, frame.w)
+            right = np.einsum("ij,ij->i", away, frame.u)
+            xyz = xyz + (p.pose_error * np.sin(phase + 1.0) + turn * up)[:, None] * frame.u
+            xyz = xyz + (p.pose_error * np.cos(phase + 1.0) - turn * right)[:, None] * frame.w
+        return xyz, offset + change
+
+    def change(self, chainage: Float, arc: Float) -> Float:
+        """Movement of the lining along its normal, m, positive inwards."""
+        change = np.zeros(len(chainage))
+        for one in self.deformations:
+            west, south, east, north = one.outline.bounds
+            held = (chainage >= west) & (chainage < east) & (arc >= south) & (arc < north)
+            if one.kind == "ring":
+                # Both walls come nearer, and the crown rises, by half of what the width loses.
+                angle = arc[held] / self.parameters.section_radius
+                change[held] -= one.change * np.cos(_DEGREES * angle)
+            else:
+                change[held] += one.change
+        return change
+
+
+def epoch(parameters: Parameters, tunnel: Tunnel) -> Epoch | None:
+    """What became of the lining; None of the first scan."""
+    p, line, edge = parameters, tunnel.line, tunnel.section.floor_arc
+    if not p.epoch:
+        return None
+    length, found = line.end - line.start, []
+    if p.moved_wall:
+        (west, east), (low, high) = WALL
+        outline = box(line.start + west * length, low * edge, line.start + east * length, high * edge)
+        found.append(Deformation(outline, "wall", p.moved_wall))
+    if p.squeezed_ring:
+        ring = p.ring_length() or _RING
+        west = line.start + round(RING * length / ring) * ring
+        found.append(Deformation(box(west, -edge, west + ring, edge), "ring", p.squeezed_ring / 2.0))
+    for k in range(p.bulges):
+        # Evenly along the tunnel, by turns left, above and right of it, out of the wall's way.
+        west = line.start + (k + 0.5) * length / p.bulges - BULGE / 2.0
+        arc = (-0.5, 0.0, 0.3)[k % 3] * edge
+        found.append(Deformation(box(west, arc, west + BULGE, arc + BULGE), "bulge", p.bulge))
+    return Epoch(p, tunnel, found)
+
+
+def leaks_since(parameters: Parameters, tunnel: Tunnel, room: Room, leaks: list[Leak]) -> list[Leak]:
+    """Leaks of a later scan: the largest grow, the smallest dry up, and new ones have numbers of their own."""
+    p = parameters
+    by_size = [leak.id for leak in sorted(leaks, key=lambda leak: -leak.area)]
+    grown, dried = by_size[: p.grown_leaks], by_size[len(by_size) - p.dried_leaks :]
+    limit = tunnel.section.floor_arc - 0.05
+    kept = [_grown(leak, limit) if leak.id in grown else leak for leak in leaks if leak.id not in dried]
+    rng = np.random.default_rng(np.random.SeedSequence(p.seed, spawn_key=(1_000_000 + p.epoch,)))
+    new = place(tunnel, room, p.new_leaks, p.leak_area, p.leak_drop, rng)
+    return kept + [replace(leak, id=len(leaks) + leak.id) for leak in new]
+
+
+def _grown(leak: Leak, limit: float) -> Leak:
+    side = math.sqrt(GROWN)
+    outline = affinity.scale(leak.polygon, side, side).intersection(
+        box(leak.polygon.bounds[0] - 100.0, -limit, leak.polygon.bounds[2] + 100.0, limit)
+    )
+    if not isinstance(outline, (Polygon, MultiPolygon)):
+        return leak
+    return replace(leak, polygon=outline, area_surface=leak.area_surface * outline.area / leak.area)
