@@ -25,6 +25,7 @@ from tunneldb.database.models.leak import (
 from tunneldb.database.models.shape import DesignProfile, DeviationSection
 from tunneldb.database.models.sonar import Bed, Ladder, RegistrationResidual, SonarPoint, SonarScan
 from tunneldb.database.models.structures import Face, Member, Spot
+from tunneldb.database.models.surfaces import EvennessArea, EvennessSection, ThicknessSection
 from tunneldb.database.models.work import Audit, Goal, Run, Stage, Worker
 
 __all__ = [
@@ -41,6 +42,8 @@ __all__ = [
     "Coverage",
     "DesignProfile",
     "DeviationSection",
+    "EvennessArea",
+    "EvennessSection",
     "Face",
     "FeatureList",
     "FileKm",
@@ -76,6 +79,7 @@ __all__ = [
     "StationEquation",
     "Survey",
     "TargetSphere",
+    "ThicknessSection",
     "Tunnel",
     "Waterproof",
     "Worker",

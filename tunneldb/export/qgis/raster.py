@@ -12,6 +12,7 @@ import rasterio
 from tunneldb.arrays import Float
 from tunneldb.export.images.palette import PALETTES, hexadecimal
 from tunneldb.raster.gap_fill import TOLD
+from tunneldb.raster.geotiff import DEVIATION_KINDS
 from tunneldb.raster.grey import grey_range
 
 FILLED = "-filled"
@@ -26,6 +27,7 @@ KINDS = {
     "raw": "Intensity, raw",
     "offset": "Offset",
     f"offset{FILLED}": f"Offset, {TOLD}",
+    **{kind: f"Deviation from the design, {layer}" for layer, kind in DEVIATION_KINDS.items()},
     "state": "States: seen, unseen, dark",
     "class": "Classes",
     SUBMERGED: "Offset below the water",
@@ -71,7 +73,7 @@ def _sample(paths: Sequence[Path], band_number: int = 1) -> Float:
 def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
     """Return the element that says how an image is drawn, and all of its kind alike.
 
-    Intensity is drawn in grey, offset in diverging colours, each state or class in its own, depth the darker the deeper.
+    Intensity is drawn in grey, offset and deviation in diverging colours, each state or class in its own, depth the darker the deeper.
     """
     element = ET.Element("pipe")
     if kind in PALETTES:
@@ -79,7 +81,7 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
         entries = ET.SubElement(renderer, "colorPalette")
         for code, (name, rgb) in PALETTES[kind].entries.items():
             ET.SubElement(entries, "paletteEntry", value=str(code), color=hexadecimal(rgb), label=name, alpha="255")
-    elif kind.removesuffix(FILLED) in ("offset", SUBMERGED):
+    elif kind.removesuffix(FILLED) in ("offset", SUBMERGED, *DEVIATION_KINDS.values()):
         limit = offset_range(paths)
         renderer = _ramp(
             element, 1, [(share * limit, f"{share * limit * 1000:+.0f} mm", colour) for share, colour in _OFFSET_COLOURS]
