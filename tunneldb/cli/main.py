@@ -54,6 +54,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "tunneldb.cli.deviation:deviation",
         "Hold the lining against its design profiles: deviation, overbreak and underbreak.",
     ),
+    "thickness": (
+        "tunneldb.cli.thickness:thickness",
+        "Tell what was put on the lining between two surveys: thickness, volume, and where it is too thin.",
+    ),
     "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),
     "export": (
         "tunneldb.cli.export:export",
