@@ -133,6 +133,7 @@ LAYERS = (
     ),
     VectorLayer("target_sphere", "Target spheres", "target_sphere", "PointZ", "target_sphere", MAP, (MAP, SPACE)),
     VectorLayer("axis", "Axis", "axis", "LineStringZ", "axis", MAP, (MAP, SPACE, FINDINGS_MAP)),
+    VectorLayer("deviation_map", "Over- and underbreak", "deviation_map", "LineString", "deviation_map", MAP, ()),
     VectorLayer("segment", "Segments", "segment", "LineStringZ", "segment", MAP, (MAP,)),
     VectorLayer("section", "Sections", "section", "LineStringZ", "section", MAP, (MAP, SPACE)),
     VectorLayer("outline", "Walls, at their widest", "outline", "LineString", "outline", MAP, (MAP, FINDINGS_MAP)),
@@ -151,6 +152,7 @@ LAYERS = (
         "section_unrolled", "Sections, unrolled", "section_unrolled", "LineString", "section_unrolled", UNROLLED,
         (UNROLLED,),
     ),
+    VectorLayer("deviation_bar", "Over- and underbreak by metre", "deviation_bar", "Polygon", "deviation_bar", UNROLLED, ()),
     VectorLayer("sheet", "Sheets of 50 m", "sheet", "Polygon", "sheet", UNROLLED, (UNROLLED, FINDINGS)),
     *_findings("sheet", UNROLLED, SHEETS, where='"shown"'),
     VectorLayer(
