@@ -87,7 +87,7 @@ def _thickness() -> None:
         ),
         sa.CheckConstraint(LAYER, name=op.f("thickness_section_layer_check")),
         schema="tunnel",
-        comment="What lies between the linings of two surveys, at right angles to a layer's profiles, in steps of chainage",
+        comment="What lies between the linings of two surveys, along normals of a layer's profiles, in steps of chainage",
     )  # fmt: skip
     op.create_index(op.f("thickness_section_before_id_idx"), "thickness_section", ["before_id"], schema="tunnel")
     op.create_index(
@@ -141,7 +141,7 @@ def _evenness() -> None:
         ),
         sa.CheckConstraint(LAYER, name=op.f("evenness_section_layer_check")),
         schema="tunnel",
-        comment="Gaps beneath a straightedge laid on the lining, the curvature of the design taken out, in steps of chainage",
+        comment="Gaps beneath a straightedge on the lining, the curvature of the design taken out, in steps of chainage",
     )  # fmt: skip
     op.create_table(
         "evenness_area",

@@ -27,7 +27,9 @@ def held_against(outline: Outline, radius: float, right: float, up: float, pixel
     pixels = round(2.0 * np.pi * radius / pixel)
     angle = -np.pi + 2.0 * np.pi * (np.arange(pixels) + 0.5) / pixels
     far = ray(angle, radius, right, up)
-    found = deviation(Stretch("", 0.0, 1.0, outline, outline), np.zeros(1), far[None] * np.sin(angle), far[None] * np.cos(angle))
+    found = deviation(
+        Stretch("", 0.0, 1.0, outline, outline), np.zeros(1), far[None] * np.sin(angle), far[None] * np.cos(angle)
+    )
     whole = Deviation(*(np.tile(part, (3, 1)) for part in (found.distance, found.share, found.curvature)))
     return section_deviation(whole, outline, pixel).deviation
 

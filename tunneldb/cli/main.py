@@ -54,15 +54,13 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "tunneldb.cli.deviation:deviation",
         "Hold the lining against its design profiles: deviation, overbreak and underbreak.",
     ),
-    "thickness": (
-        "tunneldb.cli.thickness:thickness",
-        "Tell what was put on the lining between two surveys: thickness, volume, and where it is too thin.",
-    ),
     "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),
     "export": (
         "tunneldb.cli.export:export",
         "Write a survey as GeoPackage, DXF, or its scan files with the class of each point.",
     ),
+    "thickness": ("tunneldb.cli.thickness:thickness", "State what lies between two surveys: thickness and volume."),
+    "evenness": ("tunneldb.cli.evenness:evenness", "Lay a straightedge on the lining, and state the gaps beneath."),
     "ground": ("tunneldb.cli.ground:ground", "Class the points of a scan file by itself, without a database."),
     "intensity": ("tunneldb.cli.intensity:intensity", "Show whether intensity depends on range or incidence, and plot it."),
     "image": ("tunneldb.cli.image:image", "Write the unrolled images as GeoTIFF."),

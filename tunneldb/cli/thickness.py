@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -19,14 +18,11 @@ from tunneldb.errors import UserError
 from tunneldb.files import replacing, told_to_end
 from tunneldb.store.survey import get_survey
 
-if TYPE_CHECKING:
-    from tunneldb.export.tables.thickness import Row
-
 
 @verb(
     examples=[
-        "tunneldb thickness ringo-excavated ringo-sprayed --layer excavation --minimum 0.2",
-        "tunneldb thickness ringo-sprayed ringo-2024 --from 511+200 --to 511+400 -o thickness.csv",
+        "tunneldb thickness excavation-2024 shotcrete-2024 --layer shotcrete --minimum 0.2",
+        "tunneldb thickness ringo-2024 ringo-2025 --axis-sigma 0.005 -o thickness.csv",
     ]
 )
 @click.argument("before")
@@ -34,16 +30,14 @@ if TYPE_CHECKING:
 @layer_option
 @stretch_options
 @click.option(
-    "--minimum", type=FiniteRange(0.0), metavar="M",
-    help="Thickness that is demanded, m: how much is thinner, and where, is told.",
-)  # fmt: skip
+    "--minimum", type=FiniteRange(0.0), metavar="M", help="Thickness that is demanded, m: states how many m² are thinner."
+)
 @click.option(
-    "--every", type=FiniteRange(1.0), default=100.0, show_default=True, metavar="M",
-    help="Length of the stretches that are listed, m.",
+    "--every", type=FiniteRange(1.0), default=100.0, show_default=True, metavar="M", help="Length of the stretches listed, m.",
 )  # fmt: skip
 @click.option(
     "--axis-sigma", type=FiniteRange(0.0, 1.0), metavar="M",
-    help="What the places of the two scans are good for against each other, standard deviation, m: goes into ±.",
+    help="How well the two scans lie to each other, standard deviation, m: goes into the errors of volumes.",
 )  # fmt: skip
 @click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write: .csv of sections.")
 @click.pass_obj
@@ -59,63 +53,56 @@ def thickness(
     axis_sigma: float | None,
     output: Path | None,
 ) -> None:
-    """Tell what was put on the lining between the surveys BEFORE and AFTER of one tunnel.
+    """State what lies between surveys BEFORE and AFTER of one tunnel: what was put on, or went.
 
-    Both are held against the design profiles of one layer, which is done first where it is missing or out of date; the
-    difference of the two distances, cell by cell, is the thickness at right angles to the profile. So the profiles need not be
-    those that were built: they only say along which normals is measured. Volumes are of what both surveys saw. Where the
-    surveys lie wrong against each other, thickness is wrong by as much: --axis-sigma says what that comes to.
+    Both are held against the design profiles of one layer, whichever they show themselves, and compared in cells of 0.1 m along
+    its lines and arcs: thickness is measured at right angles to these. What is missing or out of date is made first. Only what
+    both saw is in a volume or an area.
     """
-    from tunneldb.export.tables.thickness import below_rows, section_rows, sections_csv, stretch_rows
+    from tunneldb.export.tables.deviation import rows_csv
+    from tunneldb.export.tables.thickness import COLUMNS, section_rows, stretch_rows
     from tunneldb.pipeline.thickness import measure_thickness
 
     if output is not None and output.suffix.lower() != ".csv":
         raise UserError(f"{output}: thickness is written as .csv")
     with connect(settings.dsn) as conn:
-        earlier, later = get_survey(conn, before), get_survey(conn, after)
-        part = parse_stretch(conn, later, start, end)
+        old, new = get_survey(conn, before), get_survey(conn, after)
+        part = parse_stretch(conn, new, start, end)
         conn.rollback()
         with told_to_end(), bar("km") as progress:
-            made = measure_thickness(conn, earlier, later, layer, part.low, part.high, step(progress))
-        least, sigma = minimum or 0.0, axis_sigma or 0.0
-        rows = stretch_rows(conn, earlier, later, layer, part.low, part.high, every, least, sigma)
-        whole = stretch_rows(conn, earlier, later, layer, part.low, part.high, None, least, sigma)
+            made = measure_thickness(conn, old, new, layer, part.low, part.high, step(progress))
+        rows = stretch_rows(conn, old, new, layer, part.low, part.high, every, minimum or 0.0, axis_sigma or 0.0)
         if not rows:
-            raise UserError(f"surveys {before} and {after} have no section in common there")
-        tell(before=before, after=after, layer=layer, made=made, axis_sigma=axis_sigma, minimum=minimum)
-        tell(stretches=rows, whole=whole[0])
-        if minimum is not None:
-            tell(below=below_rows(conn, earlier, later, layer, part.low, part.high, minimum))
-        sections = section_rows(conn, earlier, later, layer, part.low, part.high)
+            raise UserError(f"surveys {before} and {after} have no section in common there that was held against layer {layer}")
+        sections = section_rows(conn, old, new, layer, part.low, part.high)
+    tell(before=before, after=after, layer=layer, made=made, minimum=minimum, axis_sigma=axis_sigma, stretches=rows)
     if output is None:
         tell(sections=sections)
     else:
         with replacing(output) as temporary:
-            temporary.write_text(sections_csv(sections), encoding="utf-8")
-        tell(files=[output])
-    _print(rows, whole[0], layer, minimum, axis_sigma)
+            temporary.write_text(rows_csv(COLUMNS, sections), encoding="utf-8")
+    tell(files=[] if output is None else [output])
+
+    def said(value: float | None, decimals: int) -> str:
+        return "" if value is None else f"{value:.{decimals}f}"
+
+    print_table(
+        ["from", "length m", "compared %", "volume m³", "±", "mean m", "least m", *(["thinner m²"] if minimum else [])],
+        [
+            (
+                row["label"], said(row["length"], 1), said(100.0 * row["compared_area"] / row["design_area"], 1),
+                said(row["volume"], 3), said(row["volume_sigma"], 3), said(row["thickness_mean"], 3),
+                said(row["thickness_least"], 3), *([said(row["thin_area"], 2)] if minimum else []),
+            )
+            for row in rows
+        ],
+        right=(1, 2, 3, 4, 5, 6, 7),
+    )  # fmt: skip
+    lying = (
+        "taken to be right: --axis-sigma says what it is good for"
+        if axis_sigma is None
+        else f"good for {1e3 * axis_sigma:g} mm"
+    )
+    click.echo(f"along layer {layer}; of what both saw; ± is one standard deviation, how the scans lie to each other {lying}")
     if output is not None:
         click.echo(f"written to {output}", err=True)
-
-
-def _print(rows: list[Row], whole: Row, layer: str, minimum: float | None, axis_sigma: float | None) -> None:
-    def cells(row: Row) -> list[str]:
-        mean, least = ("–" if row[name] is None else f"{1e3 * row[name]:.1f}" for name in ("thickness_mean", "thickness_least"))
-        below = [] if minimum is None else [f"{row['below_area']:.2f}"]
-        return [
-            f"{row['length']:.1f}", f"{100.0 * row['compared_share']:.1f}", f"{row['volume']:.3f}",
-            f"{row['volume_sigma']:.3f}", mean, least, *below,
-        ]  # fmt: skip
-
-    under = [] if minimum is None else [f"under {1e3 * minimum:g} mm m²"]
-    print_table(
-        ["from", "length m", "compared %", "volume m³", "±", "mean mm", "least mm", *under],
-        [*((row["label"], *cells(row)) for row in rows), ("all", *cells(whole))],
-        right=tuple(range(1, 7 + len(under))),
-    )
-    place = (
-        "the scans taken to lie right against each other: --axis-sigma says what that is good for"
-        if axis_sigma is None
-        else f"the scans good for {1e3 * axis_sigma:g} mm against each other"
-    )
-    click.echo(f"at right angles to {layer}; of what both saw; ± is one standard deviation, {place}")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.arrays import Bool, Float, Int64, Single
 from tunneldb.compiled import inner, kernel
 from tunneldb.threads import in_blocks
 
@@ -16,6 +16,7 @@ MOST_UNSEEN = 0.25
 NEAREST = 2
 """A rim nearer to the lowest place of a hollow than so many cells tells nothing of a wave: it is roughness, or noise."""
 
+_LEVEL = 1e-9  # m: of two places no deeper than that the one farther from the rims is the lowest
 _ROWS = 64  # in a block of a thread
 
 
@@ -164,17 +165,16 @@ def _hollow(
 
     It is not whole where the straightedge ends at a point of contact: its rim may lie beyond.
     """
-    deepest, lowest = 0.0, -1
+    deepest, lowest, near = 0.0, -1, 0
     for x in range(left + 1, right):
         beneath = (h[left] * (right - x) + h[right] * (x - left)) / (right - left) - h[x]
         if beneath > gap[x] or (np.isnan(gap[x]) and beneath >= 0.0):
             gap[x] = beneath
-        if beneath > deepest:
-            deepest, lowest = beneath, x
-    if whole and lowest >= 0:
-        near = min(lowest - left, right - lowest)
-        if near >= NEAREST and deepest / (near * cell) > waviness[lowest]:
-            waviness[lowest] = deepest / (near * cell)
+        aside = min(x - left, right - x)
+        if beneath > deepest + _LEVEL or (beneath > deepest - _LEVEL and beneath > _LEVEL and aside > near):
+            deepest, lowest, near = beneath, x, aside
+    if whole and near >= NEAREST and deepest / (near * cell) > waviness[lowest]:
+        waviness[lowest] = deepest / (near * cell)
 
 
 @dataclass(frozen=True)
@@ -196,13 +196,13 @@ class Cells:
     seen: Int64
 
 
-def cell_means(values: Float, factor: int, least: int) -> Cells:
+def cell_means(values: Single, factor: int, least: int) -> Cells:
     """Means of ``factor`` × ``factor`` pixels (rows, columns), both whole multiples of it, with ``least`` pixels or more."""
     rows, columns = values.shape
     blocks = values.reshape(rows // factor, factor, columns // factor, factor)
     held = np.isfinite(blocks)
     seen = held.sum(axis=(1, 3))
-    kept = np.where(held, blocks, 0.0)
+    kept = np.where(held, blocks, np.float32(0.0)).astype(np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         mean = np.where(seen >= least, kept.sum(axis=(1, 3)) / seen, np.nan)
         square = np.maximum((kept**2).sum(axis=(1, 3)) / seen - mean**2, 0.0)

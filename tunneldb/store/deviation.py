@@ -52,9 +52,7 @@ def load_offsets(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Iter
         yield decode(rows["offset"]), lining
 
 
-def replace_image(
-    conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str, blocks: Iterable[Raster]
-) -> None:
+def replace_image(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str, blocks: Iterable[Raster]) -> None:
     """Replace the image of a kilometre's deviation from a layer; blocks that show nothing are left out."""
     kind = DEVIATION_KINDS[layer]
     conn.execute("DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s", [survey.id, km, kind])

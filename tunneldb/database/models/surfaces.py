@@ -23,7 +23,7 @@ class ThicknessSection(Base):
         Index(None, "before_id"),
         Index("thickness_section_survey_id_thickness_least_idx", "survey_id", "thickness_least"),
         one_of("layer", *LAYERS),
-        {"comment": "What lies between the linings of two surveys, at right angles to a layer's profiles, in steps of chainage"},
+        {"comment": "What lies between the linings of two surveys, along normals of a layer's profiles, in steps of chainage"},
     )  # fmt: skip
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
@@ -37,9 +37,7 @@ class ThicknessSection(Base):
     compared_length: Mapped[float] = mapped_column(comment="What of that both surveys saw, m")
     area: Mapped[float] = mapped_column(comment="Area between the two surfaces, of what both saw, m²")
     noise_area: Mapped[float] = mapped_column(comment="Standard deviation of the area by the scatter of pixels, m²")
-    by_right: Mapped[float] = mapped_column(
-        comment="By how much the area grows when the later survey moves to the right, m²/m"
-    )
+    by_right: Mapped[float] = mapped_column(comment="By how much the area grows when the later survey moves to the right, m²/m")
     by_up: Mapped[float] = mapped_column(comment="By how much the area grows when the later survey moves up, m²/m")
     thickness_mean: Mapped[float | None] = mapped_column(comment="Mean of the cells that both saw, m; NULL without any")
     thickness_least: Mapped[float | None] = mapped_column(comment="Least of a cell, m")
@@ -56,7 +54,7 @@ class EvennessSection(Base):
     __table_args__ = (
         UniqueConstraint("survey_id", "layer", "chainage_from"),
         one_of("layer", *LAYERS),
-        {"comment": "Gaps beneath a straightedge laid on the lining, the curvature of the design taken out, in steps of chainage"},
+        {"comment": "Gaps beneath a straightedge on the lining, the curvature of the design taken out, in steps of chainage"},
     )
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")

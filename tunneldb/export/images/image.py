@@ -44,7 +44,7 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
     The GeoTIFFs hold dB or m as single-precision numbers, NaN where no point fell, the state of a pixel, or the code of a
     class, 0 where no point fell; x is the chainage and y the arc, m. Each file appears whole. Classes are there when stage
     ground has run: they are computed from the offset image and what that stage has stored. Deviation is there of each layer
-    that the survey was held against. Where sonar scans were loaded, the bed and what they saw, unrolled, are written beside them.
+    that the survey was held against. Where sonar scans were loaded, the bed and what they saw, unrolled, are written, too.
 
     Returns
     -------
@@ -52,7 +52,11 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
         Files written.
     """
     with snapshot(conn):
-        written = [path for kind in (*KINDS, *DEVIATION_KINDS.values(), *PALETTES) for path in _export_kind(conn, survey, km, kind, folder)]
+        written = [
+            path
+            for kind in (*KINDS, *DEVIATION_KINDS.values(), *PALETTES)
+            for path in _export_kind(conn, survey, km, kind, folder)
+        ]
         below = (export(conn, survey, km, folder) for export in (export_submerged, export_bed))
         return [*written, *(path for path in below if path is not None)]
 
@@ -98,7 +102,6 @@ def _beside(conn: psycopg.Connection, survey: Survey, kind: str, block: int) -> 
     """Kilometre and number of a block of a kind, if there is one."""
     query = "SELECT km, block FROM tunnel.image WHERE survey_id = %s AND kind = %s AND block = %s"
     return conn.execute(query, (survey.id, kind, block)).fetchall()
-
 
 
 def _export_kind(conn: psycopg.Connection, survey: Survey, km: int, kind: str, folder: Path) -> list[Path]:
@@ -192,8 +195,6 @@ def preview_factor(pixel: float) -> int:
     while abs(BLOCK / (pixel * factor) - round(BLOCK / (pixel * factor))) > 1e-6:
         factor -= 1
     return factor
-
-
 
 
 def _leaks(conn: psycopg.Connection, survey: Survey, km: int) -> list[Polygon]:

@@ -73,7 +73,8 @@ def _sample(paths: Sequence[Path], band_number: int = 1) -> Float:
 def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
     """Return the element that says how an image is drawn, and all of its kind alike.
 
-    Intensity is drawn in grey, offset and deviation in diverging colours, each state or class in its own, depth the darker the deeper.
+    Intensity is drawn in grey, offset and deviation in diverging colours, each state or class in its own; depth the darker the
+    deeper.
     """
     element = ET.Element("pipe")
     if kind in PALETTES:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
 from typing import Any
 
 import psycopg
@@ -56,10 +57,10 @@ def volume(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float
         ).fetchone()
 
 
-def sections_csv(rows: list[Row]) -> str:
-    """Sections as CSV, with a header; what could not be told is empty."""
+def rows_csv(columns: Sequence[str], rows: Sequence[Row]) -> str:
+    """Rows as CSV, with a header; what could not be told is empty."""
     text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue()

@@ -40,3 +40,5 @@ COMMENT ON COLUMN tunnel_api.deviation_map.underbreak IS 'Area inside the profil
 COMMENT ON COLUMN tunnel_api.deviation_map.overbreak IS 'Area outside the profile, of what was seen, m²';
 COMMENT ON COLUMN tunnel_api.deviation_map.balance IS 'Underbreak less overbreak, m²';
 COMMENT ON COLUMN tunnel_api.deviation_map.seen_share IS 'Share of the profile that was seen, 0 to 1';
+COMMENT ON COLUMN tunnel_api.deviation_bar.geom IS 'The bar: chainage and arc, m; SRID 0';
+COMMENT ON COLUMN tunnel_api.deviation_map.geom IS 'The metre of the measured axis, tunnel''s SRID';
