@@ -427,6 +427,31 @@ FROM generate_series(0, %(kilometres)s * 1000 - 1) AS c
 CROSS JOIN LATERAL (SELECT array_agg((0.05 * sin((c + i) / 30.0))::real) AS cells FROM generate_series(1, 251) AS i) v
 """
 
+EARLIER = """
+INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)
+SELECT tunnel_id, split_part(name, '-', 1) || '-2023', '2023-05-04', 'none', 'mobile' FROM tunnel.survey WHERE id = %(id)s
+"""
+
+# Of a section in 50 a cell is under 0.2 m.
+THICKNESS = """
+INSERT INTO tunnel.thickness_section (survey_id, before_id, km, layer, chainage_from, chainage_to, design_length,
+    compared_length, area, noise_area, by_right, by_up, thickness_mean, thickness_least, least_at, thickness)
+SELECT %(id)s, tunnel_api.survey_id(split_part(%(survey)s, '-', 1) || '-2023'), c / 1000, 'lining', c, c + 1, 25.1, 20, 5,
+    0.001, 1, 1, 0.25, CASE WHEN c %% 50 = 0 THEN 0.18 ELSE 0.22 END, 12.5, v.cells
+FROM generate_series(0, %(kilometres)s * 1000 - 1) AS c
+CROSS JOIN LATERAL (SELECT array_agg((CASE WHEN c %% 50 = 0 AND i = 125 THEN 0.18 ELSE 0.22 + 0.0001 * i END)::real) AS cells
+                      FROM generate_series(1, 251) AS i) v
+"""
+
+EVENNESS = """
+INSERT INTO tunnel.evenness_section (survey_id, km, layer, straightedge, gap_limit, chainage_from, chainage_to, arc_from, cell,
+    lining_area, measured_area, over_area, gap_along, gap_along_at, gap_around, gap_around_at, waviness, sigma, along, around)
+SELECT %(id)s, c / 1000, 'lining', 2, 0.02, c, c + 1, -12.5, 0.1, 20, 18, 1 + sin(c / 40.0), 0.02, 0,
+    0.02 + 0.01 * sin(c / 40.0), 1, 0.03, 0.001, v.cells, v.cells
+FROM generate_series(0, %(kilometres)s * 1000 - 1) AS c
+CROSS JOIN LATERAL (SELECT array_agg((0.01 + 0.01 * sin((c + i) / 30.0))::real) AS cells FROM generate_series(1, 251) AS i) v
+"""
+
 STEPS = {
     "files and ledger": (FILES, RUNS),
     "segments and sections": (SEGMENTS, COUNTED, SECTIONS),
@@ -445,6 +470,7 @@ STEPS = {
     "coverage and radiometry": (COVERAGE, RADIOMETRY, CURVES),
     "ground, clusters, target spheres": (GROUND, CLUSTERS, SPHERES),
     "deviation": (PROFILE, DEVIATION),
+    "thickness and evenness": (EARLIER, THICKNESS, EVENNESS),
 }
 
 

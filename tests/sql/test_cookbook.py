@@ -17,7 +17,7 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from psycopg.rows import dict_row
 from support.cookbook_survey import CONFIRMED, GONE, MOVED, NICHE, OLD, POINTS, SPARSE, draw_findings, prepare
-from support.example_deviation import BULGE, OVER, UNDER
+from support.example_deviation import BULGE, OVER, OVER_LIMIT, THIN, UNDER
 from support.example_objects import FLOOR, HALF_FLOOR, SPHERES, THINGS, beside
 from support.example_survey import GIRTH, NAME, SEEN_FROM, WET, example_surface
 
@@ -514,6 +514,24 @@ def wrong_axis(rows: Rows, a: Asked) -> None:
     close(row, underbreak_sigma=0.01 * 2 * 150.5, overbreak_sigma=0.01 * 3 * 150.5)
 
 
+def off_design(rows: Rows, a: Asked) -> None:
+    """One of four cells of each section lies 100 mm outside; one was not seen."""
+    (row,) = rows
+    close(row, inside_m2=0.0, outside_m2=150 * 25 / 4, seen_m2=150 * 25 * 3 / 4)
+
+
+def thin(rows: Rows, a: Asked) -> None:
+    assert [row["label"] for row in rows] == [label(at + 0.5) for at in np.arange(*THIN)]
+    for row in rows:
+        close(row, least_mm=150, along_profile_m=9, thin_m2=12, compared_percent=75)
+
+
+def uneven(rows: Rows, a: Asked) -> None:
+    assert [row["label"] for row in rows] == [label(12300.0), label(12400.0)]
+    for row in rows:
+        close(row, over_m2=100 * OVER_LIMIT, measured_m2=1800, not_measured_m2=200, greatest_mm=24)
+
+
 def deviation_stale(rows: Rows, a: Asked) -> None:
     """An edited vertex makes the image stale on which it rests."""
     (row,) = rows
@@ -564,6 +582,9 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which ten sections stand most inside the profile?": most_inside,
     "Over which stretches does lining stand more than 50 mm inside?": bulges,
     "What would an axis that is wrong by 10 mm change of it?": wrong_axis,
+    "How many m² of a stretch lie more than 50 mm off the design?": off_design,
+    "Where is what was put on since another survey thinner than 0.2 m?": thin,
+    "On how much of each 100 m is the gap beneath a straightedge greater than the limit?": uneven,
     "Is the deviation of each kilometre up to date?": deviation_stale,
     "How many findings of each kind are there, and how did they come about?": kinds,
     "Which cracks are longer than a metre, the most severe first?": cracks,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import psycopg
 
+from support.example_deviation import add_surfaces
 from tunneldb.classification.classes import PointClass
 
 NICHE = (12399.0, 12401.0, 3.3, 4.3)
@@ -60,6 +61,7 @@ def prepare(conn: psycopg.Connection, survey: str) -> None:
         (row[0], int(PointClass.NICHE), low, high, row[0], low, left, high, right),
     )
     _points(conn, row[0])
+    add_surfaces(conn, survey)
 
 
 def _points(conn: psycopg.Connection, survey_id: int) -> None:
