@@ -10,7 +10,9 @@ import argparse
 import resource
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import shapely
@@ -19,15 +21,21 @@ from affine import Affine
 from benchmarks.common import print_table, save
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.deviation import Design, block_steps
-from tunneldb.raster.geotiff import Raster
+from tunneldb.raster.geotiff import DEVIATION_KINDS, Raster, encode
 from tunneldb.raster.grid import BLOCK
+from tunneldb.shape.evenness import evenness
 from tunneldb.shape.outline import Outline
+from tunneldb.shape.overbreak import LEAST_PIXELS
 from tunneldb.shape.profile import Profile, signed_distance, stretches
+from tunneldb.shape.straightedge import Cells, cell_means
 
 sys.path.append(str(Path(__file__).parent.parent / "tests"))
 from support.curved_lining import arc, block, circle, made
 
 ANYWHERE = (-np.inf, np.inf)
+KIND = DEVIATION_KINDS["lining"]
+
+Result = TypeVar("Result")
 
 
 def horseshoe(radius: float, wall: float = 2.0) -> Outline:
@@ -122,12 +130,57 @@ def timed(pixel: float) -> list[tuple[object, ...]]:
     return [(pixel, round(pixels / 1e6, 1), round(time.perf_counter() - began, 1), round(memory))]
 
 
+def stored(pixel: float) -> list[tuple[object, ...]]:
+    """What storing the image of deviation adds to a kilometre: MB and seconds, beside those of the offset image.
+
+    Pixels have 3 mm of noise and waves of 10 mm, a fifth of them no point, and a quarter of the section is no lining.
+    """
+    surface, axis = made(5.0, 200.0, 0.03, 0.02)
+    design = Design(surface, axis, stretches([Profile("a", 0.0, 200.0, horseshoe(5.0, 4.0))]))
+    image = block(surface, 50.0, pixel)
+    rng = np.random.default_rng(1)
+    rows, columns = image.values.shape
+    wave = 0.01 * np.sin(2.0 * np.pi * np.arange(columns) * pixel / 3.0)
+    values = (wave + rng.normal(0.0, 0.003, (rows, columns))).astype(np.float32)
+    values[rng.random((rows, columns)) < 0.2] = np.nan
+    lining = np.ones((rows, columns), np.bool_)
+    lining[: rows // 8] = lining[-rows // 8 :] = False
+    offset = Raster(values, image.transform)
+    blocks = round(1000.0 / BLOCK)
+    design.deviation(offset, lining)  # compiles
+    measured, (_, found) = _timed(lambda: design.deviation(offset, lining))
+    written, tiff = _timed(lambda: encode(Raster(np.ascontiguousarray(found.distance.T, np.float32), offset.transform), KIND))
+    before = len(encode(offset, "offset"))
+    shown = np.ascontiguousarray(found.distance.T[: rows // 5 * 5, : columns // 5 * 5], np.float32)
+    averaged, cells = _timed(lambda: cell_means(shown, 5, LEAST_PIXELS))
+    cell = 5 * pixel
+    evenness(cells, 2.0, cell)  # compiles
+    means = Cells(*(np.tile(part, (1, blocks)) for part in (cells.mean, cells.sigma, cells.seen)))
+    laid, _ = _timed(lambda: evenness(means, 2.0, cell))
+    return [
+        ("offset image, stored before, MB", round(blocks * before / 1e6, 1)),
+        ("image of deviation, added, MB", round(blocks * len(tiff) / 1e6, 1)),
+        ("deviation of the pixels, s", round(blocks * measured, 1)),
+        ("writing its image, added, s", round(blocks * written, 1)),
+        ("evenness: cells of the image, s", round(blocks * averaged, 1)),
+        ("evenness: a straightedge of 2 m both ways, s", round(laid, 1)),
+    ]
+
+
+def _timed(work: Callable[[], Result]) -> tuple[float, Result]:
+    """Seconds, and the result."""
+    began = time.perf_counter()
+    result = work()
+    return time.perf_counter() - began, result
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pixel", type=float, default=0.02, help="of the images, m")
     options = parser.parse_args()
     results = {
         "distances": distances(), "curve": on_the_curve(), "areas": areas(options.pixel), "timed": timed(options.pixel),
+        "stored": stored(options.pixel),
     }  # fmt: skip
     print_table("signed distance against shapely's", ("outline", "points", "greatest error mm"), results["distances"])
     print_table(
@@ -138,6 +191,8 @@ def main() -> None:
     header = ("50 m of lining, m³", "overbreak", "underbreak", "shapely's", "", "off %")
     print_table(f"volumes, pixels of {options.pixel:g} m", header, results["areas"])
     print_table("a kilometre", ("pixel m", "million pixels", "seconds", "most memory MB"), results["timed"])
+    title = f"a kilometre's image of deviation, and evenness, pixels of {options.pixel:g} m"
+    print_table(title, ("of a kilometre", ""), results["stored"])
     save("deviation", results)
 
 
