@@ -23,6 +23,9 @@ STRUCTURES, FACES = "Structures", "Faces"
 UNDERWATER = "Under water"
 """Group of the layers of sonar scans, with the raster of the bed."""
 
+DEVIATION = "Deviation"
+"""The map theme of deviation from the design, and the print layout of its sheets."""
+
 MEMBERS = "Members"
 """The print layout with a page for each member."""
 
@@ -188,3 +191,14 @@ UNDERWATER_LAYERS = (
     ),
 )  # fmt: skip
 """The same of a survey of a canal tunnel for which sonar scans were registered."""
+
+DEVIATION_LAYERS = (
+    VectorLayer("deviation_map", "Over- and underbreak", "deviation_map", "LineString", "deviation_map", MAP, ()),
+    VectorLayer(
+        "evenness_area", "Uneven: gap over the limit", "evenness_area", "Polygon", "evenness_area", UNROLLED, (DEVIATION,)
+    ),
+    VectorLayer(
+        "deviation_bar", "Over- and underbreak by metre", "deviation_bar", "Polygon", "deviation_bar", UNROLLED, (DEVIATION,)
+    ),
+)
+"""The same of a survey that was held against a design."""
