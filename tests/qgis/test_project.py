@@ -41,7 +41,6 @@ ON_MAP = {
     "target_sphere": "PointZ",
     "cluster": "Polygon",
     "outline": "LineString",
-    "deviation_map": "LineString",
     "ground": "LineStringZ",
     "leak_3d": "PolygonZ",
 }
@@ -49,9 +48,8 @@ IMAGES = ("raw", "corrected", "corrected-filled", "offset", "state", "class")
 UNROLLED = {
     "leak_unrolled": "Polygon", "anomaly_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon",
     "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon",
-    "deviation_bar": "Polygon",
 }  # fmt: skip
-NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet", "deviation_bar"}
+NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet"}
 """Layers of the unrolled plane that its theme does not show."""
 FINDINGS = {
     f"finding_{name}_{place}": kind + z

@@ -31,6 +31,15 @@ class Step:
     figures: SectionDeviation
 
 
+def layers_held(conn: psycopg.Connection[Any], survey: Survey) -> list[str]:
+    """Layers that a survey was held against, from inside."""
+    query = (
+        "SELECT l FROM unnest(%s::text[]) WITH ORDINALITY AS u (l, n)"
+        " WHERE EXISTS (SELECT FROM tunnel.deviation_section d WHERE d.survey_id = %s AND d.layer = l) ORDER BY n"
+    )
+    return [layer for (layer,) in conn.execute(query, [list(DEVIATION_KINDS), survey.id])]
+
+
 def load_offsets(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Iterator[tuple[Raster, Bool | None]]:
     """Blocks of a kilometre's offset image, in order, with which pixels (rows, columns) show lining; None if not stored."""
     blocks = conn.execute(

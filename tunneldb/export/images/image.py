@@ -61,40 +61,45 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
         return [*written, *(path for path in below if path is not None)]
 
 
-def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> Path | None:
-    """Write what is looked at of a kilometre with its gaps filled, ``SURVEY-kmNNN-KIND-filled.tif``; its path.
+def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> list[Path]:
+    """Write what is looked at of a kilometre with its gaps filled, ``SURVEY-kmNNN-KIND-filled.tif``; their paths.
 
-    The kind is corrected intensity, or the offset where there is none; None without either. Its pixels are those of a preview:
-    it is there to be looked at, under the image that was measured. Its band's name and metadata say what it is. A profile
-    beyond the end of the kilometre fills, too. The connection must be idle.
+    The kinds are corrected intensity, or the offset where there is none, and deviation. Their pixels are those of a preview:
+    they are there to be looked at, under the image that was measured. Their band's name and metadata say what they are. A
+    profile beyond the end of the kilometre fills, too. The connection must be idle.
     """
     with snapshot(conn):
-        by_kind = {kind: image_blocks(conn, survey, km, kind) for kind in ("offset", "corrected")}
-        kind = "corrected" if by_kind["corrected"] else "offset"
-        blocks = by_kind[kind]
-        if not blocks:
-            return None
-        first = load_block(conn, survey, km, kind, blocks[0])
-        factor = preview_factor(first.transform.a)
-        rows, columns = (-(-n // factor) for n in first.values.shape)
-        extent = Extent(first.transform @ Affine.scale(factor), rows, columns * (blocks[-1] - blocks[0] + 1))
-        around = [
-            *_beside(conn, survey, kind, blocks[0] - 1),
-            *((km, block) for block in blocks),
-            *_beside(conn, survey, kind, blocks[-1] + 1),
-        ]
+        seen = "corrected" if image_blocks(conn, survey, km, "corrected") else "offset"
+        written = [_export_filled(conn, survey, km, kind, folder) for kind in (seen, *DEVIATION_KINDS.values())]
+    return [path for path in written if path is not None]
 
-        def shrunk() -> Iterator[tuple[int, Single]]:
-            for other, block in around:
-                raster = load_block(conn, survey, other, kind, block)
-                if raster.transform.a == first.transform.a:
-                    pixels = raster.values if other == km else laid(raster, first)
-                    yield (block - blocks[0]) * columns, preview.shrink(pixels, factor)
 
-        path = folder / f"{survey.name}-km{km:03d}-{kind}-filled.tif"
-        filled = fill_blocks(shrunk(), FILL / extent.transform.a)
-        with replacing(path) as temporary:
-            write_cog(temporary, kind, extent, (b for b in filled if 0 <= b[0] < extent.columns), f"{kind}, {TOLD}")
+def _export_filled(conn: psycopg.Connection, survey: Survey, km: int, kind: str, folder: Path) -> Path | None:
+    """Write an image with its gaps filled; None where there is none."""
+    blocks = image_blocks(conn, survey, km, kind)
+    if not blocks:
+        return None
+    first = load_block(conn, survey, km, kind, blocks[0])
+    factor = preview_factor(first.transform.a)
+    rows, columns = (-(-n // factor) for n in first.values.shape)
+    extent = Extent(first.transform @ Affine.scale(factor), rows, columns * (blocks[-1] - blocks[0] + 1))
+    around = [
+        *_beside(conn, survey, kind, blocks[0] - 1),
+        *((km, block) for block in blocks),
+        *_beside(conn, survey, kind, blocks[-1] + 1),
+    ]
+
+    def shrunk() -> Iterator[tuple[int, Single]]:
+        for other, block in around:
+            raster = load_block(conn, survey, other, kind, block)
+            if raster.transform.a == first.transform.a:
+                pixels = raster.values if other == km else laid(raster, first)
+                yield (block - blocks[0]) * columns, preview.shrink(pixels, factor)
+
+    path = folder / f"{survey.name}-km{km:03d}-{kind}-filled.tif"
+    filled = fill_blocks(shrunk(), FILL / extent.transform.a)
+    with replacing(path) as temporary:
+        write_cog(temporary, kind, extent, (b for b in filled if 0 <= b[0] < extent.columns), f"{kind}, {TOLD}")
     return path
 
 

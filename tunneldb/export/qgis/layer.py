@@ -23,6 +23,9 @@ STRUCTURES, FACES = "Structures", "Faces"
 UNDERWATER = "Under water"
 """Group of the layers of sonar scans, with the raster of the bed."""
 
+DEVIATION = "Deviation"
+"""The map theme of deviation from the design, and the print layout of its sheets."""
+
 MEMBERS = "Members"
 """The print layout with a page for each member."""
 
@@ -133,7 +136,6 @@ LAYERS = (
     ),
     VectorLayer("target_sphere", "Target spheres", "target_sphere", "PointZ", "target_sphere", MAP, (MAP, SPACE)),
     VectorLayer("axis", "Axis", "axis", "LineStringZ", "axis", MAP, (MAP, SPACE, FINDINGS_MAP)),
-    VectorLayer("deviation_map", "Over- and underbreak", "deviation_map", "LineString", "deviation_map", MAP, ()),
     VectorLayer("segment", "Segments", "segment", "LineStringZ", "segment", MAP, (MAP,)),
     VectorLayer("section", "Sections", "section", "LineStringZ", "section", MAP, (MAP, SPACE)),
     VectorLayer("outline", "Walls, at their widest", "outline", "LineString", "outline", MAP, (MAP, FINDINGS_MAP)),
@@ -152,7 +154,6 @@ LAYERS = (
         "section_unrolled", "Sections, unrolled", "section_unrolled", "LineString", "section_unrolled", UNROLLED,
         (UNROLLED,),
     ),
-    VectorLayer("deviation_bar", "Over- and underbreak by metre", "deviation_bar", "Polygon", "deviation_bar", UNROLLED, ()),
     VectorLayer("sheet", "Sheets of 50 m", "sheet", "Polygon", "sheet", UNROLLED, (UNROLLED, FINDINGS)),
     *_findings("sheet", UNROLLED, SHEETS, where='"shown"'),
     VectorLayer(
@@ -190,3 +191,14 @@ UNDERWATER_LAYERS = (
     ),
 )  # fmt: skip
 """The same of a survey of a canal tunnel for which sonar scans were registered."""
+
+DEVIATION_LAYERS = (
+    VectorLayer("deviation_map", "Over- and underbreak", "deviation_map", "LineString", "deviation_map", MAP, ()),
+    VectorLayer(
+        "evenness_area", "Uneven: gap over the limit", "evenness_area", "Polygon", "evenness_area", UNROLLED, (DEVIATION,)
+    ),
+    VectorLayer(
+        "deviation_bar", "Over- and underbreak by metre", "deviation_bar", "Polygon", "deviation_bar", UNROLLED, (DEVIATION,)
+    ),
+)
+"""The same of a survey that was held against a design."""

@@ -8,7 +8,7 @@ from importlib import resources
 import psycopg
 
 from tunneldb.errors import UserError
-from tunneldb.export.qgis.layer import LAYERS, STRUCTURE_LAYERS, UNDERWATER_LAYERS
+from tunneldb.export.qgis.layer import DEVIATION_LAYERS, LAYERS, STRUCTURE_LAYERS, UNDERWATER_LAYERS
 
 STYLE_NAME = "tunneldb"
 
@@ -79,7 +79,7 @@ def styled_columns() -> list[tuple[str, str, str, str]]:
     """
     return [
         (layer.view, layer.column, layer.style, layer.title)
-        for layer in (*LAYERS, *STRUCTURE_LAYERS, *UNDERWATER_LAYERS)
+        for layer in (*LAYERS, *DEVIATION_LAYERS, *STRUCTURE_LAYERS, *UNDERWATER_LAYERS)
         if layer.id == layer.view
     ] + [
         ("anomaly", "unrolled", "anomaly", "Leaks, joints and dark spots, unrolled"),
