@@ -27,6 +27,7 @@ CHAPTERS = {
     "dry": "Dry regions",
     "structures": "Structures",
     "underwater": "Under water",
+    "deviation": "Design and deviation",
     "methods": "Methods",
     "reviews": "Reviews",
     "signatures": "Signatures",

@@ -21,6 +21,7 @@ from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, STATES, U
 from tunneldb.export.tables.leaks import clock_label
 from tunneldb.raster.gap_fill import TOLD
 from tunneldb.report import data, text
+from tunneldb.report.deviation import read_deviation
 from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, without_detection
 from tunneldb.report.findings import STATE_WORDS, digest_findings, read_findings_chapter
 from tunneldb.report.lining import Form
@@ -196,6 +197,7 @@ class _Report:
         table = "leaks" in owner.chapters and survey.intensity_kind != "none"
         self.findings = read_findings_chapter(conn, survey, (low, high), ids, photos, table=table)
         self.underwater = read_underwater(conn, survey, low, high)
+        self.deviation = read_deviation(conn, survey, low, high, form) if "deviation" in owner.chapters else []
         self.regions = read_dry_regions(conn, survey, low, high)
         marks = self.findings.marks if self.findings else []
         self.strips = Strips(conn, survey, low, high, self.leaks, marks, self.coverage, pictured, form, progress, owner.words)
@@ -250,6 +252,7 @@ class _Report:
             "people": text.reviewers(self.findings.by_id.values() if self.findings else []),
             "structures": self.structures,
             "underwater": self.underwater,
+            "deviation": self.deviation,
             "edits": [text.edit(edit, numbers) for edit in edits],
             "edits_in_all": edits_in_all,
             "part": self.part,
@@ -273,7 +276,10 @@ class _Report:
         """Whether a chapter has anything to say."""
         if chapter in _OF_LEAKS:
             return self.survey.intensity_kind != "none"
-        there = {"findings": self.findings, "dry": self.regions, "structures": self.structures, "underwater": self.underwater}
+        there = {
+            "findings": self.findings, "dry": self.regions, "structures": self.structures, "underwater": self.underwater,
+            "deviation": self.deviation,
+        }  # fmt: skip
         return chapter not in there or bool(there[chapter])
 
     def _labels(self, chainages: list[float]) -> list[str]:
