@@ -1,301 +1,274 @@
-"""The chapter on the design: volumes, the image of deviation, over- and underbreak along the tunnel, the worst sections."""
+"""The chapter on design and deviation: over- and underbreak, the image of deviation, the worst sections."""
 
 from __future__ import annotations
 
+import base64
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, LiteralString
+from typing import Any
 
 import numpy as np
 import psycopg
 from PIL import Image
+from psycopg import sql
 from psycopg.rows import dict_row
 
-from tunneldb.arrays import Float, Single, UInt8
+from tunneldb.arrays import Single, UInt8
 from tunneldb.export.images.preview import shrink
-from tunneldb.export.tables.deviation import stretch_rows, volume
 from tunneldb.raster.gap_fill import FILL, fill_gaps
 from tunneldb.raster.geotiff import DEVIATION_KINDS
 from tunneldb.raster.grid import BLOCK
 from tunneldb.report.data import label_chainages
 from tunneldb.report.drawing import line_path, step_for, ticks
-from tunneldb.report.lining import QUALITY, Form, Picture, Window
-from tunneldb.shape.profile import Stretch
-from tunneldb.store.design import load_design
+from tunneldb.report.lining import QUALITY, Form
+from tunneldb.shape.profile import Stretch, stretches
+from tunneldb.store.design import load_profiles
+from tunneldb.store.deviation import layers_held
 from tunneldb.store.images import load_block
 from tunneldb.store.survey import Survey
 
-STRIP, STRIPS = 250.0, 25
-"""Length of a strip of the image, m, where there are no more than so many; else they are longer."""
+WORST = 4
+"""So many sections are drawn of the greatest overbreak, and as many of the greatest underbreak."""
 
-PIXELS = 2500
-"""Columns of a strip at most."""
+ROWS = 60
+"""The table has so many stretches at most, of 100 m or a longer round length."""
 
-WORST = 6
-"""Sections that are drawn: those with the greatest area on either side of the design."""
-
-ROWS = 40
-"""Stretches in the table of volumes at most."""
+APART = 5.0
+"""None of them is nearer to a worse one, m."""
 
 WIDTH, HEIGHT = 1000.0, 90.0
-"""Of the plot along the tunnel, above and below its base, in its own unit."""
+"""Of each half of the plot along the tunnel, in its own unit."""
 
-SPANS = (0.02, 0.05, 0.1, 0.2, 0.5)
-"""Deviation that has the full colour, m: the first that nine tenths of the cells stay within."""
+LIMITS = (0.02, 0.05, 0.1, 0.2, 0.5)
+"""Deviation at which colours are full, m: the first that nine tenths of the cells stay within."""
 
-_EXAGGERATED = 0.25  # of the design's size, how far the greatest deviation of a drawn section is to go at most
-_LEVELS = np.array([-1.0, -0.4, 0.0, 0.4, 1.0])
-_COLOURS = np.array([[33, 102, 172], [146, 197, 222], [230, 230, 230], [244, 165, 130], [178, 24, 43]])
-_NOTHING = (255, 255, 255)
+_COLUMNS = 1000  # of a picture
+_STRIP = 100.0  # length of a picture of a short stretch, m; of a long one a tenth of it, in whole blocks
+_BLUE, _GREY, _RED, _NONE = (33, 102, 172), (230, 230, 230), (178, 24, 43), (255, 255, 255)
+_DRAWN = 0.6  # m to which the greatest deviation of a section is magnified at most
+_DOWN = np.array([1.0, -1.0])
+_TIMES = (50, 20, 10, 5, 2, 1)
 
 
 @dataclass(frozen=True)
 class Plot:
-    """Over- and underbreak along the tunnel, drawn: paths above and below the base, ticks of area and of chainage."""
+    """Over- and underbreak along the tunnel: paths, and where lines of equal area and ticks stand, with labels."""
 
-    under: str
     over: str
+    under: str
     areas: list[tuple[float, str]]
     places: list[tuple[float, str]]
 
 
 @dataclass(frozen=True)
-class DrawnSection:
-    """A section with the design behind: its figures, the paths of both, m, y downwards, and how much it is exaggerated."""
+class Strip:
+    """A stretch of the image of deviation: what it is called, its length and height, m, and its picture."""
+
+    title: str
+    length: float
+    height: float
+    picture: str
+
+
+@dataclass(frozen=True)
+class WorstSection:
+    """A section with its figures, and the paths of design and lining, deviations magnified so many times."""
 
     row: dict[str, Any]
     design: str
     lining: str
     box: str
-    exaggeration: int
+    times: int
 
 
-@dataclass(frozen=True)
-class DeviationStrip:
-    """A stretch of the image of deviation, with its title."""
+class DeviationChapter:
+    """What the chapter states of a layer.
 
-    title: str
-    picture: Picture
-
-
-@dataclass(frozen=True)
-class LayerChapter:
-    """What is stated of a layer.
+    Parameters
+    ----------
+    conn, survey, layer, low, high
+        Where from; chainages, m.
+    form : {'WEBP', 'JPEG'}
+        Format of the pictures.
 
     Attributes
     ----------
-    layer : str
     whole : dict
-        Columns of function ``deviation_volume``.
+        Columns of ``deviation_volume``.
     stretches : list of dict
-        Columns of function ``deviation_stretches``.
-    step : float
-        Length of these, m.
-    stale : list of (int, str)
-        Kilometres that are out of date, and why.
-    span : float
-        Deviation that has the full colour, m.
-    strips : list of DeviationStrip
+        Columns of ``deviation_stretches``, of whole stretches that lie in the report's.
+    limit : float
+        Deviation at which colours are full, m.
     plot : Plot
-    worst : list of DrawnSection
+    worst : list of list of WorstSection
+        Of overbreak, and of underbreak.
+    stale : list of str
+        Why what is stated is out of date.
+    evenness, thickness : list of dict
+        What was made of either, of the stretch as a whole; of thickness by earlier survey.
     """
 
-    layer: str
-    whole: dict[str, Any]
-    stretches: list[dict[str, Any]]
-    step: float
-    stale: list[tuple[int, str]]
-    span: float
-    strips: list[DeviationStrip]
-    plot: Plot
-    worst: list[DrawnSection]
+    def __init__(self, conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float, form: Form) -> None:
+        self._conn, self._survey, self._low, self._high, self._form = conn, survey, low, high, form
+        self.layer = layer
+        (self.whole,) = self._rows("SELECT * FROM tunnel_api.deviation_volume(%s, %s, %s, %s)", survey.name, layer, low, high)
+        self.step = max(step_for(high - low, ROWS), 100.0)
+        self.stretches = self._rows(
+            "SELECT * FROM tunnel_api.deviation_stretches(%s, %s, %s) WHERE chainage_to > %s AND chainage_from < %s"
+            " ORDER BY chainage_from",
+            survey.name, layer, self.step, low, high,
+        )  # fmt: skip
+        self.stale = sorted({row["reason"] for row in self._rows(
+            "SELECT reason FROM tunnel_api.deviation_state(%s) WHERE layer = %s AND reason IS NOT NULL"
+            " AND (km + 1) * 1000 > %s AND km * 1000 < %s", survey.id, layer, low, high,
+        )})  # fmt: skip
+        usual = self._rows(
+            "SELECT percentile_cont(0.9) WITHIN GROUP (ORDER BY greatest(deviation_greatest, -deviation_least)) AS usual"
+            " FROM tunnel_api.deviation_section"
+            " WHERE survey_id = %s AND layer = %s AND chainage_to > %s AND chainage_from < %s",
+            survey.id, layer, low, high,
+        )[0]["usual"]  # fmt: skip
+        self.limit = next((limit for limit in LIMITS if limit >= (usual or 0.0)), LIMITS[-1])
+        self.plot = self._plot()
+        self.worst = [self._worst(kind) for kind in ("overbreak", "underbreak")]
+        self.evenness = self._rows(
+            "SELECT min(straightedge) AS straightedge, max(gap_limit) AS gap_limit, sum(lining_area) AS lining,"
+            " sum(measured_area) AS measured, sum(over_area) AS over, max(gap_along) AS along, max(gap_around) AS around,"
+            " max(waviness) AS waviness FROM tunnel_api.evenness_section"
+            " WHERE survey_id = %s AND layer = %s AND chainage_to > %s AND chainage_from < %s HAVING count(*) > 0",
+            survey.id, layer, low, high,
+        )  # fmt: skip
+        self.thickness = self._rows(
+            "SELECT before, sum((chainage_to - chainage_from) * compared_length) AS compared,"
+            " sum((chainage_to - chainage_from) * area) AS volume, min(thickness_least) AS least,"
+            " sum(compared_length * thickness_mean) / nullif(sum(compared_length), 0) AS mean"
+            " FROM tunnel_api.thickness_section"
+            " WHERE survey_id = %s AND layer = %s AND chainage_to > %s AND chainage_from < %s GROUP BY before ORDER BY 1",
+            survey.id, layer, low, high,
+        )  # fmt: skip
+
+    def _rows(self, query: Any, *values: Any) -> list[dict[str, Any]]:
+        with self._conn.cursor(row_factory=dict_row) as cursor:
+            return cursor.execute(query, values).fetchall()
+
+    def _plot(self) -> Plot:
+        """Over- and underbreak by bins of a round length, 500 at most."""
+        low, high = self._low, self._high
+        step = max(step_for(high - low, 500), 1.0)
+        rows = self._rows(
+            "SELECT floor(chainage_from / %s) * %s AS low, sum(overbreak * (chainage_to - chainage_from)) / %s AS over,"
+            " sum(underbreak * (chainage_to - chainage_from)) / %s AS under FROM tunnel_api.deviation_section"
+            " WHERE survey_id = %s AND layer = %s AND chainage_to > %s AND chainage_from < %s GROUP BY 1 ORDER BY 1",
+            step, step, step, step, self._survey.id, self.layer, low, high,
+        )  # fmt: skip
+        most = max((max(row["over"], row["under"]) for row in rows), default=0.0) or 1.0
+        across, up = WIDTH / (high - low), HEIGHT / most
+
+        def bars(name: str, way: float) -> str:
+            return "".join(
+                f"M{(row['low'] - low) * across:.1f} {HEIGHT:g}v{way * row[name] * up:.1f}h{step * across:.1f}V{HEIGHT:g}Z"
+                for row in rows if row[name] > 0.0
+            )  # fmt: skip
+
+        places = ticks(low, high, step_for(high - low, 8))
+        labels = label_chainages(self._conn, self._survey, places)
+        each = step_for(1e3 * most, 4) / 1e3
+        areas = [
+            (HEIGHT - way * area * up, f"{area:g}") for area in ticks(0.0, most, each)[1:] for way in (-1.0, 1.0)
+        ]  # fmt: skip
+        return Plot(
+            bars("over", 1.0), bars("under", -1.0), areas,
+            [((place - low) * across, label.split(".")[0]) for place, label in zip(places, labels, strict=True)],
+        )  # fmt: skip
+
+    def strips(self) -> Iterator[Strip]:
+        """Pictures of the image of deviation, one after another, with no more than one in memory."""
+        kind = DEVIATION_KINDS[self.layer]
+        blocks = self._rows(
+            "SELECT km, block FROM tunnel.image WHERE survey_id = %s AND kind = %s AND block BETWEEN %s AND %s"
+            " ORDER BY block, km",
+            self._survey.id, kind, int(self._low // BLOCK), int(np.ceil(self._high / BLOCK)) - 1,
+        )  # fmt: skip
+        each = round(max(_STRIP, step_for((self._high - self._low) / 10.0, 1)) / BLOCK)
+        there = {row["block"]: row["km"] for row in blocks}
+        for first in sorted({block // each * each for block in there}):
+            numbers = [number for number in range(first, first + each) if number in there]
+            yield self._strip(first, each, [(number, there[number]) for number in numbers], kind)
+
+    def _strip(self, first: int, count: int, blocks: list[tuple[int, int]], kind: str) -> Strip:
+        parts: list[tuple[int, float, Single]] = []
+        side = 0.0
+        for number, km in blocks:
+            raster = load_block(self._conn, self._survey, km, kind, number)
+            factor = max(1, round(count * BLOCK / _COLUMNS / raster.transform.a))
+            side = raster.transform.a * factor
+            parts.append((number, raster.transform.f, shrink(raster.values, factor)))
+        columns = round(BLOCK / side)
+        top = max(north for _, north, _ in parts)
+        bottom = min(north - len(values) * side for _, north, values in parts)
+        canvas = np.full((round((top - bottom) / side) + 1, columns * count), np.nan, np.float32)
+        for number, north, values in parts:
+            down, along = round((top - north) / side), (number - first) * columns
+            canvas[down : down + len(values), along : along + columns] = values[:, :columns]
+        held = np.flatnonzero(np.isfinite(canvas).any(axis=1))
+        canvas = fill_gaps(canvas[held[0] : held[-1] + 1] if len(held) else canvas[:1], FILL / side)
+        out = io.BytesIO()
+        Image.fromarray(_colours(canvas, self.limit)).save(out, self._form, quality=QUALITY[self._form])
+        labels = label_chainages(self._conn, self._survey, [first * BLOCK, (first + count) * BLOCK])
+        url = f"data:image/{self._form.lower()};base64,{base64.b64encode(out.getvalue()).decode()}"
+        return Strip(" – ".join(label.split(".")[0] for label in labels), count * BLOCK, len(canvas) * side, url)
+
+    def _worst(self, kind: str) -> list[WorstSection]:
+        """Sections with the greatest over- or underbreak, in order of chainage, none within 5 m of a worse one."""
+        query = sql.SQL(
+            "SELECT chainage_from, chainage_to, label, profile, overbreak, underbreak, seen_share, deviation_least,"
+            " deviation_greatest, deviation FROM tunnel_api.deviation_section"
+            " WHERE survey_id = %s AND layer = %s AND chainage_to > %s AND chainage_from < %s AND {0} > 0"
+            " ORDER BY {0} DESC LIMIT %s"
+        ).format(sql.Identifier(kind))
+        chosen: list[dict[str, Any]] = []
+        for row in self._rows(query, self._survey.id, self.layer, self._low, self._high, 20 * WORST):
+            if all(abs(row["chainage_from"] - other["chainage_from"]) >= APART for other in chosen):
+                chosen.append(row)
+        design = {part.name: part for part in stretches(load_profiles(self._conn, self._survey.tunnel_id, self.layer))}
+        worst = sorted(chosen[:WORST], key=lambda row: row["chainage_from"])
+        return [_draw(row, design[row["profile"]]) for row in worst if row["profile"] in design]
 
 
-def read_deviation(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float, form: Form) -> list[LayerChapter]:
-    """Read what is stated of a stretch against each layer's design, m; nothing where it was not held against one."""
-    layers = conn.execute(
-        "SELECT layer FROM tunnel.deviation_section WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s"
-        " GROUP BY layer ORDER BY array_position(%s, layer)",
-        [survey.id, low, high, list(DEVIATION_KINDS)],
-    ).fetchall()
-    return [_layer(conn, survey, layer, low, high, form) for (layer,) in layers]
+def read_deviation(
+    conn: psycopg.Connection[Any], survey: Survey, low: float, high: float, form: Form
+) -> list[DeviationChapter]:
+    """Read what is stated of each layer that a stretch was held against, from inside."""
+    chapters = (DeviationChapter(conn, survey, layer, low, high, form) for layer in layers_held(conn, survey))
+    return [chapter for chapter in chapters if chapter.whole["length"] is not None]
 
 
-def _layer(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float, form: Form) -> LayerChapter:
-    whole = volume(conn, survey, layer, low, high, 0.0)
-    assert whole is not None
-    step = max(step_for(high - low, ROWS), 1.0)
-    span = _span(conn, survey, layer, low, high)
-    stale = conn.execute(
-        "SELECT km, reason FROM tunnel_api.deviation_state(%s) WHERE layer = %s AND reason IS NOT NULL"
-        " AND (km + 1) * 1000.0 > %s AND km * 1000.0 < %s ORDER BY km",
-        [survey.id, layer, low, high],
-    ).fetchall()
-    return LayerChapter(
-        layer, whole, stretch_rows(conn, survey, layer, low, high, step, 0.0), step, stale, span,
-        list(_strips(conn, survey, layer, low, high, span, form)), _plot(conn, survey, layer, low, high),
-        _worst(conn, survey, layer, low, high),
-    )  # fmt: skip
-
-
-def _span(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float) -> float:
-    """Deviation that has the full colour, from a thousand sections or so."""
-    row = conn.execute(
-        "SELECT percentile_cont(0.9) WITHIN GROUP (ORDER BY abs(c.d)) FROM tunnel.deviation_section s,"
-        " unnest(s.deviation) AS c (d) WHERE s.survey_id = %s AND s.layer = %s AND s.chainage_to > %s AND s.chainage_from < %s"
-        " AND c.d <> 'NaN' AND floor(s.chainage_from)::int %% %s = 0",
-        [survey.id, layer, low, high, max(int((high - low) / 1000.0), 1)],
-    ).fetchone()
-    usual = row[0] if row is not None and row[0] is not None else 0.0
-    return next((span for span in SPANS if span >= usual - 1e-6), SPANS[-1])
-
-
-def _strips(
-    conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float, span: float, form: Form
-) -> Iterator[DeviationStrip]:
-    kind = DEVIATION_KINDS[layer]
-    length = STRIP * max(int(np.ceil((high - low) / STRIP / STRIPS)), 1)
-    places: dict[int, int] = dict(
-        conn.execute(
-            "SELECT block, min(km) FROM tunnel.image WHERE survey_id = %s AND kind = %s AND (block + 1) * %s::float8 > %s"
-            " AND block * %s::float8 < %s GROUP BY block",
-            [survey.id, kind, BLOCK, low, BLOCK, high],
-        ).fetchall()
-    )
-    for start in np.arange(np.floor(low / length) * length, high, length).tolist():
-        west, east = max(start, low), min(start + length, high)
-        blocks = {number: km for number, km in places.items() if (number + 1) * BLOCK > west and number * BLOCK < east}
-        if not blocks:
-            continue
-        picture = _picture(conn, survey, kind, blocks, (west, east), length, span, form)
-        begin, end = label_chainages(conn, survey, [west, east])
-        yield DeviationStrip(f"{begin} – {end}", picture)
-
-
-def _picture(
-    conn: psycopg.Connection[Any],
-    survey: Survey,
-    kind: str,
-    blocks: dict[int, int],
-    ends: tuple[float, float],
-    length: float,
-    span: float,
-    form: Form,
-) -> Picture:
-    """Draw the blocks (number and kilometre) of a strip, one in memory at a time."""
-    parts: list[tuple[float, float, Single]] = []
-    side = 0.0
-    for number, km in sorted(blocks.items()):
-        raster = load_block(conn, survey, km, kind, number)
-        pixel = raster.transform.a
-        factor = max(int(length / PIXELS / pixel), 1)
-        while abs(BLOCK / (pixel * factor) - round(BLOCK / (pixel * factor))) > 1e-6:  # a block is a whole number of pixels
-            factor -= 1
-        if side and abs(pixel * factor - side) > 1e-9:
-            continue  # a kilometre with pixels of another size
-        side = pixel * factor
-        parts.append((raster.transform.c, raster.transform.f, shrink(raster.values, factor)))
-    north = max(f for _, f, _ in parts)
-    south = min(f - len(values) * side for _, f, values in parts)
-    west, east = ends
-    values = np.full((round((north - south) / side), max(round((east - west) / side), 1)), np.nan, np.float32)
-    for c, f, part in parts:
-        row, column = round((north - f) / side), round((c - west) / side)
-        first, last = max(column, 0), min(column + part.shape[1], values.shape[1])
-        rows = values[row : row + len(part), first:last]
-        rows[:] = part[: len(rows), first - column : last - column]
-    values = fill_gaps(values, FILL / side)
-    shown = np.flatnonzero(np.isfinite(values).any(axis=1))
-    if len(shown):  # floor and what lies beyond the feet of the profile is left out
-        values, north = values[shown[0] : shown[-1] + 1], north - float(shown[0]) * side
-        south = north - len(values) * side
-    out = io.BytesIO()
-    Image.fromarray(colours(values, span)).save(out, form, quality=QUALITY[form])
-    return Picture(Window(west, west + values.shape[1] * side, south, north), form, out.getvalue())
-
-
-def colours(values: Single, span: float) -> UInt8:
-    """Colours (rows, columns, 3) of deviations, m: blue outside the design, red inside, white where there is none."""
-    share = np.clip(np.nan_to_num(values) / span, -1.0, 1.0)
-    painted = np.stack([np.interp(share, _LEVELS, _COLOURS[:, k]) for k in range(3)], axis=-1)
-    painted[np.isnan(values)] = _NOTHING
-    return painted.astype(np.uint8)
-
-
-def _plot(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float) -> Plot:
-    """Draw the area of each metre, or the greatest of each pixel where metres are narrower than that."""
-    rows = np.array(
-        conn.execute(
-            "SELECT chainage_from, underbreak, overbreak FROM tunnel.deviation_section WHERE survey_id = %s AND layer = %s"
-            " AND chainage_to > %s AND chainage_from < %s ORDER BY chainage_from",
-            [survey.id, layer, low, high],
-        ).fetchall(),
-        np.float64,
-    )
-    count = int(min(np.ceil(high - low), WIDTH))
-    greatest = np.zeros((2, count))
-    bins = np.clip(((rows[:, 0] - low) / (high - low) * count).astype(int), 0, count - 1)
-    for k in (0, 1):
-        np.maximum.at(greatest[k], bins, rows[:, 1 + k])
-    top = max(float(greatest.max()), 0.01)
-    x = np.repeat(np.linspace(0.0, WIDTH, count + 1), 2)
-
-    def path(values: Float, way: float) -> str:
-        y = HEIGHT * way * np.concatenate([[0.0], np.repeat(values / top, 2), [0.0]])
-        return line_path(np.column_stack([x, y]), 1) + "Z"
-
-    unit = step_for(1000.0 * top, 3) / 1000.0
-    areas = [(-way * HEIGHT * area / top, f"{area:g}") for way in (1, -1) for area in ticks(0.0, top, unit) if area or way > 0]
-    at = ticks(low, high, step_for(high - low, 8))
-    places = [((place - low) / (high - low) * WIDTH, name) for place, name in _labelled(conn, survey, at)]
-    return Plot(path(greatest[0], -1.0), path(greatest[1], 1.0), areas, places)
-
-
-def _labelled(conn: psycopg.Connection[Any], survey: Survey, at: Sequence[float]) -> Iterator[tuple[float, str]]:
-    return zip(at, label_chainages(conn, survey, list(at)) if at else [], strict=True)
-
-
-def _worst(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float) -> list[DrawnSection]:
-    """Draw the sections with the greatest areas, no two within 5 m of each other."""
-    rows = _rows(
-        conn,
-        "SELECT chainage_from, chainage_to, label, profile, overbreak, underbreak, seen_share, deviation_least,"
-        " deviation_greatest, deviation FROM tunnel_api.deviation_section WHERE survey_id = %s AND layer = %s"
-        " AND chainage_to > %s AND chainage_from < %s AND seen_length > 0 ORDER BY overbreak + underbreak DESC LIMIT %s",
-        [survey.id, layer, low, high, 20 * WORST],
-    )
-    by_name = {stretch.name: stretch for stretch in load_design(conn, survey.tunnel_id, survey.tunnel, layer)}
-    chosen: list[dict[str, Any]] = []
-    for row in rows:
-        if row["profile"] in by_name and all(abs(row["chainage_from"] - one["chainage_from"]) > 5.0 for one in chosen):
-            chosen.append(row)
-    return [_drawn(row, by_name[row["profile"]]) for row in sorted(chosen[:WORST], key=lambda row: row["chainage_from"])]
-
-
-def _drawn(row: dict[str, Any], stretch: Stretch) -> DrawnSection:
-    """Draw a section: deviations enlarged by a round number, as far as they stay in the picture."""
-    outline = stretch.at((row["chainage_from"] + row["chainage_to"]) / 2.0)
+def _draw(row: dict[str, Any], design: Stretch) -> WorstSection:
+    """Draw a section, looking up-chainage, y downwards, with deviations magnified."""
+    outline = design.at((row["chainage_from"] + row["chainage_to"]) / 2.0)
     values = np.array(row["deviation"], np.float64)
-    held = np.isfinite(values)
-    design = outline.flattened(0.005)
-    size = float(np.ptp(design, axis=0).min())
-    most = max(float(np.abs(values[held]).max()), 1e-3)
-    times = next((times for times in (50, 20, 10, 5, 2) if times * most < _EXAGGERATED * size), 1)
+    greatest = max(abs(row["deviation_least"]), abs(row["deviation_greatest"]))
+    times = next((times for times in _TIMES if times * greatest <= _DRAWN), 1)
     feet, inward = outline.places((np.arange(len(values)) + 0.5) / len(values))
     points = feet + times * values[:, None] * inward
-    runs = [part for part in np.split(np.arange(len(values)), np.flatnonzero(np.diff(held)) + 1) if held[part[0]]]
-    both = np.vstack([design, points[held]]) * [1.0, -1.0]
-    (west, top), (east, bottom) = both.min(axis=0) - 0.2, both.max(axis=0) + 0.2
-    return DrawnSection(
+    seen = np.isfinite(values)
+    pieces = np.split(np.arange(len(values)), np.flatnonzero(np.diff(seen)) + 1)
+    shape = outline.flattened(0.01)
+    around = np.vstack([shape, points[seen]])
+    (west, south), (east, north) = around.min(axis=0) - 0.2, around.max(axis=0) + 0.2
+    return WorstSection(
         row,
-        line_path(design * [1.0, -1.0]),
-        "".join(line_path(points[part] * [1.0, -1.0]) for part in runs if len(part) > 1),
-        f"{west:.2f} {top:.2f} {east - west:.2f} {bottom - top:.2f}",
+        line_path(shape * _DOWN),
+        "".join(line_path(points[piece] * _DOWN) for piece in pieces if seen[piece[0]] and len(piece) > 1),
+        f"{west:.2f} {-north:.2f} {east - west:.2f} {north - south:.2f}",
         times,
     )
 
 
-def _rows(conn: psycopg.Connection[Any], query: LiteralString, values: list[Any]) -> list[dict[str, Any]]:
-    with conn.cursor(row_factory=dict_row) as cursor:
-        return cursor.execute(query, values).fetchall()
+def _colours(values: Single, limit: float) -> UInt8:
+    """Colours (rows, columns, 3): blue outside, grey on the design, red inside."""
+    share = np.nan_to_num(np.clip(values / limit, -1.0, 1.0))
+    colours = np.stack([np.interp(share, (-1.0, 0.0, 1.0), band) for band in zip(_BLUE, _GREY, _RED, strict=True)], axis=-1)
+    colours[np.isnan(values)] = _NONE
+    return colours.astype(np.uint8)

@@ -276,7 +276,7 @@ class _Report:
         """Whether a chapter has anything to say."""
         if chapter in _OF_LEAKS:
             return self.survey.intensity_kind != "none"
-        there: dict[str, object] = {
+        there = {
             "findings": self.findings, "dry": self.regions, "structures": self.structures, "underwater": self.underwater,
             "deviation": self.deviation,
         }  # fmt: skip
