@@ -161,9 +161,11 @@ def _evenness() -> None:
         schema="tunnel",
         comment="Where the gap beneath a straightedge is greater than the limit; cut by the ends of kilometres",
     )
-    op.create_index(
-        op.f("evenness_area_survey_id_layer_km_idx"), "evenness_area", ["survey_id", "layer", "km"], schema="tunnel"
-    )
+    for column in ("km", "gap"):
+        op.create_index(
+            op.f(f"evenness_area_survey_id_layer_{column}_idx"), "evenness_area", ["survey_id", "layer", column],
+            schema="tunnel",
+        )  # fmt: skip
 
 
 def _of_survey() -> list[sa.Column]:

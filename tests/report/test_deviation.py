@@ -12,7 +12,7 @@ import psycopg
 from affine import Affine
 from click.testing import CliRunner
 from PIL import Image
-from support.example_deviation import OVER, OVER_LIMIT, UNDER, add_surfaces
+from support.example_deviation import OVER, THICK, THIN, UNDER, UNEVEN, add_surfaces
 
 from tunneldb.cli.main import main
 from tunneldb.raster.geotiff import Raster
@@ -28,7 +28,7 @@ def test_the_chapter(example: str, conn: psycopg.Connection, tmp_path: Path) -> 
     values[100:300, :400] = -0.2  # 20 m outside, then 30 m inside
     values[100:300, 400:] = 0.2
     replace_image(conn, survey, 12, "lining", [Raster(values, Affine(PIXEL, 0, 12300.0, 0, -PIXEL, 10.0))])
-    add_surfaces(conn, "demo-2024")
+    add_surfaces(conn, survey.id)
     conn.commit()
     page = tmp_path / "report.html"
     done = CliRunner().invoke(main, ["report", "demo-2024", "-o", str(page)])
@@ -42,9 +42,9 @@ def test_the_chapter(example: str, conn: psycopg.Connection, tmp_path: Path) -> 
     worst = re.findall(r"<figcaption>12\+(\d+\.\d+): [\d.]+ / ([\d.]+) m²", chapter)
     assert {round((float(at) - 299.5) * UNDER, 3) for at, _ in worst} == {float(under) for _, under in worst}
     assert max(float(at) for at, _ in worst) == 499.5
-    assert f"over 20 mm on {200 * OVER_LIMIT:.1f} m²" in chapter
+    assert f"over 20 mm on {200 * UNEVEN:.1f} m²" in chapter
     (row,) = re.findall(r"<td>demo-2023</td>(.*?)</tr>", chapter)
-    assert re.findall(r"<td class=\"n\">([^<]*)", row) == ["3\u202f600.0", "900.00", "0.250", "0.150"]
+    assert re.findall(r"<td class=\"n\">([^<]*)", row) == ["4\u202f500.0", "1\u202f500.00", f"{THICK:.3f}", f"{THIN:.3f}"]
 
     (address, *_) = re.findall(r'<img src="data:image/\w+;base64,([^"]+)" alt="12\+300', chapter)
     picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(address)))).astype(int)

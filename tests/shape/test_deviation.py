@@ -185,3 +185,18 @@ def test_on_a_curve_and_a_grade_a_lining_that_is_its_design_has_none(right: floa
     assert found.distance[np.isfinite(found.distance)].min() > -1e-4
     assert np.nanmax(found.distance) < sagitta + 1e-4
     assert np.nanmean(found.distance) == pytest.approx(2.0 / 3.0 * sagitta, abs=1e-5)
+
+
+def test_a_profile_that_is_removed_and_added_again_leaves_no_image_missing(
+    survey: str, conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    path = tmp_path / "round.csv"
+    path.write_text("right,up,radius\n0,-4.05,4.05\n0,4.05,4.05\n0,-4.05,0\n")
+    run("profile", "add", survey, "round", path)
+    run("deviation", survey)
+    run("profile", "remove", survey, "round")
+    run("profile", "add", survey, "round", path)  # the same again: what was measured holds, but its image went
+    conn.rollback()
+    rows = conn.execute("SELECT km, reason FROM tunnel_api.deviation_status ORDER BY km").fetchall()
+    assert rows == [(0, "its image is not stored"), (1, "its image is not stored")]
+    assert run("deviation", survey)["made"] == [0, 1]

@@ -17,7 +17,7 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from psycopg.rows import dict_row
 from support.cookbook_survey import CONFIRMED, GONE, MOVED, NICHE, OLD, POINTS, SPARSE, draw_findings, prepare
-from support.example_deviation import BULGE, OVER, OVER_LIMIT, THIN, UNDER
+from support.example_deviation import BULGE, OVER, THICK, THIN, THIN_PLACE, UNDER, UNEVEN
 from support.example_objects import FLOOR, HALF_FLOOR, SPHERES, THINGS, beside
 from support.example_survey import GIRTH, NAME, SEEN_FROM, WET, example_surface
 
@@ -514,22 +514,36 @@ def wrong_axis(rows: Rows, a: Asked) -> None:
     close(row, underbreak_sigma=0.01 * 2 * 150.5, overbreak_sigma=0.01 * 3 * 150.5)
 
 
-def off_design(rows: Rows, a: Asked) -> None:
-    """One of four cells of each section lies 100 mm outside; one was not seen."""
-    (row,) = rows
-    close(row, inside_m2=0.0, outside_m2=150 * 25 / 4, seen_m2=150 * 25 * 3 / 4)
+def off_the_profile(rows: Rows, a: Asked) -> None:
+    """Of four cells of 6.25 m one is 100 mm outside."""
+    assert [row["hundred"] for row in rows] == ["12+300.000", "12+400.000"]
+    for row in rows:
+        close(row, 2, inside_m2=0.0, outside_m2=100 * 6.25)
 
 
 def thin(rows: Rows, a: Asked) -> None:
-    assert [row["label"] for row in rows] == [label(at + 0.5) for at in np.arange(*THIN)]
+    low, high = THIN_PLACE
+    assert [row["label"] for row in rows] == [label(low + 0.5 + n) for n in range(int(high - low))]
     for row in rows:
-        close(row, least_mm=150, along_profile_m=9, thin_m2=12, compared_percent=75)
+        close(row, 0, least_mm=1000 * THIN)
+
+
+def put_on(rows: Rows, a: Asked) -> None:
+    assert len(rows) == 2
+    for row, cells in zip(rows, (THIN_PLACE[1] - THIN_PLACE[0], 0.0), strict=True):
+        close(row, 2, volume_m3=750.0, mean_m=THICK, thin_m2=6.25 * cells)
+        close(row, 0, compared_percent=90)
 
 
 def uneven(rows: Rows, a: Asked) -> None:
-    assert [row["label"] for row in rows] == [label(12300.0), label(12400.0)]
-    for row in rows:
-        close(row, over_m2=100 * OVER_LIMIT, measured_m2=1800, not_measured_m2=200, greatest_mm=24)
+    for row, greatest in zip(rows, (19.9, 29.9), strict=True):
+        close(row, 1, over_m2=100 * UNEVEN, measured_m2=2200.0, not_measured_m2=50.0)
+        close(row, 0, gap_mm=greatest)
+
+
+def most_uneven(rows: Rows, a: Asked) -> None:
+    assert [row["label"] for row in rows] == [label(12420.5 - 10 * n) for n in range(10)]
+    assert [row["gap_mm"] for row in rows] == [32 - n for n in range(10)]
 
 
 def deviation_stale(rows: Rows, a: Asked) -> None:
@@ -582,9 +596,11 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which ten sections stand most inside the profile?": most_inside,
     "Over which stretches does lining stand more than 50 mm inside?": bulges,
     "What would an axis that is wrong by 10 mm change of it?": wrong_axis,
-    "How many m² of a stretch lie more than 50 mm off the design?": off_design,
-    "Where is what was put on since another survey thinner than 0.2 m?": thin,
-    "On how much of each 100 m is the gap beneath a straightedge greater than the limit?": uneven,
+    "How many m² of a stretch stand more than 50 mm off the profile?": off_the_profile,
+    "Where is less than 0.2 m put on since an earlier survey?": thin,
+    "How many m³ were put on per 100 m, and how many m² are thinner than 0.2 m?": put_on,
+    "How much of each 100 m is uneven?": uneven,
+    "Which ten places are the most uneven?": most_uneven,
     "Is the deviation of each kilometre up to date?": deviation_stale,
     "How many findings of each kind are there, and how did they come about?": kinds,
     "Which cracks are longer than a metre, the most severe first?": cracks,

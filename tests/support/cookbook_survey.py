@@ -52,6 +52,7 @@ def prepare(conn: psycopg.Connection, survey: str) -> None:
         "UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0.05, 0, 0.02) WHERE survey = %s AND n = %s",
         (survey, MOVED),
     )
+    add_surfaces(conn, row[0])
     conn.execute("UPDATE tunnel.segment SET points = 100 WHERE n = %s", (SPARSE,))
     low, high, left, right = NICHE
     conn.execute(
@@ -61,7 +62,6 @@ def prepare(conn: psycopg.Connection, survey: str) -> None:
         (row[0], int(PointClass.NICHE), low, high, row[0], low, left, high, right),
     )
     _points(conn, row[0])
-    add_surfaces(conn, survey)
 
 
 def _points(conn: psycopg.Connection, survey_id: int) -> None:

@@ -95,7 +95,8 @@ class EvennessArea(Base):
 
     __tablename__ = "evenness_area"
     __table_args__ = (
-        Index(None, "survey_id", "layer", "km"),
+        Index("evenness_area_survey_id_layer_km_idx", "survey_id", "layer", "km"),
+        Index("evenness_area_survey_id_layer_gap_idx", "survey_id", "layer", "gap"),
         one_of("layer", *LAYERS),
         one_of("direction", "along", "around"),
         {"comment": "Where the gap beneath a straightedge is greater than the limit; cut by the ends of kilometres"},
