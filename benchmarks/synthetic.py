@@ -434,8 +434,8 @@ SELECT tunnel_id, 'demo-2023', '2023-05-04', 'none', 'mobile' FROM tunnel.survey
 
 # Of a hundred sections one is thinner than 0.2 m somewhere.
 THICKNESS = """
-INSERT INTO tunnel.thickness_section (survey_id, before_id, km, layer, chainage_from, chainage_to, design_length, compared_length,
-    area, noise_area, by_right, by_up, thickness_mean, thickness_least, least_at, thickness)
+INSERT INTO tunnel.thickness_section (survey_id, before_id, km, layer, chainage_from, chainage_to, design_length,
+    compared_length, area, noise_area, by_right, by_up, thickness_mean, thickness_least, least_at, thickness)
 SELECT %(id)s, b.id, c / 1000, 'lining', c, c + 1, 25.1, 20, 6.0, 0.002, 3, 1, 0.3, v.least, 12.5,
     v.least || array_fill(0.3::real, ARRAY[250])
 FROM generate_series(0, %(kilometres)s * 1000 - 1) AS c
