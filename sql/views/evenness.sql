@@ -40,6 +40,8 @@ COMMENT ON VIEW tunnel_api.evenness_area IS
     'Where the gap beneath a straightedge laid on the lining is greater than the limit; one at the end of a kilometre is in two parts';
 COMMENT ON COLUMN tunnel_api.evenness_area.layer IS 'Layer whose profiles are the template';
 COMMENT ON COLUMN tunnel_api.evenness_area.label IS 'Station of its middle, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.evenness_area.arc_from IS 'Least arc, m';
+COMMENT ON COLUMN tunnel_api.evenness_area.arc_to IS 'Greatest arc, m';
 COMMENT ON COLUMN tunnel_api.evenness_area.area IS 'Its area, m²';
 COMMENT ON COLUMN tunnel_api.evenness_area.gap IS 'Greatest gap in it, m';
 COMMENT ON COLUMN tunnel_api.evenness_area.direction IS 'along or around: how the straightedge lay';
@@ -108,5 +110,3 @@ AS $$
 $$;
 COMMENT ON FUNCTION tunnel_api.evenness_stretches(text, text, float8) IS
 'Evenness of a survey''s lining by stretches of so many metres, 1 or more, from whole multiples of them on: area seen, beneath a straightedge and with a greater gap than the limit (m²), greatest gaps (m), greatest waviness. A section counts where its middle is';
-COMMENT ON COLUMN tunnel_api.evenness_area.arc_from IS 'Least arc, m';
-COMMENT ON COLUMN tunnel_api.evenness_area.arc_to IS 'Greatest arc, m';
