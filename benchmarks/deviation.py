@@ -1,4 +1,4 @@
-"""Deviation from design profiles against closed formulas and shapely, on a curved axis too; time and memory of a kilometre.
+"""Deviation, thickness and evenness against closed formulas and shapely; time, memory and images of a kilometre.
 
 python -m benchmarks.deviation              # a minute on two cores
 python -m benchmarks.deviation --pixel 0.02 # of the kilometre that is timed
@@ -19,13 +19,17 @@ from affine import Affine
 from benchmarks.common import print_table, save
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.deviation import Design, block_steps
-from tunneldb.raster.geotiff import Raster
+from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import BLOCK
+from tunneldb.shape.evenness import evenness, step_evenness, uneven_areas
 from tunneldb.shape.outline import Outline
 from tunneldb.shape.profile import Profile, signed_distance, stretches
+from tunneldb.shape.straightedge import Cells, cell_means, gaps_beneath
+from tunneldb.shape.thickness import section_thickness
 
 sys.path.append(str(Path(__file__).parent.parent / "tests"))
 from support.curved_lining import arc, block, circle, made
+from support.eccentric_circles import held_against, ray
 
 ANYWHERE = (-np.inf, np.inf)
 
@@ -107,6 +111,98 @@ def on_the_curve() -> list[tuple[object, ...]]:
     return rows
 
 
+def thicknesses(pixel: float) -> list[tuple[object, ...]]:
+    """Between two eccentric circles held against either's design: greatest error, mm, and that of the volume of a metre, %."""
+    rows: list[tuple[object, ...]] = []
+    pairs = {
+        "0.4 m, 36 mm off": ((4.4, 0.02, -0.01), (4.0, -0.01, 0.01)),
+        "0.25 m, 100 mm off": ((4.25, 0.05, 0.0), (4.0, -0.05, 0.0)),
+    }
+    for name, (before, after) in pairs.items():
+        for radius in (after[0], before[0]):
+            outline = circle(radius)
+            cells = [held_against(outline, *one, pixel) for one in (before, after)]
+            found = section_thickness(*cells, outline)
+            count = len(found.thickness)
+            angle = np.pi + 2.0 * np.pi * (np.arange(count) + 0.5) / count
+            wanted = np.subtract(*(ray(angle, *one) for one in (before, after)))
+            off = 1e3 * float(np.abs(found.thickness - wanted).max())
+            area = np.pi * (before[0] ** 2 - after[0] ** 2)
+            rows.append((name, f"{radius:g}", round(off, 4), round(100.0 * abs(found.area / area - 1.0), 4)))
+    return rows
+
+
+def gaps() -> list[tuple[object, ...]]:
+    """Greatest gap beneath 2 m on cells of 0.1 m, mm, by formula and as found, and of an even lining with noisy pixels."""
+    x = 0.1 * np.arange(2000)
+    shapes = {
+        "waves of 1 m, 10 mm": (0.01 * np.cos(2.0 * np.pi * x), 20.0),
+        "waves of 2 m, 10 mm": (0.01 * np.cos(np.pi * x), 20.0),
+        "waves of 5 m, 10 mm": (0.01 * np.cos(2.0 * np.pi * x / 5.0), 10.0 * (1.0 - np.cos(np.pi * 2.0 / 5.0))),
+        "a step of 30 mm": (np.where(x < 100.0, 0.03, 0.0), 30.0 * 19.0 / 20.0),
+        "a bump of 30 mm": (np.where(np.abs(x - 100.0) < 0.01, 0.03, 0.0), 30.0 * 19.0 / 20.0),
+    }
+    rows: list[tuple[object, ...]] = [
+        (name, round(wanted, 4), round(1e3 * float(np.nanmax(gaps_beneath(height[None], 2.0, 0.1).gap)), 4))
+        for name, (height, wanted) in shapes.items()
+    ]
+    rng = np.random.default_rng(1)
+    noise = gaps_beneath(rng.normal(0.0, 0.003 / 5.0, (100, 2000)), 2.0, 0.1).gap
+    rows.append(
+        (
+            "even, pixels of 20 mm scatter by 3 mm: median, 99 %",
+            0.0,
+            str(np.round(1e3 * np.nanquantile(noise, [0.5, 0.99]), 2).tolist()),
+        )
+    )
+    return rows
+
+
+def timed_evenness() -> list[tuple[object, ...]]:
+    """Seconds of a kilometre of rough lining beneath 2 m and 4 m, along and around, and the most memory, MB."""
+    rng = np.random.default_rng(1)
+    cells = cell_means(rng.normal(0.0, 0.02, (1250, 2500)).astype(np.float32), 5, 3)
+    evenness(cells, 2.0, 0.1)
+    rows: list[tuple[object, ...]] = []
+    for length in (2.0, 4.0):
+        began = time.perf_counter()
+        parts = [cell_means(rng.normal(0.0, 0.02, (1250, 2500)).astype(np.float32), 5, 3) for _ in range(20)]
+        made = time.perf_counter()
+        whole = Cells(*(np.hstack([getattr(part, name) for part in parts]) for name in ("mean", "sigma", "seen")))
+        found = evenness(whole, length, 0.1)
+        steps = [step_evenness(found, slice(k, k + 10), 0.02) for k in range(0, 10_000, 10)]
+        laid = time.perf_counter()
+        areas = sum(1 for _ in uneven_areas(found, slice(0, 10_000), 0.06))
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+        rows.append(
+            (
+                length,
+                len(steps),
+                areas,
+                *np.round([made - began, laid - made, time.perf_counter() - laid], 1).tolist(),
+                round(memory),
+            )
+        )
+    return rows
+
+
+def stored(pixel: float) -> list[tuple[object, ...]]:
+    """Images of offset and deviation as they are stored, with 3 mm of noise: MB and seconds a kilometre, by a block of 50 m."""
+    surface, axis = made(5.0, 1000.0, 0.03, 0.02)
+    design = Design(surface, axis, stretches([Profile("a", 0.0, 1000.0, horseshoe(5.0, 4.0))]))
+    image = block(surface, 0.0, pixel)
+    noise = np.random.default_rng(1).normal(0.0, 0.003, image.values.shape)
+    offset = Raster((image.values + noise).astype(np.float32), image.transform)
+    _, found = design.deviation(offset, np.ones(offset.values.shape, np.bool_))
+    deviation = Raster(np.ascontiguousarray(found.distance.T, np.float32), image.transform)
+    rows: list[tuple[object, ...]] = []
+    for kind, raster in (("offset", offset), ("deviation_lining", deviation)):
+        began = time.perf_counter()
+        size = len(encode(raster, kind))
+        rows.append((kind, round(size * 1000.0 / BLOCK / 1e6, 1), round((time.perf_counter() - began) * 1000.0 / BLOCK, 1)))
+    return rows
+
+
 def timed(pixel: float) -> list[tuple[object, ...]]:
     """Seconds of a kilometre with a horseshoe of a profile, and the most memory that the process had, MB."""
     surface, axis = made(5.0, 1000.0, 0.03, 0.02)
@@ -127,7 +223,9 @@ def main() -> None:
     parser.add_argument("--pixel", type=float, default=0.02, help="of the images, m")
     options = parser.parse_args()
     results = {
-        "distances": distances(), "curve": on_the_curve(), "areas": areas(options.pixel), "timed": timed(options.pixel),
+        "distances": distances(), "curve": on_the_curve(), "areas": areas(options.pixel),
+        "thickness": thicknesses(options.pixel), "gaps": gaps(), "timed": timed(options.pixel),
+        "evenness": timed_evenness(), "stored": stored(options.pixel),
     }  # fmt: skip
     print_table("signed distance against shapely's", ("outline", "points", "greatest error mm"), results["distances"])
     print_table(
@@ -137,6 +235,13 @@ def main() -> None:
     )
     header = ("50 m of lining, m³", "overbreak", "underbreak", "shapely's", "", "off %")
     print_table(f"volumes, pixels of {options.pixel:g} m", header, results["areas"])
+    print_table(
+        "thickness between eccentric circles", ("put on", "design of radius m", "off mm", "volume off %"), results["thickness"]
+    )
+    print_table("gap beneath a straightedge of 2 m, mm", ("lining", "by formula", "found"), results["gaps"])
+    header = ("straightedge m", "sections", "areas", "cells s", "gaps s", "areas s", "most memory MB")
+    print_table("evenness of a kilometre, 25 m around, cells of 0.1 m", header, results["evenness"])
+    print_table("images of a kilometre as they are stored", ("image", "MB", "seconds"), results["stored"])
     print_table("a kilometre", ("pixel m", "million pixels", "seconds", "most memory MB"), results["timed"])
     save("deviation", results)
 

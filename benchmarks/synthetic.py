@@ -500,6 +500,36 @@ SELECT n.id, %(id)s, a.km, CASE a.id %% 25 WHEN 0 THEN 'grown' WHEN 1 THEN 'dry'
 FROM tunnel.survey n, tunnel.anomaly a WHERE n.name = 'demo-2026' AND a.survey_id = %(id)s AND a.wet
 """
 
+SURFACES = """
+INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)
+SELECT tunnel_id, 'demo-2023', '2023-05-04', 'none', 'mobile' FROM tunnel.survey WHERE id = %(id)s
+"""
+
+# Of a hundred sections one is thinner than 0.2 m somewhere.
+THICKNESS = """
+INSERT INTO tunnel.thickness_section (survey_id, before_id, km, layer, chainage_from, chainage_to, design_length,
+    compared_length, area, noise_area, by_right, by_up, thickness_mean, thickness_least, least_at, thickness)
+SELECT %(id)s, b.id, c / 1000, 'lining', c, c + 1, 25.1, 20, 6.0, 0.002, 3, 1, 0.3, v.least, 12.5,
+    v.least || array_fill(0.3::real, ARRAY[250])
+FROM generate_series(0, %(kilometres)s * 1000 - 1) AS c
+CROSS JOIN LATERAL (SELECT CASE WHEN c %% 100 = 50 THEN 0.15 ELSE 0.25 END::real AS least) v
+JOIN tunnel.survey b ON b.name = 'demo-2023'
+"""
+
+EVENNESS = """
+INSERT INTO tunnel.evenness_section (survey_id, km, layer, straightedge, gap_limit, chainage_from, chainage_to, arc_from, cell,
+    lining_area, measured_area, over_area, gap_along, gap_along_at, gap_around, gap_around_at, waviness, sigma, along, around)
+SELECT %(id)s, c / 1000, 'lining', 2, 0.02, c, c + 1, -12.5, 0.1, 20, 19.5, 0.3, 0.02 + 0.01 * sin(c / 40.0), 1, 0.03, -2, 0.05,
+    0.0004, array_fill(0.01::real, ARRAY[251]), array_fill(0.01::real, ARRAY[251])
+FROM generate_series(0, %(kilometres)s * 1000 - 1) AS c
+"""
+
+UNEVEN = """
+INSERT INTO tunnel.evenness_area (survey_id, km, layer, area, gap, direction, geom)
+SELECT %(id)s, floor(c / 1000), 'lining', 0.06, 0.02 + 0.04 * random(), 'along', ST_MakeEnvelope(c, a, c + 0.3, a + 0.2)
+FROM generate_series(0, %(kilometres)s * 5000 - 1) AS i, LATERAL (SELECT i / 5.0 AS c, 9 * sin(i) AS a) q
+"""
+
 STEPS = {
     "files and ledger": (FILES, RUNS),
     "segments and sections": (SEGMENTS, COUNTED, SECTIONS),
@@ -521,6 +551,7 @@ STEPS = {
     "clearance": (CLEARANCE, INFRINGEMENTS),
     "rings": (RINGS, RING_CHORDS),
     "change until a later survey": (LATER, CHANGE_SECTIONS, CHANGE_REGIONS, LEAK_CHANGES, "ANALYZE tunnel.leak_change"),
+    "thickness and evenness": (SURFACES, THICKNESS, EVENNESS, UNEVEN),
 }
 
 

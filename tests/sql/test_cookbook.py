@@ -19,7 +19,7 @@ from psycopg.rows import dict_row
 from support import example_change
 from support.cookbook_survey import CONFIRMED, GONE, MOVED, NICHE, OLD, POINTS, SPARSE, draw_findings, prepare
 from support.example_clearance import TIGHT
-from support.example_deviation import BULGE, OVER, UNDER
+from support.example_deviation import BULGE, OVER, THICK, THIN, THIN_PLACE, UNDER, UNEVEN
 from support.example_objects import FLOOR, HALF_FLOOR, SPHERES, THINGS, beside
 from support.example_rings import COUNT, OVALITY, STEP
 from support.example_survey import GIRTH, NAME, SEEN_FROM, WET, example_surface
@@ -536,6 +536,38 @@ def wrong_axis(rows: Rows, a: Asked) -> None:
     close(row, underbreak_sigma=0.01 * 2 * 150.5, overbreak_sigma=0.01 * 3 * 150.5)
 
 
+def off_the_profile(rows: Rows, a: Asked) -> None:
+    """Of four cells of 6.25 m one is 100 mm outside."""
+    assert [row["hundred"] for row in rows] == ["12+300.000", "12+400.000"]
+    for row in rows:
+        close(row, 2, inside_m2=0.0, outside_m2=100 * 6.25)
+
+
+def thin(rows: Rows, a: Asked) -> None:
+    low, high = THIN_PLACE
+    assert [row["label"] for row in rows] == [label(low + 0.5 + n) for n in range(int(high - low))]
+    for row in rows:
+        close(row, 0, least_mm=1000 * THIN)
+
+
+def put_on(rows: Rows, a: Asked) -> None:
+    assert len(rows) == 2
+    for row, cells in zip(rows, (THIN_PLACE[1] - THIN_PLACE[0], 0.0), strict=True):
+        close(row, 2, volume_m3=750.0, mean_m=THICK, thin_m2=6.25 * cells)
+        close(row, 0, compared_percent=90)
+
+
+def uneven(rows: Rows, a: Asked) -> None:
+    for row, greatest in zip(rows, (19.9, 29.9), strict=True):
+        close(row, 1, over_m2=100 * UNEVEN, measured_m2=2200.0, not_measured_m2=50.0)
+        close(row, 0, gap_mm=greatest)
+
+
+def most_uneven(rows: Rows, a: Asked) -> None:
+    assert [row["label"] for row in rows] == [label(12420.5 - 10 * n) for n in range(10)]
+    assert [row["gap_mm"] for row in rows] == [32 - n for n in range(10)]
+
+
 def deviation_stale(rows: Rows, a: Asked) -> None:
     """An edited vertex makes the image stale on which it rests."""
     (row,) = rows
@@ -635,6 +667,11 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which ten sections stand most inside the profile?": most_inside,
     "Over which stretches does lining stand more than 50 mm inside?": bulges,
     "What would an axis that is wrong by 10 mm change of it?": wrong_axis,
+    "How many m² of a stretch stand more than 50 mm off the profile?": off_the_profile,
+    "Where is less than 0.2 m put on since an earlier survey?": thin,
+    "How many m³ were put on per 100 m, and how many m² are thinner than 0.2 m?": put_on,
+    "How much of each 100 m is uneven?": uneven,
+    "Which ten places are the most uneven?": most_uneven,
     "Is the deviation of each kilometre up to date?": deviation_stale,
     "Which rings are oval by more than 5 ‰?": oval,
     "Which are the ten greatest steps between rings?": great_steps,

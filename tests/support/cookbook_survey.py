@@ -6,6 +6,7 @@ import numpy as np
 import psycopg
 
 from support.example_change import add_change
+from support.example_deviation import add_surfaces
 from tunneldb.classification.classes import PointClass
 
 NICHE = (12399.0, 12401.0, 3.3, 4.3)
@@ -52,6 +53,7 @@ def prepare(conn: psycopg.Connection, survey: str) -> None:
         "UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0.05, 0, 0.02) WHERE survey = %s AND n = %s",
         (survey, MOVED),
     )
+    add_surfaces(conn, row[0])
     conn.execute("UPDATE tunnel.segment SET points = 100 WHERE n = %s", (SPARSE,))
     low, high, left, right = NICHE
     conn.execute(

@@ -69,7 +69,7 @@ def deviation(
     what was seen; what was not is stated as unseen, and is in none of them. tunneldb profile add gives the profiles;
     docs/howto-shape.md says what the columns mean.
     """
-    from tunneldb.export.tables.deviation import section_rows, sections_csv, stretch_rows, volume
+    from tunneldb.export.tables.deviation import COLUMNS, rows_csv, section_rows, stretch_rows, volume
     from tunneldb.pipeline.deviation import measure_deviation
 
     if output is not None and output.suffix.lower() not in _FILES:
@@ -89,7 +89,7 @@ def deviation(
         if output is None:
             tell(sections=section_rows(conn, found, layer, part.low, part.high))
         elif output.suffix.lower() == ".csv":
-            text = sections_csv(section_rows(conn, found, layer, part.low, part.high))
+            text = rows_csv(COLUMNS, section_rows(conn, found, layer, part.low, part.high))
             with replacing(output) as temporary:
                 temporary.write_text(text, encoding="utf-8")
             files = [output]

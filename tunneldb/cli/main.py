@@ -67,6 +67,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "tunneldb.cli.export:export",
         "Write a survey as GeoPackage, DXF, or its scan files with the class of each point.",
     ),
+    "thickness": ("tunneldb.cli.thickness:thickness", "State what lies between two surveys: thickness and volume."),
+    "evenness": ("tunneldb.cli.evenness:evenness", "Lay a straightedge on the lining, and state the gaps beneath."),
     "ground": ("tunneldb.cli.ground:ground", "Class the points of a scan file by itself, without a database."),
     "intensity": ("tunneldb.cli.intensity:intensity", "Show whether intensity depends on range or incidence, and plot it."),
     "image": ("tunneldb.cli.image:image", "Write the unrolled images as GeoTIFF."),

@@ -102,8 +102,7 @@ def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> li
         advance = step(progress)("images", len(kilometres))
         for km in kilometres:
             written += export_kilometre(conn, survey, km, folder)
-            filled = export_filled(conn, survey, km, folder)
-            written += [] if filled is None else [filled]
+            written += export_filled(conn, survey, km, folder)
             advance(1)
     return [path for path in written if path.suffix == ".tif"]
 

@@ -21,7 +21,7 @@ from tunneldb.raster.geotiff import Raster
 from tunneldb.shape.overbreak import section_deviation
 from tunneldb.shape.profile import Deviation, Stretch, deviation
 from tunneldb.store.design import load_design
-from tunneldb.store.deviation import STEP, Step, deviation_inputs, load_offsets, save_steps, stale_kilometres
+from tunneldb.store.deviation import STEP, Step, deviation_inputs, load_offsets, replace_image, save_steps, stale_kilometres
 from tunneldb.store.ledger import stage_run
 from tunneldb.store.scene import load_scene
 from tunneldb.store.surface import load_alignment, load_surface, survey_ends
@@ -152,11 +152,14 @@ def deviation_blocks(
 def _kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> tuple[list[Step], str | None]:
     design = load_design_of(conn, survey, km, layer)
     ends = survey_ends(conn, survey) or (-np.inf, np.inf)
-    steps = [
-        step
-        for offset, along, found in deviation_blocks(conn, survey, km, design)
-        for step in block_steps(design.stretches, offset, along, found, ends)
-    ]
+    steps: list[Step] = []
+
+    def images() -> Iterator[Raster]:
+        for offset, along, found in deviation_blocks(conn, survey, km, design):
+            steps.extend(block_steps(design.stretches, offset, along, found, ends))
+            yield Raster(np.ascontiguousarray(found.distance.T, np.float32), offset.transform)
+
+    replace_image(conn, survey, km, layer, images())
     states = conn.execute(
         "SELECT EXISTS (SELECT FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = 'state')", [survey.id, km]
     ).fetchone()

@@ -21,6 +21,17 @@ STEP = {"raw": 0.01, "corrected": 0.01, "offset": 0.001, "state": 1.0, "change":
 """Value of one step of the stored whole numbers: dB, dB, m, and of the state of pixels itself."""
 
 UNIT = {"raw": "dB", "corrected": "dB", "offset": "m", "state": "", "deviation": "m", "change": "m", "lod": "m"}
+DEVIATION_KINDS = {
+    "lining": "deviation_lining",
+    "shotcrete": "deviation_shotcrete",
+    "excavation": "deviation_excavation",
+}
+"""Images of the deviation (m) from the design profiles of each layer, which are there where they were asked for."""
+
+STEP = {"raw": 0.01, "corrected": 0.01, "offset": 0.001, "state": 1.0, **dict.fromkeys(DEVIATION_KINDS.values(), 0.001)}
+"""Value of one step of the stored whole numbers: dB, dB, m, of the state of pixels itself, m."""
+
+UNIT = {"raw": "dB", "corrected": "dB", "offset": "m", "state": "", **dict.fromkeys(DEVIATION_KINDS.values(), "m")}
 
 NODATA = -32768
 
@@ -84,6 +95,15 @@ def decode(tiff: bytes) -> Raster:
             steps = image.read(1)
             values = np.where(steps == image.nodata, np.nan, steps * image.scales[0]).astype(np.float32)
             return Raster(values, image.transform)
+
+
+def laid(raster: Raster, like: Raster) -> Single:
+    """Values of a block in the rows of another one with the same pixels."""
+    down = round((like.transform.f - raster.transform.f) / like.transform.a)
+    values = np.full((len(like.values), raster.values.shape[1]), np.nan, np.float32)
+    rows = slice(max(down, 0), min(down + len(raster.values), len(values)))
+    values[rows] = raster.values[rows.start - down : rows.stop - down]
+    return values
 
 
 @kernel

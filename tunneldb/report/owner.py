@@ -30,6 +30,7 @@ CHAPTERS = {
     "clearance": "Clearance",
     "rings": "Rings",
     "change": "What changed",
+    "deviation": "Design and deviation",
     "methods": "Methods",
     "reviews": "Reviews",
     "signatures": "Signatures",

@@ -23,6 +23,7 @@ from tunneldb.raster.gap_fill import TOLD
 from tunneldb.report import data, text
 from tunneldb.report.change import CHANGE_WORDS, read_change
 from tunneldb.report.clearance import read_clearance
+from tunneldb.report.deviation import read_deviation
 from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, without_detection
 from tunneldb.report.findings import STATE_WORDS, digest_findings, read_findings_chapter
 from tunneldb.report.lining import Form
@@ -202,6 +203,7 @@ class _Report:
         self.clearance = read_clearance(conn, survey, low, high)
         self.rings = read_rings(conn, survey, low, high)
         self.change = read_change(conn, survey, low, high)
+        self.deviation = read_deviation(conn, survey, low, high, form) if "deviation" in owner.chapters else []
         self.regions = read_dry_regions(conn, survey, low, high)
         marks = self.findings.marks if self.findings else []
         self.strips = Strips(conn, survey, low, high, self.leaks, marks, self.coverage, pictured, form, progress, owner.words)
@@ -260,6 +262,7 @@ class _Report:
             "rings": self.rings,
             "change": self.change,
             "change_words": CHANGE_WORDS,
+            "deviation": self.deviation,
             "edits": [text.edit(edit, numbers) for edit in edits],
             "edits_in_all": edits_in_all,
             "part": self.part,
@@ -285,7 +288,7 @@ class _Report:
             return self.survey.intensity_kind != "none"
         there: dict[str, object] = {
             "findings": self.findings, "dry": self.regions, "structures": self.structures, "underwater": self.underwater,
-            "clearance": self.clearance, "rings": self.rings, "change": self.change,
+            "clearance": self.clearance, "rings": self.rings, "change": self.change, "deviation": self.deviation,
         }  # fmt: skip
         return chapter not in there or bool(there[chapter])
 

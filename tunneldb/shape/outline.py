@@ -83,6 +83,14 @@ class Outline:
         within = (along - (ends[k] - self.lengths[k])) / self.lengths[k]
         return _within(self.elements[k], within)
 
+    def curvature(self, share: Float) -> Float:
+        """Curvature at shares (n,) of the length, 1/m, positive where it is concave seen from inside."""
+        ends = np.cumsum(self.lengths)
+        begin, end, bulge = self.elements[:, :2], self.elements[:, 2:4], self.elements[:, 4]
+        each = -4.0 * bulge / (np.hypot(*(end - begin).T) * (1.0 + bulge**2))
+        k = np.minimum(np.searchsorted(ends, share * ends[-1], side="right"), len(ends) - 1)
+        return np.asarray(each[k])
+
     def flattened(self, chord_error: float = _CHORD_ERROR) -> Float:
         """Vertices (n, 2) of chords that stray from the arcs by no more than the error, m."""
         parts = []

@@ -39,7 +39,7 @@ class SectionDeviation:
     shift : (2,) float array
         How far the lining as a whole lies right of the profile and above it, m; NaN where too little is seen.
     deviation : (n,) float array
-        Mean of each cell, m, positive inside; NaN where unseen.
+        Mean of each cell, in its middle, m, positive inside; NaN where unseen.
     """
 
     design_length: float
@@ -89,7 +89,8 @@ def section_deviation(found: Deviation, outline: Outline, pixel: float) -> Secti
     -----
     The area of a cell is the mean, over its pixels, of d (1 - κ d / 2), times its length; one with fewer than LEAST_PIXELS
     pixels is unseen. Towards an unseen neighbour a cell ends with its last pixel. Of each pixel what is outside and what is
-    inside are kept apart, so that they don't cancel within a cell.
+    inside are kept apart, so that they don't cancel within a cell. The means that are stored are those in the middle of cells:
+    pixels do not lie evenly in each, which on a slope would count.
     """
     length = outline.length
     count = max(int(np.ceil(length / cell_length(pixel) - 1e-9)), 1)
@@ -110,6 +111,7 @@ def section_deviation(found: Deviation, outline: Outline, pixel: float) -> Secti
         over, under = (np.where(seen, summed(part) / pixels, 0.0) for part in (-np.minimum(area, 0.0), np.maximum(area, 0.0)))
         outside = np.where(seen, summed((distance < 0.0).astype(np.float64)) / pixels, 0.0)
         square = summed((distance - np.nan_to_num(mean)[cell]) ** 2)
+        centred = mean - _slope(mean, outline.closed) * (summed(place - cell) / pixels - 0.5)
         sigma = float(np.sqrt(square[seen].sum() / (pixels[seen] - 1.0).sum())) if seen.any() else np.nan
     long = each * _seen_parts(place - cell, cell, seen, pixel / each / 2.0, outline.closed)
     _, inward = outline.places((np.arange(count) + 0.5) / count)
@@ -122,8 +124,8 @@ def section_deviation(found: Deviation, outline: Outline, pixel: float) -> Secti
         over_by=(long * outside) @ inward,
         under_by=-(long * (seen - outside)) @ inward,
         sigma=sigma,
-        shift=_shift(mean, inward),
-        deviation=mean,
+        shift=_shift(centred, inward),
+        deviation=centred,
     )
 
 
@@ -149,6 +151,16 @@ def _seen_parts(within: Float, cell: Int64, seen: Bool, half: float, closed: boo
     begin = np.where(before, 0.0, np.maximum(low - half, 0.0))
     end = np.where(after, 1.0, np.minimum(high + half, 1.0))
     return np.where(seen, end - begin, 0.0)
+
+
+def _slope(mean: Float, closed: bool) -> Float:
+    """By how much the mean grows from cell to cell, (n,): the lesser way to both neighbours, 0 where they differ in sign.
+
+    So a step, or a neighbour that was not seen, makes none.
+    """
+    rise = np.diff(mean, prepend=mean[-1] if closed else np.nan)
+    after = np.roll(rise, -1)
+    return np.asarray(np.where(rise * after > 0.0, np.sign(rise) * np.minimum(np.abs(rise), np.abs(after)), 0.0))
 
 
 def _shift(mean: Float, inward: Float) -> Float:

@@ -12,7 +12,8 @@ from tunneldb.store.survey import Survey
 
 _RESULTS = (
     "change_section", "change_image", "change_region", "leak_change", "clearance_infringement", "clearance_section", "ring",
-    "deviation_section", "anomaly_part", "anomaly", "coverage", "image", "radiometry", "range_curve", "target_sphere",
+    "evenness_area", "evenness_section", "thickness_section", "deviation_section", "anomaly_part", "anomaly", "coverage",
+    "image", "radiometry", "range_curve", "target_sphere",
     "cluster", "lining", "ground", "section", "segment", "axis_vertex",
 )  # fmt: skip
 """Tables of schema tunnel whose rows are the results of stages in a kilometre."""

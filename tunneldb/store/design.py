@@ -11,6 +11,8 @@ import psycopg
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
+from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.raster.geotiff import DEVIATION_KINDS
 from tunneldb.shape.outline import Outline
 from tunneldb.shape.profile import Profile, Stretch, stretches
 from tunneldb.store.surface import alignment_of
@@ -74,12 +76,21 @@ def save_profile(conn: psycopg.Connection[Any], tunnel: DesignTunnel, profile: P
 
 
 def remove_profile(conn: psycopg.Connection[Any], tunnel_id: int, tunnel: str, name: str, layer: str) -> None:
-    """Remove a profile; what was made by it becomes stale."""
-    done = conn.execute(
+    """Remove a profile, and the images of deviation where it or a transition to it held; what was made by it becomes stale."""
+    there = load_profiles(conn, tunnel_id, layer)
+    place = next((k for k, profile in enumerate(there) if profile.name == name), None)
+    if place is None:
+        raise UserError(f"tunnel {tunnel} has no profile {name!r} of layer {layer}: tunneldb profile list {tunnel}")
+    low = there[place - 1].chainage_to if place > 0 else -np.inf
+    high = there[place + 1].chainage_from if place + 1 < len(there) else np.inf
+    conn.execute(
+        "DELETE FROM tunnel.image i USING tunnel.survey s WHERE s.tunnel_id = %s AND i.survey_id = s.id AND i.kind = %s"
+        " AND (i.km + 1) * %s::float8 > %s AND i.km * %s::float8 < %s",
+        [tunnel_id, DEVIATION_KINDS[layer], KILOMETRE, low, KILOMETRE, high],
+    )
+    conn.execute(
         "DELETE FROM tunnel.design_profile WHERE tunnel_id = %s AND name = %s AND layer = %s", [tunnel_id, name, layer]
     )
-    if done.rowcount == 0:
-        raise UserError(f"tunnel {tunnel} has no profile {name!r} of layer {layer}: tunneldb profile list {tunnel}")
 
 
 def load_profiles(conn: psycopg.Connection[Any], tunnel_id: int, layer: str) -> list[Profile]:

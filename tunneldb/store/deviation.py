@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,8 @@ import psycopg
 
 from tunneldb.arrays import Bool
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.raster.geotiff import Raster, decode
+from tunneldb.raster.geotiff import DEVIATION_KINDS, Raster, decode, encode
+from tunneldb.raster.grid import BLOCK
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.shape.overbreak import SectionDeviation
 from tunneldb.store.survey import Survey
@@ -28,6 +29,15 @@ class Step:
     low: float
     high: float
     figures: SectionDeviation
+
+
+def layers_held(conn: psycopg.Connection[Any], survey: Survey) -> list[str]:
+    """Layers that a survey was held against, from inside."""
+    query = (
+        "SELECT l FROM unnest(%s::text[]) WITH ORDINALITY AS u (l, n)"
+        " WHERE EXISTS (SELECT FROM tunnel.deviation_section d WHERE d.survey_id = %s AND d.layer = l) ORDER BY n"
+    )
+    return [layer for (layer,) in conn.execute(query, [list(DEVIATION_KINDS), survey.id])]
 
 
 def load_offsets(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Iterator[tuple[Raster, Bool | None]]:
@@ -49,6 +59,18 @@ def load_offsets(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Iter
             state = decode(rows["state"]).values
             lining = (state == PixelState.LINING) | (state == PixelState.DARK)
         yield decode(rows["offset"]), lining
+
+
+def replace_image(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str, blocks: Iterable[Raster]) -> None:
+    """Replace the image of a kilometre's deviation from a layer; blocks that show nothing are left out."""
+    kind = DEVIATION_KINDS[layer]
+    conn.execute("DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s", [survey.id, km, kind])
+    for raster in blocks:
+        if np.isfinite(raster.values).any():
+            conn.execute(
+                "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %b)",
+                (survey.id, km, kind, round(raster.transform.c / BLOCK), encode(raster, kind)),
+            )
 
 
 def stale_kilometres(

@@ -20,7 +20,7 @@ from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.radiometry.robust_statistics import DryLevel
 from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.accumulator import Window
-from tunneldb.raster.geotiff import Raster, encode
+from tunneldb.raster.geotiff import Raster, decode, encode
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.store.survey import Survey
@@ -35,6 +35,25 @@ def load_reference(conn: psycopg.Connection[Any], survey: Survey) -> ReferenceCu
         return None
     table = np.array(rows, dtype=np.float64)
     return ReferenceCurve.from_rows(table[:, 0], table[:, 1])
+
+
+def image_blocks(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: str) -> list[int]:
+    """Numbers of the blocks of a kilometre's image of a kind, in order."""
+    rows = conn.execute(
+        "SELECT block FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s ORDER BY block", (survey.id, km, kind)
+    )
+    return [block for (block,) in rows]
+
+
+def load_block(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: str, block: int) -> Raster:
+    """Read a block that is there."""
+    row = conn.execute(
+        "SELECT tiff FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s AND block = %s",
+        (survey.id, km, kind, block),
+        binary=True,
+    ).fetchone()
+    assert row is not None
+    return decode(row[0])
 
 
 def load_regions(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: str) -> list[Polygon]:
@@ -78,7 +97,11 @@ class ImageStore:
         grid, columns = self.grid, window.columns
         block = grid.first_block + columns.start // grid.block_columns
         if not self._blocks:  # only now: what makes the images takes long, and others look at those that are there
-            self.conn.execute("DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s", (self.survey.id, grid.km))
+            # Deviation is not made here: it stays, stale, with its sections.
+            self.conn.execute(
+                "DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind NOT LIKE 'deviation%%'",
+                (self.survey.id, grid.km),
+            )
         self.pixels += int(np.count_nonzero(window.weight))
         self._blocks.append(block)
         for kind in self.kinds:

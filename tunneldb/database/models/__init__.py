@@ -28,6 +28,7 @@ from tunneldb.database.models.ring import Ring, RingChord
 from tunneldb.database.models.shape import DesignProfile, DeviationSection
 from tunneldb.database.models.sonar import Bed, Ladder, RegistrationResidual, SonarPoint, SonarScan
 from tunneldb.database.models.structures import Face, Member, Spot
+from tunneldb.database.models.surfaces import EvennessArea, EvennessSection, ThicknessSection
 from tunneldb.database.models.work import Audit, Goal, Run, Stage, Worker
 
 __all__ = [
@@ -49,6 +50,8 @@ __all__ = [
     "Coverage",
     "DesignProfile",
     "DeviationSection",
+    "EvennessArea",
+    "EvennessSection",
     "Face",
     "FeatureList",
     "FileKm",
@@ -88,6 +91,7 @@ __all__ = [
     "StationEquation",
     "Survey",
     "TargetSphere",
+    "ThicknessSection",
     "Tunnel",
     "Waterproof",
     "Worker",

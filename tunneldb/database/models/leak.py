@@ -143,7 +143,9 @@ class Image(Base):
 
     __tablename__ = "image"
     __table_args__ = (
-        one_of("kind", "raw", "corrected", "offset", "state"),
+        one_of(
+            "kind", "raw", "corrected", "offset", "state", "deviation_lining", "deviation_shotcrete", "deviation_excavation"
+        ),
         {
             "comment": "Unrolled images in blocks of 50 m: partition image_s<survey>",
             "postgresql_partition_by": "LIST (survey_id)",
@@ -153,7 +155,9 @@ class Image(Base):
     survey_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=SURVEY)
     km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)
     kind: Mapped[str] = mapped_column(
-        primary_key=True, comment="raw or corrected intensity, dB, offset from the surface, m, or state of the pixel"
+        primary_key=True,
+        comment="raw or corrected intensity, dB, offset from the surface, m, state of the pixel, or deviation from the design "
+        "profiles of a layer, m",
     )
     block: Mapped[int] = mapped_column(
         primary_key=True, autoincrement=False, comment="Block along the tunnel: floor(chainage / 50)"

@@ -72,7 +72,8 @@ class Run(Base):
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     km: Mapped[int | None] = mapped_column(comment="Kilometre; none for the whole survey")
     stage: Mapped[str] = mapped_column(
-        comment="read, load, axis, segments, sections, ground, detect; spheres, members, deviation, clearance, rings, compare"
+        comment="read, load, axis, segments, sections, ground, detect; spheres, members, deviation, clearance, rings, compare, "
+        "thickness, evenness"
     )
     parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Parameters that it ran with")
     versions: Mapped[dict[str, Any]] = mapped_column(

@@ -5,32 +5,28 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import psycopg
 
-from tunneldb.arrays import Single
 from tunneldb.export.images.cog import Extent, write_cog
 from tunneldb.files import replacing
-from tunneldb.pipeline.deviation import deviation_blocks, load_design_of
+from tunneldb.raster.geotiff import DEVIATION_KINDS
+from tunneldb.store.images import image_blocks, load_block
 from tunneldb.store.survey import Survey
 
 
 def write_deviation(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str, path: Path) -> Path | None:
-    """Write the deviation of each pixel of lining of a kilometre, m, positive inside; NaN elsewhere. None without images.
+    """Write the stored deviation of each pixel of lining of a kilometre, m, positive inside; NaN elsewhere. None without any.
 
     x is the chainage, y the arc, m, as in the other images of the survey, whose pixels these are.
     """
-    design = load_design_of(conn, survey, km, layer)
-    blocks: list[tuple[float, Single]] = []
-    transform = None
-    for offset, _, found in deviation_blocks(conn, survey, km, design):
-        transform = transform or offset.transform
-        blocks.append((offset.transform.c, np.ascontiguousarray(found.distance.T, np.float32)))
-    if transform is None:
+    kind = DEVIATION_KINDS[layer]
+    blocks = image_blocks(conn, survey, km, kind)
+    if not blocks:
         return None
-    columns = [round((west - transform.c) / transform.a) for west, _ in blocks]
-    pixels = [values for _, values in blocks]
-    extent = Extent(transform, pixels[0].shape[0], columns[-1] + pixels[-1].shape[1])
+    first = load_block(conn, survey, km, kind, blocks[0])
+    rows, width = first.values.shape
+    extent = Extent(first.transform, rows, width * (blocks[-1] - blocks[0] + 1))
+    pixels = (((block - blocks[0]) * width, load_block(conn, survey, km, kind, block).values) for block in blocks)
     with replacing(path) as temporary:
-        write_cog(temporary, "deviation", extent, zip(columns, pixels, strict=True), f"deviation from {layer}, positive inside")
+        write_cog(temporary, kind, extent, pixels, f"deviation from {layer}, positive inside")
     return path

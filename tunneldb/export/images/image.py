@@ -23,9 +23,10 @@ from tunneldb.export.images.underwater import export_bed, export_submerged
 from tunneldb.files import replacing
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.raster.gap_fill import FILL, TOLD, fill_blocks
-from tunneldb.raster.geotiff import KINDS, Raster, decode
+from tunneldb.raster.geotiff import DEVIATION_KINDS, KINDS, laid
 from tunneldb.raster.grid import BLOCK
 from tunneldb.store.alignment import load_stationing
+from tunneldb.store.images import image_blocks, load_block
 from tunneldb.store.survey import Survey
 
 
@@ -42,8 +43,8 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
 
     The GeoTIFFs hold dB or m as single-precision numbers, NaN where no point fell, the state of a pixel, or the code of a
     class, 0 where no point fell; x is the chainage and y the arc, m. Each file appears whole. Classes are there when stage
-    ground has run: they are computed from the offset image and what that stage has stored. Where sonar scans were loaded, the
-    bed and what they saw, unrolled, are written beside them.
+    ground has run: they are computed from the offset image and what that stage has stored. Deviation is there of each layer
+    that the survey was held against. Where sonar scans were loaded, the bed and what they saw, unrolled, are written, too.
 
     Returns
     -------
@@ -51,45 +52,54 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
         Files written.
     """
     with snapshot(conn):
-        written = [path for kind in (*KINDS, *PALETTES) for path in _export_kind(conn, survey, km, kind, folder)]
+        written = [
+            path
+            for kind in (*KINDS, *DEVIATION_KINDS.values(), *PALETTES)
+            for path in _export_kind(conn, survey, km, kind, folder)
+        ]
         below = (export(conn, survey, km, folder) for export in (export_submerged, export_bed))
         return [*written, *(path for path in below if path is not None)]
 
 
-def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> Path | None:
-    """Write what is looked at of a kilometre with its gaps filled, ``SURVEY-kmNNN-KIND-filled.tif``; its path.
+def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> list[Path]:
+    """Write what is looked at of a kilometre with its gaps filled, ``SURVEY-kmNNN-KIND-filled.tif``; their paths.
 
-    The kind is corrected intensity, or the offset where there is none; None without either. Its pixels are those of a preview:
-    it is there to be looked at, under the image that was measured. Its band's name and metadata say what it is. A profile
-    beyond the end of the kilometre fills, too. The connection must be idle.
+    The kinds are corrected intensity, or the offset where there is none, and deviation. Their pixels are those of a preview:
+    they are there to be looked at, under the image that was measured. Their band's name and metadata say what they are. A
+    profile beyond the end of the kilometre fills, too. The connection must be idle.
     """
     with snapshot(conn):
-        by_kind = {kind: _blocks(conn, survey, km, kind) for kind in ("offset", "corrected")}
-        kind = "corrected" if by_kind["corrected"] else "offset"
-        blocks = by_kind[kind]
-        if not blocks:
-            return None
-        first = _read(conn, survey, km, kind, blocks[0])
-        factor = preview_factor(first.transform.a)
-        rows, columns = (-(-n // factor) for n in first.values.shape)
-        extent = Extent(first.transform @ Affine.scale(factor), rows, columns * (blocks[-1] - blocks[0] + 1))
-        around = [
-            *_beside(conn, survey, kind, blocks[0] - 1),
-            *((km, block) for block in blocks),
-            *_beside(conn, survey, kind, blocks[-1] + 1),
-        ]
+        seen = "corrected" if image_blocks(conn, survey, km, "corrected") else "offset"
+        written = [_export_filled(conn, survey, km, kind, folder) for kind in (seen, *DEVIATION_KINDS.values())]
+    return [path for path in written if path is not None]
 
-        def shrunk() -> Iterator[tuple[int, Single]]:
-            for other, block in around:
-                raster = _read(conn, survey, other, kind, block)
-                if raster.transform.a == first.transform.a:
-                    pixels = raster.values if other == km else _laid(raster, first)
-                    yield (block - blocks[0]) * columns, preview.shrink(pixels, factor)
 
-        path = folder / f"{survey.name}-km{km:03d}-{kind}-filled.tif"
-        filled = fill_blocks(shrunk(), FILL / extent.transform.a)
-        with replacing(path) as temporary:
-            write_cog(temporary, kind, extent, (b for b in filled if 0 <= b[0] < extent.columns), f"{kind}, {TOLD}")
+def _export_filled(conn: psycopg.Connection, survey: Survey, km: int, kind: str, folder: Path) -> Path | None:
+    """Write an image with its gaps filled; None where there is none."""
+    blocks = image_blocks(conn, survey, km, kind)
+    if not blocks:
+        return None
+    first = load_block(conn, survey, km, kind, blocks[0])
+    factor = preview_factor(first.transform.a)
+    rows, columns = (-(-n // factor) for n in first.values.shape)
+    extent = Extent(first.transform @ Affine.scale(factor), rows, columns * (blocks[-1] - blocks[0] + 1))
+    around = [
+        *_beside(conn, survey, kind, blocks[0] - 1),
+        *((km, block) for block in blocks),
+        *_beside(conn, survey, kind, blocks[-1] + 1),
+    ]
+
+    def shrunk() -> Iterator[tuple[int, Single]]:
+        for other, block in around:
+            raster = load_block(conn, survey, other, kind, block)
+            if raster.transform.a == first.transform.a:
+                pixels = raster.values if other == km else laid(raster, first)
+                yield (block - blocks[0]) * columns, preview.shrink(pixels, factor)
+
+    path = folder / f"{survey.name}-km{km:03d}-{kind}-filled.tif"
+    filled = fill_blocks(shrunk(), FILL / extent.transform.a)
+    with replacing(path) as temporary:
+        write_cog(temporary, kind, extent, (b for b in filled if 0 <= b[0] < extent.columns), f"{kind}, {TOLD}")
     return path
 
 
@@ -99,23 +109,14 @@ def _beside(conn: psycopg.Connection, survey: Survey, kind: str, block: int) -> 
     return conn.execute(query, (survey.id, kind, block)).fetchall()
 
 
-def _laid(raster: Raster, like: Raster) -> Single:
-    """Values of a block in the rows of another one."""
-    down = round((like.transform.f - raster.transform.f) / like.transform.a)
-    values = np.full(like.values.shape, np.nan, np.float32)
-    rows = slice(max(down, 0), min(down + len(raster.values), len(values)))
-    values[rows] = raster.values[rows.start - down : rows.stop - down]
-    return values
-
-
 def _export_kind(conn: psycopg.Connection, survey: Survey, km: int, kind: str, folder: Path) -> list[Path]:
     """Write the image of one kind and its preview, if there are any; returns their paths."""
     stored = "offset" if kind == "class" else kind
-    blocks = _blocks(conn, survey, km, stored)
+    blocks = image_blocks(conn, survey, km, stored)
     painter = ClassPainter.load(conn, survey, km) if kind == "class" and blocks else None
     if not blocks or (kind == "class" and painter is None):
         return []
-    first = _read(conn, survey, km, stored, blocks[0])
+    first = load_block(conn, survey, km, stored, blocks[0])
     rows, width = first.values.shape
     extent = Extent(first.transform, rows, width * (blocks[-1] - blocks[0] + 1))
     stem = f"{survey.name}-km{km:03d}-{kind}"
@@ -135,6 +136,7 @@ _TITLES = {
     "raw": "raw intensity",
     "corrected": "corrected intensity",
     "offset": "offset from the section surface",
+    **{kind: f"deviation from the design of layer {layer}" for layer, kind in DEVIATION_KINDS.items()},
     "state": "states",
     "class": "classes",
 }
@@ -183,7 +185,7 @@ def _pixels(
 ) -> Iterator[tuple[int, NDArray[Any]]]:
     """First column and pixels of each stored block, codes in 8 bits, or their classes; the sheet takes note of them."""
     for block in blocks:
-        raster = _read(conn, survey, km, kind, block)
+        raster = load_block(conn, survey, km, kind, block)
         pixels: NDArray[Any] = raster.values if painter is None else painter.paint(raster)
         if kind in PALETTES:
             pixels = pixels.astype(np.uint8, copy=False)
@@ -198,24 +200,6 @@ def preview_factor(pixel: float) -> int:
     while abs(BLOCK / (pixel * factor) - round(BLOCK / (pixel * factor))) > 1e-6:
         factor -= 1
     return factor
-
-
-def _blocks(conn: psycopg.Connection, survey: Survey, km: int, kind: str) -> Sequence[int]:
-    rows = conn.execute(
-        "SELECT block FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s ORDER BY block",
-        (survey.id, km, kind),
-    )
-    return [block for (block,) in rows]
-
-
-def _read(conn: psycopg.Connection, survey: Survey, km: int, kind: str, block: int) -> Raster:
-    row = conn.execute(
-        "SELECT tiff FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s AND block = %s",
-        (survey.id, km, kind, block),
-        binary=True,
-    ).fetchone()
-    assert row is not None
-    return decode(row[0])
 
 
 def _leaks(conn: psycopg.Connection, survey: Survey, km: int) -> list[Polygon]:

@@ -18,6 +18,7 @@ from tunneldb.classification.classes import PointClass
 from tunneldb.export.images.palette import PALETTES
 from tunneldb.geometry.stationing import Stationing
 from tunneldb.raster.gap_fill import FILL, fill_gaps
+from tunneldb.raster.geotiff import DEVIATION_KINDS
 
 STRIP = 100.0
 """Length of a strip, m."""
@@ -27,6 +28,9 @@ PIXEL = 0.05
 
 OFFSET_SPANS = (0.02, 0.05, 0.1, 0.2, 0.5)
 """Offsets beyond one of these are shown in the full colour, m: the first that nine tenths of the image stay within."""
+
+_SIGNED = ("offset", *DEVIATION_KINDS.values())
+"""Kinds of image with a sign."""
 
 _MARGIN, _HEAD, _GAP = 84, 40, 26
 _TICK = 10  # of chainage, m
@@ -105,9 +109,9 @@ def draw(
         File to write.
     title : str
         Heading.
-    kind : {'raw', 'corrected', 'offset', 'state', 'class'}
-        Intensities are drawn in grey between their 2nd and 98th percentile, offsets in blue (outside the
-        surface) to red (inside), states and classes in their colours.
+    kind : str
+        'raw', 'corrected', 'offset', 'state', 'class', or one of deviation. Intensities are drawn in grey between their 2nd and
+        98th percentile, offsets and deviations in blue (outside) to red (inside), states and classes in their colours.
     strips : sequence of Strip
         In order of chainage.
     stationing : Stationing
@@ -170,8 +174,8 @@ def _head(
         return _legend(pen, _MARGIN + int(pen.textlength(f"{title}:  ", font)), kind, strips, font)
     low, high = span
     scale = (
-        f"blue {low:+.2f} m (outside) to red {high:+.2f} m (inside)"
-        if kind == "offset"
+        f"blue {1e3 * low:+.0f} mm (outside) to red {1e3 * high:+.0f} mm (inside)"
+        if kind in _SIGNED
         else f"black {low:.2f} dB to white {high:.2f} dB"
     )
     pen.text((_MARGIN, 8), f"{title}:  {scale}", _INK, font)
@@ -203,7 +207,7 @@ def _span(kind: str, strips: Sequence[Strip]) -> tuple[float, float]:
     held = np.concatenate([s.values[np.isfinite(s.values)] for s in strips])
     if len(held) == 0 or kind in PALETTES:
         return 0.0, 1.0
-    if kind == "offset":
+    if kind in _SIGNED:
         usual = float(np.percentile(np.abs(held), 90))
         span = next((s for s in OFFSET_SPANS if s >= usual), OFFSET_SPANS[-1])
         return -span, span
@@ -220,7 +224,7 @@ def _colours(kind: str, values: Single, low: float, high: float) -> UInt8:
         return np.asarray(table[np.nan_to_num(values).astype(np.uint8)])
     with np.errstate(invalid="ignore"):
         share = np.clip((values - low) / (high - low), 0.0, 1.0)[..., None]
-    if kind == "offset":
+    if kind in _SIGNED:
         colour = np.where(share < 0.5, _BLUE + (_WHITE - _BLUE) * 2 * share, _WHITE + (_RED - _WHITE) * (2 * share - 1))
     else:
         colour = np.repeat(255.0 * share, 3, axis=2)

@@ -25,6 +25,8 @@ UNDERWATER = "Under water"
 
 CLEARANCE = "Clearance"
 """Group of the layers of clearance, but for those on the unrolled plane."""
+DEVIATION = "Deviation"
+"""The map theme of deviation from the design, and the print layout of its sheets."""
 
 MEMBERS = "Members"
 """The print layout with a page for each member."""
@@ -213,3 +215,13 @@ RING_LAYERS = (
     VectorLayer("ring_unrolled", "Rings, by ovality", "ring_unrolled", "Polygon", "ring", UNROLLED, ()),
 )
 """The same of a survey whose lining has rings."""
+DEVIATION_LAYERS = (
+    VectorLayer("deviation_map", "Over- and underbreak", "deviation_map", "LineString", "deviation_map", MAP, ()),
+    VectorLayer(
+        "evenness_area", "Uneven: gap over the limit", "evenness_area", "Polygon", "evenness_area", UNROLLED, (DEVIATION,)
+    ),
+    VectorLayer(
+        "deviation_bar", "Over- and underbreak by metre", "deviation_bar", "Polygon", "deviation_bar", UNROLLED, (DEVIATION,)
+    ),
+)
+"""The same of a survey that was held against a design."""

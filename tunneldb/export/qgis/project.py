@@ -9,7 +9,7 @@ import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Iterable, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import psycopg
@@ -17,6 +17,7 @@ import psycopg
 from tunneldb import __version__
 from tunneldb.export.qgis.catalogue import Catalogue, read_catalogue
 from tunneldb.export.qgis.crs import crs_element, no_crs
+from tunneldb.export.qgis.deviation_sheet import deviation_layout
 from tunneldb.export.qgis.extent import (
     Extent,
     View,
@@ -42,6 +43,8 @@ from tunneldb.export.qgis.finding_style import finding_style
 from tunneldb.export.qgis.layer import (
     CLEARANCE,
     CLEARANCE_LAYERS,
+    DEVIATION,
+    DEVIATION_LAYERS,
     FACES,
     FINDINGS,
     FINDINGS_MAP,
@@ -60,14 +63,16 @@ from tunneldb.export.qgis.layer import (
     VectorLayer,
 )
 from tunneldb.export.qgis.member_sheet import member_layout
-from tunneldb.export.qgis.raster import BED, FILLED, KINDS, SUBMERGED, image_kind, pipe
+from tunneldb.export.qgis.raster import BED, FILLED, KINDS, SUBMERGED, image_kind, pipe, shown_limits
 from tunneldb.export.qgis.sheet import sheet_layout
 from tunneldb.export.qgis.source import RECOMPUTED_FROM, Source, recompute
 from tunneldb.export.qgis.space import docks, filled_layers, has_rows, scene, site_viewpoint, viewpoint
 from tunneldb.export.qgis.styles import require_table, style_elements
 from tunneldb.export.tables.spots import read_spots
 from tunneldb.files import replacing
+from tunneldb.raster.geotiff import DEVIATION_KINDS
 from tunneldb.store.coverage import read_coverage
+from tunneldb.store.deviation import layers_held
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.rings import has_rings
 from tunneldb.store.sonar import has_sonar
@@ -177,8 +182,10 @@ def _project(
     source = Source.of_connection(conn) if service is None else Source.of_service(service)
     cells = first_members(conn, survey.name)
     structures = survey.site or cells is not None
+    designed = layers_held(conn, survey)[:1]
     layers = (
         *(() if survey.site else LAYERS),
+        *(replace(layer, where=f"\"layer\" = '{held}'") for held in designed for layer in DEVIATION_LAYERS),
         *(STRUCTURE_LAYERS if structures else ()),
         *(UNDERWATER_LAYERS if has_sonar(conn, survey) else ()),
         *(layer for layer in CLEARANCE_LAYERS if has_rows(conn, survey.name, layer)),
@@ -219,6 +226,8 @@ def _project(
     if sheet is not None and catalogue is not None:
         findings = layer_id(SHEET_FINDING), source.table(SHEET_FINDING, survey.name)
         layouts.append(sheet_layout(survey, sheet, catalogue, known["sheet"], known["leak_sheet"], findings))
+    if sheet is not None and designed:
+        layouts.append(deviation_layout(survey, sheet, known["sheet"], layer_id("deviation_bar"), shown_limits(images)))
     if cells is not None:
         layouts.append(member_layout(survey, known["member_sheet"], known["spot_sheet"]))
     if len(layouts):
@@ -327,11 +336,14 @@ def _table(
 def _rasters(images: Sequence[Path], folder: Path | None, crs: ET.Element) -> list[_Entry]:
     """Layers of the images, a group for each kind; the first kind that there is is shown, and what lies below the water.
 
+    Theme Deviation shows deviation from the innermost layer of the design that there is.
+
     It lies over the same with gaps filled.
     """
     entries = []
     of_kind = {kind: sorted(path for path in images if image_kind(path) == kind) for kind in KINDS}
     shown = {next((kind for kind, paths in of_kind.items() if paths), ""), SUBMERGED}
+    design = next((kind for kind in DEVIATION_KINDS.values() if of_kind[kind]), "")
     for kind, title in KINDS.items():
         paths = of_kind[kind]
         drawn = pipe(kind, of_kind[kind.removesuffix(FILLED)])
@@ -347,7 +359,8 @@ def _rasters(images: Sequence[Path], folder: Path | None, crs: ET.Element) -> li
             if kind == BED:
                 entries.append(_Entry(layer_id(path.stem), path.stem, (UNDERWATER, title), (MAP,), element))
                 continue
-            themes = (UNROLLED, SHEETS, FINDINGS) if kind.removesuffix(FILLED) in shown else ()
+            themes: tuple[str, ...] = (UNROLLED, SHEETS, FINDINGS) if kind.removesuffix(FILLED) in shown else ()
+            themes += (DEVIATION,) if kind.removesuffix(FILLED) == design else ()
             entries.append(_Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))
     return entries
 
@@ -396,7 +409,7 @@ def _themes(entries: Sequence[_Entry], *, site: bool) -> ET.Element:
     """Map themes: which layers are visible, and the groups that must be switched on for it; of a tunnel all of its own."""
     presets = ET.Element("visibility-presets")
     used = {theme for entry in entries for theme in entry.themes} | (set() if site else {MAP, UNROLLED, SPACE, SHEETS})
-    known = (MAP, UNROLLED, FINDINGS, FINDINGS_MAP, SPACE, SHEETS, FACES)
+    known = (MAP, UNROLLED, FINDINGS, FINDINGS_MAP, DEVIATION, SPACE, SHEETS, FACES)
     for theme in (theme for theme in known if theme in used):
         preset = ET.SubElement(presets, "visibility-preset", {"name": theme, "has-expanded-info": "1"})
         shown = [entry for entry in entries if theme in entry.themes]

@@ -12,6 +12,7 @@ import rasterio
 from tunneldb.arrays import Float
 from tunneldb.export.images.palette import PALETTES, hexadecimal
 from tunneldb.raster.gap_fill import TOLD
+from tunneldb.raster.geotiff import DEVIATION_KINDS
 from tunneldb.raster.grey import grey_range
 
 FILLED = "-filled"
@@ -26,6 +27,11 @@ KINDS = {
     "raw": "Intensity, raw",
     "offset": "Offset",
     f"offset{FILLED}": f"Offset, {TOLD}",
+    **{
+        f"{kind}{end}": f"Deviation from the design, {layer}{said}"
+        for layer, kind in DEVIATION_KINDS.items()
+        for end, said in (("", ""), (FILLED, f", {TOLD}"))
+    },
     "state": "States: seen, unseen, dark",
     "class": "Classes",
     SUBMERGED: "Offset below the water",
@@ -37,7 +43,7 @@ OFFSET_RANGES = (0.1, 0.2, 0.5)
 """Offset at which the colours are full, m: the least that nine tenths of the images stay within."""
 
 # Inwards red, outwards blue (ColorBrewer RdBu), the surface itself grey, to be told from paper.
-_OFFSET_COLOURS = ((-1.0, "#2166ac"), (-0.4, "#92c5de"), (0.0, "#e6e6e6"), (0.4, "#f4a582"), (1.0, "#b2182b"))
+OFFSET_COLOURS = ((-1.0, "#2166ac"), (-0.4, "#92c5de"), (0.0, "#e6e6e6"), (0.4, "#f4a582"), (1.0, "#b2182b"))
 # The deeper the darker (ColorBrewer Blues).
 _DEPTH_COLOURS = ("#eff3ff", "#bdd7e7", "#6baed6", "#3182bd", "#08519c")
 _DEPTH = 2  # band of the depth in a raster of the bed
@@ -56,6 +62,15 @@ def offset_range(paths: Sequence[Path]) -> float:
     return next((limit for limit in OFFSET_RANGES if limit >= usual), OFFSET_RANGES[-1])
 
 
+def shown_limits(images: Sequence[Path]) -> tuple[str, float] | None:
+    """Kind of deviation that theme Deviation shows, of the images that there are, and where its colours are full, m."""
+    for kind in DEVIATION_KINDS.values():
+        paths = [path for path in images if image_kind(path) == kind]
+        if paths:
+            return kind, offset_range(paths)
+    return None
+
+
 def _sample(paths: Sequence[Path], band_number: int = 1) -> Float:
     """Values of a band of images, some from all over each."""
     samples = [np.empty(0)]
@@ -71,7 +86,8 @@ def _sample(paths: Sequence[Path], band_number: int = 1) -> Float:
 def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
     """Return the element that says how an image is drawn, and all of its kind alike.
 
-    Intensity is drawn in grey, offset in diverging colours, each state or class in its own, depth the darker the deeper.
+    Intensity is drawn in grey, offset and deviation in diverging colours, each state or class in its own; depth the darker the
+    deeper.
     """
     element = ET.Element("pipe")
     if kind in PALETTES:
@@ -79,10 +95,10 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
         entries = ET.SubElement(renderer, "colorPalette")
         for code, (name, rgb) in PALETTES[kind].entries.items():
             ET.SubElement(entries, "paletteEntry", value=str(code), color=hexadecimal(rgb), label=name, alpha="255")
-    elif kind.removesuffix(FILLED) in ("offset", SUBMERGED):
+    elif kind.removesuffix(FILLED) in ("offset", SUBMERGED, *DEVIATION_KINDS.values()):
         limit = offset_range(paths)
         renderer = _ramp(
-            element, 1, [(share * limit, f"{share * limit * 1000:+.0f} mm", colour) for share, colour in _OFFSET_COLOURS]
+            element, 1, [(share * limit, f"{share * limit * 1000:+.0f} mm", colour) for share, colour in OFFSET_COLOURS]
         )
     elif kind == BED:
         shallow, deep = np.quantile(_sample(paths, _DEPTH), [0.02, 0.98]) if paths else (0.0, 1.0)

@@ -79,12 +79,12 @@ def sheet_layout(
     collection = ET.SubElement(layout, "PageCollection")
     for page in range(1 + len(goes_on)):
         collection.append(item(SHEETS, PAGE_ITEM, f"page {page + 1}", (0.0, 0.0, *PAGE), page, background="true"))
-    strip = _strip(scale, extent)
+    strip = strip_map(scale, extent, SHEETS)
     layout.append(strip)
     layout.extend(_texts(survey, scale, goes_on))
     layout.extend(_colours(catalogue, below + _BELOW - 2 * _LINE - 0.3))
     layout.append(_left_out(below + _BELOW - _LINE - 0.3))
-    layout.append(_scale_bar(strip.attrib["uuid"]))
+    layout.append(scale_bar(strip.attrib["uuid"], SHEETS))
     if leak_pages:
         layout.extend(sheet_table(LEAKS, leaks, Frames.on([0], range(1, 1 + leak_pages), below + _BELOW)))
     further = range(1 + leak_pages, 1 + len(goes_on))
@@ -101,24 +101,24 @@ def sheet_layout(
     return layout
 
 
-def _strip(scale: int, extent: Extent) -> ET.Element:
-    """The unrolled lining of the sheet, from edge to edge as its table, under a grid of 10 m by 2 m."""
+def strip_map(scale: int, extent: Extent, theme: str) -> ET.Element:
+    """The unrolled lining of a sheet as a theme shows it, from edge to edge as its table, under a grid of 10 m by 2 m."""
     width, height = LENGTH * 1000.0 / scale, (extent.ymax - extent.ymin) * 1000.0 / scale
     element = item(
-        SHEETS, MAP_ITEM, "strip", ((PAGE[0] - width) / 2 + 4, TOP, width, height), frame="true", background="true",
+        theme, MAP_ITEM, "strip", ((PAGE[0] - width) / 2 + 4, TOP, width, height), frame="true", background="true",
         followPreset="true",
-        followPresetName=SHEETS, mapRotation="0", drawCanvasItems="false", labelMargin="0,mm", keepLayerSet="false",
+        followPresetName=theme, mapRotation="0", drawCanvasItems="false", labelMargin="0,mm", keepLayerSet="false",
     )  # fmt: skip
     sides = {"xmin": extent.xmin, "xmax": extent.xmax, "ymin": extent.ymin, "ymax": extent.ymax}
     ET.SubElement(element, "Extent", {side: repr(value) for side, value in sides.items()})
-    element.append(_grid("chainage", "10", "0", _CHAINAGE_LABEL, bottom=True))
-    element.append(_grid("arc", "0", "2", _ARC_LABEL, bottom=False))
+    element.append(_grid(theme, "chainage", "10", "0", _CHAINAGE_LABEL, bottom=True))
+    element.append(_grid(theme, "arc", "0", "2", _ARC_LABEL, bottom=False))
     # Scaling 0 keeps the strip's scale; 1 would choose among those of the designer, from 1:500, as soon as it is open.
     ET.SubElement(element, "AtlasMap", atlasDriven="1", scalingMode="0", margin="0")
     return element
 
 
-def _grid(name: str, x: str, y: str, label: str, *, bottom: bool) -> ET.Element:
+def _grid(layout: str, name: str, x: str, y: str, label: str, *, bottom: bool) -> ET.Element:
     """Lines at multiples of x and y metres, labelled on one side; the sides are shown in QGIS' numbers."""
     shown, hidden = "0", "3"
     labelled = "bottom" if bottom else "left"
@@ -126,7 +126,7 @@ def _grid(name: str, x: str, y: str, label: str, *, bottom: bool) -> ET.Element:
     for side in ("left", "right", "top", "bottom"):
         sides |= {f"{side}AnnotationDisplay": shown if side == labelled else hidden, f"{side}AnnotationPosition": "1"}
     element = ET.Element(
-        "ComposerMapGrid", sides, name=name, uuid=key(SHEETS, f"grid {name}"), show="1",
+        "ComposerMapGrid", sides, name=name, uuid=key(layout, f"grid {name}"), show="1",
         position="3", gridStyle="0", unit="0", intervalX=x, intervalY=y, offsetX="0", offsetY="0", blendMode="0",
         showAnnotation="1", annotationFormat="8", annotationExpression=label, annotationPrecision="0",
         frameAnnotationDistance="1", gridFrameStyle="0",
@@ -218,9 +218,10 @@ def _left_out(y: float) -> ET.Element:
     return label(SHEETS, "left out", f"[% coalesce('Not counted and not drawn: ' || {said}, '') %]", box, 7)
 
 
-def _scale_bar(strip: str) -> ET.Element:
+def scale_bar(strip: str, layout: str) -> ET.Element:
+    """A bar of 10 m beneath a strip, by its key."""
     element = item(
-        SHEETS, SCALE_BAR, "scale bar", (MARGIN, FOOT, 50, 10), style="Line Ticks Up", mapUuid=strip, unitType="meters",
+        layout, SCALE_BAR, "scale bar", (MARGIN, FOOT, 50, 10), style="Line Ticks Up", mapUuid=strip, unitType="meters",
         unitLabel="m", numUnitsPerSegment="5", numSegments="2", numSegmentsLeft="0", numMapUnitsPerScaleBarUnit="1",
         segmentSizeMode="0", height="1.5", labelBarSpace="1", boxContentSpace="1", outlineWidth="0.2", alignment="0",
         numSubdivisions="1", minBarWidth="10", maxBarWidth="100", lineJoinStyle="miter", lineCapStyle="square",

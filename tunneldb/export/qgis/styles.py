@@ -8,7 +8,14 @@ from importlib import resources
 import psycopg
 
 from tunneldb.errors import UserError
-from tunneldb.export.qgis.layer import CLEARANCE_LAYERS, LAYERS, RING_LAYERS, STRUCTURE_LAYERS, UNDERWATER_LAYERS
+from tunneldb.export.qgis.layer import (
+    CLEARANCE_LAYERS,
+    DEVIATION_LAYERS,
+    LAYERS,
+    RING_LAYERS,
+    STRUCTURE_LAYERS,
+    UNDERWATER_LAYERS,
+)
 
 STYLE_NAME = "tunneldb"
 
@@ -79,7 +86,7 @@ def styled_columns() -> list[tuple[str, str, str, str]]:
     """
     return [
         (layer.view, layer.column, layer.style, layer.title)
-        for layer in (*LAYERS, *STRUCTURE_LAYERS, *UNDERWATER_LAYERS, *CLEARANCE_LAYERS, *RING_LAYERS)
+        for layer in (*LAYERS, *STRUCTURE_LAYERS, *UNDERWATER_LAYERS, *CLEARANCE_LAYERS, *RING_LAYERS, *DEVIATION_LAYERS)
         if layer.id == layer.view
     ] + [
         ("anomaly", "unrolled", "anomaly", "Leaks, joints and dark spots, unrolled"),

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from typing import Any
 
 import psycopg
 from psycopg import sql
 from psycopg.rows import dict_row
 
+from tunneldb.csvfile import write_csv
 from tunneldb.store.survey import Survey
 
 Row = dict[str, Any]
@@ -47,11 +46,8 @@ def change_rows(conn: psycopg.Connection[Any], view: str, old: Survey, new: Surv
 
 def change_csv(rows: list[Row], view: str) -> str:
     """Rows as CSV, with a header; what could not be told is empty."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS[view], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({name: " ".join(map(str, v)) if isinstance(v, list) else v for name, v in row.items()} for row in rows)
-    return text.getvalue()
+    cells = ([row[name] for name in COLUMNS[view]] for row in rows)
+    return write_csv(COLUMNS[view], ([" ".join(map(str, v)) if isinstance(v, list) else v for v in row] for row in cells))
 
 
 def summary(sections: list[Row], regions: list[Row], leaks: list[Row]) -> Row:

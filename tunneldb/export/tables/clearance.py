@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from typing import Any
 
 import psycopg
 from psycopg.rows import dict_row
 
+from tunneldb.csvfile import write_csv
 from tunneldb.store.survey import Survey
 
 Row = dict[str, Any]
@@ -63,11 +62,7 @@ def summary(conn: psycopg.Connection[Any], survey: Survey, gauge: str, track: st
 
 def sections_csv(rows: Sequence[Row]) -> str:
     """Sections as CSV, with a column for each direction of 5°."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
     count = len(rows[0]["margins"]) if rows else 0
-    writer.writerow([*SECTION, *(f"margin_{k * 360 // count:03d}" for k in range(count))])
-    for row in rows:
-        cells = [*(row[name] for name in SECTION), *(None if v != v else v for v in row["margins"])]
-        writer.writerow([round(cell, 5) if isinstance(cell, float) else cell for cell in cells])
-    return out.getvalue()
+    names = [*SECTION, *(f"margin_{k * 360 // count:03d}" for k in range(count))]
+    cells = ([*(row[name] for name in SECTION), *(None if v != v else v for v in row["margins"])] for row in rows)
+    return write_csv(names, ([round(cell, 5) if isinstance(cell, float) else cell for cell in row] for row in cells))

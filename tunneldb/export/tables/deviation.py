@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import psycopg
@@ -55,9 +56,9 @@ def volume(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float
         ).fetchone()
 
 
-def sections_csv(rows: list[Row]) -> str:
-    """Sections as CSV, with a header; what could not be told is empty."""
-    return write_csv(COLUMNS, ([row[name] for name in COLUMNS] for row in rows))
+def rows_csv(columns: Sequence[str], rows: Sequence[Row]) -> str:
+    """Rows as CSV, with a header; what could not be told is empty."""
+    return write_csv(columns, ([row[name] for name in columns] for row in rows))
 
 
 def _rounded(value: Any) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import psycopg
 from psycopg import sql
 from psycopg.rows import dict_row
 
+from tunneldb.csvfile import write_csv
 from tunneldb.store.survey import Survey
 
 Row = dict[str, Any]
@@ -56,7 +56,4 @@ def write_rings(rows: list[Row], path: Path, ending: str, title: str) -> None:
         cells = [[row.get(name) for name in header] for row in rows]
         write_workbook(path, [Sheet("rings", [Column(name) for name in header], cells)], title)
         return
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, header, restval="", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    path.write_text(write_csv(header, ([row.get(name) for name in header] for row in rows)), encoding="utf-8")

@@ -1,0 +1,40 @@
+"""How even a lining is, as tables by section and by stretch."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import psycopg
+from psycopg import sql
+from psycopg.rows import dict_row
+
+from tunneldb.store.survey import Survey
+
+Row = dict[str, Any]
+
+COLUMNS = (
+    "chainage_from", "chainage_to", "label", "lining_area", "measured_area", "over_area", "gap_along", "gap_along_at",
+    "gap_around", "gap_around_at", "waviness", "sigma",
+)  # fmt: skip
+"""Of a section; m and m²."""
+
+
+def section_rows(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float) -> list[Row]:
+    """Sections that lie in a stretch, whole or in part, in order of chainage."""
+    query = sql.SQL(
+        "SELECT {} FROM tunnel_api.evenness_section"
+        " WHERE survey_id = %s AND layer = %s AND chainage_to > %s AND chainage_from < %s ORDER BY chainage_from"
+    ).format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)))
+    with conn.cursor(row_factory=dict_row) as cursor:
+        rows = cursor.execute(query, [survey.id, layer, low, high]).fetchall()
+    return [{name: round(value, 5) if isinstance(value, float) else value for name, value in row.items()} for row in rows]
+
+
+def stretch_rows(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float, step: float) -> list[Row]:
+    """Evenness by stretches of so many metres that lie in another one, whole or in part."""
+    with conn.cursor(row_factory=dict_row) as cursor:
+        return cursor.execute(
+            "SELECT * FROM tunnel_api.evenness_stretches(%s, %s, %s) WHERE chainage_to > %s AND chainage_from < %s"
+            " ORDER BY chainage_from",
+            [survey.name, layer, step, low, high],
+        ).fetchall()
