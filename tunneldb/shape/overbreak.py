@@ -154,7 +154,7 @@ def _seen_parts(within: Float, cell: Int64, seen: Bool, half: float, closed: boo
 
 
 def _slope(mean: Float, closed: bool) -> Float:
-    """By how much the mean grows from cell to cell, (n,): the lesser of the ways to both neighbours, 0 where they differ in sign.
+    """By how much the mean grows from cell to cell, (n,): the lesser of the steps to both neighbours, 0 where signs differ.
 
     So a step, or a neighbour that was not seen, makes none.
     """
