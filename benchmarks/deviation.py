@@ -172,7 +172,7 @@ def timed_evenness() -> list[tuple[object, ...]]:
         found = evenness(whole, length, 0.1)
         steps = [step_evenness(found, slice(k, k + 10), 0.02) for k in range(0, 10_000, 10)]
         laid = time.perf_counter()
-        areas = sum(1 for _ in uneven_areas(found, slice(0, 10_000), 0.06))
+        areas = sum(1 for _ in uneven_areas(found, slice(0, 10_000), 0.012))
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
         rows.append(
             (

@@ -362,6 +362,28 @@ def test_a_deleted_survey_takes_its_rows_along(example: str, conn: psycopg.Conne
             assert count == (0,), table
 
 
+def test_images_of_before_are_kept_and_deviation_is_a_kind_of_them(empty_dsn: str) -> None:
+    with sqlalchemy_engine(empty_dsn).begin() as session:
+        session.exec_driver_sql("CREATE EXTENSION postgis")
+        command.upgrade(alembic_config(session), "0024")
+        session.exec_driver_sql(
+            """
+            INSERT INTO tunnel.tunnel (name, srid, alignment) VALUES ('t', 25830, 'SRID=25830;LINESTRINGZ(0 0 0, 0 9 0)');
+            INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)
+            SELECT t.id, 'a', '2024-05-04', 'none', 'mobile' FROM tunnel.tunnel t;
+            INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) SELECT id, 0, 'offset', 0, 'x' FROM tunnel.survey;
+            """
+        )
+    with open_connection(empty_dsn) as connection:
+        install(connection, STAGES)
+        add = "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) SELECT id, 0, %s, 0, 'x' FROM tunnel.survey"
+        connection.execute(add, ["deviation_lining"])
+        kinds = connection.execute("SELECT kind FROM tunnel.image ORDER BY kind").fetchall()
+        assert kinds == [("deviation_lining",), ("offset",)]
+        with pytest.raises(psycopg.errors.CheckViolation):
+            connection.execute(add, ["deviation_rock"])
+
+
 def test_a_newer_database_is_refused(conn: psycopg.Connection, dsn: str) -> None:
     conn.execute("UPDATE tunnel.alembic_version SET version_num = '9999'")
     conn.commit()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
@@ -30,7 +31,7 @@ class Evenness:
     along: Gaps
     around: Gaps
 
-    @property
+    @cached_property
     def gap(self) -> Float:
         """The greater gap of both ways, m; NaN where no straightedge could be laid."""
         return np.asarray(np.fmax(self.along.gap, self.around.gap))
