@@ -277,8 +277,10 @@ class _Report:
         """Whether a chapter has anything to say."""
         if chapter in _OF_LEAKS:
             return self.survey.intensity_kind != "none"
-        there = {"findings": self.findings, "dry": self.regions, "structures": self.structures, "underwater": self.underwater}
-        there["change"] = self.change
+        there = {
+            "findings": self.findings, "dry": self.regions, "structures": self.structures, "underwater": self.underwater,
+            "change": self.change,
+        }  # fmt: skip
         return chapter not in there or bool(there[chapter])
 
     def _labels(self, chainages: list[float]) -> list[str]:
