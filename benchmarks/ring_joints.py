@@ -71,8 +71,6 @@ def main() -> None:
             mean = (found[-1] - found[0]) / (len(found) - 1)
             off = (found - first) / pitch
             wrong = 1e3 * pitch * np.abs(off - np.rint(off))
-            figures = round(1e3 * float(mean - pitch), 2), round(float(np.quantile(wrong, 0.95)), 1), round(seconds, 1)
-            rows.append((kind, pitch, len(found), *figures))
             within = float(np.quantile(wrong, 0.95))
             off_true = 1e3 * float(mean - pitch)
             rows.append((kind, pitch, len(found), round(off_true, 2), round(within, 1), round(seconds, 1)))

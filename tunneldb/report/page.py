@@ -289,9 +289,6 @@ class _Report:
         there: dict[str, object] = {
             "findings": self.findings, "dry": self.regions, "structures": self.structures, "underwater": self.underwater,
             "clearance": self.clearance, "rings": self.rings, "change": self.change, "deviation": self.deviation,
-        there = {
-            "findings": self.findings, "dry": self.regions, "structures": self.structures, "underwater": self.underwater,
-            "change": self.change,
         }  # fmt: skip
         return chapter not in there or bool(there[chapter])
 
