@@ -34,7 +34,8 @@ def add_clearance(conn: psycopg.Connection, survey_id: int) -> None:
     )
     conn.execute(
         "INSERT INTO tunnel.gauge (tunnel_id, name, outline, source, checksum)"
-        " SELECT tunnel_id, 'example', '{-1,0,0,-1,4,0,1,4,0,1,0,0,-1,0,0}', 'example.csv', '0' FROM tunnel.survey WHERE id = %s",
+        " SELECT tunnel_id, 'example', '{-1,0,0,-1,4,0,1,4,0,1,0,0,-1,0,0}', 'example.csv', '0'"
+        " FROM tunnel.survey WHERE id = %s",
         (survey_id,),
     )
 
