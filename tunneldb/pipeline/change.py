@@ -126,7 +126,7 @@ def compare(
         raise UserError(
             f"{old.name} and {new.name} have no kilometre with offset images in common there: tunneldb run makes them"
         )
-    blocked = [(km, why) for km, (why, _, _) in there.items() if why is not None and why.startswith("detect of ")]
+    blocked = [(km, why) for km, (why, _, _) in there.items() if why is not None and " is stale: " in why]
     if blocked:
         km, why = blocked[0]
         raise UserError(f"kilometre {km}: {why}; tunneldb run --stale that survey, then compare")
