@@ -91,20 +91,20 @@ AS $$
     SELECT w.low, w.high, tunnel_api.station_label(s.tunnel_id, w.low), w.length, w.design_area, w.compared_area, w.volume,
            sqrt(w.noise + ($6 * w.by_right) ^ 2 + ($6 * w.by_up) ^ 2), w.mean, w.least, w.thin
       FROM (SELECT v.id, v.tunnel_id FROM tunnel_api.survey v WHERE v.id = tunnel_api.survey_id($2)) s
+     CROSS JOIN (SELECT tunnel_api.survey_id($1) AS id OFFSET 0) b  -- once, not once a section
      CROSS JOIN LATERAL (
         SELECT n * $4 AS low, (n + 1) * $4 AS high, sum(p.long) AS length, sum(p.long * d.design_length) AS design_area,
                sum(p.long * d.compared_length) AS compared_area, sum(p.long * d.area) AS volume,
                sum((p.long * d.noise_area) ^ 2) AS noise, sum(p.long * d.by_right) AS by_right, sum(p.long * d.by_up) AS by_up,
                sum(p.long * d.compared_length * d.thickness_mean) / nullif(sum(p.long * d.compared_length), 0) AS mean,
-               min(d.thickness_least) AS least, coalesce(sum(p.long * t.long), 0) AS thin
+               min(d.thickness_least) AS least,
+               coalesce(sum(p.long * CASE WHEN d.thickness_least < $5 THEN d.design_length / cardinality(d.thickness) * (
+                   SELECT count(*) FROM unnest(d.thickness) c (thick) WHERE c.thick < $5) END), 0) AS thin
           FROM tunnel_api.thickness_section d
          CROSS JOIN (VALUES (0), (1)) AS k (further)
          CROSS JOIN LATERAL (SELECT floor(d.chainage_from / $4) + k.further AS n) f
          CROSS JOIN LATERAL (SELECT least(d.chainage_to, (n + 1) * $4) - greatest(d.chainage_from, n * $4) AS long) p
-          LEFT JOIN LATERAL (
-            SELECT d.design_length / cardinality(d.thickness) * count(*) AS long FROM unnest(d.thickness) c (thick)
-             WHERE c.thick < $5) t ON d.thickness_least < $5
-         WHERE d.survey_id = s.id AND d.before_id = tunnel_api.survey_id($1) AND d.layer = $3 AND $4 >= 1 AND p.long > 0
+         WHERE d.survey_id = s.id AND d.before_id = b.id AND d.layer = $3 AND $4 >= 1 AND p.long > 0
          GROUP BY n) w
 $$;
 COMMENT ON FUNCTION tunnel_api.thickness_stretches(text, text, text, float8, float8, float8) IS

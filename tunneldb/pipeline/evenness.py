@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 import psycopg
-from shapely.affinity import translate
+import rasterio.features
+import shapely
+import shapely.geometry
+from affine import Affine
 
 from tunneldb.arrays import Single
 from tunneldb.errors import UserError
@@ -16,8 +19,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.deviation import measure_deviation
 from tunneldb.raster.geotiff import DEVIATION_KINDS, laid
 from tunneldb.raster.grid import BLOCK
-from tunneldb.raster.polygons import outline
-from tunneldb.shape.evenness import Evenness, evenness, step_evenness, uneven_areas
+from tunneldb.shape.evenness import ALONG, AROUND, Evenness, evenness, step_evenness, uneven_areas
 from tunneldb.shape.overbreak import CELL, LEAST_PIXELS
 from tunneldb.shape.straightedge import Cells, cell_means
 from tunneldb.store.deviation import STEP
@@ -170,11 +172,16 @@ def steps_of(grid: CellGrid, found: Evenness, km: int, limit: float, ends: tuple
 
 
 def polygons_of(grid: CellGrid, found: Evenness, km: int, limit: float) -> Iterator[UnevenPolygon]:
-    """Where the gap is too large in a kilometre, in the unrolled plane."""
+    """Where the gap is too large in a kilometre, in the unrolled plane, along the sides of cells."""
     first = max(round((km * KILOMETRE - grid.west) / grid.cell), 0)
     last = min(round(((km + 1) * KILOMETRE - grid.west) / grid.cell), found.cells.mean.shape[1])
-    column, row = round(grid.west / grid.cell), int(np.floor(grid.south / grid.cell))
-    rest = grid.south - row * grid.cell
-    for area in uneven_areas(found, slice(first, last), limit):
-        shape = outline(area.mask, column + first + area.column, row + area.row, grid.cell)
-        yield UnevenPolygon(translate(shape, 0.0, rest), area.cells * grid.cell**2, area.gap, area.direction)
+    areas = uneven_areas(found, slice(first, last), limit)
+    place = Affine(grid.cell, 0.0, round(grid.west + first * grid.cell, 6), 0.0, grid.cell, grid.south)
+    for shape, number in rasterio.features.shapes(areas.label, areas.label > 0, connectivity=4, transform=place):
+        k = int(number) - 1
+        yield UnevenPolygon(
+            shapely.geometry.polygon.orient(shapely.geometry.shape(shape)),
+            float(areas.cells[k] * grid.cell**2),
+            float(areas.gap[k]),
+            ALONG if areas.along[k] else AROUND,
+        )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
 
-from tunneldb.arrays import Bool, Float
+from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.shape.straightedge import Cells, Gaps, gaps_beneath
 
 ALONG, AROUND = "along", "around"
@@ -61,27 +60,25 @@ class StepEvenness:
 
 
 @dataclass(frozen=True)
-class UnevenArea:
-    """Cells that hang together by their sides, with a greater gap than the limit.
+class UnevenAreas:
+    """Areas of cells that hang together by their sides, with a greater gap than the limit.
 
     Attributes
     ----------
-    mask : (rows, columns) bool array
-    row, column : int
-        Its first row and column.
-    cells : int
-    gap : float
+    label : (rows, columns) int32 array
+        Number of the area that a cell is in, from 1; 0 in none.
+    cells : (n,) int array
+        How many it has.
+    gap : (n,) float array
         Greatest gap in it, m.
-    direction : str
-        How the straightedge lay that has it.
+    along : (n,) bool array
+        Whether the straightedge that has it lay along the tunnel, or else around the section.
     """
 
-    mask: Bool
-    row: int
-    column: int
-    cells: int
-    gap: float
-    direction: str
+    label: Int32
+    cells: Int64
+    gap: Float
+    along: Bool
 
 
 def evenness(cells: Cells, length: float, cell: float) -> Evenness:
@@ -107,16 +104,14 @@ def step_evenness(found: Evenness, columns: slice, limit: float) -> StepEvenness
     )
 
 
-def uneven_areas(found: Evenness, columns: slice, limit: float) -> Iterator[UnevenArea]:
+def uneven_areas(found: Evenness, columns: slice, limit: float) -> UnevenAreas:
     """Where, in some columns, the gap is greater than a limit, m."""
-    along, around = found.along.gap[:, columns], found.around.gap[:, columns]
-    gap = np.nan_to_num(np.fmax(along, around))
-    label, count = ndimage.label(gap > limit)
-    for number, (rows, across) in enumerate(ndimage.find_objects(label, count), start=1):
-        mask = label[rows, across] == number
-        greatest = float(gap[rows, across][mask].max())
-        laid_along = np.nan_to_num(along[rows, across])[mask].max() >= greatest
-        yield UnevenArea(mask, rows.start, across.start, int(mask.sum()), greatest, ALONG if laid_along else AROUND)
+    gap = np.nan_to_num(found.gap[:, columns])
+    label, count = ndimage.label(gap > limit, output=np.int32)
+    numbers = np.arange(1, count + 1)
+    greatest = np.asarray(ndimage.maximum(gap, label, numbers))
+    along = np.asarray(ndimage.maximum(np.nan_to_num(found.along.gap[:, columns]), label, numbers))
+    return UnevenAreas(label, np.bincount(label.ravel(), minlength=count + 1)[1:], greatest, along >= greatest)
 
 
 def _greatest(gap: Float) -> Float:
