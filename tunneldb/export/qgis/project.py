@@ -353,7 +353,7 @@ def _rasters(images: Sequence[Path], folder: Path | None, crs: ET.Element) -> li
             if kind == BED:
                 entries.append(_Entry(layer_id(path.stem), path.stem, (UNDERWATER, title), (MAP,), element))
                 continue
-            themes = (UNROLLED, SHEETS, FINDINGS) if kind.removesuffix(FILLED) in shown else ()
+            themes: tuple[str, ...] = (UNROLLED, SHEETS, FINDINGS) if kind.removesuffix(FILLED) in shown else ()
             themes += (DEVIATION,) if kind.removesuffix(FILLED) == design else ()
             entries.append(_Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))
     return entries
