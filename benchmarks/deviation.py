@@ -189,7 +189,7 @@ def timed_evenness() -> list[tuple[object, ...]]:
 
 
 def stored(pixel: float) -> list[tuple[object, ...]]:
-    """Images of offset and deviation as they are stored, 3 mm of noise: MB and CPU seconds a kilometre, by a block of 50 m."""
+    """Images of offset and deviation as they are stored, with 3 mm of noise: MB and CPU seconds a kilometre."""
     surface, axis = made(5.0, 1000.0, 0.03, 0.02)
     design = Design(surface, axis, stretches([Profile("a", 0.0, 1000.0, horseshoe(5.0, 4.0))]))
     image = block(surface, 0.0, pixel)

@@ -116,6 +116,7 @@ def test_what_is_wrong_is_told_with_what_was_done_before(example: str, tmp_path:
         ["simulate-structure", str(tmp_path), "--stations", "0"],
         ["simulate-canal", str(tmp_path), "--length", "1"],
         ["profile", "add", "demo", "nowhere.csv"], ["deviation", "nobody"], ["clearance", "nobody", "--gauge", "nowhere.csv"],
+        ["thickness", "nobody", example], ["evenness", "nobody"], ["compare", "nobody", "nobody"],
         ["rings", "--points", "nowhere.csv", "--axis", "nowhere.csv", "--diameter", "6"],
         ["survey", "add", "x"], ["export", example, "-o", str(tmp_path / "x.pdf")], ["status", example, "--watch"],
     ):  # fmt: skip

@@ -2,11 +2,11 @@
 <qgis version="3.22.0" styleCategories="AllStyleCategories" hasScaleBasedVisibilityFlag="0" minScale="0" maxScale="0" readOnly="0">
   <renderer-v2 type="graduatedSymbol" attr="&quot;overbreak&quot; + &quot;underbreak&quot;" graduatedMethod="GraduatedColor" symbollevels="0" forceraster="0" enableorderby="0">
     <ranges>
-      <range symbol="0" lower="0.000000" upper="0.100000" label="Over- and underbreak up to 0.1 m²" render="true"/>
-      <range symbol="1" lower="0.100000" upper="0.250000" label="0.1 to 0.25 m²" render="true"/>
-      <range symbol="2" lower="0.250000" upper="0.500000" label="0.25 to 0.5 m²" render="true"/>
-      <range symbol="3" lower="0.500000" upper="1.000000" label="0.5 to 1 m²" render="true"/>
-      <range symbol="4" lower="1.000000" upper="1000.000000" label="Over 1 m²" render="true"/>
+      <range symbol="0" lower="0.000000" upper="0.250000" label="Over- and underbreak up to 0.25 m²" render="true"/>
+      <range symbol="1" lower="0.250000" upper="0.500000" label="0.25 to 0.5 m²" render="true"/>
+      <range symbol="2" lower="0.500000" upper="1.000000" label="0.5 to 1 m²" render="true"/>
+      <range symbol="3" lower="1.000000" upper="2.000000" label="1 to 2 m²" render="true"/>
+      <range symbol="4" lower="2.000000" upper="1000.000000" label="Over 2 m²" render="true"/>
     </ranges>
     <symbols>
       <symbol name="0" type="line" alpha="1" clip_to_extent="1" force_rhr="0">
