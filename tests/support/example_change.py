@@ -80,3 +80,13 @@ def add_earlier(conn: psycopg.Connection, survey: str) -> None:
     conn.execute("UPDATE tunnel.survey SET name = %s, date = '2022-05-04' WHERE name = %s", (EARLIER, LATER))
     change = Raster(IMAGE, Affine(0.1, 0.0, 12320.0, 0.0, -0.1, 1.0))
     save_images(conn, get_survey(conn, EARLIER), get_survey(conn, survey), 12, change, change)
+
+
+def add_change_run(conn: psycopg.Connection, survey: str) -> None:
+    """The run of the ledger that made it."""
+    conn.execute(
+        "INSERT INTO tunnel.run (survey_id, km, stage, parameters, versions, counts, started_at, finished_at, outcome)"
+        " SELECT n.id, 12, 'compare', jsonb_build_object('old', o.id), '{}', '{}', now(), now(), 'done'"
+        " FROM tunnel.survey n, tunnel.survey o WHERE (n.name, o.name) = (%s, %s)",
+        (LATER, survey),
+    )

@@ -15,7 +15,7 @@
       <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="33,102,172,150"/>
+            <Option type="QString" name="color" value="33,102,172,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="5,48,97,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -28,7 +28,7 @@
       <symbol name="1" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="67,147,195,150"/>
+            <Option type="QString" name="color" value="67,147,195,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="5,48,97,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -41,7 +41,7 @@
       <symbol name="2" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="146,197,222,150"/>
+            <Option type="QString" name="color" value="146,197,222,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="5,48,97,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -54,7 +54,7 @@
       <symbol name="3" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="209,229,240,150"/>
+            <Option type="QString" name="color" value="209,229,240,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="5,48,97,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -67,7 +67,7 @@
       <symbol name="4" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="253,219,199,150"/>
+            <Option type="QString" name="color" value="253,219,199,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="103,0,31,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -80,7 +80,7 @@
       <symbol name="5" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="244,165,130,150"/>
+            <Option type="QString" name="color" value="244,165,130,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="103,0,31,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -93,7 +93,7 @@
       <symbol name="6" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="214,96,77,150"/>
+            <Option type="QString" name="color" value="214,96,77,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="103,0,31,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -106,7 +106,7 @@
       <symbol name="7" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="178,24,43,150"/>
+            <Option type="QString" name="color" value="178,24,43,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="103,0,31,255"/>
             <Option type="QString" name="outline_style" value="solid"/>

@@ -15,7 +15,7 @@
       <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="33,102,172,150"/>
+            <Option type="QString" name="color" value="33,102,172,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="5,48,97,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -28,7 +28,7 @@
       <symbol name="1" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="67,147,195,150"/>
+            <Option type="QString" name="color" value="67,147,195,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="5,48,97,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -41,7 +41,7 @@
       <symbol name="2" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="146,197,222,150"/>
+            <Option type="QString" name="color" value="146,197,222,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="5,48,97,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -54,7 +54,7 @@
       <symbol name="3" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="209,229,240,150"/>
+            <Option type="QString" name="color" value="209,229,240,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="5,48,97,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -67,7 +67,7 @@
       <symbol name="4" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="253,219,199,150"/>
+            <Option type="QString" name="color" value="253,219,199,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="103,0,31,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -80,7 +80,7 @@
       <symbol name="5" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="244,165,130,150"/>
+            <Option type="QString" name="color" value="244,165,130,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="103,0,31,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -93,7 +93,7 @@
       <symbol name="6" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="214,96,77,150"/>
+            <Option type="QString" name="color" value="214,96,77,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="103,0,31,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -106,7 +106,7 @@
       <symbol name="7" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="178,24,43,150"/>
+            <Option type="QString" name="color" value="178,24,43,120"/>
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="103,0,31,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
@@ -286,56 +286,56 @@
       <rule key="{change-space-7}" filter='"change_mean" &gt;= 0.01' description="inwards, 10 mm and more">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="178,24,43,255" diffuse="178,24,43,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="107,14,26,255" diffuse="107,14,26,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="2" color="103,0,31,255"/>
         </symbol>
       </rule>
       <rule key="{change-space-6}" filter='"change_mean" &gt;= 0.005 AND "change_mean" &lt; 0.01' description="inwards, 5 to 10 mm">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="214,96,77,255" diffuse="214,96,77,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="128,58,46,255" diffuse="128,58,46,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="2" color="103,0,31,255"/>
         </symbol>
       </rule>
       <rule key="{change-space-5}" filter='"change_mean" &gt;= 0.002 AND "change_mean" &lt; 0.005' description="inwards, 2 to 5 mm">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="244,165,130,255" diffuse="244,165,130,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="146,99,78,255" diffuse="146,99,78,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="2" color="103,0,31,255"/>
         </symbol>
       </rule>
       <rule key="{change-space-4}" filter='"change_mean" &gt;= 0 AND "change_mean" &lt; 0.002' description="inwards, less than 2 mm">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="253,219,199,255" diffuse="253,219,199,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="152,131,119,255" diffuse="152,131,119,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="2" color="103,0,31,255"/>
         </symbol>
       </rule>
       <rule key="{change-space-3}" filter='"change_mean" &gt; -0.002 AND "change_mean" &lt;= 0' description="outwards, less than 2 mm">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="209,229,240,255" diffuse="209,229,240,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="125,137,144,255" diffuse="125,137,144,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="2" color="5,48,97,255"/>
         </symbol>
       </rule>
       <rule key="{change-space-2}" filter='"change_mean" &gt; -0.005 AND "change_mean" &lt;= -0.002' description="outwards, 2 to 5 mm">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="146,197,222,255" diffuse="146,197,222,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="88,118,133,255" diffuse="88,118,133,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="2" color="5,48,97,255"/>
         </symbol>
       </rule>
       <rule key="{change-space-1}" filter='"change_mean" &gt; -0.01 AND "change_mean" &lt;= -0.005' description="outwards, 5 to 10 mm">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="67,147,195,255" diffuse="67,147,195,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="40,88,117,255" diffuse="40,88,117,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="2" color="5,48,97,255"/>
         </symbol>
       </rule>
       <rule key="{change-space-0}" filter='"change_mean" &lt;= -0.01' description="outwards, 10 mm and more">
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
-          <material ambient="33,102,172,255" diffuse="33,102,172,255" specular="0,0,0,255" shininess="0"/>
+          <material ambient="20,61,103,255" diffuse="20,61,103,255" specular="0,0,0,255" shininess="0"/>
           <edges enabled="1" width="2" color="5,48,97,255"/>
         </symbol>
       </rule>
