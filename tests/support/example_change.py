@@ -29,6 +29,10 @@ IMAGE[0, 0] = np.nan
 """Change of cells (rows, columns), m: inwards in the first half of each row, outwards in the other, one unseen."""
 
 
+OVALER = 1.5
+"""Ovality of each ring over that in the survey before."""
+
+
 def add_change(conn: psycopg.Connection, survey: str) -> None:
     """A survey of 2026 that was compared with that of 2024; each section moved by 10 µm more than the one before."""
     (old, tunnel) = conn.execute("SELECT id, tunnel_id FROM tunnel.survey WHERE name = %s", (survey,)).fetchone()
@@ -49,6 +53,13 @@ def add_change(conn: psycopg.Connection, survey: str) -> None:
         given,
     )
     box = "ST_MakeEnvelope(%(at)s, 0, %(at)s + 1, %(area)s, 0)"
+    conn.execute(
+        "INSERT INTO tunnel.ring (survey_id, km, number, chainage_from, chainage_to, origin, joint, seen_share, shape, radius,"
+        " radius_se, ovality, ovality_se, design_diameter, diameter_from)"
+        " SELECT %s, km, number, chainage_from, chainage_to, origin, joint, seen_share, shape, radius, radius_se, %s * ovality,"
+        " ovality_se, design_diameter, diameter_from FROM tunnel.ring WHERE survey_id = %s",
+        (new, OVALER, old),
+    )
     on_map = "ST_MakeEnvelope(%(at)s, 0, %(at)s + 1, %(area)s, 25830)"
     for at, area, mean in REGIONS:
         conn.execute(
