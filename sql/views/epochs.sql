@@ -245,6 +245,22 @@ $$;
 COMMENT ON FUNCTION tunnel_api.convergence(text, float8, float8, float8) IS
 'By how much the chord between two clock positions, by default 9 and 3, became longer since the older survey, m, in each survey that was compared with it, by date; negative where the walls approach each other. The clock positions must lie opposite to each other: then the changes along both normals are those along the chord';
 
+CREATE OR REPLACE FUNCTION tunnel_api.ring_series(tunnel text, chainage float8)
+RETURNS TABLE (survey text, date date, number int, label text, seen_share float8, radius float8, radius_se float8, ovality float8,
+               ovality_se float8, largest_clock float8, largest_clock_se float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    SELECT s.name, s.date, r.number, tunnel_api.station_label(s.tunnel_id, (r.chainage_from + r.chainage_to) / 2), r.seen_share,
+           r.radius, r.radius_se, r.ovality, r.ovality_se, r.largest_clock, r.largest_clock_se
+      FROM tunnel.tunnel t
+      JOIN tunnel.survey s ON s.tunnel_id = t.id
+     CROSS JOIN LATERAL (SELECT q.* FROM tunnel.ring q WHERE q.survey_id = s.id AND q.chainage_from <= $2
+                          ORDER BY q.chainage_from DESC LIMIT 1) r
+     WHERE t.name = $1 AND r.chainage_to > $2
+     ORDER BY s.date, s.name
+$$;
+COMMENT ON FUNCTION tunnel_api.ring_series(text, float8) IS
+'Shape of the ring at a chainage (m) in each survey of a tunnel whose rings are defined, by date: share of it that is seen, mean radius (m), ovality as a share of the design diameter, clock position of the largest diameter (degrees), each with its standard error; NULL where it was not measured or cannot be told. Rings are those of each survey: their numbers differ where they were found or counted otherwise';
+
 CREATE OR REPLACE FUNCTION tunnel_api.leak_area_series(tunnel text, step float8 DEFAULT 100)
 RETURNS TABLE (chainage_from float8, chainage_to float8, label text, survey text, date date, leaks bigint, area float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 1000 SECURITY DEFINER SET search_path = pg_catalog, pg_temp SET jit = off AS $$

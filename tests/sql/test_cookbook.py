@@ -591,6 +591,13 @@ def converged(rows: Rows, a: Asked) -> None:
     close(rows[0], convergence_mm=0, se_mm=0.7)
 
 
+def ring_by_survey(rows: Rows, a: Asked) -> None:
+    """Rings are 2 m long from 12+300 on: 12+345 lies in the 23rd."""
+    assert [(row["survey"], row["number"]) for row in rows] == [(NAME, 23), (example_change.LATER, 23)]
+    close(rows[0], ovality=23000 * OVALITY, se=0.1, radius_mm=4000)
+    close(rows[1], ovality=23000 * OVALITY * example_change.OVALER, se=0.1, radius_mm=4000)
+
+
 def new_leaks(rows: Rows, a: Asked) -> None:
     (row,) = rows
     assert row["label"] == label(12330.5)
@@ -676,6 +683,7 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which rings are oval by more than 5 ‰?": oval,
     "Which are the ten greatest steps between rings?": great_steps,
     "How has a chord changed since another survey?": converged,
+    "How did a ring change from survey to survey?": ring_by_survey,
     "What is new since a survey?": new_leaks,
     "Which leaks grew most?": grown_leaks,
     "Which ten sections moved most, and which changed their shape most?": moved_sections,

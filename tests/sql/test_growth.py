@@ -14,7 +14,7 @@ import pytest
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
-from tunneldb.cli.main import _describe_database_error
+from tunneldb.database.failures import describe_failure
 from tunneldb.database import connect, copy_binary, pack
 from tunneldb.store.catalog import remove_survey
 from tunneldb.store.sources import load_points, sample
@@ -337,7 +337,7 @@ def test_a_removal_waits_for_who_reads_and_holds_up_nobody(dsn: str) -> None:
 def test_a_server_out_of_locks_says_which_setting_to_raise(conn: psycopg.Connection) -> None:
     with pytest.raises(psycopg.errors.OutOfMemory) as caught:
         conn.execute("SELECT count(pg_advisory_xact_lock(n)) FROM generate_series(1, 10000000) AS n")
-    message = _describe_database_error(caught.value)
+    message = describe_failure(caught.value)
     assert message is not None
     assert "max_locks_per_transaction" in message
     assert "\n" not in message

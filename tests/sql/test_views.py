@@ -11,7 +11,9 @@ import psycopg
 import pytest
 import shapely
 from psycopg import sql
+from support.example_change import add_change, add_change_run
 from support.example_clearance import add_clearance_run
+from support.example_deviation import add_surfaces
 from support.example_sonar import save_example_registration
 from support.example_structures import save_example_structures
 from support.queue_rows import add_file, add_goal, add_job, add_worker
@@ -109,6 +111,13 @@ def test_every_view_begins_with_a_stable_integer_key(
     save_example_structures(conn, "demo-2024")
     save_example_registration(conn, "demo-2024")
     add_clearance_run(conn, "demo-2024")
+    add_change(conn, "demo-2024")
+    add_change_run(conn, "demo-2024")
+    add_surfaces(conn, one(conn, "SELECT id FROM tunnel.survey WHERE name = %s", example))
+    conn.execute(  # the earlier survey saw kilometre 12, too
+        "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) SELECT s.id, i.km, i.kind, i.block, i.tiff"
+        " FROM tunnel.image i, tunnel.survey s WHERE i.kind = 'offset' AND s.name = 'demo-2023'"
+    )
     for view in views(conn):
         with conn.cursor() as cursor:
             cursor.execute(sql.SQL("SELECT * FROM tunnel_api.{}").format(sql.Identifier(view)))

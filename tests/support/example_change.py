@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import psycopg
+from affine import Affine
 
-LATER = "demo-2026"
+from tunneldb.raster.geotiff import Raster
+from tunneldb.store.change import save_images
+from tunneldb.store.survey import get_survey
+
+LATER, EARLIER = "demo-2026", "demo-2022"
 SECTION, GIRTH = 1.5, 20.0
 """Length of a section, m, and lining of it by metre, m."""
 
@@ -16,6 +22,15 @@ LEAKS = {"grown": (1.0, 3.0), "new": (0.0, 0.4), "dry": (0.3, 0.0), "same": (0.8
 
 REGIONS = ((12320.0, 2.0, 0.004), (12410.0, 5.0, -0.006))
 """Regions of change: chainage, area in m², mean in m."""
+
+
+IMAGE = np.where(np.arange(50).reshape(5, 10) % 10 < 5, 0.004, -0.002).astype(np.float32)
+IMAGE[0, 0] = np.nan
+"""Change of cells (rows, columns), m: inwards in the first half of each row, outwards in the other, one unseen."""
+
+
+OVALER = 1.5
+"""Ovality of each ring over that in the survey before."""
 
 
 def add_change(conn: psycopg.Connection, survey: str) -> None:
@@ -38,13 +53,21 @@ def add_change(conn: psycopg.Connection, survey: str) -> None:
         given,
     )
     box = "ST_MakeEnvelope(%(at)s, 0, %(at)s + 1, %(area)s, 0)"
+    conn.execute(
+        "INSERT INTO tunnel.ring (survey_id, km, number, chainage_from, chainage_to, origin, joint, seen_share, shape, radius,"
+        " radius_se, ovality, ovality_se, design_diameter, diameter_from)"
+        " SELECT %s, km, number, chainage_from, chainage_to, origin, joint, seen_share, shape, radius, radius_se, %s * ovality,"
+        " ovality_se, design_diameter, diameter_from FROM tunnel.ring WHERE survey_id = %s",
+        (new, OVALER, old),
+    )
+    on_map = "ST_MakeEnvelope(%(at)s, 0, %(at)s + 1, %(area)s, 25830)"
     for at, area, mean in REGIONS:
         conn.execute(
             "INSERT INTO tunnel.change_region (survey_id, old_survey_id, km, chainage_from, chainage_to,"
             " arc_from, arc_to, clock,"
             " area, change_mean, lod, change_extreme, unrolled, map, surface) VALUES (%(new)s, %(old)s, 12,"
             " %(at)s, %(at)s + 1, 0,"
-            f" %(area)s, 1, %(area)s, %(mean)s, 0.001, %(mean)s, {box}, {box}, ST_Force3D({box}))",
+            f" %(area)s, 1, %(area)s, %(mean)s, 0.001, %(mean)s, {box}, {on_map}, ST_Force3D({on_map}))",
             given | {"at": at, "area": area, "mean": mean},
         )
     for n, (state, (before, after)) in enumerate(LEAKS.items()):
@@ -55,6 +78,26 @@ def add_change(conn: psycopg.Connection, survey: str) -> None:
             " unrolled, map, surface)"
             " VALUES (%(new)s, %(old)s, 12, %(state)s, %(ids)s, '{}', '{}', '{}', %(before)s, 0.03, %(after)s,"
             " 0.04, 1, 1, %(at)s,"
-            f" %(at)s + 1, 1, ST_Multi({box}), ST_Multi({box}), ST_Force3D(ST_Multi({box})))",
+            f" %(at)s + 1, 1, ST_Multi({box}), ST_Multi({on_map}), ST_Force3D(ST_Multi({on_map})))",
             given | {"at": 12310 + 20 * n, "area": 1, "state": state, "before": before, "after": after, "ids": [n]},
         )
+
+
+def add_earlier(conn: psycopg.Connection, survey: str) -> None:
+    """The same the other way round: the survey of 2024 is the newer, the other of 2022; with an image, 10 cells wide by 5."""
+    add_change(conn, survey)
+    for table in ("change_section", "change_region", "leak_change"):
+        conn.execute(f"UPDATE tunnel.{table} SET survey_id = old_survey_id, old_survey_id = survey_id")  # type: ignore[arg-type]
+    conn.execute("UPDATE tunnel.survey SET name = %s, date = '2022-05-04' WHERE name = %s", (EARLIER, LATER))
+    change = Raster(IMAGE, Affine(0.1, 0.0, 12320.0, 0.0, -0.1, 1.0))
+    save_images(conn, get_survey(conn, EARLIER), get_survey(conn, survey), 12, change, change)
+
+
+def add_change_run(conn: psycopg.Connection, survey: str) -> None:
+    """The run of the ledger that made it."""
+    conn.execute(
+        "INSERT INTO tunnel.run (survey_id, km, stage, parameters, versions, counts, started_at, finished_at, outcome)"
+        " SELECT n.id, 12, 'compare', jsonb_build_object('old', o.id), '{}', '{}', now(), now(), 'done'"
+        " FROM tunnel.survey n, tunnel.survey o WHERE (n.name, o.name) = (%s, %s)",
+        (LATER, survey),
+    )

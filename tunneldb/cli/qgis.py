@@ -14,6 +14,7 @@ from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.export.images.change import export_change
 from tunneldb.export.images.image import export_filled, export_kilometre, image_kilometres
 from tunneldb.export.qgis import store_project, store_styles, write_project
 from tunneldb.export.tables.spots import read_spots
@@ -54,8 +55,9 @@ def qgis(
     atlas with a page for each; of a site they are all that there is.
 
     Leaks can be reviewed and axis vertices moved in it. It shows the intensity, or the offset where there is none, over the
-    same with gaps up to 0.6 m filled. The styles also go into the database, where QGIS finds them for layers that are added by
-    hand. A project in the database holds the images by their absolute paths.
+    same with gaps up to 0.6 m filled. Of a survey that was compared with an older one it shows what changed. The styles also go
+    into the database, where QGIS finds them for layers that are added by hand. A project in the database holds the images by
+    their absolute paths.
     """
     if output is None and name is None:
         raise UserError("say where the project goes: -o FILE.qgz, or --database")
@@ -103,6 +105,7 @@ def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> li
         for km in kilometres:
             written += export_kilometre(conn, survey, km, folder)
             written += export_filled(conn, survey, km, folder)
+            written += export_change(conn, survey, km, folder)
             advance(1)
     return [path for path in written if path.suffix == ".tif"]
 

@@ -17,10 +17,6 @@ from tunneldb.compiled import kernel
 KINDS = ("raw", "corrected", "offset")
 """What the images of a kilometre show: raw and corrected intensity (dB), offset from the surface (m)."""
 
-STEP = {"raw": 0.01, "corrected": 0.01, "offset": 0.001, "state": 1.0, "change": 1e-4, "lod": 1e-4}
-"""Value of one step of the stored whole numbers: dB, dB, m, and of the state of pixels itself."""
-
-UNIT = {"raw": "dB", "corrected": "dB", "offset": "m", "state": "", "deviation": "m", "change": "m", "lod": "m"}
 DEVIATION_KINDS = {
     "lining": "deviation_lining",
     "shotcrete": "deviation_shotcrete",
@@ -28,10 +24,19 @@ DEVIATION_KINDS = {
 }
 """Images of the deviation (m) from the design profiles of each layer, which are there where they were asked for."""
 
-STEP = {"raw": 0.01, "corrected": 0.01, "offset": 0.001, "state": 1.0, **dict.fromkeys(DEVIATION_KINDS.values(), 0.001)}
+CHANGE = "change"
+"""Image of the change (m) since an older survey, positive inwards, which is there where two surveys were compared."""
+
+STEP = {
+    "raw": 0.01, "corrected": 0.01, "offset": 0.001, "state": 1.0, CHANGE: 1e-4, "lod": 1e-4,
+    **dict.fromkeys(DEVIATION_KINDS.values(), 0.001),
+}  # fmt: skip
 """Value of one step of the stored whole numbers: dB, dB, m, of the state of pixels itself, m."""
 
-UNIT = {"raw": "dB", "corrected": "dB", "offset": "m", "state": "", **dict.fromkeys(DEVIATION_KINDS.values(), "m")}
+UNIT = {
+    "raw": "dB", "corrected": "dB", "offset": "m", "state": "", CHANGE: "m", "lod": "m",
+    **dict.fromkeys(DEVIATION_KINDS.values(), "m"),
+}  # fmt: skip
 
 NODATA = -32768
 

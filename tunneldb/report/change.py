@@ -10,7 +10,8 @@ from psycopg.rows import dict_row
 
 from tunneldb.export.tables.change import Row, change_rows, summary
 from tunneldb.report.drawing import step_for, ticks
-from tunneldb.store.survey import Survey, get_survey
+from tunneldb.store.change import older_compared
+from tunneldb.store.survey import Survey
 
 WIDTH, HEIGHT = 1000.0, 120.0
 """Of the drawing of sections, in its own unit."""
@@ -68,15 +69,9 @@ class ChangeChapter:
 
 def read_change(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> ChangeChapter | None:
     """Read what changed in a stretch; None where the survey was compared with no older one there."""
-    row = conn.execute(
-        "SELECT o.name FROM tunnel.change_section c JOIN tunnel.survey o ON o.id = c.old_survey_id"
-        " WHERE c.survey_id = %s AND c.chainage_to > %s AND c.chainage_from < %s AND o.date <= %s"
-        " ORDER BY o.date DESC, o.name LIMIT 1",
-        [survey.id, low, high, survey.date],
-    ).fetchone()
-    if row is None:
+    old = older_compared(conn, survey, low, high)
+    if old is None:
         return None
-    old = get_survey(conn, row[0])
     sections = change_rows(conn, "change_section", old, survey, low, high)
     regions = change_rows(conn, "change_region", old, survey, low, high)
     leaks = change_rows(conn, "leak_change", old, survey, low, high)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +19,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.raster.geotiff import Raster, decode, encode
 from tunneldb.raster.grid import BLOCK
 from tunneldb.shape.rigid_motion import Motion
-from tunneldb.store.survey import Survey
+from tunneldb.store.survey import Survey, get_survey
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,19 @@ def load_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: 
         Leak(id, kind, wet, area, contrast, shapely.make_valid(shapely.from_wkb(bytes(outline))))
         for id, kind, wet, area, contrast, outline in rows
     ]
+
+
+def older_compared(
+    conn: psycopg.Connection[Any], survey: Survey, low: float = -math.inf, high: float = math.inf
+) -> Survey | None:
+    """Of the surveys that one was compared with between two chainages (m), the last before it; None without any."""
+    row = conn.execute(
+        "SELECT o.name FROM tunnel.change_section c JOIN tunnel.survey o ON o.id = c.old_survey_id"
+        " WHERE c.survey_id = %s AND c.chainage_to > %s AND c.chainage_from < %s AND o.date <= %s"
+        " ORDER BY o.date DESC, o.name LIMIT 1",
+        [survey.id, low, high, survey.date],
+    ).fetchone()
+    return None if row is None else get_survey(conn, row[0])
 
 
 def clear_change(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int) -> None:

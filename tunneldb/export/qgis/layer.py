@@ -28,6 +28,9 @@ CLEARANCE = "Clearance"
 DEVIATION = "Deviation"
 """The map theme of deviation from the design, and the print layout of its sheets."""
 
+CHANGE, CHANGE_MAP = "Change", "Change on the map"
+"""Map themes of what changed since an older survey, on the unrolled lining and beside the axis."""
+
 MEMBERS = "Members"
 """The print layout with a page for each member."""
 
@@ -225,3 +228,28 @@ DEVIATION_LAYERS = (
     ),
 )
 """The same of a survey that was held against a design."""
+
+CHANGE_LAYERS = (
+    VectorLayer(
+        "leak_change_map", "What became of leaks, beside the axis", "leak_change_map", "MultiPolygon", "leak_change", MAP,
+        (CHANGE_MAP,),
+    ),
+    VectorLayer(
+        "change_region_map", "Changed lining, beside the axis", "change_region_map", "Polygon", "change_region", MAP,
+        (CHANGE_MAP,),
+    ),
+    VectorLayer(
+        "leak_change_unrolled", "What became of leaks", "leak_change_unrolled", "MultiPolygon", "leak_change", UNROLLED,
+        (CHANGE,),
+    ),
+    VectorLayer(
+        "change_region_unrolled", "Changed lining", "change_region_unrolled", "Polygon", "change_region", UNROLLED, (CHANGE,)
+    ),
+    VectorLayer(
+        "change_region_3d", "Changed lining, in space", "change_region_3d", "PolygonZ", "change_region_3d", SPACE, (SPACE,)
+    ),
+)  # fmt: skip
+"""The same of a survey that was compared with an older one; each only where it has rows."""
+
+UNDER_CHANGE = {"axis": (CHANGE_MAP,), "outline": (CHANGE_MAP,), "sheet": (CHANGE,)}
+"""Other layers that the themes of change show, with those."""

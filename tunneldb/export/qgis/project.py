@@ -41,6 +41,9 @@ from tunneldb.export.qgis.finding_form import (
 )
 from tunneldb.export.qgis.finding_style import finding_style
 from tunneldb.export.qgis.layer import (
+    CHANGE,
+    CHANGE_LAYERS,
+    CHANGE_MAP,
     CLEARANCE,
     CLEARANCE_LAYERS,
     DEVIATION,
@@ -57,6 +60,7 @@ from tunneldb.export.qgis.layer import (
     SPACE,
     STRUCTURE_LAYERS,
     STRUCTURES,
+    UNDER_CHANGE,
     UNDERWATER,
     UNDERWATER_LAYERS,
     UNROLLED,
@@ -70,7 +74,9 @@ from tunneldb.export.qgis.space import docks, filled_layers, has_rows, scene, si
 from tunneldb.export.qgis.styles import require_table, style_elements
 from tunneldb.export.tables.spots import read_spots
 from tunneldb.files import replacing
+from tunneldb.raster.geotiff import CHANGE as CHANGE_KIND
 from tunneldb.raster.geotiff import DEVIATION_KINDS
+from tunneldb.store.change import older_compared
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.deviation import layers_held
 from tunneldb.store.remarks import read_remarks
@@ -191,6 +197,9 @@ def _project(
         *(layer for layer in CLEARANCE_LAYERS if has_rows(conn, survey.name, layer)),
         *(RING_LAYERS if has_rings(conn, survey) else ()),
     )
+    old = None if survey.site else older_compared(conn, survey)
+    if old is not None:
+        layers = _with_change(conn, survey, old, layers)
     filled = filled_layers(conn, survey.name, layers)
     entries = [_table(source, survey, "remark", "What is to be known (table)", counted=True)]
     if structures:
@@ -249,6 +258,17 @@ def _project(
         ]
     )
     return root
+
+
+def _with_change(
+    conn: psycopg.Connection, survey: Survey, old: Survey, layers: Sequence[VectorLayer]
+) -> tuple[VectorLayer, ...]:
+    """These layers, and above them those of what changed since an older survey that have rows."""
+    since = (
+        replace(layer, title=f"{layer.title}, since {old.name}", where=f'"old_survey_id" = {old.id}') for layer in CHANGE_LAYERS
+    )
+    under = (replace(layer, themes=(*layer.themes, *UNDER_CHANGE.get(layer.id, ()))) for layer in layers)
+    return (*(layer for layer in since if has_rows(conn, survey.name, layer)), *under)
 
 
 def layer_id(name: str) -> str:
@@ -336,7 +356,7 @@ def _table(
 def _rasters(images: Sequence[Path], folder: Path | None, crs: ET.Element) -> list[_Entry]:
     """Layers of the images, a group for each kind; the first kind that there is is shown, and what lies below the water.
 
-    Theme Deviation shows deviation from the innermost layer of the design that there is.
+    Theme Deviation shows deviation from the innermost layer of the design that there is, theme Change the change.
 
     It lies over the same with gaps filled.
     """
@@ -361,6 +381,7 @@ def _rasters(images: Sequence[Path], folder: Path | None, crs: ET.Element) -> li
                 continue
             themes: tuple[str, ...] = (UNROLLED, SHEETS, FINDINGS) if kind.removesuffix(FILLED) in shown else ()
             themes += (DEVIATION,) if kind.removesuffix(FILLED) == design else ()
+            themes += (CHANGE,) if kind == CHANGE_KIND else ()
             entries.append(_Entry(layer_id(path.stem), path.stem, (UNROLLED, title), themes, element))
     return entries
 
@@ -409,7 +430,7 @@ def _themes(entries: Sequence[_Entry], *, site: bool) -> ET.Element:
     """Map themes: which layers are visible, and the groups that must be switched on for it; of a tunnel all of its own."""
     presets = ET.Element("visibility-presets")
     used = {theme for entry in entries for theme in entry.themes} | (set() if site else {MAP, UNROLLED, SPACE, SHEETS})
-    known = (MAP, UNROLLED, FINDINGS, FINDINGS_MAP, DEVIATION, SPACE, SHEETS, FACES)
+    known = (MAP, UNROLLED, FINDINGS, FINDINGS_MAP, DEVIATION, CHANGE, CHANGE_MAP, SPACE, SHEETS, FACES)
     for theme in (theme for theme in known if theme in used):
         preset = ET.SubElement(presets, "visibility-preset", {"name": theme, "has-expanded-info": "1"})
         shown = [entry for entry in entries if theme in entry.themes]

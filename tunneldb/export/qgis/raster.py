@@ -12,7 +12,7 @@ import rasterio
 from tunneldb.arrays import Float
 from tunneldb.export.images.palette import PALETTES, hexadecimal
 from tunneldb.raster.gap_fill import TOLD
-from tunneldb.raster.geotiff import DEVIATION_KINDS
+from tunneldb.raster.geotiff import CHANGE, DEVIATION_KINDS
 from tunneldb.raster.grey import grey_range
 
 FILLED = "-filled"
@@ -32,6 +32,7 @@ KINDS = {
         for layer, kind in DEVIATION_KINDS.items()
         for end, said in (("", ""), (FILLED, f", {TOLD}"))
     },
+    CHANGE: "Change since an older survey",
     "state": "States: seen, unseen, dark",
     "class": "Classes",
     SUBMERGED: "Offset below the water",
@@ -41,6 +42,9 @@ KINDS = {
 
 OFFSET_RANGES = (0.1, 0.2, 0.5)
 """Offset at which the colours are full, m: the least that nine tenths of the images stay within."""
+
+CHANGE_RANGES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
+"""The same of change, m."""
 
 # Inwards red, outwards blue (ColorBrewer RdBu), the surface itself grey, to be told from paper.
 OFFSET_COLOURS = ((-1.0, "#2166ac"), (-0.4, "#92c5de"), (0.0, "#e6e6e6"), (0.4, "#f4a582"), (1.0, "#b2182b"))
@@ -55,11 +59,11 @@ def image_kind(path: Path) -> str | None:
     return next((kind for kind in KINDS if path.stem.endswith(kind)), None)
 
 
-def offset_range(paths: Sequence[Path]) -> float:
-    """Return the offset, m, at which the colours of these images are full: rock is rougher than concrete."""
+def offset_range(paths: Sequence[Path], ranges: Sequence[float] = OFFSET_RANGES) -> float:
+    """Return the offset or change, m, at which the colours of these images are full: rock is rougher than concrete."""
     values = np.abs(_sample(paths))
     usual = np.quantile(values, 0.9) if len(values) else 0.0
-    return next((limit for limit in OFFSET_RANGES if limit >= usual), OFFSET_RANGES[-1])
+    return next((limit for limit in ranges if limit >= usual), ranges[-1])
 
 
 def shown_limits(images: Sequence[Path]) -> tuple[str, float] | None:
@@ -86,8 +90,8 @@ def _sample(paths: Sequence[Path], band_number: int = 1) -> Float:
 def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
     """Return the element that says how an image is drawn, and all of its kind alike.
 
-    Intensity is drawn in grey, offset and deviation in diverging colours, each state or class in its own; depth the darker the
-    deeper.
+    Intensity is drawn in grey, offset, deviation and change in diverging colours, each state or class in its own; depth the
+    darker the deeper.
     """
     element = ET.Element("pipe")
     if kind in PALETTES:
@@ -95,10 +99,10 @@ def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
         entries = ET.SubElement(renderer, "colorPalette")
         for code, (name, rgb) in PALETTES[kind].entries.items():
             ET.SubElement(entries, "paletteEntry", value=str(code), color=hexadecimal(rgb), label=name, alpha="255")
-    elif kind.removesuffix(FILLED) in ("offset", SUBMERGED, *DEVIATION_KINDS.values()):
-        limit = offset_range(paths)
+    elif kind.removesuffix(FILLED) in ("offset", SUBMERGED, CHANGE, *DEVIATION_KINDS.values()):
+        limit = offset_range(paths, CHANGE_RANGES if kind == CHANGE else OFFSET_RANGES)
         renderer = _ramp(
-            element, 1, [(share * limit, f"{share * limit * 1000:+.0f} mm", colour) for share, colour in OFFSET_COLOURS]
+            element, 1, [(share * limit, f"{round(share * limit * 1000, 1):+g} mm", colour) for share, colour in OFFSET_COLOURS]
         )
     elif kind == BED:
         shallow, deep = np.quantile(_sample(paths, _DEPTH), [0.02, 0.98]) if paths else (0.0, 1.0)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from importlib import resources
+from itertools import chain
 
 import psycopg
 
 from tunneldb.errors import UserError
 from tunneldb.export.qgis.layer import (
+    CHANGE_LAYERS,
     CLEARANCE_LAYERS,
     DEVIATION_LAYERS,
     LAYERS,
@@ -86,7 +88,9 @@ def styled_columns() -> list[tuple[str, str, str, str]]:
     """
     return [
         (layer.view, layer.column, layer.style, layer.title)
-        for layer in (*LAYERS, *STRUCTURE_LAYERS, *UNDERWATER_LAYERS, *CLEARANCE_LAYERS, *RING_LAYERS, *DEVIATION_LAYERS)
+        for layer in chain(
+            LAYERS, STRUCTURE_LAYERS, UNDERWATER_LAYERS, CLEARANCE_LAYERS, RING_LAYERS, DEVIATION_LAYERS, CHANGE_LAYERS
+        )
         if layer.id == layer.view
     ] + [
         ("anomaly", "unrolled", "anomaly", "Leaks, joints and dark spots, unrolled"),
