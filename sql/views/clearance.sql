@@ -51,13 +51,13 @@ COMMENT ON COLUMN tunnel_api.clearance_section.geom IS 'The point with the least
 
 CREATE OR REPLACE VIEW tunnel_api.clearance_infringement AS
 SELECT i.id, i.survey_id, s.name AS survey, i.km, i.gauge, i.track, i.chainage_from, i.chainage_to,
-       tunnel_api.station_label(s.tunnel_id, i.chainage_from) AS label, i.depth, i.clock, tunnel_api.class_name(i.class) AS class,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (i.chainage_from + i.chainage_to) / 2) l) AS label, i.depth, i.clock, tunnel_api.class_name(i.class) AS class,
        i.counts, i.cluster_id, i.points, i.unrolled, i.geom
   FROM tunnel.clearance_infringement i JOIN tunnel.survey s ON s.id = i.survey_id;
 COMMENT ON VIEW tunnel_api.clearance_infringement IS 'Groups of points inside an outline about a track, in pieces of 10 m at most';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.gauge IS 'Name of the outline';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.track IS 'single; left or right; of more than two their number from the left; given';
-COMMENT ON COLUMN tunnel_api.clearance_infringement.label IS 'Station of its beginning, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.clearance_infringement.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.depth IS 'How deep it reaches in, m';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.clock IS 'Direction of its deepest point, degrees from straight above the outline''s middle to the right';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.class IS 'What causes it: lining, niche, appendage, object, sphere, unassigned';

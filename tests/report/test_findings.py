@@ -327,8 +327,8 @@ def test_an_owners_template(drawn: str, folder: Path, tmp_path: Path) -> None:
     assert re.findall(r'<section id="(\w+)"(?! class="kind)', text) == ["findings", "leaks", "sheets", "dry", "signatures"]
     left_out = re.findall(r"nicht in diesem Bericht:(.*)</p>", text)[0]
     assert [name.strip() for name in left_out.split(",")] == [
-        "Zusammenfassung", "Gesehenes und nicht Gesehenes", "Dichtheit", "Auskleidung", "Statistik", "Ringe", "Verfahren",
-        "Prüfungen",
+        "Zusammenfassung", "Gesehenes und nicht Gesehenes", "Dichtheit", "Auskleidung", "Statistik", "Lichtraum", "Ringe",
+        "Verfahren", "Prüfungen",
     ]  # fmt: skip
     for said in ("<h2>Spalt</h2>", "<dd>Bahn &amp; Söhne</dd>", "<h2>Unterschriften</h2>", "--severity: #123456", 'lang="de"'):
         assert said in text

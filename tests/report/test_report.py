@@ -299,7 +299,8 @@ def test_without_intensity_the_offset_is_shown(
     page = browser.new_page()
     troubles = watch(page)
     page.goto(path.as_uri())
-    page.evaluate("document.getElementById('deviation').remove()")  # which says what was seen of the lining's shape
+    for chapter in ("deviation", "clearance", "rings", "change"):  # which say what was seen of the lining's shape
+        page.evaluate("name => document.getElementById(name)?.remove()", chapter)
     for media in ("screen", "print"):
         page.emulate_media(media=media)
         shown = page.locator("body").inner_text()

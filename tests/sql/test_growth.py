@@ -14,8 +14,8 @@ import pytest
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
-from tunneldb.database.failures import describe_failure
 from tunneldb.database import connect, copy_binary, pack
+from tunneldb.database.failures import describe_failure
 from tunneldb.store.catalog import remove_survey
 from tunneldb.store.sources import load_points, sample
 from tunneldb.store.survey import get_survey

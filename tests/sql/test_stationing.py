@@ -10,6 +10,8 @@ import psycopg
 import pytest
 from click.testing import CliRunner, Result
 from psycopg import sql
+from support.example_change import add_change
+from support.example_deviation import add_surfaces
 from support.example_sonar import save_example_registration
 from support.example_structures import save_example_structures
 
@@ -192,6 +194,8 @@ def labelled_views(conn: psycopg.Connection) -> list[tuple[str, str, str]]:
 def test_labels_of_every_view_are_stations(conn: psycopg.Connection, example: str) -> None:
     save_example_structures(conn, example)
     save_example_registration(conn, example)
+    add_change(conn, example)
+    add_surfaces(conn, conn.execute("SELECT id FROM tunnel.survey WHERE name = %s", [example]).fetchone()[0])
     for table in ("member", "face", "spot"):
         conn.execute(sql.SQL("UPDATE tunnel.{} SET chainage = 12345.678 + id").format(sql.Identifier(table)))
     views = labelled_views(conn)
