@@ -9,7 +9,9 @@ import psycopg
 from psycopg.rows import dict_row
 
 from tunneldb.export.tables.change import Row, change_rows, summary
+from tunneldb.report.change_series import ovality_curve, wet_curve
 from tunneldb.report.drawing import step_for, ticks
+from tunneldb.report.rings import Curve
 from tunneldb.store.change import older_compared
 from tunneldb.store.survey import Survey
 
@@ -49,6 +51,8 @@ class ChangeChapter:
         Places along it, with chainages.
     series : list of dict
         Wet area of each survey of the tunnel in the stretch.
+    wet, ovality : Curve or None
+        Wet area by date; ovality of rings before and after, where both surveys have some.
     stale : list of int
         Kilometres whose comparison is out of date.
     """
@@ -64,6 +68,8 @@ class ChangeChapter:
     most: float
     ticks: list[tuple[float, str]]
     series: list[Row]
+    wet: Curve | None
+    ovality: Curve | None
     stale: list[int]
 
 
@@ -78,6 +84,7 @@ def read_change(conn: psycopg.Connection[Any], survey: Survey, low: float, high:
     largest = sorted(regions, key=lambda region: -region["area"])[:LISTED]
     most = max([row[name] for row in sections for name in ("shift", "change_rms") if row[name] is not None], default=0.0)
     scale = WIDTH / (high - low)
+    series = _series(conn, survey, low, high)
     stale = conn.execute(
         "SELECT km FROM tunnel_api.change_state(%s, %s) WHERE reason IS NOT NULL AND done_at IS NOT NULL ORDER BY km",
         [survey.id, old.id],
@@ -89,7 +96,7 @@ def read_change(conn: psycopg.Connection[Any], survey: Survey, low: float, high:
         [((one["chainage_from"] - low) * scale, (one["chainage_to"] - one["chainage_from"]) * scale)
          for one in sections if not one["seen_both"]],
         most, [((x - low) * scale, f"{x:.0f}") for x in ticks(low, high, step_for(high - low, 10))],
-        _series(conn, survey, low, high), [km for (km,) in stale],
+        series, wet_curve(series), ovality_curve(conn, old, survey, low, high), [km for (km,) in stale],
     )  # fmt: skip
 
 

@@ -129,11 +129,12 @@ def _curves(rows: Sequence[dict[str, Any]]) -> list[Curve]:
     ]
     start, end = float(joint[0]), float(rows[-1]["chainage_to"])
     return [
-        _curve(name, lines, unit, start, end) for name, lines, unit in drawn if any(np.isfinite(y).any() for _, _, y in lines)
+        curve(name, lines, unit, start, end) for name, lines, unit in drawn if any(np.isfinite(y).any() for _, _, y in lines)
     ]
 
 
-def _curve(name: str, lines: Sequence[tuple[str, Float, Float]], unit: str, start: float, end: float) -> Curve:
+def curve(name: str, lines: Sequence[tuple[str, Float, Float]], unit: str, start: float, end: float) -> Curve:
+    """Draw lines of one quantity from a chainage to another, m: class, places and values of each; NaN is left open."""
     values = np.concatenate([y[np.isfinite(y)] for _, _, y in lines])
     low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
     span = max(high - low, 0.1)
