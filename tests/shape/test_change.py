@@ -8,7 +8,7 @@ import shapely
 from support.curved_lining import made
 
 from tunneldb.anomalies.change import Leak, groups, state_of, wet_area
-from tunneldb.pipeline.change import Change, measure_change, section_figures
+from tunneldb.pipeline.change import Change, measure_change, rings_apart, section_figures
 from tunneldb.shape.change import change_regions, significant
 from tunneldb.shape.epoch_cells import CellGrid, Cells, CellSums, rounding_variance
 
@@ -125,3 +125,16 @@ def test_leaks_that_do_not_touch_are_apart() -> None:
     found = groups([leak(1, 0, 1), leak(2, 3, 4)], [leak(3, 0.5, 3.05), leak(4, 9, 10)])
     assert sorted((len(group.old), len(group.new)) for group in found) == [(0, 1), (2, 1)]
     assert groups([], []) == []
+
+
+def test_rings_that_touch_are_drawn_apart() -> None:
+    """Two holes that touch each other in a corner, one of which touches the rim."""
+    outline = shapely.difference(shapely.box(0, 0, 1, 1), shapely.union_all([shapely.box(0.1, 0.1, 0.2, 0.2),
+                                                                             shapely.box(0.2, 0.2, 0.3, 0.3)]))  # fmt: skip
+    outline = shapely.difference(outline, shapely.box(0, 0, 0.1, 0.1))
+    apart = rings_apart(outline)
+    assert apart.geom_type == "Polygon"
+    assert apart.is_valid
+    rings = [apart.exterior, *apart.interiors]
+    assert not any(one.intersects(other) for n, one in enumerate(rings) for other in rings[:n])
+    assert shapely.hausdorff_distance(apart, outline) < 2e-3

@@ -338,11 +338,19 @@ def _stored_region(region: shape_change.Region, grid: CellGrid, surface: Surface
     outlines = [shapely.geometry.shape(one) for one, value in features.shapes(mask, transform=transform) if value == 1]
     return [
         StoredRegion(
-            outline, anomaly_geometries(outline, surface), len(region.rows) * grid.cell**2, region.mean, region.lod,
-            region.greatest,
+            outline, anomaly_geometries(rings_apart(outline), surface), len(region.rows) * grid.cell**2, region.mean,
+            region.lod, region.greatest,
         )
         for outline in outlines
     ]  # fmt: skip
+
+
+def rings_apart(outline: shapely.Polygon) -> shapely.Polygon:
+    """An outline of cells whose rings touch nowhere, drawn in by 1 mm: QGIS fills no other in space.
+
+    Cells that are connected share an edge, so that it stays in one piece.
+    """
+    return shapely.buffer(outline, -1e-3, join_style="mitre")
 
 
 def _leaks(

@@ -19,7 +19,7 @@
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="5,48,97,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
-            <Option type="QString" name="outline_width" value="0.35"/>
+            <Option type="QString" name="outline_width" value="0.25"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
@@ -32,7 +32,7 @@
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="5,48,97,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
-            <Option type="QString" name="outline_width" value="0.35"/>
+            <Option type="QString" name="outline_width" value="0.25"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
@@ -45,7 +45,7 @@
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="5,48,97,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
-            <Option type="QString" name="outline_width" value="0.35"/>
+            <Option type="QString" name="outline_width" value="0.25"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
@@ -58,7 +58,7 @@
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="5,48,97,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
-            <Option type="QString" name="outline_width" value="0.35"/>
+            <Option type="QString" name="outline_width" value="0.25"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
@@ -71,7 +71,7 @@
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="103,0,31,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
-            <Option type="QString" name="outline_width" value="0.35"/>
+            <Option type="QString" name="outline_width" value="0.25"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
@@ -84,7 +84,7 @@
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="103,0,31,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
-            <Option type="QString" name="outline_width" value="0.35"/>
+            <Option type="QString" name="outline_width" value="0.25"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
@@ -97,7 +97,7 @@
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="103,0,31,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
-            <Option type="QString" name="outline_width" value="0.35"/>
+            <Option type="QString" name="outline_width" value="0.25"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
@@ -110,7 +110,7 @@
             <Option type="QString" name="style" value="solid"/>
             <Option type="QString" name="outline_color" value="103,0,31,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
-            <Option type="QString" name="outline_width" value="0.35"/>
+            <Option type="QString" name="outline_width" value="0.25"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
             <Option type="QString" name="joinstyle" value="round"/>
           </Option>
