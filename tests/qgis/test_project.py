@@ -483,7 +483,7 @@ def test_3d_view_looks_at_the_largest_leak(shared: Path) -> None:
     seen = act(shared, "space")
     assert (seen["name"], seen["crs"]) == ("3D", "EPSG:25830")
     assert seen["open"] == "0", "QGIS 3.24 and later open it when asked to"
-    assert set(seen["layers"]) == {"axis", "section", "leak_3d", "target_sphere", "ground"}
+    assert set(seen["layers"]) == {"axis", "section", "leak_3d", "target_sphere", "ground", "clearance_infringement_3d"}
     # a terrain would hide what lies below it, and its height shift all layers in QGIS 3.22
     assert (seen["terrain"], seen["offset"], seen["lights"]) == (False, 0, 1)
     place = example_surface()[0].to_space(np.array([12402.5]), np.array([0.0]), np.zeros(1))[0]
@@ -510,7 +510,9 @@ def test_layer_without_rows_is_not_in_3d(conn: psycopg.Connection, example: str,
     conn.execute("DELETE FROM tunnel.target_sphere")
     conn.commit()
     assert write(tmp_path / "demo.qgz").exit_code == 0
-    assert set(act(tmp_path / "demo.qgz", "space")["layers"]) == {"axis", "section", "leak_3d", "ground"}
+    assert set(act(tmp_path / "demo.qgz", "space")["layers"]) == {
+        "axis", "section", "leak_3d", "ground", "clearance_infringement_3d",
+    }  # fmt: skip
     after = {name: qgs(tmp_path / "demo.qgz").split(f"<id>tunneldb_layer_{name}</id>")[1] for name in ("target_sphere", "axis")}
     assert "<renderer-3d" not in after["target_sphere"].split("</maplayer>")[0]
     assert "<renderer-3d" in after["axis"].split("</maplayer>")[0]

@@ -19,8 +19,8 @@ Ranges = Sequence[tuple[int, int]]
 """Half-open ranges of point numbers, from 0, in the order in which they are to be read."""
 
 
-FARTHEST = 1e9
-"""Greatest coordinate of a point, m: no projected system has one, and what is computed from it would be lost in rounding."""
+FARTHEST = 1e11
+"""Greatest coordinate of a point: no projected system has one, in millimetres even."""
 
 
 def on_earth(values: Float) -> Bool:

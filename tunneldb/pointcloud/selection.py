@@ -26,7 +26,7 @@ from tunneldb.pointcloud.beyond_ends import BeyondEnds
 from tunneldb.pointcloud.chainage_lookup import STRETCHING, ChainageLookup
 from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.noise import DIAMETER, POINTS, is_noise, search_radii, typical_density
-from tunneldb.pointcloud.points import CHUNK, Points
+from tunneldb.pointcloud.points import CHUNK, Points, on_earth
 from tunneldb.pointcloud.poses import PoseFaults, PoseModel
 from tunneldb.pointcloud.prefetch import in_order, prefetch
 from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, PLACE, Rows, Spool, bin_of, rows_xyz, windows
@@ -311,7 +311,7 @@ class _Filter:
         self.counts.invalid += int(np.count_nonzero(~finite))
         if not self.invalid:
             first = int(np.argmin(finite))
-            which = ("a coordinate" if not np.isfinite(points.xyz[first]).all()
+            which = ("a coordinate" if not on_earth(points.xyz[first]).all()
                      else "gps_time" if not np.isfinite(points.time[first]) and self.poses.mobile
                      else self.dimension)  # fmt: skip
             self.invalid = f"{which} is NaN or infinite, first at point {number[first] + 1}; mend the file"
