@@ -83,6 +83,13 @@ def make_folder(path: Path) -> None:
         raise UserError(f"{path}: the folder cannot be made: {error.strerror}") from error
 
 
+def by_kilometre(path: Path, kilometres: Sequence[int]) -> list[Path]:
+    """Names of files that there is one of for each kilometre: the path itself for a single one, else with its number."""
+    if len(kilometres) == 1:
+        return [path]
+    return [path.with_name(f"{path.stem}-km{km:03d}{path.suffix}") for km in kilometres]
+
+
 def common_name(paths: Sequence[Path]) -> str:
     """What the names of files begin with, without numbers that tell them apart, in letters that a tunnel's name may have."""
     stems = [path.name.split(".", 1)[0] for path in paths]

@@ -17,7 +17,7 @@ from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import replacing, told_to_end
+from tunneldb.files import by_kilometre, replacing, told_to_end
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def _write(conn: psycopg.Connection[Any], survey: Survey, layer: str, part: Stre
     from tunneldb.store.deviation import stale_kilometres
 
     there = stale_kilometres(conn, survey, layer, part.low, part.high)
-    paths = [output if len(there) == 1 else output.with_name(f"{output.stem}-km{km:03d}{output.suffix}") for km in there]
+    paths = by_kilometre(output, list(there))
     written = (write_deviation(conn, survey, km, layer, path) for km, path in zip(there, paths, strict=True))
     return [path for path in written if path is not None]
 

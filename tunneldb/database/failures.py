@@ -31,6 +31,6 @@ def describe_failure(error: Exception) -> str | None:
     return None
 
 
-def first_line(error: Exception) -> str:
+def first_line(error: BaseException) -> str:
     """First line of an error's message, without what PostgreSQL appends about where it was."""
     return str(error).strip().split("\n", 1)[0]

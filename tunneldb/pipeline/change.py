@@ -22,7 +22,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.deviation import lining_by_class
 from tunneldb.raster.geotiff import Raster
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.pixel_state import PixelState, shows_lining
 from tunneldb.shape import change as shape_change
 from tunneldb.shape.epoch_cells import LEAST_SIDE, SEEN_SHARE, CellGrid, Cells, CellSums, without_edges
 from tunneldb.shape.rigid_motion import Motion, motion_columns, rigid_motion
@@ -40,6 +40,7 @@ from tunneldb.store.change import (
     save_sections,
     stale_kilometres,
 )
+from tunneldb.store.images import image_blocks, load_block
 from tunneldb.store.ledger import stage_run
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
@@ -298,20 +299,19 @@ class _Lining:
             self._classes = self._classes or lining_by_class(*self._of)
             lining = self._classes(raster)
             return lining, lining
-        lining = there & ((state == PixelState.LINING) | (state == PixelState.DARK))
+        lining = there & shows_lining(state)
         return lining | (there & (state == PixelState.RECESS)), lining
 
 
 def _extent(conn: psycopg.Connection[Any], survey: Survey, km: int) -> tuple[float, float, float, float, float] | None:
     """Chainage and arc from and to of a kilometre's offset image, and its pixel, m."""
-    found = None
-    for raster, _ in load_blocks(conn, survey, km * KILOMETRE, (km + 1) * KILOMETRE - 1e-6):
-        place, (rows, columns) = raster.transform, raster.values.shape
-        north, east = place.f, place.c + columns * place.a
-        box = place.c, east, north - rows * place.a, north
-        found = box if found is None else (found[0], max(found[1], east), min(found[2], box[2]), max(found[3], north))
-        pixel = place.a
-    return None if found is None else (*found, pixel)
+    blocks = image_blocks(conn, survey, km, "offset")
+    if not blocks:
+        return None
+    first = load_block(conn, survey, km, "offset", blocks[0])  # all blocks of a kilometre have its rows
+    place, (rows, columns) = first.transform, first.values.shape
+    east = place.c + (blocks[-1] - blocks[0] + 1) * columns * place.a
+    return place.c, east, place.f - rows * place.a, place.f, place.a
 
 
 def _parts(raster: Raster, seen: Bool) -> list[tuple[Any, Any]]:

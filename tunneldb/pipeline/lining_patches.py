@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -13,10 +13,11 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.deviation import Design, lining_by_class
-from tunneldb.raster.geotiff import Raster, decode
+from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.grid import BLOCK
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.pixel_state import shows_lining
 from tunneldb.shape.patches import PATCH, Patches, average, join
+from tunneldb.store.images import load_kinds
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
@@ -57,7 +58,7 @@ class LiningPatches:
         return float(np.nan_to_num(high[0] - low[0]))
 
     def _load(self, block: int) -> Patches | None:
-        images = load_block(self.conn, self.survey, block, ("offset", "state"))
+        images = load_images(self.conn, self.survey, block, ("offset", "state"))
         if "offset" not in images:
             return None
         offset = images["offset"]
@@ -71,16 +72,11 @@ class LiningPatches:
 
     def _lining(self, block: int, images: dict[str, Raster]) -> Bool:
         if "state" in images:
-            return shown_lining(images["state"])
+            return shows_lining(images["state"].values)
         km = int(block * BLOCK // KILOMETRE)
         if km not in self._classes:
             self._classes[km] = lining_by_class(self.conn, self.survey, km, self.surface)
         return self._classes[km](images["offset"])
-
-
-def shown_lining(state: Raster) -> Bool:
-    """Which pixels show lining."""
-    return np.asarray((state.values == PixelState.LINING) | (state.values == PixelState.DARK))
 
 
 def pixel_places(image: Raster) -> tuple[Float, Float]:
@@ -91,19 +87,6 @@ def pixel_places(image: Raster) -> tuple[Float, Float]:
     return chainage, np.asarray(place.f + (np.arange(rows) + 0.5) * place.e, dtype=np.float64)
 
 
-def load_block(conn: psycopg.Connection[Any], survey: Survey, block: int, kinds: tuple[str, ...]) -> dict[str, Raster]:
+def load_images(conn: psycopg.Connection[Any], survey: Survey, block: int, kinds: tuple[str, ...]) -> dict[str, Raster]:
     """Images of a block by kind; those that are not stored are missing."""
-    rows = conn.execute(
-        "SELECT kind, tiff FROM tunnel.image WHERE survey_id = %s AND km = %s AND block = %s AND kind = ANY(%s)",
-        [survey.id, int(block * BLOCK // KILOMETRE), block, list(kinds)],
-        binary=True,
-    ).fetchall()
-    return {kind: decode(tiff) for kind, tiff in rows}
-
-
-def image_blocks(conn: psycopg.Connection[Any], survey: Survey) -> Iterator[int]:
-    """Numbers of the blocks that a survey has an offset image of, in order."""
-    rows = conn.execute(
-        "SELECT block FROM tunnel.image WHERE survey_id = %s AND kind = 'offset' ORDER BY block", [survey.id]
-    ).fetchall()
-    return (block for (block,) in rows)
+    return load_kinds(conn, survey, int(block * BLOCK // KILOMETRE), block, kinds)

@@ -15,14 +15,16 @@ from tunneldb.csvfile import read_csv
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.deviation import STATIONS
-from tunneldb.pipeline.lining_patches import LiningPatches, image_blocks, load_block, shown_lining
+from tunneldb.pipeline.lining_patches import LiningPatches, load_images
 from tunneldb.pipeline.run import nothing_yet
+from tunneldb.raster.pixel_state import shows_lining
 from tunneldb.shape.circle import taubin
 from tunneldb.shape.lining_ring import LiningRing, measure_ring
 from tunneldb.shape.profile import Profile
 from tunneldb.shape.ring_joint_steps import MARGIN, REACH, Steps, joint_steps
 from tunneldb.shape.ring_joints import Joints, NoRingsError, column_signals, follow, peaks, ring_length, strength
 from tunneldb.store.design import load_profiles
+from tunneldb.store.images import survey_blocks
 from tunneldb.store.ledger import stage_run
 from tunneldb.store.rings import (
     MeasuredRing,
@@ -106,7 +108,7 @@ def find_rings(conn: psycopg.Connection[Any], survey: Survey, begin: Begin) -> t
     UserError
         If no length of rings can be told.
     """
-    blocks = list(image_blocks(conn, survey))
+    blocks = survey_blocks(conn, survey, "offset")
     if not blocks:
         raise nothing_yet(conn, survey, "has no offset image")
     advance = begin(f"joints of {survey.name}", len(blocks))
@@ -133,11 +135,11 @@ def _signals(
     parts: list[Float] = []
     start, pixel = 0.0, 0.0
     for block in blocks:
-        images = load_block(conn, survey, block, ("offset", "corrected", "state"))
+        images = load_images(conn, survey, block, ("offset", "corrected", "state"))
         offset, level = images["offset"], images.get("corrected")
         if not parts:
             start, pixel = offset.transform.c, offset.transform.a
-        shown = shown_lining(images["state"]) if "state" in images else np.isfinite(offset.values)
+        shown = shows_lining(images["state"].values) if "state" in images else np.isfinite(offset.values)
         blank = np.float32(np.nan)
         parts.append(
             column_signals(

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import psycopg
 
+from tunneldb.database.failures import first_line
 from tunneldb.errors import UserError
 from tunneldb.threads import use_threads
 
@@ -208,7 +209,7 @@ async def _tend(orders: Orders, leave: _Leave, worker: int, presence: psycopg.As
 
 
 def _line(error: BaseException) -> str:
-    return str(error).strip().split("\n", 1)[0] or type(error).__name__
+    return first_line(error) or type(error).__name__
 
 
 def _away() -> tuple[type[Exception], ...]:

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from tunneldb.arrays import UInt8
+from tunneldb.arrays import Bool, Single, UInt8
 from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.raster import appendages as appendage
 from tunneldb.raster import relief
@@ -26,6 +26,11 @@ class PixelState(IntEnum):
     FLOOR = 4
     DARK = 5  # in the stored image of states only: lining that is dark
     SUBMERGED = 6  # below the water
+
+
+def shows_lining(state: Single) -> Bool:
+    """Which pixels of a stored image of states show lining, dark or not."""
+    return np.asarray((state == PixelState.LINING) | (state == PixelState.DARK))
 
 
 def reach(pixel: float) -> int:

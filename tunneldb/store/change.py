@@ -19,6 +19,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.raster.geotiff import Raster, decode, encode
 from tunneldb.raster.grid import BLOCK
 from tunneldb.shape.rigid_motion import Motion
+from tunneldb.store.images import load_kinds
 from tunneldb.store.survey import Survey, get_survey
 
 
@@ -78,17 +79,10 @@ def load_blocks(
         [survey.id, int(low // KILOMETRE), int(high // KILOMETRE)],
     ).fetchall()
     for km, block in blocks:
-        rows = dict(
-            conn.execute(
-                "SELECT kind, tiff FROM tunnel.image"
-                " WHERE survey_id = %s AND km = %s AND block = %s AND kind IN ('offset', 'state')",
-                [survey.id, km, block],
-                binary=True,
-            ).fetchall()
-        )
-        offset = decode(rows["offset"])
+        images = load_kinds(conn, survey, km, block, ("offset", "state"))
+        offset = images["offset"]
         if offset.transform.c < high and offset.transform.c + BLOCK > low:
-            yield offset, decode(rows["state"]).values if "state" in rows else None
+            yield offset, images["state"].values if "state" in images else None
 
 
 def change_inputs(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int) -> dict[str, Any]:

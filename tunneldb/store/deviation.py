@@ -11,10 +11,11 @@ import psycopg
 
 from tunneldb.arrays import Bool
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.raster.geotiff import DEVIATION_KINDS, Raster, decode, encode
+from tunneldb.raster.geotiff import DEVIATION_KINDS, Raster, encode
 from tunneldb.raster.grid import BLOCK
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.pixel_state import shows_lining
 from tunneldb.shape.overbreak import SectionDeviation
+from tunneldb.store.images import image_blocks, load_kinds
 from tunneldb.store.survey import Survey
 
 STEP = 1.0
@@ -42,23 +43,9 @@ def layers_held(conn: psycopg.Connection[Any], survey: Survey) -> list[str]:
 
 def load_offsets(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Iterator[tuple[Raster, Bool | None]]:
     """Blocks of a kilometre's offset image, in order, with which pixels (rows, columns) show lining; None if not stored."""
-    blocks = conn.execute(
-        "SELECT block FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = 'offset' ORDER BY block", [survey.id, km]
-    ).fetchall()
-    for (block,) in blocks:
-        rows = dict(
-            conn.execute(
-                "SELECT kind, tiff FROM tunnel.image"
-                " WHERE survey_id = %s AND km = %s AND block = %s AND kind IN ('offset', 'state')",
-                [survey.id, km, block],
-                binary=True,
-            ).fetchall()
-        )
-        lining = None
-        if "state" in rows:
-            state = decode(rows["state"]).values
-            lining = (state == PixelState.LINING) | (state == PixelState.DARK)
-        yield decode(rows["offset"]), lining
+    for block in image_blocks(conn, survey, km, "offset"):
+        images = load_kinds(conn, survey, km, block, ("offset", "state"))
+        yield images["offset"], shows_lining(images["state"].values) if "state" in images else None
 
 
 def replace_image(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str, blocks: Iterable[Raster]) -> None:

@@ -45,15 +45,25 @@ def image_blocks(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: s
     return [block for (block,) in rows]
 
 
+def survey_blocks(conn: psycopg.Connection[Any], survey: Survey, kind: str) -> list[int]:
+    """Numbers of the blocks of a survey's image of a kind, in order."""
+    rows = conn.execute("SELECT block FROM tunnel.image WHERE survey_id = %s AND kind = %s ORDER BY block", (survey.id, kind))
+    return [block for (block,) in rows]
+
+
 def load_block(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: str, block: int) -> Raster:
     """Read a block that is there."""
-    row = conn.execute(
-        "SELECT tiff FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s AND block = %s",
-        (survey.id, km, kind, block),
+    return load_kinds(conn, survey, km, block, (kind,))[kind]
+
+
+def load_kinds(conn: psycopg.Connection[Any], survey: Survey, km: int, block: int, kinds: Sequence[str]) -> dict[str, Raster]:
+    """Read the images of a block by kind; those that are not stored are missing."""
+    rows = conn.execute(
+        "SELECT kind, tiff FROM tunnel.image WHERE survey_id = %s AND km = %s AND block = %s AND kind = ANY(%s)",
+        (survey.id, km, block, list(kinds)),
         binary=True,
-    ).fetchone()
-    assert row is not None
-    return decode(row[0])
+    ).fetchall()
+    return {kind: decode(tiff) for kind, tiff in rows}
 
 
 def load_regions(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: str) -> list[Polygon]:
