@@ -59,10 +59,7 @@ class Design:
 
     def deviation(self, offset: Raster, lining: Bool) -> tuple[Float, Deviation]:
         """Chainage along the given axis of the columns of a block, and deviation of its pixels of lining, (c, r)."""
-        rows, columns = offset.values.shape
-        transform = offset.transform
-        chainage = _places(transform.c, transform.a, columns)
-        arc = _places(transform.f, transform.e, rows)
+        chainage, arc = offset.places()
         shown = replace(offset, values=np.where(lining, offset.values, np.float32(np.nan)))
         along, right, up = self.places(chainage, arc, shown)
         found = Deviation(*(np.full(right.shape, np.nan) for _ in range(3)))
@@ -173,7 +170,7 @@ def block_steps(
 ) -> Iterator[Step]:
     """Figures of the steps of a block, cut where the survey, or a profile, begins or ends."""
     pixel, west = offset.transform.a, offset.transform.c
-    chainage = _places(west, pixel, offset.values.shape[1])
+    chainage, _ = offset.places()
     number = np.floor((chainage - west) / STEP)
     for first, stop in pairwise(np.flatnonzero(np.diff(number, prepend=-1.0, append=-1.0)).tolist()):
         here = slice(first, stop)
@@ -191,24 +188,14 @@ def block_steps(
             yield Step(stretch.name, round(low, 6), round(high, 6), section_deviation(part, outline, pixel))
 
 
-def _places(begin: float, pixel: float, count: int) -> Float:
-    """Middles of so many pixels, m."""
-    return np.asarray(begin + (np.arange(count) + 0.5) * pixel, dtype=np.float64)
-
-
 def lining_by_class(conn: psycopg.Connection[Any], survey: Survey, km: int, surface: Surface) -> Callable[[Raster], Bool]:
     """What of an offset image is lining, by the classes of stage ``ground``: where no state of pixels is stored."""
     scene = load_scene(conn, survey, km, km)
 
     def lining(offset: Raster) -> Bool:
-        place = offset.transform
+        chainage, arc = offset.places()
         row, column = np.nonzero(np.isfinite(offset.values))
-        rows, columns = offset.values.shape
-        points = surface.to_space(
-            _places(place.c, place.a, columns)[column],
-            _places(place.f, place.e, rows)[row],
-            offset.values[row, column].astype(np.float64),
-        )
+        points = surface.to_space(chainage[column], arc[row], offset.values[row, column].astype(np.float64))
         held = np.isfinite(points[:, 0])
         shown = np.zeros(offset.values.shape, np.bool_)
         shown[row[held], column[held]] = scene.classes(points[held]) == PointClass.LINING

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from tunneldb.arrays import Bool, Float
+from tunneldb.arrays import Bool
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.deviation import Design, lining_by_class
@@ -63,7 +63,7 @@ class LiningPatches:
             return None
         offset = images["offset"]
         lining = self._lining(block, images)
-        chainage, arc = pixel_places(offset)
+        chainage, arc = offset.places()
         side = max(round(PATCH / offset.transform.a), 1) * offset.transform.a
         values = np.where(lining, offset.values, np.float32(np.nan))
         at, along, mean = average(values, chainage, arc, side)
@@ -77,14 +77,6 @@ class LiningPatches:
         if km not in self._classes:
             self._classes[km] = lining_by_class(self.conn, self.survey, km, self.surface)
         return self._classes[km](images["offset"])
-
-
-def pixel_places(image: Raster) -> tuple[Float, Float]:
-    """Chainage of an image's columns and arc of its rows, middles, m."""
-    rows, columns = image.values.shape
-    place = image.transform
-    chainage = np.asarray(place.c + (np.arange(columns) + 0.5) * place.a, dtype=np.float64)
-    return chainage, np.asarray(place.f + (np.arange(rows) + 0.5) * place.e, dtype=np.float64)
 
 
 def load_images(conn: psycopg.Connection[Any], survey: Survey, block: int, kinds: tuple[str, ...]) -> dict[str, Raster]:

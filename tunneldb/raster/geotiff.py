@@ -11,7 +11,7 @@ from affine import Affine
 from rasterio.errors import NotGeoreferencedWarning
 from rasterio.io import MemoryFile
 
-from tunneldb.arrays import Int16, Single
+from tunneldb.arrays import Float, Int16, Single
 from tunneldb.compiled import kernel
 
 KINDS = ("raw", "corrected", "offset")
@@ -55,6 +55,13 @@ class Raster:
 
     values: Single
     transform: Affine
+
+    def places(self) -> tuple[Float, Float]:
+        """Chainage of the columns and arc of the rows, middles, m."""
+        rows, columns = self.values.shape
+        place = self.transform
+        chainage = np.asarray(place.c + (np.arange(columns) + 0.5) * place.a, dtype=np.float64)
+        return chainage, np.asarray(place.f + (np.arange(rows) + 0.5) * place.e, dtype=np.float64)
 
 
 def whole(values: Single, kind: str) -> Int16:
