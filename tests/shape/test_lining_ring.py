@@ -54,6 +54,14 @@ def test_a_box_has_chords_and_no_radius() -> None:
     assert found.chords[0].length == pytest.approx(5.0, abs=0.02)
 
 
+def test_standard_errors_of_steps_hold() -> None:
+    """Of the biweight's planes, too, which give what lies far off less weight."""
+    off = [joint_steps(patches(seed=seed), JOINT, LENGTH, LENGTH) for seed in range(12)]
+    ratio = np.concatenate([(one.step / one.se)[np.isfinite(one.step)] for one in off])
+    assert len(ratio) > 400
+    assert np.sqrt(np.mean(ratio**2)) == pytest.approx(1.0, abs=0.07)
+
+
 @pytest.mark.parametrize("kind", ["inwards", "shifted"])
 def test_steps_are_those_that_were_made(kind: str) -> None:
     shown = patches()
@@ -88,6 +96,15 @@ def test_lips_between_segments_are_found_where_they_are() -> None:
     assert lip is not None
     assert min(abs(lip.arc - 2.0), abs(lip.arc - 4.5)) < 2 * SIDE
     assert lip.size == pytest.approx(0.004 if abs(lip.arc - 2.0) < 1.0 else -0.004, abs=0.001)
+
+
+def test_a_ring_askew_to_the_axis_has_no_lip_beside_what_hides_a_part_of_it() -> None:
+    """Rows that are seen at one end of the ring only lie where that end is."""
+    shown = patches()
+    askew = Patches(shown.chainage, shown.arc, shown.right + 0.008 * (shown.chainage - 100.75)[:, None], shown.up)
+    hidden = (shown.chainage < 101.1)[:, None] & (np.abs(shown.arc - 4.8) < 0.3)
+    right, up = (np.where(hidden, np.nan, part) for part in (askew.right, askew.up))
+    assert measure_ring(Patches(shown.chainage, shown.arc, right, up), 100.0, JOINT, 18.2).lip is None
 
 
 def test_patches_are_means_at_whole_multiples() -> None:
