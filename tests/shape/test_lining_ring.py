@@ -10,6 +10,7 @@ from tunneldb.shape.lining_ring import measure_ring
 from tunneldb.shape.patches import Patches, average
 from tunneldb.shape.ring_joint_steps import joint_steps
 from tunneldb.shape.ring_joints import NoRingsError, column_signals, follow, peaks, ring_length, strength
+from tunneldb.shape.rings import fit_ring
 
 RADIUS, CENTRE, SIDE, NOISE = 2.9, (0.02, -0.03), 0.06, 0.0006
 JOINT, LENGTH = 101.5, 1.5
@@ -41,6 +42,22 @@ def test_shape_chord_and_seen_share_are_those_of_the_ellipse() -> None:
     level, unseen = found.chords
     assert level.length == pytest.approx(2.0 * (RADIUS - 0.008 * np.cos(0.8)), abs=max(5.0 * level.se, 0.0005))
     assert np.isnan(unseen.length)
+
+
+@pytest.mark.parametrize("third", [0.0, 0.002])
+def test_standard_errors_hold_with_three_tenths_of_the_ring_unseen(third: float) -> None:
+    """Also of a ring that is not quite an ellipse, which an ellipse alone would follow by millimetres."""
+    random = np.random.default_rng(7)
+    turn = np.radians(np.linspace(-180.0, 180.0, 300, endpoint=False))
+    turn = turn[np.abs(turn) < np.radians(126.0)]
+    ratio = []
+    for _ in range(80):
+        radius = RADIUS + 0.008 * np.cos(2.0 * (turn - random.uniform(0.0, 3.0)))
+        radius += third * np.cos(3.0 * (turn - random.uniform(0.0, 2.0))) + random.normal(0.0, NOISE, len(turn))
+        ellipse = fit_ring(radius[:, None] * np.column_stack([np.sin(turn), np.cos(turn)])).adjustment.ellipse
+        off = [ellipse.radius - RADIUS, ellipse.flattening - 0.008]
+        ratio.append(off / np.array([np.sqrt(ellipse.covariance[2, 2]), ellipse.flattening_se]))
+    assert (np.abs(ratio) < 1.96).mean() == pytest.approx(0.95, abs=0.05)
 
 
 def test_a_box_has_chords_and_no_radius() -> None:
