@@ -169,6 +169,7 @@ AS $$
           FROM tunnel_api.deviation_section d
          CROSS JOIN LATERAL (SELECT least(d.chainage_to, $4) - greatest(d.chainage_from, $3) AS long) p
          WHERE d.survey_id = s.id AND d.layer = $2 AND d.chainage_from > $3 - 1.001 AND d.chainage_from < $4 AND p.long > 0
+           AND tunnel_api.in_order($3, $4)
         HAVING count(*) > 0) d
 $$;
 COMMENT ON FUNCTION tunnel_api.deviation_volume(text, text, float8, float8, float8) IS
@@ -218,6 +219,7 @@ AS $$
           FROM unnest(b.deviation, a.deviation) AS c (old, new)
          WHERE c.old <> 'NaN' AND c.new <> 'NaN') t
      WHERE b.survey_id = tunnel_api.survey_id($1) AND b.layer = $3 AND b.chainage_from >= $4 AND b.chainage_from < $5 AND t.share > 0
+       AND tunnel_api.in_order($4, $5)
 $$;
 COMMENT ON FUNCTION tunnel_api.deviation_thickness(text, text, text, float8, float8) IS
 'What was put on between two surveys of one tunnel, by section that begins between two chainages (m), by default all: mean and least thickness (m) at right angles to the profile, of the cells that both saw (compared_share of the profile). Both surveys must have been held against the same profiles';
