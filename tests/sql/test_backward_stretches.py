@@ -44,7 +44,7 @@ def test_every_function_refuses_a_backward_stretch(conn: psycopg.Connection[Any]
     assert {"coverage", "leak_statistics", "coverage_gaps", "stage_state", "queue_plan", "ring_statistics"} <= wanted.keys()
     for name, call in wanted.items():
         with (
-            pytest.raises(psycopg.errors.InvalidParameterValue, match="from 12500 to 12300 k?m runs backwards"),
+            pytest.raises(psycopg.errors.InvalidParameterValue, match=r"from 12500 to 12300 k?m runs backwards"),
             conn.transaction(),
         ):
             conn.execute(call)
