@@ -38,7 +38,7 @@ def require_own_cache() -> None:
 
 
 def _open_to(place: Path, *, above: bool) -> str | None:
-    """Why others may put files into a folder, or take away what is in one above; None if they may not, or it is not there yet."""
+    """Why others may put files into a folder, or take from one above what is there; None if they may not, or there is none."""
     try:
         found = place.stat()
     except OSError:
