@@ -169,6 +169,7 @@ AS $$
           FROM tunnel_api.deviation_section d
          CROSS JOIN LATERAL (SELECT least(d.chainage_to, $4) - greatest(d.chainage_from, $3) AS long) p
          WHERE d.survey_id = s.id AND d.layer = $2 AND d.chainage_from > $3 - 1.001 AND d.chainage_from < $4 AND p.long > 0
+           AND tunnel_api.in_order($3, $4)
         HAVING count(*) > 0) d
 $$;
 COMMENT ON FUNCTION tunnel_api.deviation_volume(text, text, float8, float8, float8) IS
