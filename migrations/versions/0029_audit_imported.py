@@ -1,12 +1,12 @@
 """Entries of the audit that came in with an archive of a survey say so.
 
-Revision: 0031, after 0028.
+Revision: 0029, after 0028.
 """
 
 import sqlalchemy as sa
 from alembic import op
 
-revision = "0031"
+revision = "0029"
 down_revision = "0028"
 branch_labels = None
 depends_on = None
