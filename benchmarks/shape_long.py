@@ -88,6 +88,7 @@ def main() -> None:
             if not arguments.only or any(title.startswith(word) for word in arguments.only):
                 progress(title)
                 found[title] = watched(command, dsn)
+                progress(f"{title}: {found[title]}")
     print_table(
         f"{arguments.km} km",
         ("verb", "seconds", "processor s", "s per km", "peak, MB"),
