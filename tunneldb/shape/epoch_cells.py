@@ -121,6 +121,7 @@ class CellSums:
             scatter = np.maximum(zz - along * uz - across * vz, 0.0) * n / np.maximum(n - 3.0, 1.0)
             lever = 1.0 / n * (1.0 + (vv * u * u - 2.0 * uv * u * v + uu * v * v) / determinant)
             offset = z - along * u - across * v
+            variance = scatter * lever + rounding_variance(scatter)
         seen = (
             (n >= _LEAST)
             & (n >= SEEN_SHARE * pixels)
@@ -132,7 +133,6 @@ class CellSums:
         def shown(values: Float) -> Single:
             return np.where(seen, values, np.nan).astype(np.float32).reshape(shape)
 
-        variance = scatter * lever + rounding_variance(scatter)
         return Cells(shown(offset), shown(variance), np.minimum(looked / pixels, 1.0).astype(np.float32).reshape(shape))
 
 
