@@ -25,7 +25,7 @@ from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_differ
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.pixel_state import PixelState, shows_lining
 from tunneldb.shape import change as shape_change
-from tunneldb.shape.epoch_cells import LEAST_SIDE, SEEN_SHARE, CellGrid, Cells, CellSums, without_edges
+from tunneldb.shape.epoch_cells import LEAST_SIDE, SEEN_SHARE, CellGrid, Cells, CellSums, with_hollows, without_edges
 from tunneldb.shape.rigid_motion import Motion, motion_columns, rigid_motion
 from tunneldb.store.change import (
     Section,
@@ -137,8 +137,8 @@ def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int,
     sums = _old_sums(conn, old, km, surface, cell)
     if sums is None:  # it was there when it was asked for
         return {"sections": 0}
-    first = without_edges(sums.cells())
-    second = without_edges(_new_sums(conn, new, km, other, surface, sums.grid, sums.pixel).cells())
+    newer = _new_sums(conn, new, km, other, surface, sums.grid, sums.pixel)
+    first, second = (without_edges(cells) for cells in with_hollows(sums, newer))
     found = measure_change(surface, sums.grid, first, second, length)
     grid = found.grid
     transform = Affine(cell, 0.0, grid.west, 0.0, -cell, grid.south + grid.rows * cell)
