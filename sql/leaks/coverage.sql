@@ -99,13 +99,14 @@ COMMENT ON FUNCTION tunnel_api.coverage(text, float8, float8) IS
 
 
 -- Of an area on the lining (m²) whose outline lies in the unrolled plane, the part between two chainages (m). The planner puts
--- the body in the place of a call; one that is not cut is not clipped.
+-- the body in the place of a call; one that is not cut is not clipped. Callers ask with what of a stretch lies in a survey: of none,
+-- which runs backwards then, there is no part.
 CREATE OR REPLACE FUNCTION tunnel_api.area_between(outline geometry, area float8, chainage_from float8, chainage_to float8)
 RETURNS float8
 LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT
 AS $$
     SELECT CASE WHEN public.ST_XMin($1) >= $3 AND public.ST_XMax($1) <= $4 THEN $2
-        WHEN NOT tunnel_api.in_order($3, $4) THEN NULL
+        WHEN $3 >= $4 THEN 0
         ELSE $2 / nullif(public.ST_Area($1), 0) * public.ST_Area(public.ST_ClipByBox2D($1, public.ST_MakeBox2D(
             public.ST_MakePoint(greatest($3, -1e9), -1e4), public.ST_MakePoint(least($4, 1e9), 1e4)))) END
 $$;
